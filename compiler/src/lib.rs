@@ -1,0 +1,1 @@
+//! The ESL compiler: source text to bytecode modules.

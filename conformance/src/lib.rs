@@ -1,0 +1,1 @@
+//! Conformance programs of ESL and their runner.

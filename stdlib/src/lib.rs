@@ -1,0 +1,1 @@
+//! The ESL library, written in ESL, as a compiled image.

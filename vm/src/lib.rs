@@ -1,0 +1,1 @@
+//! The ESL virtual machine: values, heap, interpreter, tasks.
