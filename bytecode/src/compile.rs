@@ -1,0 +1,265 @@
+//! What compiler and virtual machine are to each other. Neither names the other: the compiler asks an [`Environment`]
+//! what names mean and drives a [`CompileTimeHost`] that runs macros; the virtual machine is handed a [`Compile`] for
+//! `eval`, `load` and `read`.
+//!
+//! A compilation is a machine of steps: it never runs a macro itself but says that one is to be run, and is told the
+//! outcome. So a running program can compile in a task that is preempted and aborted like any other.
+
+use std::sync::Arc;
+
+use crate::datum::{Datum, ObjectId};
+use crate::diagnostic::Diagnostic;
+use crate::module::Module;
+use crate::span::{SourceId, Span};
+use crate::symbol::Symbol;
+
+/// How many arguments a function takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Arity {
+    /// At least so many.
+    pub min: u32,
+    /// At most so many; `None` without a limit.
+    pub max: Option<u32>,
+}
+
+/// What a symbol names as a function, globally.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum GlobalFunction {
+    /// Nothing yet.
+    #[default]
+    Undefined,
+    /// A function; its arity if known.
+    Function(Option<Arity>),
+    /// A macro.
+    Macro,
+}
+
+/// What a symbol names as a variable, globally.
+#[derive(Clone, Debug, Default)]
+pub enum GlobalVariable {
+    /// Nothing yet.
+    #[default]
+    Undefined,
+    /// A special variable.
+    Special,
+    /// A constant with this value.
+    Constant(Datum),
+}
+
+/// A function that reads a slot of a structure.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Accessor {
+    /// Name of the class.
+    pub class: Symbol,
+    /// Number of the slot, from 0.
+    pub slot: u16,
+    /// Whether it may not be set.
+    pub read_only: bool,
+}
+
+/// All that is known of a symbol globally when a form is compiled.
+#[derive(Clone, Debug, Default)]
+pub struct Global {
+    /// As a function.
+    pub function: GlobalFunction,
+    /// As a variable.
+    pub variable: GlobalVariable,
+    /// Whether it reads a slot of a structure.
+    pub accessor: Option<Accessor>,
+    /// Whether it belongs to the language: programs may not redefine it.
+    pub locked: bool,
+    /// For a function of the base language that was left out: what to use instead.
+    pub instead: Option<String>,
+}
+
+/// Why a name could not be read as a symbol.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum InternError {
+    /// There is no package of this name.
+    NoPackage(String),
+    /// The package has no external symbol of this name; `exists` if it has an internal one.
+    NotExternal {
+        /// Whether there is an internal symbol of that name.
+        exists: bool,
+    },
+}
+
+/// What names mean while a form is read and compiled. No call of these runs the program.
+pub trait Environment {
+    /// What is known of `symbol`.
+    fn global(&self, symbol: &Symbol) -> Global;
+    /// What is known of the function `(setf symbol)`.
+    fn setf_function(&self, symbol: &Symbol) -> GlobalFunction;
+    /// The data that the library recorded about `symbol` under `indicator`, such as the expander of a `defsetf`.
+    fn property(&self, symbol: &Symbol, indicator: &Symbol) -> Option<Datum>;
+    /// The symbol that `name` denotes when read in the current package (`package` is `None`), or after `package:` or, if
+    /// `internal`, `package::`.
+    ///
+    /// # Errors
+    /// [`InternError`] if there is no such package or no such external symbol.
+    fn intern(&mut self, package: Option<&str>, name: &str, internal: bool) -> Result<Symbol, InternError>;
+    /// A number for a fresh uninterned symbol of this compilation unit.
+    fn fresh(&mut self) -> u32;
+    /// Names like `symbol` that are defined as a function or, if `variable`, as a variable; the likeliest first.
+    fn similar(&self, symbol: &Symbol, variable: bool) -> Vec<Symbol>;
+}
+
+/// Which macro is called.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum MacroRef {
+    /// The global macro of this name.
+    Global(Symbol),
+    /// The function of a `macrolet`, as a step of [`Step::Load`] with `keep` returned it.
+    Local(ObjectId),
+}
+
+/// One local definition that a macro's environment argument knows of, for `macroexpand` inside macros.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LocalDefinition {
+    /// The name.
+    pub name: Symbol,
+    /// The macro function; `None` for a local function, which hides a macro of that name.
+    pub expander: Option<ObjectId>,
+}
+
+/// A macro call to be run.
+#[derive(Clone, Debug)]
+pub struct MacroCall {
+    /// The macro.
+    pub function: MacroRef,
+    /// The whole form.
+    pub form: Datum,
+    /// The local macros and functions around it, innermost first.
+    pub locals: Arc<[LocalDefinition]>,
+}
+
+/// What a compilation wants next.
+#[derive(Debug)]
+pub enum Step {
+    /// Run this macro and answer with [`Answer::Expansion`] or [`Answer::Failed`].
+    Expand(MacroCall),
+    /// Load this module and run its top level, at compile time. Answer with [`Answer::Loaded`], or [`Answer::Failed`];
+    /// if `keep`, with [`Answer::Object`], the value of its last top-level form.
+    Load {
+        /// The module.
+        module: Module,
+        /// Whether the value is wanted.
+        keep: bool,
+    },
+    /// The compilation is over. There is no module when one of the diagnostics is an error.
+    Done(Option<Module>, Vec<Diagnostic>),
+}
+
+/// What became of a step.
+#[derive(Debug)]
+pub enum Answer {
+    /// First step: there is nothing to answer.
+    Start,
+    /// The macro's expansion.
+    Expansion(Datum),
+    /// The module has run.
+    Loaded,
+    /// The value that was to be kept.
+    Object(ObjectId),
+    /// The macro or module failed; the text says with what.
+    Failed(String),
+}
+
+/// A compilation under way.
+pub trait Compilation: Send {
+    /// Takes the outcome of the last step and works up to the next one. Work between two steps is bounded by the size
+    /// of one top-level form; `charge` is called with the number of nodes that were worked on.
+    fn step(&mut self, environment: &mut dyn Environment, answer: Answer, charge: &mut dyn FnMut(u64)) -> Step;
+}
+
+/// A compiler, for a virtual machine that evaluates at run time.
+pub trait Compile: Send {
+    /// Begins to compile one form. Its value is what the last top-level function of the module returns.
+    fn compile_form(&self, form: Datum) -> Box<dyn Compilation>;
+    /// Begins to compile a whole text, called `name` in diagnostics.
+    fn compile_text(&self, name: &str, text: &str) -> Box<dyn Compilation>;
+    /// Reads one datum of `text` from byte `start` on: the datum, `None` at the end of the text, and the offset after it.
+    ///
+    /// # Errors
+    /// A diagnostic, for a text that is no datum; [`Diagnostic::code`] tells an unfinished one from a wrong one.
+    fn read(
+        &self,
+        environment: &mut dyn Environment,
+        text: &str,
+        start: usize,
+    ) -> Result<(Option<Datum>, usize), Box<Diagnostic>>;
+    /// Draws a diagnostic as it is shown to people, with the source line when it is known.
+    fn render(&self, diagnostic: &Diagnostic) -> String;
+}
+
+/// Runs the compile-time parts of a program. Implemented over a virtual machine.
+pub trait CompileTimeHost: Environment {
+    /// Runs a macro to its end, within a limit of ticks.
+    ///
+    /// # Errors
+    /// The text of the failure that ended it.
+    fn expand(&mut self, call: &MacroCall) -> Result<Datum, String>;
+    /// Loads a module and runs its top level.
+    ///
+    /// # Errors
+    /// The text of the failure that ended it.
+    fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, String>;
+}
+
+/// Works a compilation through to its end with the help of `host`.
+pub fn drive(
+    compilation: &mut dyn Compilation,
+    host: &mut dyn CompileTimeHost,
+) -> (Option<Module>, Vec<Diagnostic>) {
+    let mut answer = Answer::Start;
+    loop {
+        // A trait object is not upcast through a method call: say which of its two faces is meant.
+        let environment: &mut dyn Environment = host;
+        answer = match compilation.step(environment, answer, &mut |_| {}) {
+            Step::Done(module, diagnostics) => return (module, diagnostics),
+            Step::Expand(call) => match host.expand(&call) {
+                Ok(expansion) => Answer::Expansion(expansion),
+                Err(failure) => Answer::Failed(failure),
+            },
+            Step::Load { module, keep } => match host.load(module, keep) {
+                Ok(Some(object)) => Answer::Object(object),
+                Ok(None) => Answer::Loaded,
+                Err(failure) => Answer::Failed(failure),
+            },
+        };
+    }
+}
+
+/// The place of a span, for people: the source's name, line and column from 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The source.
+    pub source: SourceId,
+    /// Line, from 1.
+    pub line: u32,
+    /// Column in characters, from 1.
+    pub column: u32,
+}
+
+/// The offsets at which the lines of a text begin, to turn spans into places.
+#[derive(Clone, Debug)]
+pub struct LineIndex {
+    starts: Vec<u32>,
+}
+
+impl LineIndex {
+    /// Finds the lines of `text`.
+    pub fn new(text: &str) -> LineIndex {
+        let breaks = text.bytes().enumerate().filter(|&(_, byte)| byte == b'\n');
+        LineIndex { starts: std::iter::once(0).chain(breaks.map(|(i, _)| i as u32 + 1)).collect() }
+    }
+
+    /// Line and column of the start of `span`, which lies in `text`.
+    pub fn place(&self, text: &str, span: Span) -> Place {
+        let line = self.starts.partition_point(|&start| start <= span.start).max(1) - 1;
+        let start = self.starts[line] as usize;
+        let end = (span.start as usize).min(text.len());
+        let column = text.get(start..end).map_or(0, |prefix| prefix.chars().count());
+        Place { source: span.source, line: line as u32 + 1, column: column as u32 + 1 }
+    }
+}

@@ -1,0 +1,310 @@
+//! Data as source text denotes it: what the reader makes, macros transform and modules keep as constants.
+//!
+//! A [`Datum`] is an immutable tree (or graph: sub-data may be shared) in which every node carries the [`Span`] that
+//! it was read from. Sharing is identity: the same node reached twice denotes one object of the running program.
+//!
+//! Guarantees: dropping a datum takes no native stack in proportion to its depth.
+//! Not here: reading text (the compiler's `reader`), objects of a running program (the virtual machine).
+
+use std::fmt;
+use std::sync::Arc;
+
+use num_bigint::BigInt;
+
+use crate::span::Span;
+use crate::symbol::Symbol;
+
+/// An object of the running program that occurs in a form given to `eval` or returned by a macro: an index into a
+/// table that the compile-time host keeps for the length of one compilation. It cannot be written to a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ObjectId(pub u32);
+
+/// What a datum is.
+#[derive(Clone, Debug)]
+pub enum DatumKind {
+    /// `NIL`, the empty list. A datum is never the *symbol* `NIL`.
+    Nil,
+    /// A symbol other than `NIL`.
+    Symbol(Symbol),
+    /// An integer of any size.
+    Integer(BigInt),
+    /// A ratio in lowest terms with a denominator above 1.
+    Ratio(BigInt, BigInt),
+    /// A double float.
+    Float(f64),
+    /// A character.
+    Character(char),
+    /// A literal string.
+    String(Arc<str>),
+    /// A pair.
+    Cons(Datum, Datum),
+    /// A simple vector.
+    Vector(Arc<[Datum]>),
+    /// An array of a rank other than 1, its elements in row-major order.
+    Array(Arc<[u32]>, Arc<[Datum]>),
+    /// Some object of the running program.
+    Object(ObjectId),
+}
+
+#[derive(Debug)]
+struct Node {
+    kind: DatumKind,
+    span: Span,
+}
+
+/// A datum: a reference to a shared, immutable node. Cloning is cheap.
+#[derive(Clone)]
+pub struct Datum(Arc<Node>);
+
+impl Datum {
+    /// A datum of the given kind.
+    pub fn new(kind: DatumKind, span: Span) -> Datum {
+        Datum(Arc::new(Node { kind, span }))
+    }
+
+    /// The empty list.
+    pub fn nil(span: Span) -> Datum {
+        Datum::new(DatumKind::Nil, span)
+    }
+
+    /// A symbol; `COMMON-LISP:NIL` becomes the empty list.
+    pub fn symbol(symbol: Symbol, span: Span) -> Datum {
+        if symbol.is_cl("NIL") { Datum::nil(span) } else { Datum::new(DatumKind::Symbol(symbol), span) }
+    }
+
+    /// An integer.
+    pub fn integer(value: impl Into<BigInt>, span: Span) -> Datum {
+        Datum::new(DatumKind::Integer(value.into()), span)
+    }
+
+    /// A string.
+    pub fn string(value: &str, span: Span) -> Datum {
+        Datum::new(DatumKind::String(value.into()), span)
+    }
+
+    /// A pair.
+    pub fn cons(car: Datum, cdr: Datum, span: Span) -> Datum {
+        Datum::new(DatumKind::Cons(car, cdr), span)
+    }
+
+    /// A proper list of `items`.
+    pub fn list<I>(items: I, span: Span) -> Datum
+    where
+        I: IntoIterator<Item = Datum>,
+        I::IntoIter: DoubleEndedIterator,
+    {
+        Datum::list_with_tail(items, Datum::nil(span), span)
+    }
+
+    /// A list of `items` that ends in `tail`.
+    pub fn list_with_tail<I>(items: I, tail: Datum, span: Span) -> Datum
+    where
+        I: IntoIterator<Item = Datum>,
+        I::IntoIter: DoubleEndedIterator,
+    {
+        items.into_iter().rev().fold(tail, |rest, item| Datum::cons(item, rest, span))
+    }
+
+    /// What this datum is.
+    pub fn kind(&self) -> &DatumKind {
+        &self.0.kind
+    }
+
+    /// Where it was written.
+    pub fn span(&self) -> Span {
+        self.0.span
+    }
+
+    /// Whether both are the same node.
+    pub fn is_same(&self, other: &Datum) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
+    /// An address that tells nodes apart for as long as they are alive.
+    pub fn identity(&self) -> usize {
+        Arc::as_ptr(&self.0).addr()
+    }
+
+    /// Whether this is `NIL`.
+    pub fn is_nil(&self) -> bool {
+        matches!(self.kind(), DatumKind::Nil)
+    }
+
+    /// The symbol that this is, `NIL` apart.
+    pub fn as_symbol(&self) -> Option<&Symbol> {
+        match self.kind() {
+            DatumKind::Symbol(symbol) => Some(symbol),
+            _ => None,
+        }
+    }
+
+    /// The halves of a pair.
+    pub fn as_cons(&self) -> Option<(&Datum, &Datum)> {
+        match self.kind() {
+            DatumKind::Cons(car, cdr) => Some((car, cdr)),
+            _ => None,
+        }
+    }
+
+    /// The elements of a list, in order. Stops at the first tail that is no pair; [`Elements::tail`] gives it.
+    pub fn elements(&self) -> Elements<'_> {
+        Elements { rest: self }
+    }
+
+    /// The elements of a proper list; `None` if this is not one.
+    pub fn as_list(&self) -> Option<Vec<&Datum>> {
+        let mut elements = self.elements();
+        let items: Vec<&Datum> = elements.by_ref().collect();
+        elements.tail().is_nil().then_some(items)
+    }
+}
+
+/// Iterator over the elements of a list; see [`Datum::elements`].
+#[derive(Clone, Debug)]
+pub struct Elements<'a> {
+    rest: &'a Datum,
+}
+
+impl<'a> Elements<'a> {
+    /// What has not been iterated over yet; at the end, the list's last `cdr`.
+    pub fn tail(&self) -> &'a Datum {
+        self.rest
+    }
+}
+
+impl<'a> Iterator for Elements<'a> {
+    type Item = &'a Datum;
+
+    fn next(&mut self) -> Option<&'a Datum> {
+        let (car, cdr) = self.rest.as_cons()?;
+        self.rest = cdr;
+        Some(car)
+    }
+}
+
+impl Drop for Node {
+    /// Takes children apart on an explicit stack: a tree may be deeper than the native stack is long.
+    fn drop(&mut self) {
+        let mut orphans: Vec<Datum> = Vec::new();
+        release(&mut self.kind, &mut orphans);
+        while let Some(Datum(node)) = orphans.pop() {
+            if let Some(mut node) = Arc::into_inner(node) {
+                release(&mut node.kind, &mut orphans);
+            }
+        }
+    }
+}
+
+/// Moves the children of a node that is about to go to `orphans`, leaving the node flat.
+fn release(kind: &mut DatumKind, orphans: &mut Vec<Datum>) {
+    if !matches!(kind, DatumKind::Cons(..) | DatumKind::Vector(..) | DatumKind::Array(..)) {
+        return;
+    }
+    match std::mem::replace(kind, DatumKind::Nil) {
+        DatumKind::Cons(car, cdr) => orphans.extend([cdr, car]),
+        DatumKind::Vector(mut items) | DatumKind::Array(_, mut items) => {
+            // A shared slice is left to its last owner.
+            if let Some(items) = Arc::get_mut(&mut items) {
+                let hole = Datum::nil(Span::default());
+                orphans.extend(items.iter_mut().map(|item| std::mem::replace(item, hole.clone())));
+            }
+        }
+        _ => unreachable!("only compound data reach this match"),
+    }
+}
+
+impl fmt::Debug for Datum {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+impl fmt::Display for Datum {
+    /// The datum as it could be read again, as far as that goes; deep and long parts are cut off with `#` and `...`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        display(self, f, 0)
+    }
+}
+
+/// How deep and how long [`Datum`]'s display goes: it is meant for messages and snapshots.
+const DISPLAY_DEPTH: u32 = 40;
+const DISPLAY_LENGTH: usize = 1000;
+
+fn display(datum: &Datum, f: &mut fmt::Formatter<'_>, depth: u32) -> fmt::Result {
+    if depth > DISPLAY_DEPTH {
+        return f.write_str("#");
+    }
+    match datum.kind() {
+        DatumKind::Nil => f.write_str("NIL"),
+        DatumKind::Symbol(symbol) => write!(f, "{symbol}"),
+        DatumKind::Integer(value) => write!(f, "{value}"),
+        DatumKind::Ratio(numerator, denominator) => write!(f, "{numerator}/{denominator}"),
+        DatumKind::Float(value) => write!(f, "{value:?}"),
+        DatumKind::Character(c) => write!(f, "#\\{c}"),
+        DatumKind::String(value) => write!(f, "{value:?}"),
+        DatumKind::Object(ObjectId(id)) => write!(f, "#<object {id}>"),
+        DatumKind::Cons(..) => {
+            f.write_str("(")?;
+            let mut elements = datum.elements();
+            for (i, item) in elements.by_ref().enumerate() {
+                if i > 0 {
+                    f.write_str(" ")?;
+                }
+                if i == DISPLAY_LENGTH {
+                    return f.write_str("...)");
+                }
+                display(item, f, depth + 1)?;
+            }
+            if !elements.tail().is_nil() {
+                f.write_str(" . ")?;
+                display(elements.tail(), f, depth + 1)?;
+            }
+            f.write_str(")")
+        }
+        DatumKind::Vector(items) => display_items(items, "#(", f, depth),
+        DatumKind::Array(dimensions, items) => display_items(items, &format!("#{}A(", dimensions.len()), f, depth),
+    }
+}
+
+fn display_items(items: &[Datum], open: &str, f: &mut fmt::Formatter<'_>, depth: u32) -> fmt::Result {
+    f.write_str(open)?;
+    for (i, item) in items.iter().enumerate() {
+        if i > 0 {
+            f.write_str(" ")?;
+        }
+        if i == DISPLAY_LENGTH {
+            return f.write_str("...)");
+        }
+        display(item, f, depth + 1)?;
+    }
+    f.write_str(")")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_deep_datum_is_dropped_without_native_recursion() {
+        let span = Span::default();
+        let mut deep = Datum::nil(span);
+        for _ in 0..1_000_000 {
+            deep = Datum::list([deep], span);
+        }
+        let mut vectors = Datum::nil(span);
+        for _ in 0..200_000 {
+            vectors = Datum::new(DatumKind::Vector([vectors].into()), span);
+        }
+        drop(deep);
+        drop(vectors);
+    }
+
+    #[test]
+    fn a_list_gives_its_elements_and_its_tail() {
+        let span = Span::default();
+        let dotted = Datum::list_with_tail([Datum::integer(1, span)], Datum::integer(2, span), span);
+        assert!(dotted.as_list().is_none());
+        assert_eq!(dotted.to_string(), "(1 . 2)");
+        assert_eq!(Datum::symbol(Symbol::cl("NIL"), span).to_string(), "NIL");
+    }
+}

@@ -1,0 +1,606 @@
+//! The opcode table: every instruction of the virtual machine, declared once.
+//!
+//! The table is expanded into [`Opcode`], [`Instr`] with its encoder and decoder, the disassembler's text, the
+//! verifier's view of operands, and `docs/bytecode.md`. The interpreter has one arm for each row, in this order.
+//!
+//! An instruction is one 32-bit word, `opcode | operands << 8`, or two: the second, the *aux* word, holds the operand
+//! of 32 bits. `R[n]` is a register of the current frame, `K[n]` a constant of the function. Jumps are relative to the
+//! word after the instruction. Only the rows under "loops" jump back, and each of them is a tick; so is every call.
+//!
+//! Numbers are never given twice. Those from `0xC0` on belong to the virtual machine and are refused in files.
+//!
+//! The word after the mnemonic says what becomes of the value that a recovery puts in place of a failed instruction:
+//! `value` goes to the first operand, `test` decides the jump, `call` is delivered as the results of a call,
+//! `effect` is dropped; `silent` instructions never fail.
+
+use std::fmt;
+
+use crate::operand::*;
+
+/// Calls `$with!` with every row of the table.
+#[macro_export]
+macro_rules! for_each_opcode {
+    ($with:ident) => {
+        $with! {
+            // ---- moves and constants
+            /// `R[dst] := R[src]`
+            Move = 0x01, "move", silent { dst: Dst, src: Reg };
+            /// `R[dst] := value`
+            LoadInt = 0x02, "load-int", silent { dst: Dst, value: Int16 };
+            /// `R[dst] := K[constant]`
+            LoadConst = 0x03, "load-const", silent { dst: Dst, constant: ConstIdx };
+            /// `R[first], … R[first+count-1] := NIL`
+            LoadNil = 0x04, "load-nil", silent { first: Base, count: Count };
+            /// `R[dst] := T`
+            LoadTrue = 0x05, "load-true", silent { dst: Dst };
+
+            // ---- arithmetic
+            /// `R[dst] := R[left] + R[right]`
+            Add = 0x08, "add", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst] := R[left] - R[right]`
+            Sub = 0x09, "sub", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst] := R[left] * R[right]`
+            Mul = 0x0A, "mul", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst] := R[left] / R[right]`
+            Div = 0x0B, "div", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst] := R[left] + value`
+            AddInt = 0x0C, "add-int", value { dst: Dst, left: Reg, value: Int8 };
+            /// `R[dst]` := the quotient of `R[left]` by `R[right]`, rounded towards minus infinity
+            Floor = 0x0D, "floor", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst]` := the quotient of `R[left]` by `R[right]`, rounded towards zero
+            Truncate = 0x0E, "truncate", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst]` := the remainder that goes with `floor`
+            Mod = 0x0F, "mod", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst]` := the remainder that goes with `truncate`
+            Rem = 0x10, "rem", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst] := R[left] and R[right]`, bit by bit
+            LogAnd = 0x11, "logand", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst] := R[left] or R[right]`, bit by bit
+            LogIor = 0x12, "logior", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst] := R[left] xor R[right]`, bit by bit
+            LogXor = 0x13, "logxor", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst]` := integer `R[left]` shifted left by `R[right]`, right when that is negative
+            Ash = 0x14, "ash", value { dst: Dst, left: Reg, right: Reg };
+
+            // ---- comparisons that give T or NIL
+            /// `R[dst] := (not R[src])`
+            Not = 0x18, "not", silent { dst: Dst, src: Reg };
+            /// `R[dst] := (eq R[left] R[right])`
+            Eq = 0x19, "eq", silent { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst] := (eql R[left] R[right])`
+            Eql = 0x1A, "eql", silent { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst] := (= R[left] R[right])`
+            NumEq = 0x1B, "num-eq", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst] := (< R[left] R[right])`
+            Less = 0x1C, "less", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst] := (<= R[left] R[right])`
+            LessEq = 0x1D, "less-eq", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst]` := whether `R[src]` is of the type
+            IsType = 0x1E, "is-type", silent { dst: Dst, src: Reg, code: TypeIdx };
+
+            // ---- jumps forward
+            /// Jumps.
+            JumpAlways = 0x20, "jump", silent { to: Jump24 };
+            /// Jumps if `R[test]` is `NIL`.
+            JumpIfNil = 0x21, "jump-if-nil", silent { test: Reg, to: Jump16 };
+            /// Jumps if `R[test]` is not `NIL`.
+            JumpIfNotNil = 0x22, "jump-if-not-nil", silent { test: Reg, to: Jump16 };
+            /// Jumps if `R[test]` is a pair.
+            JumpIfCons = 0x23, "jump-if-cons", silent { test: Reg, to: Jump16 };
+            /// Jumps if `R[test]` is not a pair.
+            JumpIfNotCons = 0x24, "jump-if-not-cons", silent { test: Reg, to: Jump16 };
+            /// Jumps if an argument was given for the parameter `R[test]`; otherwise the default follows.
+            JumpIfSupplied = 0x25, "jump-if-supplied", silent { test: Reg, to: Jump16 };
+            /// Jumps if `(eq R[left] R[right])`.
+            JumpEq = 0x26, "jump-eq", silent { left: Reg, right: Reg, to: Jump };
+            /// Jumps unless `(eq R[left] R[right])`.
+            JumpNotEq = 0x27, "jump-not-eq", silent { left: Reg, right: Reg, to: Jump };
+            /// Jumps if `(eql R[left] R[right])`.
+            JumpEql = 0x28, "jump-eql", silent { left: Reg, right: Reg, to: Jump };
+            /// Jumps unless `(eql R[left] R[right])`.
+            JumpNotEql = 0x29, "jump-not-eql", silent { left: Reg, right: Reg, to: Jump };
+            /// Jumps if `(eql R[left] K[constant])`.
+            JumpEqlConst = 0x2A, "jump-eql-const", silent { left: Reg, constant: ConstIdx, to: Jump };
+            /// Jumps unless `(eql R[left] K[constant])`.
+            JumpNotEqlConst = 0x2B, "jump-not-eql-const", silent { left: Reg, constant: ConstIdx, to: Jump };
+            /// Jumps if `R[test]` is of the type.
+            JumpIfType = 0x2C, "jump-if-type", silent { test: Reg, code: TypeIdx, to: Jump };
+            /// Jumps unless `R[test]` is of the type.
+            JumpIfNotType = 0x2D, "jump-if-not-type", silent { test: Reg, code: TypeIdx, to: Jump };
+            /// Jumps if `(= R[left] R[right])`.
+            JumpNumEq = 0x30, "jump-num-eq", test { left: Reg, right: Reg, to: Jump };
+            /// Jumps unless `(= R[left] R[right])`.
+            JumpNotNumEq = 0x31, "jump-not-num-eq", test { left: Reg, right: Reg, to: Jump };
+            /// Jumps if `(< R[left] R[right])`.
+            JumpLess = 0x32, "jump-less", test { left: Reg, right: Reg, to: Jump };
+            /// Jumps unless `(< R[left] R[right])`.
+            JumpNotLess = 0x33, "jump-not-less", test { left: Reg, right: Reg, to: Jump };
+            /// Jumps if `(<= R[left] R[right])`.
+            JumpLessEq = 0x34, "jump-less-eq", test { left: Reg, right: Reg, to: Jump };
+            /// Jumps unless `(<= R[left] R[right])`.
+            JumpNotLessEq = 0x35, "jump-not-less-eq", test { left: Reg, right: Reg, to: Jump };
+            /// Jumps if `(= R[left] value)`.
+            JumpNumEqInt = 0x36, "jump-num-eq-int", test { left: Reg, value: Int16, to: Jump };
+            /// Jumps unless `(= R[left] value)`.
+            JumpNotNumEqInt = 0x37, "jump-not-num-eq-int", test { left: Reg, value: Int16, to: Jump };
+            /// Jumps if `(< R[left] value)`.
+            JumpLessInt = 0x38, "jump-less-int", test { left: Reg, value: Int16, to: Jump };
+            /// Jumps unless `(< R[left] value)`.
+            JumpNotLessInt = 0x39, "jump-not-less-int", test { left: Reg, value: Int16, to: Jump };
+            /// Jumps if `(> R[left] value)`.
+            JumpGreaterInt = 0x3A, "jump-greater-int", test { left: Reg, value: Int16, to: Jump };
+            /// Jumps unless `(> R[left] value)`.
+            JumpNotGreaterInt = 0x3B, "jump-not-greater-int", test { left: Reg, value: Int16, to: Jump };
+
+            // ---- loops: the only jumps back, a tick each
+            /// Jumps back.
+            Loop = 0x40, "loop", silent { to: Back24 };
+            /// Jumps back if `R[test]` is `NIL`.
+            LoopIfNil = 0x41, "loop-if-nil", silent { test: Reg, to: Back16 };
+            /// Jumps back if `R[test]` is not `NIL`.
+            LoopIfNotNil = 0x42, "loop-if-not-nil", silent { test: Reg, to: Back16 };
+            /// Jumps back if `R[test]` is a pair.
+            LoopIfCons = 0x43, "loop-if-cons", silent { test: Reg, to: Back16 };
+            /// Jumps back if `(< R[left] R[right])`.
+            LoopLess = 0x44, "loop-less", test { left: Reg, right: Reg, to: Back };
+            /// Jumps back unless `(< R[left] R[right])`.
+            LoopNotLess = 0x45, "loop-not-less", test { left: Reg, right: Reg, to: Back };
+            /// `R[counter] := R[counter] + step`, then jumps back if `(< R[counter] R[limit])`. The addition, and with
+            /// it the instruction, has no effect if either is no real number.
+            LoopCount = 0x46, "loop-count", test { counter: Reg, limit: Reg, step: Int8, to: Back };
+
+            // ---- lists
+            /// `R[dst] := (cons R[car] R[cdr])`
+            Cons = 0x48, "cons", value { dst: Dst, car: Reg, cdr: Reg };
+            /// `R[dst] := (car R[list])`
+            Car = 0x49, "car", value { dst: Dst, list: Reg };
+            /// `R[dst] := (cdr R[list])`
+            Cdr = 0x4A, "cdr", value { dst: Dst, list: Reg };
+            /// `R[dst] := (cadr R[list])`
+            Cadr = 0x4B, "cadr", value { dst: Dst, list: Reg };
+            /// `R[dst] := (cddr R[list])`
+            Cddr = 0x4C, "cddr", value { dst: Dst, list: Reg };
+            /// The car of the pair `R[pair]` becomes `R[value]`.
+            SetCar = 0x4D, "set-car", effect { pair: Reg, value: Reg };
+            /// The cdr of the pair `R[pair]` becomes `R[value]`.
+            SetCdr = 0x4E, "set-cdr", effect { pair: Reg, value: Reg };
+            /// `R[dst]` := a fresh list of `R[first], … R[first+count-1]`
+            List = 0x4F, "list", value { dst: Dst, first: Base, count: Count };
+
+            // ---- vectors and structures
+            /// `R[dst] := (svref R[vector] R[index])`
+            VectorRef = 0x50, "vector-ref", value { dst: Dst, vector: Reg, index: Reg };
+            /// Element `R[index]` of the simple vector `R[vector]` becomes `R[value]`.
+            VectorSet = 0x51, "vector-set", effect { vector: Reg, index: Reg, value: Reg };
+            /// `R[dst] := (aref R[array] R[index])`, for an array of rank 1
+            ArrayRef = 0x52, "array-ref", value { dst: Dst, array: Reg, index: Reg };
+            /// Element `R[index]` of the array `R[array]` of rank 1 becomes `R[value]`.
+            ArraySet = 0x53, "array-set", effect { array: Reg, index: Reg, value: Reg };
+            /// `R[dst]` := slot `slot` of `R[instance]`, which must be an instance of the class or a subclass.
+            Slot = 0x54, "slot", value { dst: Dst, instance: Reg, slot: Index, class: WideClassIdx };
+            /// Slot `slot` of `R[instance]` becomes `R[value]`.
+            SetSlot = 0x55, "set-slot", effect { instance: Reg, slot: Index, value: Reg, class: WideClassIdx };
+            /// Jumps unless `R[test]` is an instance of the class or a subclass.
+            JumpIfNotInstance = 0x56, "jump-if-not-instance", silent { test: Reg, class: ClassIdx, to: Jump };
+
+            // ---- variables
+            /// `R[dst]` := a fresh box that holds `R[src]`
+            MakeBox = 0x58, "make-box", value { dst: Dst, src: Reg };
+            /// `R[dst]` := what the box `R[cell]` holds. The box must have been made by `make-box`.
+            BoxRef = 0x59, "box-ref", silent { dst: Dst, cell: Reg };
+            /// The box `R[cell]` holds `R[src]`.
+            BoxSet = 0x5A, "box-set", silent { cell: Reg, src: Reg };
+            /// `R[dst]` := a closure of `K[function]`, whose captures are taken as that function declares them
+            MakeClosure = 0x5B, "make-closure", value { dst: Dst, function: FunctionIdx };
+            /// Capture `index` of the closure `R[closure]`, made by `make-closure` in this frame, becomes `R[src]`.
+            PatchCapture = 0x5C, "patch-capture", silent { closure: Reg, index: Index, src: Reg };
+            /// `R[dst]` := capture `index` of the running function
+            CaptureRef = 0x5D, "capture-ref", silent { dst: Dst, index: Index };
+            /// `R[dst]` := what the box that is capture `index` of the running function holds
+            CaptureBoxRef = 0x5E, "capture-box-ref", silent { dst: Dst, index: Index };
+            /// The box that is capture `index` of the running function holds `R[src]`.
+            CaptureBoxSet = 0x5F, "capture-box-set", silent { src: Reg, index: Index };
+            /// `R[dst]` := the value of the special variable `K[symbol]`
+            SymbolValue = 0x60, "symbol-value", value { dst: Dst, symbol: SymbolIdx };
+            /// The special variable `K[symbol]` becomes `R[src]`.
+            SetSymbolValue = 0x61, "set-symbol-value", effect { src: Reg, symbol: SymbolIdx };
+            /// Binds the special variable `K[symbol]` to `R[src]`.
+            Bind = 0x62, "bind", effect { src: Reg, symbol: SymbolIdx };
+            /// Undoes the newest `count` bindings of this frame.
+            Unbind = 0x63, "unbind", silent { count: Count };
+            /// Binds the symbols of the list `R[symbols]` to the items of `R[values]`, missing ones to nothing. The
+            /// innermost control entry must be a scope of this frame; popping it undoes the bindings.
+            BindList = 0x64, "bind-list", effect { symbols: Reg, values: Reg };
+            /// `R[dst]` := the global function named `K[symbol]`
+            FunctionRef = 0x65, "function-ref", value { dst: Dst, symbol: SymbolIdx };
+
+            // ---- calls: a window is the callee (or room for it), a link word, then the arguments
+            /// Calls the function (or function named by the symbol) `R[window]` with `R[window+2] …`.
+            Call = 0x68, "call", call { window: Base, count: Count, want: Want, pad: Pad };
+            /// Calls the global function `K[symbol]` with `R[window+2] …`.
+            CallGlobal = 0x69, "call-global", call { window: Base, count: Count, want: Want, symbol: WideSymbolIdx };
+            /// Calls the running function, with the number of arguments that it takes exactly.
+            CallSelf = 0x6A, "call-self", call { window: Base, count: Count, want: Want, pad: Pad };
+            /// Calls a builtin with `R[window+2] …`.
+            CallBuiltin = 0x6B, "call-builtin", call { window: Base, count: Count, want: Want, builtin: BuiltinIdx };
+            /// Calls `R[window]` with `R[window+2] …`, the last argument a list of further arguments.
+            Apply = 0x6C, "apply", call { window: Base, count: Count, want: Want, pad: Pad };
+            /// As `call`, in place of the running function.
+            TailCall = 0x6D, "tail-call", call { window: Base, count: Count, pad: Pad };
+            /// As `call-global`, in place of the running function.
+            TailCallGlobal = 0x6E, "tail-call-global", call { window: Base, count: Count, symbol: WideSymbolIdx };
+            /// As `call-builtin`; returns what the builtin returns.
+            TailCallBuiltin = 0x6F, "tail-call-builtin", call { window: Base, count: Count, builtin: BuiltinIdx };
+            /// As `apply`, in place of the running function.
+            TailApply = 0x70, "tail-apply", call { window: Base, count: Count, pad: Pad };
+            /// Returns `R[src]`.
+            Return = 0x71, "return", silent { src: Reg };
+            /// Returns `R[first], … R[first+count-1]` as multiple values.
+            ReturnValues = 0x72, "return-values", silent { first: Base, count: Count };
+            /// Returns the value list.
+            ReturnAll = 0x73, "return-all", silent { };
+
+            // ---- the value list: where all values of a form are kept
+            /// The value list := `R[first], … R[first+count-1]`
+            SetValues = 0x74, "set-values", silent { first: Base, count: Count };
+            /// `R[first], … R[first+count-1]` := the value list, missing values `NIL`
+            GetValues = 0x75, "get-values", silent { first: Base, count: Count };
+            /// `R[dst]` := a fresh list of the value list
+            ValuesToList = 0x76, "values-to-list", value { dst: Dst };
+            /// The value list := the items of the list `R[src]`
+            ListToValues = 0x77, "list-to-values", effect { src: Reg };
+
+            // ---- the control stack. While an entry stands, registers below its `window` keep their values.
+            /// `R[dst]` := a fresh tag, equal only to itself, for `push-catch`
+            NewTag = 0x78, "new-tag", value { dst: Dst };
+            /// Pushes a catch for the tag `R[tag]`: a throw to it pops it, delivers its values to the window, and
+            /// goes on at `to`.
+            PushCatch = 0x79, "push-catch", value { window: Base, tag: Reg, want: Want, to: Jump };
+            /// Pushes a cleanup: when an unwinding passes, the code at `to` runs until `end-cleanup`.
+            PushCleanup = 0x7A, "push-cleanup", effect { window: Base, to: Jump };
+            /// Pushes handlers: for each type of the vector `K[types]`, a case. When one takes a condition, the entry
+            /// is popped, `R[window]` is the index of the case, `R[window+1]` the condition, and control goes to `to`.
+            PushHandlerCase = 0x7B, "push-handler-case", effect { window: Base, types: VectorIdx, to: Jump };
+            /// Pushes handlers that run at the point of signalling: `R[handlers]` is a list of `(type . function)`.
+            PushHandlers = 0x7C, "push-handlers", effect { window: Base, handlers: Reg };
+            /// Pushes a mask: entries from the fixnum `R[from]` on (a height of the control stack) are not searched.
+            PushMask = 0x7D, "push-mask", effect { window: Base, from: Reg };
+            /// Pushes a scope for `bind-list`.
+            PushScope = 0x7E, "push-scope", effect { window: Base };
+            /// Pops the newest `count` entries, and undoes bindings made since the oldest of them.
+            PopControl = 0x7F, "pop-control", silent { count: Count };
+            /// Ends the protected part in the normal way: the cleanup entry on top becomes a running cleanup, and control
+            /// falls through into its code. The value list is kept until `end-cleanup`.
+            EnterCleanup = 0x80, "enter-cleanup", silent { };
+            /// Ends a cleanup: goes on with what it interrupted, or with the next instruction after `enter-cleanup`.
+            EndCleanup = 0x81, "end-cleanup", silent { };
+            /// Throws the value list to the catch for the tag `R[tag]`. Fails with `control-error`, nothing unwound,
+            /// when there is none; `kind` says which form it was: 0 `throw`, 1 `return-from`, 2 `go`.
+            Throw = 0x82, "throw", effect { tag: Reg, kind: Count };
+        }
+    };
+}
+
+/// What becomes of a value that a recovery puts in place of a failed instruction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Substitute {
+    /// The instruction never fails.
+    Silent,
+    /// The value goes to the register that the first operand names.
+    Value,
+    /// The value decides whether the jump is taken.
+    Test,
+    /// The values are delivered as the results of a call.
+    Call,
+    /// The value is dropped.
+    Effect,
+}
+
+macro_rules! substitute {
+    (silent) => {
+        Substitute::Silent
+    };
+    (value) => {
+        Substitute::Value
+    };
+    (test) => {
+        Substitute::Test
+    };
+    (call) => {
+        Substitute::Call
+    };
+    (effect) => {
+        Substitute::Effect
+    };
+}
+
+/// One row of the table, for tools that list opcodes.
+#[derive(Clone, Copy, Debug)]
+pub struct OpcodeInfo {
+    /// The opcode.
+    pub opcode: Opcode,
+    /// Its name in disassemblies.
+    pub mnemonic: &'static str,
+    /// What a substituted value becomes.
+    pub substitute: Substitute,
+    /// Name and type of each operand, in order.
+    pub operands: &'static [(&'static str, &'static str)],
+    /// Its effect.
+    pub doc: &'static [&'static str],
+}
+
+macro_rules! define_opcodes {
+    ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $substitute:ident
+        { $( $field:ident : $ty:ident ),* } ; )*) => {
+        /// The number of an instruction.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[repr(u8)]
+        pub enum Opcode {
+            $( $(#[doc = $doc])* $name = $number, )*
+        }
+
+        /// An instruction, decoded.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[allow(missing_docs, reason = "operands are described by the text of their instruction")]
+        pub enum Instr {
+            $( $(#[doc = $doc])* $name { $( $field: $ty ),* }, )*
+        }
+
+        /// The table as data, in the order of declaration.
+        pub const OPCODES: &[OpcodeInfo] = &[
+            $( OpcodeInfo {
+                opcode: Opcode::$name,
+                mnemonic: $mnemonic,
+                substitute: substitute!($substitute),
+                operands: &[$( (stringify!($field), stringify!($ty)) ),*],
+                doc: &[$( $doc ),*],
+            }, )*
+        ];
+
+        impl Opcode {
+            /// The opcode with this number, unless there is none.
+            pub fn from_number(number: u8) -> Option<Opcode> {
+                match number {
+                    $( $number => Some(Opcode::$name), )*
+                    _ => None,
+                }
+            }
+
+            /// Its name in disassemblies.
+            pub fn mnemonic(self) -> &'static str {
+                match self {
+                    $( Opcode::$name => $mnemonic, )*
+                }
+            }
+
+            /// Length of the instruction in words: 1, or 2 with an aux word.
+            pub const fn words(self) -> usize {
+                match self {
+                    $( Opcode::$name => 1 $( + (<$ty as Operand>::WIDTH == 32) as usize )*, )*
+                }
+            }
+
+            /// What becomes of a value put in place of the failed instruction.
+            pub const fn substitute(self) -> Substitute {
+                match self {
+                    $( Opcode::$name => substitute!($substitute), )*
+                }
+            }
+        }
+
+        impl Instr {
+            /// The opcode of this instruction.
+            pub fn opcode(&self) -> Opcode {
+                match self {
+                    $( Instr::$name { .. } => Opcode::$name, )*
+                }
+            }
+
+            /// The instruction word, and the aux word if it has one.
+            pub fn encode(&self) -> (u32, Option<u32>) {
+                match *self {
+                    $( Instr::$name { $( $field ),* } => {
+                        #[allow(unused_mut, reason = "some instructions have no operands")]
+                        let mut packer = Packer::new(Opcode::$name);
+                        $( packer.put($field); )*
+                        packer.finish()
+                    } )*
+                }
+            }
+
+            /// Decodes the instruction that begins at `code[at]`. `None` if there is no such opcode or the aux word
+            /// is missing.
+            pub fn decode(code: &[u32], at: usize) -> Option<Instr> {
+                let word = *code.get(at)?;
+                let opcode = Opcode::from_number(word as u8)?;
+                let aux = if opcode.words() == 2 { *code.get(at + 1)? } else { 0 };
+                #[allow(unused_mut, unused_variables, reason = "some instructions have no operands")]
+                let mut unpacker = Unpacker { word: word >> 8, aux };
+                Some(match opcode {
+                    $( Opcode::$name => Instr::$name { $( $field: unpacker.take::<$ty>() ),* }, )*
+                })
+            }
+
+            /// Calls `visit` with the role of each operand, in order.
+            pub fn visit_operands(&self, mut visit: impl FnMut(Role)) {
+                #[allow(unused, reason = "some instructions have no operands")]
+                let visit = &mut visit;
+                match *self {
+                    $( Instr::$name { $( $field ),* } => { $( visit($field.role()); )* } )*
+                }
+            }
+        }
+
+        impl fmt::Display for Instr {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                match *self {
+                    $( Instr::$name { $( $field ),* } => {
+                        f.write_str($mnemonic)?;
+                        $( write!(f, " {}", $field)?; )*
+                        Ok(())
+                    } )*
+                }
+            }
+        }
+
+        // Operands fit the word: at most 24 bits beside the opcode, at most one aux word.
+        $( const _: () = {
+            let narrow: u32 = 0 $( + if <$ty as Operand>::WIDTH == 32 { 0 } else { <$ty as Operand>::WIDTH } )*;
+            assert!(narrow <= 24 && Opcode::$name.words() <= 2);
+            assert!($number > 0 && $number < 0xC0);
+        }; )*
+    };
+}
+
+for_each_opcode!(define_opcodes);
+
+struct Packer {
+    word: u32,
+    shift: u32,
+    aux: Option<u32>,
+}
+
+impl Packer {
+    fn new(opcode: Opcode) -> Packer {
+        Packer { word: opcode as u32, shift: 8, aux: None }
+    }
+
+    fn put<T: Operand>(&mut self, operand: T) {
+        if T::WIDTH == 32 {
+            self.aux = Some(operand.to_bits());
+        } else {
+            self.word |= operand.to_bits() << self.shift;
+            self.shift += T::WIDTH;
+        }
+    }
+
+    fn finish(self) -> (u32, Option<u32>) {
+        (self.word, self.aux)
+    }
+}
+
+struct Unpacker {
+    word: u32,
+    aux: u32,
+}
+
+impl Unpacker {
+    fn take<T: Operand>(&mut self) -> T {
+        if T::WIDTH == 32 {
+            return T::from_bits(self.aux);
+        }
+        let operand = T::from_bits(self.word);
+        self.word >>= T::WIDTH;
+        operand
+    }
+}
+
+macro_rules! define_type_codes {
+    ($( $(#[$doc:meta])* $name:ident = $number:literal, $symbol:literal; )*) => {
+        /// Types that an instruction can test for, without a call.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[repr(u8)]
+        pub enum TypeCode {
+            $( $(#[$doc])* $name = $number, )*
+        }
+
+        impl TypeCode {
+            /// All of them.
+            pub const ALL: &[TypeCode] = &[$( TypeCode::$name ),*];
+
+            /// The type code with this number, unless there is none.
+            pub fn from_number(number: u8) -> Option<TypeCode> {
+                match number {
+                    $( $number => Some(TypeCode::$name), )*
+                    _ => None,
+                }
+            }
+
+            /// The name of the type, a symbol of `COMMON-LISP`.
+            pub fn type_name(self) -> &'static str {
+                match self {
+                    $( TypeCode::$name => $symbol, )*
+                }
+            }
+        }
+    };
+}
+
+define_type_codes! {
+    /// A pair.
+    Cons = 0, "CONS";
+    /// A pair or `NIL`.
+    List = 1, "LIST";
+    /// A symbol, `NIL` and `T` too.
+    Symbol = 2, "SYMBOL";
+    /// A keyword.
+    Keyword = 3, "KEYWORD";
+    /// Any number.
+    Number = 4, "NUMBER";
+    /// An integer of any size.
+    Integer = 5, "INTEGER";
+    /// An integer of one word.
+    Fixnum = 6, "FIXNUM";
+    /// A double float.
+    Float = 7, "FLOAT";
+    /// An integer or a ratio.
+    Rational = 8, "RATIONAL";
+    /// A character.
+    Character = 9, "CHARACTER";
+    /// A string, also one with a fill pointer.
+    String = 10, "STRING";
+    /// An array of rank 1.
+    Vector = 11, "VECTOR";
+    /// A simple general vector.
+    SimpleVector = 12, "SIMPLE-VECTOR";
+    /// Any array.
+    Array = 13, "ARRAY";
+    /// A function.
+    Function = 14, "FUNCTION";
+    /// A hash table.
+    HashTable = 15, "HASH-TABLE";
+    /// Anything but a pair.
+    Atom = 16, "ATOM";
+    /// `NIL`.
+    Null = 17, "NULL";
+    /// A list or a vector.
+    Sequence = 18, "SEQUENCE";
+    /// An integer, a ratio or a float.
+    Real = 19, "REAL";
+    /// A ratio.
+    Ratio = 20, "RATIO";
+    /// An integer too large for a word.
+    Bignum = 21, "BIGNUM";
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn operands_survive_encoding() {
+        let cases = [
+            Instr::Move { dst: Dst(3), src: Reg(250) },
+            Instr::LoadInt { dst: Dst(0), value: Int16(-32768) },
+            Instr::AddInt { dst: Dst(1), left: Reg(2), value: Int8(-1) },
+            Instr::JumpAlways { to: Jump24(0x7f_ffff) },
+            Instr::Loop { to: Back24(-0x80_0000) },
+            Instr::LoopCount { counter: Reg(1), limit: Reg(2), step: Int8(-128), to: Back(-70000) },
+            Instr::Call { window: Base(9), count: Count(3), want: Want::ALL, pad: Pad(0) },
+            Instr::ReturnAll {},
+        ];
+        for case in cases {
+            let (word, aux) = case.encode();
+            let code: Vec<u32> = std::iter::once(word).chain(aux).collect();
+            assert_eq!(code.len(), case.opcode().words());
+            assert_eq!(Instr::decode(&code, 0), Some(case));
+        }
+    }
+
+    #[test]
+    fn an_instruction_without_its_aux_word_does_not_decode() {
+        let (word, _) = Instr::Call { window: Base(0), count: Count(0), want: Want::ONE, pad: Pad(0) }.encode();
+        assert_eq!(Instr::decode(&[word], 0), None);
+        assert_eq!(Instr::decode(&[0], 0), None);
+    }
+}
