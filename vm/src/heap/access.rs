@@ -1,0 +1,432 @@
+//! Checked access to objects: the whole heap as safe code sees it.
+//!
+//! Guarantees: nothing here can break memory safety, however odd the caller. Each function tests tag and kind and every
+//! index, and answers `None` when one does not fit. That the address itself is good follows from two facts: values with
+//! an address come only from the allocation functions of the same heap, and memory is given back only after
+//! `end_marking`, whose caller vouches that everything still in use was marked. Borrows do the rest: a slice of the
+//! heap borrows the heap, so nothing can be stored, allocated or collected while it is in use.
+//!
+//! Every store of a value goes through [`Heap::store`], which is the write barrier; stores of raw data need none.
+//! The parts of objects that the interpreter trusts without a test (the function of a symbol, the code of a function,
+//! the data of an array, the class of a structure) have setters of their own, or none.
+
+use super::Heap;
+use super::layout::{Array, Bignum, Boxed, Code, Cons, Float, Function, Header, Kind, Symbol};
+use super::object::is_vouched_for;
+use crate::value::Value;
+use std::slice;
+
+/// Whether a bignum is below zero, and its magnitude, least limb first.
+#[derive(Copy, Clone, PartialEq, Eq, Debug)]
+pub struct BignumRef<'a> {
+    /// Below zero.
+    pub negative: bool,
+    /// Magnitude in limbs of 64 bits, least first, the last not zero.
+    pub limbs: &'a [u64],
+}
+
+impl Heap {
+    /// The kind of an object; `None` for a cons and for all that has no address.
+    #[inline(always)]
+    pub fn kind(&self, v: Value) -> Option<Kind> {
+        Some(self.header(v)?.kind)
+    }
+
+    /// Whether `v` is an object of this kind.
+    #[inline(always)]
+    pub fn is(&self, v: Value, kind: Kind) -> bool {
+        self.kind(v) == Some(kind)
+    }
+
+    /// The header of an object.
+    #[inline(always)]
+    pub fn header(&self, v: Value) -> Option<Header> {
+        // SAFETY: an object value is the address of a live object (module header).
+        v.as_object_ptr().map(|object| unsafe { *object })
+    }
+
+    #[inline(always)]
+    fn object_of(&self, v: Value, kind: Kind) -> Option<*mut Header> {
+        let object = v.as_object_ptr()?;
+        // SAFETY: an object value is the address of a live object.
+        if unsafe { (*object).kind } == kind { Some(object) } else { None }
+    }
+
+    // Conses.
+
+    /// The cons, if `v` is one.
+    #[inline(always)]
+    pub fn as_cons(&self, v: Value) -> Option<Cons> {
+        // SAFETY: a cons value is the address of a live cons.
+        v.as_cons_ptr().map(|cons| unsafe { *cons })
+    }
+
+    /// The car of a cons, `nil` of `nil`, `None` of anything else.
+    #[inline(always)]
+    pub fn car(&self, v: Value) -> Option<Value> {
+        match self.as_cons(v) {
+            Some(cons) => Some(cons.car),
+            None if v.is_nil() => Some(v),
+            None => None,
+        }
+    }
+
+    /// The cdr of a cons, `nil` of `nil`, `None` of anything else.
+    #[inline(always)]
+    pub fn cdr(&self, v: Value) -> Option<Value> {
+        match self.as_cons(v) {
+            Some(cons) => Some(cons.cdr),
+            None if v.is_nil() => Some(v),
+            None => None,
+        }
+    }
+
+    /// Sets the car of a cons; `None` if `v` is none.
+    #[inline(always)]
+    pub fn set_car(&mut self, v: Value, new: Value) -> Option<()> {
+        let cons = v.as_cons_ptr()?;
+        // SAFETY: a cons value is the address of a live cons.
+        unsafe { self.store(&raw mut (*cons).car, new) };
+        Some(())
+    }
+
+    /// Sets the cdr of a cons; `None` if `v` is none.
+    #[inline(always)]
+    pub fn set_cdr(&mut self, v: Value, new: Value) -> Option<()> {
+        let cons = v.as_cons_ptr()?;
+        // SAFETY: a cons value is the address of a live cons.
+        unsafe { self.store(&raw mut (*cons).cdr, new) };
+        Some(())
+    }
+
+    // Records.
+
+    /// All slots of a record of this kind, in the order of its layout.
+    #[inline]
+    pub fn record(&self, v: Value, kind: Kind) -> Option<&[Value]> {
+        if !kind.is_record() {
+            return None;
+        }
+        let object = self.object_of(v, kind)?;
+        // SAFETY: a live record has `len` initialised values after its header; they are borrowed with the heap.
+        Some(unsafe { slice::from_raw_parts(object.add(1).cast(), (*object).len as usize) })
+    }
+
+    /// Sets slot `index` of a record of this kind; `None` if `v` is none or has no such slot.
+    ///
+    /// Not for symbols, functions and arrays, nor the class (slot 0) of a structure: these give `None`.
+    #[inline]
+    pub fn record_set(&mut self, v: Value, kind: Kind, index: usize, new: Value) -> Option<()> {
+        if !kind.is_record() || is_vouched_for(kind) && (kind != Kind::Structure || index == 0) {
+            return None;
+        }
+        self.set_slot(v, kind, index, new)
+    }
+
+    #[inline(always)]
+    fn set_slot(&mut self, v: Value, kind: Kind, index: usize, new: Value) -> Option<()> {
+        let object = self.object_of(v, kind)?;
+        // SAFETY: a live record has `len` values after its header, and `index` is below that.
+        unsafe {
+            if index >= (*object).len as usize {
+                return None;
+            }
+            self.store(object.add(1).cast::<Value>().add(index), new);
+        }
+        Some(())
+    }
+
+    /// The elements of a simple vector.
+    #[inline(always)]
+    pub fn vector(&self, v: Value) -> Option<&[Value]> {
+        self.record(v, Kind::SimpleVector)
+    }
+
+    /// Sets an element of a simple vector; `None` if `v` is none or has no such element.
+    #[inline(always)]
+    pub fn vector_set(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
+        self.set_slot(v, Kind::SimpleVector, index, new)
+    }
+
+    /// What a box holds.
+    #[inline(always)]
+    pub fn unbox(&self, v: Value) -> Option<Value> {
+        let object = self.object_of(v, Kind::Box)?;
+        // SAFETY: a live box.
+        Some(unsafe { (*object.cast::<Boxed>()).value })
+    }
+
+    /// Sets what a box holds; `None` if `v` is none.
+    #[inline(always)]
+    pub fn set_box(&mut self, v: Value, new: Value) -> Option<()> {
+        self.set_slot(v, Kind::Box, 0, new)
+    }
+
+    /// The slots of a structure, without its class.
+    #[inline]
+    pub fn structure_slots(&self, v: Value) -> Option<&[Value]> {
+        self.record(v, Kind::Structure).map(|slots| &slots[1..])
+    }
+
+    /// The class of a structure.
+    #[inline]
+    pub fn structure_class(&self, v: Value) -> Option<Value> {
+        self.record(v, Kind::Structure).map(|slots| slots[0])
+    }
+
+    /// Sets a slot of a structure, the class not counted; `None` if `v` is none or has no such slot.
+    #[inline]
+    pub fn structure_set(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
+        self.set_slot(v, Kind::Structure, index.checked_add(1)?, new)
+    }
+
+    // Symbols and functions.
+
+    /// The symbol object, if `v` is one (`nil` and `t` as values of a program are not).
+    #[inline(always)]
+    pub fn symbol(&self, v: Value) -> Option<&Symbol> {
+        let object = self.object_of(v, Kind::Symbol)?;
+        // SAFETY: a live symbol, borrowed with the heap.
+        Some(unsafe { &*object.cast() })
+    }
+
+    /// Sets the value cell of a symbol; `None` if `v` is none.
+    pub fn symbol_set_value(&mut self, v: Value, new: Value) -> Option<()> {
+        self.set_slot(v, Kind::Symbol, 2, new)
+    }
+
+    /// Sets the home package of a symbol; `None` if `v` is none.
+    pub fn symbol_set_package(&mut self, v: Value, new: Value) -> Option<()> {
+        self.set_slot(v, Kind::Symbol, 1, new)
+    }
+
+    /// Sets the function of a symbol; `None` if `v` is none or `new` is not a function.
+    pub fn symbol_set_function(&mut self, v: Value, new: Value) -> Option<()> {
+        if !self.is(new, Kind::Function) {
+            return None;
+        }
+        self.set_slot(v, Kind::Symbol, 3, new)
+    }
+
+    /// Sets the macro function of a symbol; `None` if `v` is none.
+    pub fn symbol_set_macro_function(&mut self, v: Value, new: Value) -> Option<()> {
+        self.set_slot(v, Kind::Symbol, 4, new)
+    }
+
+    /// Sets the property list of a symbol; `None` if `v` is none.
+    pub fn symbol_set_plist(&mut self, v: Value, new: Value) -> Option<()> {
+        self.set_slot(v, Kind::Symbol, 5, new)
+    }
+
+    /// The code of a function.
+    #[inline(always)]
+    pub fn function_code(&self, v: Value) -> Option<Value> {
+        let object = self.object_of(v, Kind::Function)?;
+        // SAFETY: a live function.
+        Some(unsafe { (*object.cast::<Function>()).code })
+    }
+
+    /// The captured values of a function.
+    pub fn function_captures(&self, v: Value) -> Option<&[Value]> {
+        self.record(v, Kind::Function).map(|slots| &slots[1..])
+    }
+
+    /// Sets a captured value of a function; `None` if `v` is none or has no such capture.
+    pub fn function_set_capture(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
+        self.set_slot(v, Kind::Function, index.checked_add(1)?, new)
+    }
+
+    /// The fixed part of code.
+    #[inline(always)]
+    pub fn code(&self, v: Value) -> Option<&Code> {
+        let object = self.object_of(v, Kind::Code)?;
+        // SAFETY: a live code object, borrowed with the heap.
+        Some(unsafe { &*object.cast() })
+    }
+
+    /// The constants of code.
+    pub fn code_constants(&self, v: Value) -> Option<&[Value]> {
+        let object = self.object_of(v, Kind::Code)?;
+        // SAFETY: a live code object has `nconsts` values at the fixed offset.
+        unsafe {
+            let n = (*object.cast::<Code>()).nconsts as usize;
+            Some(slice::from_raw_parts(object.byte_add(Code::CONSTANTS_OFFSET).cast(), n))
+        }
+    }
+
+    /// The instruction words of code, as they are now.
+    pub fn code_words(&self, v: Value) -> Option<&[u32]> {
+        let object = self.object_of(v, Kind::Code)?;
+        // SAFETY: a live code object has `nwords` words after its constants.
+        unsafe {
+            let code = &*object.cast::<Code>();
+            Some(slice::from_raw_parts(object.byte_add(code.words_offset()).cast(), code.nwords as usize))
+        }
+    }
+
+    // Arrays.
+
+    /// Whether `v` may be what an array keeps its elements in.
+    pub fn is_array_data(&self, v: Value) -> bool {
+        matches!(self.kind(v), Some(Kind::SimpleVector | Kind::String | Kind::Bytes))
+    }
+
+    /// The fixed part of an array that is not simple.
+    pub fn array(&self, v: Value) -> Option<&Array> {
+        let object = self.object_of(v, Kind::Array)?;
+        // SAFETY: a live array, borrowed with the heap.
+        Some(unsafe { &*object.cast() })
+    }
+
+    /// The dimensions of an array that is not simple.
+    pub fn array_dimensions(&self, v: Value) -> Option<&[Value]> {
+        self.record(v, Kind::Array).map(|slots| &slots[2..])
+    }
+
+    /// Sets the fill pointer of an array that is not simple; `None` if `v` is none.
+    pub fn array_set_fill(&mut self, v: Value, fill: Value) -> Option<()> {
+        self.set_slot(v, Kind::Array, 1, fill)
+    }
+
+    /// Gives an array other elements; `None` if `v` is no array or `data` none of SimpleVector, String, Bytes.
+    pub fn array_set_data(&mut self, v: Value, data: Value) -> Option<()> {
+        if !self.is_array_data(data) {
+            return None;
+        }
+        self.set_slot(v, Kind::Array, 0, data)
+    }
+
+    /// Sets a dimension of an array that is not simple; `None` if `v` is none or has no such dimension.
+    pub fn array_set_dimension(&mut self, v: Value, axis: usize, size: Value) -> Option<()> {
+        self.set_slot(v, Kind::Array, axis.checked_add(2)?, size)
+    }
+
+    // Numbers.
+
+    /// The double, boxed or not.
+    #[inline]
+    pub fn as_double(&self, v: Value) -> Option<f64> {
+        v.as_double().or_else(|| {
+            let object = self.object_of(v, Kind::Float)?;
+            // SAFETY: a live boxed double.
+            Some(unsafe { (*object.cast::<Float>()).value })
+        })
+    }
+
+    /// Sign and limbs of a bignum.
+    pub fn bignum(&self, v: Value) -> Option<BignumRef<'_>> {
+        let limbs = self.raw(v, Kind::Bignum)?;
+        Some(BignumRef { negative: self.header(v)?.flags & Bignum::NEGATIVE != 0, limbs })
+    }
+
+    /// Numerator and denominator of a ratio.
+    pub fn ratio(&self, v: Value) -> Option<(Value, Value)> {
+        self.record(v, Kind::Ratio).map(|slots| (slots[0], slots[1]))
+    }
+
+    // Raw data.
+
+    /// The code points of a string.
+    #[inline(always)]
+    pub fn string(&self, v: Value) -> Option<&[u32]> {
+        self.raw(v, Kind::String)
+    }
+
+    /// The code points of a string, to be changed in place.
+    #[inline(always)]
+    pub fn string_mut(&mut self, v: Value) -> Option<&mut [u32]> {
+        self.raw_mut(v, Kind::String)
+    }
+
+    /// The text of a string; what is no Unicode scalar value comes out as U+FFFD.
+    pub fn string_text(&self, v: Value) -> Option<String> {
+        let text = |&code: &u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
+        Some(self.string(v)?.iter().map(text).collect())
+    }
+
+    /// Words of 32 bits.
+    #[inline(always)]
+    pub fn words(&self, v: Value) -> Option<&[u32]> {
+        self.raw(v, Kind::Words32)
+    }
+
+    /// Words of 32 bits, to be changed in place.
+    #[inline(always)]
+    pub fn words_mut(&mut self, v: Value) -> Option<&mut [u32]> {
+        self.raw_mut(v, Kind::Words32)
+    }
+
+    /// Bytes.
+    pub fn bytes(&self, v: Value) -> Option<&[u8]> {
+        self.raw(v, Kind::Bytes)
+    }
+
+    /// Bytes, to be changed in place.
+    pub fn bytes_mut(&mut self, v: Value) -> Option<&mut [u8]> {
+        self.raw_mut(v, Kind::Bytes)
+    }
+
+    /// The elements of a raw object. `T` must be the integer of the size of its elements.
+    #[inline(always)]
+    fn raw<T: RawElement>(&self, v: Value, kind: Kind) -> Option<&[T]> {
+        debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
+        let object = self.object_of(v, kind)?;
+        // SAFETY: a live raw object has `len` initialised elements of this size, of a type without invalid patterns.
+        Some(unsafe { slice::from_raw_parts(object.add(1).cast(), (*object).len as usize) })
+    }
+
+    #[inline(always)]
+    fn raw_mut<T: RawElement>(&mut self, v: Value, kind: Kind) -> Option<&mut [T]> {
+        debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
+        let object = self.object_of(v, kind)?;
+        // SAFETY: as in `raw`; the heap is borrowed mutably, so nobody else sees the elements.
+        Some(unsafe { slice::from_raw_parts_mut(object.add(1).cast(), (*object).len as usize) })
+    }
+
+    // Flags.
+
+    /// The flags of an object of this kind.
+    #[inline]
+    pub fn flags(&self, v: Value, kind: Kind) -> Option<u8> {
+        self.object_of(v, kind)?;
+        Some(self.header(v)?.flags)
+    }
+
+    /// Sets the flags of an object of this kind; `None` if `v` is none.
+    pub fn set_flags(&mut self, v: Value, kind: Kind, flags: u8) -> Option<()> {
+        let object = self.object_of(v, kind)?;
+        // SAFETY: a live object; no size and no memory safety depends on the flags.
+        unsafe { (*object).flags = flags };
+        Some(())
+    }
+
+    /// Sets `aux` of an object of this kind; `None` if `v` is none, or for arrays, where it is the rank.
+    pub fn set_aux(&mut self, v: Value, kind: Kind, aux: u16) -> Option<()> {
+        if kind == Kind::Array {
+            return None;
+        }
+        let object = self.object_of(v, kind)?;
+        // SAFETY: a live object; no size and no memory safety depends on `aux`.
+        unsafe { (*object).aux = aux };
+        Some(())
+    }
+
+    /// The write barrier and the store behind it: the one way by which a value overwrites another in the heap.
+    ///
+    /// # Safety
+    /// `slot` is a value slot of a live object of this heap.
+    #[inline(always)]
+    pub unsafe fn store(&mut self, slot: *mut Value, new: Value) {
+        // SAFETY: by the contract, `slot` is initialised and ours to write.
+        unsafe {
+            self.log_if_marking(*slot);
+            *slot = new;
+        }
+    }
+}
+
+/// Elements of raw objects.
+trait RawElement: Copy {}
+impl RawElement for u8 {}
+impl RawElement for u32 {}
+impl RawElement for u64 {}

@@ -1,0 +1,393 @@
+//! Making objects: one function per kind.
+//!
+//! Guarantees: no function here collects, so values in the caller's hands stay good; every object is initialised in
+//! full before its address becomes a [`Value`]; on an error nothing has changed that a program could see. Initialising
+//! stores need no barrier, since nothing was overwritten.
+//!
+//! The promises about contents that the interpreter relies on are asserted here: the code of a function is a Code, the
+//! function of a symbol is a Function, its name a String, the class of a structure a Class, the data of an array a
+//! SimpleVector, String or Bytes.
+
+use super::layout::{Bignum, Boxed, Code, Cons, Float, Function, Header, Kind, MAX_LENGTH, Symbol, Vector};
+use super::{AllocError, Heap};
+use crate::value::Value;
+
+/// What a Code object is made from.
+#[derive(Copy, Clone, Debug)]
+pub struct CodeParts<'a> {
+    /// What names it in a backtrace.
+    pub name: Value,
+    /// Debug information, or `nil`.
+    pub debug: Value,
+    /// What it belongs to, or `nil`.
+    pub owner: Value,
+    /// The exact number of arguments, or [`Code::ANY_ARITY`].
+    pub arity: u32,
+    /// Number of registers of a frame.
+    pub nregs: u32,
+    /// The constants.
+    pub constants: &'a [Value],
+    /// The instruction words. `entry` will be the first of them.
+    pub words: &'a [u32],
+}
+
+impl Heap {
+    /// A cons, if there is room in the current hole: the part of [`Heap::cons`] to inline into a hot loop.
+    #[inline(always)]
+    pub fn cons_in_hole(&mut self, car: Value, cdr: Value) -> Option<Value> {
+        let cons = self.bump(size_of::<Cons>())?.as_ptr().cast::<Cons>();
+        // SAFETY: `bump` gave us 16 aligned bytes of our own, and both fields are written before the value is made.
+        unsafe {
+            cons.write(Cons { car, cdr });
+            Some(Value::from_cons(cons))
+        }
+    }
+
+    /// A new cons.
+    ///
+    /// # Errors
+    /// As for every allocation, see [`AllocError`].
+    #[inline]
+    pub fn cons(&mut self, car: Value, cdr: Value) -> Result<Value, AllocError> {
+        match self.cons_in_hole(car, cdr) {
+            Some(v) => Ok(v),
+            None => self.cons_slow(car, cdr),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn cons_slow(&mut self, car: Value, cdr: Value) -> Result<Value, AllocError> {
+        let cons = self.allocate(size_of::<Cons>())?.as_ptr().cast::<Cons>();
+        // SAFETY: `allocate` gave us 16 aligned bytes of our own, written before the value is made.
+        unsafe {
+            cons.write(Cons { car, cdr });
+            Ok(Value::from_cons(cons))
+        }
+    }
+
+    /// A new list of `items`.
+    pub fn list(&mut self, items: &[Value]) -> Result<Value, AllocError> {
+        self.list_with_tail(items, Value::NIL)
+    }
+
+    /// A new list of `items` that ends in `tail` (`list*`).
+    pub fn list_with_tail(&mut self, items: &[Value], tail: Value) -> Result<Value, AllocError> {
+        items.iter().rev().try_fold(tail, |rest, &item| self.cons(item, rest))
+    }
+
+    /// A new box.
+    #[inline]
+    pub fn alloc_box(&mut self, value: Value) -> Result<Value, AllocError> {
+        let boxed = self.allocate(size_of::<Boxed>())?.as_ptr().cast::<Boxed>();
+        let header = Header { kind: Kind::Box, flags: 0, aux: 0, len: 1 };
+        // SAFETY: 16 aligned bytes of our own, written before the value is made.
+        unsafe {
+            boxed.write(Boxed { header, value });
+            Ok(Value::from_object(boxed.cast()))
+        }
+    }
+
+    /// The double `x`, boxed if it has to be.
+    #[inline]
+    pub fn float(&mut self, x: f64) -> Result<Value, AllocError> {
+        match Value::double(x) {
+            Some(v) => Ok(v),
+            None => self.alloc_float(x),
+        }
+    }
+
+    #[cold]
+    fn alloc_float(&mut self, x: f64) -> Result<Value, AllocError> {
+        let float = self.allocate(size_of::<Float>())?.as_ptr().cast::<Float>();
+        let header = Header { kind: Kind::Float, flags: 0, aux: 0, len: 1 };
+        // SAFETY: 16 aligned bytes of our own, written before the value is made.
+        unsafe {
+            float.write(Float { header, value: x });
+            Ok(Value::from_object(float.cast()))
+        }
+    }
+
+    /// A new record of values.
+    ///
+    /// # Panics
+    /// When `kind` is not a record, or is one whose contents the heap vouches for (symbol, function, array,
+    /// structure), which have functions of their own.
+    pub fn alloc_record(
+        &mut self,
+        kind: Kind,
+        flags: u8,
+        aux: u16,
+        slots: &[Value],
+    ) -> Result<Value, AllocError> {
+        assert!(kind.is_record() && !is_vouched_for(kind), "{kind:?} is made by a function of its own");
+        self.record_from(kind, flags, aux, &[], slots)
+    }
+
+    /// A new record of `len` slots, all `fill`. For kinds as [`Heap::alloc_record`].
+    ///
+    /// # Panics
+    /// As [`Heap::alloc_record`].
+    pub fn alloc_record_filled(
+        &mut self,
+        kind: Kind,
+        aux: u16,
+        len: usize,
+        fill: Value,
+    ) -> Result<Value, AllocError> {
+        assert!(kind.is_record() && !is_vouched_for(kind), "{kind:?} is made by a function of its own");
+        let vector = self.begin_object(kind, 0, aux, len)?;
+        // SAFETY: `begin_object` gave room for `len` elements; all are written before the value is made.
+        unsafe {
+            let elements = &raw mut (*vector.cast::<Vector>()).elements;
+            let elements = elements.cast::<Value>();
+            for i in 0..len {
+                elements.add(i).write(fill);
+            }
+            Ok(Value::from_object(vector))
+        }
+    }
+
+    /// A new simple vector of `elements`.
+    pub fn alloc_vector(&mut self, elements: &[Value]) -> Result<Value, AllocError> {
+        self.record_from(Kind::SimpleVector, 0, 0, &[], elements)
+    }
+
+    /// A new simple vector of `len` elements, all `fill`.
+    pub fn alloc_vector_filled(&mut self, len: usize, fill: Value) -> Result<Value, AllocError> {
+        self.alloc_record_filled(Kind::SimpleVector, 0, len, fill)
+    }
+
+    /// A new ratio. That it is in lowest terms and its denominator above one is up to the caller.
+    pub fn alloc_ratio(&mut self, numerator: Value, denominator: Value) -> Result<Value, AllocError> {
+        self.record_from(Kind::Ratio, 0, 0, &[], &[numerator, denominator])
+    }
+
+    /// A new identity; `value` rides along.
+    pub fn alloc_tag(&mut self, value: Value) -> Result<Value, AllocError> {
+        self.record_from(Kind::Tag, 0, 0, &[], &[value])
+    }
+
+    /// A new instance of `class` with these slots.
+    ///
+    /// # Panics
+    /// When `class` is not a Class.
+    pub fn alloc_structure(&mut self, class: Value, slots: &[Value]) -> Result<Value, AllocError> {
+        assert_eq!(self.kind(class), Some(Kind::Class), "the class of a structure is a Class");
+        self.record_from(Kind::Structure, 0, 0, &[class], slots)
+    }
+
+    /// A new array that is not simple. `aux` becomes the number of dimensions.
+    ///
+    /// # Panics
+    /// When `data` is none of SimpleVector, String, Bytes, or there are more than 65 535 dimensions.
+    pub fn alloc_array(
+        &mut self,
+        flags: u8,
+        data: Value,
+        fill: Value,
+        dimensions: &[Value],
+    ) -> Result<Value, AllocError> {
+        assert!(self.is_array_data(data), "the data of an array is a vector or string");
+        let rank = u16::try_from(dimensions.len()).expect("an array has less than 65536 dimensions");
+        self.record_from(Kind::Array, flags, rank, &[data, fill], dimensions)
+    }
+
+    /// A new symbol without value, macro function and properties.
+    ///
+    /// # Panics
+    /// When `name` is not a String or `function` not a Function.
+    pub fn alloc_symbol(
+        &mut self,
+        flags: u8,
+        name: Value,
+        package: Value,
+        function: Value,
+    ) -> Result<Value, AllocError> {
+        assert_eq!(self.kind(name), Some(Kind::String), "the name of a symbol is a string");
+        assert_eq!(self.kind(function), Some(Kind::Function), "the function of a symbol is a function");
+        let slots: [Value; Symbol::LEN] = [name, package, Value::UNBOUND, function, Value::NIL, Value::NIL];
+        self.record_from(Kind::Symbol, flags, 0, &[], &slots)
+    }
+
+    /// A new function: code with captured variables.
+    ///
+    /// # Panics
+    /// When `code` is not a Code.
+    pub fn alloc_function(&mut self, code: Value, captures: &[Value]) -> Result<Value, AllocError> {
+        assert_eq!(self.kind(code), Some(Kind::Code), "the code of a function is a Code");
+        self.record_from(Kind::Function, 0, 0, &[code], captures)
+    }
+
+    /// A new function whose captures the caller fills in, for the interpreter: they start out `nil`.
+    ///
+    /// # Safety
+    /// `code` is a Code.
+    pub unsafe fn alloc_closure(
+        &mut self,
+        code: Value,
+        ncaptures: usize,
+    ) -> Result<*mut Function, AllocError> {
+        debug_assert_eq!(self.kind(code), Some(Kind::Code));
+        let function = self.begin_object(Kind::Function, 0, 0, 1 + ncaptures)?.cast::<Function>();
+        // SAFETY: `begin_object` gave room for the code and the captures.
+        unsafe {
+            (&raw mut (*function).code).write(code);
+            let captures = (&raw mut (*function).captures).cast::<Value>();
+            for i in 0..ncaptures {
+                captures.add(i).write(Value::NIL);
+            }
+        }
+        function.expose_provenance();
+        Ok(function)
+    }
+
+    /// New code.
+    ///
+    /// # Safety
+    /// Words, constants, registers and arity have passed the verifier together, or were made by the VM to the same
+    /// rules: the interpreter runs them without a check.
+    pub unsafe fn alloc_code(&mut self, parts: CodeParts<'_>) -> Result<Value, AllocError> {
+        let (nconsts, nwords) = (parts.constants.len(), parts.words.len());
+        let len = Code::len(nconsts, nwords);
+        if nconsts > MAX_LENGTH || nwords > MAX_LENGTH {
+            return Err(AllocError::TooLarge { requested: len.saturating_mul(8) });
+        }
+        let object = self.begin_object(Kind::Code, 0, 0, len)?;
+        let code = object.cast::<Code>();
+        // SAFETY: `begin_object` gave room for `len` units of 8 bytes, which `Code::len` computed for exactly these
+        // constants and words; everything is written before the value is made. Provenance is exposed because the
+        // interpreter walks from `entry` through the whole object.
+        unsafe {
+            let constants = (&raw mut (*code).constants).cast::<Value>();
+            let words = constants.add(nconsts).cast::<u32>();
+            code.write(Code {
+                header: *object,
+                name: parts.name,
+                debug: parts.debug,
+                owner: parts.owner,
+                entry: words,
+                arity: parts.arity,
+                nregs: parts.nregs,
+                nconsts: nconsts as u32,
+                nwords: nwords as u32,
+                spare: [0; 2],
+                constants: [],
+            });
+            std::ptr::copy_nonoverlapping(parts.constants.as_ptr(), constants, nconsts);
+            std::ptr::copy_nonoverlapping(parts.words.as_ptr(), words, nwords);
+            Ok(Value::from_object(object))
+        }
+    }
+
+    /// A new string of these code points.
+    pub fn alloc_string(&mut self, characters: &[u32]) -> Result<Value, AllocError> {
+        self.raw_from(Kind::String, 0, characters)
+    }
+
+    /// A new string of `len` times the code point `fill`.
+    pub fn alloc_string_filled(&mut self, len: usize, fill: u32) -> Result<Value, AllocError> {
+        self.raw_filled(Kind::String, len, fill)
+    }
+
+    /// A new string with the text of `text`.
+    pub fn alloc_str(&mut self, text: &str) -> Result<Value, AllocError> {
+        let object = self.begin_object(Kind::String, 0, 0, text.chars().count())?;
+        // SAFETY: `begin_object` gave room for as many words as `text` has characters.
+        unsafe {
+            let characters = object.add(1).cast::<u32>();
+            for (i, c) in text.chars().enumerate() {
+                characters.add(i).write(c as u32);
+            }
+            Ok(Value::from_object(object))
+        }
+    }
+
+    /// A new bignum. Leading zero limbs are cut off; that the number is no fixnum is up to the caller.
+    pub fn alloc_bignum(&mut self, negative: bool, limbs: &[u64]) -> Result<Value, AllocError> {
+        let significant = limbs.iter().rposition(|&limb| limb != 0).map_or(0, |last| last + 1);
+        let flags = if negative { Bignum::NEGATIVE } else { 0 };
+        self.raw_from(Kind::Bignum, flags, &limbs[..significant])
+    }
+
+    /// New words of 32 bits, all `fill`.
+    pub fn alloc_words(&mut self, len: usize, fill: u32) -> Result<Value, AllocError> {
+        self.raw_filled(Kind::Words32, len, fill)
+    }
+
+    /// New bytes.
+    pub fn alloc_bytes(&mut self, bytes: &[u8]) -> Result<Value, AllocError> {
+        self.raw_from(Kind::Bytes, 0, bytes)
+    }
+
+    /// New bytes, all `fill`.
+    pub fn alloc_bytes_filled(&mut self, len: usize, fill: u8) -> Result<Value, AllocError> {
+        self.raw_filled(Kind::Bytes, len, fill)
+    }
+
+    /// Memory for an object, its header written, its `len` elements not.
+    #[inline]
+    fn begin_object(
+        &mut self,
+        kind: Kind,
+        flags: u8,
+        aux: u16,
+        len: usize,
+    ) -> Result<*mut Header, AllocError> {
+        if len > MAX_LENGTH {
+            return Err(AllocError::TooLarge { requested: len.saturating_mul(1 << kind.element_shift()) });
+        }
+        let object = self.allocate(kind.size(len))?.as_ptr().cast::<Header>();
+        // SAFETY: `allocate` gave us at least 16 aligned bytes of our own.
+        unsafe { object.write(Header { kind, flags, aux, len: len as u32 }) };
+        Ok(object)
+    }
+
+    /// A record of the values of `first` and then those of `rest`.
+    fn record_from(
+        &mut self,
+        kind: Kind,
+        flags: u8,
+        aux: u16,
+        first: &[Value],
+        rest: &[Value],
+    ) -> Result<Value, AllocError> {
+        debug_assert!(kind.is_record());
+        let object = self.begin_object(kind, flags, aux, first.len() + rest.len())?;
+        // SAFETY: `begin_object` gave room for all elements; they are written before the value is made.
+        unsafe {
+            let elements = object.add(1).cast::<Value>();
+            std::ptr::copy_nonoverlapping(first.as_ptr(), elements, first.len());
+            std::ptr::copy_nonoverlapping(rest.as_ptr(), elements.add(first.len()), rest.len());
+            Ok(Value::from_object(object))
+        }
+    }
+
+    fn raw_from<T: Copy>(&mut self, kind: Kind, flags: u8, elements: &[T]) -> Result<Value, AllocError> {
+        debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
+        let object = self.begin_object(kind, flags, 0, elements.len())?;
+        // SAFETY: `begin_object` gave room for as many elements of this size; they are written before the value is made.
+        unsafe {
+            std::ptr::copy_nonoverlapping(elements.as_ptr(), object.add(1).cast::<T>(), elements.len());
+            Ok(Value::from_object(object))
+        }
+    }
+
+    fn raw_filled<T: Copy>(&mut self, kind: Kind, len: usize, fill: T) -> Result<Value, AllocError> {
+        debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
+        let object = self.begin_object(kind, 0, 0, len)?;
+        // SAFETY: `begin_object` gave room for `len` elements of this size; they are written before the value is made.
+        unsafe {
+            let elements = object.add(1).cast::<T>();
+            for i in 0..len {
+                elements.add(i).write(fill);
+            }
+            Ok(Value::from_object(object))
+        }
+    }
+}
+
+/// Kinds of which the heap guarantees something about the contents.
+pub(super) const fn is_vouched_for(kind: Kind) -> bool {
+    matches!(kind, Kind::Symbol | Kind::Function | Kind::Array | Kind::Structure)
+}

@@ -1,0 +1,512 @@
+//! `Value`: one 64-bit word that is any datum of a program.
+//!
+//! ```text
+//! low bits   what                  rest of the word
+//!      x00   fixnum                62-bit signed integer, shifted left by two
+//!      x11   double                (bits + 3·2^60) rotated left by three, for 2^-255 <= |x| < 2^257
+//!      001   cons                  address of a 16-byte `Cons`, plus one
+//!      101   object                address of a `Header`, plus five
+//!      010   immediate             sub-tag in bits 3..8, payload from bit 8
+//!      110   handle                generation in bits 3..32, index in bits 32..64
+//! ```
+//!
+//! Guarantees: two values are `eq` in the language exactly when their words are equal, except that nothing is
+//! promised about boxed numbers; every word that safe code can make is either free of addresses or was handed out by
+//! the heap. Truth is one compare with [`Value::NIL`]. Fixnums add, subtract and compare without untagging, a test of
+//! two fixnums is `(a | b) & 3 == 0`, of two immediate doubles `a & b & 3 == 3`.
+//!
+//! A raw pointer to an instruction has its two low bits clear, so the collector takes it for a fixnum; that is why a
+//! stack may hold return addresses between values.
+//!
+//! Not here: following an address (`heap`), doubles outside the window and big integers (boxed, `heap`), the names
+//! and property lists of `nil` and `t`, whose symbol objects the VM keeps aside: in programs [`Value::NIL`] and
+//! [`Value::T`] are their only representation.
+//!
+//! Unsafe invariants:
+//! 1. A word tagged as cons or object was made from the address of a live object of the heap of this VM
+//!    ([`Value::from_cons`], [`Value::from_object`]), whose provenance was exposed.
+//! 2. Everything else a word says is arithmetic on the word alone.
+//!
+//! Source: the float encoding is the one-range member of the family in Melançon, Serrano and Feeley 2024
+//! (arXiv 2411.16544), as in CRuby's flonums; the tags follow the measurements in the design notes.
+
+#![allow(unsafe_code)]
+
+use crate::heap::layout::{Cons, Header};
+use std::fmt;
+
+/// A datum: a number, character or constant in the word itself, or the address of a cons or object in the heap.
+///
+/// `==` is the language's `eq`.
+#[repr(transparent)]
+#[derive(Copy, Clone, PartialEq, Eq)]
+pub struct Value(u64);
+
+const _: () = assert!(size_of::<Value>() == 8 && align_of::<Value>() == 8);
+
+/// Mask of the three tag bits.
+pub const TAG_MASK: u64 = 7;
+/// Tag of a cons.
+pub const TAG_CONS: u64 = 1;
+/// Tag of a heap object with a header.
+pub const TAG_OBJECT: u64 = 5;
+/// Tag of an immediate constant or character.
+pub const TAG_IMMEDIATE: u64 = 2;
+/// Tag of a handle.
+pub const TAG_HANDLE: u64 = 6;
+
+const SUB_NIL: u64 = 0;
+const SUB_T: u64 = 1;
+const SUB_UNBOUND: u64 = 2;
+const SUB_UNSUPPLIED: u64 = 3;
+const SUB_EOF: u64 = 4;
+const SUB_CHARACTER: u64 = 5;
+const SUB_POSITIVE_ZERO: u64 = 6;
+const SUB_NEGATIVE_ZERO: u64 = 7;
+const SUB_INFINITY: u64 = 8;
+const SUB_NEGATIVE_INFINITY: u64 = 9;
+const SUB_NAN: u64 = 10;
+const SUB_POISON: u64 = 31;
+
+const fn immediate(sub: u64, payload: u64) -> Value {
+    Value(payload << 8 | sub << 3 | TAG_IMMEDIATE)
+}
+
+/// What moves the exponents of the window to the two patterns that the rotation turns into the tag.
+const DOUBLE_BIAS: u64 = 3 << 60;
+
+impl Value {
+    /// The empty list and falsehood.
+    pub const NIL: Value = immediate(SUB_NIL, 0);
+    /// Truth.
+    pub const T: Value = immediate(SUB_T, 0);
+    /// What a variable without a value holds. Never seen by a program.
+    pub const UNBOUND: Value = immediate(SUB_UNBOUND, 0);
+    /// What a parameter holds for which no argument was given. Never seen by a program.
+    pub const UNSUPPLIED: Value = immediate(SUB_UNSUPPLIED, 0);
+    /// What reading past the end gives inside the VM.
+    pub const EOF: Value = immediate(SUB_EOF, 0);
+    /// The double `+0.0`.
+    pub const POSITIVE_ZERO: Value = immediate(SUB_POSITIVE_ZERO, 0);
+    /// The double `-0.0`.
+    pub const NEGATIVE_ZERO: Value = immediate(SUB_NEGATIVE_ZERO, 0);
+    /// The double positive infinity.
+    pub const INFINITY: Value = immediate(SUB_INFINITY, 0);
+    /// The double negative infinity.
+    pub const NEGATIVE_INFINITY: Value = immediate(SUB_NEGATIVE_INFINITY, 0);
+    /// The one double that is not a number; payloads of other NaNs are dropped.
+    pub const NAN: Value = immediate(SUB_NAN, 0);
+    /// What debug builds write over freed memory. No live object holds it.
+    pub(crate) const POISON: Value = immediate(SUB_POISON, 0xBAD_F00D);
+
+    /// Least fixnum, −2^61.
+    pub const FIXNUM_MIN: i64 = -(1 << 61);
+    /// Greatest fixnum, 2^61 − 1.
+    pub const FIXNUM_MAX: i64 = (1 << 61) - 1;
+    /// One more than the greatest code of a character.
+    pub const CHARACTER_LIMIT: u32 = 0x11_0000;
+    /// One more than the greatest generation of a handle.
+    pub const GENERATION_LIMIT: u32 = 1 << 29;
+
+    /// The word itself, for tables keyed by identity of what is not an address, and for the interpreter.
+    ///
+    /// An address must not decide anything that a program can see; see `Heap::identity` for a number that may.
+    #[inline(always)]
+    pub const fn bits(self) -> u64 {
+        self.0
+    }
+
+    /// Takes a word as a value.
+    ///
+    /// # Safety
+    /// The word was made by [`Value::bits`], or it has neither the tag of a cons nor that of an object.
+    #[inline(always)]
+    pub const unsafe fn from_bits(bits: u64) -> Value {
+        Value(bits)
+    }
+
+    // Fixnums.
+
+    /// The fixnum `n`, or nothing when `n` does not fit into 62 bits.
+    #[inline(always)]
+    pub const fn fixnum(n: i64) -> Option<Value> {
+        if n >= Self::FIXNUM_MIN && n <= Self::FIXNUM_MAX { Some(Value((n << 2) as u64)) } else { None }
+    }
+
+    /// The fixnum `n`; for counts and small constants.
+    #[inline(always)]
+    pub const fn small(n: i32) -> Value {
+        Value(((n as i64) << 2) as u64)
+    }
+
+    /// The length or index `n`.
+    ///
+    /// # Panics
+    /// In debug builds, when `n` is not below 2^61, which no length is.
+    #[inline(always)]
+    pub const fn index(n: usize) -> Value {
+        debug_assert!(n as u64 <= Self::FIXNUM_MAX as u64);
+        Value((n as u64) << 2)
+    }
+
+    /// Whether this is a fixnum.
+    #[inline(always)]
+    pub const fn is_fixnum(self) -> bool {
+        self.0 & 3 == 0
+    }
+
+    /// Whether both are fixnums, in one test.
+    #[inline(always)]
+    pub const fn both_fixnums(a: Value, b: Value) -> bool {
+        (a.0 | b.0) & 3 == 0
+    }
+
+    /// The integer, if this is a fixnum.
+    #[inline(always)]
+    pub const fn as_fixnum(self) -> Option<i64> {
+        if self.is_fixnum() { Some(self.0 as i64 >> 2) } else { None }
+    }
+
+    /// The integer, if this is a fixnum and not negative and fits an index.
+    #[inline(always)]
+    pub const fn as_index(self) -> Option<usize> {
+        if self.is_fixnum() && self.0 as i64 >= 0 { Some((self.0 >> 2) as usize) } else { None }
+    }
+
+    // Doubles.
+
+    /// The double `x` if it needs no box: inside the window, zero, infinite, or not a number.
+    ///
+    /// `Heap::float` takes every double.
+    #[inline(always)]
+    pub const fn double(x: f64) -> Option<Value> {
+        let word = x.to_bits().wrapping_add(DOUBLE_BIAS).rotate_left(3);
+        if word & 3 == 3 { Some(Value(word)) } else { Self::special_double(x) }
+    }
+
+    /// The doubles that have a constant of their own.
+    #[cold]
+    const fn special_double(x: f64) -> Option<Value> {
+        const NEGATIVE_ZERO_BITS: u64 = 1 << 63;
+        match x.to_bits() {
+            0 => Some(Self::POSITIVE_ZERO),
+            NEGATIVE_ZERO_BITS => Some(Self::NEGATIVE_ZERO),
+            _ if x.is_nan() => Some(Self::NAN),
+            _ if x.is_infinite() => Some(if x > 0.0 { Self::INFINITY } else { Self::NEGATIVE_INFINITY }),
+            _ => None,
+        }
+    }
+
+    /// Whether this is a double inside the window. Zero, the infinities and NaN are not, nor are boxed ones.
+    #[inline(always)]
+    pub const fn is_windowed_double(self) -> bool {
+        self.0 & 3 == 3
+    }
+
+    /// Whether both are doubles inside the window, in one test.
+    #[inline(always)]
+    pub const fn both_windowed_doubles(a: Value, b: Value) -> bool {
+        a.0 & b.0 & 3 == 3
+    }
+
+    /// The double of a value of which [`Value::is_windowed_double`] is true; any other gives some number.
+    #[inline(always)]
+    pub const fn windowed_double(self) -> f64 {
+        f64::from_bits(self.0.rotate_right(3).wrapping_sub(DOUBLE_BIAS))
+    }
+
+    /// The double, if this is one without a box. `Heap::as_double` knows the boxed ones too.
+    #[inline(always)]
+    pub const fn as_double(self) -> Option<f64> {
+        if self.is_windowed_double() { Some(self.windowed_double()) } else { self.as_special_double() }
+    }
+
+    #[cold]
+    const fn as_special_double(self) -> Option<f64> {
+        match self {
+            Self::POSITIVE_ZERO => Some(0.0),
+            Self::NEGATIVE_ZERO => Some(-0.0),
+            Self::INFINITY => Some(f64::INFINITY),
+            Self::NEGATIVE_INFINITY => Some(f64::NEG_INFINITY),
+            Self::NAN => Some(f64::NAN),
+            _ => None,
+        }
+    }
+
+    // Immediates.
+
+    /// `t` for true, `nil` for false.
+    #[inline(always)]
+    pub const fn boolean(b: bool) -> Value {
+        if b { Self::T } else { Self::NIL }
+    }
+
+    /// Whether this is `nil`.
+    #[inline(always)]
+    pub const fn is_nil(self) -> bool {
+        self.0 == Self::NIL.0
+    }
+
+    /// Whether this is anything but `nil`.
+    #[inline(always)]
+    pub const fn is_true(self) -> bool {
+        !self.is_nil()
+    }
+
+    /// The character with this code, or nothing at [`Value::CHARACTER_LIMIT`] and above. Surrogates are characters,
+    /// as they are in SBCL.
+    #[inline(always)]
+    pub const fn character(code: u32) -> Option<Value> {
+        if code < Self::CHARACTER_LIMIT { Some(immediate(SUB_CHARACTER, code as u64)) } else { None }
+    }
+
+    /// Whether this is a character.
+    #[inline(always)]
+    pub const fn is_character(self) -> bool {
+        self.0 & 0xFF == SUB_CHARACTER << 3 | TAG_IMMEDIATE
+    }
+
+    /// The code, if this is a character.
+    #[inline(always)]
+    pub const fn as_character(self) -> Option<u32> {
+        if self.is_character() { Some((self.0 >> 8) as u32) } else { None }
+    }
+
+    // Handles.
+
+    /// The handle with this index and generation, or nothing at [`Value::GENERATION_LIMIT`] and above.
+    #[inline(always)]
+    pub const fn handle(index: u32, generation: u32) -> Option<Value> {
+        if generation < Self::GENERATION_LIMIT {
+            Some(Value((index as u64) << 32 | (generation as u64) << 3 | TAG_HANDLE))
+        } else {
+            None
+        }
+    }
+
+    /// Index and generation, if this is a handle.
+    #[inline(always)]
+    pub const fn as_handle(self) -> Option<(u32, u32)> {
+        if self.0 & TAG_MASK == TAG_HANDLE {
+            Some(((self.0 >> 32) as u32, (self.0 as u32) >> 3))
+        } else {
+            None
+        }
+    }
+
+    // Addresses. Following one is the business of `heap` and the interpreter.
+
+    /// Whether this is a cons.
+    #[inline(always)]
+    pub const fn is_cons(self) -> bool {
+        self.0 & TAG_MASK == TAG_CONS
+    }
+
+    /// Whether this is a cons or `nil`.
+    #[inline(always)]
+    pub const fn is_list(self) -> bool {
+        self.is_cons() || self.is_nil()
+    }
+
+    /// Whether this is an object with a header; its kind is asked of the heap.
+    #[inline(always)]
+    pub const fn is_object(self) -> bool {
+        self.0 & TAG_MASK == TAG_OBJECT
+    }
+
+    /// Whether this is an address: a cons or an object. The collector follows these and no others.
+    #[inline(always)]
+    pub const fn is_address(self) -> bool {
+        self.0 & 3 == 1
+    }
+
+    /// The address of the cons, if this is one.
+    #[inline(always)]
+    pub fn as_cons_ptr(self) -> Option<*mut Cons> {
+        if self.is_cons() { Some(self.cons_ptr()) } else { None }
+    }
+
+    /// The address of the object, if this is one.
+    #[inline(always)]
+    pub fn as_object_ptr(self) -> Option<*mut Header> {
+        if self.is_object() { Some(self.object_ptr()) } else { None }
+    }
+
+    /// The address of the cons; without meaning unless this is one.
+    #[inline(always)]
+    pub fn cons_ptr(self) -> *mut Cons {
+        debug_assert!(self.is_cons());
+        std::ptr::with_exposed_provenance_mut((self.0 - TAG_CONS) as usize)
+    }
+
+    /// The address of the object; without meaning unless this is one.
+    #[inline(always)]
+    pub fn object_ptr(self) -> *mut Header {
+        debug_assert!(self.is_object());
+        std::ptr::with_exposed_provenance_mut((self.0 - TAG_OBJECT) as usize)
+    }
+
+    /// The cons at `cons`.
+    ///
+    /// # Safety
+    /// `cons` is the address of an initialised cons in the heap of this VM.
+    #[inline(always)]
+    pub(crate) unsafe fn from_cons(cons: *mut Cons) -> Value {
+        let address = cons.expose_provenance() as u64;
+        debug_assert!(address & 15 == 0);
+        Value(address + TAG_CONS)
+    }
+
+    /// The object at `object`.
+    ///
+    /// # Safety
+    /// `object` is the address of an object in the heap of this VM, all of it initialised.
+    #[inline(always)]
+    pub(crate) unsafe fn from_object(object: *mut Header) -> Value {
+        let address = object.expose_provenance() as u64;
+        debug_assert!(address & 15 == 0);
+        Value(address + TAG_OBJECT)
+    }
+}
+
+impl From<bool> for Value {
+    fn from(b: bool) -> Value {
+        Value::boolean(b)
+    }
+}
+
+/// For developers: the tag and what the word alone tells. Addresses are shown, so no program may see this.
+impl fmt::Debug for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(n) = self.as_fixnum() {
+            return write!(f, "{n}");
+        }
+        if let Some(x) = self.as_double() {
+            return write!(f, "{x:?}");
+        }
+        if let Some(code) = self.as_character() {
+            return write!(f, "#\\u+{code:X}");
+        }
+        if let Some((index, generation)) = self.as_handle() {
+            return write!(f, "handle {index}.{generation}");
+        }
+        match *self {
+            Value::NIL => f.write_str("nil"),
+            Value::T => f.write_str("t"),
+            Value::UNBOUND => f.write_str("unbound"),
+            Value::UNSUPPLIED => f.write_str("unsupplied"),
+            Value::EOF => f.write_str("eof"),
+            Value::POISON => f.write_str("poison"),
+            v if v.is_cons() => write!(f, "cons@{:x}", v.0),
+            v if v.is_object() => write!(f, "object@{:x}", v.0),
+            v => write!(f, "invalid {:x}", v.0),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fixnums_hold_62_bits() {
+        for n in [0, 1, -1, 42, Value::FIXNUM_MIN, Value::FIXNUM_MAX] {
+            let v = Value::fixnum(n).unwrap();
+            assert_eq!(v.as_fixnum(), Some(n));
+            assert!(v.is_fixnum() && v.as_double().is_none() && !v.is_address() && v.as_handle().is_none());
+        }
+        assert_eq!(Value::fixnum(Value::FIXNUM_MIN - 1), None);
+        assert_eq!(Value::fixnum(Value::FIXNUM_MAX + 1), None);
+        assert_eq!(Value::small(-7).as_fixnum(), Some(-7));
+        assert_eq!(Value::small(-7).as_index(), None);
+        assert_eq!(Value::index(7).as_index(), Some(7));
+    }
+
+    #[test]
+    fn doubles_in_the_window_need_no_box() {
+        let least = 2f64.powi(-255);
+        let beyond = 2f64.powi(257);
+        let greatest = f64::from_bits(beyond.to_bits() - 1);
+        for x in [1.0, -1.0, 0.1, -1e70, 3.5e-70, least, -least, greatest, -greatest] {
+            let v = Value::double(x).unwrap();
+            assert!(v.is_windowed_double() && !v.is_fixnum(), "{x}");
+            assert_eq!(v.as_double().map(f64::to_bits), Some(x.to_bits()));
+        }
+        let below = f64::from_bits(least.to_bits() - 1);
+        for x in [below, -below, beyond, -beyond, f64::MIN_POSITIVE, f64::MAX, f64::MIN, f64::from_bits(1)] {
+            assert_eq!(Value::double(x), None, "{x}");
+        }
+    }
+
+    #[test]
+    fn special_doubles_are_constants() {
+        for x in [0.0, -0.0, f64::INFINITY, f64::NEG_INFINITY] {
+            let v = Value::double(x).unwrap();
+            assert!(!v.is_windowed_double());
+            assert_eq!(v.as_double().map(f64::to_bits), Some(x.to_bits()));
+        }
+        assert_ne!(Value::double(0.0), Value::double(-0.0));
+        assert_eq!(Value::double(f64::NAN), Some(Value::NAN));
+        assert_eq!(Value::double(f64::from_bits(f64::NAN.to_bits() ^ 1 << 63 ^ 5)), Some(Value::NAN));
+        assert!(Value::NAN.as_double().unwrap().is_nan());
+    }
+
+    #[test]
+    fn every_exponent_survives() {
+        for exponent in 0..2048u64 {
+            for sign in [0, 1u64 << 63] {
+                for mantissa in [0, 1, (1 << 52) - 1] {
+                    let x = f64::from_bits(sign | exponent << 52 | mantissa);
+                    match Value::double(x).map(|v| v.as_double().unwrap()) {
+                        Some(back) if x.is_nan() => assert!(back.is_nan()),
+                        Some(back) => assert_eq!(back.to_bits(), x.to_bits()),
+                        None => assert!(!(768..1280).contains(&exponent), "{x} is in the window"),
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn constants_differ_and_are_nothing_else() {
+        let all = [
+            Value::NIL,
+            Value::T,
+            Value::UNBOUND,
+            Value::UNSUPPLIED,
+            Value::EOF,
+            Value::POSITIVE_ZERO,
+            Value::NEGATIVE_ZERO,
+            Value::INFINITY,
+            Value::NEGATIVE_INFINITY,
+            Value::NAN,
+            Value::POISON,
+            Value::character(0).unwrap(),
+        ];
+        for (i, a) in all.iter().enumerate() {
+            assert!(!a.is_fixnum() && !a.is_windowed_double() && !a.is_address() && a.as_handle().is_none());
+            assert!(all[..i].iter().all(|b| a != b));
+        }
+        assert!(Value::NIL.is_nil() && Value::NIL.is_list() && !Value::NIL.is_true() && Value::T.is_true());
+        assert_eq!(Value::from(true), Value::T);
+    }
+
+    #[test]
+    fn characters_hold_21_bits() {
+        for code in [0, 'a' as u32, 0xD800, 0x10_FFFF] {
+            assert_eq!(Value::character(code).unwrap().as_character(), Some(code));
+        }
+        assert_eq!(Value::character(0x11_0000), None);
+        assert_eq!(Value::NIL.as_character(), None);
+    }
+
+    #[test]
+    fn handles_hold_index_and_generation() {
+        for (index, generation) in [(0, 0), (u32::MAX, Value::GENERATION_LIMIT - 1), (7, 3)] {
+            let v = Value::handle(index, generation).unwrap();
+            assert_eq!(v.as_handle(), Some((index, generation)));
+            assert!(!v.is_address() && !v.is_fixnum() && !v.is_windowed_double());
+        }
+        assert_eq!(Value::handle(0, Value::GENERATION_LIMIT), None);
+    }
+}
