@@ -1,0 +1,36 @@
+//! The functions that are written in Rust, one file for each domain.
+//!
+//! Rules for a builtin:
+//! - It never calls back into the language. It may ask for a call in its place ([`Exit::Call`]).
+//! - Its work is bounded: up to [`LIMIT`] units, for which it charges; above, it gives [`Exit::Slowly`] before it has had
+//!   any effect, or fails.
+//! - It allocates before it has any effect, since [`Exit::Collect`] means that it is done again from the start.
+//! - No collection happens while it runs, so values need no rooting.
+//!
+//! [`Exit::Call`]: crate::raise::Exit::Call
+//! [`Exit::Slowly`]: crate::raise::Exit::Slowly
+//! [`Exit::Collect`]: crate::raise::Exit::Collect
+
+use esl_bytecode::builtin::Builtin;
+
+use crate::raise::Outcome;
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// Units of work (list cells, elements, nodes) that one call of a builtin may do.
+pub const LIMIT: usize = 4096;
+
+/// A function that is written in Rust. The number of arguments has been checked against the table.
+pub type Native = fn(&mut Vm, &[Value]) -> Outcome;
+
+/// The implementation of each row of the table. A row without an arm here does not compile.
+pub fn native(builtin: Builtin) -> Native {
+    match builtin {
+        Builtin::SetFunction => define::set_function,
+        Builtin::SetMacro => define::set_macro,
+        Builtin::ProclaimSpecial => define::proclaim_special,
+        Builtin::DefineConstant => define::define_constant,
+    }
+}
+
+mod define;

@@ -1,0 +1,115 @@
+//! What a builtin or an instruction says when it cannot do its work.
+//!
+//! A failure leaves Rust as data: a [`Raised`] waits in the [`Vm`] while the builtin returns
+//! [`Exit::Raise`]. The interpreter then calls the library function `%raise` at the point of failure, in a frame above
+//! the failed instruction; nothing has been unwound. What `%raise` returns takes the place of the operation's result.
+
+use crate::heap::AllocError;
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// What was expected in place of a datum: a type specifier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Expected {
+    /// The type of this name in `COMMON-LISP`.
+    Type(&'static str),
+    /// An integer from 0 to below this limit: an index.
+    Index(usize),
+    /// A type specifier made by the program.
+    Specifier(Value),
+}
+
+/// A failure of an operation, before it is made into a condition.
+#[derive(Clone, Debug)]
+pub enum Raised {
+    /// `type-error`: the datum is not of the expected type.
+    Type(Value, Expected),
+    /// `division-by-zero`: name of the operation in `COMMON-LISP`, operands.
+    DivisionByZero(&'static str, [Value; 2]),
+    /// `arithmetic-error` with a text: the result does not exist or is too large.
+    Arithmetic(&'static str, String),
+    /// `floating-point-overflow`: name of the operation.
+    FloatOverflow(&'static str),
+    /// `unbound-variable`: the symbol.
+    UnboundVariable(Value),
+    /// `undefined-function`: the symbol.
+    UndefinedFunction(Value),
+    /// `program-error` with a text: wrong number of arguments, unknown key and the like.
+    Program(String),
+    /// `control-error` with a text.
+    Control(String),
+    /// `parse-error` with a text.
+    Parse(String),
+    /// `reader-error` with a text: where, what was expected, what to do.
+    Reader(String),
+    /// `end-of-file` on a stream.
+    EndOfFile(Value),
+    /// `stream-error` on a stream, with a text.
+    Stream(Value, String),
+    /// `simple-error` with a text.
+    Simple(String),
+    /// A failure of the given cause (a keyword's name) and one argument.
+    Cause(&'static str, Value),
+    /// The task's stack has reached its limit.
+    StackExhausted,
+    /// The heap has reached its limit, or an object would be larger than it.
+    HeapExhausted,
+}
+
+/// Why a builtin gives no value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exit {
+    /// It failed; [`Vm::raised`] says how.
+    Raise,
+    /// It gives other than one value: they are in the value list.
+    Values,
+    /// The work is above its limit: the ESL function in its row of the table takes over with the same arguments. It
+    /// has had no effect.
+    Slowly,
+    /// It asks for a call in its place: [`Vm::requested_call`] holds the function and the arguments.
+    Call,
+    /// It needs room: collect, then do it again. It has had no effect.
+    Collect,
+    /// The task waits; what wakes it delivers the value.
+    Park,
+}
+
+/// What a builtin gives: one value, or the reason why not.
+pub type Outcome = Result<Value, Exit>;
+
+impl From<AllocError> for Exit {
+    fn from(error: AllocError) -> Exit {
+        match error {
+            AllocError::NeedCollection => Exit::Collect,
+            AllocError::TooLarge { .. } => Exit::Collect,
+        }
+    }
+}
+
+impl Vm {
+    /// Notes a failure; give the result back to the caller.
+    #[cold]
+    pub fn raise<T>(&mut self, raised: Raised) -> Result<T, Exit> {
+        self.raised = Some(raised);
+        Err(Exit::Raise)
+    }
+
+    /// Notes that `datum` is not of the type with this name in `COMMON-LISP`.
+    #[cold]
+    pub fn type_error<T>(&mut self, datum: Value, expected: &'static str) -> Result<T, Exit> {
+        self.raise(Raised::Type(datum, Expected::Type(expected)))
+    }
+
+    /// Notes that `datum` is not an index below `limit`.
+    #[cold]
+    pub fn index_error<T>(&mut self, datum: Value, limit: usize) -> Result<T, Exit> {
+        self.raise(Raised::Type(datum, Expected::Index(limit)))
+    }
+
+    /// Notes a wrong call or form.
+    #[cold]
+    pub fn program_error<T>(&mut self, text: impl Into<String>) -> Result<T, Exit> {
+        self.raise(Raised::Program(text.into()))
+    }
+}
