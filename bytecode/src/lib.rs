@@ -13,5 +13,6 @@ pub mod opcode;
 pub mod operand;
 pub mod span;
 pub mod symbol;
+pub mod verify;
 
 pub use num_bigint::BigInt;

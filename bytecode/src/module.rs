@@ -53,11 +53,34 @@ pub enum Constant {
 
 /// Where a closure takes one of its captures from, at the time it is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Capture {
+pub enum CaptureSource {
     /// A register of the frame that makes the closure.
     Register(u8),
     /// A capture of the function that makes the closure.
     Capture(u8),
+    /// Nowhere yet: it is `NIL` until `patch-capture` fills it in. For closures that capture each other.
+    Later,
+}
+
+/// One capture of a function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Capture {
+    /// Where it comes from.
+    pub source: CaptureSource,
+    /// Whether it is a box, to be used by `capture-box-ref` and `capture-box-set`. Never so for one that comes later.
+    pub boxed: bool,
+}
+
+impl Capture {
+    /// A capture of a value.
+    pub fn value(source: CaptureSource) -> Capture {
+        Capture { source, boxed: false }
+    }
+
+    /// A capture of a box.
+    pub fn boxed(source: CaptureSource) -> Capture {
+        Capture { source, boxed: true }
+    }
 }
 
 /// What a function takes. Arguments arrive in registers: first the required ones, then the optional ones, then the list
@@ -121,7 +144,7 @@ pub struct Function {
     pub parameters: Parameters,
     /// Number of registers of its frame: at least those of its parameters, at most 250.
     pub registers: u8,
-    /// Where its captures come from.
+    /// Its captures, and where they come from.
     pub captures: Vec<Capture>,
     /// Its constants: `K[n]` is `constants[n]` of the module's pool.
     pub constants: Vec<PoolIdx>,
@@ -135,6 +158,8 @@ pub struct Function {
 pub const MAX_REGISTERS: u8 = 250;
 /// The largest number of words of a function's code.
 pub const MAX_CODE: usize = 32_000;
+/// The largest number of entries that a frame has on the control stack at a time.
+pub const MAX_CONTROL: usize = 250;
 
 /// A compiled unit.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -11,7 +11,8 @@
 //!
 //! The word after the mnemonic says what becomes of the value that a recovery puts in place of a failed instruction:
 //! `value` goes to the first operand, `test` decides the jump, `call` is delivered as the results of a call,
-//! `effect` is dropped; `silent` instructions never fail.
+//! `effect` is dropped; for `never` there is no value that could stand, and a recovery can only have the instruction
+//! tried again, or leave; `silent` instructions never fail.
 
 use std::fmt;
 
@@ -185,14 +186,15 @@ macro_rules! for_each_opcode {
 
             // ---- variables
             /// `R[dst]` := a fresh box that holds `R[src]`
-            MakeBox = 0x58, "make-box", value { dst: Dst, src: Reg };
+            MakeBox = 0x58, "make-box", never { dst: Dst, src: Reg };
             /// `R[dst]` := what the box `R[cell]` holds. The box must have been made by `make-box`.
             BoxRef = 0x59, "box-ref", silent { dst: Dst, cell: Reg };
             /// The box `R[cell]` holds `R[src]`.
             BoxSet = 0x5A, "box-set", silent { cell: Reg, src: Reg };
             /// `R[dst]` := a closure of `K[function]`, whose captures are taken as that function declares them
-            MakeClosure = 0x5B, "make-closure", value { dst: Dst, function: FunctionIdx };
-            /// Capture `index` of the closure `R[closure]`, made by `make-closure` in this frame, becomes `R[src]`.
+            MakeClosure = 0x5B, "make-closure", never { dst: Dst, function: FunctionIdx };
+            /// Capture `index` of the closure `R[closure]`, made by `make-closure` in this frame, becomes `R[src]`. The
+            /// closure's function declares that capture as one that comes later.
             PatchCapture = 0x5C, "patch-capture", silent { closure: Reg, index: Index, src: Reg };
             /// `R[dst]` := capture `index` of the running function
             CaptureRef = 0x5D, "capture-ref", silent { dst: Dst, index: Index };
@@ -205,7 +207,7 @@ macro_rules! for_each_opcode {
             /// The special variable `K[symbol]` becomes `R[src]`.
             SetSymbolValue = 0x61, "set-symbol-value", effect { src: Reg, symbol: SymbolIdx };
             /// Binds the special variable `K[symbol]` to `R[src]`.
-            Bind = 0x62, "bind", effect { src: Reg, symbol: SymbolIdx };
+            Bind = 0x62, "bind", never { src: Reg, symbol: SymbolIdx };
             /// Undoes the newest `count` bindings of this frame.
             Unbind = 0x63, "unbind", silent { count: Count };
             /// Binds the symbols of the list `R[symbols]` to the items of `R[values]`, missing ones to nothing. The
@@ -255,18 +257,18 @@ macro_rules! for_each_opcode {
             NewTag = 0x78, "new-tag", value { dst: Dst };
             /// Pushes a catch for the tag `R[tag]`: a throw to it pops it, delivers its values to the window, and
             /// goes on at `to`.
-            PushCatch = 0x79, "push-catch", value { window: Base, tag: Reg, want: Want, to: Jump };
+            PushCatch = 0x79, "push-catch", never { window: Base, tag: Reg, want: Want, to: Jump };
             /// Pushes a cleanup: when an unwinding passes, the code at `to` runs until `end-cleanup`.
-            PushCleanup = 0x7A, "push-cleanup", effect { window: Base, to: Jump };
+            PushCleanup = 0x7A, "push-cleanup", never { window: Base, to: Jump };
             /// Pushes handlers: for each type of the vector `K[types]`, a case. When one takes a condition, the entry
             /// is popped, `R[window]` is the index of the case, `R[window+1]` the condition, and control goes to `to`.
-            PushHandlerCase = 0x7B, "push-handler-case", effect { window: Base, types: VectorIdx, to: Jump };
+            PushHandlerCase = 0x7B, "push-handler-case", never { window: Base, types: VectorIdx, to: Jump };
             /// Pushes handlers that run at the point of signalling: `R[handlers]` is a list of `(type . function)`.
-            PushHandlers = 0x7C, "push-handlers", effect { window: Base, handlers: Reg };
+            PushHandlers = 0x7C, "push-handlers", never { window: Base, handlers: Reg };
             /// Pushes a mask: entries from the fixnum `R[from]` on (a height of the control stack) are not searched.
-            PushMask = 0x7D, "push-mask", effect { window: Base, from: Reg };
+            PushMask = 0x7D, "push-mask", never { window: Base, from: Reg };
             /// Pushes a scope for `bind-list`.
-            PushScope = 0x7E, "push-scope", effect { window: Base };
+            PushScope = 0x7E, "push-scope", never { window: Base };
             /// Pops the newest `count` entries, and undoes bindings made since the oldest of them.
             PopControl = 0x7F, "pop-control", silent { count: Count };
             /// Ends the protected part in the normal way: the cleanup entry on top becomes a running cleanup, and control
@@ -294,6 +296,8 @@ pub enum Substitute {
     Call,
     /// The value is dropped.
     Effect,
+    /// No value can stand for the instruction: it is tried again, or left.
+    Never,
 }
 
 macro_rules! substitute {
@@ -311,6 +315,9 @@ macro_rules! substitute {
     };
     (effect) => {
         Substitute::Effect
+    };
+    (never) => {
+        Substitute::Never
     };
 }
 
