@@ -148,4 +148,164 @@ define_builtins! {
     ProclaimSpecial = internal "%PROCLAIM-SPECIAL" ("symbol");
     /// Makes `symbol` a constant with `value`, and returns it. Fails if it is a constant with another value.
     DefineConstant = internal "%DEFINE-CONSTANT" ("symbol value");
+
+    // ---- functions and values
+    /// Calls `function`, or the function that a symbol names, with `arguments`.
+    Funcall = cl "FUNCALL" ("function &rest arguments");
+    /// Calls `function` with `arguments`, the last of which is a list of further arguments.
+    Apply = cl "APPLY" ("function argument &rest arguments");
+    /// Its arguments, as multiple values.
+    Values = cl "VALUES" ("&rest values");
+    /// The items of `list`, as multiple values.
+    ValuesList = cl "VALUES-LIST" ("list");
+    /// Its argument.
+    Identity = cl "IDENTITY" ("object");
+
+    // ---- identity and types
+    /// Whether both are the same object.
+    Eq = cl "EQ" ("left right");
+    /// Whether both are the same object, or equal numbers of one type, or equal characters.
+    Eql = cl "EQL" ("left right");
+    /// Whether `object` is `NIL`.
+    Not = cl "NOT" ("object");
+    /// Whether `object` is `NIL`.
+    Null = cl "NULL" ("object");
+    /// Whether `object` is a pair.
+    Consp = cl "CONSP" ("object");
+    /// Whether `object` is anything but a pair.
+    Atom = cl "ATOM" ("object");
+    /// Whether `object` is a pair or `NIL`.
+    Listp = cl "LISTP" ("object");
+    /// Whether `object` is a symbol.
+    Symbolp = cl "SYMBOLP" ("object");
+    /// Whether `object` is a keyword.
+    Keywordp = cl "KEYWORDP" ("object");
+    /// Whether `object` is a number.
+    Numberp = cl "NUMBERP" ("object");
+    /// Whether `object` is an integer, a ratio or a float.
+    Realp = cl "REALP" ("object");
+    /// Whether `object` is an integer or a ratio.
+    Rationalp = cl "RATIONALP" ("object");
+    /// Whether `object` is an integer.
+    Integerp = cl "INTEGERP" ("object");
+    /// Whether `object` is a float.
+    Floatp = cl "FLOATP" ("object");
+    /// Whether `object` is a character.
+    Characterp = cl "CHARACTERP" ("object");
+    /// Whether `object` is a string.
+    Stringp = cl "STRINGP" ("object");
+    /// Whether `object` is an array of rank 1.
+    Vectorp = cl "VECTORP" ("object");
+    /// Whether `object` is a simple general vector.
+    SimpleVectorp = cl "SIMPLE-VECTOR-P" ("object");
+    /// Whether `object` is an array.
+    Arrayp = cl "ARRAYP" ("object");
+    /// Whether `object` is a function.
+    Functionp = cl "FUNCTIONP" ("object");
+    /// Whether `object` is a hash table.
+    HashTablep = cl "HASH-TABLE-P" ("object");
+
+    // ---- numbers
+    /// The sum; 0 of no numbers.
+    Add = cl "+" ("&rest numbers");
+    /// The first number less the others; the negative of a single one.
+    Subtract = cl "-" ("number &rest numbers");
+    /// The product; 1 of no numbers.
+    Multiply = cl "*" ("&rest numbers");
+    /// The first number divided by the others; the reciprocal of a single one. Exact for integers and ratios.
+    Divide = cl "/" ("number &rest numbers");
+    /// `number` plus one.
+    Increment = cl "1+" ("number");
+    /// `number` less one.
+    Decrement = cl "1-" ("number");
+    /// Quotient rounded towards minus infinity, and remainder.
+    Floor = cl "FLOOR" ("number &optional divisor");
+    /// Quotient rounded towards plus infinity, and remainder.
+    Ceiling = cl "CEILING" ("number &optional divisor");
+    /// Quotient rounded towards zero, and remainder.
+    Truncate = cl "TRUNCATE" ("number &optional divisor");
+    /// Quotient rounded to the nearest integer, halves to the even one, and remainder.
+    Round = cl "ROUND" ("number &optional divisor");
+    /// The remainder of `floor`.
+    Mod = cl "MOD" ("number divisor");
+    /// The remainder of `truncate`.
+    Rem = cl "REM" ("number divisor");
+    /// The numbers' bitwise and; -1 of none.
+    LogAnd = cl "LOGAND" ("&rest integers");
+    /// The numbers' bitwise or; 0 of none.
+    LogIor = cl "LOGIOR" ("&rest integers");
+    /// The numbers' bitwise exclusive or; 0 of none.
+    LogXor = cl "LOGXOR" ("&rest integers");
+    /// `integer` shifted left by `count` bits, right if that is negative.
+    Ash = cl "ASH" ("integer count");
+    /// Whether all numbers are equal.
+    NumEqual = cl "=" ("number &rest numbers");
+    /// Whether no two numbers are equal.
+    NumNotEqual = cl "/=" ("number &rest numbers");
+    /// Whether the numbers increase.
+    Less = cl "<" ("number &rest numbers");
+    /// Whether the numbers never decrease.
+    LessEqual = cl "<=" ("number &rest numbers");
+    /// Whether the numbers decrease.
+    Greater = cl ">" ("number &rest numbers");
+    /// Whether the numbers never increase.
+    GreaterEqual = cl ">=" ("number &rest numbers");
+    /// Whether `number` is zero.
+    Zerop = cl "ZEROP" ("number");
+    /// Whether `number` is above zero.
+    Plusp = cl "PLUSP" ("number");
+    /// Whether `number` is below zero.
+    Minusp = cl "MINUSP" ("number");
+
+    // ---- lists
+    /// A fresh pair.
+    Cons = cl "CONS" ("car cdr");
+    /// The car of a pair, `NIL` of `NIL`.
+    Car = cl "CAR" ("list");
+    /// The cdr of a pair, `NIL` of `NIL`.
+    Cdr = cl "CDR" ("list");
+    /// The car of the cdr.
+    Cadr = cl "CADR" ("list");
+    /// The cdr of the cdr.
+    Cddr = cl "CDDR" ("list");
+    /// The first item of a list, `NIL` if there is none.
+    First = cl "FIRST" ("list");
+    /// The list without its first item.
+    Rest = cl "REST" ("list");
+    /// The second item of a list, `NIL` if there is none.
+    Second = cl "SECOND" ("list");
+    /// Makes `object` the car of `pair`, and returns `pair`.
+    Rplaca = cl "RPLACA" ("pair object");
+    /// Makes `object` the cdr of `pair`, and returns `pair`.
+    Rplacd = cl "RPLACD" ("pair object");
+    /// Makes `value` the car of `pair`, and returns `value`.
+    SetCar = internal "%SET-CAR" ("pair value");
+    /// Makes `value` the cdr of `pair`, and returns `value`.
+    SetCdr = internal "%SET-CDR" ("pair value");
+    /// A fresh list of `objects`.
+    List = cl "LIST" ("&rest objects");
+    /// A list of the objects that ends in the last of them.
+    ListStar = cl "LIST*" ("object &rest objects");
+    /// The lists joined: all but the last are copied.
+    Append = cl "APPEND" ("&rest lists") slowly "SLOW-APPEND";
+
+    // ---- arrays
+    /// A fresh simple vector of `objects`.
+    Vector = cl "VECTOR" ("&rest objects");
+    /// Element `index` of a simple general vector.
+    Svref = cl "SVREF" ("vector index");
+    /// Makes `value` element `index` of a simple general vector, and returns `value`.
+    SetSvref = internal "%SET-SVREF" ("vector index value");
+    /// The element of `array` that the subscripts select.
+    Aref = cl "AREF" ("array &rest subscripts");
+    /// Sets the element of `array` that the subscripts select to the last argument, and returns that.
+    SetAref = internal "%SET-AREF" ("array &rest subscripts-and-value");
+
+    // ---- structures
+    /// Slot `index` of `instance`, which must be an instance of the class named `class` or a subclass.
+    SlotOf = internal "%SLOT" ("class index instance");
+    /// Makes `value` slot `index` of `instance`, and returns `value`.
+    SetSlotOf = internal "%SET-SLOT" ("class index instance value");
+    /// Whether `object` is an instance of the structure class named `class` or a subclass.
+    IsInstance = internal "%INSTANCE-P" ("class object");
 }
