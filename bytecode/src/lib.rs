@@ -8,6 +8,8 @@ pub mod builtin;
 pub mod compile;
 pub mod datum;
 pub mod diagnostic;
+pub mod file;
+pub mod link;
 pub mod module;
 pub mod opcode;
 pub mod operand;
