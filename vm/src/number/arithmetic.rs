@@ -1,0 +1,159 @@
+//! Sum, difference, product and quotient of any two numbers.
+
+use super::{Int, Number, Ratio, limit};
+use crate::raise::{Exit, Outcome, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// `a + b`.
+pub(crate) fn add(vm: &mut Vm, a: Value, b: Value) -> Outcome {
+    if let (Some(x), Some(y)) = (a.as_fixnum(), b.as_fixnum()) {
+        return vm.integer_value("+", &Int::from(x + y));
+    }
+    if let (Some(x), Some(y)) = (a.as_double(), b.as_double()) {
+        return vm.float_value("+", x + y);
+    }
+    match operands(vm, "+", a, b)? {
+        Pair::Ints(x, y) => {
+            vm.charge(x.len() + y.len());
+            vm.integer_value("+", &x.plus(&y))
+        }
+        Pair::Ratios(x, y) => {
+            check_ratios(vm, &x, &y)?;
+            vm.ratio_value("+", &x.plus(&y))
+        }
+        Pair::Floats(x, y) => vm.float_value("+", x + y),
+    }
+}
+
+/// `a - b`.
+pub(crate) fn subtract(vm: &mut Vm, a: Value, b: Value) -> Outcome {
+    if let (Some(x), Some(y)) = (a.as_fixnum(), b.as_fixnum()) {
+        return vm.integer_value("-", &Int::from(x - y));
+    }
+    if let (Some(x), Some(y)) = (a.as_double(), b.as_double()) {
+        return vm.float_value("-", x - y);
+    }
+    match operands(vm, "-", a, b)? {
+        Pair::Ints(x, y) => {
+            vm.charge(x.len() + y.len());
+            vm.integer_value("-", &x.minus(&y))
+        }
+        Pair::Ratios(x, y) => {
+            check_ratios(vm, &x, &y)?;
+            vm.ratio_value("-", &x.plus(&y.negated()))
+        }
+        Pair::Floats(x, y) => vm.float_value("-", x - y),
+    }
+}
+
+/// `- a`.
+pub(crate) fn negate(vm: &mut Vm, a: Value) -> Outcome {
+    match vm.number(a, "NUMBER")? {
+        Number::Int(n) => {
+            vm.charge(n.len());
+            vm.integer_value("-", &n.negated())
+        }
+        Number::Ratio(r) => {
+            vm.charge(r.len());
+            vm.ratio_value("-", &r.negated())
+        }
+        Number::Float(x) => Ok(vm.heap.float(-x)?),
+    }
+}
+
+/// `a · b`.
+pub(crate) fn multiply(vm: &mut Vm, a: Value, b: Value) -> Outcome {
+    if let (Some(x), Some(y)) = (a.as_double(), b.as_double()) {
+        return vm.float_value("*", x * y);
+    }
+    match operands(vm, "*", a, b)? {
+        Pair::Ints(x, y) => {
+            vm.check_bits("*", (x.bits() + y.bits()).saturating_sub(1))?;
+            vm.check_work(x.len(), y.len())?;
+            vm.integer_value("*", &x.times(&y))
+        }
+        Pair::Ratios(x, y) => {
+            check_ratios(vm, &x, &y)?;
+            vm.ratio_value("*", &x.times(&y))
+        }
+        Pair::Floats(x, y) => vm.float_value("*", x * y),
+    }
+}
+
+/// `a / b`: a ratio where integers do not divide.
+pub(crate) fn divide(vm: &mut Vm, a: Value, b: Value) -> Outcome {
+    match operands(vm, "/", a, b)? {
+        Pair::Ints(_, y) if y.is_zero() => vm.raise(Raised::DivisionByZero("/", [a, b])),
+        Pair::Ints(Int::Small(x), Int::Small(y)) if x.checked_rem(y) == Some(0) => {
+            vm.integer_value("/", &Int::Small(x / y))
+        }
+        Pair::Ints(x, y) => {
+            check_gcd(vm, x.len(), y.len())?;
+            vm.ratio_value("/", &Ratio::reduced(&x, &y))
+        }
+        Pair::Ratios(_, y) if y.numerator.is_zero() => vm.raise(Raised::DivisionByZero("/", [a, b])),
+        Pair::Ratios(x, y) => {
+            check_ratios(vm, &x, &y)?;
+            vm.ratio_value("/", &x.times(&y.inverted()))
+        }
+        Pair::Floats(x, y) => float_quotient(vm, "/", [a, b], x, y),
+    }
+}
+
+/// The quotient of doubles, which the values `operands` are.
+pub(crate) fn float_quotient(vm: &mut Vm, op: &'static str, operands: [Value; 2], x: f64, y: f64) -> Outcome {
+    if y == 0.0 && x != 0.0 {
+        return vm.raise(Raised::DivisionByZero(op, operands));
+    }
+    vm.float_value(op, x / y)
+}
+
+/// Two numbers of one type.
+pub(crate) enum Pair {
+    Ints(Int, Int),
+    Ratios(Ratio, Ratio),
+    Floats(f64, f64),
+}
+
+/// The numbers that `a` and `b` are, brought to one type by contagion.
+pub(crate) fn operands(vm: &mut Vm, op: &'static str, a: Value, b: Value) -> Result<Pair, Exit> {
+    typed_operands(vm, op, a, b, "NUMBER")
+}
+
+/// As [`operands`], where something else is not of type `expected`.
+pub(crate) fn typed_operands(
+    vm: &mut Vm,
+    op: &'static str,
+    a: Value,
+    b: Value,
+    expected: &'static str,
+) -> Result<Pair, Exit> {
+    let (x, y) = (vm.number(a, expected)?, vm.number(b, expected)?);
+    Ok(match (x, y) {
+        (Number::Int(x), Number::Int(y)) => Pair::Ints(x, y),
+        (Number::Ratio(x), Number::Ratio(y)) => Pair::Ratios(x, y),
+        (Number::Ratio(x), Number::Int(y)) => Pair::Ratios(x, Ratio::integer(y)),
+        (Number::Int(x), Number::Ratio(y)) => Pair::Ratios(Ratio::integer(x), y),
+        (Number::Float(x), Number::Float(y)) => Pair::Floats(x, y),
+        (Number::Float(x), _) => Pair::Floats(x, vm.to_double(op, b, expected)?),
+        (_, Number::Float(y)) => Pair::Floats(vm.to_double(op, a, expected)?, y),
+    })
+}
+
+/// Charges for arithmetic on ratios, unless their parts are too large for one operation.
+pub(crate) fn check_ratios(vm: &mut Vm, x: &Ratio, y: &Ratio) -> Result<(), Exit> {
+    check_gcd(vm, x.len(), y.len())
+}
+
+/// Charges for a greatest common divisor of integers of `a` and `b` limbs, unless that is too much for one operation.
+pub(crate) fn check_gcd(vm: &mut Vm, a: usize, b: usize) -> Result<(), Exit> {
+    let len = a.max(b);
+    if len > limit::GCD_LIMBS {
+        return Err(Exit::Slowly);
+    }
+    if len > 2 {
+        vm.charge(4 * len * len);
+    }
+    Ok(())
+}

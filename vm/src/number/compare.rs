@@ -1,0 +1,102 @@
+//! Comparison of numbers by their exact values, and `eql`.
+
+use std::cmp::Ordering;
+
+use super::{Int, Number, Ratio, float};
+use crate::heap::{Heap, Kind};
+use crate::raise::Exit;
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// `(= a b)`.
+pub(crate) fn num_equal(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
+    Ok(compare(vm, "=", a, b, "NUMBER")? == Some(Ordering::Equal))
+}
+
+/// `(< a b)`.
+pub(crate) fn less(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
+    Ok(compare(vm, "<", a, b, "REAL")? == Some(Ordering::Less))
+}
+
+/// `(<= a b)`.
+pub(crate) fn less_or_equal(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
+    Ok(matches!(compare(vm, "<=", a, b, "REAL")?, Some(Ordering::Less | Ordering::Equal)))
+}
+
+/// −1, 0 or 1, as `a` is below, at or above zero.
+pub(crate) fn sign(vm: &mut Vm, a: Value, expected: &'static str) -> Result<i32, Exit> {
+    Ok(match vm.number(a, expected)? {
+        Number::Int(n) => n.signum(),
+        Number::Ratio(r) => r.numerator.signum(),
+        Number::Float(x) => i32::from(x > 0.0) - i32::from(x < 0.0),
+    })
+}
+
+/// How `a` compares with `b`; nothing when one is not a number in the sense of floats.
+fn compare(
+    vm: &mut Vm,
+    op: &'static str,
+    a: Value,
+    b: Value,
+    expected: &'static str,
+) -> Result<Option<Ordering>, Exit> {
+    if let (Some(x), Some(y)) = (a.as_fixnum(), b.as_fixnum()) {
+        return Ok(Some(x.cmp(&y)));
+    }
+    if let (Some(x), Some(y)) = (a.as_double(), b.as_double()) {
+        return Ok(x.partial_cmp(&y));
+    }
+    let (x, y) = (vm.number(a, expected)?, vm.number(b, expected)?);
+    Ok(match (&x, &y) {
+        (Number::Int(x), Number::Int(y)) => Some(x.compare(y)),
+        (Number::Float(x), Number::Float(y)) => x.partial_cmp(y),
+        (Number::Float(x), Number::Int(y)) => float_and_int(*x, y),
+        (Number::Int(x), Number::Float(y)) => float_and_int(*y, x).map(Ordering::reverse),
+        (Number::Float(x), Number::Ratio(y)) => float_and_ratio(vm, op, *x, y)?,
+        (Number::Ratio(x), Number::Float(y)) => float_and_ratio(vm, op, *y, x)?.map(Ordering::reverse),
+        (Number::Ratio(x), Number::Ratio(y)) => Some(x.compare(vm, op, y)?),
+        (Number::Ratio(x), Number::Int(y)) => Some(x.compare(vm, op, &Ratio::integer(y.clone()))?),
+        (Number::Int(x), Number::Ratio(y)) => Some(Ratio::integer(x.clone()).compare(vm, op, y)?),
+    })
+}
+
+fn float_and_int(x: f64, n: &Int) -> Option<Ordering> {
+    match n {
+        // Integers of 53 bits are doubles exactly.
+        Int::Small(n) if n.unsigned_abs() < 1 << 53 => x.partial_cmp(&(*n as f64)),
+        _ if !x.is_finite() => x.partial_cmp(&0.0),
+        _ => {
+            let whole = x.trunc();
+            let order = Int::from_f64(whole).compare(n);
+            Some(if order == Ordering::Equal { x.total_cmp(&whole) } else { order })
+        }
+    }
+}
+
+fn float_and_ratio(vm: &mut Vm, op: &'static str, x: f64, r: &Ratio) -> Result<Option<Ordering>, Exit> {
+    if x.is_finite() { float::rational(x).compare(vm, op, r).map(Some) } else { Ok(x.partial_cmp(&0.0)) }
+}
+
+/// `(eql a b)`: the same object, or numbers of one type with one value, the sign of zero counted.
+#[inline]
+pub(crate) fn eql(heap: &Heap, a: Value, b: Value) -> bool {
+    a == b || a.is_object() && b.is_object() && boxed_eql(heap, a, b)
+}
+
+#[cold]
+fn boxed_eql(heap: &Heap, a: Value, b: Value) -> bool {
+    let kind = heap.kind(a);
+    if kind != heap.kind(b) {
+        return false;
+    }
+    match kind {
+        Some(Kind::Float) => heap.as_double(a).map(f64::to_bits) == heap.as_double(b).map(f64::to_bits),
+        Some(Kind::Bignum) => heap.bignum(a) == heap.bignum(b),
+        Some(Kind::Ratio) => match (heap.ratio(a), heap.ratio(b)) {
+            // The parts are integers, so this goes one level deep.
+            (Some((a, b)), Some((c, d))) => eql(heap, a, c) && eql(heap, b, d),
+            _ => false,
+        },
+        _ => false,
+    }
+}

@@ -1,0 +1,57 @@
+//! Doubles: their parts, and the way between them and the rationals, each rounded once.
+
+use super::{Int, Ratio};
+
+/// The double nearest to `mantissa · 2^exponent`, halves to even: infinite when it is too large, and exact about
+/// denormalized numbers. `mantissa` may hold in its last bit that something follows, if it has 66 bits or more.
+pub(crate) fn rounded(mantissa: u128, exponent: i64) -> f64 {
+    if mantissa == 0 {
+        return 0.0;
+    }
+    let bits = i64::from(128 - mantissa.leading_zeros());
+    let leading = exponent + bits - 1;
+    if leading > 1023 {
+        return f64::INFINITY;
+    }
+    // Numbers below 2^-1022 have fewer bits.
+    let precision = if leading >= -1022 { 53 } else { 53 - (-1022 - leading) };
+    if precision < 0 {
+        return 0.0;
+    }
+    let drop = bits - precision;
+    if drop <= 0 {
+        return libm::scalbn(mantissa as f64, exponent as i32);
+    }
+    let kept = mantissa.checked_shr(drop as u32).unwrap_or(0);
+    let rest = mantissa - kept.checked_shl(drop as u32).unwrap_or(0);
+    let half = 1u128 << (drop - 1);
+    let up = rest > half || rest == half && kept & 1 == 1;
+    libm::scalbn((kept + u128::from(up)) as f64, (exponent + drop) as i32)
+}
+
+/// Mantissa (with the sign) and exponent of a finite double: `x = mantissa · 2^exponent`, exactly.
+pub(crate) fn decode(x: f64) -> (i64, i32) {
+    let bits = x.to_bits();
+    let fraction = (bits & ((1 << 52) - 1)) as i64;
+    let biased = (bits >> 52 & 0x7FF) as i32;
+    let (mantissa, exponent) =
+        if biased == 0 { (fraction, -1074) } else { (fraction | 1 << 52, biased - 1075) };
+    (if x.is_sign_negative() { -mantissa } else { mantissa }, exponent)
+}
+
+/// The rational with exactly the value of a finite double.
+pub(crate) fn rational(x: f64) -> Ratio {
+    let (mantissa, exponent) = decode(x);
+    if exponent >= 0 {
+        return Ratio::integer(Int::from(mantissa).shifted_left(exponent as u64));
+    }
+    let zeros = mantissa.trailing_zeros().min(exponent.unsigned_abs());
+    Ratio {
+        numerator: Int::from(mantissa >> zeros),
+        denominator: if mantissa == 0 {
+            Int::ONE
+        } else {
+            Int::ONE.shifted_left(u64::from(exponent.unsigned_abs() - zeros))
+        },
+    }
+}

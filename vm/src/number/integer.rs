@@ -1,0 +1,299 @@
+//! Integers of any size, taken out of their values.
+//!
+//! An [`Int`] is `Small` exactly when it fits 127 bits and a sign: sums and products of fixnums, and most of what
+//! programs do beyond them, never touch the allocator of the host. Above that it is a `BigInt`.
+//!
+//! Not here: the limits of size and work, which the callers check ([`super::limit`]).
+
+use std::cmp::Ordering;
+
+use num_bigint::{BigInt, BigUint, Sign};
+use num_integer::Integer;
+use num_traits::{Signed, ToPrimitive, Zero};
+use smallvec::SmallVec;
+
+use crate::heap::Heap;
+use crate::value::Value;
+
+/// An integer of any size.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Int {
+    /// One that fits.
+    Small(i128),
+    /// One that does not.
+    Big(BigInt),
+}
+
+impl Int {
+    /// Zero.
+    pub(crate) const ZERO: Int = Int::Small(0);
+    /// One.
+    pub(crate) const ONE: Int = Int::Small(1);
+
+    /// The integer that `v` is, if it is one.
+    pub(crate) fn of(heap: &Heap, v: Value) -> Option<Int> {
+        if let Some(n) = v.as_fixnum() {
+            return Some(Int::Small(i128::from(n)));
+        }
+        let big = heap.bignum(v)?;
+        let magnitude = match *big.limbs {
+            [] => 0,
+            [low] => u128::from(low),
+            [low, high] if high >> 63 == 0 => u128::from(high) << 64 | u128::from(low),
+            _ => {
+                let words: SmallVec<[u32; 64]> =
+                    big.limbs.iter().flat_map(|&limb| [limb as u32, (limb >> 32) as u32]).collect();
+                let sign = if big.negative { Sign::Minus } else { Sign::Plus };
+                return Some(Int::from_big(BigInt::from_biguint(sign, BigUint::from_slice(&words))));
+            }
+        };
+        let magnitude = magnitude as i128;
+        Some(Int::Small(if big.negative { -magnitude } else { magnitude }))
+    }
+
+    /// The integer `n`, in the form that fits.
+    pub(crate) fn from_big(n: BigInt) -> Int {
+        match n.to_i128() {
+            Some(small) => Int::Small(small),
+            None => Int::Big(n),
+        }
+    }
+
+    /// As a `BigInt`.
+    pub(crate) fn to_big(&self) -> BigInt {
+        match self {
+            Int::Small(n) => BigInt::from(*n),
+            Int::Big(n) => n.clone(),
+        }
+    }
+
+    /// Sign and limbs as the heap keeps them.
+    pub(crate) fn limbs(&self) -> (bool, SmallVec<[u64; 8]>) {
+        match self {
+            Int::Small(n) => {
+                let magnitude = n.unsigned_abs();
+                (*n < 0, SmallVec::from_slice(&[magnitude as u64, (magnitude >> 64) as u64]))
+            }
+            Int::Big(n) => (n.is_negative(), n.iter_u64_digits().collect()),
+        }
+    }
+
+    /// The fixnum, if it is one.
+    pub(crate) fn as_fixnum(&self) -> Option<i64> {
+        match self {
+            Int::Small(n) => {
+                i64::try_from(*n).ok().filter(|n| (Value::FIXNUM_MIN..=Value::FIXNUM_MAX).contains(n))
+            }
+            Int::Big(_) => None,
+        }
+    }
+
+    /// Bits of the magnitude; 0 for zero.
+    pub(crate) fn bits(&self) -> u64 {
+        match self {
+            Int::Small(n) => u64::from(128 - n.unsigned_abs().leading_zeros()),
+            Int::Big(n) => n.bits(),
+        }
+    }
+
+    /// Limbs of 64 bits of the magnitude, at least 1: the unit of work.
+    pub(crate) fn len(&self) -> usize {
+        (self.bits() as usize).div_ceil(64).max(1)
+    }
+
+    /// Whether it is zero.
+    pub(crate) fn is_zero(&self) -> bool {
+        matches!(self, Int::Small(0))
+    }
+
+    /// Whether it is one.
+    pub(crate) fn is_one(&self) -> bool {
+        matches!(self, Int::Small(1))
+    }
+
+    /// Whether it is below zero.
+    pub(crate) fn is_negative(&self) -> bool {
+        match self {
+            Int::Small(n) => *n < 0,
+            Int::Big(n) => n.is_negative(),
+        }
+    }
+
+    /// Whether it is odd.
+    pub(crate) fn is_odd(&self) -> bool {
+        match self {
+            Int::Small(n) => n & 1 == 1,
+            Int::Big(n) => n.is_odd(),
+        }
+    }
+
+    /// −1, 0 or 1.
+    pub(crate) fn signum(&self) -> i32 {
+        match self {
+            Int::Small(n) => n.signum() as i32,
+            Int::Big(n) => {
+                if n.is_negative() {
+                    -1
+                } else {
+                    1
+                }
+            }
+        }
+    }
+
+    /// With the other sign.
+    pub(crate) fn negated(&self) -> Int {
+        match self {
+            Int::Small(n) if let Some(negated) = n.checked_neg() => Int::Small(negated),
+            _ => Int::from_big(-self.to_big()),
+        }
+    }
+
+    /// Without its sign.
+    pub(crate) fn abs(&self) -> Int {
+        if self.is_negative() { self.negated() } else { self.clone() }
+    }
+
+    /// The sum.
+    pub(crate) fn plus(&self, other: &Int) -> Int {
+        match (self, other) {
+            (Int::Small(a), Int::Small(b)) if let Some(sum) = a.checked_add(*b) => Int::Small(sum),
+            (Int::Big(a), Int::Big(b)) => Int::from_big(a + b),
+            (Int::Big(a), Int::Small(b)) | (Int::Small(b), Int::Big(a)) => Int::from_big(a + *b),
+            (Int::Small(a), Int::Small(b)) => Int::from_big(BigInt::from(*a) + *b),
+        }
+    }
+
+    /// The difference.
+    pub(crate) fn minus(&self, other: &Int) -> Int {
+        match (self, other) {
+            (Int::Small(a), Int::Small(b)) if let Some(difference) = a.checked_sub(*b) => {
+                Int::Small(difference)
+            }
+            (Int::Big(a), Int::Big(b)) => Int::from_big(a - b),
+            (Int::Big(a), Int::Small(b)) => Int::from_big(a - *b),
+            (Int::Small(a), Int::Big(b)) => Int::from_big(*a - b),
+            (Int::Small(a), Int::Small(b)) => Int::from_big(BigInt::from(*a) - *b),
+        }
+    }
+
+    /// The product.
+    pub(crate) fn times(&self, other: &Int) -> Int {
+        match (self, other) {
+            (Int::Small(a), Int::Small(b)) if let Some(product) = a.checked_mul(*b) => Int::Small(product),
+            (Int::Big(a), Int::Big(b)) => Int::from_big(a * b),
+            (Int::Big(a), Int::Small(b)) | (Int::Small(b), Int::Big(a)) => {
+                match u64::try_from(b.unsigned_abs()) {
+                    Ok(limb) if *b < 0 => Int::from_big(-(a * limb)),
+                    Ok(limb) => Int::from_big(a * limb),
+                    Err(_) => Int::from_big(a * *b),
+                }
+            }
+            (Int::Small(a), Int::Small(b)) => Int::from_big(BigInt::from(*a) * *b),
+        }
+    }
+
+    /// Quotient rounded towards zero, and the remainder with it. `other` is not zero.
+    pub(crate) fn div_rem(&self, other: &Int) -> (Int, Int) {
+        match (self, other) {
+            (Int::Small(a), Int::Small(b)) if let Some(quotient) = a.checked_div(*b) => {
+                (Int::Small(quotient), Int::Small(a.wrapping_rem(*b)))
+            }
+            _ => {
+                let (quotient, remainder) = self.to_big().div_rem(&other.to_big());
+                (Int::from_big(quotient), Int::from_big(remainder))
+            }
+        }
+    }
+
+    /// The quotient where the division is known to leave no remainder.
+    pub(crate) fn exact_quotient(&self, other: &Int) -> Int {
+        if other.is_one() { self.clone() } else { self.div_rem(other).0 }
+    }
+
+    /// Twice, four times … the integer: `self · 2^shift`.
+    pub(crate) fn shifted_left(&self, shift: u64) -> Int {
+        match self {
+            Int::Small(0) => Int::ZERO,
+            Int::Small(n) if self.bits() + shift < 127 => Int::Small(n << shift),
+            _ => Int::from_big(self.to_big() << shift),
+        }
+    }
+
+    /// The integer part, rounded down, of `self / 2^shift`.
+    pub(crate) fn shifted_right(&self, shift: u64) -> Int {
+        match self {
+            Int::Small(n) => Int::Small(n >> shift.min(127)),
+            Int::Big(n) if shift > n.bits() => Int::Small(if n.is_negative() { -1 } else { 0 }),
+            Int::Big(n) => Int::from_big(n >> shift),
+        }
+    }
+
+    /// The value that tells how it compares with `other`.
+    pub(crate) fn compare(&self, other: &Int) -> Ordering {
+        match (self, other) {
+            (Int::Small(a), Int::Small(b)) => a.cmp(b),
+            (Int::Big(a), Int::Big(b)) => a.cmp(b),
+            (Int::Big(a), Int::Small(_)) => {
+                if a.is_negative() {
+                    Ordering::Less
+                } else {
+                    Ordering::Greater
+                }
+            }
+            (Int::Small(_), Int::Big(b)) => {
+                if b.is_negative() {
+                    Ordering::Greater
+                } else {
+                    Ordering::Less
+                }
+            }
+        }
+    }
+
+    /// The nearest double, halves to even; infinite when it is too large for one.
+    pub(crate) fn to_f64(&self) -> f64 {
+        match self {
+            Int::Small(n) => *n as f64,
+            Int::Big(n) => {
+                // The 127 leading bits decide, with one more that says whether anything follows.
+                let shift = n.bits() - 126;
+                let leading = (n.magnitude() >> shift).to_u128().expect("126 bits fit");
+                let sticky = n.magnitude().trailing_zeros().is_some_and(|zeros| zeros < shift);
+                let magnitude = super::float::rounded(leading << 1 | u128::from(sticky), shift as i64 - 1);
+                if n.is_negative() { -magnitude } else { magnitude }
+            }
+        }
+    }
+
+    /// The integer that a finite double without fraction is.
+    pub(crate) fn from_f64(x: f64) -> Int {
+        if x.abs() < 2f64.powi(126) {
+            return Int::Small(x as i128);
+        }
+        let (mantissa, exponent) = super::float::decode(x);
+        Int::Small(i128::from(mantissa)).shifted_left(exponent as u64)
+    }
+}
+
+impl From<i64> for Int {
+    fn from(n: i64) -> Int {
+        Int::Small(i128::from(n))
+    }
+}
+
+impl From<BigUint> for Int {
+    fn from(n: BigUint) -> Int {
+        if n.is_zero() { Int::ZERO } else { Int::from_big(BigInt::from(n)) }
+    }
+}
+
+impl Int {
+    /// The integer `n`.
+    pub(crate) fn from_unsigned(n: u128) -> Int {
+        match i128::try_from(n) {
+            Ok(n) => Int::Small(n),
+            Err(_) => Int::Big(BigInt::from(n)),
+        }
+    }
+}

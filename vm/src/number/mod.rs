@@ -1,0 +1,169 @@
+//! The numeric tower: integers of any size, ratios and doubles, with the contagion of Common Lisp.
+//!
+//! Pure functions on values, used by the builtins and by the interpreter where an instruction meets operands that are
+//! not both fixnums or both doubles.
+//!
+//! Guarantees: results are normalized, so that a number has one representation (a bignum that fits is a fixnum, a
+//! ratio is in lowest terms with a denominator above one) and `eql` need not compute. A float and a rational are
+//! compared by their exact values. No result is infinite or not a number: the operation fails as under SBCL's traps.
+//!
+//! Work is bounded, since nothing can interrupt it:
+//! - No integer has more than [`BIT_LIMIT`] bits. An operation whose result would have more fails with an
+//!   arithmetic error before it begins.
+//! - Steps that are quadratic in the sizes of their operands (products, quotients, greatest common divisors, digits) take
+//!   at most the work named in [`limit`]. Above, the outcome is [`Exit::Slowly`], and the ESL function in the row of the
+//!   builtin of that name (`+`, `*`, `floor`, …) does the operation in pieces.
+//! - What was done is charged: a unit for each pair of limbs that was multiplied or limb that was copied.
+//!
+//! Not here: what the reader takes for a number (the compiler), functions of any number of arguments (`builtins`).
+
+use crate::heap::{Heap, Kind};
+use crate::raise::{Exit, Outcome, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+
+pub(crate) use arithmetic::{add, divide, multiply, negate, subtract};
+pub(crate) use compare::{eql, less, less_or_equal, num_equal, sign};
+pub(crate) use integer::Int;
+pub(crate) use rounding::{Rounding, modulo, quotient, remainder};
+
+mod arithmetic;
+mod compare;
+pub(crate) mod float;
+mod integer;
+pub(crate) mod limit;
+mod ratio;
+mod rounding;
+
+pub(crate) use limit::BIT_LIMIT;
+pub(crate) use ratio::Ratio;
+
+/// A number, taken out of its value.
+#[derive(Clone, Debug)]
+pub(crate) enum Number {
+    /// An integer of any size.
+    Int(Int),
+    /// A ratio that is no integer.
+    Ratio(Ratio),
+    /// A double.
+    Float(f64),
+}
+
+impl Number {
+    /// The number that `v` is, if it is one.
+    pub(crate) fn of(heap: &Heap, v: Value) -> Option<Number> {
+        if let Some(x) = v.as_double() {
+            return Some(Number::Float(x));
+        }
+        if v.is_fixnum() {
+            return Int::of(heap, v).map(Number::Int);
+        }
+        match heap.kind(v)? {
+            Kind::Bignum => Int::of(heap, v).map(Number::Int),
+            Kind::Float => heap.as_double(v).map(Number::Float),
+            Kind::Ratio => Ratio::of(heap, v).map(Number::Ratio),
+            _ => None,
+        }
+    }
+}
+
+/// Whether `v` is an integer.
+pub(crate) fn is_integer(heap: &Heap, v: Value) -> bool {
+    v.is_fixnum() || heap.is(v, Kind::Bignum)
+}
+
+/// Whether `v` is an integer or a ratio.
+pub(crate) fn is_rational(heap: &Heap, v: Value) -> bool {
+    v.is_fixnum() || matches!(heap.kind(v), Some(Kind::Bignum | Kind::Ratio))
+}
+
+/// Whether `v` is a double.
+pub(crate) fn is_float(heap: &Heap, v: Value) -> bool {
+    v.as_double().is_some() || heap.is(v, Kind::Float)
+}
+
+/// Whether `v` is a number; all numbers are real.
+pub(crate) fn is_number(heap: &Heap, v: Value) -> bool {
+    v.is_fixnum()
+        || v.as_double().is_some()
+        || matches!(heap.kind(v), Some(Kind::Bignum | Kind::Ratio | Kind::Float))
+}
+
+impl Vm {
+    /// The number that `v` is; a type error that names `expected` otherwise.
+    pub(crate) fn number(&mut self, v: Value, expected: &'static str) -> Result<Number, Exit> {
+        match Number::of(&self.heap, v) {
+            Some(number) => Ok(number),
+            None => self.type_error(v, expected),
+        }
+    }
+
+    /// The integer that `v` is; a type error otherwise.
+    pub(crate) fn integer(&mut self, v: Value) -> Result<Int, Exit> {
+        match Int::of(&self.heap, v) {
+            Some(n) => Ok(n),
+            None => self.type_error(v, "INTEGER"),
+        }
+    }
+
+    /// The double that `v` is or rounds to; a type error that names `expected` for what is no number, a failure of `op`
+    /// for a rational that is too large.
+    pub(crate) fn to_double(
+        &mut self,
+        op: &'static str,
+        v: Value,
+        expected: &'static str,
+    ) -> Result<f64, Exit> {
+        let x = match self.number(v, expected)? {
+            Number::Float(x) => return Ok(x),
+            Number::Int(n) => n.to_f64(),
+            Number::Ratio(r) => r.to_f64(),
+        };
+        if x.is_finite() { Ok(x) } else { self.raise(Raised::FloatOverflow(op)) }
+    }
+
+    /// The integer `n` as the value of operation `op`, which fails if it is too large.
+    pub(crate) fn integer_value(&mut self, op: &'static str, n: &Int) -> Outcome {
+        if let Some(n) = n.as_fixnum().and_then(Value::fixnum) {
+            return Ok(n);
+        }
+        self.check_bits(op, n.bits())?;
+        let (negative, limbs) = n.limbs();
+        Ok(self.heap.alloc_bignum(negative, &limbs)?)
+    }
+
+    /// The quotient of two integers in lowest terms, `denominator` above zero, as the value of operation `op`.
+    pub(crate) fn ratio_value(&mut self, op: &'static str, r: &Ratio) -> Outcome {
+        let numerator = self.integer_value(op, &r.numerator)?;
+        if r.denominator.is_one() {
+            return Ok(numerator);
+        }
+        let denominator = self.integer_value(op, &r.denominator)?;
+        Ok(self.heap.alloc_ratio(numerator, denominator)?)
+    }
+
+    /// The double `x` as the value of operation `op` on finite numbers, which fails if it overflowed or has no value.
+    #[inline]
+    pub(crate) fn float_value(&mut self, op: &'static str, x: f64) -> Outcome {
+        if x.is_finite() { Ok(self.heap.float(x)?) } else { self.float_trap(op, x) }
+    }
+
+    #[cold]
+    fn float_trap(&mut self, op: &'static str, x: f64) -> Outcome {
+        if x.is_nan() {
+            self.raise(Raised::Arithmetic(op, "the result is not a number".into()))
+        } else {
+            self.raise(Raised::FloatOverflow(op))
+        }
+    }
+
+    /// Gives several values.
+    pub(crate) fn give_values(&mut self, values: &[Value]) -> Outcome {
+        self.values.clear();
+        self.values.extend_from_slice(values);
+        Err(Exit::Values)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,165 @@
+//! Ratios: quotients of integers in lowest terms.
+
+use std::cmp::Ordering;
+
+use num_bigint::BigUint;
+use num_integer::Integer;
+
+use super::{Int, limit};
+use crate::heap::Heap;
+use crate::raise::{Exit, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// A quotient of integers. An integer is one with the denominator 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Ratio {
+    /// Above the line; carries the sign.
+    pub(crate) numerator: Int,
+    /// Below the line; above zero, and without a common divisor with the numerator.
+    pub(crate) denominator: Int,
+}
+
+/// The greatest common divisor, not negative.
+pub(crate) fn gcd(a: &Int, b: &Int) -> Int {
+    match (a, b) {
+        (Int::Small(a), Int::Small(b)) => small_gcd(a.unsigned_abs(), b.unsigned_abs()),
+        _ => {
+            let (a, b) = (a.to_big(), b.to_big());
+            BigUint::gcd(a.magnitude(), b.magnitude()).into()
+        }
+    }
+}
+
+/// Euclid's algorithm down to one limb, then the binary one, which needs no division.
+fn small_gcd(mut a: u128, mut b: u128) -> Int {
+    while b >> 64 != 0 || a >> 64 != 0 && b != 0 {
+        (a, b) = (b, a % b);
+    }
+    if b == 0 {
+        return Int::from_unsigned(a);
+    }
+    let (mut a, mut b) = (a as u64, b as u64);
+    if a == 0 {
+        return Int::from_unsigned(u128::from(b));
+    }
+    let shift = (a | b).trailing_zeros();
+    a >>= a.trailing_zeros();
+    while b != 0 {
+        b >>= b.trailing_zeros();
+        if a > b {
+            std::mem::swap(&mut a, &mut b);
+        }
+        b -= a;
+    }
+    Int::from_unsigned(u128::from(a) << shift)
+}
+
+impl Ratio {
+    /// The ratio that `v` is, if it is one.
+    pub(crate) fn of(heap: &Heap, v: Value) -> Option<Ratio> {
+        let (numerator, denominator) = heap.ratio(v)?;
+        Some(Ratio { numerator: Int::of(heap, numerator)?, denominator: Int::of(heap, denominator)? })
+    }
+
+    /// The integer `n` over 1.
+    pub(crate) fn integer(n: Int) -> Ratio {
+        Ratio { numerator: n, denominator: Int::ONE }
+    }
+
+    /// `numerator / denominator` in lowest terms. The denominator is not zero.
+    pub(crate) fn reduced(numerator: &Int, denominator: &Int) -> Ratio {
+        let divisor = gcd(numerator, denominator);
+        let divisor = if denominator.is_negative() { divisor.negated() } else { divisor };
+        Ratio {
+            numerator: numerator.exact_quotient(&divisor),
+            denominator: denominator.exact_quotient(&divisor),
+        }
+    }
+
+    /// The sum.
+    pub(crate) fn plus(&self, other: &Ratio) -> Ratio {
+        // Knuth 4.5.1: the divisors are much smaller than the products that they save.
+        let divisor = gcd(&self.denominator, &other.denominator);
+        let (left, right) =
+            (self.denominator.exact_quotient(&divisor), other.denominator.exact_quotient(&divisor));
+        let sum = self.numerator.times(&right).plus(&other.numerator.times(&left));
+        if divisor.is_one() {
+            return Ratio { numerator: sum, denominator: left.times(&other.denominator) };
+        }
+        let common = gcd(&sum, &divisor);
+        Ratio {
+            numerator: sum.exact_quotient(&common),
+            denominator: left.times(&other.denominator.exact_quotient(&common)),
+        }
+    }
+
+    /// The product.
+    pub(crate) fn times(&self, other: &Ratio) -> Ratio {
+        let first = gcd(&self.numerator, &other.denominator);
+        let second = gcd(&other.numerator, &self.denominator);
+        let numerator = self.numerator.exact_quotient(&first).times(&other.numerator.exact_quotient(&second));
+        let denominator =
+            self.denominator.exact_quotient(&second).times(&other.denominator.exact_quotient(&first));
+        Ratio { numerator, denominator }
+    }
+
+    /// With the other sign.
+    pub(crate) fn negated(&self) -> Ratio {
+        Ratio { numerator: self.numerator.negated(), denominator: self.denominator.clone() }
+    }
+
+    /// One divided by it. It is not zero.
+    pub(crate) fn inverted(&self) -> Ratio {
+        if self.numerator.is_negative() {
+            Ratio { numerator: self.denominator.negated(), denominator: self.numerator.negated() }
+        } else {
+            Ratio { numerator: self.denominator.clone(), denominator: self.numerator.clone() }
+        }
+    }
+
+    /// Limbs of the larger part: the unit of work.
+    pub(crate) fn len(&self) -> usize {
+        self.numerator.len().max(self.denominator.len())
+    }
+
+    /// The nearest double, halves to even; infinite when it is too large for one.
+    pub(crate) fn to_f64(&self) -> f64 {
+        // A quotient of at least 66 bits, and whether there was a remainder: enough for one rounding.
+        let shift = 66 + self.denominator.bits() as i64 - self.numerator.bits() as i64;
+        let (mut numerator, mut denominator) = (self.numerator.abs(), self.denominator.clone());
+        if shift > 0 {
+            numerator = numerator.shifted_left(shift as u64);
+        } else {
+            denominator = denominator.shifted_left(shift.unsigned_abs());
+        }
+        let (quotient, remainder) = numerator.div_rem(&denominator);
+        let Int::Small(quotient) = quotient else { unreachable!("the quotient has at most 67 bits") };
+        let leading = (quotient as u128) << 1 | u128::from(!remainder.is_zero());
+        let magnitude = super::float::rounded(leading, -shift - 1);
+        if self.numerator.is_negative() { -magnitude } else { magnitude }
+    }
+
+    /// How it compares with `other`, unless that takes too much work.
+    pub(crate) fn compare(&self, vm: &mut Vm, op: &'static str, other: &Ratio) -> Result<Ordering, Exit> {
+        let (left, right) = (self.numerator.signum(), other.numerator.signum());
+        if left != right || left == 0 {
+            return Ok(left.cmp(&right));
+        }
+        // a/b against c/d is a·d against c·b; the lengths of the products often decide.
+        let low = (self.numerator.bits() + other.denominator.bits()) as i64;
+        let high = (other.numerator.bits() + self.denominator.bits()) as i64;
+        if (low - high).abs() > 1 {
+            let by_size = low.cmp(&high);
+            return Ok(if left < 0 { by_size.reverse() } else { by_size });
+        }
+        let work =
+            self.numerator.len() * other.denominator.len() + other.numerator.len() * self.denominator.len();
+        if work > limit::WORK_LIMIT {
+            let text = format!("ratios of {low} bits that are nearly equal are too large to be compared");
+            return vm.raise(Raised::Arithmetic(op, text));
+        }
+        vm.charge(work);
+        Ok(self.numerator.times(&other.denominator).compare(&other.numerator.times(&self.denominator)))
+    }
+}

@@ -1,0 +1,205 @@
+//! Division with a quotient that is an integer: `floor`, `ceiling`, `truncate`, `round`, `mod`, `rem`.
+//!
+//! On floats the quotient is the rounded float quotient, truncated, and the remainder is computed from it, as SBCL does;
+//! so `(floor 1.0 0.1)` is 10, although 0.1 is a little more than a tenth.
+
+use std::cmp::Ordering;
+
+use super::arithmetic::{Pair, check_ratios, typed_operands};
+use super::{Int, Ratio};
+use crate::raise::{Exit, Outcome, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// Which integer near a quotient is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Rounding {
+    /// The greatest that is not above it.
+    Floor,
+    /// The least that is not below it.
+    Ceiling,
+    /// Its integer part.
+    Truncate,
+    /// The nearest; halves go to the even one.
+    Round,
+}
+
+impl Rounding {
+    /// What to add to the truncated quotient of a division by `divisor` that left `remainder`.
+    ///
+    /// `half` tells how twice the remainder compares with the divisor, both without sign.
+    fn step(self, remainder_negative: bool, divisor_negative: bool, is_odd: bool, half: Ordering) -> i32 {
+        let outward = if remainder_negative == divisor_negative { 1 } else { -1 };
+        match self {
+            Rounding::Truncate => 0,
+            Rounding::Floor => outward.min(0),
+            Rounding::Ceiling => outward.max(0),
+            Rounding::Round => match half {
+                Ordering::Less => 0,
+                Ordering::Equal => {
+                    if is_odd {
+                        outward
+                    } else {
+                        0
+                    }
+                }
+                Ordering::Greater => outward,
+            },
+        }
+    }
+}
+
+/// An integer quotient and the remainder that goes with it.
+enum Division {
+    Ints(Int, Int),
+    Ratio(Int, Ratio),
+    Float(Int, f64),
+}
+
+/// The quotient of `a` by `b`, an integer.
+pub(crate) fn quotient(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Outcome {
+    if let Some((quotient, _)) = small(rounding, a, b) {
+        return vm.integer_value("/", &quotient);
+    }
+    match division(vm, rounding, a, b)? {
+        Division::Ints(quotient, _) | Division::Ratio(quotient, _) | Division::Float(quotient, _) => {
+            vm.integer_value("/", &quotient)
+        }
+    }
+}
+
+/// The remainder that goes with `floor`.
+pub(crate) fn modulo(vm: &mut Vm, a: Value, b: Value) -> Outcome {
+    rest(vm, Rounding::Floor, a, b)
+}
+
+/// The remainder that goes with `truncate`.
+pub(crate) fn remainder(vm: &mut Vm, a: Value, b: Value) -> Outcome {
+    rest(vm, Rounding::Truncate, a, b)
+}
+
+/// Quotient and remainder, as two values.
+pub(crate) fn both(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Outcome {
+    let division = match small(rounding, a, b) {
+        Some((quotient, remainder)) => Division::Ints(quotient, remainder),
+        None => division(vm, rounding, a, b)?,
+    };
+    let quotient = match &division {
+        Division::Ints(quotient, _) | Division::Ratio(quotient, _) | Division::Float(quotient, _) => {
+            vm.integer_value("/", quotient)?
+        }
+    };
+    let remainder = remainder_value(vm, division)?;
+    vm.give_values(&[quotient, remainder])
+}
+
+/// The quotient as a float, and the remainder: `ffloor` and its like.
+pub(crate) fn both_with_float(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Outcome {
+    let division = division(vm, rounding, a, b)?;
+    let (Division::Ints(quotient, _) | Division::Ratio(quotient, _) | Division::Float(quotient, _)) =
+        &division;
+    let mut x = quotient.to_f64();
+    if quotient.is_zero() && rounding != Rounding::Floor && rounding != Rounding::Round {
+        // A float quotient between -1 and 0 is minus zero.
+        if let Division::Float(_, remainder) = &division
+            && (*remainder < 0.0) != (super::sign(vm, b, "REAL")? < 0)
+            && *remainder != 0.0
+        {
+            x = -0.0;
+        }
+    }
+    let quotient = vm.float_value("/", x)?;
+    let remainder = remainder_value(vm, division)?;
+    vm.give_values(&[quotient, remainder])
+}
+
+fn rest(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Outcome {
+    if let Some((_, remainder)) = small(rounding, a, b) {
+        return vm.integer_value("/", &remainder);
+    }
+    let division = division(vm, rounding, a, b)?;
+    remainder_value(vm, division)
+}
+
+fn remainder_value(vm: &mut Vm, division: Division) -> Outcome {
+    match division {
+        Division::Ints(_, remainder) => vm.integer_value("/", &remainder),
+        Division::Ratio(_, remainder) => vm.ratio_value("/", &remainder),
+        Division::Float(_, remainder) => vm.float_value("/", remainder),
+    }
+}
+
+/// Fixnums, without zero as the divisor.
+fn small(rounding: Rounding, a: Value, b: Value) -> Option<(Int, Int)> {
+    let (a, b) = (a.as_fixnum()?, b.as_fixnum().filter(|&b| b != 0)?);
+    let (mut quotient, mut remainder) = (a / b, a % b);
+    if remainder != 0 {
+        let half = (2 * remainder.unsigned_abs()).cmp(&b.unsigned_abs());
+        let step = i64::from(rounding.step(remainder < 0, b < 0, quotient & 1 == 1, half));
+        quotient += step;
+        remainder -= step * b;
+    }
+    Some((Int::from(quotient), Int::from(remainder)))
+}
+
+fn division(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Result<Division, Exit> {
+    match typed_operands(vm, "/", a, b, "REAL")? {
+        Pair::Ints(_, y) if y.is_zero() => vm.raise(Raised::DivisionByZero("/", [a, b])),
+        Pair::Ints(x, y) => {
+            let (quotient, remainder) = int_division(vm, rounding, &x, &y)?;
+            Ok(Division::Ints(quotient, remainder))
+        }
+        Pair::Ratios(_, y) if y.numerator.is_zero() => vm.raise(Raised::DivisionByZero("/", [a, b])),
+        Pair::Ratios(x, y) => {
+            check_ratios(vm, &x, &y)?;
+            // x / y is the quotient of integers n / d, and its remainder belongs over the common denominator.
+            let n = x.numerator.times(&y.denominator);
+            let d = x.denominator.times(&y.numerator);
+            let (quotient, remainder) = int_division(vm, rounding, &n, &d)?;
+            Ok(Division::Ratio(quotient, Ratio::reduced(&remainder, &x.denominator.times(&y.denominator))))
+        }
+        Pair::Floats(x, y) => float_division(vm, rounding, [a, b], x, y),
+    }
+}
+
+fn int_division(vm: &mut Vm, rounding: Rounding, a: &Int, b: &Int) -> Result<(Int, Int), Exit> {
+    vm.check_work((a.len() + 1).saturating_sub(b.len()), b.len())?;
+    vm.charge(a.len() + b.len());
+    let (quotient, remainder) = a.div_rem(b);
+    if remainder.is_zero() || rounding == Rounding::Truncate {
+        return Ok((quotient, remainder));
+    }
+    let half = remainder.abs().shifted_left(1).compare(&b.abs());
+    let step = rounding.step(remainder.is_negative(), b.is_negative(), quotient.is_odd(), half);
+    Ok(match step {
+        0 => (quotient, remainder),
+        1 => (quotient.plus(&Int::ONE), remainder.minus(b)),
+        _ => (quotient.minus(&Int::ONE), remainder.plus(b)),
+    })
+}
+
+fn float_division(
+    vm: &mut Vm,
+    rounding: Rounding,
+    operands: [Value; 2],
+    x: f64,
+    y: f64,
+) -> Result<Division, Exit> {
+    if y == 0.0 && x != 0.0 {
+        return vm.raise(Raised::DivisionByZero("/", operands));
+    }
+    let exact = x / y;
+    if !exact.is_finite() {
+        return vm.float_value("/", exact).map(|_| unreachable!("the value is not finite"));
+    }
+    let whole = exact.trunc();
+    let mut quotient = Int::from_f64(whole);
+    let mut remainder = x - whole * y;
+    if remainder != 0.0 {
+        let half = (2.0 * remainder.abs()).partial_cmp(&y.abs()).unwrap_or(Ordering::Less);
+        let step = rounding.step(remainder < 0.0, y < 0.0, quotient.is_odd(), half);
+        quotient = quotient.plus(&Int::from(i64::from(step)));
+        remainder -= f64::from(step) * y;
+    }
+    Ok(Division::Float(quotient, remainder))
+}
