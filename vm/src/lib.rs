@@ -3,4 +3,10 @@
 #![deny(unsafe_code)]
 
 pub mod heap;
+pub mod host;
 pub mod value;
+
+mod load;
+mod shape;
+mod stub;
+mod world;

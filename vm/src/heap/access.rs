@@ -226,6 +226,29 @@ impl Heap {
         Some(unsafe { (*object.cast::<Function>()).code })
     }
 
+    /// Gives a function other code; `None` if `v` is no function, or `code` is no Code for as many captures. Only the
+    /// loader does so, when it puts the real code in place of a stub.
+    pub(crate) fn function_set_code(&mut self, v: Value, code: Value) -> Option<()> {
+        if self.code(code)?.spare[1] as usize != self.function_captures(v)?.len() {
+            return None;
+        }
+        self.set_slot(v, Kind::Function, 0, code)
+    }
+
+    /// Sets a constant of code; `None` if `v` is none or has no such constant. Only for constants of which the
+    /// interpreter expects nothing, or a class in place of its name.
+    pub(crate) fn code_set_constant(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
+        let object = self.object_of(v, Kind::Code)?;
+        // SAFETY: a live code object has `nconsts` values at the fixed offset, and `index` is below that.
+        unsafe {
+            if index >= (*object.cast::<Code>()).nconsts as usize {
+                return None;
+            }
+            self.store(object.byte_add(Code::CONSTANTS_OFFSET).cast::<Value>().add(index), new);
+        }
+        Some(())
+    }
+
     /// The captured values of a function.
     pub fn function_captures(&self, v: Value) -> Option<&[Value]> {
         self.record(v, Kind::Function).map(|slots| &slots[1..])

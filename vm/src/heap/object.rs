@@ -10,6 +10,8 @@
 
 use super::layout::{Bignum, Boxed, Code, Cons, Float, Function, Header, Kind, MAX_LENGTH, Symbol, Vector};
 use super::{AllocError, Heap};
+use crate::load::Verified;
+use crate::shape::{Shape, Sort};
 use crate::value::Value;
 
 /// What a Code object is made from.
@@ -25,6 +27,8 @@ pub struct CodeParts<'a> {
     pub arity: u32,
     /// Number of registers of a frame.
     pub nregs: u32,
+    /// The packed shape, and the number of captures: see [`crate::shape`].
+    pub spare: [u64; 2],
     /// The constants.
     pub constants: &'a [Value],
     /// The instruction words. `entry` will be the first of them.
@@ -271,13 +275,52 @@ impl Heap {
                 nregs: parts.nregs,
                 nconsts: nconsts as u32,
                 nwords: nwords as u32,
-                spare: [0; 2],
+                spare: parts.spare,
                 constants: [],
             });
             std::ptr::copy_nonoverlapping(parts.constants.as_ptr(), constants, nconsts);
             std::ptr::copy_nonoverlapping(parts.words.as_ptr(), words, nwords);
             Ok(Value::from_object(object))
         }
+    }
+
+    /// New code of one word of the machine's own, such as what stands in for a function that is not there yet. `shape`
+    /// says that it is no bytecode, so its constants and registers are never looked at.
+    ///
+    /// # Panics
+    /// When `shape` is that of bytecode.
+    pub(crate) fn alloc_stub(
+        &mut self,
+        name: Value,
+        owner: Value,
+        shape: Shape,
+        ncaptures: usize,
+        word: u32,
+    ) -> Result<Value, AllocError> {
+        assert_ne!(shape.sort, Sort::Bytecode, "a stub is no bytecode");
+        let parts = CodeParts {
+            name,
+            debug: Value::NIL,
+            owner,
+            arity: Code::ANY_ARITY,
+            nregs: 0,
+            spare: [shape.pack(), ncaptures as u64],
+            constants: &[],
+            words: &[word],
+        };
+        // SAFETY: a call of code without an exact arity looks at the shape, which says that there is no bytecode.
+        unsafe { self.alloc_code(parts) }
+    }
+
+    /// New code of a function that was verified, laid out as [`crate::shape`] says.
+    pub(crate) fn alloc_verified_code(
+        &mut self,
+        parts: CodeParts<'_>,
+        _verified: &Verified,
+    ) -> Result<Value, AllocError> {
+        // SAFETY: the token says that the loader has taken the parts from a module that the verifier has accepted, or
+        // that is part of this program.
+        unsafe { self.alloc_code(parts) }
     }
 
     /// A new string of these code points.

@@ -1,0 +1,289 @@
+//! A host without an outside: a clock that jumps, given input, captured output, files that live in memory.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::{Host, HostError, Input, Message, Output, Wake, WriteMode};
+
+/// What a program has written, and the files as they are: shared between a [`VirtualHost`] and whoever looks at it.
+#[derive(Clone, Default)]
+pub struct Captured(Arc<Mutex<Contents>>);
+
+#[derive(Default)]
+struct Contents {
+    output: Vec<u8>,
+    error: Vec<u8>,
+    files: BTreeMap<String, Vec<u8>>,
+}
+
+impl Captured {
+    fn contents(&self) -> MutexGuard<'_, Contents> {
+        // The contents are whole at every moment: a panic elsewhere does not spoil them.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What was written to standard output so far.
+    pub fn output(&self) -> String {
+        String::from_utf8_lossy(&self.contents().output).into_owned()
+    }
+
+    /// What was written to standard error so far.
+    pub fn error(&self) -> String {
+        String::from_utf8_lossy(&self.contents().error).into_owned()
+    }
+
+    /// What was written to standard output since this was last asked.
+    pub fn take_output(&self) -> String {
+        let bytes = std::mem::take(&mut self.contents().output);
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+
+    pub(super) fn append(&self, output: Output, bytes: &[u8]) {
+        let mut contents = self.contents();
+        match output {
+            Output::Standard => contents.output.extend_from_slice(bytes),
+            Output::Error => contents.error.extend_from_slice(bytes),
+        }
+    }
+
+    /// The contents of a file.
+    pub fn file(&self, path: &str) -> Option<Vec<u8>> {
+        self.contents().files.get(path).cloned()
+    }
+}
+
+/// A host in memory. Time passes only when the program waits or the host is told so.
+#[derive(Default)]
+pub struct VirtualHost {
+    now: u64,
+    wall_clock_start: i64,
+    seed: u64,
+    arguments: Vec<String>,
+    input: VecDeque<Vec<u8>>,
+    /// Messages by the time at which they arrive, earliest first.
+    messages: VecDeque<(u64, Message)>,
+    captured: Captured,
+    /// Bytes that may still be written to standard output before it breaks.
+    output_limit: Option<usize>,
+    refuses_files: bool,
+}
+
+impl VirtualHost {
+    /// A host with nothing in it, at time zero.
+    pub fn new() -> VirtualHost {
+        VirtualHost::default()
+    }
+
+    /// What the program writes.
+    pub fn captured(&self) -> Captured {
+        self.captured.clone()
+    }
+
+    /// Gives text to standard input, as one chunk; the end comes after the last.
+    #[must_use]
+    pub fn with_input(mut self, text: impl Into<Vec<u8>>) -> VirtualHost {
+        let text = text.into();
+        if !text.is_empty() {
+            self.input.push_back(text);
+        }
+        self
+    }
+
+    /// Gives the program its arguments.
+    #[must_use]
+    pub fn with_arguments(mut self, arguments: Vec<String>) -> VirtualHost {
+        self.arguments = arguments;
+        self
+    }
+
+    /// Sets the seed.
+    #[must_use]
+    pub fn with_seed(mut self, seed: u64) -> VirtualHost {
+        self.seed = seed;
+        self
+    }
+
+    /// Sets the wall clock at time zero, in nanoseconds since 1970.
+    #[must_use]
+    pub fn with_wall_clock(mut self, start: i64) -> VirtualHost {
+        self.wall_clock_start = start;
+        self
+    }
+
+    /// Puts a file there.
+    #[must_use]
+    pub fn with_file(self, path: &str, contents: impl Into<Vec<u8>>) -> VirtualHost {
+        self.captured.contents().files.insert(path.to_owned(), contents.into());
+        self
+    }
+
+    /// Lets a message arrive at a time in nanoseconds.
+    #[must_use]
+    pub fn with_message(mut self, time: u64, message: Message) -> VirtualHost {
+        let at = self.messages.partition_point(|&(other, _)| other <= time);
+        self.messages.insert(at, (time, message));
+        self
+    }
+
+    /// Breaks standard output after so many bytes.
+    #[must_use]
+    pub fn with_output_limit(mut self, bytes: usize) -> VirtualHost {
+        self.output_limit = Some(bytes);
+        self
+    }
+
+    /// Refuses all access to files.
+    #[must_use]
+    pub fn without_files(mut self) -> VirtualHost {
+        self.refuses_files = true;
+        self
+    }
+
+    fn check_files(&self) -> Result<(), HostError> {
+        if self.refuses_files { Err(HostError::Refused) } else { Ok(()) }
+    }
+}
+
+impl Host for VirtualHost {
+    fn monotonic(&mut self) -> u64 {
+        self.now
+    }
+
+    fn wall_clock(&mut self) -> i64 {
+        self.wall_clock_start.saturating_add_unsigned(self.now)
+    }
+
+    fn wait(&mut self, deadline: Option<u64>, for_input: bool) -> Wake {
+        if for_input {
+            // Input is there or at its end: there is nothing to wait for.
+            return Wake::Arrival;
+        }
+        match (deadline, self.messages.front()) {
+            (deadline, Some(&(arrival, _))) if deadline.is_none_or(|deadline| arrival <= deadline) => {
+                self.now = self.now.max(arrival);
+                Wake::Arrival
+            }
+            (Some(deadline), _) => {
+                self.now = self.now.max(deadline);
+                Wake::Time
+            }
+            (None, _) => Wake::Never,
+        }
+    }
+
+    fn is_virtual(&self) -> bool {
+        true
+    }
+
+    fn advance(&mut self, nanoseconds: u64) {
+        self.now = self.now.saturating_add(nanoseconds);
+    }
+
+    fn seed(&mut self) -> u64 {
+        self.seed
+    }
+
+    fn arguments(&mut self) -> Vec<String> {
+        self.arguments.clone()
+    }
+
+    fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError> {
+        let limit = match output {
+            Output::Standard => self.output_limit.unwrap_or(usize::MAX),
+            Output::Error => usize::MAX,
+        };
+        let taken = bytes.len().min(limit);
+        self.captured.append(output, &bytes[..taken]);
+        if output == Output::Standard {
+            self.output_limit = self.output_limit.map(|limit| limit - taken);
+        }
+        if taken < bytes.len() { Err(HostError::BrokenPipe) } else { Ok(()) }
+    }
+
+    fn read_input(&mut self) -> Input {
+        self.input.pop_front().map_or(Input::End, Input::Data)
+    }
+
+    fn read_file(&mut self, path: &str) -> Result<Vec<u8>, HostError> {
+        self.check_files()?;
+        self.captured.file(path).ok_or(HostError::NotFound)
+    }
+
+    fn write_file(&mut self, path: &str, bytes: &[u8], mode: WriteMode) -> Result<(), HostError> {
+        self.check_files()?;
+        let mut contents = self.captured.contents();
+        if mode == WriteMode::Create && contents.files.contains_key(path) {
+            return Err(HostError::Exists);
+        }
+        let file = contents.files.entry(path.to_owned()).or_default();
+        if mode == WriteMode::Replace {
+            file.clear();
+        }
+        file.extend_from_slice(bytes);
+        Ok(())
+    }
+
+    fn file_exists(&mut self, path: &str) -> bool {
+        !self.refuses_files && self.captured.contents().files.contains_key(path)
+    }
+
+    fn delete_file(&mut self, path: &str) -> Result<(), HostError> {
+        self.check_files()?;
+        self.captured.contents().files.remove(path).map(|_| ()).ok_or(HostError::NotFound)
+    }
+
+    fn receive(&mut self) -> Vec<Message> {
+        let arrived = self.messages.partition_point(|&(time, _)| time <= self.now);
+        self.messages.drain(..arrived).map(|(_, message)| message).collect()
+    }
+
+    fn has_senders(&self) -> bool {
+        !self.messages.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_jumps_to_what_happens_first() {
+        let message = Message { channel: "bump".into(), arguments: Vec::new() };
+        let mut host = VirtualHost::new().with_wall_clock(1000).with_message(70, message);
+        assert_eq!(host.wait(Some(50), false), Wake::Time);
+        assert_eq!((host.monotonic(), host.wall_clock()), (50, 1050));
+        assert!(host.receive().is_empty());
+        assert_eq!(host.wait(Some(100), false), Wake::Arrival);
+        assert_eq!((host.monotonic(), host.receive().len()), (70, 1));
+        assert_eq!(host.wait(None, false), Wake::Never);
+        host.advance(5);
+        assert_eq!(host.monotonic(), 75);
+    }
+
+    #[test]
+    fn input_is_given_in_chunks_and_output_can_break() {
+        let mut host = VirtualHost::new().with_input("a\n").with_input("b").with_output_limit(3);
+        let captured = host.captured();
+        assert_eq!(host.read_input(), Input::Data(b"a\n".to_vec()));
+        assert_eq!(host.read_input(), Input::Data(b"b".to_vec()));
+        assert_eq!(host.read_input(), Input::End);
+        assert_eq!(host.write(Output::Standard, b"xy"), Ok(()));
+        assert_eq!(host.write(Output::Standard, b"z!"), Err(HostError::BrokenPipe));
+        assert_eq!(captured.output(), "xyz");
+    }
+
+    #[test]
+    fn files_are_those_that_were_given_or_written() {
+        let mut host = VirtualHost::new().with_file("a", "1");
+        assert_eq!(host.read_file("a"), Ok(b"1".to_vec()));
+        assert_eq!(host.read_file("b"), Err(HostError::NotFound));
+        assert_eq!(host.write_file("a", b"2", WriteMode::Create), Err(HostError::Exists));
+        assert_eq!(host.write_file("a", b"2", WriteMode::Append), Ok(()));
+        assert_eq!(host.captured().file("a"), Some(b"12".to_vec()));
+        assert_eq!(host.write_file("a", b"3", WriteMode::Replace), Ok(()));
+        assert_eq!(host.read_file("a"), Ok(b"3".to_vec()));
+        assert_eq!(host.delete_file("a"), Ok(()));
+        assert!(!host.file_exists("a"));
+        assert_eq!(VirtualHost::new().without_files().read_file("a"), Err(HostError::Refused));
+    }
+}

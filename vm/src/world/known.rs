@@ -1,0 +1,65 @@
+//! The symbols and keywords that the machine itself speaks of.
+
+use esl_bytecode::symbol::Symbol;
+
+use crate::heap::{AllocError, Heap};
+use crate::value::Value;
+use crate::world::World;
+
+macro_rules! home {
+    (cl, $name:literal) => {
+        Symbol::cl($name)
+    };
+    (esl, $name:literal) => {
+        Symbol::esl($name)
+    };
+    (keyword, $name:literal) => {
+        Symbol::keyword($name)
+    };
+}
+
+macro_rules! define_known {
+    ($( $field:ident = $home:ident $name:literal ; )*) => {
+        /// Well-known symbols, made when the machine is.
+        #[derive(Clone, Copy, Debug)]
+        #[allow(missing_docs, reason = "each is the symbol of its name")]
+        pub(crate) struct Known {
+            $( pub(crate) $field: Value, )*
+        }
+
+        impl Known {
+            /// What stands there until [`Known::intern`] has been called.
+            pub(super) const NONE: Known = Known { $( $field: Value::NIL, )* };
+
+            /// Makes all of them.
+            pub(super) fn intern(world: &mut World, heap: &mut Heap) -> Result<Known, AllocError> {
+                Ok(Known { $( $field: world.intern(heap, &home!($home, $name))?, )* })
+            }
+
+            /// Calls `visit` with each.
+            pub(super) fn visit(&self, visit: &mut dyn FnMut(Value)) {
+                $( visit(self.$field); )*
+            }
+        }
+    };
+}
+
+define_known! {
+    quote = cl "QUOTE";
+    function = cl "FUNCTION";
+    lambda = cl "LAMBDA";
+    setf = cl "SETF";
+    structure_object = cl "STRUCTURE-OBJECT";
+    error = cl "ERROR";
+    raise = esl "%RAISE";
+    // Properties under which the machine keeps data on a symbol.
+    variable_documentation = esl "%VARIABLE-DOCUMENTATION";
+    accessor = esl "%ACCESSOR";
+    instead = esl "%INSTEAD";
+    // Answers and options in keywords.
+    internal = keyword "INTERNAL";
+    external = keyword "EXTERNAL";
+    inherited = keyword "INHERITED";
+    end_of_file = keyword "EOF";
+    would_block = keyword "WOULD-BLOCK";
+}

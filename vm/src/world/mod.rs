@@ -1,0 +1,409 @@
+//! The world of names: symbols, packages, classes, builtins as functions.
+//!
+//! The rules of packages (what a name read in a package means) are those of [`esl_bytecode`]; here is what the names
+//! stand for in a running machine. A symbol object is made when it is first asked for, and with it, for the name of a
+//! builtin, the function object. So a machine starts with a few dozen symbols however large the language is.
+//!
+//! Guarantees: one symbol object for each symbol of a package, for as long as the machine lives. [`Value::NIL`] and
+//! [`Value::T`] are never symbol objects in the hands of a program; their names, functions and properties are in two
+//! *companion* objects, which [`World::object_of`] gives.
+//! Not here: what may be redefined is asked by the builtins; values of task-local bindings (`control`).
+
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+use std::sync::Arc;
+
+use esl_bytecode::builtin::{BUILTINS, Builtin, Visibility};
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Home, KEYWORD_PACKAGE, Symbol};
+
+use crate::heap::layout::Symbol as SymbolObject;
+use crate::heap::{AllocError, Heap, Kind};
+use crate::shape::{Shape, Sort};
+use crate::stub;
+use crate::value::Value;
+
+mod known;
+
+pub(crate) use known::Known;
+
+/// Hashes what is a good hash already: symbols, and addresses of objects.
+#[derive(Default)]
+pub(crate) struct GivenHash(u64);
+
+impl Hasher for GivenHash {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.0 = self.0.rotate_left(8) ^ u64::from(byte);
+        }
+    }
+
+    fn write_u64(&mut self, word: u64) {
+        // Addresses differ in the middle bits only; the table looks at the lowest and the highest.
+        self.0 = word.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(26);
+    }
+}
+
+/// A map whose keys hash themselves well.
+pub(crate) type GivenMap<K, V> = HashMap<K, V, BuildHasherDefault<GivenHash>>;
+
+/// Names and what they stand for.
+pub(crate) struct World {
+    /// Symbols that the machine speaks of.
+    pub(crate) known: Known,
+    /// Whether the library is being loaded: only then may names of the language be defined.
+    pub(crate) is_open: bool,
+    /// The objects of symbols that have a package.
+    symbols: GivenMap<Symbol, Value>,
+    /// The names of symbol objects, by address: filled when somebody asks.
+    names: GivenMap<u64, Symbol>,
+    /// The objects of packages.
+    package_objects: HashMap<Arc<str>, Value>,
+    /// The companions of `NIL` and `T`.
+    nil: Value,
+    t: Value,
+    /// The code of every symbol without a function.
+    undefined: Value,
+    /// Structure and condition classes by the address of their names.
+    classes: GivenMap<u64, Value>,
+}
+
+impl World {
+    /// A world of the language's names, without any definition but the builtins.
+    ///
+    /// # Errors
+    /// [`AllocError`] when the heap is too small for it.
+    pub(crate) fn new(heap: &mut Heap) -> Result<World, AllocError> {
+        let shape = Shape::other(Sort::Undefined, 0);
+        let undefined = heap.alloc_stub(Value::NIL, Value::NIL, shape, 1, stub::word(stub::UNDEFINED, 0))?;
+        let mut world = World {
+            known: Known::NONE,
+            is_open: true,
+            symbols: GivenMap::default(),
+            names: GivenMap::default(),
+            package_objects: HashMap::new(),
+            nil: Value::NIL,
+            t: Value::NIL,
+            undefined,
+            classes: GivenMap::default(),
+        };
+        world.nil = world.make_constant(heap, &Symbol::cl("NIL"), Value::NIL)?;
+        world.t = world.make_constant(heap, &Symbol::cl("T"), Value::T)?;
+        world.known = Known::intern(&mut world, heap)?;
+        Ok(world)
+    }
+
+    /// The companion of a symbol that is an immediate.
+    fn make_constant(&mut self, heap: &mut Heap, symbol: &Symbol, value: Value) -> Result<Value, AllocError> {
+        let object = self.make_object(heap, symbol)?;
+        heap.symbol_set_value(object, value);
+        let flags = SymbolObject::CONSTANT | SymbolObject::LOCKED;
+        heap.set_flags(object, Kind::Symbol, flags);
+        self.symbols.insert(symbol.clone(), value);
+        Ok(object)
+    }
+
+    /// The symbol, as a program sees it: `NIL` and `T` are immediates. For an uninterned one a new symbol each time; who
+    /// wants one object for one number keeps a table.
+    ///
+    /// # Errors
+    /// As for every allocation.
+    pub(crate) fn intern(&mut self, heap: &mut Heap, symbol: &Symbol) -> Result<Value, AllocError> {
+        if let Some(&object) = self.symbols.get(symbol) {
+            return Ok(object);
+        }
+        let object = self.make_object(heap, symbol)?;
+        if symbol.package().is_some() {
+            self.symbols.insert(symbol.clone(), object);
+        }
+        Ok(object)
+    }
+
+    /// The symbol of this name in `COMMON-LISP`.
+    ///
+    /// # Errors
+    /// As for every allocation.
+    pub(crate) fn intern_cl(&mut self, heap: &mut Heap, name: &str) -> Result<Value, AllocError> {
+        self.intern(heap, &Symbol::cl(name))
+    }
+
+    /// The symbol of this name in `ESL`.
+    ///
+    /// # Errors
+    /// As for every allocation.
+    pub(crate) fn intern_esl(&mut self, heap: &mut Heap, name: &str) -> Result<Value, AllocError> {
+        self.intern(heap, &Symbol::esl(name))
+    }
+
+    /// The keyword of this name.
+    ///
+    /// # Errors
+    /// As for every allocation.
+    pub(crate) fn keyword(&mut self, heap: &mut Heap, name: &str) -> Result<Value, AllocError> {
+        self.intern(heap, &Symbol::keyword(name))
+    }
+
+    /// The symbol, if there is an object of it already.
+    pub(crate) fn find(&self, symbol: &Symbol) -> Option<Value> {
+        self.symbols.get(symbol).copied()
+    }
+
+    /// A new object for `symbol`, with its builtin function if it names one.
+    fn make_object(&mut self, heap: &mut Heap, symbol: &Symbol) -> Result<Value, AllocError> {
+        let name = heap.alloc_str(symbol.name())?;
+        let (package, flags) = match symbol.package() {
+            None => (Value::NIL, 0),
+            Some(home) => (self.package_object(heap, home)?, home_flags(home)),
+        };
+        let object = self.make_symbol(heap, name, package, flags)?;
+        if flags & SymbolObject::KEYWORD != 0 {
+            heap.symbol_set_value(object, object);
+        } else if let Some(builtin) = find_builtin(symbol) {
+            let function = self.make_builtin(heap, builtin, object)?;
+            heap.symbol_set_function(object, function);
+        }
+        Ok(object)
+    }
+
+    /// A new symbol object in no table, with this name (a String) and package.
+    ///
+    /// # Errors
+    /// As for every allocation.
+    pub(crate) fn make_symbol(
+        &mut self,
+        heap: &mut Heap,
+        name: Value,
+        package: Value,
+        flags: u8,
+    ) -> Result<Value, AllocError> {
+        let function = heap.alloc_function(self.undefined, &[Value::NIL])?;
+        let object = heap.alloc_symbol(flags, name, package, function)?;
+        heap.function_set_capture(function, 0, object);
+        Ok(object)
+    }
+
+    fn make_builtin(&mut self, heap: &mut Heap, builtin: Builtin, name: Value) -> Result<Value, AllocError> {
+        let number = builtin.number();
+        let shape = Shape::other(Sort::Native, number as u16);
+        let code = heap.alloc_stub(name, Value::NIL, shape, 0, stub::native_word(builtin))?;
+        heap.alloc_function(code, &[])
+    }
+
+    /// The object of the package of this name.
+    fn package_object(&mut self, heap: &mut Heap, name: &Arc<str>) -> Result<Value, AllocError> {
+        if let Some(&object) = self.package_objects.get(name) {
+            return Ok(object);
+        }
+        let text = heap.alloc_str(name)?;
+        let object = heap.alloc_record(Kind::Package, 0, 0, &[text])?;
+        self.package_objects.insert(name.clone(), object);
+        Ok(object)
+    }
+
+    /// The symbol object of a symbol: the companion of `NIL` and `T`, others are their own. `None` if `v` is no symbol.
+    #[inline]
+    pub(crate) fn object_of(&self, heap: &Heap, v: Value) -> Option<Value> {
+        match v {
+            Value::NIL => Some(self.nil),
+            Value::T => Some(self.t),
+            _ if heap.is(v, Kind::Symbol) => Some(v),
+            _ => None,
+        }
+    }
+
+    /// Whether `v` is a symbol, `NIL` and `T` included.
+    #[inline]
+    pub(crate) fn is_symbol(&self, heap: &Heap, v: Value) -> bool {
+        v.is_nil() || v == Value::T || heap.is(v, Kind::Symbol)
+    }
+
+    /// The name of a symbol as the compiler knows it. `None` if `v` is no symbol, or one without a package.
+    pub(crate) fn name_of(&mut self, heap: &Heap, v: Value) -> Option<Symbol> {
+        let object = self.object_of(heap, v)?;
+        if let Some(symbol) = self.names.get(&object.bits()) {
+            return Some(symbol.clone());
+        }
+        let symbol = self.read_name(heap, object)?;
+        self.names.insert(object.bits(), symbol.clone());
+        Some(symbol)
+    }
+
+    /// As [`World::name_of`], without remembering it.
+    pub(crate) fn read_name(&self, heap: &Heap, v: Value) -> Option<Symbol> {
+        let object = self.object_of(heap, v)?;
+        let symbol = heap.symbol(object)?;
+        let home: Arc<str> = self.package_name(heap, symbol.package)?.into();
+        Some(Symbol::new(&home, &heap.string_text(symbol.name)?))
+    }
+
+    /// The name of a package object.
+    pub(crate) fn package_name(&self, heap: &Heap, package: Value) -> Option<String> {
+        heap.string_text(*heap.record(package, Kind::Package)?.first()?)
+    }
+
+    /// The function of a symbol, unless it has none. `None`, too, if `v` is no symbol.
+    #[inline]
+    pub(crate) fn function_of(&self, heap: &Heap, v: Value) -> Option<Value> {
+        let function = heap.symbol(self.object_of(heap, v)?)?.function;
+        if self.is_undefined(heap, function) { None } else { Some(function) }
+    }
+
+    /// Whether `function` is what a symbol without a function holds.
+    #[inline]
+    pub(crate) fn is_undefined(&self, heap: &Heap, function: Value) -> bool {
+        heap.function_code(function) == Some(self.undefined)
+    }
+
+    /// Takes the function of a symbol away. `None` if `v` is no symbol.
+    ///
+    /// # Errors
+    /// As for every allocation.
+    pub(crate) fn remove_function(&mut self, heap: &mut Heap, v: Value) -> Result<Option<()>, AllocError> {
+        let Some(object) = self.object_of(heap, v) else { return Ok(None) };
+        let function = heap.alloc_function(self.undefined, &[v])?;
+        Ok(heap.symbol_set_function(object, function))
+    }
+
+    /// The macro function of a symbol.
+    pub(crate) fn macro_function_of(&self, heap: &Heap, v: Value) -> Option<Value> {
+        let function = heap.symbol(self.object_of(heap, v)?)?.macro_function;
+        if function.is_nil() { None } else { Some(function) }
+    }
+
+    /// Whether the symbol may not be given another function, macro or constant: it belongs to the language.
+    pub(crate) fn is_locked(&self, heap: &Heap, v: Value) -> bool {
+        let flags = self.object_of(heap, v).and_then(|object| heap.flags(object, Kind::Symbol));
+        !self.is_open && flags.is_some_and(|flags| flags & SymbolObject::LOCKED != 0)
+    }
+
+    /// Calls `visit` with every object that the world keeps alive.
+    pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
+        self.known.visit(visit);
+        [self.nil, self.t, self.undefined].into_iter().for_each(&mut *visit);
+        self.symbols.values().copied().for_each(&mut *visit);
+        self.package_objects.values().copied().for_each(&mut *visit);
+        self.classes.values().copied().for_each(&mut *visit);
+    }
+}
+
+/// The symbol that keeps the function `(setf name)`: one of the same package, named as it is written.
+pub(crate) fn setf_cell(symbol: &Symbol) -> Symbol {
+    let name = format!("(SETF {})", symbol.name());
+    match symbol.home() {
+        Home::Package(package) => Symbol::new(package, &name),
+        Home::Uninterned(id) => Symbol::uninterned(*id, &name),
+    }
+}
+
+fn home_flags(home: &str) -> u8 {
+    match home {
+        CL_PACKAGE | ESL_PACKAGE => SymbolObject::LOCKED,
+        KEYWORD_PACKAGE => SymbolObject::KEYWORD | SymbolObject::CONSTANT | SymbolObject::LOCKED,
+        _ => 0,
+    }
+}
+
+/// Numbers of the builtins, ordered by package and name.
+const BUILTINS_BY_NAME: [u16; BUILTINS.len()] = sorted_builtins();
+
+const fn sorted_builtins() -> [u16; BUILTINS.len()] {
+    let mut numbers = [0; BUILTINS.len()];
+    let mut gap = 1;
+    let mut at = 0;
+    while at < numbers.len() {
+        numbers[at] = at as u16;
+        at += 1;
+        if gap < numbers.len() / 3 {
+            gap = gap * 3 + 1;
+        }
+    }
+    // Shell sort: short, and the compiler runs it, once.
+    while gap > 0 {
+        let mut at = gap;
+        while at < numbers.len() {
+            let number = numbers[at];
+            let mut hole = at;
+            while hole >= gap && is_before(number, numbers[hole - gap]) {
+                numbers[hole] = numbers[hole - gap];
+                hole -= gap;
+            }
+            numbers[hole] = number;
+            at += 1;
+        }
+        gap /= 3;
+    }
+    numbers
+}
+
+const fn is_before(a: u16, b: u16) -> bool {
+    let (a, b) = (&BUILTINS[a as usize], &BUILTINS[b as usize]);
+    let (a_is_cl, b_is_cl) = (matches!(a.visibility, Visibility::Cl), matches!(b.visibility, Visibility::Cl));
+    if a_is_cl != b_is_cl {
+        return a_is_cl;
+    }
+    let (a, b) = (a.name.as_bytes(), b.name.as_bytes());
+    let mut at = 0;
+    while at < a.len() && at < b.len() {
+        if a[at] != b[at] {
+            return a[at] < b[at];
+        }
+        at += 1;
+    }
+    a.len() < b.len()
+}
+
+/// The builtin that `symbol` names.
+pub(crate) fn find_builtin(symbol: &Symbol) -> Option<Builtin> {
+    let is_cl = symbol.is_in(CL_PACKAGE);
+    if !is_cl && !symbol.is_in(ESL_PACKAGE) {
+        return None;
+    }
+    let key = (!is_cl, symbol.name());
+    let of = |&number: &u16| {
+        let info = &BUILTINS[usize::from(number)];
+        (info.visibility != Visibility::Cl, info.name)
+    };
+    let at = BUILTINS_BY_NAME.binary_search_by(|number| of(number).cmp(&key)).ok()?;
+    Builtin::from_number(u32::from(BUILTINS_BY_NAME[at]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_symbol_has_one_object_and_a_builtin_its_function() {
+        let mut heap = Heap::for_tests();
+        let mut world = World::new(&mut heap).unwrap();
+        let car = world.intern_cl(&mut heap, "CAR").unwrap();
+        assert_eq!(world.intern(&mut heap, &Symbol::cl("CAR")), Ok(car));
+        assert!(world.function_of(&heap, car).is_some());
+        assert_eq!(world.name_of(&heap, car), Some(Symbol::cl("CAR")));
+        let foo = world.intern_esl(&mut heap, "FOO").unwrap();
+        assert_eq!(world.function_of(&heap, foo), None);
+        let keyword = world.keyword(&mut heap, "K").unwrap();
+        assert_eq!(heap.symbol(keyword).unwrap().value, keyword);
+    }
+
+    #[test]
+    fn every_builtin_is_found_by_its_name() {
+        for info in BUILTINS {
+            let symbol = Symbol::new(&info.package().into(), info.name);
+            assert_eq!(find_builtin(&symbol), Some(info.builtin));
+        }
+        assert_eq!(find_builtin(&Symbol::keyword("CAR")), None);
+    }
+
+    #[test]
+    fn nil_and_t_are_immediates_with_companions() {
+        let mut heap = Heap::for_tests();
+        let mut world = World::new(&mut heap).unwrap();
+        assert_eq!(world.intern_cl(&mut heap, "NIL"), Ok(Value::NIL));
+        assert_eq!(world.intern_cl(&mut heap, "T"), Ok(Value::T));
+        assert_eq!(world.name_of(&heap, Value::T), Some(Symbol::cl("T")));
+        assert!(world.is_symbol(&heap, Value::NIL));
+    }
+}
