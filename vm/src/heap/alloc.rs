@@ -1,7 +1,33 @@
-//! Allocation of raw memory.
+//! Allocation: bump pointers into the holes that the last sweep left.
+//!
+//! Two regions cut objects off the front of their current hole. The first takes every object that fits; when one does
+//! not, a small object (up to [`SMALL`]) moves the first region on to its next hole, and a medium one goes to the
+//! second region, so that a big object does not throw away the rest of a small hole. Large objects have memory of
+//! their own (`large`). Regions walk the blocks in order of address, sweeping what they come to, then take a new arena,
+//! and at the limit the small holes that they passed over.
+//!
+//! Guarantees: nothing here collects. What is allocated while marking counts as marked. A refill sweeps at most
+//! [`REFILL_SWEEPS`] blocks while the heap may grow. The same allocations give the same addresses relative to their
+//! arenas, and ask for slices at the same points, in every run.
+//!
+//! Invariants: `next <= end <= hole_end`; the granules from `next` to `hole_end` are free and in one block whose state
+//! is Taken; their metadata is zero, or the epoch while marking (see `metadata`, invariant 3).
 
-use super::Heap;
+use super::arena::{ARENA, Arena, BLOCK, BLOCKS, BlockState, metadata_of};
+use super::large::{LargeObject, footprint, is_large};
+use super::layout::GRANULE;
+use super::metadata::{END, next_hole};
+use super::{Heap, Phase};
 use std::ptr::NonNull;
+
+/// Greatest object, in bytes, for which the first region moves on to its next hole.
+const SMALL: usize = 256;
+/// A hole is used in pieces of this many bytes, so that slices come in time; also what one slice is owed for.
+pub(super) const PIECE: usize = 32 << 10;
+/// Blocks that one refill sweeps in vain before it takes a new arena, if it may.
+const REFILL_SWEEPS: usize = 8;
+/// The first region leaves a block with less than this many free bytes alone until the limit is reached.
+const WORTHWHILE: usize = BLOCK / 16;
 
 /// Why there was no memory.
 #[derive(Copy, Clone, PartialEq, Eq, Debug)]
@@ -15,32 +41,110 @@ pub enum AllocError {
     },
 }
 
-/// Free memory of which objects are cut off at the front.
-pub(crate) struct Hole {
-    pub(crate) next: usize,
-    pub(crate) end: usize,
+/// Which region.
+#[derive(Copy, Clone, PartialEq, Eq)]
+enum Which {
+    First,
+    Second,
 }
 
-impl Hole {
-    pub(crate) const fn empty() -> Hole {
-        Hole { next: 0, end: 0 }
+/// The current hole of a region, and where it looks for the next.
+#[derive(Debug)]
+pub(super) struct Region {
+    /// Where the next object goes.
+    next: usize,
+    /// End of the current piece of the hole.
+    end: usize,
+    /// End of the hole.
+    hole_end: usize,
+    /// Objects below this were counted.
+    counted: usize,
+    /// Objects of this hole at or above this were allocated while marking.
+    black_from: usize,
+    /// Arena, block and granule from where to look for further holes, in the current block.
+    scan: Option<(usize, usize, usize)>,
+    /// Arena and block to consider next.
+    cursor: (usize, usize),
+    /// Arena and block of a new arena to consider before that.
+    fresh: Option<(usize, usize)>,
+}
+
+impl Region {
+    pub(super) const fn new() -> Region {
+        Region {
+            next: 0,
+            end: 0,
+            hole_end: 0,
+            counted: 0,
+            black_from: 0,
+            scan: None,
+            cursor: (0, 1),
+            fresh: None,
+        }
+    }
+
+    #[inline(always)]
+    fn bump(&mut self, bytes: usize) -> Option<NonNull<u8>> {
+        let start = self.next;
+        if self.end - start < bytes {
+            return None;
+        }
+        self.next = start + bytes;
+        NonNull::new(std::ptr::with_exposed_provenance_mut(start))
+    }
+
+    /// Bytes allocated and not counted yet.
+    pub(super) fn uncounted(&self) -> usize {
+        self.next - self.counted
+    }
+
+    /// From here on what is allocated in the current hole counts as marked.
+    pub(super) fn begin_marking(&mut self, epoch: u8) {
+        self.black_from = self.next;
+        fill_metadata(self.next, self.hole_end, epoch);
+    }
+
+    /// Gives up the current hole. While marking, what was allocated black becomes one extent.
+    fn retire(&mut self, marking: bool) {
+        if marking && self.next < self.hole_end {
+            fill_metadata(self.next, self.hole_end, 0);
+        }
+        if marking && self.black_from < self.next {
+            // SAFETY: the granule before `next` lies in the current hole, in a live arena.
+            unsafe { *metadata_of(self.next - GRANULE) |= END };
+        }
+        debug_assert_eq!(self.uncounted(), 0);
+        (self.next, self.end, self.hole_end, self.counted, self.black_from) = (0, 0, 0, 0, 0);
+    }
+
+    /// Starts over at the first block.
+    pub(super) fn restart(&mut self, marking: bool) {
+        self.retire(marking);
+        (self.scan, self.cursor, self.fresh) = (None, (0, 1), None);
+    }
+}
+
+/// Sets the metadata of the free granules from `start` to `end`, addresses in one block.
+fn fill_metadata(start: usize, end: usize, byte: u8) {
+    if start < end {
+        // SAFETY: a hole lies in one block of a live arena, and its metadata bytes are next to each other.
+        unsafe { metadata_of(start).write_bytes(byte, (end - start) / GRANULE) };
     }
 }
 
 impl Heap {
+    /// Memory of `bytes`, a multiple of the granule, if the current hole has it.
     #[inline(always)]
     pub(super) fn bump(&mut self, bytes: usize) -> Option<NonNull<u8>> {
-        let start = self.hole.next;
-        if self.hole.end - start < bytes {
-            return None;
-        }
-        self.hole.next = start + bytes;
-        NonNull::new(std::ptr::with_exposed_provenance_mut(start))
+        self.first.bump(bytes)
     }
 
+    /// Memory of `bytes`, a multiple of the granule, not initialised.
     #[inline(always)]
     pub(super) fn allocate(&mut self, bytes: usize) -> Result<NonNull<u8>, AllocError> {
-        match self.bump(bytes) {
+        debug_assert!(bytes != 0 && bytes.is_multiple_of(GRANULE));
+        // The size decides where an object lives, room in the hole or not: the marker goes by the size alone.
+        match if is_large(bytes) { None } else { self.bump(bytes) } {
             Some(p) => Ok(p),
             None => self.allocate_slow(bytes),
         }
@@ -49,16 +153,187 @@ impl Heap {
     #[cold]
     #[inline(never)]
     fn allocate_slow(&mut self, bytes: usize) -> Result<NonNull<u8>, AllocError> {
-        let size = bytes.max(1 << 20);
-        let layout = std::alloc::Layout::from_size_align(size, 16).map_err(|_| AllocError::NeedCollection)?;
-        // SAFETY: the size is not zero.
-        let p = unsafe { std::alloc::alloc(layout) };
-        if p.is_null() {
+        if is_large(bytes) {
+            return self.allocate_large(bytes);
+        }
+        let which = if bytes <= SMALL { Which::First } else { Which::Second };
+        if let Some(p) = self.region(which).bump(bytes) {
+            return Ok(p);
+        }
+        self.refill(which, bytes)?;
+        Ok(self.region(which).bump(bytes).unwrap_or_else(|| unreachable!("a refill makes room")))
+    }
+
+    fn region(&mut self, which: Which) -> &mut Region {
+        match which {
+            Which::First => &mut self.first,
+            Which::Second => &mut self.second,
+        }
+    }
+
+    /// Makes room for `bytes` in the current piece of a region.
+    fn refill(&mut self, which: Which, bytes: usize) -> Result<(), AllocError> {
+        let (marking, epoch) = (self.phase == Phase::Marking, self.epoch);
+        loop {
+            let region = self.region(which);
+            let allocated = region.uncounted();
+            region.counted = region.next;
+            if region.hole_end - region.next >= bytes {
+                region.end = region.hole_end.min(region.next + PIECE.max(bytes));
+                self.count_allocated(allocated);
+                return Ok(());
+            }
+            region.retire(marking);
+            self.count_allocated(allocated);
+
+            let scan = match self.region(which).scan {
+                Some(scan) => scan,
+                None => {
+                    let (arena, block) = self.next_block(which, bytes)?;
+                    (arena, block, 0)
+                }
+            };
+            let (arena, block, from) = scan;
+            let hole = self.arenas[arena].as_ref().and_then(|arena| {
+                let hole = next_hole(arena.metadata(block), from, bytes / GRANULE)?;
+                Some((arena.address(block), hole))
+            });
+            let region = self.region(which);
+            region.scan = None;
+            if let Some((address, hole)) = hole {
+                region.scan = Some((arena, block, hole.end));
+                region.next = address + hole.start * GRANULE;
+                region.hole_end = address + hole.end * GRANULE;
+                (region.end, region.counted) = (region.next, region.next);
+                if marking {
+                    region.begin_marking(epoch);
+                }
+            }
+        }
+    }
+
+    /// A swept block with room for `bytes`, now taken.
+    fn next_block(&mut self, which: Which, bytes: usize) -> Result<(usize, usize), AllocError> {
+        // 1. What is left of the arena that this region had to ask for.
+        while let Some((arena, block)) = self.region(which).fresh {
+            self.region(which).fresh = if block < BLOCKS { Some((arena, block + 1)) } else { None };
+            if self.take_if(arena, block, |block| block.is_empty()) {
+                return Ok((arena, block));
+            }
+        }
+        // 2. Blocks in order of address, unless that takes too long.
+        let may_grow = self.committed + ARENA <= self.limit_now();
+        let mut swept_in_vain = 0;
+        while self.region(which).cursor.0 < self.arenas.len() {
+            let (arena, block) = self.region(which).cursor;
+            if may_grow && swept_in_vain == REFILL_SWEEPS {
+                break;
+            }
+            self.region(which).cursor = if block < BLOCKS { (arena, block + 1) } else { (arena + 1, 1) };
+            swept_in_vain += usize::from(self.sweep_if_needed(arena, block));
+            let fits = |block: &super::arena::Block| match which {
+                Which::First => {
+                    block.summary.free * GRANULE >= WORTHWHILE && block.summary.largest * GRANULE >= bytes
+                }
+                Which::Second => block.summary.largest * GRANULE >= super::arena::LARGE,
+            };
+            if self.take_if(arena, block, fits) {
+                return Ok((arena, block));
+            }
+        }
+        // 3. A new arena.
+        if may_grow && let Some(arena) = self.grow() {
+            self.region(which).fresh = Some((arena, 2));
+            let taken = self.take_if(arena, 1, |_| true);
+            debug_assert!(taken);
+            return Ok((arena, 1));
+        }
+        // 4. Any hole that is long enough. The cursor has passed every block, unless the system refused memory.
+        for arena in 0..self.arenas.len() {
+            for block in 1..=BLOCKS {
+                self.sweep_if_needed(arena, block);
+                if self.take_if(arena, block, |block| block.summary.largest * GRANULE >= bytes) {
+                    return Ok((arena, block));
+                }
+            }
+        }
+        Err(AllocError::NeedCollection)
+    }
+
+    /// Takes a block if it is swept and fits.
+    fn take_if(&mut self, arena: usize, block: usize, fits: impl Fn(&super::arena::Block) -> bool) -> bool {
+        let Some(arena) = self.arenas.get_mut(arena).and_then(Option::as_mut) else { return false };
+        let takes = arena.block(block).state == BlockState::Swept && fits(arena.block(block));
+        if takes {
+            arena.take(block);
+        }
+        takes
+    }
+
+    /// Bytes that may be taken from the system, with the reserve if it is open.
+    fn limit_now(&self) -> usize {
+        if self.reserve_open { self.limit + super::RESERVE } else { self.limit }
+    }
+
+    /// Takes a new arena from the system. Its number is the least free one.
+    fn grow(&mut self) -> Option<usize> {
+        let number = self.arenas.iter().position(Option::is_none).unwrap_or(self.arenas.len());
+        let arena = Arena::new(u32::try_from(number).ok()?)?;
+        if number == self.arenas.len() {
+            self.arenas.push(Some(arena));
+        } else {
+            self.arenas[number] = Some(arena);
+        }
+        self.commit(ARENA);
+        Some(number)
+    }
+
+    fn commit(&mut self, bytes: usize) {
+        self.committed += bytes;
+        self.stats.peak = self.stats.peak.max(self.committed as u64);
+    }
+
+    fn allocate_large(&mut self, bytes: usize) -> Result<NonNull<u8>, AllocError> {
+        if footprint(bytes) > self.limit {
+            return Err(AllocError::TooLarge { requested: bytes });
+        }
+        if self.committed + footprint(bytes) > self.limit_now() {
             return Err(AllocError::NeedCollection);
         }
-        self.arenas.push(p);
-        self.hole.next = p.expose_provenance();
-        self.hole.end = self.hole.next + size;
-        self.bump(bytes).ok_or(AllocError::NeedCollection)
+        // The current epoch: marked while marking and not yet swept while sweeping; stale by the next cycle.
+        let large = LargeObject::new(bytes, self.large_number, self.large.len(), self.epoch)
+            .ok_or(AllocError::NeedCollection)?;
+        let object = large.object();
+        self.large.push(large);
+        self.large_number += 1;
+        self.commit(footprint(bytes));
+        self.count_allocated(bytes);
+        Ok(object)
+    }
+
+    /// Counts what was allocated, and asks for the collector when it is time.
+    fn count_allocated(&mut self, bytes: usize) {
+        self.stats.allocated += bytes as u64;
+        self.pacing.since_cycle += bytes as u64;
+        match self.phase {
+            Phase::Idle => self.due |= self.pacing.since_cycle >= self.pacing.threshold,
+            Phase::Marking | Phase::Sweeping => {
+                if self.phase == Phase::Marking {
+                    self.pacing.black += bytes as u64;
+                }
+                self.pacing.owed += bytes as u64;
+                self.due |= self.pacing.owed >= PIECE as u64;
+            }
+        }
+    }
+
+    /// Counts what the regions have allocated in their current holes.
+    pub(super) fn count_regions(&mut self) {
+        for which in [Which::First, Which::Second] {
+            let region = self.region(which);
+            let allocated = region.uncounted();
+            region.counted = region.next;
+            self.count_allocated(allocated);
+        }
     }
 }

@@ -1,30 +1,85 @@
 //! The heap: where everything lives that a [`Value`] has the address of.
+//!
+//! ```text
+//! object    making objects, a function per kind          access    checked reading and writing of objects
+//! layout    their form, to the byte                      alloc     bump allocation into holes
+//! mark      incremental marking                          sweep     lazy sweeping
+//! arena     1 MiB pieces of memory, in blocks            large     big objects, one by one
+//! metadata  one byte per granule
+//! ```
+//!
+//! Objects never move. A cycle of the collector marks what is reachable, in slices between which the program runs, then
+//! what was not marked is swept, in slices and as the allocator needs it. When to run depends on nothing but the number
+//! of bytes allocated, so a run repeats exactly.
+//!
+//! Guarantees: safe code cannot break memory safety through this interface. The argument:
+//! 1. Values with an address come only from the allocation functions, fully initialised, and [`Heap::new`] makes its
+//!    caller promise that they are used with no other heap, and not after this one.
+//! 2. No allocation collects. Memory is reused only after [`Heap::end_marking`], whose caller promises that all values
+//!    still in use were reached. So between two safepoints every value is good, and builtins need no roots.
+//! 3. Access tests tag, kind and index, and borrows the heap. Every store passes the write barrier.
+//!
+//! What the VM does at a tick when [`Heap::gc_due`]:
+//!
+//! ```text
+//! Idle       begin_cycle, mark the fixed roots
+//! Marking    slice; when Drained: scan a stack not yet scanned in this cycle (cycle_id tells) with the visits left
+//!            over, or end_marking when there is none
+//! Sweeping   slice
+//! ```
+//!
+//! Roots are of three sorts. *Fixed* roots are marked at the beginning, and whoever overwrites one later calls
+//! [`Heap::log_if_marking`] with the old value first. *Stacks* are scanned once per cycle, before their task runs in it
+//! (why that is sound: `mark`). *Few and changing* roots may be marked at the beginning and all again before the end.
+//!
+//! Not here: which roots there are, when to run a slice, weak references.
+
 #![allow(unsafe_code)]
 
 pub mod layout;
 
 mod access;
 mod alloc;
+mod arena;
+mod large;
+mod mark;
+mod metadata;
 mod object;
+mod sweep;
 
+pub use access::BignumRef;
 pub use alloc::AllocError;
 pub use layout::Kind;
 pub use object::CodeParts;
 
-use crate::value::Value;
+use crate::value::{TAG_MASK, Value};
+use alloc::Region;
+use arena::{ARENA, Arena};
+use large::LargeObject;
+use mark::Marker;
+use sweep::Sweep;
+
+/// Bytes that [`Heap::open_reserve`] adds to the limit.
+pub const RESERVE: usize = 1 << 20;
+
+/// Visits of an ordinary slice: well under 100 µs.
+pub const SLICE_VISITS: u32 = 2000;
 
 /// What a heap may use, and when it collects.
 #[derive(Clone, Debug)]
 pub struct HeapConfig {
-    /// Bytes that the heap may take from the system, metadata included.
+    /// Bytes that the heap may take from the system, metadata included; at least one arena of 1 MiB.
     pub limit: usize,
-    /// A cycle starts when this much, or as much as was live if that is more, was allocated since the last one.
+    /// A cycle starts when this much was allocated since the last one, or as much as was live then if that is more.
+    /// Near the limit it starts sooner.
     pub cycle_floor: usize,
+    /// Most objects on the mark stack, of 8 bytes each; more of them wait in the metadata, which is slower.
+    pub mark_stack: usize,
 }
 
 impl Default for HeapConfig {
     fn default() -> Self {
-        HeapConfig { limit: 1 << 30, cycle_floor: 8 << 20 }
+        HeapConfig { limit: 1 << 30, cycle_floor: 8 << 20, mark_stack: 128 << 10 }
     }
 }
 
@@ -41,11 +96,15 @@ pub enum Phase {
 
 /// What a slice has left to do.
 #[derive(Copy, Clone, PartialEq, Eq, Debug)]
+#[must_use]
 pub enum SliceOutcome {
     /// More of the same.
     More,
     /// All that was marked has been followed: mark the stacks not yet scanned, or end marking.
-    Drained,
+    Drained {
+        /// Visits not used; a scanned slot may count as a quarter of one.
+        left: u32,
+    },
     /// The cycle is over.
     Finished,
 }
@@ -59,7 +118,7 @@ pub struct HeapStats {
     pub slices: u64,
     /// Visits of the longest slice.
     pub longest_slice: u64,
-    /// Bytes found live by the last cycle.
+    /// Bytes found live by the last cycle, what was allocated during it included.
     pub live: u64,
     /// Bytes allocated.
     pub allocated: u64,
@@ -69,12 +128,48 @@ pub struct HeapStats {
     pub peak: u64,
 }
 
-/// A heap.
-pub struct Heap {
-    pub(crate) hole: alloc::Hole,
-    marking: bool,
-    arenas: Vec<*mut u8>,
+/// When to run, in bytes allocated.
+struct Pacing {
+    /// `HeapConfig::cycle_floor`.
+    floor: u64,
+    /// A cycle starts at this much.
+    threshold: u64,
+    /// Allocated since the last marking ended.
+    since_cycle: u64,
+    /// Allocated since the marking under way began.
+    black: u64,
+    /// Allocated during the cycle, and not worked off by slices.
+    owed: u64,
 }
+
+/// A heap. See the module documentation for the rules of its use.
+pub struct Heap {
+    // What the interpreter's fast paths touch comes first.
+    first: Region,
+    second: Region,
+    marking: bool,
+    due: bool,
+    reserve_open: bool,
+
+    phase: Phase,
+    epoch: u8,
+    cycle_id: u64,
+    pacing: Pacing,
+    marker: Marker,
+    sweep: Sweep,
+
+    // Invariant: `committed` is the sum of all arenas and large objects.
+    arenas: Vec<Option<Arena>>,
+    large: Vec<LargeObject>,
+    large_number: u64,
+    committed: usize,
+    limit: usize,
+
+    stats: HeapStats,
+}
+
+// SAFETY: a heap owns its memory, shares none of it, and is tied to no thread.
+unsafe impl Send for Heap {}
 
 impl Heap {
     /// Makes an empty heap.
@@ -82,8 +177,27 @@ impl Heap {
     /// # Safety
     /// The caller promises that a value with an address is used only with the heap that it came from, and not after
     /// that heap was dropped.
-    pub unsafe fn new(_config: HeapConfig) -> Heap {
-        Heap { hole: alloc::Hole::empty(), marking: false, arenas: Vec::new() }
+    pub unsafe fn new(config: HeapConfig) -> Heap {
+        let floor = config.cycle_floor as u64;
+        Heap {
+            first: Region::new(),
+            second: Region::new(),
+            marking: false,
+            due: false,
+            reserve_open: false,
+            phase: Phase::Idle,
+            epoch: 1,
+            cycle_id: 0,
+            pacing: Pacing { floor, threshold: floor, since_cycle: 0, black: 0, owed: 0 },
+            marker: Marker::new(config.mark_stack),
+            sweep: Sweep::default(),
+            arenas: Vec::new(),
+            large: Vec::new(),
+            large_number: 0,
+            committed: 0,
+            limit: config.limit.max(ARENA),
+            stats: HeapStats::default(),
+        }
     }
 
     /// A heap for the unit tests of this crate.
@@ -93,8 +207,8 @@ impl Heap {
         unsafe { Heap::new(HeapConfig::default()) }
     }
 
-    /// The write barrier: whoever overwrites a value in the heap, or in a root that is scanned only once per cycle,
-    /// calls this with the old value first.
+    /// The write barrier: whoever overwrites a value in the heap, or in a fixed root, calls this with the old value
+    /// first.
     #[inline(always)]
     pub fn log_if_marking(&mut self, old: Value) {
         if self.marking {
@@ -103,74 +217,89 @@ impl Heap {
     }
 
     #[cold]
-    fn log(&mut self, _old: Value) {}
+    #[inline(never)]
+    fn log(&mut self, old: Value) {
+        self.mark(old);
+    }
 
-    /// Whether the collector wants to run at the next tick: begin a cycle when idle, else run a slice.
+    /// Whether the collector wants to run at the next tick: begin a cycle when idle, else run a slice. Changes only
+    /// when allocation takes its slow path, and by the collector's own functions.
     #[inline(always)]
     pub fn gc_due(&self) -> bool {
-        false
+        self.due
     }
 
     /// What the collector is doing.
     pub fn phase(&self) -> Phase {
-        Phase::Idle
+        self.phase
     }
 
     /// Number of the cycle that runs or ran last; a task stack notes it when it was scanned.
     pub fn cycle_id(&self) -> u64 {
-        0
+        self.cycle_id
     }
 
-    /// Begins a cycle. The caller marks the fixed roots at once, before anything else runs.
-    pub fn begin_cycle(&mut self) {}
-
-    /// Marks a value: it, and what it leads to, outlives this cycle.
-    #[inline]
-    pub fn mark(&mut self, _v: Value) {}
-
-    /// Marks all values of a root or stack. Raw return addresses among them do no harm.
-    pub fn mark_slice(&mut self, _values: &[Value]) {}
-
-    /// Runs a slice of marking or sweeping, of about `max_visits` objects.
-    pub fn slice(&mut self, _max_visits: u32) -> SliceOutcome {
-        SliceOutcome::Finished
-    }
-
-    /// Ends marking; what was neither marked nor allocated in this cycle will be freed.
-    ///
-    /// # Safety
-    /// Every value that anyone will still use was marked, is reachable from what was marked, or was allocated since
-    /// the cycle began.
-    ///
-    /// # Panics
-    /// Unless the last slice was [`SliceOutcome::Drained`] and nothing was marked since.
-    pub unsafe fn end_marking(&mut self) {}
-
-    /// A whole cycle at once: drops one in progress, calls `mark_roots`, follows everything, and frees the rest.
-    ///
-    /// # Safety
-    /// As for [`Heap::end_marking`], of what `mark_roots` marks.
-    pub unsafe fn collect_fully(&mut self, mark_roots: impl FnOnce(&mut Heap)) {
-        mark_roots(self);
-    }
-
-    /// Opens the reserve above the limit, once, for the clause that handles `:heap-exhausted`; whether it was closed.
+    /// Opens the reserve above the limit for the clause that handles `:heap-exhausted`; false if it is open already.
     pub fn open_reserve(&mut self) -> bool {
-        true
+        !std::mem::replace(&mut self.reserve_open, true)
     }
 
-    /// Closes the reserve again.
-    pub fn close_reserve(&mut self) {}
+    /// Closes the reserve. What it holds stays; the next allocation beyond the limit fails again.
+    pub fn close_reserve(&mut self) {
+        self.reserve_open = false;
+    }
 
     /// A number that tells a value from all others alive at the same time, the same in every run of the same program:
     /// what `eq` hash tables hash.
     pub fn identity(&self, v: Value) -> u64 {
-        v.bits()
+        if !v.is_address() {
+            return v.bits();
+        }
+        // SAFETY: a value with an address is that of a live object (`access`, module header).
+        unsafe {
+            if let Some(object) = v.as_object_ptr()
+                && large::is_large((*object).size())
+            {
+                return 1 << 63 | (*large::header_of(object)).number << 3 | v.bits() & TAG_MASK;
+            }
+            let arena = u64::from((*arena::header_of(mark::address_of(v))).number);
+            arena * ARENA as u64 + v.bits() % ARENA as u64
+        }
     }
 
     /// Figures since the heap was made.
     pub fn stats(&self) -> HeapStats {
-        HeapStats::default()
+        let uncounted = (self.first.uncounted() + self.second.uncounted()) as u64;
+        HeapStats {
+            allocated: self.stats.allocated + uncounted,
+            committed: self.committed as u64,
+            ..self.stats
+        }
+    }
+
+    /// Asserts that the address of `v` is one of this heap.
+    #[cfg(feature = "paranoid")]
+    fn assert_mine(&self, v: Value) {
+        // SAFETY: none if `v` is foreign, which is what this looks for; for a value of this heap both are live.
+        unsafe {
+            if let Some(object) = v.as_object_ptr()
+                && large::is_large((*object).size())
+            {
+                let header = large::header_of(object);
+                let known = self.large.get((*header).index);
+                assert!(
+                    known.is_some_and(|known| std::ptr::eq(known.header(), header)),
+                    "{v:?} is not of this heap"
+                );
+            } else {
+                let header = arena::header_of(mark::address_of(v));
+                let known = self.arenas.get((*header).number as usize).and_then(Option::as_ref);
+                assert!(
+                    known.is_some_and(|known| std::ptr::eq(known.header(), header)),
+                    "{v:?} is not of this heap"
+                );
+            }
+        }
     }
 }
 

@@ -1,0 +1,214 @@
+//! Arenas: 1 MiB of memory from the system, aligned to its size, cut into 16 blocks.
+//!
+//! ```text
+//! block 0                                     blocks 1 to 15
+//! | ArenaHeader | metadata of blocks 1 to 15 | objects ...
+//! ```
+//!
+//! One byte of metadata for 16 bytes is a sixteenth, so the metadata of all blocks is just the size of one block, and
+//! the bytes that would describe block 0 itself make room for the header. From any address in an arena, masking gives
+//! the header, shifting the byte of its granule.
+//!
+//! Unsafe invariants:
+//! 1. An arena is live, and its metadata initialised, from [`Arena::new`] until it is dropped; its provenance is exposed.
+//! 2. References to metadata are made only through a borrow of the [`Arena`], and live no longer than one function.
+
+use super::layout::GRANULE;
+use super::metadata::{self, Summary};
+use std::alloc::{Layout, alloc, dealloc};
+use std::ops::Range;
+use std::ptr::NonNull;
+
+/// Bytes of a block. Smaller under Miri, which would otherwise spend its time on metadata.
+pub(super) const BLOCK: usize = if cfg!(miri) { 4 << 10 } else { 64 << 10 };
+/// Bytes of an arena, and its alignment.
+pub(super) const ARENA: usize = BLOCK * 16;
+/// Number of blocks for objects; their numbers are 1 to 15.
+pub(super) const BLOCKS: usize = 15;
+/// Granules of a block.
+pub(super) const BLOCK_GRANULES: usize = BLOCK / GRANULE;
+/// Objects above this size, in bytes, live outside of arenas.
+pub(super) const LARGE: usize = BLOCK / 8;
+
+const LAYOUT: Layout = match Layout::from_size_align(ARENA, ARENA) {
+    Ok(layout) => layout,
+    Err(_) => unreachable!(),
+};
+
+/// What stands at the start of an arena: what must be found from an address alone.
+#[repr(C)]
+pub(super) struct ArenaHeader {
+    /// Index in the heap's table.
+    pub(super) number: u32,
+    /// Granules marked gray.
+    pub(super) grays: u32,
+}
+
+const _: () = assert!(size_of::<ArenaHeader>() <= BLOCK / GRANULE);
+
+/// Where a block stands between two cycles.
+#[derive(Copy, Clone, PartialEq, Eq, Debug)]
+pub(super) enum BlockState {
+    /// Holds what the last cycle did not mark; not to be allocated from.
+    Unswept,
+    /// Canonical, and not allocated from since.
+    Swept,
+    /// Allocated from since it was swept.
+    Taken,
+}
+
+/// What is known of a block. The counts are those of the last sweep.
+#[derive(Copy, Clone, Debug)]
+pub(super) struct Block {
+    pub(super) state: BlockState,
+    pub(super) summary: Summary,
+}
+
+impl Block {
+    const EMPTY: Block = Block {
+        state: BlockState::Swept,
+        summary: Summary { free: BLOCK_GRANULES, largest: BLOCK_GRANULES },
+    };
+
+    /// Whether nothing at all lives in the block.
+    pub(super) fn is_empty(&self) -> bool {
+        self.state == BlockState::Swept && self.summary.free == BLOCK_GRANULES
+    }
+}
+
+/// An arena.
+pub(super) struct Arena {
+    base: NonNull<u8>,
+    blocks: [Block; BLOCKS + 1],
+}
+
+impl Arena {
+    /// A new arena with empty blocks, or nothing if the system has no memory.
+    pub(super) fn new(number: u32) -> Option<Arena> {
+        // SAFETY: the size is not zero. The metadata block is zeroed and the header written before anything reads them.
+        unsafe {
+            let base = NonNull::new(alloc(LAYOUT))?;
+            base.write_bytes(0, BLOCK);
+            base.cast().write(ArenaHeader { number, grays: 0 });
+            base.as_ptr().expose_provenance();
+            let arena = Arena { base, blocks: [Block::EMPTY; BLOCKS + 1] };
+            if cfg!(debug_assertions) {
+                for block in 1..=BLOCKS {
+                    poison(arena.address(block), 0..BLOCK_GRANULES);
+                }
+            }
+            Some(arena)
+        }
+    }
+
+    /// Address of the first byte of a block.
+    pub(super) fn address(&self, block: usize) -> usize {
+        debug_assert!((1..=BLOCKS).contains(&block));
+        self.base.addr().get() + block * BLOCK
+    }
+
+    /// What is known of a block.
+    pub(super) fn block(&self, block: usize) -> &Block {
+        &self.blocks[block]
+    }
+
+    /// Notes that a block is allocated from.
+    pub(super) fn take(&mut self, block: usize) {
+        debug_assert_eq!(self.blocks[block].state, BlockState::Swept);
+        self.blocks[block].state = BlockState::Taken;
+    }
+
+    /// Whether nothing lives in any block.
+    pub(super) fn is_empty(&self) -> bool {
+        self.blocks[1..].iter().all(Block::is_empty)
+    }
+
+    /// Notes that a marking has ended: all blocks but empty ones are to be swept.
+    pub(super) fn expect_sweep(&mut self) {
+        for block in &mut self.blocks[1..] {
+            if !block.is_empty() {
+                block.state = BlockState::Unswept;
+            }
+        }
+    }
+
+    /// Sweeps a block, and gives the bytes that live in it.
+    pub(super) fn sweep(&mut self, block: usize, epoch: u8) -> usize {
+        debug_assert_eq!(self.blocks[block].state, BlockState::Unswept);
+        let address = self.address(block);
+        let summary = metadata::sweep(self.metadata_mut(block), epoch, |hole| {
+            if cfg!(debug_assertions) {
+                // SAFETY: a hole of a block just swept holds nothing that anyone will read.
+                unsafe { poison(address, hole) };
+            }
+        });
+        self.blocks[block] = Block { state: BlockState::Swept, summary };
+        (BLOCK_GRANULES - summary.free) * GRANULE
+    }
+
+    /// The metadata of a block.
+    pub(super) fn metadata(&self, block: usize) -> &[u8] {
+        debug_assert!((1..=BLOCKS).contains(&block));
+        // SAFETY: invariants 1 and 2; the bytes of block b stand at offset b * BLOCK / 16.
+        unsafe {
+            let start = self.base.as_ptr().add(block * BLOCK_GRANULES);
+            std::slice::from_raw_parts(start, BLOCK_GRANULES)
+        }
+    }
+
+    /// The metadata of a block, to be changed.
+    pub(super) fn metadata_mut(&mut self, block: usize) -> &mut [u8] {
+        debug_assert!((1..=BLOCKS).contains(&block));
+        // SAFETY: as in `metadata`, and the arena is borrowed mutably.
+        unsafe {
+            let start = self.base.as_ptr().add(block * BLOCK_GRANULES);
+            std::slice::from_raw_parts_mut(start, BLOCK_GRANULES)
+        }
+    }
+
+    /// The header.
+    pub(super) fn header_mut(&mut self) -> &mut ArenaHeader {
+        // SAFETY: invariant 1, and the arena is borrowed mutably.
+        unsafe { self.base.cast().as_mut() }
+    }
+
+    /// The header.
+    pub(super) fn header(&self) -> &ArenaHeader {
+        // SAFETY: invariant 1.
+        unsafe { self.base.cast().as_ref() }
+    }
+}
+
+impl Drop for Arena {
+    fn drop(&mut self) {
+        // SAFETY: allocated with this layout in `new`, and dropped once.
+        unsafe { dealloc(self.base.as_ptr(), LAYOUT) }
+    }
+}
+
+/// The header of the arena that an address lies in.
+#[inline(always)]
+pub(super) fn header_of(address: usize) -> *mut ArenaHeader {
+    std::ptr::with_exposed_provenance_mut(address & !(ARENA - 1))
+}
+
+/// The metadata byte of the granule at an address in an arena.
+#[inline(always)]
+pub(super) fn metadata_of(address: usize) -> *mut u8 {
+    let offset = address & (ARENA - 1);
+    std::ptr::with_exposed_provenance_mut((address - offset) + offset / GRANULE)
+}
+
+/// Writes a value that no program holds over granules of the block at `address`.
+///
+/// # Safety
+/// Nobody will read the granules before they are allocated again.
+unsafe fn poison(address: usize, granules: Range<usize>) {
+    let start = std::ptr::with_exposed_provenance_mut::<u64>(address + granules.start * GRANULE);
+    // SAFETY: the granules lie in one block of a live arena, and by the contract nobody else uses them.
+    unsafe {
+        for i in 0..granules.len() * (GRANULE / 8) {
+            start.add(i).write(crate::value::Value::POISON.bits());
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Large objects: above an eighth of a block, each in memory of its own, which the sweep gives back to the system.
+//!
+//! ```text
+//! | LargeHeader (32 bytes) | Header | elements ...
+//!                          ^ the address in the value
+//! ```
+//!
+//! Whether an object is large follows from its size, so from its header: the marker needs no table.
+
+use super::arena::LARGE;
+use super::layout::{GRANULE, Header};
+use std::alloc::{Layout, alloc, dealloc};
+use std::ptr::NonNull;
+
+/// What stands before a large object.
+#[repr(C, align(16))]
+pub(super) struct LargeHeader {
+    /// Bytes of the whole, this header included.
+    pub(super) bytes: usize,
+    /// Counts up with every large object of the heap; gives it its identity.
+    pub(super) number: u64,
+    /// Index in the heap's list.
+    pub(super) index: usize,
+    /// The epoch that it was marked in, or allocated in.
+    pub(super) epoch: u8,
+    /// Marked, but still to be followed.
+    pub(super) gray: bool,
+}
+
+const _: () = assert!(size_of::<LargeHeader>() == 32 && size_of::<LargeHeader>().is_multiple_of(GRANULE));
+
+/// Bytes that an object of this size takes from the system.
+pub(super) const fn footprint(bytes: usize) -> usize {
+    bytes + size_of::<LargeHeader>()
+}
+
+/// Whether an object of this size is large.
+#[inline(always)]
+pub(super) const fn is_large(bytes: usize) -> bool {
+    bytes > LARGE
+}
+
+/// A large object, owned.
+pub(super) struct LargeObject(NonNull<LargeHeader>);
+
+impl LargeObject {
+    /// Memory for an object of `bytes`, or nothing if the system has none.
+    pub(super) fn new(bytes: usize, number: u64, index: usize, epoch: u8) -> Option<LargeObject> {
+        let bytes = footprint(bytes);
+        let layout = Layout::from_size_align(bytes, GRANULE).ok()?;
+        // SAFETY: the size is not zero, and the header is written at once.
+        unsafe {
+            let header = NonNull::new(alloc(layout))?.cast::<LargeHeader>();
+            header.write(LargeHeader { bytes, number, index, epoch, gray: false });
+            header.as_ptr().expose_provenance();
+            Some(LargeObject(header))
+        }
+    }
+
+    /// Address of the object proper.
+    pub(super) fn object(&self) -> NonNull<u8> {
+        // SAFETY: the allocation is longer than the header.
+        unsafe { self.0.add(1).cast() }
+    }
+
+    /// The header.
+    pub(super) fn header(&self) -> &LargeHeader {
+        // SAFETY: written in `new`, and live until `self` is dropped.
+        unsafe { self.0.as_ref() }
+    }
+
+    /// The header.
+    pub(super) fn header_mut(&mut self) -> &mut LargeHeader {
+        // SAFETY: as in `header`, and borrowed mutably.
+        unsafe { self.0.as_mut() }
+    }
+}
+
+impl Drop for LargeObject {
+    fn drop(&mut self) {
+        let bytes = self.header().bytes;
+        // SAFETY: allocated with this layout in `new`, and dropped once.
+        unsafe { dealloc(self.0.as_ptr().cast(), Layout::from_size_align_unchecked(bytes, GRANULE)) }
+    }
+}
+
+/// The header before a large object.
+///
+/// # Safety
+/// `object` is a live large object.
+#[inline(always)]
+pub(super) unsafe fn header_of(object: *mut Header) -> *mut LargeHeader {
+    // SAFETY: a large object is preceded by its header in the same allocation.
+    unsafe { object.cast::<LargeHeader>().sub(1) }
+}

@@ -1,0 +1,381 @@
+//! Marking: which objects are reachable from the roots as they were when the cycle began.
+//!
+//! The collector is incremental, snapshot-at-the-beginning (Yuasa 1990). Whatever was reachable when the cycle began
+//! survives it, whatever the program does meanwhile: before a value in the heap is overwritten it is marked. What is
+//! allocated during the cycle survives it too, without being followed. So a cycle may take as many slices as it likes,
+//! and nothing is ever scanned twice; what became garbage during the cycle is found by the next.
+//!
+//! Stacks are not scanned at the beginning. Each is scanned once in the cycle, before its task runs in it, or by the
+//! marker at its leisure. That is sound because only the task itself reads its stack: until it is scanned nothing
+//! leaves it, and what others write into it comes from stacks scanned, from marked objects, or from new ones.
+//!
+//! ```text
+//! begin_cycle, mark(fixed roots) -> slice ... slice -> Drained -> mark_slice(stack), slice ... -> end_marking
+//! ```
+//!
+//! Guarantees: no recursion on the native stack; the mark stack has a fixed capacity, beyond which objects wait as gray
+//! bytes in the metadata; the work of a slice is bounded by its visits; a vector is followed in pieces of
+//! [`PIECE_LENGTH`] elements.
+//!
+//! Invariants while marking:
+//! 1. A marked object that may hold unmarked addresses of the snapshot is on the mark stack, in `pieces`, or gray.
+//! 2. A marked object's last granule carries the end bit: it is set together with the mark, since the size is known.
+
+use super::arena::{self, Arena, BLOCKS, metadata_of};
+use super::large;
+use super::layout::{Code, Cons, GRANULE, Header, Kind};
+use super::metadata::{END, EPOCH, GRAY, GRAY_CONS, next_epoch, next_gray};
+use super::{Heap, Phase, SliceOutcome};
+use crate::value::Value;
+
+/// Elements of a record that are followed at once.
+const PIECE_LENGTH: usize = if cfg!(miri) { 64 } else { 1024 };
+/// Elements that count as one visit.
+const ELEMENTS_PER_VISIT: i64 = 4;
+/// Visits that the search for gray bytes in one arena counts as.
+const GRAY_SEARCH_VISITS: i64 = 256;
+
+/// What is to be followed.
+pub(super) struct Marker {
+    /// Marked objects that were not looked into.
+    stack: Vec<Value>,
+    /// Most entries of `stack`.
+    capacity: usize,
+    /// Records that were followed in part, and where to go on.
+    pieces: Vec<(Value, usize)>,
+    /// Gray granules in arenas, and gray large objects.
+    grays: usize,
+    /// Bytes marked in this cycle.
+    pub(super) bytes: u64,
+}
+
+impl Marker {
+    pub(super) fn new(capacity: usize) -> Marker {
+        Marker { stack: Vec::new(), capacity: capacity.max(1), pieces: Vec::new(), grays: 0, bytes: 0 }
+    }
+
+    fn is_drained(&self) -> bool {
+        self.stack.is_empty() && self.pieces.is_empty() && self.grays == 0
+    }
+
+    /// Moves gray objects of an arena to the stack, as many as fit.
+    fn take_grays_of(&mut self, arena: &mut Arena) {
+        for block in 1..=BLOCKS {
+            let start = arena.address(block);
+            let mut from = 0;
+            while let Some(granule) = next_gray(arena.metadata(block), from) {
+                if self.stack.len() >= self.capacity {
+                    return;
+                }
+                let byte = &mut arena.metadata_mut(block)[granule];
+                let is_cons = *byte & GRAY_CONS != 0;
+                *byte &= !(GRAY | GRAY_CONS);
+                arena.header_mut().grays -= 1;
+                self.grays -= 1;
+                let address = start + granule * GRANULE;
+                // SAFETY: `make_gray` made this byte gray for the cons or object that starts here.
+                self.stack.push(unsafe {
+                    if is_cons {
+                        Value::from_cons(std::ptr::with_exposed_provenance_mut(address))
+                    } else {
+                        Value::from_object(std::ptr::with_exposed_provenance_mut(address))
+                    }
+                });
+                from = granule + 1;
+            }
+        }
+    }
+}
+
+impl Heap {
+    /// Begins a cycle. The caller marks the fixed roots at once, before anything else runs. Does nothing while
+    /// marking; a sweep under way is finished first.
+    pub fn begin_cycle(&mut self) {
+        match self.phase {
+            Phase::Marking => return,
+            Phase::Sweeping => self.finish_sweep(),
+            Phase::Idle => {}
+        }
+        self.start_marking();
+    }
+
+    fn start_marking(&mut self) {
+        debug_assert!(self.marker.is_drained());
+        self.count_regions();
+        self.phase = Phase::Marking;
+        self.marking = true;
+        self.epoch = next_epoch(self.epoch);
+        self.cycle_id += 1;
+        self.due = false;
+        self.marker.bytes = 0;
+        (self.pacing.owed, self.pacing.black) = (0, 0);
+        self.first.begin_marking(self.epoch);
+        self.second.begin_marking(self.epoch);
+    }
+
+    /// Marks a value: it, and what it leads to, outlives this cycle. Does nothing when no marking is under way.
+    #[inline]
+    pub fn mark(&mut self, v: Value) {
+        if self.marking && v.is_address() && self.set_mark(v) {
+            self.push(v);
+        }
+    }
+
+    /// Marks all values of a root or stack. Raw instruction addresses among them do no harm.
+    pub fn mark_slice(&mut self, values: &[Value]) {
+        for &v in values {
+            self.mark(v);
+        }
+    }
+
+    /// Whether marking is under way and `v` is marked already. What has no address counts as marked.
+    pub fn is_marked(&self, v: Value) -> bool {
+        if !v.is_address() {
+            return true;
+        }
+        // SAFETY: a value with an address is that of a live object (`access`, module header).
+        unsafe {
+            if let Some(object) = v.as_object_ptr()
+                && large::is_large((*object).size())
+            {
+                return (*large::header_of(object)).epoch == self.epoch;
+            }
+            *metadata_of(address_of(v)) & EPOCH == self.epoch
+        }
+    }
+
+    /// Sets the mark of an address; whether it was unmarked and has to be followed.
+    #[inline]
+    fn set_mark(&mut self, v: Value) -> bool {
+        debug_assert!(v != Value::POISON && v.is_address());
+        #[cfg(feature = "paranoid")]
+        self.assert_mine(v);
+        let epoch = self.epoch;
+        if v.is_cons() {
+            let byte = metadata_of(v.cons_ptr().addr());
+            // SAFETY: a cons value is the address of a live cons, which lies in an arena.
+            unsafe {
+                if *byte & EPOCH == epoch {
+                    return false;
+                }
+                *byte = epoch | END;
+            }
+            self.marker.bytes += GRANULE as u64;
+            return true;
+        }
+        let object = v.object_ptr();
+        // SAFETY: an object value is the address of a live object; by its size it lies in an arena or is large.
+        unsafe {
+            let header = *object;
+            let bytes = header.size();
+            if large::is_large(bytes) {
+                let large = large::header_of(object);
+                if (*large).epoch == epoch {
+                    return false;
+                }
+                (*large).epoch = epoch;
+            } else {
+                let first = metadata_of(object.addr());
+                if *first & EPOCH == epoch {
+                    return false;
+                }
+                *first = *first & !EPOCH | epoch;
+                *first.add(bytes / GRANULE - 1) |= END;
+            }
+            self.marker.bytes += bytes as u64;
+            !header.kind.is_raw() && header.len != 0
+        }
+    }
+
+    /// Notes a marked object that has to be followed.
+    #[inline]
+    fn push(&mut self, v: Value) {
+        if self.marker.stack.len() < self.marker.capacity {
+            self.marker.stack.push(v);
+        } else {
+            self.make_gray(v);
+        }
+    }
+
+    #[cold]
+    fn make_gray(&mut self, v: Value) {
+        self.marker.grays += 1;
+        // SAFETY: `v` was marked just now, so it is live, in an arena or large.
+        unsafe {
+            if let Some(object) = v.as_object_ptr()
+                && large::is_large((*object).size())
+            {
+                (*large::header_of(object)).gray = true;
+                return;
+            }
+            let address = address_of(v);
+            *metadata_of(address) |= if v.is_cons() { GRAY | GRAY_CONS } else { GRAY };
+            (*arena::header_of(address)).grays += 1;
+        }
+    }
+
+    /// Runs a slice of marking or sweeping of about `max_visits` objects, more when the heap has run ahead.
+    pub fn slice(&mut self, max_visits: u32) -> SliceOutcome {
+        let behind = self.pacing.since_cycle > 2 * self.pacing.threshold + self.stats.live;
+        let budget = i64::from(max_visits) * if behind { 2 } else { 1 };
+        self.pacing.owed = self.pacing.owed.saturating_sub(super::alloc::PIECE as u64);
+        self.due = self.pacing.owed >= super::alloc::PIECE as u64;
+        let mut left = budget;
+        let outcome = match self.phase {
+            Phase::Idle => {
+                self.due = self.pacing.since_cycle >= self.pacing.threshold;
+                return SliceOutcome::Finished;
+            }
+            Phase::Marking => self.follow(&mut left),
+            Phase::Sweeping => self.sweep_slice(&mut left),
+        };
+        self.stats.slices += 1;
+        self.stats.longest_slice = self.stats.longest_slice.max((budget - left) as u64);
+        outcome
+    }
+
+    /// Follows what is marked until nothing is left or the budget is spent.
+    fn follow(&mut self, left: &mut i64) -> SliceOutcome {
+        while *left > 0 {
+            if let Some(v) = self.marker.stack.pop() {
+                self.visit(v, left);
+            } else if let Some((v, from)) = self.marker.pieces.pop() {
+                self.visit_record(v, from, left);
+            } else if self.marker.grays > 0 {
+                self.collect_grays(left);
+            } else {
+                return SliceOutcome::Drained { left: *left as u32 };
+            }
+        }
+        SliceOutcome::More
+    }
+
+    /// Follows a marked object, and on along the first unmarked cons or object that it leads to.
+    fn visit(&mut self, mut v: Value, left: &mut i64) {
+        while v.is_cons() {
+            if *left <= 0 {
+                return self.push(v);
+            }
+            *left -= 1;
+            // SAFETY: a marked cons is live.
+            let Cons { car, cdr } = unsafe { *v.cons_ptr() };
+            let follow_cdr = cdr.is_address() && self.set_mark(cdr);
+            let follow_car = car.is_address() && self.set_mark(car);
+            v = match (follow_car, follow_cdr) {
+                (true, true) => {
+                    self.push(cdr);
+                    car
+                }
+                (true, false) => car,
+                (false, true) => cdr,
+                (false, false) => return,
+            };
+        }
+        self.visit_record(v, 0, left);
+    }
+
+    /// Follows a marked object from slot `from` on.
+    fn visit_record(&mut self, v: Value, from: usize, left: &mut i64) {
+        let object = v.object_ptr();
+        // SAFETY: a marked object is live; its kind says which of its words are values, and none of them is
+        // written while this runs.
+        let (slots, more): (&[Value], &[Value]) = unsafe {
+            let header = *object;
+            let first = object.add(1).cast::<Value>();
+            if header.kind == Kind::Code {
+                let code = object.cast::<Code>();
+                let constants = object.byte_add(Code::CONSTANTS_OFFSET).cast::<Value>();
+                let n = (*code).nconsts as usize;
+                (std::slice::from_raw_parts(first, 3), std::slice::from_raw_parts(constants, n))
+            } else {
+                debug_assert!(header.kind.is_record());
+                (&[], std::slice::from_raw_parts(first, header.len as usize))
+            }
+        };
+        let end = more.len().min(from + PIECE_LENGTH);
+        if end < more.len() {
+            self.marker.pieces.push((v, end));
+        }
+        if from == 0 {
+            self.mark_slice(slots);
+        }
+        self.mark_slice(&more[from..end]);
+        *left -= 1 + (end - from) as i64 / ELEMENTS_PER_VISIT;
+    }
+
+    /// Moves gray objects to the empty mark stack: as many as fit, from one arena or from among the large objects.
+    fn collect_grays(&mut self, left: &mut i64) {
+        debug_assert!(self.marker.stack.is_empty());
+        *left -= GRAY_SEARCH_VISITS;
+        if let Some(arena) = self.arenas.iter_mut().flatten().find(|arena| arena.header().grays > 0) {
+            return self.marker.take_grays_of(arena);
+        }
+        for large in self.large.iter_mut().filter(|large| large.header().gray).take(self.marker.capacity) {
+            large.header_mut().gray = false;
+            self.marker.grays -= 1;
+            // SAFETY: a gray large object is marked, so it is a live object in full.
+            self.marker.stack.push(unsafe { Value::from_object(large.object().as_ptr().cast::<Header>()) });
+        }
+    }
+
+    /// Ends marking; what was neither marked nor allocated in this cycle will be freed.
+    ///
+    /// # Safety
+    /// Every value that anyone will still use was marked, is reachable from what was marked, or was allocated since
+    /// the cycle began.
+    ///
+    /// # Panics
+    /// Unless marking is under way and the last slice was [`SliceOutcome::Drained`], with nothing marked since.
+    pub unsafe fn end_marking(&mut self) {
+        assert!(
+            self.phase == Phase::Marking && self.marker.is_drained(),
+            "something is still to be followed"
+        );
+        self.count_regions();
+        self.first.restart(true);
+        self.second.restart(true);
+        self.stats.live = self.marker.bytes + self.pacing.black;
+        self.stats.cycles += 1;
+        self.marking = false;
+        self.begin_sweep();
+    }
+
+    /// Forgets the marking under way. Its marks stay in the metadata; the sweep of the next cycle clears them.
+    fn abandon_marking(&mut self) {
+        self.count_regions();
+        self.first.restart(true);
+        self.second.restart(true);
+        self.marker.stack.clear();
+        self.marker.pieces.clear();
+        while self.marker.grays > 0 {
+            self.collect_grays(&mut 0);
+            self.marker.stack.clear();
+        }
+        self.marking = false;
+        self.phase = Phase::Idle;
+    }
+
+    /// A whole cycle at once: drops one in progress, calls `mark_roots`, follows everything, and frees the rest.
+    ///
+    /// # Safety
+    /// As for [`Heap::end_marking`], of what `mark_roots` marks.
+    pub unsafe fn collect_fully(&mut self, mark_roots: impl FnOnce(&mut Heap)) {
+        match self.phase {
+            Phase::Marking => self.abandon_marking(),
+            Phase::Sweeping => self.finish_sweep(),
+            Phase::Idle => {}
+        }
+        self.start_marking();
+        mark_roots(self);
+        while let SliceOutcome::More = self.follow(&mut i64::from(u32::MAX)) {}
+        // SAFETY: the caller's promise.
+        unsafe { self.end_marking() };
+        self.finish_sweep();
+    }
+}
+
+/// The address of a cons or object.
+#[inline(always)]
+pub(super) fn address_of(v: Value) -> usize {
+    (v.bits() & !crate::value::TAG_MASK) as usize
+}

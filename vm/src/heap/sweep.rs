@@ -1,0 +1,166 @@
+//! Sweeping: what the last marking did not reach is free.
+//!
+//! Blocks are swept when the allocator comes to them, or by slices, whichever is first; large objects by slices only.
+//! An arena in which nothing is left goes back to the system, but for a few that are kept.
+//!
+//! Guarantees: every block is swept once between two markings. What is allocated while sweeping is not touched by it.
+
+use super::arena::{ARENA, BLOCKS, BlockState};
+use super::layout::GRANULE;
+use super::metadata::check_canonical;
+use super::{Heap, Phase, SliceOutcome};
+
+/// Visits that the sweep of a block counts as.
+const BLOCK_VISITS: i64 = 512;
+/// Visits that freeing a large object counts as.
+const FREE_VISITS: i64 = 64;
+/// One empty arena is kept, and one more for this many in use.
+const ARENAS_PER_SPARE: usize = 8;
+/// Least allocation, in bytes, between two cycles, however close the limit is.
+const LEAST_THRESHOLD: u64 = 256 << 10;
+
+/// How far the sweep has come.
+#[derive(Default)]
+pub(super) struct Sweep {
+    /// Arena and block to sweep next.
+    at: (usize, usize),
+    /// Large objects below this index are still to be looked at, from the end on.
+    large: usize,
+    /// Empty arenas kept so far.
+    spares: usize,
+    /// Bytes found live.
+    live: u64,
+}
+
+impl Heap {
+    /// Turns from marking to sweeping.
+    pub(super) fn begin_sweep(&mut self) {
+        self.phase = Phase::Sweeping;
+        for arena in self.arenas.iter_mut().flatten() {
+            arena.expect_sweep();
+        }
+        self.sweep = Sweep { at: (0, 1), large: self.large.len(), spares: 0, live: 0 };
+        let live = self.stats.live;
+        let room = (self.limit as u64).saturating_sub(live) / 2;
+        self.pacing.threshold = live.max(self.pacing.floor).min(room.max(LEAST_THRESHOLD));
+        self.pacing.since_cycle = 0;
+        self.pacing.owed = 0;
+        self.due = false;
+    }
+
+    /// Sweeps a block if that is still to be done; whether it was.
+    pub(super) fn sweep_if_needed(&mut self, arena: usize, block: usize) -> bool {
+        let Some(arena) = self.arenas.get_mut(arena).and_then(Option::as_mut) else { return false };
+        if arena.block(block).state != BlockState::Unswept {
+            return false;
+        }
+        self.sweep.live += arena.sweep(block, self.epoch) as u64;
+        true
+    }
+
+    /// Sweeps until all is done or the budget is spent.
+    pub(super) fn sweep_slice(&mut self, left: &mut i64) -> SliceOutcome {
+        while *left > 0 {
+            if self.sweep.at.0 < self.arenas.len() {
+                let (arena, block) = self.sweep.at;
+                *left -= if self.sweep_if_needed(arena, block) { BLOCK_VISITS } else { 1 };
+                self.sweep.at = (arena, block + 1);
+                if block == BLOCKS {
+                    self.sweep.at = (arena + 1, 1);
+                    self.release_if_empty(arena);
+                }
+            } else if self.sweep.large > 0 {
+                self.sweep.large -= 1;
+                *left -= if self.free_large_if_dead(self.sweep.large) { FREE_VISITS } else { 1 };
+            } else {
+                debug_assert_eq!(self.sweep.live, self.stats.live, "marking and sweeping count alike");
+                self.phase = Phase::Idle;
+                self.pacing.owed = 0;
+                self.due = self.pacing.since_cycle >= self.pacing.threshold;
+                return SliceOutcome::Finished;
+            }
+        }
+        SliceOutcome::More
+    }
+
+    /// Sweeps all that is left.
+    pub(super) fn finish_sweep(&mut self) {
+        while self.phase == Phase::Sweeping
+            && self.sweep_slice(&mut i64::from(u32::MAX)) == SliceOutcome::More
+        {}
+    }
+
+    /// Gives an arena in which nothing lives back to the system, unless it is to be kept.
+    fn release_if_empty(&mut self, arena: usize) {
+        if self.arenas[arena].as_ref().is_none_or(|arena| !arena.is_empty()) {
+            return;
+        }
+        let in_use = self.arenas.iter().flatten().count();
+        if self.sweep.spares <= in_use / ARENAS_PER_SPARE {
+            self.sweep.spares += 1;
+        } else {
+            self.arenas[arena] = None;
+            self.committed -= ARENA;
+        }
+    }
+
+    /// Frees the large object at an index unless it was marked; whether it did.
+    fn free_large_if_dead(&mut self, index: usize) -> bool {
+        let header = self.large[index].header();
+        debug_assert!(!header.gray && header.index == index);
+        if header.epoch == self.epoch {
+            self.sweep.live += (header.bytes - super::large::footprint(0)) as u64;
+            return false;
+        }
+        self.committed -= header.bytes;
+        self.large.swap_remove(index);
+        if let Some(moved) = self.large.get_mut(index) {
+            moved.header_mut().index = index;
+        }
+        true
+    }
+
+    /// Looks for contradictions in the metadata and the books; for tests. Says nothing of blocks still to be swept.
+    ///
+    /// # Errors
+    /// What was found.
+    pub fn check(&self) -> Result<(), String> {
+        let mut committed = 0;
+        for (number, arena) in self.arenas.iter().enumerate() {
+            let Some(arena) = arena else { continue };
+            committed += ARENA;
+            if arena.header().number as usize != number {
+                return Err(format!("arena {number} says it is {}", arena.header().number));
+            }
+            for block in 1..=BLOCKS {
+                let is = arena.block(block);
+                if is.state == BlockState::Unswept && self.phase != Phase::Sweeping {
+                    return Err(format!("arena {number} block {block} was left out of the sweep"));
+                }
+                if is.state != BlockState::Swept || self.phase == Phase::Marking {
+                    continue;
+                }
+                match check_canonical(arena.metadata(block), self.epoch) {
+                    Ok(summary) if summary == is.summary => {}
+                    Ok(summary) => {
+                        return Err(format!("arena {number} block {block}: {:?} is {summary:?}", is.summary));
+                    }
+                    Err(e) => return Err(format!("arena {number} block {block}: {e}")),
+                }
+            }
+        }
+        for (index, large) in self.large.iter().enumerate() {
+            committed += large.header().bytes;
+            if large.header().index != index {
+                return Err(format!("large object {index} says it is {}", large.header().index));
+            }
+        }
+        if committed != self.committed {
+            return Err(format!("{committed} bytes are taken, {} noted", self.committed));
+        }
+        if !self.stats.live.is_multiple_of(GRANULE as u64) {
+            return Err("live bytes are not whole granules".into());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,573 @@
+//! The collector against a model: a random program over heap, globals and several task stacks, with slices of the
+//! collector between any two of its steps, and a shadow of the object graph that says what must and what may survive.
+//!
+//! Checked at the end of each marking: everything reachable is marked (nothing in use is freed), and nothing is marked
+//! but what was reachable when the cycle began or was allocated since (garbage floats for at most one cycle). Checked
+//! all the time: every object that the program meets holds what the shadow says. The stacks follow the rule that the
+//! collector is built on: a stack is scanned before its task runs in a cycle, otherwise any time, once.
+
+use esl_vm::heap::layout::Code;
+use esl_vm::heap::{AllocError, CodeParts, Heap, HeapConfig, Kind, Phase, SliceOutcome};
+use esl_vm::value::Value;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A small generator (splitmix64), so that a seed is all that a failure needs.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ z >> 31
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.next() % n as u64) as usize
+    }
+
+    fn one_in(&mut self, n: usize) -> bool {
+        self.below(n) == 0
+    }
+}
+
+/// A value as the shadow knows it: an object by number, or itself.
+#[derive(Copy, Clone, PartialEq, Debug)]
+enum Shade {
+    Object(usize),
+    Plain(Value),
+}
+
+/// What the shadow knows of an object.
+struct Shadow {
+    value: Value,
+    /// `None` is a cons.
+    kind: Option<Kind>,
+    /// What is traced, in the order of the layout.
+    slots: Vec<Shade>,
+    /// Elements of a raw object; their contents follow from number and index.
+    raw_len: usize,
+    bytes: u64,
+}
+
+struct TaskStack {
+    values: Vec<Shade>,
+    scanned_in: u64,
+}
+
+struct Model {
+    random: Random,
+    heap: Heap,
+    shadows: BTreeMap<usize, Shadow>,
+    next_object: usize,
+    /// Fixed roots: marked at the beginning of a cycle, overwritten through the barrier.
+    globals: Vec<Shade>,
+    tasks: Vec<TaskStack>,
+    running: usize,
+    /// Reachable when the cycle began, or allocated since.
+    may_survive: BTreeSet<usize>,
+    /// The collector gets a slice after one in so many steps.
+    laziness: usize,
+    cycles: usize,
+    forced: usize,
+}
+
+const GLOBALS: usize = 8;
+/// Globals that always hold a code and a function, for the objects that need one.
+const CODE: usize = 0;
+const FUNCTION: usize = 1;
+
+fn raw_element(object: usize, index: usize) -> u32 {
+    (object as u32).wrapping_mul(0x9E37_79B9).wrapping_add(index as u32) | 1
+}
+
+impl Model {
+    fn new(seed: u64, config: HeapConfig, laziness: usize) -> Model {
+        // SAFETY: the values stay in this model.
+        let heap = unsafe { Heap::new(config) };
+        let stack = || TaskStack { values: Vec::new(), scanned_in: 0 };
+        let mut model = Model {
+            random: Random(seed),
+            heap,
+            shadows: BTreeMap::new(),
+            next_object: 0,
+            globals: vec![Shade::Plain(Value::NIL); GLOBALS],
+            tasks: (0..4).map(|_| stack()).collect(),
+            running: 0,
+            may_survive: BTreeSet::new(),
+            laziness,
+            cycles: 0,
+            forced: 0,
+        };
+        model.globals[CODE] = model.make(Some(Kind::Code), 3, 0).unwrap();
+        model.globals[FUNCTION] = model.make(Some(Kind::Function), 1, 0).unwrap();
+        model
+    }
+
+    fn value(&self, shade: Shade) -> Value {
+        match shade {
+            Shade::Object(object) => self.shadows[&object].value,
+            Shade::Plain(value) => value,
+        }
+    }
+
+    // The program.
+
+    /// Some value that the running task can get at without reading the heap.
+    fn pick(&mut self) -> Shade {
+        let stack = &self.tasks[self.running].values;
+        match self.random.below(8) {
+            0 => Shade::Plain(Value::small(self.random.next() as i32)),
+            1 => self.globals[self.random.below(GLOBALS)],
+            _ if stack.is_empty() => Shade::Plain(Value::NIL),
+            _ => stack[self.random.below(stack.len())],
+        }
+    }
+
+    fn pick_object(&mut self) -> Option<usize> {
+        (0..4).find_map(|_| match self.pick() {
+            Shade::Object(object) => Some(object),
+            Shade::Plain(_) => None,
+        })
+    }
+
+    /// A length: mostly short, sometimes medium, rarely large.
+    fn length(&mut self) -> usize {
+        let scale = if cfg!(miri) { 16 } else { 1 };
+        match self.random.below(64) {
+            0 => self.random.below(4000) / scale,
+            1..4 => self.random.below(900) / scale,
+            4..20 => self.random.below(40),
+            _ => self.random.below(6),
+        }
+    }
+
+    /// Makes an object of random values with its shadow; collects when the heap says so.
+    fn make(&mut self, kind: Option<Kind>, slots: usize, raw_len: usize) -> Result<Shade, AllocError> {
+        let mut shades: Vec<Shade> = (0..slots).map(|_| self.pick()).collect();
+        match kind {
+            Some(Kind::Function) => shades[0] = self.globals[CODE],
+            Some(Kind::Symbol) => shades[3] = self.globals[FUNCTION],
+            _ => {}
+        }
+        let object = self.next_object;
+        let value = match self.make_value(object, kind, &shades, raw_len) {
+            Err(AllocError::NeedCollection) => {
+                self.collect_fully(&shades);
+                self.forced += 1;
+                self.make_value(object, kind, &shades, raw_len)?
+            }
+            other => other?,
+        };
+        self.next_object += 1;
+        let len = self.heap.header(value).map_or(0, |header| header.len as usize);
+        let bytes = kind.map_or(16, |kind| kind.size(len)) as u64;
+        self.shadows.insert(object, Shadow { value, kind, slots: shades, raw_len, bytes });
+        self.may_survive.insert(object);
+        Ok(Shade::Object(object))
+    }
+
+    fn make_value(
+        &mut self,
+        object: usize,
+        kind: Option<Kind>,
+        shades: &[Shade],
+        raw_len: usize,
+    ) -> Result<Value, AllocError> {
+        let values: Vec<Value> = shades.iter().map(|&shade| self.value(shade)).collect();
+        let raw: Vec<u32> = (0..raw_len).map(|i| raw_element(object, i)).collect();
+        let heap = &mut self.heap;
+        let Some(kind) = kind else { return heap.cons(values[0], values[1]) };
+        match kind {
+            Kind::Code => {
+                let parts = CodeParts {
+                    name: values[0],
+                    debug: values[1],
+                    owner: values[2],
+                    arity: Code::ANY_ARITY,
+                    nregs: 3,
+                    spare: [0; 2],
+                    constants: &values[3..],
+                    words: &raw,
+                };
+                // SAFETY: nobody runs this code.
+                unsafe { heap.alloc_code(parts) }
+            }
+            Kind::Function => heap.alloc_function(values[0], &values[1..]),
+            Kind::Box => heap.alloc_box(values[0]),
+            Kind::Structure => heap.alloc_structure(values[0], &values[1..]),
+            Kind::Symbol => {
+                let symbol = heap.alloc_symbol(0, values[0], values[1], values[3])?;
+                heap.symbol_set_value(symbol, values[2]).unwrap();
+                heap.symbol_set_macro_function(symbol, values[4]).unwrap();
+                heap.symbol_set_plist(symbol, values[5]).unwrap();
+                Ok(symbol)
+            }
+            Kind::String => heap.alloc_string(&raw),
+            Kind::Words32 => {
+                let words = heap.alloc_words(raw_len, 0)?;
+                heap.words_mut(words).unwrap().copy_from_slice(&raw);
+                Ok(words)
+            }
+            Kind::Bytes => heap.alloc_bytes(&raw.iter().map(|&x| x as u8).collect::<Vec<_>>()),
+            Kind::Bignum => heap.alloc_bignum(true, &raw.iter().map(|&x| u64::from(x)).collect::<Vec<_>>()),
+            _ => heap.alloc_record(kind, 0, 0, &values),
+        }
+    }
+
+    fn allocate(&mut self) -> Result<(), AllocError> {
+        let len = self.length();
+        let class_and_more = len + 1;
+        let made = match self.random.below(16) {
+            0..6 => self.make(None, 2, 0),
+            6..9 => self.make(Some(Kind::SimpleVector), len, 0),
+            9 => self.make(Some(Kind::Box), 1, 0),
+            10 => self.make(Some(Kind::Function), 1 + len % 4, 0),
+            11 => self.make(Some(Kind::Code), 3 + len, self.random.0 as usize % 9),
+            12 => {
+                let name = self.make(Some(Kind::String), 0, len)?;
+                self.tasks[self.running].values.push(name);
+                self.make_with(Kind::Symbol, 6, name)
+            }
+            13 => {
+                let class = self.make(Some(Kind::Class), len % 7, 0)?;
+                self.tasks[self.running].values.push(class);
+                self.make_with(Kind::Structure, class_and_more, class)
+            }
+            14 => self.make(Some([Kind::String, Kind::Bytes, Kind::Words32][len % 3]), 0, len),
+            _ => self.make(Some(Kind::Bignum), 0, 1 + len),
+        };
+        self.tasks[self.running].values.push(made?);
+        Ok(())
+    }
+
+    /// As `make`, with a given first slot.
+    fn make_with(&mut self, kind: Kind, slots: usize, first: Shade) -> Result<Shade, AllocError> {
+        let mut shades: Vec<Shade> = (0..slots).map(|_| self.pick()).collect();
+        shades[0] = first;
+        if kind == Kind::Symbol {
+            shades[3] = self.globals[FUNCTION];
+        }
+        let object = self.next_object;
+        let value = self.make_value(object, Some(kind), &shades, 0)?;
+        self.next_object += 1;
+        let bytes = kind.size(slots) as u64;
+        self.shadows.insert(object, Shadow { value, kind: Some(kind), slots: shades, raw_len: 0, bytes });
+        self.may_survive.insert(object);
+        Ok(Shade::Object(object))
+    }
+
+    fn forget_much(&mut self) {
+        for task in 0..self.tasks.len() {
+            self.enter(task);
+            self.tasks[task].values.clear();
+        }
+    }
+
+    /// Overwrites a slot of an object, through the heap's own functions, which hold the barrier.
+    fn store(&mut self) {
+        let Some(object) = self.pick_object() else { return };
+        let new = self.pick();
+        let value = self.value(new);
+        let shadow = self.shadows.get_mut(&object).unwrap();
+        if shadow.slots.is_empty() {
+            return;
+        }
+        let index = self.random.below(shadow.slots.len());
+        let heap = &mut self.heap;
+        let stored = match shadow.kind {
+            None if index == 0 => heap.set_car(shadow.value, value),
+            None => heap.set_cdr(shadow.value, value),
+            Some(Kind::Box) => heap.set_box(shadow.value, value),
+            Some(Kind::SimpleVector) => heap.vector_set(shadow.value, index, value),
+            Some(Kind::Symbol) => match index {
+                1 => heap.symbol_set_package(shadow.value, value),
+                2 => heap.symbol_set_value(shadow.value, value),
+                3 => heap.symbol_set_function(shadow.value, value),
+                4 => heap.symbol_set_macro_function(shadow.value, value),
+                5 => heap.symbol_set_plist(shadow.value, value),
+                _ => None,
+            },
+            Some(Kind::Function) if index > 0 => heap.function_set_capture(shadow.value, index - 1, value),
+            Some(Kind::Structure) if index > 0 => heap.structure_set(shadow.value, index - 1, value),
+            Some(kind) => heap.record_set(shadow.value, kind, index, value),
+        };
+        if stored.is_some() {
+            shadow.slots[index] = new;
+        }
+    }
+
+    fn step(&mut self) {
+        let running = self.running;
+        match self.random.below(20) {
+            // When the heap is full of reachable objects the program forgets most of them.
+            0..6 => self.allocate().unwrap_or_else(|_| self.forget_much()),
+            6..10 => self.store(),
+            10..13 => {
+                if let Some(object) = self.pick_object() {
+                    self.verify(object);
+                    let slots = &self.shadows[&object].slots;
+                    if !slots.is_empty() {
+                        let slot = slots[self.random.below(slots.len())];
+                        self.tasks[running].values.push(slot);
+                    }
+                }
+            }
+            13..15 => {
+                let stack = &mut self.tasks[running].values;
+                let keep = self.random.below(stack.len() + 1);
+                if self.random.one_in(4) || stack.len() > 60 {
+                    stack.truncate(keep);
+                } else {
+                    stack.pop();
+                }
+            }
+            15 => {
+                let new = self.pick();
+                let global = 2 + self.random.below(GLOBALS - 2);
+                let old = self.value(self.globals[global]);
+                self.heap.log_if_marking(old);
+                self.globals[global] = new;
+            }
+            16 => {
+                // A message: it lands in a stack that may not have been scanned.
+                let message = self.pick();
+                let to = self.random.below(self.tasks.len());
+                let stack = &mut self.tasks[to].values;
+                if !stack.is_empty() && self.random.one_in(2) {
+                    let slot = self.random.below(stack.len());
+                    stack[slot] = message;
+                } else {
+                    stack.push(message);
+                }
+            }
+            17 if self.tasks.len() < 12 => {
+                // A new task is born scanned.
+                let values = (0..3).map(|_| self.pick()).collect();
+                self.tasks.push(TaskStack { values, scanned_in: self.heap.cycle_id() });
+            }
+            17 if self.tasks.len() > 2 => {
+                let task = self.random.below(self.tasks.len());
+                self.tasks.swap_remove(task);
+                self.enter(0);
+            }
+            _ => self.enter(self.random.0 as usize % self.tasks.len()),
+        }
+    }
+
+    /// Switches to a task; its stack is scanned first if it was not in this cycle.
+    fn enter(&mut self, task: usize) {
+        self.scan(task);
+        self.running = task;
+    }
+
+    // The collector's driver.
+
+    fn scan(&mut self, task: usize) {
+        if self.tasks[task].scanned_in == self.heap.cycle_id() {
+            return;
+        }
+        self.tasks[task].scanned_in = self.heap.cycle_id();
+        let values: Vec<Value> = self.tasks[task].values.iter().map(|&shade| self.value(shade)).collect();
+        self.heap.mark_slice(&values);
+    }
+
+    fn collector_step(&mut self) {
+        match self.heap.phase() {
+            Phase::Idle => {
+                if self.heap.gc_due() || self.random.one_in(200) {
+                    self.begin_cycle();
+                }
+            }
+            Phase::Marking => {
+                let visits = 1 + self.random.below(40) as u32;
+                let SliceOutcome::Drained { .. } = self.heap.slice(visits) else { return };
+                let waiting = |task: &TaskStack| task.scanned_in != self.heap.cycle_id();
+                match self.tasks.iter().position(waiting) {
+                    Some(task) => self.scan(task),
+                    None => self.end_marking(),
+                }
+            }
+            Phase::Sweeping => {
+                let _ = self.heap.slice(1 + self.random.below(2000) as u32);
+                if self.heap.phase() == Phase::Idle || self.random.one_in(100) {
+                    self.heap.check().unwrap();
+                }
+            }
+        }
+    }
+
+    fn begin_cycle(&mut self) {
+        self.may_survive = self.reachable(&[]);
+        self.heap.begin_cycle();
+        let globals: Vec<Value> = self.globals.iter().map(|&shade| self.value(shade)).collect();
+        self.heap.mark_slice(&globals);
+        // The running task goes on, so its stack is due at once.
+        self.scan(self.running);
+    }
+
+    fn end_marking(&mut self) {
+        for object in self.reachable(&[]) {
+            assert!(
+                self.heap.is_marked(self.shadows[&object].value),
+                "object {object} is in use and not marked: {:?} of {} bytes, snapshot {}",
+                self.shadows[&object].kind,
+                self.shadows[&object].bytes,
+                self.may_survive.contains(&object),
+            );
+        }
+        for (object, shadow) in &self.shadows {
+            if self.heap.is_marked(shadow.value) {
+                assert!(self.may_survive.contains(object), "object {object} was garbage and is marked");
+            }
+        }
+        let heap = &self.heap;
+        self.shadows.retain(|_, shadow| heap.is_marked(shadow.value));
+        // SAFETY: everything reachable was seen to be marked just now.
+        unsafe { self.heap.end_marking() };
+        self.check_live();
+        self.cycles += 1;
+    }
+
+    fn check_live(&self) {
+        let live: u64 = self.shadows.values().map(|shadow| shadow.bytes).sum();
+        assert_eq!(self.heap.stats().live, live);
+    }
+
+    fn collect_fully(&mut self, extra: &[Shade]) {
+        let mut roots: Vec<Shade> = self.globals.clone();
+        roots.extend(self.tasks.iter().flat_map(|task| &task.values));
+        roots.extend(extra);
+        let values: Vec<Value> = roots.iter().map(|&shade| self.value(shade)).collect();
+        let reachable = self.reachable(extra);
+        self.shadows.retain(|object, _| reachable.contains(object));
+        // SAFETY: `values` are all roots of the model and what the caller holds.
+        unsafe { self.heap.collect_fully(|heap| heap.mark_slice(&values)) };
+        self.may_survive = reachable;
+        self.check_live();
+        self.heap.check().unwrap();
+        for task in &mut self.tasks {
+            task.scanned_in = self.heap.cycle_id();
+        }
+    }
+
+    // The oracle.
+
+    fn reachable(&self, extra: &[Shade]) -> BTreeSet<usize> {
+        let mut found = BTreeSet::new();
+        let mut open: Vec<Shade> = self.globals.clone();
+        open.extend(self.tasks.iter().flat_map(|task| &task.values));
+        open.extend(extra);
+        while let Some(shade) = open.pop() {
+            if let Shade::Object(object) = shade
+                && found.insert(object)
+            {
+                open.extend(&self.shadows[&object].slots);
+            }
+        }
+        found
+    }
+
+    /// Compares an object with its shadow.
+    fn verify(&self, object: usize) {
+        let shadow = &self.shadows[&object];
+        let (heap, v) = (&self.heap, shadow.value);
+        let expected: Vec<Value> = shadow.slots.iter().map(|&shade| self.value(shade)).collect();
+        assert_eq!(heap.kind(v), shadow.kind, "object {object}");
+        let actual = match shadow.kind {
+            None => vec![heap.car(v).unwrap(), heap.cdr(v).unwrap()],
+            Some(Kind::Code) => {
+                let code = heap.code(v).unwrap();
+                let mut slots = vec![code.name, code.debug, code.owner];
+                slots.extend(heap.code_constants(v).unwrap());
+                slots
+            }
+            Some(kind) if kind.is_record() => heap.record(v, kind).unwrap().to_vec(),
+            Some(_) => vec![],
+        };
+        assert_eq!(actual, expected, "slots of object {object}");
+        let mut raw = (0..shadow.raw_len).map(|i| raw_element(object, i));
+        let same = match shadow.kind {
+            Some(Kind::Code) => heap.code_words(v).unwrap().iter().copied().eq(raw),
+            Some(Kind::String) => heap.string(v).unwrap().iter().copied().eq(raw),
+            Some(Kind::Words32) => heap.words(v).unwrap().iter().copied().eq(raw),
+            Some(Kind::Bytes) => heap.bytes(v).unwrap().iter().copied().eq(raw.map(|x| x as u8)),
+            Some(Kind::Bignum) => heap.bignum(v).unwrap().limbs.iter().copied().eq(raw.map(u64::from)),
+            _ => raw.next().is_none(),
+        };
+        assert!(same, "contents of object {object}");
+    }
+
+    fn verify_reachable(&self) {
+        for object in self.reachable(&[]) {
+            self.verify(object);
+        }
+    }
+
+    fn run(&mut self, steps: usize) {
+        for step in 0..steps {
+            self.step();
+            if self.random.one_in(self.laziness) {
+                self.collector_step();
+            }
+            if step % 1000 == 999 {
+                self.verify_reachable();
+            }
+        }
+        self.verify_reachable();
+        self.collect_fully(&[]);
+        self.verify_reachable();
+        // Nothing but the globals' garbage is left when everything is forgotten, and the memory is given back.
+        self.tasks.iter_mut().for_each(|task| task.values.clear());
+        self.globals.iter_mut().for_each(|global| *global = Shade::Plain(Value::NIL));
+        self.collect_fully(&[]);
+        assert_eq!(self.heap.stats().live, 0);
+        assert!(self.heap.stats().committed <= 2 << 20);
+    }
+}
+
+struct Totals {
+    cycles: usize,
+    forced: usize,
+}
+
+fn run(seeds: std::ops::Range<u64>, steps: usize, laziness: usize, config: HeapConfig) -> Totals {
+    let (seeds, steps) = if cfg!(miri) { (seeds.start..seeds.start + 1, steps / 40) } else { (seeds, steps) };
+    let mut totals = Totals { cycles: 0, forced: 0 };
+    for seed in seeds {
+        // The seed is what a failure needs to be repeated.
+        let outcome = std::panic::catch_unwind(|| {
+            let mut model = Model::new(seed, config.clone(), laziness);
+            model.run(steps);
+            (model.cycles, model.forced)
+        });
+        let (cycles, forced) = outcome.unwrap_or_else(|_| panic!("seed {seed} fails with {config:?}"));
+        totals.cycles += cycles;
+        totals.forced += forced;
+    }
+    totals
+}
+
+#[test]
+fn what_is_in_use_survives() {
+    let config = HeapConfig { cycle_floor: 64 << 10, ..HeapConfig::default() };
+    assert!(run(0..12, 20_000, 1, config).cycles > 0);
+}
+
+#[test]
+fn what_is_in_use_survives_a_full_mark_stack() {
+    let config = HeapConfig { cycle_floor: 64 << 10, mark_stack: 3, ..HeapConfig::default() };
+    assert!(run(100..112, 20_000, 1, config).cycles > 0);
+}
+
+#[test]
+fn what_is_in_use_survives_at_the_limit() {
+    let config = HeapConfig { limit: 3 << 19, cycle_floor: 1 << 20, ..HeapConfig::default() };
+    let totals = run(200..212, 20_000, 300, config);
+    assert!(
+        cfg!(miri) || totals.cycles > 0 && totals.forced > 0,
+        "{} cycles, {} forced",
+        totals.cycles,
+        totals.forced
+    );
+}
