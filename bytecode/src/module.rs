@@ -158,6 +158,8 @@ pub struct Function {
 pub const MAX_REGISTERS: u8 = 250;
 /// The largest number of words of a function's code.
 pub const MAX_CODE: usize = 32_000;
+/// The largest number of captures of a function: their operands are bytes.
+pub const MAX_CAPTURES: usize = 256;
 /// The largest number of entries that a frame has on the control stack at a time.
 pub const MAX_CONTROL: usize = 250;
 

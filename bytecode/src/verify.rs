@@ -1,6 +1,7 @@
 //! The verifier: refuses every module that the interpreter could not run without looking at each step.
 //!
-//! **Theorem.** Of a module for which [`verify`] returned `Ok`, the interpreter may assume:
+//! **Theorem.** Of a module for which [`verify`] returned `Ok`, the interpreter may assume the following; V1 to V5 for all
+//! of a function's code, V6 to V11 for what control can get to.
 //!
 //! * **V1, instructions.** Wherever control gets to in a function begins an instruction of the opcode table, with its
 //!   aux word. A function has at least one word of code and at most [`MAX_CODE`]; control does not run past the end.
@@ -34,14 +35,14 @@
 //!   and no bindings made since; `bind-list` finds a scope of this frame; `unbind` undoes bindings of `bind` that this
 //!   frame made since the innermost entry and its last `bind-list`. Returns and tail calls find no entry and no
 //!   binding of this frame. A cleanup that was pushed is thus run, unless the task is killed.
-//! * **V10, landings.** While an entry stands, no call has a window below the entry's. The code at `to` asks for no
+//! * **V10, landings.** While an entry stands, no call and no further entry has a window below the entry's. The code at `to` asks for no
 //!   more than: registers below the entry's window as they are, the results (`push-catch`) or the two registers
 //!   (`push-handler-case`), the entry popped or, for a cleanup, replaced by a running one, and the bindings undone
 //!   that were made since the push.
 //! * **V11, the value list.** It is read only where the same frame set it on every path: by a call or a catch that wants
 //!   all, `set-values` or `list-to-values`, with nothing in between but silent instructions that do not loop, or a
 //!   cleanup from `enter-cleanup` to `end-cleanup`. So no one else has to preserve it.
-//! * **V12, functions.** Parameters have registers, `parameters.registers() <= registers`. Names of keys are symbols
+//! * **V12, functions.** There are at most [`MAX_CAPTURES`] captures. Parameters have registers, `parameters.registers() <= registers`. Names of keys are symbols
 //!   (`NIL` and `T` too). Top-level functions take no arguments and have no captures.
 //! * **V13, the pool.** Entries refer to earlier entries only. A `Symbol` is not `COMMON-LISP:NIL` or `T`; a ratio is in
 //!   lowest terms with a denominator above 1; an array has as many elements as its dimensions say and a rank other
@@ -64,7 +65,55 @@
 //! Not here: whether the file is intact (`file`), whether symbols and classes exist (the virtual machine's loader).
 //! Source: the verifiers of the JVM (definite assignment by data flow) and of WebAssembly (a static stack of labels).
 
+mod error;
+mod flow;
+mod pool;
+mod registers;
+mod shape;
+mod state;
+
+pub use error::{Fault, Place, VerifyError};
+pub use pool::MAX_RATIO_BITS;
+pub use state::EntryKind;
+
 #[allow(unused_imports, reason = "named by the text above")]
-use crate::module::{CaptureSource, Constant, MAX_CODE, MAX_CONTROL, MAX_REGISTERS, Module};
+use crate::module::{CaptureSource, Constant, MAX_CAPTURES, MAX_CODE, MAX_CONTROL, MAX_REGISTERS};
+use crate::module::{FunctionNumber, Module};
 #[allow(unused_imports, reason = "named by the text above")]
 use crate::{opcode::TypeCode, operand::Want};
+
+/// Checks all of `module`.
+///
+/// # Errors
+/// The first fault that is found.
+pub fn verify(module: &Module) -> Result<(), VerifyError> {
+    pool::verify(module)?;
+    for (index, &number) in module.toplevel.iter().enumerate() {
+        verify_toplevel(module, number)
+            .map_err(|fault| VerifyError { place: Place::Toplevel(index), fault })?;
+    }
+    (0..module.functions.len() as u32).try_for_each(|number| verify_function(module, FunctionNumber(number)))
+}
+
+/// Checks one function of a module whose constants are in order (V13).
+///
+/// # Errors
+/// The first fault that is found.
+pub fn verify_function(module: &Module, number: FunctionNumber) -> Result<(), VerifyError> {
+    let shape = shape::verify(module, number)?;
+    flow::verify(module, number, &shape)
+}
+
+fn verify_toplevel(module: &Module, number: FunctionNumber) -> Result<(), Fault> {
+    let function = pool::function(module, number)?;
+    if function.parameters.registers() != 0 || function.parameters.keys.is_some() {
+        return Err(Fault::ToplevelParameters);
+    }
+    if !function.captures.is_empty() {
+        return Err(Fault::ToplevelCaptures);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;
