@@ -2,11 +2,21 @@
 
 #![deny(unsafe_code)]
 
+pub mod builtins;
 pub mod heap;
 pub mod host;
+pub mod raise;
+pub mod run;
+pub mod task;
 pub mod value;
+pub mod vm;
 
+mod control;
+mod describe;
+mod interp;
 mod load;
+mod number;
 mod shape;
+mod stack;
 mod stub;
 mod world;

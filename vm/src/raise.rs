@@ -4,6 +4,8 @@
 //! [`Exit::Raise`]. The interpreter then calls the library function `%raise` at the point of failure, in a frame above
 //! the failed instruction; nothing has been unwound. What `%raise` returns takes the place of the operation's result.
 
+use smallvec::{SmallVec, smallvec};
+
 use crate::heap::AllocError;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -73,6 +75,8 @@ pub enum Exit {
     Collect,
     /// The task waits; what wakes it delivers the value.
     Park,
+    /// An unwinding of the task has begun.
+    Unwind,
 }
 
 /// What a builtin gives: one value, or the reason why not.
@@ -81,8 +85,8 @@ pub type Outcome = Result<Value, Exit>;
 impl From<AllocError> for Exit {
     fn from(error: AllocError) -> Exit {
         match error {
-            AllocError::NeedCollection => Exit::Collect,
-            AllocError::TooLarge { .. } => Exit::Collect,
+            // What is too large will still be so after a collection; then the heap counts as exhausted.
+            AllocError::NeedCollection | AllocError::TooLarge { .. } => Exit::Collect,
         }
     }
 }
@@ -111,5 +115,81 @@ impl Vm {
     #[cold]
     pub fn program_error<T>(&mut self, text: impl Into<String>) -> Result<T, Exit> {
         self.raise(Raised::Program(text.into()))
+    }
+}
+
+impl Vm {
+    /// The arguments of `%raise` for the failure that is noted: a keyword, and what goes with it.
+    ///
+    /// # Errors
+    /// [`Exit::Collect`] if there is no room for a text.
+    pub(crate) fn raised_arguments(&mut self) -> Result<SmallVec<[Value; 16]>, Exit> {
+        // It stays noted until it has been put into words, since that may have to be done again.
+        let raised = self.raised.clone().unwrap_or(Raised::Simple("an operation failed".into()));
+        let arguments: SmallVec<[Value; 16]> = match raised {
+            Raised::Type(datum, expected) => {
+                let expected = match expected {
+                    Expected::Type(name) => self.world.intern_cl(&mut self.heap, name)?,
+                    Expected::Index(limit) => {
+                        // (INTEGER 0 (limit))
+                        let limit = self.heap.list(&[Value::index(limit)])?;
+                        let integer = self.world.intern_cl(&mut self.heap, "INTEGER")?;
+                        self.heap.list(&[integer, Value::small(0), limit])?
+                    }
+                    Expected::Specifier(specifier) => specifier,
+                };
+                smallvec![self.keyword("TYPE-ERROR")?, datum, expected]
+            }
+            Raised::DivisionByZero(operation, operands) => {
+                let operation = self.world.intern_cl(&mut self.heap, operation)?;
+                let operands = self.heap.list(&operands)?;
+                smallvec![self.keyword("DIVISION-BY-ZERO")?, operation, operands]
+            }
+            Raised::Arithmetic(operation, text) => {
+                let operation = self.world.intern_cl(&mut self.heap, operation)?;
+                let text = self.heap.alloc_str(&text)?;
+                smallvec![self.keyword("ARITHMETIC-ERROR")?, operation, text]
+            }
+            Raised::FloatOverflow(operation) => {
+                let operation = self.world.intern_cl(&mut self.heap, operation)?;
+                smallvec![self.keyword("FLOATING-POINT-OVERFLOW")?, operation]
+            }
+            Raised::UnboundVariable(symbol) => smallvec![self.keyword("UNBOUND-VARIABLE")?, symbol],
+            Raised::UndefinedFunction(symbol) => smallvec![self.keyword("UNDEFINED-FUNCTION")?, symbol],
+            Raised::Program(text) => self.raised_text("PROGRAM-ERROR", &text)?,
+            Raised::Control(text) => self.raised_text("CONTROL-ERROR", &text)?,
+            Raised::Parse(text) => self.raised_text("PARSE-ERROR", &text)?,
+            Raised::Reader(text) => self.raised_text("READER-ERROR", &text)?,
+            Raised::Simple(text) => self.raised_text("SIMPLE-ERROR", &text)?,
+            Raised::EndOfFile(stream) => smallvec![self.keyword("END-OF-FILE")?, stream],
+            Raised::Stream(stream, text) => {
+                let text = self.heap.alloc_str(&text)?;
+                smallvec![self.keyword("STREAM-ERROR")?, stream, text]
+            }
+            Raised::Cause(cause, argument) => {
+                let cause = self.keyword(cause)?;
+                smallvec![self.keyword("CAUSE")?, cause, argument]
+            }
+            Raised::StackExhausted => smallvec![self.keyword("STACK-EXHAUSTED")?],
+            Raised::HeapExhausted => smallvec![self.keyword("HEAP-EXHAUSTED")?],
+        };
+        self.raised = None;
+        Ok(arguments)
+    }
+
+    fn raised_text(&mut self, kind: &str, text: &str) -> Result<SmallVec<[Value; 16]>, Exit> {
+        let text = self.heap.alloc_str(text)?;
+        Ok(smallvec![self.keyword(kind)?, text])
+    }
+
+    /// The keyword of this name.
+    fn keyword(&mut self, name: &str) -> Result<Value, Exit> {
+        Ok(self.world.keyword(&mut self.heap, name)?)
+    }
+
+    /// The arguments of `%raise` as a text, for when there is no library that could say it better.
+    pub(crate) fn describe_failure(&self, arguments: &[Value]) -> String {
+        let words: Vec<String> = arguments.iter().map(|&argument| self.describe(argument)).collect();
+        words.join(" ")
     }
 }

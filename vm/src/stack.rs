@@ -24,8 +24,6 @@ use crate::value::Value;
 pub(crate) struct Stack {
     start: NonNull<Value>,
     capacity: usize,
-    /// Words above this one have been nil since they were last wiped.
-    high_water: usize,
 }
 
 // SAFETY: a stack owns its segment; the values in it belong to the heap of the machine that owns the stack.
@@ -38,7 +36,7 @@ impl Stack {
     /// A stack of nils.
     pub(crate) fn new() -> Stack {
         let start = allocate(INITIAL);
-        Stack { start, capacity: INITIAL, high_water: 0 }
+        Stack { start, capacity: INITIAL }
     }
 
     /// Address of the first word.
@@ -67,19 +65,16 @@ impl Stack {
         let old = std::mem::replace(&mut self.start, start);
         // SAFETY: `old` was allocated with this layout and is no longer used.
         unsafe { dealloc(old.as_ptr().cast(), layout(self.capacity)) };
-        // The running frame may have written up to the old end.
-        self.high_water = self.high_water.max(self.capacity);
         self.capacity = capacity;
     }
 
     /// Clears everything from `top` on, so that what is below is all that a scan sees.
     pub(crate) fn wipe(&mut self, top: usize) {
-        // The interpreter does not note how high it has written, only that it is below the capacity.
+        // The interpreter does not note how high it has written: that would cost each call a store.
         for index in top..self.capacity {
             // SAFETY: the index is below the capacity.
             unsafe { self.start.as_ptr().add(index).write(Value::NIL) };
         }
-        self.high_water = top;
     }
 
     /// The words below `top`.

@@ -1,8 +1,19 @@
 //! The virtual machine: a heap, a world of names, and tasks that run in them.
 
-use crate::heap::{Heap, HeapConfig};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use esl_bytecode::builtin::BUILTINS;
+use slotmap::SlotMap;
+
+use crate::control::End;
+use crate::heap::{AllocError, Heap, HeapConfig};
 use crate::host::Host;
+use crate::interp::Cpu;
+use crate::interp::call::{Arguments, make_starter};
 use crate::raise::Raised;
+use crate::run::{RunQueue, Tasks};
+use crate::task::{Task, TaskId};
 use crate::value::Value;
 use crate::world::World;
 
@@ -11,7 +22,7 @@ use crate::world::World;
 pub struct Config {
     /// Limit of the heap in bytes.
     pub memory: usize,
-    /// Limit of a task's stack in words.
+    /// Limit of a task's stack in words; also of its bindings and of the entries of its control stack.
     pub stack: usize,
     /// Ticks that a task runs before the next one has its turn.
     pub slice: u32,
@@ -37,29 +48,163 @@ impl Default for Config {
 }
 
 /// A virtual machine.
+///
+/// The values that it hands out belong to it: they are of no use to another machine, and good until it runs again,
+/// unless they are pinned.
 pub struct Vm {
+    // ---- where things are
     /// Where objects live.
     pub(crate) heap: Heap,
     /// Symbols, packages, classes and loaded modules.
     pub(crate) world: World,
     /// The outside.
-    pub(crate) host: Box<dyn Host>,
+    pub(crate) host: Box<dyn Host + Send>,
+    /// Values that the embedder holds on to.
+    pub(crate) pinned: Vec<Value>,
+
+    // ---- tasks
+    /// The tasks.
+    pub(crate) tasks: Tasks,
+    /// Those that are runnable, in order.
+    pub(crate) queue: RunQueue,
+    /// The one that runs, out of its place in `tasks`.
+    pub(crate) running: Option<Box<Task>>,
+    /// Its registers.
+    pub(crate) cpu: Cpu,
+    /// How it ends, once its unwinding has reached the root.
+    pub(crate) ending: Option<End>,
+    /// Ticks that all tasks have used.
+    pub(crate) spent: u64,
+    /// The function with which every task begins.
+    pub(crate) starter: Value,
+    /// Set from outside to abort the task that the embedder names with [`Vm::interruptible`].
+    pub(crate) interrupt: Arc<AtomicBool>,
+    /// The task that an interrupt aborts.
+    pub(crate) interruptible: Option<TaskId>,
+
+    // ---- between the interpreter and builtins
     /// The value list: all values of the form that was evaluated last, where they are wanted.
     pub(crate) values: Vec<Value>,
     /// The failure that a builtin has noted, until the interpreter takes it.
     pub(crate) raised: Option<Raised>,
     /// The call that a builtin has asked for: the function, then its arguments.
     pub(crate) requested_call: Vec<Value>,
-    /// Ticks that the running builtin has charged, beside the one of its call.
+    /// Ticks that builtins have charged, beside those of their calls, until the interpreter takes them.
     pub(crate) charged: u64,
+    /// Place and time of the last collection for want of room; a second one there would not help.
+    pub(crate) collected_at: Option<(*const u32, u64, i32)>,
+    /// The text of a failure that no library was there to deal with.
+    pub(crate) last_words: Option<String>,
+
     /// Limits and settings.
     pub(crate) config: Config,
 }
 
+// SAFETY: the raw pointers of a machine point into what the machine owns, or into static tables.
+#[allow(unsafe_code, reason = "the machine owns what its pointers point to")]
+unsafe impl Send for Vm {}
+
 impl Vm {
+    /// A machine without a library.
+    ///
+    /// # Errors
+    /// [`AllocError`] if the limit of memory leaves no room for what every machine has.
+    pub fn new(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, AllocError> {
+        let heap_config = HeapConfig { limit: config.memory, ..HeapConfig::default() };
+        // SAFETY: the machine uses its heap's values with its heap only, and drops both together. Values that an embedder
+        // gets hold of come with the promise that the documentation of `Vm` asks for.
+        #[allow(unsafe_code, reason = "the one place where a machine is given its heap")]
+        let mut heap = unsafe { Heap::new(heap_config) };
+        let world = World::new(&mut heap)?;
+        let starter = make_starter(&mut heap)?;
+        Ok(Vm {
+            heap,
+            world,
+            host,
+            pinned: vec![starter],
+            tasks: SlotMap::with_key(),
+            queue: RunQueue::new(),
+            running: None,
+            cpu: Cpu::new(),
+            ending: None,
+            spent: 0,
+            starter,
+            interrupt: Arc::default(),
+            interruptible: None,
+            values: Vec::new(),
+            raised: None,
+            requested_call: Vec::new(),
+            charged: 0,
+            collected_at: None,
+            last_words: None,
+            config,
+        })
+    }
+
+    /// Limits and settings.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
     /// Charges the running task `units` of work (list cells, elements, characters): a tick for each 64.
     #[inline]
     pub fn charge(&mut self, units: usize) {
         self.charged += units as u64 / 64;
+    }
+
+    /// Asks for a call in the place of the builtin, which gives [`crate::raise::Exit::Call`].
+    pub(crate) fn request_call(&mut self, function: Value, arguments: &[Value]) {
+        self.requested_call.clear();
+        self.requested_call.push(function);
+        self.requested_call.extend_from_slice(arguments);
+    }
+
+    /// The call that a builtin has asked for.
+    pub(crate) fn take_requested_call(&mut self) -> (Value, Arguments) {
+        let mut call = self.requested_call.drain(..);
+        let function = call.next().unwrap_or(Value::NIL);
+        (function, call.collect())
+    }
+
+    /// The function of the library that takes over from a builtin with too much to do.
+    pub(crate) fn slow_twin(&mut self, number: u16) -> Option<Value> {
+        let name = BUILTINS.get(usize::from(number))?.slowly?;
+        let symbol = self.world.intern_esl(&mut self.heap, name).ok()?;
+        self.is_defined(symbol).then_some(symbol)
+    }
+
+    /// Whether a symbol has a global function.
+    pub(crate) fn is_defined(&self, symbol: Value) -> bool {
+        let function = self.world.function_of(&self.heap, symbol);
+        function.is_some_and(|function| !self.world.is_undefined(&self.heap, function))
+    }
+
+    /// A flag that makes the machine abort a task at the end of its slice when it is set.
+    pub fn interrupt_flag(&self) -> Arc<AtomicBool> {
+        self.interrupt.clone()
+    }
+
+    /// Names the task that an interrupt aborts.
+    pub fn set_interruptible(&mut self, id: Option<TaskId>) {
+        self.interruptible = id;
+    }
+
+    /// Takes an interrupt, if it is meant for the task whose turn it is.
+    pub(crate) fn take_interrupt(&mut self, id: TaskId) -> bool {
+        self.interruptible == Some(id)
+            && self.interrupt.swap(false, std::sync::atomic::Ordering::Relaxed)
+    }
+
+    /// Keeps a value from being collected, until [`Vm::unpin`].
+    pub fn pin(&mut self, value: Value) {
+        self.heap.log_if_marking(value);
+        self.pinned.push(value);
+    }
+
+    /// Lets go of a pinned value.
+    pub fn unpin(&mut self, value: Value) {
+        if let Some(index) = self.pinned.iter().rposition(|&pinned| pinned == value) {
+            self.pinned.swap_remove(index);
+        }
     }
 }

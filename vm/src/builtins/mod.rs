@@ -11,7 +11,7 @@
 //! [`Exit::Slowly`]: crate::raise::Exit::Slowly
 //! [`Exit::Collect`]: crate::raise::Exit::Collect
 
-use esl_bytecode::builtin::Builtin;
+use esl_bytecode::builtin::{BUILTINS, Builtin};
 
 use crate::raise::Outcome;
 use crate::value::Value;
@@ -23,8 +23,19 @@ pub const LIMIT: usize = 4096;
 /// A function that is written in Rust. The number of arguments has been checked against the table.
 pub type Native = fn(&mut Vm, &[Value]) -> Outcome;
 
+/// The implementations, by the numbers of their rows.
+pub(crate) static NATIVES: [Native; BUILTINS.len()] = {
+    let mut table: [Native; BUILTINS.len()] = [define::set_function; BUILTINS.len()];
+    let mut number = 0;
+    while number < BUILTINS.len() {
+        table[number] = native(BUILTINS[number].builtin);
+        number += 1;
+    }
+    table
+};
+
 /// The implementation of each row of the table. A row without an arm here does not compile.
-pub fn native(builtin: Builtin) -> Native {
+pub const fn native(builtin: Builtin) -> Native {
     match builtin {
         Builtin::SetFunction => define::set_function,
         Builtin::SetMacro => define::set_macro,

@@ -52,6 +52,9 @@ define_known! {
     structure_object = cl "STRUCTURE-OBJECT";
     error = cl "ERROR";
     raise = esl "%RAISE";
+    allow_other_keys = keyword "ALLOW-OTHER-KEYS";
+    stack_exhausted = keyword "STACK-EXHAUSTED";
+    heap_exhausted = keyword "HEAP-EXHAUSTED";
     // Properties under which the machine keeps data on a symbol.
     variable_documentation = esl "%VARIABLE-DOCUMENTATION";
     accessor = esl "%ACCESSOR";

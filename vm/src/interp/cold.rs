@@ -1,0 +1,533 @@
+//! The slow parts of instructions: each decodes its operands again, does its work, and writes its own result, so that
+//! the loop passes three registers and expects nothing back but a [`Signal`].
+//!
+//! Every function here has the contract of [`super::settle`]: `pc` is at an instruction of the row it serves, `base` is
+//! the running frame's, and what the verifier proved holds (V1 to V13).
+
+use esl_bytecode::builtin::Builtin;
+use esl_bytecode::module::CaptureSource;
+use esl_bytecode::opcode::TypeCode;
+
+use super::{Operation, Signal, code_of, constants_of};
+use crate::builtins::{NATIVES, Native, types};
+use crate::control::Binding;
+use crate::heap::layout::{Code, Function, Kind, Symbol};
+use crate::number;
+use crate::raise::{Exit, Expected, Outcome, Raised};
+use crate::shape::{Shape, Sort, capture_source};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// Operands A, B, C of an instruction.
+fn operands(word: u32) -> (usize, usize, usize) {
+    ((word >> 8 & 0xff) as usize, (word >> 16 & 0xff) as usize, (word >> 24) as usize)
+}
+
+/// Puts an outcome into register `dst`.
+unsafe fn finish(base: *mut Value, dst: usize, outcome: Outcome) -> Signal {
+    match outcome {
+        Ok(value) => {
+            // SAFETY: V3: a register of the frame.
+            unsafe { *base.add(dst) = value };
+            Signal::Next
+        }
+        Err(exit) => Signal::Exit(exit),
+    }
+}
+
+/// The operation of a word.
+fn operation(word: u32) -> Operation {
+    // SAFETY: V1.
+    unsafe { std::mem::transmute(word as u8) }
+}
+
+/// The builtin that does the work of an instruction in the cases that the loop does not know.
+fn builtin(operation: Operation) -> Native {
+    let builtin = match operation {
+        Operation::Floor => Builtin::Floor,
+        Operation::Truncate => Builtin::Truncate,
+        Operation::Mod => Builtin::Mod,
+        Operation::Rem => Builtin::Rem,
+        Operation::LogAnd => Builtin::LogAnd,
+        Operation::LogIor => Builtin::LogIor,
+        Operation::LogXor => Builtin::LogXor,
+        Operation::Ash => Builtin::Ash,
+        Operation::VectorRef => Builtin::Svref,
+        Operation::VectorSet => Builtin::SetSvref,
+        Operation::ArrayRef => Builtin::Aref,
+        Operation::ArraySet => Builtin::SetAref,
+        _ => unreachable!("the loop asks for the builtins of these instructions only"),
+    };
+    NATIVES[builtin as usize]
+}
+
+/// Arithmetic and comparisons that give a value.
+#[cold]
+#[inline(never)]
+pub(super) unsafe fn arithmetic(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = *pc;
+        let (dst, b, c) = operands(word);
+        let left = *base.add(b);
+        if operation(word) == Operation::AddInt {
+            let outcome = number::add(vm, left, Value::small(word as i32 >> 24));
+            return finish(base, dst, outcome);
+        }
+        let right = *base.add(c);
+        let outcome = match operation(word) {
+            Operation::Add => number::add(vm, left, right),
+            Operation::Sub => number::subtract(vm, left, right),
+            Operation::Mul => number::multiply(vm, left, right),
+            Operation::Div => number::divide(vm, left, right),
+            Operation::NumEq => number::num_equal(vm, left, right).map(Value::boolean),
+            Operation::Less => number::less(vm, left, right).map(Value::boolean),
+            Operation::LessEq => number::less_or_equal(vm, left, right).map(Value::boolean),
+            operation => {
+                match builtin(operation)(vm, &[left, right]) {
+                    // Of quotient and remainder the instruction wants the first.
+                    Err(Exit::Values) => Ok(vm.values.first().copied().unwrap_or(Value::NIL)),
+                    outcome => outcome,
+                }
+            }
+        };
+        finish(base, dst, outcome)
+    }
+}
+
+/// Comparisons that jump, and the counting loop: whether they hold.
+#[cold]
+#[inline(never)]
+pub(super) unsafe fn compare(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Result<bool, Signal> {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = *pc;
+        let (a, b, _) = operands(word);
+        let left = *base.add(a);
+        let int = Value::small(word as i32 >> 16);
+        let result = match operation(word) {
+            Operation::JumpNumEq | Operation::JumpNotNumEq => number::num_equal(vm, left, *base.add(b)),
+            Operation::JumpLess | Operation::JumpNotLess | Operation::LoopLess | Operation::LoopNotLess => {
+                number::less(vm, left, *base.add(b))
+            }
+            Operation::JumpLessEq | Operation::JumpNotLessEq => number::less_or_equal(vm, left, *base.add(b)),
+            Operation::JumpNumEqInt | Operation::JumpNotNumEqInt => number::num_equal(vm, left, int),
+            Operation::JumpLessInt | Operation::JumpNotLessInt => number::less(vm, left, int),
+            Operation::JumpGreaterInt | Operation::JumpNotGreaterInt => number::less(vm, int, left),
+            _ => {
+                // The counting loop: nothing is stored before the comparison has come out well.
+                let step = Value::small(word as i32 >> 24);
+                let limit = *base.add(b);
+                number::add(vm, left, step).and_then(|sum| {
+                    let holds = number::less(vm, sum, limit)?;
+                    *base.add(a) = sum;
+                    Ok(holds)
+                })
+            }
+        };
+        result.map_err(Signal::Exit)
+    }
+}
+
+/// Whether two values are `eql`.
+#[inline(always)]
+pub(super) fn eql(vm: &Vm, a: Value, b: Value) -> bool {
+    a == b || (a.is_object() && b.is_object() && eql_objects(vm, a, b))
+}
+
+#[cold]
+#[inline(never)]
+fn eql_objects(vm: &Vm, a: Value, b: Value) -> bool {
+    number::eql(&vm.heap, a, b)
+}
+
+/// Whether `value` is of the type with this code.
+#[inline(always)]
+pub(super) fn is_type(vm: &Vm, value: Value, code: u8) -> bool {
+    // The commonest tests of immediate values need no look at the heap.
+    match TypeCode::from_number(code) {
+        Some(TypeCode::Cons) => value.is_cons(),
+        Some(TypeCode::Atom) => !value.is_cons(),
+        Some(TypeCode::List) => value.is_list(),
+        Some(TypeCode::Null) => value.is_nil(),
+        Some(TypeCode::Fixnum) => value.is_fixnum(),
+        Some(TypeCode::Character) => value.is_character(),
+        Some(code) => types::has_type_code(vm, value, code),
+        None => false,
+    }
+}
+
+/// `cons` when the hole is full.
+#[cold]
+#[inline(never)]
+pub(super) unsafe fn cons(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let (dst, b, c) = operands(*pc);
+        let outcome = vm.heap.cons(*base.add(b), *base.add(c)).map_err(Exit::from);
+        finish(base, dst, outcome)
+    }
+}
+
+/// `list`.
+#[inline(never)]
+pub(super) unsafe fn list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header; V3: the items are registers of the frame.
+    unsafe {
+        let (dst, first, count) = operands(*pc);
+        let mut rest = Value::NIL;
+        for i in (0..count).rev() {
+            rest = match vm.heap.cons(*base.add(first + i), rest) {
+                Ok(cons) => cons,
+                Err(error) => return Signal::Exit(error.into()),
+            };
+        }
+        *base.add(dst) = rest;
+        Signal::Next
+    }
+}
+
+/// The parts of lists, of what is no pair.
+#[cold]
+#[inline(never)]
+pub(super) unsafe fn list_part(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = *pc;
+        let (a, b, _) = operands(word);
+        let part = match operation(word) {
+            Operation::SetCar | Operation::SetCdr => {
+                return Signal::Exit(vm.type_error::<()>(*base.add(a), "CONS").unwrap_err());
+            }
+            Operation::Cadr | Operation::Cddr => {
+                let list = *base.add(b);
+                let rest = if list.is_nil() { Some(list) } else { vm.heap.cdr(list) };
+                match rest {
+                    Some(rest) if rest.is_nil() => Ok(rest),
+                    Some(rest) => vm.type_error(rest, "LIST"),
+                    None => vm.type_error(list, "LIST"),
+                }
+            }
+            _ if (*base.add(b)).is_nil() => Ok(Value::NIL),
+            _ => vm.type_error(*base.add(b), "LIST"),
+        };
+        finish(base, a, part)
+    }
+}
+
+/// References to arrays that are no simple vectors, or with a wrong index.
+#[cold]
+#[inline(never)]
+pub(super) unsafe fn array(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = *pc;
+        let (a, b, c) = operands(word);
+        let (x, y, z) = (*base.add(a), *base.add(b), *base.add(c));
+        match operation(word) {
+            operation @ (Operation::VectorRef | Operation::ArrayRef) => {
+                let outcome = builtin(operation)(vm, &[y, z]);
+                finish(base, a, outcome)
+            }
+            operation => match builtin(operation)(vm, &[x, y, z]) {
+                Ok(_) => Signal::Next,
+                Err(exit) => Signal::Exit(exit),
+            },
+        }
+    }
+}
+
+/// Slots: the first time at a place, of instances of subclasses, and of what is no instance.
+#[cold]
+#[inline(never)]
+pub(super) unsafe fn slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = *pc;
+        let (a, b, c) = operands(word);
+        let class = class_constant(vm, base, *pc.add(1));
+        let reads = operation(word) == Operation::Slot;
+        let (instance, slot) = if reads { (*base.add(b), c) } else { (*base.add(a), b) };
+        let has_slot = vm.heap.structure_slots(instance).is_some_and(|slots| slot < slots.len());
+        if !has_slot || !vm.is_instance(instance, class) {
+            let raised = Raised::Type(instance, Expected::Specifier(vm.class_name(class)));
+            return Signal::Exit(vm.raise::<()>(raised).unwrap_err());
+        }
+        if reads {
+            let value = vm.heap.structure_slots(instance).map_or(Value::NIL, |slots| slots[slot]);
+            *base.add(a) = value;
+        } else {
+            vm.heap.structure_set(instance, slot, *base.add(c));
+        }
+        Signal::Next
+    }
+}
+
+/// Whether `value` is an instance of the class that is constant `index`, or of a subclass.
+///
+/// # Safety
+/// See the module's header.
+#[cold]
+#[inline(never)]
+pub(super) unsafe fn is_instance(vm: &mut Vm, base: *mut Value, value: Value, index: usize) -> bool {
+    // SAFETY: by the contract.
+    let class = unsafe { class_constant(vm, base, index as u32) };
+    vm.is_instance(value, class)
+}
+
+/// The class that is a constant of the running function. As loaded the constant is the name of the class; the class, as
+/// it is now, is put in its place, also when the class of that name has become another one.
+unsafe fn class_constant(vm: &mut Vm, base: *mut Value, index: u32) -> Value {
+    // SAFETY: V4.
+    unsafe {
+        let constant = constants_of(code_of(*base.sub(2))).add(index as usize).cast_mut();
+        let name = if vm.heap.is(*constant, Kind::Class) { vm.class_name(*constant) } else { *constant };
+        if let Some(class) = vm.find_class(name)
+            && class != *constant
+        {
+            vm.heap.store(constant, class);
+        }
+        *constant
+    }
+}
+
+/// `make-box`.
+#[inline(never)]
+pub(super) unsafe fn make_box(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let (dst, src, _) = operands(*pc);
+        let outcome = vm.heap.alloc_box(*base.add(src)).map_err(Exit::from);
+        finish(base, dst, outcome)
+    }
+}
+
+/// `make-closure` of a function with captures.
+#[inline(never)]
+pub(super) unsafe fn make_closure(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header; the constant is the code of a function with captures (`shape`), and V8 says that
+    // what they are taken from is there.
+    unsafe {
+        let word = *pc;
+        let (dst, _, _) = operands(word);
+        let running = *base.sub(2);
+        let code = *constants_of(code_of(running)).add((word >> 16) as usize);
+        let layout = code.object_ptr().cast::<Code>();
+        let count = (*layout).spare[1] as usize;
+        let closure = match vm.heap.alloc_closure(code, count) {
+            Ok(closure) => closure,
+            Err(error) => return Signal::Exit(error.into()),
+        };
+        let sources = layout.byte_add((*layout).words_offset()).cast::<u32>();
+        let sources = sources.add((*layout).nwords as usize - count);
+        let captures = (&raw mut (*closure).captures).cast::<Value>();
+        let own = (&raw const (*running.object_ptr().cast::<Function>()).captures).cast::<Value>();
+        for i in 0..count {
+            let value = match capture_source(*sources.add(i)) {
+                CaptureSource::Register(register) => *base.add(usize::from(register)),
+                CaptureSource::Capture(index) => *own.add(usize::from(index)),
+                CaptureSource::Later => Value::NIL,
+            };
+            // An initialising store needs no barrier.
+            *captures.add(i) = value;
+        }
+        *base.add(dst) = Value::from_object(closure.cast());
+        Signal::Next
+    }
+}
+
+/// The symbol that is a constant of the running function.
+unsafe fn symbol_constant(base: *mut Value, index: u32) -> Value {
+    // SAFETY: V4.
+    unsafe { *constants_of(code_of(*base.sub(2))).add(index as usize) }
+}
+
+/// `symbol-value` of a symbol that some task has bound, or that has no value.
+#[inline(never)]
+pub(super) unsafe fn symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = *pc;
+        let symbol = symbol_constant(base, word >> 16);
+        match vm.symbol_value(symbol) {
+            Some(value) => {
+                *base.add(operands(word).0) = value;
+                Signal::Next
+            }
+            None => Signal::Exit(vm.raise::<()>(Raised::UnboundVariable(symbol)).unwrap_err()),
+        }
+    }
+}
+
+/// `set-symbol-value`.
+#[inline(never)]
+pub(super) unsafe fn set_symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = *pc;
+        let symbol = symbol_constant(base, word >> 16);
+        let value = *base.add(operands(word).0);
+        match vm.set_symbol_value(symbol, value) {
+            Ok(()) => Signal::Next,
+            Err(exit) => Signal::Exit(exit),
+        }
+    }
+}
+
+/// `bind`.
+#[inline(never)]
+pub(super) unsafe fn bind(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = *pc;
+        let symbol = symbol_constant(base, word >> 16);
+        let value = *base.add(operands(word).0);
+        match vm.bind(symbol, value) {
+            Ok(()) => Signal::Next,
+            Err(exit) => Signal::Exit(exit),
+        }
+    }
+}
+
+/// `unbind`.
+#[inline(never)]
+pub(super) unsafe fn unbind(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    let count = operands(unsafe { *pc }).0;
+    let bindings = &mut vm.task_mut().control.bindings;
+    bindings.truncate(bindings.len().saturating_sub(count));
+    Signal::Next
+}
+
+/// `function-ref`.
+#[inline(never)]
+pub(super) unsafe fn function_ref(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = *pc;
+        let symbol = symbol_constant(base, word >> 16);
+        let function = (*symbol.object_ptr().cast::<Symbol>()).function;
+        if Shape::unpack((*code_of(function)).spare[0]).sort == Sort::Undefined {
+            return Signal::Exit(vm.raise::<()>(Raised::UndefinedFunction(symbol)).unwrap_err());
+        }
+        *base.add(operands(word).0) = function;
+        Signal::Next
+    }
+}
+
+/// `set-values` and the values of `return-values`.
+#[inline(never)]
+pub(super) unsafe fn set_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header; V3: the values are registers of the frame.
+    unsafe {
+        let (first, count, _) = operands(*pc);
+        vm.values.clear();
+        vm.values.extend_from_slice(std::slice::from_raw_parts(base.add(first), count));
+    }
+    Signal::Next
+}
+
+/// `get-values`.
+#[inline(never)]
+pub(super) unsafe fn get_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header; V3: the registers are of the frame.
+    unsafe {
+        let (first, count, _) = operands(*pc);
+        for i in 0..count {
+            *base.add(first + i) = vm.values.get(i).copied().unwrap_or(Value::NIL);
+        }
+    }
+    Signal::Next
+}
+
+/// `values-to-list`.
+#[inline(never)]
+pub(super) unsafe fn values_to_list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    vm.charge(vm.values.len());
+    let outcome = vm.heap.list(&vm.values).map_err(Exit::from);
+    // SAFETY: see the module's header.
+    unsafe { finish(base, operands(*pc).0, outcome) }
+}
+
+/// `list-to-values`.
+#[inline(never)]
+pub(super) unsafe fn list_to_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    let list = unsafe { *base.add(operands(*pc).0) };
+    vm.values.clear();
+    let mut rest = list;
+    while rest.is_cons() {
+        if vm.values.len() == super::call::MAX_SPREAD {
+            let text = format!("more than {} values", super::call::MAX_SPREAD);
+            return Signal::Exit(vm.program_error::<()>(text).unwrap_err());
+        }
+        vm.values.push(vm.heap.car(rest).unwrap_or(Value::NIL));
+        rest = vm.heap.cdr(rest).unwrap_or(Value::NIL);
+    }
+    vm.charge(vm.values.len());
+    if rest.is_true() {
+        return Signal::Exit(vm.type_error::<()>(list, "LIST").unwrap_err());
+    }
+    Signal::Next
+}
+
+impl Vm {
+    /// The value of a special variable in the running task; `None` if it has none.
+    pub(crate) fn symbol_value(&self, symbol: Value) -> Option<Value> {
+        let cell = self.heap.symbol(symbol)?;
+        let value = if cell.header.flags & Symbol::EVER_BOUND == 0 {
+            cell.value
+        } else {
+            self.running.as_ref().map_or(cell.value, |task| {
+                let control = &task.control;
+                control.find_binding(symbol).map_or(cell.value, |index| control.bindings[index].value)
+            })
+        };
+        (value != Value::UNBOUND).then_some(value)
+    }
+
+    /// Sets a special variable in the running task: its binding, or else the global value.
+    ///
+    /// # Errors
+    /// A failure if it is a constant.
+    pub(crate) fn set_symbol_value(&mut self, symbol: Value, value: Value) -> Result<(), Exit> {
+        let Some(cell) = self.heap.symbol(symbol) else { return self.type_error(symbol, "SYMBOL") };
+        let flags = cell.header.flags;
+        if flags & Symbol::CONSTANT != 0 {
+            let name = self.heap.string_text(cell.name).unwrap_or_default();
+            return self.program_error(format!("{name} is a constant and cannot be set"));
+        }
+        if flags & Symbol::EVER_BOUND != 0
+            && let Some(task) = self.running.as_mut()
+            && let Some(index) = task.control.find_binding(symbol)
+        {
+            task.control.bindings[index].value = value;
+            return Ok(());
+        }
+        self.heap.symbol_set_value(symbol, value);
+        Ok(())
+    }
+
+    /// Binds a special variable in the running task.
+    ///
+    /// # Errors
+    /// A failure if it is a constant, or if there are too many bindings.
+    pub(crate) fn bind(&mut self, symbol: Value, value: Value) -> Result<(), Exit> {
+        let Some(cell) = self.heap.symbol(symbol) else { return self.type_error(symbol, "SYMBOL") };
+        let flags = cell.header.flags;
+        if flags & Symbol::CONSTANT != 0 {
+            let name = self.heap.string_text(cell.name).unwrap_or_default();
+            return self.program_error(format!("{name} is a constant and cannot be bound"));
+        }
+        if flags & Symbol::EVER_BOUND == 0 {
+            self.heap.set_flags(symbol, Kind::Symbol, flags | Symbol::EVER_BOUND);
+        }
+        let limit = self.config.stack;
+        let bindings = &mut self.task_mut().control.bindings;
+        if bindings.len() >= limit {
+            return self.raise(Raised::StackExhausted);
+        }
+        bindings.push(Binding { symbol, value });
+        Ok(())
+    }
+}

@@ -1,0 +1,238 @@
+//! Instructions on the control stack, and unwinding.
+
+use esl_bytecode::opcode::Opcode;
+
+use super::{Signal, call, code_of, constants_of};
+use crate::control::{End, Entry, EntryKind, Running, Target, Unwinding};
+use crate::raise::{Exit, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// `new-tag`.
+#[inline(never)]
+pub(super) unsafe fn new_tag(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    match vm.heap.alloc_tag(Value::NIL) {
+        Ok(tag) => {
+            // SAFETY: V3: a register of the frame.
+            unsafe { *base.add((*pc >> 8 & 0xff) as usize) = tag };
+            Signal::Next
+        }
+        Err(error) => Signal::Exit(error.into()),
+    }
+}
+
+/// The instructions that push an entry.
+#[inline(never)]
+pub(super) unsafe fn push(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: V1 and V2: the instruction has its aux word and jumps inside the function; V3, V4: registers and constants
+    // are there.
+    unsafe {
+        let word = *pc;
+        let window = (word >> 8) as u8;
+        let register = |index: u32| *base.add((index & 0xff) as usize);
+        let to = || pc.add(2).offset(*pc.add(1) as i32 as isize);
+        let (kind, data, want, to) = match Opcode::from_number(word as u8) {
+            Some(Opcode::PushCatch) => (EntryKind::Catch, register(word >> 16), (word >> 24) as u8, to()),
+            Some(Opcode::PushCleanup) => (EntryKind::Cleanup, Value::NIL, 0, to()),
+            Some(Opcode::PushHandlerCase) => {
+                let types = *constants_of(code_of(*base.sub(2))).add((word >> 16) as usize);
+                (EntryKind::HandlerCase, types, 2, to())
+            }
+            Some(Opcode::PushHandlers) => (EntryKind::Handlers, register(word >> 16), 0, std::ptr::null()),
+            Some(Opcode::PushMask) => (EntryKind::Mask, register(word >> 16), 0, std::ptr::null()),
+            _ => (EntryKind::Scope, Value::NIL, 0, std::ptr::null()),
+        };
+        let limit = vm.config.stack;
+        let offset = vm.offset_of(base);
+        let task = vm.task_mut();
+        let control = &mut task.control;
+        if control.entries.len() >= limit {
+            return Signal::Exit(vm.raise::<()>(Raised::StackExhausted).unwrap_err());
+        }
+        let bindings = control.bindings.len() as u32;
+        control.entries.push(Entry { data, pc: to, base: offset as u32, bindings, window, want, kind });
+        Signal::Next
+    }
+}
+
+/// `pop-control`.
+#[inline(never)]
+pub(super) unsafe fn pop(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Signal {
+    // SAFETY: V1.
+    let count = unsafe { *pc >> 8 & 0xff };
+    let control = &mut vm.task_mut().control;
+    for _ in 0..count {
+        if let Some(entry) = control.entries.pop() {
+            control.bindings.truncate(entry.bindings as usize);
+        }
+    }
+    Signal::Next
+}
+
+/// `bind-list`.
+#[inline(never)]
+pub(super) unsafe fn bind_list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: V3: registers of the frame.
+    let (symbols, values) = unsafe {
+        (*base.add((*pc >> 8 & 0xff) as usize), *base.add((*pc >> 16 & 0xff) as usize))
+    };
+    let height = vm.task().control.bindings.len();
+    match vm.bind_list(symbols, values) {
+        Ok(()) => Signal::Next,
+        Err(exit) => {
+            vm.task_mut().control.bindings.truncate(height);
+            Signal::Exit(exit)
+        }
+    }
+}
+
+/// `enter-cleanup`.
+#[inline(never)]
+pub(super) unsafe fn enter_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value) -> Signal {
+    let values = std::mem::take(&mut vm.values);
+    let control = &mut vm.task_mut().control;
+    if let Some(entry) = control.entries.last_mut() {
+        entry.kind = EntryKind::Running;
+        let bindings = entry.bindings as usize;
+        control.bindings.truncate(bindings);
+        control.running.push(Running { pending: None, values });
+    }
+    Signal::Next
+}
+
+/// `end-cleanup`.
+#[inline(never)]
+pub(super) unsafe fn end_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value) -> Signal {
+    let control = &mut vm.task_mut().control;
+    control.entries.pop();
+    let Running { pending, values } = control.running.pop().unwrap_or_default();
+    control.unwinding = pending;
+    let unwinds = control.unwinding.is_some();
+    vm.values = values;
+    if unwinds { Signal::Unwind } else { Signal::Next }
+}
+
+/// `throw`.
+#[inline(never)]
+pub(super) unsafe fn throw(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: V3: a register of the frame.
+    let (tag, kind) = unsafe { (*base.add((*pc >> 8 & 0xff) as usize), *pc >> 16 & 0xff) };
+    match vm.task().control.find_catch(tag) {
+        Some(index) => {
+            let values = std::mem::take(&mut vm.values);
+            vm.task_mut().control.unwinding = Some(Unwinding { target: Target::Entry(index), values });
+            Signal::Unwind
+        }
+        None => {
+            let text = match kind {
+                0 => "there is no catch for the tag of this THROW",
+                1 => "the block of this RETURN-FROM has been left",
+                _ => "the tagbody of this GO has been left",
+            };
+            Signal::Exit(vm.raise::<()>(Raised::Control(text.into())).unwrap_err())
+        }
+    }
+}
+
+/// Works on the unwinding of the running task until it lands, meets a cleanup, or a tick is due.
+///
+/// # Safety
+/// As [`super::settle`].
+pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
+    loop {
+        let task = vm.task_mut();
+        let Some(unwinding) = task.control.unwinding.take() else { return Signal::Reload };
+        let height = task.control.entries.len();
+        match unwinding.target {
+            Target::Entry(index) if index + 1 >= height => {
+                // SAFETY: the entry's frame is live: entries of a frame are popped before it is left.
+                return unsafe { land(vm, unwinding.values) };
+            }
+            Target::Root(end) if height == 0 => {
+                task.control.bindings.clear();
+                vm.values = unwinding.values;
+                vm.ending = Some(end);
+                return Signal::TaskExit;
+            }
+            _ => {}
+        }
+        let Some(entry) = task.control.entries.pop() else { return Signal::Reload };
+        match entry.kind {
+            EntryKind::Cleanup => {
+                task.control.bindings.truncate(entry.bindings as usize);
+                task.control.entries.push(Entry { kind: EntryKind::Running, ..entry });
+                task.control.running.push(Running { pending: Some(unwinding), values: Vec::new() });
+                // SAFETY: as above; the entry's pc is the cleanup's first instruction.
+                unsafe { vm.resume_at(&entry) };
+                return Signal::Reload;
+            }
+            EntryKind::Running => {
+                // A cleanup is left. What it interrupted is dropped, unless that was to end the task.
+                let interrupted = task.control.running.pop().and_then(|running| running.pending);
+                task.control.unwinding = Some(match interrupted {
+                    Some(pending) if matches!(pending.target, Target::Root(_)) => pending,
+                    _ => unwinding,
+                });
+            }
+            _ => task.control.unwinding = Some(unwinding),
+        }
+        vm.cpu.ticks -= 1;
+        if vm.cpu.ticks < 0 {
+            return Signal::Tick;
+        }
+    }
+}
+
+/// Ends an unwinding at the entry on top of the control stack.
+///
+/// # Safety
+/// As [`unwind`].
+unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
+    let control = &mut vm.task_mut().control;
+    let Some(entry) = control.entries.pop() else { return Signal::Reload };
+    control.bindings.truncate(entry.bindings as usize);
+    vm.values = values;
+    // SAFETY: the entry's frame is live, and V10: its landing asks for no more than the registers below the window.
+    unsafe {
+        vm.resume_at(&entry);
+        let window = vm.cpu.base.add(usize::from(entry.window));
+        call::deliver(vm, window, usize::from(entry.want));
+    }
+    vm.close_reserve();
+    Signal::Reload
+}
+
+impl Vm {
+    /// Makes the frame and place of an entry the running ones.
+    ///
+    /// # Safety
+    /// The entry belongs to the running task, and its frame is live.
+    unsafe fn resume_at(&mut self, entry: &Entry) {
+        self.cpu.pc = entry.pc;
+        // SAFETY: by the contract, the offset lies in the stack.
+        self.cpu.base = unsafe { self.task().stack.start().add(entry.base as usize) };
+    }
+
+    /// Binds the symbols of a list to the items of another.
+    fn bind_list(&mut self, symbols: Value, values: Value) -> Result<(), Exit> {
+        let (mut symbols, mut values) = (symbols, values);
+        while let Some(pair) = self.heap.as_cons(symbols) {
+            let value = match self.heap.as_cons(values) {
+                Some(item) => {
+                    values = item.cdr;
+                    item.car
+                }
+                None => Value::UNBOUND,
+            };
+            self.charge(64);
+            self.bind(pair.car, value)?;
+            symbols = pair.cdr;
+        }
+        if symbols.is_true() { self.type_error(symbols, "LIST") } else { Ok(()) }
+    }
+
+    /// Begins to unwind the running task to its root, which ends it.
+    pub(crate) fn begin_end(&mut self, end: End) {
+        self.task_mut().control.unwinding = Some(Unwinding { target: Target::Root(end), values: Vec::new() });
+    }
+}

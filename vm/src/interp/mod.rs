@@ -1,0 +1,1032 @@
+//! THE loop: runs the bytecode of one task until its slice is over, it ends, or it waits.
+//!
+//! Registers of the machine are locals of [`run`]: `pc`, `base` (the running frame's first register), `k` (the running
+//! code's constants) and `ticks`. An arm decodes, takes the fast path, and leaves everything else to a cold function or to
+//! a [`Signal`], which breaks out of the inner loop with `pc` still at the instruction; the outer loop deals with it and
+//! comes back with fresh registers. So the hot loop holds nothing that has to be dropped, and the size of its frame stays
+//! small.
+//!
+//! Safepoints are ticks: a call or a turn of a loop takes one, and when none is left the instruction is given up before
+//! it has had any effect. Preemption, collection and aborts happen there and nowhere else, save that an instruction for
+//! which there is no room is given up too, and done again after a collection.
+//!
+//! What the loop takes for granted of code is the list V1 to V13 in `esl_bytecode::verify`; its `SAFETY:` notes name the
+//! items. What it owes in return is M1 to M6 there.
+#![allow(unsafe_code)]
+
+pub(crate) mod call;
+mod cold;
+mod collect;
+mod control;
+mod raise;
+pub(crate) mod stubs;
+
+use esl_bytecode::for_each_opcode;
+
+use crate::builtins::NATIVES;
+use crate::heap::layout::{Boxed, Code, Function, Kind, Structure, Symbol, Vector};
+use crate::raise::Exit;
+use crate::value::Value;
+use crate::vm::Vm;
+
+macro_rules! define_operations {
+    ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $substitute:ident
+        { $( $field:ident : $ty:ident ),* } ; )*) => {
+        /// The operations of the loop: every opcode, and those that only the machine's own stubs contain.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub(crate) enum Operation {
+            $( $name = $number, )*
+            /// The function that took the place of an instruction has returned: see `raise`.
+            ErrorReturn = crate::stub::ERROR_RETURN,
+            /// The task's function has returned: its values are in the value list.
+            TaskExit = crate::stub::TASK_EXIT,
+        }
+    };
+}
+for_each_opcode!(define_operations);
+
+/// Why the inner loop was left, or what a cold function wants of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Signal {
+    /// Go on after this instruction.
+    Next,
+    /// Go on at `Cpu::pc` with `Cpu::base`.
+    Reload,
+    /// No tick is left.
+    Tick,
+    /// A builtin gave no value, or an instruction failed as a builtin does.
+    Exit(Exit),
+    /// The call of this instruction takes the slow way.
+    Call,
+    /// The values in the value list are to be delivered to the caller of this frame.
+    ReturnAll,
+    /// The unwinding noted in the task goes on.
+    Unwind,
+    /// The task has come to its end.
+    TaskExit,
+}
+
+/// Why a task stopped running.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Leave {
+    /// It has used up the ticks that it was given.
+    Slice,
+    /// It has ended.
+    Ended,
+    /// It waits.
+    Parked,
+}
+
+/// The machine's registers while the loop is left.
+pub(crate) struct Cpu {
+    /// The next instruction, or the one that was given up.
+    pub pc: *const u32,
+    /// First register of the running frame.
+    pub base: *mut Value,
+    /// End of the running task's stack.
+    pub stack_end: *mut Value,
+    /// Ticks left until the next safepoint.
+    pub ticks: i32,
+    /// Ticks kept back so that the collector has its turn at the next tick.
+    pub reserve: i32,
+    /// Ticks of this slice that were given out at its beginning.
+    pub granted: i32,
+}
+
+impl Cpu {
+    pub(crate) const fn new() -> Cpu {
+        Cpu {
+            pc: std::ptr::null(),
+            base: std::ptr::null_mut(),
+            stack_end: std::ptr::null_mut(),
+            ticks: 0,
+            reserve: 0,
+            granted: 0,
+        }
+    }
+}
+
+// SAFETY: the pointers are into the running task's stack and into code, both owned by the machine.
+unsafe impl Send for Cpu {}
+
+/// The code of a function.
+///
+/// # Safety
+/// `function` is a Function.
+#[inline(always)]
+pub(crate) unsafe fn code_of(function: Value) -> *mut Code {
+    // SAFETY: by the contract; the heap sees to it that the code of a function is a Code.
+    unsafe { (*function.object_ptr().cast::<Function>()).code.object_ptr().cast() }
+}
+
+/// The constants of a code.
+///
+/// # Safety
+/// `code` points to a Code.
+#[inline(always)]
+pub(crate) unsafe fn constants_of(code: *mut Code) -> *const Value {
+    // SAFETY: the constants are at a fixed offset inside the object.
+    unsafe { code.byte_add(Code::CONSTANTS_OFFSET).cast() }
+}
+
+/// Element `i` of a simple vector, box or other record.
+///
+/// # Safety
+/// `object` is a record with more than `i` elements.
+#[inline(always)]
+unsafe fn element(object: Value, i: usize) -> *mut Value {
+    // SAFETY: elements follow the header.
+    unsafe { object.object_ptr().byte_add(size_of::<Vector>()).cast::<Value>().add(i) }
+}
+
+#[inline(always)]
+fn is_simple_vector(v: Value) -> bool {
+    // SAFETY: an object's value is the address of a live header.
+    v.is_object() && unsafe { (*v.object_ptr()).kind == Kind::SimpleVector }
+}
+
+/// Makes the task in `vm.running` the one whose registers are in `vm.cpu`, with so many ticks.
+pub(crate) fn load(vm: &mut Vm, ticks: i32) {
+    let task = vm.task();
+    let (pc, end) = (task.pc, task.stack.end());
+    // SAFETY: the base of a task lies in its stack.
+    let base = unsafe { task.stack.start().add(task.base) };
+    vm.cpu = Cpu { pc, base, stack_end: end, ticks, reserve: 0, granted: ticks };
+    vm.arm();
+}
+
+/// Runs the task in `vm.running` from `vm.cpu` until it leaves the processor.
+pub(crate) fn run(vm: &mut Vm) -> Leave {
+    if vm.task().control.unwinding.is_some() {
+        // SAFETY: as below.
+        if let Err(leave) = unsafe { settle(vm, Signal::Unwind) } {
+            return leave;
+        }
+    }
+    loop {
+        // SAFETY: `vm.cpu` describes the running task: its pc lies in code that its innermost frame keeps alive and that
+        // has passed the verifier, its base in its stack, with room for the registers of that code.
+        let signal = unsafe { dispatch(vm) };
+        // SAFETY: `dispatch` has put its registers back.
+        let signal = unsafe { settle(vm, signal) };
+        if let Err(leave) = signal {
+            return leave;
+        }
+    }
+}
+
+/// Deals with a signal, and with those that follow from it, until the loop can go on.
+///
+/// # Safety
+/// `vm.cpu` describes the running task, at the instruction that gave the signal.
+unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
+    // SAFETY, for all of these: each has the contract of this function and leaves `vm.cpu` in order.
+    unsafe {
+        loop {
+            signal = match signal {
+                Signal::Reload => return Ok(()),
+                Signal::Next => {
+                    let words = stubs::length(*vm.cpu.pc);
+                    vm.cpu.pc = vm.cpu.pc.add(words);
+                    return Ok(());
+                }
+                Signal::Tick => match vm.safepoint() {
+                    Some(leave) => return Err(leave),
+                    None if vm.task().control.unwinding.is_some() => Signal::Unwind,
+                    None => return Ok(()),
+                },
+                Signal::Exit(Exit::Park) => return Err(Leave::Parked),
+                Signal::Exit(exit) => raise::exit(vm, exit),
+                Signal::Call => call::slow_call(vm),
+                Signal::ReturnAll => call::return_all(vm),
+                Signal::Unwind => control::unwind(vm),
+                Signal::TaskExit => {
+                    vm.finish_task();
+                    return Err(Leave::Ended);
+                }
+            };
+        }
+    }
+}
+
+/// The inner loop.
+///
+/// # Safety
+/// As [`settle`]; the code at `pc` has passed the verifier, or is a stub.
+#[allow(clippy::too_many_lines, reason = "one arm for each row of the opcode table")]
+unsafe fn dispatch(vm: &mut Vm) -> Signal {
+    let mut pc = vm.cpu.pc;
+    let mut base = vm.cpu.base;
+    let mut ticks = vm.cpu.ticks;
+    // SAFETY: `base[-2]` is the function of the frame (M2), which keeps its code alive.
+    let mut k = unsafe { constants_of(code_of(*base.sub(2))) };
+
+    // SAFETY, for the whole loop: V1 makes every word reached an instruction with its aux word; V3 keeps registers inside
+    // the frame, for which the call made room; V4 keeps constants inside the code; V6 makes every register read hold an
+    // object of the program. What depends on data is tested before it is used (M6).
+    let signal = unsafe {
+        loop {
+            let word = *pc;
+            macro_rules! a {
+                () => {
+                    ((word >> 8) & 0xff) as usize
+                };
+            }
+            macro_rules! b {
+                () => {
+                    ((word >> 16) & 0xff) as usize
+                };
+            }
+            macro_rules! c {
+                () => {
+                    (word >> 24) as usize
+                };
+            }
+            macro_rules! d {
+                () => {
+                    (word >> 16) as usize
+                };
+            }
+            macro_rules! signed_d {
+                () => {
+                    (word as i32 >> 16) as isize
+                };
+            }
+            macro_rules! aux {
+                () => {
+                    *pc.add(1)
+                };
+            }
+            macro_rules! get {
+                ($register:expr) => {
+                    *base.add($register)
+                };
+            }
+            macro_rules! set {
+                ($register:expr, $value:expr) => {{
+                    let value = $value;
+                    *base.add($register) = value;
+                }};
+            }
+            // Goes on after an instruction of this many words.
+            macro_rules! next {
+                ($words:literal) => {{
+                    pc = pc.add($words);
+                    continue;
+                }};
+            }
+            // Jumps from behind an instruction of this many words.
+            macro_rules! jump {
+                ($words:literal, $offset:expr) => {{
+                    pc = pc.add($words).offset($offset);
+                    continue;
+                }};
+            }
+            macro_rules! jump_if {
+                ($words:literal, $test:expr, $offset:expr) => {{
+                    if $test {
+                        jump!($words, $offset);
+                    }
+                    next!($words);
+                }};
+            }
+            macro_rules! tick {
+                () => {
+                    ticks -= 1;
+                    if ticks < 0 {
+                        break Signal::Tick;
+                    }
+                };
+            }
+            // Leaves the instruction to a cold function.
+            macro_rules! cold {
+                ($words:literal, $function:path) => {{
+                    match $function(vm, pc, base) {
+                        Signal::Next => {
+                            if vm.wants_attention() {
+                                ticks = vm.attend(ticks);
+                            }
+                            next!($words);
+                        }
+                        signal => break signal,
+                    }
+                }};
+            }
+            // A comparison's cold part puts T or NIL into the value list's place and says Next.
+            macro_rules! cold_test {
+                ($words:literal, $jump_when:literal, $offset:expr) => {{
+                    match cold::compare(vm, pc, base) {
+                        Ok(holds) => jump_if!($words, holds == $jump_when, $offset),
+                        Err(signal) => break signal,
+                    }
+                }};
+            }
+            macro_rules! arithmetic {
+                ($fixnum:ident, $float:tt) => {{
+                    let (x, y) = (get!(b!()), get!(c!()));
+                    if Value::both_fixnums(x, y) {
+                        let (sum, overflow) = (x.bits() as i64).$fixnum(y.bits() as i64);
+                        if !overflow {
+                            set!(a!(), Value::from_bits(sum as u64));
+                            next!(1);
+                        }
+                    } else if Value::both_windowed_doubles(x, y) {
+                        let result = x.windowed_double() $float y.windowed_double();
+                        if let Some(v) = windowed(result) {
+                            set!(a!(), v);
+                            next!(1);
+                        }
+                    }
+                    cold!(1, cold::arithmetic)
+                }};
+            }
+            macro_rules! compare {
+                ($operator:tt, $x:expr, $y:expr, $then:expr, $else:expr) => {{
+                    let (x, y) = ($x, $y);
+                    if Value::both_fixnums(x, y) {
+                        if (x.bits() as i64) $operator (y.bits() as i64) { $then } else { $else }
+                    } else if Value::both_windowed_doubles(x, y) {
+                        if x.windowed_double() $operator y.windowed_double() { $then } else { $else }
+                    }
+                }};
+            }
+            macro_rules! jump_compare {
+                ($operator:tt, $jump_when:literal) => {{
+                    let offset = aux!() as i32 as isize;
+                    compare!($operator, get!(a!()), get!(b!()),
+                        jump_if!(2, $jump_when, offset), jump_if!(2, !$jump_when, offset));
+                    cold_test!(2, $jump_when, offset)
+                }};
+            }
+            macro_rules! jump_compare_int {
+                ($operator:tt, $jump_when:literal) => {{
+                    let offset = aux!() as i32 as isize;
+                    let x = get!(a!());
+                    if x.is_fixnum() {
+                        let holds = (x.bits() as i64) $operator (((word as i32 >> 16) as i64) << 2);
+                        jump_if!(2, holds == $jump_when, offset);
+                    }
+                    cold_test!(2, $jump_when, offset)
+                }};
+            }
+            macro_rules! bitwise {
+                ($operator:tt) => {{
+                    let (x, y) = (get!(b!()), get!(c!()));
+                    if Value::both_fixnums(x, y) {
+                        set!(a!(), Value::from_bits(x.bits() $operator y.bits()));
+                        next!(1);
+                    }
+                    cold!(1, cold::arithmetic)
+                }};
+            }
+            // Makes the frame of a function with bytecode that takes exactly the given arguments.
+            macro_rules! enter {
+                ($window:expr, $function:expr, $code:expr, $return_to:expr) => {{
+                    let (window, code): (*mut Value, *mut Code) = ($window, $code);
+                    let registers = window.add(2);
+                    if registers.add((*code).nregs as usize) > vm.cpu.stack_end {
+                        break Signal::Call;
+                    }
+                    *window = $function;
+                    *window.add(1) = Value::from_bits($return_to as u64);
+                    base = registers;
+                    k = constants_of(code);
+                    pc = (*code).entry;
+                    continue;
+                }};
+            }
+            macro_rules! return_value {
+                ($value:expr) => {{
+                    let value = $value;
+                    let return_to = (*base.sub(1)).bits() as usize;
+                    let return_to: *const u32 = std::ptr::with_exposed_provenance(return_to);
+                    let call = *return_to.sub(2);
+                    if call >> 24 != 0 {
+                        vm.values.clear();
+                        vm.values.push(value);
+                        break Signal::ReturnAll;
+                    }
+                    *base.sub(2) = value;
+                    base = base.sub(2 + ((call >> 8) & 0xff) as usize);
+                    pc = return_to;
+                    k = constants_of(code_of(*base.sub(2)));
+                    continue;
+                }};
+            }
+
+            // SAFETY: V1; stubs consist of operations too.
+            match std::mem::transmute::<u8, Operation>(word as u8) {
+                // ---- moves and constants
+                Operation::Move => {
+                    set!(a!(), get!(b!()));
+                    next!(1)
+                }
+                Operation::LoadInt => {
+                    set!(a!(), Value::small(word as i32 >> 16));
+                    next!(1)
+                }
+                Operation::LoadConst => {
+                    set!(a!(), *k.add(d!()));
+                    next!(1)
+                }
+                Operation::LoadNil => {
+                    for i in 0..b!() {
+                        set!(a!() + i, Value::NIL);
+                    }
+                    next!(1)
+                }
+                Operation::LoadTrue => {
+                    set!(a!(), Value::T);
+                    next!(1)
+                }
+
+                // ---- arithmetic
+                Operation::Add => arithmetic!(overflowing_add, +),
+                Operation::Sub => arithmetic!(overflowing_sub, -),
+                Operation::Mul => {
+                    let (x, y) = (get!(b!()), get!(c!()));
+                    if Value::both_fixnums(x, y) {
+                        let (product, overflow) = (x.bits() as i64 >> 2).overflowing_mul(y.bits() as i64);
+                        if !overflow {
+                            set!(a!(), Value::from_bits(product as u64));
+                            next!(1);
+                        }
+                    } else if Value::both_windowed_doubles(x, y)
+                        && let Some(v) = windowed(x.windowed_double() * y.windowed_double())
+                    {
+                        set!(a!(), v);
+                        next!(1);
+                    }
+                    cold!(1, cold::arithmetic)
+                }
+                Operation::Div => {
+                    let (x, y) = (get!(b!()), get!(c!()));
+                    if Value::both_windowed_doubles(x, y)
+                        && let Some(v) = windowed(x.windowed_double() / y.windowed_double())
+                    {
+                        set!(a!(), v);
+                        next!(1);
+                    }
+                    cold!(1, cold::arithmetic)
+                }
+                Operation::AddInt => {
+                    let x = get!(b!());
+                    if x.is_fixnum() {
+                        let addend = i64::from(word as i32 >> 24) << 2;
+                        let (sum, overflow) = (x.bits() as i64).overflowing_add(addend);
+                        if !overflow {
+                            set!(a!(), Value::from_bits(sum as u64));
+                            next!(1);
+                        }
+                    } else if x.is_windowed_double()
+                        && let Some(v) = windowed(x.windowed_double() + f64::from(word as i32 >> 24))
+                    {
+                        set!(a!(), v);
+                        next!(1);
+                    }
+                    cold!(1, cold::arithmetic)
+                }
+                Operation::Floor => {
+                    let (x, y) = (get!(b!()), get!(c!()));
+                    if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
+                        let quotient = (x.bits() as i64).div_euclid(y.bits() as i64);
+                        set!(a!(), Value::from_bits((quotient << 2) as u64));
+                        next!(1);
+                    }
+                    cold!(1, cold::arithmetic)
+                }
+                Operation::Truncate => {
+                    let (x, y) = (get!(b!()), get!(c!()));
+                    if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
+                        let quotient = (x.bits() as i64) / (y.bits() as i64);
+                        set!(a!(), Value::from_bits((quotient << 2) as u64));
+                        next!(1);
+                    }
+                    cold!(1, cold::arithmetic)
+                }
+                Operation::Mod => {
+                    let (x, y) = (get!(b!()), get!(c!()));
+                    if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
+                        // Both are shifted by two, and so is the remainder.
+                        let remainder = (x.bits() as i64).rem_euclid(y.bits() as i64);
+                        set!(a!(), Value::from_bits(remainder as u64));
+                        next!(1);
+                    }
+                    cold!(1, cold::arithmetic)
+                }
+                Operation::Rem => {
+                    let (x, y) = (get!(b!()), get!(c!()));
+                    if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
+                        let remainder = (x.bits() as i64) % (y.bits() as i64);
+                        set!(a!(), Value::from_bits(remainder as u64));
+                        next!(1);
+                    }
+                    cold!(1, cold::arithmetic)
+                }
+                Operation::LogAnd => bitwise!(&),
+                Operation::LogIor => bitwise!(|),
+                Operation::LogXor => bitwise!(^),
+                Operation::Ash => {
+                    let (x, y) = (get!(b!()), get!(c!()));
+                    if Value::both_fixnums(x, y) {
+                        let (n, shift) = (x.bits() as i64, y.bits() as i64 >> 2);
+                        if shift <= 0 {
+                            let shifted = n >> (-shift).min(63);
+                            set!(a!(), Value::from_bits((shifted & !3) as u64));
+                            next!(1);
+                        }
+                        if shift < 62 && (n << shift) >> shift == n {
+                            set!(a!(), Value::from_bits((n << shift) as u64));
+                            next!(1);
+                        }
+                    }
+                    cold!(1, cold::arithmetic)
+                }
+
+                // ---- comparisons that give T or NIL
+                Operation::Not => {
+                    set!(a!(), Value::boolean(get!(b!()).is_nil()));
+                    next!(1)
+                }
+                Operation::Eq => {
+                    set!(a!(), Value::boolean(get!(b!()) == get!(c!())));
+                    next!(1)
+                }
+                Operation::Eql => {
+                    set!(a!(), Value::boolean(cold::eql(vm, get!(b!()), get!(c!()))));
+                    next!(1)
+                }
+                Operation::NumEq => {
+                    compare!(==, get!(b!()), get!(c!()),
+                        { set!(a!(), Value::T); next!(1) }, { set!(a!(), Value::NIL); next!(1) });
+                    cold!(1, cold::arithmetic)
+                }
+                Operation::Less => {
+                    compare!(<, get!(b!()), get!(c!()),
+                        { set!(a!(), Value::T); next!(1) }, { set!(a!(), Value::NIL); next!(1) });
+                    cold!(1, cold::arithmetic)
+                }
+                Operation::LessEq => {
+                    compare!(<=, get!(b!()), get!(c!()),
+                        { set!(a!(), Value::T); next!(1) }, { set!(a!(), Value::NIL); next!(1) });
+                    cold!(1, cold::arithmetic)
+                }
+                Operation::IsType => {
+                    set!(a!(), Value::boolean(cold::is_type(vm, get!(b!()), c!() as u8)));
+                    next!(1)
+                }
+
+                // ---- jumps forward
+                Operation::JumpAlways => jump!(1, (word as i32 >> 8) as isize),
+                Operation::JumpIfNil => jump_if!(1, get!(a!()).is_nil(), signed_d!()),
+                Operation::JumpIfNotNil => jump_if!(1, get!(a!()).is_true(), signed_d!()),
+                Operation::JumpIfCons => jump_if!(1, get!(a!()).is_cons(), signed_d!()),
+                Operation::JumpIfNotCons => jump_if!(1, !get!(a!()).is_cons(), signed_d!()),
+                Operation::JumpIfSupplied => jump_if!(1, get!(a!()) != Value::UNSUPPLIED, signed_d!()),
+                Operation::JumpEq => jump_if!(2, get!(a!()) == get!(b!()), aux!() as i32 as isize),
+                Operation::JumpNotEq => jump_if!(2, get!(a!()) != get!(b!()), aux!() as i32 as isize),
+                Operation::JumpEql => {
+                    jump_if!(2, cold::eql(vm, get!(a!()), get!(b!())), aux!() as i32 as isize)
+                }
+                Operation::JumpNotEql => {
+                    jump_if!(2, !cold::eql(vm, get!(a!()), get!(b!())), aux!() as i32 as isize)
+                }
+                Operation::JumpEqlConst => {
+                    jump_if!(2, cold::eql(vm, get!(a!()), *k.add(d!())), aux!() as i32 as isize)
+                }
+                Operation::JumpNotEqlConst => {
+                    jump_if!(2, !cold::eql(vm, get!(a!()), *k.add(d!())), aux!() as i32 as isize)
+                }
+                Operation::JumpIfType => {
+                    jump_if!(2, cold::is_type(vm, get!(a!()), b!() as u8), aux!() as i32 as isize)
+                }
+                Operation::JumpIfNotType => {
+                    jump_if!(2, !cold::is_type(vm, get!(a!()), b!() as u8), aux!() as i32 as isize)
+                }
+                Operation::JumpNumEq => jump_compare!(==, true),
+                Operation::JumpNotNumEq => jump_compare!(==, false),
+                Operation::JumpLess => jump_compare!(<, true),
+                Operation::JumpNotLess => jump_compare!(<, false),
+                Operation::JumpLessEq => jump_compare!(<=, true),
+                Operation::JumpNotLessEq => jump_compare!(<=, false),
+                Operation::JumpNumEqInt => jump_compare_int!(==, true),
+                Operation::JumpNotNumEqInt => jump_compare_int!(==, false),
+                Operation::JumpLessInt => jump_compare_int!(<, true),
+                Operation::JumpNotLessInt => jump_compare_int!(<, false),
+                Operation::JumpGreaterInt => jump_compare_int!(>, true),
+                Operation::JumpNotGreaterInt => jump_compare_int!(>, false),
+
+                // ---- loops
+                Operation::Loop => {
+                    tick!();
+                    jump!(1, (word as i32 >> 8) as isize)
+                }
+                Operation::LoopIfNil => {
+                    if get!(a!()).is_nil() {
+                        tick!();
+                        jump!(1, signed_d!());
+                    }
+                    next!(1)
+                }
+                Operation::LoopIfNotNil => {
+                    if get!(a!()).is_true() {
+                        tick!();
+                        jump!(1, signed_d!());
+                    }
+                    next!(1)
+                }
+                Operation::LoopIfCons => {
+                    if get!(a!()).is_cons() {
+                        tick!();
+                        jump!(1, signed_d!());
+                    }
+                    next!(1)
+                }
+                Operation::LoopLess => {
+                    tick!();
+                    jump_compare!(<, true)
+                }
+                Operation::LoopNotLess => {
+                    tick!();
+                    jump_compare!(<, false)
+                }
+                Operation::LoopCount => {
+                    tick!();
+                    let (x, limit) = (get!(a!()), get!(b!()));
+                    let step = i64::from(word as i32 >> 24) << 2;
+                    if Value::both_fixnums(x, limit) {
+                        let (sum, overflow) = (x.bits() as i64).overflowing_add(step);
+                        if !overflow {
+                            set!(a!(), Value::from_bits(sum as u64));
+                            jump_if!(2, sum < limit.bits() as i64, aux!() as i32 as isize);
+                        }
+                    }
+                    cold_test!(2, true, aux!() as i32 as isize)
+                }
+
+                // ---- lists
+                Operation::Cons => {
+                    if let Some(v) = vm.heap.cons_in_hole(get!(b!()), get!(c!())) {
+                        set!(a!(), v);
+                        next!(1);
+                    }
+                    cold!(1, cold::cons)
+                }
+                Operation::Car => {
+                    let list = get!(b!());
+                    if list.is_cons() {
+                        set!(a!(), (*list.cons_ptr()).car);
+                        next!(1);
+                    }
+                    cold!(1, cold::list_part)
+                }
+                Operation::Cdr => {
+                    let list = get!(b!());
+                    if list.is_cons() {
+                        set!(a!(), (*list.cons_ptr()).cdr);
+                        next!(1);
+                    }
+                    cold!(1, cold::list_part)
+                }
+                Operation::Cadr => {
+                    let list = get!(b!());
+                    if list.is_cons() {
+                        let rest = (*list.cons_ptr()).cdr;
+                        if rest.is_cons() {
+                            set!(a!(), (*rest.cons_ptr()).car);
+                            next!(1);
+                        }
+                    }
+                    cold!(1, cold::list_part)
+                }
+                Operation::Cddr => {
+                    let list = get!(b!());
+                    if list.is_cons() {
+                        let rest = (*list.cons_ptr()).cdr;
+                        if rest.is_cons() {
+                            set!(a!(), (*rest.cons_ptr()).cdr);
+                            next!(1);
+                        }
+                    }
+                    cold!(1, cold::list_part)
+                }
+                Operation::SetCar => {
+                    let pair = get!(a!());
+                    if pair.is_cons() {
+                        vm.heap.store(&raw mut (*pair.cons_ptr()).car, get!(b!()));
+                        next!(1);
+                    }
+                    cold!(1, cold::list_part)
+                }
+                Operation::SetCdr => {
+                    let pair = get!(a!());
+                    if pair.is_cons() {
+                        vm.heap.store(&raw mut (*pair.cons_ptr()).cdr, get!(b!()));
+                        next!(1);
+                    }
+                    cold!(1, cold::list_part)
+                }
+                Operation::List => cold!(1, cold::list),
+
+                // ---- vectors and structures
+                Operation::VectorRef | Operation::ArrayRef => {
+                    let (vector, index) = (get!(b!()), get!(c!()));
+                    if is_simple_vector(vector)
+                        && index.is_fixnum()
+                        && index.bits() >> 2 < u64::from((*vector.object_ptr()).len)
+                    {
+                        set!(a!(), *element(vector, (index.bits() >> 2) as usize));
+                        next!(1);
+                    }
+                    cold!(1, cold::array)
+                }
+                Operation::VectorSet | Operation::ArraySet => {
+                    let (vector, index) = (get!(a!()), get!(b!()));
+                    if is_simple_vector(vector)
+                        && index.is_fixnum()
+                        && index.bits() >> 2 < u64::from((*vector.object_ptr()).len)
+                    {
+                        vm.heap.store(element(vector, (index.bits() >> 2) as usize), get!(c!()));
+                        next!(1);
+                    }
+                    cold!(1, cold::array)
+                }
+                Operation::Slot => {
+                    let instance = get!(b!());
+                    if is_instance_of_exactly(instance, *k.add(aux!() as usize)) {
+                        // The class has the slot: the compiler took its number from it, and `cold::slot` checked it when
+                        // this place met the class first. Instances of a class never change in length.
+                        let slot = c!() + 1;
+                        if slot < (*instance.object_ptr()).len as usize {
+                            set!(a!(), *element(instance, slot));
+                            next!(2);
+                        }
+                    }
+                    cold!(2, cold::slot)
+                }
+                Operation::SetSlot => {
+                    let instance = get!(a!());
+                    if is_instance_of_exactly(instance, *k.add(aux!() as usize)) {
+                        let slot = b!() + 1;
+                        if slot < (*instance.object_ptr()).len as usize {
+                            vm.heap.store(element(instance, slot), get!(c!()));
+                            next!(2);
+                        }
+                    }
+                    cold!(2, cold::slot)
+                }
+                Operation::JumpIfNotInstance => {
+                    let value = get!(a!());
+                    let holds = is_instance_of_exactly(value, *k.add(d!()))
+                        || (value.is_object() && cold::is_instance(vm, base, value, d!()));
+                    jump_if!(2, !holds, aux!() as i32 as isize)
+                }
+
+                // ---- variables
+                Operation::MakeBox => cold!(1, cold::make_box),
+                Operation::BoxRef => {
+                    // SAFETY: V7 makes this a box, and likewise in the three arms below that deal with boxes.
+                    set!(a!(), (*get!(b!()).object_ptr().cast::<Boxed>()).value);
+                    next!(1)
+                }
+                Operation::BoxSet => {
+                    let cell = get!(a!()).object_ptr().cast::<Boxed>();
+                    vm.heap.store(&raw mut (*cell).value, get!(b!()));
+                    next!(1)
+                }
+                Operation::MakeClosure => {
+                    let function = *k.add(d!());
+                    // Functions without captures are made when their code is loaded.
+                    if (*function.object_ptr()).kind == Kind::Function {
+                        set!(a!(), function);
+                        next!(1);
+                    }
+                    cold!(1, cold::make_closure)
+                }
+                Operation::PatchCapture => {
+                    // SAFETY: V8: a closure with such a capture.
+                    vm.heap.store(element(get!(a!()), 1 + b!()), get!(c!()));
+                    next!(1)
+                }
+                Operation::CaptureRef => {
+                    // SAFETY: V8: the running function has such a capture.
+                    set!(a!(), *element(*base.sub(2), 1 + b!()));
+                    next!(1)
+                }
+                Operation::CaptureBoxRef => {
+                    let cell = *element(*base.sub(2), 1 + b!());
+                    set!(a!(), (*cell.object_ptr().cast::<Boxed>()).value);
+                    next!(1)
+                }
+                Operation::CaptureBoxSet => {
+                    let cell = *element(*base.sub(2), 1 + b!());
+                    vm.heap.store(&raw mut (*cell.object_ptr().cast::<Boxed>()).value, get!(a!()));
+                    next!(1)
+                }
+                Operation::SymbolValue => {
+                    // SAFETY: V4: the constant is a symbol.
+                    let symbol = (*k.add(d!())).object_ptr().cast::<Symbol>();
+                    let value = (*symbol).value;
+                    if (*symbol).header.flags & Symbol::EVER_BOUND == 0 && value != Value::UNBOUND {
+                        set!(a!(), value);
+                        next!(1);
+                    }
+                    cold!(1, cold::symbol_value)
+                }
+                Operation::SetSymbolValue => cold!(1, cold::set_symbol_value),
+                Operation::Bind => cold!(1, cold::bind),
+                Operation::Unbind => cold!(1, cold::unbind),
+                Operation::BindList => cold!(1, control::bind_list),
+                Operation::FunctionRef => cold!(1, cold::function_ref),
+
+                // ---- calls
+                Operation::Call => {
+                    tick!();
+                    let window = base.add(a!());
+                    let function = *window;
+                    if function.is_object() && (*function.object_ptr()).kind == Kind::Function {
+                        let code = code_of(function);
+                        if (*code).arity == b!() as u32 {
+                            enter!(window, function, code, pc.add(2));
+                        }
+                    }
+                    break Signal::Call;
+                }
+                Operation::CallGlobal => {
+                    tick!();
+                    // SAFETY: V4: the constant is a symbol, and the function of a symbol is a Function.
+                    let symbol = (*k.add(aux!() as usize)).object_ptr().cast::<Symbol>();
+                    let function = (*symbol).function;
+                    let code = code_of(function);
+                    if (*code).arity == b!() as u32 {
+                        enter!(base.add(a!()), function, code, pc.add(2));
+                    }
+                    break Signal::Call;
+                }
+                Operation::CallSelf => {
+                    tick!();
+                    // SAFETY: V5: the running function takes exactly these arguments.
+                    let code = k.byte_sub(Code::CONSTANTS_OFFSET).cast::<Code>().cast_mut();
+                    enter!(base.add(a!()), *base.sub(2), code, pc.add(2));
+                }
+                Operation::CallBuiltin => {
+                    tick!();
+                    let window = base.add(a!());
+                    let arguments = std::slice::from_raw_parts(window.add(2), b!());
+                    // SAFETY: V5: the number is in the table, the number of arguments right.
+                    let native = *NATIVES.get_unchecked(aux!() as usize);
+                    (vm.cpu.pc, vm.cpu.base) = (pc, base);
+                    match native(vm, arguments) {
+                        Ok(value) if c!() == 0 => {
+                            *window = value;
+                            if vm.wants_attention() {
+                                ticks = vm.attend(ticks);
+                            }
+                            next!(2)
+                        }
+                        Ok(value) => {
+                            vm.values.clear();
+                            vm.values.push(value);
+                            call::deliver(vm, window, c!());
+                            next!(2)
+                        }
+                        Err(Exit::Values) => {
+                            call::deliver(vm, window, c!());
+                            if vm.wants_attention() {
+                                ticks = vm.attend(ticks);
+                            }
+                            next!(2)
+                        }
+                        Err(exit) => {
+                            break Signal::Exit(exit);
+                        }
+                    }
+                }
+                Operation::Apply | Operation::TailApply => {
+                    tick!();
+                    break Signal::Call;
+                }
+                Operation::TailCall => {
+                    tick!();
+                    let window = base.add(a!());
+                    let function = *window;
+                    if function.is_object() && (*function.object_ptr()).kind == Kind::Function {
+                        let code = code_of(function);
+                        if (*code).arity == b!() as u32 && base.add((*code).nregs as usize) <= vm.cpu.stack_end {
+                            for i in 0..b!() {
+                                *base.add(i) = *window.add(2 + i);
+                            }
+                            *base.sub(2) = function;
+                            k = constants_of(code);
+                            pc = (*code).entry;
+                            continue;
+                        }
+                    }
+                    break Signal::Call;
+                }
+                Operation::TailCallGlobal => {
+                    tick!();
+                    let symbol = (*k.add(aux!() as usize)).object_ptr().cast::<Symbol>();
+                    let function = (*symbol).function;
+                    let code = code_of(function);
+                    if (*code).arity == b!() as u32 && base.add((*code).nregs as usize) <= vm.cpu.stack_end {
+                        let window = base.add(a!());
+                        for i in 0..b!() {
+                            *base.add(i) = *window.add(2 + i);
+                        }
+                        *base.sub(2) = function;
+                        k = constants_of(code);
+                        pc = (*code).entry;
+                        continue;
+                    }
+                    break Signal::Call;
+                }
+                Operation::TailCallBuiltin => {
+                    tick!();
+                    let arguments = std::slice::from_raw_parts(base.add(a!() + 2), b!());
+                    let native = *NATIVES.get_unchecked(aux!() as usize);
+                    (vm.cpu.pc, vm.cpu.base) = (pc, base);
+                    match native(vm, arguments) {
+                        Ok(value) => {
+                            if vm.wants_attention() {
+                                ticks = vm.attend(ticks);
+                            }
+                            return_value!(value)
+                        }
+                        Err(Exit::Values) => {
+                            if vm.wants_attention() {
+                                ticks = vm.attend(ticks);
+                            }
+                            break Signal::ReturnAll;
+                        }
+                        Err(exit) => {
+                            break Signal::Exit(exit);
+                        }
+                    }
+                }
+                Operation::Return => return_value!(get!(a!())),
+                Operation::ReturnValues => {
+                    if b!() == 1 {
+                        return_value!(get!(a!()))
+                    }
+                    cold::set_values(vm, pc, base);
+                    break Signal::ReturnAll;
+                }
+                Operation::ReturnAll => break Signal::ReturnAll,
+
+                // ---- the value list
+                Operation::SetValues => cold!(1, cold::set_values),
+                Operation::GetValues => cold!(1, cold::get_values),
+                Operation::ValuesToList => cold!(1, cold::values_to_list),
+                Operation::ListToValues => cold!(1, cold::list_to_values),
+
+                // ---- the control stack
+                Operation::NewTag => cold!(1, control::new_tag),
+                Operation::PushCatch => cold!(2, control::push),
+                Operation::PushCleanup => cold!(2, control::push),
+                Operation::PushHandlerCase => cold!(2, control::push),
+                Operation::PushHandlers => cold!(1, control::push),
+                Operation::PushMask => cold!(1, control::push),
+                Operation::PushScope => cold!(1, control::push),
+                Operation::PopControl => cold!(1, control::pop),
+                Operation::EnterCleanup => cold!(1, control::enter_cleanup),
+                Operation::EndCleanup => cold!(1, control::end_cleanup),
+                Operation::Throw => match control::throw(vm, pc, base) {
+                    Signal::Next => next!(1),
+                    signal => break signal,
+                },
+
+                // ---- stubs
+                Operation::ErrorReturn => match raise::error_return(vm, pc, base) {
+                    Signal::Next => next!(1),
+                    signal => break signal,
+                },
+                Operation::TaskExit => break Signal::TaskExit,
+            }
+        }
+    };
+    vm.cpu.pc = pc;
+    vm.cpu.base = base;
+    vm.cpu.ticks = ticks;
+    signal
+}
+
+/// The double as a value, if it is one of those that need no box and are not special: see `Value::double`.
+#[inline(always)]
+fn windowed(x: f64) -> Option<Value> {
+    let word = x.to_bits().wrapping_add(3 << 60).rotate_left(3);
+    // SAFETY: a word with these low bits is a double, whatever the rest.
+    if word & 3 == 3 { Some(unsafe { Value::from_bits(word) }) } else { None }
+}
+
+/// Whether `value` is an instance of just this class, not of a subclass.
+#[inline(always)]
+unsafe fn is_instance_of_exactly(value: Value, class: Value) -> bool {
+    // SAFETY: an object's value is the address of a live header; the class of a structure follows it.
+    value.is_object()
+        && unsafe {
+            (*value.object_ptr()).kind == Kind::Structure
+                && (*value.object_ptr().cast::<Structure>()).class == class
+        }
+}
