@@ -424,8 +424,8 @@ mod tests {
 
     #[test]
     fn doubles_in_the_window_need_no_box() {
-        let least = 2f64.powi(-255);
-        let beyond = 2f64.powi(257);
+        // 2^-255 and 2^257, spelt out because `powi` need not be exact.
+        let (least, beyond) = (f64::from_bits(768 << 52), f64::from_bits(1280 << 52));
         let greatest = f64::from_bits(beyond.to_bits() - 1);
         for x in [1.0, -1.0, 0.1, -1e70, 3.5e-70, least, -least, greatest, -greatest] {
             let v = Value::double(x).unwrap();

@@ -551,19 +551,19 @@ fn run(seeds: std::ops::Range<u64>, steps: usize, laziness: usize, config: HeapC
 #[test]
 fn what_is_in_use_survives() {
     let config = HeapConfig { cycle_floor: 64 << 10, ..HeapConfig::default() };
-    assert!(run(0..12, 20_000, 1, config).cycles > 0);
+    assert!(run(0..6, 10_000, 1, config).cycles > 0);
 }
 
 #[test]
 fn what_is_in_use_survives_a_full_mark_stack() {
     let config = HeapConfig { cycle_floor: 64 << 10, mark_stack: 3, ..HeapConfig::default() };
-    assert!(run(100..112, 20_000, 1, config).cycles > 0);
+    assert!(run(100..106, 10_000, 1, config).cycles > 0);
 }
 
 #[test]
 fn what_is_in_use_survives_at_the_limit() {
     let config = HeapConfig { limit: 3 << 19, cycle_floor: 1 << 20, ..HeapConfig::default() };
-    let totals = run(200..212, 20_000, 300, config);
+    let totals = run(200..206, 10_000, 300, config);
     assert!(
         cfg!(miri) || totals.cycles > 0 && totals.forced > 0,
         "{} cycles, {} forced",

@@ -40,9 +40,9 @@ impl Heap {
             arena.expect_sweep();
         }
         self.sweep = Sweep { at: (0, 1), large: self.large.len(), spares: 0, live: 0 };
-        let live = self.stats.live;
-        let room = (self.limit as u64).saturating_sub(live) / 2;
-        self.pacing.threshold = live.max(self.pacing.floor).min(room.max(LEAST_THRESHOLD));
+        // What was allocated during the cycle is mostly garbage: it counts as live here, but does not put off the next.
+        let room = (self.limit as u64).saturating_sub(self.stats.live) / 2;
+        self.pacing.threshold = self.marker.bytes.max(self.pacing.floor).min(room.max(LEAST_THRESHOLD));
         self.pacing.since_cycle = 0;
         self.pacing.owed = 0;
         self.due = false;
@@ -90,13 +90,13 @@ impl Heap {
         {}
     }
 
-    /// Gives an arena in which nothing lives back to the system, unless it is to be kept.
+    /// Gives an arena in which nothing lives back to the system, unless it is to be kept. None is kept beyond the limit.
     fn release_if_empty(&mut self, arena: usize) {
         if self.arenas[arena].as_ref().is_none_or(|arena| !arena.is_empty()) {
             return;
         }
         let in_use = self.arenas.iter().flatten().count();
-        if self.sweep.spares <= in_use / ARENAS_PER_SPARE {
+        if self.sweep.spares <= in_use / ARENAS_PER_SPARE && self.committed <= self.limit {
             self.sweep.spares += 1;
         } else {
             self.arenas[arena] = None;
