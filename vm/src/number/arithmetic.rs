@@ -148,12 +148,13 @@ pub(crate) fn check_ratios(vm: &mut Vm, x: &Ratio, y: &Ratio) -> Result<(), Exit
 
 /// Charges for a greatest common divisor of integers of `a` and `b` limbs, unless that is too much for one operation.
 pub(crate) fn check_gcd(vm: &mut Vm, a: usize, b: usize) -> Result<(), Exit> {
-    let len = a.max(b);
-    if len > limit::GCD_LIMBS {
+    let (long, short) = (a.max(b), a.min(b));
+    if short > limit::GCD_LIMBS || 2 * long.saturating_mul(short) > limit::WORK_LIMIT {
         return Err(Exit::Slowly);
     }
-    if len > 2 {
-        vm.charge(4 * len * len);
+    if long > 2 {
+        // One division brings both to the size of the shorter, then every limb takes two passes over the numbers.
+        vm.charge((long + 4 * short) * short);
     }
     Ok(())
 }

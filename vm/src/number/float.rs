@@ -55,3 +55,53 @@ pub(crate) fn rational(x: f64) -> Ratio {
         },
     }
 }
+
+/// The simplest rational that reads as the finite double `x`: the one with the least denominator in the interval that
+/// rounds to `x`.
+pub(crate) fn rationalize(x: f64) -> Ratio {
+    let (mantissa, exponent) = decode(x);
+    if exponent >= 0 || mantissa == 0 {
+        return rational(x);
+    }
+    // The ends of the interval lie half a unit of the last place away.
+    let denominator = Int::ONE.shifted_left(u64::from(exponent.unsigned_abs()) + 1);
+    let magnitude = i128::from(mantissa.unsigned_abs());
+    let low = Ratio::reduced(&Int::Small(2 * magnitude - 1), &denominator);
+    let high = Ratio::reduced(&Int::Small(2 * magnitude + 1), &denominator);
+    let simplest = simplest_between(low, high);
+    if mantissa < 0 { simplest.negated() } else { simplest }
+}
+
+/// The ratio with the least denominator in the closed interval, whose ends are above zero, by continued fractions.
+fn simplest_between(low: Ratio, high: Ratio) -> Ratio {
+    let (mut low, mut high) = (low, high);
+    // The last two convergents p/q.
+    let (mut p0, mut q0, mut p1, mut q1) = (Int::ZERO, Int::ONE, Int::ONE, Int::ZERO);
+    loop {
+        let (whole, rest) = low.numerator.div_rem(&low.denominator);
+        let term = if rest.is_zero() { whole.clone() } else { whole.plus(&Int::ONE) };
+        let is_inside = high.numerator.compare(&term.times(&high.denominator)).is_ge();
+        let quotient = if is_inside { term } else { whole };
+        let (p2, q2) = (quotient.times(&p1).plus(&p0), quotient.times(&q1).plus(&q0));
+        if is_inside {
+            return Ratio { numerator: p2, denominator: q2 };
+        }
+        (p0, q0, p1, q1) = (p1, q1, p2, q2);
+        let fraction = |r: &Ratio| Ratio {
+            numerator: r.numerator.minus(&quotient.times(&r.denominator)),
+            denominator: r.denominator.clone(),
+        };
+        // Taking reciprocals turns the interval round.
+        (low, high) = (fraction(&high).inverted(), fraction(&low).inverted());
+    }
+}
+
+/// `x · 2^exponent`, rounded once.
+pub(crate) fn scaled(x: f64, exponent: i64) -> f64 {
+    libm::scalbn(x, exponent.clamp(-5000, 5000) as i32)
+}
+
+/// Fraction from 1/2 to below 1 without the sign, and the exponent that goes with it, of a finite double.
+pub(crate) fn fraction_and_exponent(x: f64) -> (f64, i32) {
+    libm::frexp(x.abs())
+}

@@ -67,6 +67,19 @@ impl Int {
         }
     }
 
+    /// The integer with these limbs, least first.
+    pub(crate) fn from_limbs(limbs: &[u64]) -> Int {
+        match *limbs {
+            [] => Int::ZERO,
+            [low] => Int::Small(i128::from(low)),
+            _ => {
+                let words: SmallVec<[u32; 64]> =
+                    limbs.iter().flat_map(|&limb| [limb as u32, (limb >> 32) as u32]).collect();
+                BigUint::from_slice(&words).into()
+            }
+        }
+    }
+
     /// Sign and limbs as the heap keeps them.
     pub(crate) fn limbs(&self) -> (bool, SmallVec<[u64; 8]>) {
         match self {

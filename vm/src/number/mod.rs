@@ -8,7 +8,7 @@
 //! compared by their exact values. No result is infinite or not a number: the operation fails as under SBCL's traps.
 //!
 //! Work is bounded, since nothing can interrupt it:
-//! - No integer has more than [`BIT_LIMIT`] bits. An operation whose result would have more fails with an
+//! - No integer has more than [`limit::BIT_LIMIT`] bits. An operation whose result would have more fails with an
 //!   arithmetic error before it begins.
 //! - Steps that are quadratic in the sizes of their operands (products, quotients, greatest common divisors, digits) take
 //!   at most the work named in [`limit`]. Above, the outcome is [`Exit::Slowly`], and the ESL function in the row of the
@@ -25,18 +25,22 @@ use crate::vm::Vm;
 pub(crate) use arithmetic::{add, divide, multiply, negate, subtract};
 pub(crate) use compare::{eql, less, less_or_equal, num_equal, sign};
 pub(crate) use integer::Int;
+pub(crate) use ratio::Ratio;
 pub(crate) use rounding::{Rounding, modulo, quotient, remainder};
 
 mod arithmetic;
+pub(crate) mod bits;
 mod compare;
+pub(crate) mod elementary;
 pub(crate) mod float;
+pub(crate) mod gcd;
 mod integer;
 pub(crate) mod limit;
+pub(crate) mod power;
+pub(crate) mod random;
 mod ratio;
-mod rounding;
-
-pub(crate) use limit::BIT_LIMIT;
-pub(crate) use ratio::Ratio;
+pub(crate) mod rounding;
+pub(crate) mod text;
 
 /// A number, taken out of its value.
 #[derive(Clone, Debug)]

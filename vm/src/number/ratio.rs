@@ -2,9 +2,7 @@
 
 use std::cmp::Ordering;
 
-use num_bigint::BigUint;
-use num_integer::Integer;
-
+use super::gcd::gcd;
 use super::{Int, limit};
 use crate::heap::Heap;
 use crate::raise::{Exit, Raised};
@@ -18,41 +16,6 @@ pub(crate) struct Ratio {
     pub(crate) numerator: Int,
     /// Below the line; above zero, and without a common divisor with the numerator.
     pub(crate) denominator: Int,
-}
-
-/// The greatest common divisor, not negative.
-pub(crate) fn gcd(a: &Int, b: &Int) -> Int {
-    match (a, b) {
-        (Int::Small(a), Int::Small(b)) => small_gcd(a.unsigned_abs(), b.unsigned_abs()),
-        _ => {
-            let (a, b) = (a.to_big(), b.to_big());
-            BigUint::gcd(a.magnitude(), b.magnitude()).into()
-        }
-    }
-}
-
-/// Euclid's algorithm down to one limb, then the binary one, which needs no division.
-fn small_gcd(mut a: u128, mut b: u128) -> Int {
-    while b >> 64 != 0 || a >> 64 != 0 && b != 0 {
-        (a, b) = (b, a % b);
-    }
-    if b == 0 {
-        return Int::from_unsigned(a);
-    }
-    let (mut a, mut b) = (a as u64, b as u64);
-    if a == 0 {
-        return Int::from_unsigned(u128::from(b));
-    }
-    let shift = (a | b).trailing_zeros();
-    a >>= a.trailing_zeros();
-    while b != 0 {
-        b >>= b.trailing_zeros();
-        if a > b {
-            std::mem::swap(&mut a, &mut b);
-        }
-        b -= a;
-    }
-    Int::from_unsigned(u128::from(a) << shift)
 }
 
 impl Ratio {

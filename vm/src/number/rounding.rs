@@ -163,7 +163,7 @@ fn division(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Result<Divis
 }
 
 fn int_division(vm: &mut Vm, rounding: Rounding, a: &Int, b: &Int) -> Result<(Int, Int), Exit> {
-    vm.check_work((a.len() + 1).saturating_sub(b.len()), b.len())?;
+    vm.check_work(2 * (a.len() + 1).saturating_sub(b.len()), b.len())?;
     vm.charge(a.len() + b.len());
     let (quotient, remainder) = a.div_rem(b);
     if remainder.is_zero() || rounding == Rounding::Truncate {
@@ -197,7 +197,9 @@ fn float_division(
     let mut remainder = x - whole * y;
     if remainder != 0.0 {
         let half = (2.0 * remainder.abs()).partial_cmp(&y.abs()).unwrap_or(Ordering::Less);
-        let step = rounding.step(remainder < 0.0, y < 0.0, quotient.is_odd(), half);
+        // The rounded quotient may be past the exact one; then the sign of the remainder would tell the wrong side.
+        let is_negative = if rounding == Rounding::Round { remainder < 0.0 } else { x < 0.0 };
+        let step = rounding.step(is_negative, y < 0.0, quotient.is_odd(), half);
         quotient = quotient.plus(&Int::from(i64::from(step)));
         remainder -= f64::from(step) * y;
     }

@@ -1,0 +1,142 @@
+//! Integers as infinite rows of bits in two's complement.
+
+use num_bigint::BigInt;
+use num_traits::Signed;
+
+use super::Int;
+use crate::raise::{Exit, Outcome};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// A way to join the bits of two integers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum BitOperation {
+    /// Bits that are in both.
+    And,
+    /// Bits that are in either.
+    Or,
+    /// Bits that are in one and not in the other.
+    Xor,
+}
+
+/// The integers joined bit by bit.
+pub(crate) fn join(vm: &mut Vm, operation: BitOperation, a: Value, b: Value) -> Outcome {
+    let (a, b) = (vm.integer(a)?, vm.integer(b)?);
+    vm.charge(a.len() + b.len());
+    vm.integer_value("LOGAND", &a.joined(operation, &b))
+}
+
+/// `(lognot a)`
+pub(crate) fn complement(vm: &mut Vm, a: Value) -> Outcome {
+    let a = vm.integer(a)?;
+    vm.charge(a.len());
+    vm.integer_value("LOGNOT", &a.complement())
+}
+
+/// `(ash a count)`
+pub(crate) fn shift(vm: &mut Vm, a: Value, count: Value) -> Outcome {
+    let (n, count) = (vm.integer(a)?, vm.integer(count)?);
+    vm.charge(n.len());
+    if n.is_zero() {
+        return Ok(a);
+    }
+    if count.is_negative() {
+        let shift = u64::try_from(count.negated().to_big()).unwrap_or(u64::MAX);
+        return vm.integer_value("ASH", &n.shifted_right(shift));
+    }
+    // What does not fit is beyond the limit anyway.
+    let shift = u64::try_from(count.to_big()).unwrap_or(u64::MAX >> 1).min(u64::MAX >> 1);
+    vm.check_bits("ASH", n.bits() + shift)?;
+    vm.charge(shift as usize / 64);
+    vm.integer_value("ASH", &n.shifted_left(shift))
+}
+
+/// `(logbitp index a)`: an index past the last bit sees the sign.
+pub(crate) fn bit(vm: &mut Vm, index: Value, a: Value) -> Result<bool, Exit> {
+    let n = vm.integer(a)?;
+    match Int::of(&vm.heap, index) {
+        Some(index) if !index.is_negative() => Ok(match u64::try_from(index.to_big()) {
+            Ok(index) => n.bit(index),
+            Err(_) => n.is_negative(),
+        }),
+        _ => vm.type_error(index, "UNSIGNED-BYTE"),
+    }
+}
+
+/// `size` bits of `a` from bit `position` up, as an integer that is not negative.
+pub(crate) fn field(vm: &mut Vm, size: u64, position: u64, a: &Int) -> Result<Int, Exit> {
+    vm.charge(a.len());
+    let shifted = a.shifted_right(position);
+    // Above the length of a number that is not negative there is nothing.
+    let size = if shifted.is_negative() { size } else { size.min(shifted.bits()) };
+    vm.check_bits("LDB", size)?;
+    Ok(shifted.joined(BitOperation::And, &mask(size)))
+}
+
+/// `a` with the field of `size` bits from `position` up replaced by the lowest bits of `new`.
+pub(crate) fn deposit(vm: &mut Vm, new: &Int, size: u64, position: u64, a: &Int) -> Result<Int, Exit> {
+    if size == 0 {
+        return Ok(a.clone());
+    }
+    vm.check_bits("DPB", size.saturating_add(position))?;
+    vm.charge(a.len() + (size + position) as usize / 64);
+    let mask = mask(size);
+    let kept = a.joined(BitOperation::And, &mask.shifted_left(position).complement());
+    let placed = new.joined(BitOperation::And, &mask).shifted_left(position);
+    Ok(kept.joined(BitOperation::Or, &placed))
+}
+
+/// `size` ones.
+fn mask(size: u64) -> Int {
+    Int::ONE.shifted_left(size).minus(&Int::ONE)
+}
+
+impl Int {
+    /// Both joined bit by bit.
+    pub(crate) fn joined(&self, operation: BitOperation, other: &Int) -> Int {
+        if let (Int::Small(a), Int::Small(b)) = (self, other) {
+            return Int::Small(match operation {
+                BitOperation::And => a & b,
+                BitOperation::Or => a | b,
+                BitOperation::Xor => a ^ b,
+            });
+        }
+        let (a, b) = (self.to_big(), other.to_big());
+        Int::from_big(match operation {
+            BitOperation::And => a & b,
+            BitOperation::Or => a | b,
+            BitOperation::Xor => a ^ b,
+        })
+    }
+
+    /// All bits turned over: `-1 - self`.
+    pub(crate) fn complement(&self) -> Int {
+        match self {
+            Int::Small(n) => Int::Small(!n),
+            Int::Big(n) => Int::from_big(-BigInt::from(1) - n),
+        }
+    }
+
+    /// The bit with this index.
+    pub(crate) fn bit(&self, index: u64) -> bool {
+        match self {
+            Int::Small(n) => n >> index.min(127) & 1 == 1,
+            Int::Big(n) => n.bit(index),
+        }
+    }
+
+    /// Ones of an integer that is not negative, zeros of a negative one.
+    pub(crate) fn count_bits(&self) -> u64 {
+        let ones = |n: &BigInt| n.iter_u64_digits().map(|limb| u64::from(limb.count_ones())).sum();
+        match self {
+            Int::Small(n) => u64::from(if *n < 0 { n.count_zeros() } else { n.count_ones() }),
+            Int::Big(n) if n.is_negative() => ones(&(-BigInt::from(1) - n)),
+            Int::Big(n) => ones(n),
+        }
+    }
+
+    /// Bits that it takes in two's complement, the sign not counted.
+    pub(crate) fn length(&self) -> u64 {
+        if self.is_negative() { self.complement().bits() } else { self.bits() }
+    }
+}

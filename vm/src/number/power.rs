@@ -1,0 +1,213 @@
+//! Powers, roots, exponentials and logarithms.
+//!
+//! Powers with an integer exponent of exact numbers are exact; everything else is a double. Where Common Lisp would give
+//! a complex number, these fail with an arithmetic error.
+
+use num_traits::Pow;
+
+use super::limit::{self, BIT_LIMIT};
+use super::{Int, Number, Ratio};
+use crate::raise::{Exit, Outcome, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// `(expt base power)`
+pub(crate) fn expt(vm: &mut Vm, base: Value, power: Value) -> Outcome {
+    let (x, y) = (vm.number(base, "NUMBER")?, vm.number(power, "NUMBER")?);
+    match (x, y) {
+        (x, Number::Int(y)) if y.is_zero() => match x {
+            Number::Float(_) => Ok(vm.heap.float(1.0)?),
+            _ => Ok(Value::small(1)),
+        },
+        (Number::Int(x), Number::Int(y)) => {
+            if x.is_zero() && y.is_negative() {
+                return vm.raise(Raised::DivisionByZero("EXPT", [base, power]));
+            }
+            let result = int_power(vm, &x, &y.abs())?;
+            let result = Ratio::integer(result);
+            vm.ratio_value("EXPT", &if y.is_negative() { result.inverted() } else { result })
+        }
+        (Number::Ratio(x), Number::Int(y)) => {
+            let magnitude = y.abs();
+            let numerator = int_power(vm, &x.numerator, &magnitude)?;
+            let denominator = int_power(vm, &x.denominator, &magnitude)?;
+            let result = Ratio { numerator, denominator };
+            vm.ratio_value("EXPT", &if y.is_negative() { result.inverted() } else { result })
+        }
+        (_, y) => {
+            let x = vm.to_double("EXPT", base, "NUMBER")?;
+            let is_float = matches!(y, Number::Float(_));
+            let y = vm.to_double("EXPT", power, "NUMBER")?;
+            real_power(vm, [base, power], is_float, x, y)
+        }
+    }
+}
+
+/// An integer to an exponent that is not negative. 0 to the 0 is 1.
+fn int_power(vm: &mut Vm, base: &Int, exponent: &Int) -> Result<Int, Exit> {
+    if base.is_one() || exponent.is_zero() {
+        return Ok(Int::ONE);
+    }
+    if base.is_zero() {
+        return Ok(Int::ZERO);
+    }
+    if *base == Int::Small(-1) {
+        return Ok(if exponent.is_odd() { base.clone() } else { Int::ONE });
+    }
+    // The magnitude is at least 2^(bits - 1), so the power has more than (bits - 1)·exponent bits.
+    let exponent = exponent.as_fixnum().map_or(BIT_LIMIT + 1, |exponent| exponent.unsigned_abs());
+    let zeros = base.trailing_zeros();
+    let odd = base.shifted_right(zeros);
+    let least_bits = (base.bits() - 1).saturating_mul(exponent).saturating_add(1);
+    vm.check_bits("EXPT", least_bits)?;
+    let limbs = (odd.bits().saturating_mul(exponent) as usize).div_ceil(64);
+    // The last product is of two halves, and all others together cost a third of it.
+    vm.check_work(limbs / 2 + 1, if odd.bits() == 1 { 1 } else { limbs / 2 + 1 })?;
+    let power = match odd {
+        Int::Small(1) => Int::ONE,
+        Int::Small(-1) => Int::Small(if exponent & 1 == 1 { -1 } else { 1 }),
+        odd => {
+            let exponent = u32::try_from(exponent).expect("the limit of bits is far below");
+            match &odd {
+                Int::Small(n) if let Some(power) = n.checked_pow(exponent) => Int::Small(power),
+                odd => Int::from_big(Pow::pow(odd.to_big(), exponent)),
+            }
+        }
+    };
+    let shift = zeros * exponent;
+    vm.check_bits("EXPT", power.bits() + shift)?;
+    vm.charge(shift as usize / 64);
+    Ok(power.shifted_left(shift))
+}
+
+fn real_power(vm: &mut Vm, operands: [Value; 2], is_float: bool, x: f64, y: f64) -> Outcome {
+    if x == 0.0 && y == 0.0 && is_float {
+        return vm.raise(Raised::Arithmetic("EXPT", "zero to the power of a zero float has no value".into()));
+    }
+    if x == 0.0 && y < 0.0 {
+        return vm.raise(Raised::DivisionByZero("EXPT", operands));
+    }
+    if x < 0.0 && y.fract() != 0.0 {
+        return vm.raise(Raised::Arithmetic("EXPT", "the result would be a complex number".into()));
+    }
+    vm.float_value("EXPT", libm::pow(x, y))
+}
+
+/// `(sqrt a)`
+pub(crate) fn sqrt(vm: &mut Vm, a: Value) -> Outcome {
+    let x = vm.to_double("SQRT", a, "NUMBER")?;
+    if x < 0.0 {
+        return vm
+            .raise(Raised::Arithmetic("SQRT", "the square root of a negative number is complex".into()));
+    }
+    vm.float_value("SQRT", x.sqrt())
+}
+
+/// `(isqrt a)`: the greatest integer whose square is not above `a`.
+pub(crate) fn isqrt(vm: &mut Vm, a: Value) -> Outcome {
+    match Int::of(&vm.heap, a) {
+        Some(n) if !n.is_negative() => {
+            if n.len() > limit::ROOT_LIMBS {
+                return Err(Exit::Slowly);
+            }
+            vm.charge(4 * n.len() * n.len());
+            let root = match n {
+                Int::Small(n) => Int::from_unsigned(n.unsigned_abs().isqrt()),
+                Int::Big(n) => Int::from_big(n.sqrt()),
+            };
+            vm.integer_value("ISQRT", &root)
+        }
+        _ => vm.type_error(a, "UNSIGNED-BYTE"),
+    }
+}
+
+/// `(exp a)`
+pub(crate) fn exp(vm: &mut Vm, a: Value) -> Outcome {
+    let x = vm.to_double("EXP", a, "NUMBER")?;
+    vm.float_value("EXP", libm::exp(x))
+}
+
+/// `(log a)`
+pub(crate) fn log(vm: &mut Vm, a: Value) -> Outcome {
+    let (bits, x) = log_parts(vm, a)?;
+    vm.float_value("LOG", libm::log(x) + bits * std::f64::consts::LN_2)
+}
+
+/// `(log a base)`
+pub(crate) fn log_in_base(vm: &mut Vm, a: Value, base: Value) -> Outcome {
+    vm.number(a, "NUMBER")?;
+    if super::sign(vm, base, "NUMBER")? == 0 {
+        return Ok(Value::POSITIVE_ZERO);
+    }
+    let (a_bits, x) = log_parts(vm, a)?;
+    let (base_bits, y) = log_parts(vm, base)?;
+    if let Some(power) = exact_log(vm, a, base) {
+        return vm.float_value("LOG", power);
+    }
+    let (numerator, denominator) = (libm::log2(x) + a_bits, libm::log2(y) + base_bits);
+    if denominator == 0.0 {
+        return vm.raise(Raised::DivisionByZero("LOG", [a, base]));
+    }
+    vm.float_value("LOG", numerator / denominator)
+}
+
+/// A number above zero as `x · 2^bits`, where `x` is a double; `bits` is 0 unless the number is beyond the doubles.
+fn log_parts(vm: &mut Vm, a: Value) -> Result<(f64, f64), Exit> {
+    let number = vm.number(a, "NUMBER")?;
+    let (is_zero, is_negative) = match &number {
+        Number::Int(n) => (n.is_zero(), n.is_negative()),
+        Number::Ratio(r) => (false, r.numerator.is_negative()),
+        Number::Float(x) => (*x == 0.0, *x < 0.0),
+    };
+    if is_zero {
+        return vm.raise(Raised::DivisionByZero("LOG", [a, Value::small(0)]));
+    }
+    if is_negative {
+        return vm.raise(Raised::Arithmetic("LOG", "the logarithm of a negative number is complex".into()));
+    }
+    Ok(match number {
+        Number::Float(x) => (0.0, x),
+        Number::Int(n) => scaled(&Ratio::integer(n)),
+        Number::Ratio(r) => scaled(&r),
+    })
+}
+
+/// A ratio above zero as `x · 2^bits`.
+fn scaled(r: &Ratio) -> (f64, f64) {
+    let x = r.to_f64();
+    if x.is_normal() {
+        return (0.0, x);
+    }
+    let bits = r.numerator.bits() as i64 - r.denominator.bits() as i64;
+    let r = if bits > 0 {
+        Ratio { numerator: r.numerator.clone(), denominator: r.denominator.shifted_left(bits.unsigned_abs()) }
+    } else {
+        Ratio { numerator: r.numerator.shifted_left(bits.unsigned_abs()), denominator: r.denominator.clone() }
+    };
+    (bits as f64, r.to_f64())
+}
+
+/// The exponent, if `a` is a power of `base` and both are integers: a quotient of rounded logarithms may miss it.
+fn exact_log(vm: &Vm, a: Value, base: Value) -> Option<f64> {
+    let (a, base) = (Int::of(&vm.heap, a)?, Int::of(&vm.heap, base)?);
+    if base.bits() < 2 || a.bits() > 4096 {
+        return None;
+    }
+    let guess = ((a.bits() as f64) / libm::log2(base.to_f64())).round();
+    [guess - 1.0, guess].into_iter().find(|&power| {
+        power >= 0.0
+            && power * (base.bits() - 1) as f64 <= 4096.0
+            && Int::from_big(Pow::pow(base.to_big(), power as u32)) == a
+    })
+}
+
+impl Int {
+    /// Zeros below the lowest one; 0 for zero.
+    pub(crate) fn trailing_zeros(&self) -> u64 {
+        match self {
+            Int::Small(0) => 0,
+            Int::Small(n) => u64::from(n.trailing_zeros()),
+            Int::Big(n) => n.trailing_zeros().unwrap_or(0),
+        }
+    }
+}

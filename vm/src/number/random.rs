@@ -1,0 +1,135 @@
+//! Random numbers that are the same in every run: xoshiro256**, seeded by a number.
+//!
+//! A state is a record with one slot, eight words of 32 bits. Who draws passes the state; nothing here is hidden.
+//! Source: Blackman and Vigna, "Scrambled linear pseudorandom number generators", 2021; SplitMix64 spreads the seed.
+
+use num_bigint::{BigInt, BigUint};
+
+use super::{Int, Number};
+use crate::heap::Kind;
+use crate::raise::Outcome;
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// A new state.
+pub(crate) fn make_state(vm: &mut Vm, seed: u64) -> Outcome {
+    let mut words = Vec::with_capacity(8);
+    let mut at = seed;
+    for _ in 0..4 {
+        at = at.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = at;
+        z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^= z >> 31;
+        words.extend([z as u32, (z >> 32) as u32]);
+    }
+    state_of(vm, &words)
+}
+
+/// A new state that goes on as `state` would.
+pub(crate) fn copy_state(vm: &mut Vm, state: Value) -> Outcome {
+    let words = words_of(vm, state)?;
+    let words = vm.heap.words(words).unwrap_or_default().to_vec();
+    state_of(vm, &words)
+}
+
+fn state_of(vm: &mut Vm, words: &[u32]) -> Outcome {
+    let object = vm.heap.alloc_words(words.len(), 0)?;
+    if let Some(slots) = vm.heap.words_mut(object) {
+        slots.copy_from_slice(words);
+    }
+    Ok(vm.heap.alloc_record(Kind::RandomState, 0, 0, &[object])?)
+}
+
+fn words_of(vm: &mut Vm, state: Value) -> Outcome {
+    match vm.heap.record(state, Kind::RandomState) {
+        Some(&[words]) => Ok(words),
+        _ => vm.type_error(state, "RANDOM-STATE"),
+    }
+}
+
+/// A number from 0 to below `limit`, of its type.
+pub(crate) fn random(vm: &mut Vm, limit: Value, state: Value) -> Outcome {
+    let object = words_of(vm, state)?;
+    let mut generator = Generator::load(vm, object);
+    let result = match Number::of(&vm.heap, limit) {
+        Some(Number::Float(x)) if x > 0.0 => loop {
+            let y = (generator.next() >> 11) as f64 / (1u64 << 53) as f64 * x;
+            if y < x {
+                break vm.float_value("RANDOM", y)?;
+            }
+        },
+        Some(Number::Int(n)) if n.signum() > 0 => {
+            vm.charge(n.len());
+            let drawn = generator.below(&n);
+            vm.integer_value("RANDOM", &drawn)?
+        }
+        _ => return vm.type_error(limit, "REAL"),
+    };
+    // The state moves on only when nothing can fail any more.
+    generator.store(vm, object);
+    Ok(result)
+}
+
+struct Generator([u64; 4]);
+
+impl Generator {
+    fn load(vm: &Vm, object: Value) -> Generator {
+        let words = vm.heap.words(object).unwrap_or_default();
+        let word = |i: usize| words.get(i).copied().map_or(1, u64::from);
+        Generator([0, 1, 2, 3].map(|i| word(2 * i) | word(2 * i + 1) << 32))
+    }
+
+    fn store(&self, vm: &mut Vm, object: Value) {
+        let words = self.0.iter().flat_map(|&s| [s as u32, (s >> 32) as u32]);
+        for (slot, word) in vm.heap.words_mut(object).unwrap_or_default().iter_mut().zip(words) {
+            *slot = word;
+        }
+    }
+
+    fn next(&mut self) -> u64 {
+        let s = &mut self.0;
+        let result = s[1].wrapping_mul(5).rotate_left(7).wrapping_mul(9);
+        let t = s[1] << 17;
+        s[2] ^= s[0];
+        s[3] ^= s[1];
+        s[1] ^= s[2];
+        s[0] ^= s[3];
+        s[2] ^= t;
+        s[3] = s[3].rotate_left(45);
+        result
+    }
+
+    /// An integer from 0 to below `limit`, which is above zero, each as likely as the others.
+    fn below(&mut self, limit: &Int) -> Int {
+        if let Some(limit) = limit.as_fixnum() {
+            let limit = limit.unsigned_abs();
+            let mask = u64::MAX >> (limit | 1).leading_zeros();
+            loop {
+                // Half of the draws at least are below the limit.
+                let drawn = self.next() & mask;
+                if drawn < limit {
+                    return Int::from(drawn as i64);
+                }
+            }
+        }
+        let bits = limit.bits() as usize;
+        loop {
+            let mut words: Vec<u32> = Vec::with_capacity(bits.div_ceil(32) + 1);
+            while words.len() * 32 < bits {
+                let drawn = self.next();
+                words.extend([drawn as u32, (drawn >> 32) as u32]);
+            }
+            words.truncate(bits.div_ceil(32));
+            if bits % 32 != 0
+                && let Some(last) = words.last_mut()
+            {
+                *last &= (1 << (bits % 32)) - 1;
+            }
+            let drawn = Int::from_big(BigInt::from(BigUint::new(words)));
+            if drawn.compare(limit).is_lt() {
+                return drawn;
+            }
+        }
+    }
+}

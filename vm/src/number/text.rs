@@ -1,0 +1,201 @@
+//! Numbers as text: integers in any radix, doubles by the shortest digits that read back.
+//!
+//! Not here: what `*print-base*` and `*print-radix*` ask for, and the directives of `format`, which are written in ESL
+//! over these; reading numbers in source text (the compiler's reader).
+
+use num_bigint::{BigInt, BigUint};
+use num_integer::Integer;
+use num_traits::{Pow, Zero};
+
+use super::{Int, float, limit};
+use crate::raise::Exit;
+use crate::vm::Vm;
+
+/// The digits of `n` in `radix`, from 2 to 36, with `-` in front of a negative number.
+///
+/// # Errors
+/// [`Exit::Slowly`] for a number above [`limit::DIGIT_LIMBS`] in a radix that is no power of two.
+pub(crate) fn integer_text(vm: &mut Vm, n: &Int, radix: u32) -> Result<String, Exit> {
+    match n {
+        Int::Small(n) if radix == 10 => Ok(n.to_string()),
+        _ => {
+            let len = n.len();
+            if !radix.is_power_of_two() {
+                if len > limit::DIGIT_LIMBS {
+                    return Err(Exit::Slowly);
+                }
+                vm.charge(len * len);
+            }
+            vm.charge(64 * len);
+            Ok(n.to_big().to_str_radix(radix).to_uppercase())
+        }
+    }
+}
+
+/// A double as `prin1` writes it: positional from 1e-3 to below 1e7, else with an exponent.
+pub(crate) fn float_text(x: f64) -> String {
+    if x.is_nan() {
+        return "#<FLOAT NAN>".into();
+    }
+    let sign = if x.is_sign_negative() { "-" } else { "" };
+    if x.is_infinite() {
+        return format!("#<FLOAT {}INFINITY>", if x < 0.0 { "-" } else { "+" });
+    }
+    let magnitude = x.abs();
+    if magnitude == 0.0 {
+        return format!("{sign}0.0");
+    }
+    if (1e-3..1e7).contains(&magnitude) {
+        let digits = magnitude.to_string();
+        let point = if digits.contains('.') { "" } else { ".0" };
+        return format!("{sign}{digits}{point}");
+    }
+    let (digits, exponent) = scientific(magnitude);
+    let (first, rest) = digits.split_at(1);
+    let rest = if rest.is_empty() { "0" } else { rest };
+    format!("{sign}{first}.{rest}e{exponent}")
+}
+
+/// The shortest digits of a finite double above zero that read back, without a point, and the decimal exponent of the
+/// first of them.
+fn scientific(x: f64) -> (String, i32) {
+    let text = format!("{x:e}");
+    let (digits, exponent) = text.split_once('e').expect("this format has an exponent");
+    (digits.replace('.', ""), exponent.parse().expect("an exponent is an integer"))
+}
+
+/// Decimal digits of a finite double that is not negative, and where the point goes: the number is `0.d1d2d3… · 10^k`.
+///
+/// With a `position`, digits below `10^position` are not wanted: the digits are the shortest in the closed interval of
+/// half a unit of that position about the exact value. This is what `format` prints.
+///
+/// Source: Burger and Dybvig, "Printing floating-point numbers quickly and accurately", 1996, with the cutoff of
+/// SBCL's `flonum-to-digits`, whose every choice is kept.
+pub(crate) fn float_digits(x: f64, position: Option<i32>) -> (i32, String) {
+    let Some(position) = position else {
+        if x == 0.0 {
+            return (0, "0".into());
+        }
+        let (digits, exponent) = scientific(x);
+        return (exponent + 1, digits);
+    };
+    let (mantissa, exponent) = float::decode(x);
+    let mantissa = mantissa.unsigned_abs();
+    // x is r/s; half the gaps to its neighbours are low/s and high/s.
+    let is_boundary = mantissa == 1 << 52 && exponent > -1074;
+    let unit = if is_boundary { 2u32 } else { 1 };
+    let mut r = BigUint::from(mantissa) * 2u32 * unit;
+    let mut s = BigUint::from(2u32 * unit);
+    let (mut low, mut high) = (BigUint::from(1u32), BigUint::from(unit));
+    if exponent >= 0 {
+        for n in [&mut r, &mut low, &mut high] {
+            *n <<= exponent;
+        }
+    } else {
+        s <<= exponent.unsigned_abs();
+    }
+    // Half a unit of the position asked for: s · 10^position / 2, on a common scale.
+    let power: BigUint = Pow::pow(BigUint::from(10u32), position.unsigned_abs());
+    if position < 0 {
+        for n in [&mut r, &mut s, &mut low, &mut high] {
+            *n *= &power;
+        }
+    }
+    for n in [&mut r, &mut s, &mut low, &mut high] {
+        *n <<= 1u32;
+    }
+    let half: BigUint = if position < 0 { &s / &power } else { &s * &power } >> 1u32;
+    scale_and_generate(r, s, low.max(half.clone()), high.max(half))
+}
+
+fn scale_and_generate(mut r: BigUint, mut s: BigUint, mut low: BigUint, mut high: BigUint) -> (i32, String) {
+    let mut k = 0;
+    while &r + &high >= s {
+        s *= 10u32;
+        k += 1;
+    }
+    loop {
+        if r <= low || (&r + &high) * 10u32 >= s {
+            break;
+        }
+        k -= 1;
+        for n in [&mut r, &mut low, &mut high] {
+            *n *= 10u32;
+        }
+    }
+    let mut digits = String::new();
+    loop {
+        for n in [&mut r, &mut low, &mut high] {
+            *n *= 10u32;
+        }
+        let (digit, rest) = r.div_rem(&s);
+        r = rest;
+        let digit = digit.iter_u32_digits().next().unwrap_or(0);
+        let (is_low, is_high) = (r <= low, &r + &high >= s);
+        let digit = match (is_low, is_high) {
+            (false, false) => digit,
+            (false, true) => digit + 1,
+            (true, false) => digit,
+            (true, true) => digit + u32::from(&r * 2u32 >= s),
+        };
+        // Scaling has seen to it that no carry leaves the first digit, and an interval that let one out of a later
+        // digit would have ended the digit before.
+        digits.push(char::from_digit(digit, 10).unwrap_or('9'));
+        if is_low || is_high {
+            return (k, digits);
+        }
+    }
+}
+
+/// What `parse-integer` finds.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Parsed {
+    /// An integer, and the index after its last digit.
+    Integer(Int, usize),
+    /// No digit where one is expected; the index of what stands there.
+    Nothing(usize),
+    /// Too many digits for one operation.
+    TooLong,
+}
+
+/// Reads an integer in `radix` from the characters from `start` on: white space, a sign, digits.
+pub(crate) fn parse_integer(characters: &[u32], start: usize, radix: u32) -> Parsed {
+    let character = |at: usize| characters.get(at).copied().and_then(char::from_u32);
+    let mut at = start;
+    while character(at).is_some_and(is_blank) {
+        at += 1;
+    }
+    let is_negative = character(at) == Some('-');
+    if is_negative || character(at) == Some('+') {
+        at += 1;
+    }
+    let first = at;
+    let mut small = 0i128;
+    let mut digits = Vec::new();
+    while let Some(digit) = character(at).and_then(|c| c.to_digit(radix)) {
+        // 24 digits fit in any radix.
+        if at - first < 24 {
+            small = small * i128::from(radix) + i128::from(digit);
+        }
+        digits.push(digit as u8);
+        at += 1;
+    }
+    if at == first {
+        return Parsed::Nothing(at);
+    }
+    if digits.len() > limit::PARSED_DIGITS {
+        return Parsed::TooLong;
+    }
+    let magnitude = if digits.len() <= 24 {
+        Int::Small(small)
+    } else {
+        let n = BigUint::from_radix_be(&digits, radix).unwrap_or_else(BigUint::zero);
+        Int::from_big(BigInt::from(n))
+    };
+    Parsed::Integer(if is_negative { magnitude.negated() } else { magnitude }, at)
+}
+
+/// What `parse-integer` skips.
+pub(crate) fn is_blank(c: char) -> bool {
+    matches!(c, ' ' | '\t' | '\n' | '\r' | '\x0c' | '\x0b' | '\u{8}' | '\u{a0}')
+}
