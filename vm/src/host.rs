@@ -12,10 +12,12 @@ use std::fmt;
 
 use esl_bytecode::datum::Datum;
 
+mod console;
 mod real;
 mod record;
 mod virtual_host;
 
+pub(crate) use console::{Character, Console, column_after, encode};
 pub use real::{FileAccess, MessageSender, RealHost};
 pub use record::{Record, Recording, RecordingHost, ReplayHost};
 pub use virtual_host::{Captured, VirtualHost};

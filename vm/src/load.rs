@@ -1,4 +1,312 @@
 //! From compiled modules to functions in the heap.
+//!
+//! A module that is read or compiled while the machine runs is verified and loaded as a whole; nothing of it stays
+//! outside of the heap, so what a program has forgotten is collected. The image of the library is trusted and loaded
+//! piece by piece (`image`): a function is a stub until it is called for the first time.
+//!
+//! Guarantees: one value for each entry of a module's pool, so that literal data keep their identity; a Code is laid out
+//! as [`crate::shape`] says.
+//!
+//! A constant that names a structure class is its symbol here. The machine puts the class in its place when an
+//! instruction first needs it, so code may be loaded before the class is defined, and sees the class as it is then.
+
+use std::collections::HashMap;
+use std::fmt;
+
+use esl_bytecode::BigInt;
+use esl_bytecode::file::ReadError;
+use esl_bytecode::module::{Constant, Function, Module, PoolIdx};
+use esl_bytecode::symbol::{Home, Symbol};
+use esl_bytecode::verify::{VerifyError, verify};
+
+use crate::heap::layout::Code;
+use crate::heap::{AllocError, CodeParts, Heap};
+use crate::raise::{Exit, Raised};
+use crate::shape::{Shape, Sort, capture_word};
+use crate::stub;
+use crate::value::Value;
+use crate::world::World;
+
+mod debug;
+mod definitions;
+mod image;
+
+pub use debug::SourcePlace;
+pub use definitions::prepare;
+pub(crate) use image::{Images, function as image_function, open as open_image};
 
 /// Says that a module has passed the verifier, or is part of this program.
 pub(crate) struct Verified(());
+
+/// Why a module was not loaded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LoadError {
+    /// The verifier refuses it.
+    Refused(VerifyError),
+    /// The image is damaged.
+    Damaged(ReadError),
+    /// It refers to an object of another compilation.
+    ForeignObject,
+    /// There is no room.
+    Alloc(AllocError),
+}
+
+impl fmt::Display for LoadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LoadError::Refused(error) => write!(f, "the verifier refuses the module: {error}"),
+            LoadError::Damaged(error) => error.fmt(f),
+            LoadError::ForeignObject => f.write_str("the module refers to an object of another compilation"),
+            LoadError::Alloc(_) => f.write_str("there is not enough memory for the module"),
+        }
+    }
+}
+
+impl std::error::Error for LoadError {}
+
+impl From<AllocError> for LoadError {
+    fn from(error: AllocError) -> LoadError {
+        LoadError::Alloc(error)
+    }
+}
+
+impl From<ReadError> for LoadError {
+    fn from(error: ReadError) -> LoadError {
+        LoadError::Damaged(error)
+    }
+}
+
+/// The objects that the constants of a module may refer to, beside those that they describe: what modules of one
+/// compilation have in common.
+pub(crate) trait Shared {
+    /// The symbol object for an uninterned symbol's number, if there is one.
+    fn uninterned(&self, id: u32) -> Option<Value>;
+    /// Notes the symbol object that was made for a number.
+    fn note_uninterned(&mut self, id: u32, object: Value);
+    /// An object of the program.
+    fn object(&self, id: u32) -> Option<Value>;
+}
+
+/// A module that stands alone, as one from a file does.
+#[derive(Default)]
+pub(crate) struct Alone(HashMap<u32, Value>);
+
+impl Shared for Alone {
+    fn uninterned(&self, id: u32) -> Option<Value> {
+        self.0.get(&id).copied()
+    }
+
+    fn note_uninterned(&mut self, id: u32, object: Value) {
+        self.0.insert(id, object);
+    }
+
+    fn object(&self, _id: u32) -> Option<Value> {
+        None
+    }
+}
+
+/// Loads a module: a list of the functions that run its top-level forms, in order.
+///
+/// # Errors
+/// [`LoadError`]; then nothing of it can be reached.
+pub(crate) fn load(
+    heap: &mut Heap,
+    world: &mut World,
+    module: &Module,
+    shared: &mut dyn Shared,
+) -> Result<Value, LoadError> {
+    verify(module).map_err(LoadError::Refused)?;
+    Loader { heap, world, module, shared, verified: Verified(()), pool: Vec::new(), functions: Vec::new() }.load()
+}
+
+/// A module on its way into the heap.
+struct Loader<'a> {
+    heap: &'a mut Heap,
+    world: &'a mut World,
+    module: &'a Module,
+    shared: &'a mut dyn Shared,
+    verified: Verified,
+    /// The values of the pool.
+    pool: Vec<Value>,
+    /// For a function without captures its Function, for one with captures its Code.
+    functions: Vec<Value>,
+}
+
+impl Loader<'_> {
+    fn load(mut self) -> Result<Value, LoadError> {
+        // Data may contain functions, and functions each other, so functions are made before they have their code.
+        let shape = Shape::other(Sort::Lazy, 0);
+        let stub = self.heap.alloc_stub(Value::NIL, Value::NIL, shape, 0, stub::word(stub::LAZY, 0))?;
+        for function in &self.module.functions {
+            let has_captures = !function.captures.is_empty();
+            let object = if has_captures { Value::NIL } else { self.heap.alloc_function(stub, &[])? };
+            self.functions.push(object);
+        }
+        self.pool.reserve_exact(self.module.constants.len());
+        for constant in &self.module.constants {
+            let value = self.constant(constant)?;
+            self.pool.push(value);
+        }
+        let sources = debug::sources(self.heap, &self.module.sources)?;
+        let mut codes = Vec::with_capacity(self.module.functions.len());
+        for (function, object) in self.module.functions.iter().zip(&mut self.functions) {
+            let constants = own_constants(function, |PoolIdx(index)| self.pool[index as usize]);
+            let debug = debug::describe(self.heap, function, &self.pool, sources)?;
+            let parts = Parts { function, constants: &constants, name: name_of(function, &self.pool), debug };
+            let code = make_code(self.heap, &self.verified, &parts, Value::NIL)?;
+            if object.is_nil() {
+                *object = code;
+            } else {
+                self.heap.function_set_code(*object, code);
+            }
+            codes.push(code);
+        }
+        self.fill_in(&codes);
+        let toplevel: Vec<Value> =
+            self.module.toplevel.iter().map(|number| self.functions[number.0 as usize]).collect();
+        Ok(self.heap.list(&toplevel)?)
+    }
+
+    /// Puts the Codes of functions with captures, which are known only now, where they are constants.
+    fn fill_in(&mut self, codes: &[Value]) {
+        for (function, &code) in self.module.functions.iter().zip(codes) {
+            for (index, &PoolIdx(constant)) in function.constants.iter().enumerate() {
+                if let Constant::Function(number) = self.module.constants[constant as usize] {
+                    self.heap.code_set_constant(code, index, self.functions[number.0 as usize]);
+                }
+            }
+        }
+    }
+
+    fn symbol(&mut self, symbol: &Symbol) -> Result<Value, AllocError> {
+        let Home::Uninterned(id) = *symbol.home() else { return self.world.intern(self.heap, symbol) };
+        if let Some(object) = self.shared.uninterned(id) {
+            return Ok(object);
+        }
+        let object = self.world.intern(self.heap, symbol)?;
+        self.shared.note_uninterned(id, object);
+        Ok(object)
+    }
+
+    /// The value of a constant; earlier ones are there.
+    fn constant(&mut self, constant: &Constant) -> Result<Value, LoadError> {
+        let pool = |&PoolIdx(index): &PoolIdx| self.pool[index as usize];
+        Ok(match constant {
+            Constant::Nil => Value::NIL,
+            Constant::True => Value::T,
+            Constant::Symbol(symbol) | Constant::Class(symbol) => self.symbol(symbol)?,
+            Constant::Integer(value) => integer(self.heap, value)?,
+            Constant::Ratio(numerator, denominator) => ratio(self.heap, numerator, denominator)?,
+            Constant::Float(value) => self.heap.float(*value)?,
+            Constant::Character(c) => character(*c),
+            Constant::String(text) => self.heap.alloc_str(text)?,
+            Constant::Cons(car, cdr) => self.heap.cons(pool(car), pool(cdr))?,
+            Constant::Vector(items) => {
+                let items: Vec<Value> = items.iter().map(pool).collect();
+                self.heap.alloc_vector(&items)?
+            }
+            Constant::Array(dimensions, items) => {
+                let items: Vec<Value> = items.iter().map(pool).collect();
+                array(self.heap, dimensions, &items)?
+            }
+            Constant::Function(number) => self.functions[number.0 as usize],
+            Constant::Object(id) => self.shared.object(id.0).ok_or(LoadError::ForeignObject)?,
+        })
+    }
+}
+
+/// What a Code is made from.
+struct Parts<'a> {
+    function: &'a Function,
+    /// Its constants, the names of its keys last.
+    constants: &'a [Value],
+    name: Value,
+    debug: Value,
+}
+
+fn make_code(
+    heap: &mut Heap,
+    verified: &Verified,
+    parts: &Parts<'_>,
+    owner: Value,
+) -> Result<Value, AllocError> {
+    let function = parts.function;
+    let mut words = function.code.clone();
+    words.extend(function.captures.iter().copied().map(capture_word));
+    let parameters = &function.parameters;
+    let arity = if parameters.is_exact() { u32::from(parameters.required) } else { Code::ANY_ARITY };
+    let parts = CodeParts {
+        name: parts.name,
+        debug: parts.debug,
+        owner,
+        arity,
+        nregs: u32::from(function.registers),
+        spare: [Shape::bytecode(parameters).pack(), function.captures.len() as u64],
+        constants: parts.constants,
+        words: &words,
+    };
+    heap.alloc_verified_code(parts, verified)
+}
+
+/// The constants of a function's Code: its own, then the names of its keys.
+fn own_constants(function: &Function, value: impl FnMut(PoolIdx) -> Value) -> Vec<Value> {
+    let keys = function.parameters.keys.iter().flatten();
+    function.constants.iter().chain(keys).copied().map(value).collect()
+}
+
+fn name_of(function: &Function, pool: &[Value]) -> Value {
+    function.name.map_or(Value::NIL, |PoolIdx(index)| pool[index as usize])
+}
+
+pub(crate) fn character(c: char) -> Value {
+    Value::character(u32::from(c)).unwrap_or(Value::NIL)
+}
+
+/// The value of an integer of any size.
+///
+/// # Errors
+/// As for every allocation.
+pub(crate) fn integer(heap: &mut Heap, value: &BigInt) -> Result<Value, AllocError> {
+    if let Some(fixnum) = i64::try_from(value).ok().and_then(Value::fixnum) {
+        return Ok(fixnum);
+    }
+    let limbs: Vec<u64> = value.iter_u64_digits().collect();
+    heap.alloc_bignum(value.sign() == num_bigint::Sign::Minus, &limbs)
+}
+
+/// The value of a ratio in lowest terms.
+///
+/// # Errors
+/// As for every allocation.
+pub(crate) fn ratio(heap: &mut Heap, numerator: &BigInt, denominator: &BigInt) -> Result<Value, AllocError> {
+    let numerator = integer(heap, numerator)?;
+    let denominator = integer(heap, denominator)?;
+    heap.alloc_ratio(numerator, denominator)
+}
+
+/// A literal array of a rank other than 1.
+///
+/// # Errors
+/// As for every allocation.
+pub(crate) fn array(heap: &mut Heap, dimensions: &[u32], items: &[Value]) -> Result<Value, AllocError> {
+    let data = heap.alloc_vector(items)?;
+    let dimensions: Vec<Value> = dimensions.iter().map(|&size| Value::index(size as usize)).collect();
+    heap.alloc_array(0, data, Value::NIL, &dimensions)
+}
+
+impl From<LoadError> for Raised {
+    fn from(error: LoadError) -> Raised {
+        Raised::Program(error.to_string())
+    }
+}
+
+impl crate::vm::Vm {
+    /// Gives what became of a load to the program: no room means that the operation is done again after a collection.
+    pub(crate) fn loaded<T>(&mut self, result: Result<T, LoadError>) -> Result<T, Exit> {
+        match result {
+            Ok(value) => Ok(value),
+            Err(LoadError::Alloc(error)) => Err(error.into()),
+            Err(error) => self.raise(error.into()),
+        }
+    }
+}

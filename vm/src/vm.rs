@@ -8,7 +8,7 @@ use slotmap::SlotMap;
 
 use crate::control::End;
 use crate::heap::{AllocError, Heap, HeapConfig};
-use crate::host::Host;
+use crate::host::{Console, Host};
 use crate::interp::Cpu;
 use crate::interp::call::{Arguments, make_starter};
 use crate::raise::Raised;
@@ -59,6 +59,8 @@ pub struct Vm {
     pub(crate) world: World,
     /// The outside.
     pub(crate) host: Box<dyn Host + Send>,
+    /// The standard streams, buffered.
+    pub(crate) console: Console,
     /// Values that the embedder holds on to.
     pub(crate) pinned: Vec<Value>,
 
@@ -121,6 +123,7 @@ impl Vm {
             heap,
             world,
             host,
+            console: Console::default(),
             pinned: vec![starter],
             tasks: SlotMap::with_key(),
             queue: RunQueue::new(),
@@ -139,6 +142,13 @@ impl Vm {
             last_words: None,
             config,
         })
+    }
+
+    /// A machine without a library and with a captured outside, for the unit tests of this crate.
+    #[cfg(test)]
+    pub(crate) fn for_tests() -> Vm {
+        let host = Box::new(crate::host::VirtualHost::new());
+        Vm::new(Config::default(), host).expect("there is room for an empty machine")
     }
 
     /// Limits and settings.

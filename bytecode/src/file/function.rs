@@ -108,6 +108,17 @@ pub(super) fn read(mut from: Cursor<'_>, pool: usize) -> Result<Function, ReadEr
     Ok(Function { name, lambda_list, documentation, parameters, registers, captures, constants, code, lines })
 }
 
+/// The number of captures in a record.
+pub(super) fn capture_count(mut from: Cursor<'_>) -> Result<usize, ReadError> {
+    // Name, lambda list, documentation; required, optional, registers.
+    from.bytes(3 * 4 + 3)?;
+    if from.u8()? & FLAG_KEYS != 0 {
+        let keys = from.count(4)?;
+        from.bytes(keys * 4)?;
+    }
+    from.count(2)
+}
+
 fn optional_constant(from: &mut Cursor<'_>, pool: usize) -> Result<Option<PoolIdx>, ReadError> {
     let mut ahead = from.clone();
     if ahead.u32()? == NONE {

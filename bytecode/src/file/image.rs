@@ -240,6 +240,29 @@ impl ModuleImage {
         Ok(Symbols { records, names, packages: packages as usize, left: self.symbol_count })
     }
 
+    /// One symbol.
+    ///
+    /// # Errors
+    /// [`ReadError::Damaged`], also if there is no such symbol.
+    pub fn symbol(&self, number: u32) -> Result<SymbolRecord<'_>, ReadError> {
+        let section = &self.sections[Section::Symbols.position()];
+        if number as usize >= self.symbol_count {
+            let problem = Problem::Index { of: "symbols", found: number, count: self.symbol_count as u32 };
+            return Err(self.section(Section::Symbols).damaged(problem));
+        }
+        let at = self.symbol_records + number as usize * 16;
+        let mut record = Cursor::new(&self.bytes[at..section.end], at, Some(Section::Symbols));
+        let (package, id, start, length) = (record.u32()?, record.u32()?, record.u32()?, record.u32()?);
+        let home = match package {
+            NONE => SymbolHome::Uninterned(id),
+            package => SymbolHome::Package(package),
+        };
+        let names = self.symbol_records + self.symbol_count * 16 - section.start;
+        let name = self.part(Section::Symbols, names.saturating_add(start as usize), length as usize)?;
+        let name = std::str::from_utf8(name.rest()).map_err(|_| name.damaged(Problem::Utf8))?;
+        Ok(SymbolRecord { home, name })
+    }
+
     /// How many constants there are.
     pub fn constant_count(&self) -> usize {
         self.constant_count
@@ -322,6 +345,15 @@ impl ModuleImage {
     pub fn function(&self, number: FunctionNumber) -> Result<Function, ReadError> {
         let (offset, length) = self.function_place(number)?;
         function::read(self.part(Section::Functions, offset as usize, length as usize)?, self.constant_count)
+    }
+
+    /// How many captures a function has, without decoding all of it.
+    ///
+    /// # Errors
+    /// [`ReadError::Damaged`], also if there is no such function.
+    pub fn capture_count(&self, number: FunctionNumber) -> Result<usize, ReadError> {
+        let (offset, length) = self.function_place(number)?;
+        function::capture_count(self.part(Section::Functions, offset as usize, length as usize)?)
     }
 
     /// Offset and length of a function's record.

@@ -45,3 +45,4 @@ pub const fn native(builtin: Builtin) -> Native {
 }
 
 mod define;
+mod stream;

@@ -226,10 +226,10 @@ impl Heap {
         Some(unsafe { (*object.cast::<Function>()).code })
     }
 
-    /// Gives a function other code; `None` if `v` is no function, or `code` is no Code for as many captures. Only the
-    /// loader does so, when it puts the real code in place of a stub.
+    /// Gives a function other code; `None` if `v` is no function, or `code` no Code, or one that has more captures. Only
+    /// the loader does so, when it puts the real code in place of a stub.
     pub(crate) fn function_set_code(&mut self, v: Value, code: Value) -> Option<()> {
-        if self.code(code)?.spare[1] as usize != self.function_captures(v)?.len() {
+        if self.code(code)?.spare[1] as usize > self.function_captures(v)?.len() {
             return None;
         }
         self.set_slot(v, Kind::Function, 0, code)

@@ -14,14 +14,17 @@ use std::hash::{BuildHasherDefault, Hasher};
 use std::sync::Arc;
 
 use esl_bytecode::builtin::{BUILTINS, Builtin, Visibility};
+use esl_bytecode::file::ModuleImage;
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Home, KEYWORD_PACKAGE, Symbol};
 
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{AllocError, Heap, Kind};
+use crate::load::{self, Images, LoadError};
 use crate::shape::{Shape, Sort};
 use crate::stub;
 use crate::value::Value;
 
+pub(crate) mod class;
 mod known;
 
 pub(crate) use known::Known;
@@ -67,6 +70,8 @@ pub(crate) struct World {
     t: Value,
     /// The code of every symbol without a function.
     undefined: Value,
+    /// Modules that are loaded piece by piece.
+    pub(crate) images: Images,
     /// Structure and condition classes by the address of their names.
     classes: GivenMap<u64, Value>,
 }
@@ -88,6 +93,7 @@ impl World {
             nil: Value::NIL,
             t: Value::NIL,
             undefined,
+            images: Images::default(),
             classes: GivenMap::default(),
         };
         world.nil = world.make_constant(heap, &Symbol::cl("NIL"), Value::NIL)?;
@@ -165,7 +171,43 @@ impl World {
             let function = self.make_builtin(heap, builtin, object)?;
             heap.symbol_set_function(object, function);
         }
+        self.define_from_images(heap, symbol, object)?;
         Ok(object)
+    }
+
+    /// Gives a symbol object what the images define its symbol as.
+    fn define_from_images(
+        &mut self,
+        heap: &mut Heap,
+        symbol: &Symbol,
+        object: Value,
+    ) -> Result<(), AllocError> {
+        let Some((image, definition)) = self.images.definition(symbol) else { return Ok(()) };
+        if let Some(number) = definition.function {
+            let function = load::image_function(heap, self, image, number)?;
+            heap.symbol_set_function(object, function);
+        }
+        if let Some(number) = definition.macro_function {
+            let function = load::image_function(heap, self, image, number)?;
+            heap.symbol_set_macro_function(object, function);
+        }
+        Ok(())
+    }
+
+    /// Takes an image in: a list of the functions that run its top-level forms.
+    ///
+    /// # Errors
+    /// [`LoadError`].
+    pub(crate) fn open_image(&mut self, heap: &mut Heap, image: Arc<ModuleImage>) -> Result<Value, LoadError> {
+        let toplevel = load::open_image(heap, self, image)?;
+        // Symbols that are there already have missed the definitions.
+        let symbols: Vec<(Symbol, Value)> = self.symbols.iter().map(|(s, &v)| (s.clone(), v)).collect();
+        for (symbol, v) in symbols {
+            if let Some(object) = self.object_of(heap, v) {
+                self.define_from_images(heap, &symbol, object)?;
+            }
+        }
+        Ok(toplevel)
     }
 
     /// A new symbol object in no table, with this name (a String) and package.
@@ -285,6 +327,7 @@ impl World {
         [self.nil, self.t, self.undefined].into_iter().for_each(&mut *visit);
         self.symbols.values().copied().for_each(&mut *visit);
         self.package_objects.values().copied().for_each(&mut *visit);
+        self.images.roots(visit);
         self.classes.values().copied().for_each(&mut *visit);
     }
 }

@@ -1,0 +1,98 @@
+//! Definitions: what a symbol stands for as a function, macro, special variable or constant.
+
+use crate::heap::Kind;
+use crate::heap::layout::Symbol;
+use crate::raise::{Exit, Outcome};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// `%set-function`
+pub(crate) fn set_function(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[name, function] = arguments else { unreachable!("the table says two") };
+    let symbol = vm.definable(name, "function")?;
+    if !vm.heap.is(function, Kind::Function) {
+        return vm.type_error(function, "FUNCTION");
+    }
+    vm.heap.symbol_set_function(symbol, function);
+    vm.heap.symbol_set_macro_function(symbol, Value::NIL);
+    Ok(name)
+}
+
+/// `%set-macro`
+pub(crate) fn set_macro(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[name, function] = arguments else { unreachable!("the table says two") };
+    let symbol = vm.definable(name, "macro")?;
+    if !vm.heap.is(function, Kind::Function) {
+        return vm.type_error(function, "FUNCTION");
+    }
+    vm.world.remove_function(&mut vm.heap, name)?;
+    vm.heap.symbol_set_macro_function(symbol, function);
+    Ok(name)
+}
+
+/// `%proclaim-special`
+pub(crate) fn proclaim_special(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let name = arguments[0];
+    let symbol = vm.symbol_object(name)?;
+    let flags = vm.heap.flags(symbol, Kind::Symbol).unwrap_or(0);
+    if flags & Symbol::CONSTANT != 0 {
+        let name = vm.describe(name);
+        return vm.program_error(format!("{name} is a constant and cannot be made a variable"));
+    }
+    vm.heap.set_flags(symbol, Kind::Symbol, flags | Symbol::SPECIAL);
+    Ok(name)
+}
+
+/// `%define-constant`
+pub(crate) fn define_constant(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[name, value] = arguments else { unreachable!("the table says two") };
+    let symbol = vm.symbol_object(name)?;
+    let flags = vm.heap.flags(symbol, Kind::Symbol).unwrap_or(0);
+    let old = vm.heap.symbol(symbol).map_or(Value::UNBOUND, |symbol| symbol.value);
+    if flags & Symbol::CONSTANT != 0 {
+        if crate::number::eql(&vm.heap, old, value) {
+            return Ok(name);
+        }
+        let (name, old) = (vm.describe(name), vm.describe(old));
+        return vm.program_error(format!("{name} is a constant already, with the value {old}"));
+    }
+    if vm.world.is_locked(&vm.heap, name) || flags & Symbol::SPECIAL != 0 {
+        let name = vm.describe(name);
+        return vm.program_error(format!("{name} is a variable and cannot be made a constant"));
+    }
+    vm.heap.symbol_set_value(symbol, value);
+    vm.heap.set_flags(symbol, Kind::Symbol, flags | Symbol::CONSTANT);
+    Ok(name)
+}
+
+impl Vm {
+    /// The symbol that holds `function`, a stub for a function that is not there.
+    pub(crate) fn name_of_undefined(&self, function: Value) -> Value {
+        let captures = self.heap.function_captures(function);
+        captures.and_then(|captures| captures.first().copied()).unwrap_or(Value::NIL)
+    }
+
+    /// The object of a symbol.
+    ///
+    /// # Errors
+    /// `type-error` if `v` is no symbol.
+    pub(crate) fn symbol_object(&mut self, v: Value) -> Result<Value, Exit> {
+        match self.world.object_of(&self.heap, v) {
+            Some(object) => Ok(object),
+            None => self.type_error(v, "SYMBOL"),
+        }
+    }
+
+    /// The object of a symbol that may be given a definition as a `what`.
+    ///
+    /// # Errors
+    /// `type-error` if `v` is no symbol, `program-error` if it belongs to the language.
+    fn definable(&mut self, v: Value, what: &str) -> Result<Value, Exit> {
+        let object = self.symbol_object(v)?;
+        if self.world.is_locked(&self.heap, v) {
+            let name = self.describe(v);
+            return self.program_error(format!("{name} belongs to the language and cannot be redefined as a {what}"));
+        }
+        Ok(object)
+    }
+}

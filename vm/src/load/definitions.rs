@@ -1,0 +1,173 @@
+//! The definitions of an image: which symbols have which of its functions, as a table instead of code that runs.
+//!
+//! The table is the last constant of the image, a vector: the symbol `ESL::%DEFINITIONS`, then for each defined symbol,
+//! ordered by package and name, the symbol, its function and its macro function (`NIL` for none).
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use esl_bytecode::builtin::Builtin;
+use esl_bytecode::file::{ConstantRecord, ModuleImage, ReadError, SymbolHome};
+use esl_bytecode::module::{Constant, FunctionNumber, Module, PoolIdx};
+use esl_bytecode::opcode::Instr;
+use esl_bytecode::symbol::Symbol;
+
+const MARKER: &str = "%DEFINITIONS";
+/// Items of a row.
+const ROW: usize = 3;
+
+/// What an image defines a symbol as: numbers of functions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Definition {
+    /// Its function.
+    pub function: Option<u32>,
+    /// Its macro function.
+    pub macro_function: Option<u32>,
+}
+
+/// Where the table of an image is.
+pub(super) struct Definitions {
+    /// The constants that make up the rows.
+    items: Vec<PoolIdx>,
+}
+
+impl Definitions {
+    /// The table of an image; an empty one if it has none.
+    pub(super) fn of(image: &ModuleImage) -> Result<Definitions, ReadError> {
+        let mut items = Vec::new();
+        if let Some(last) = (image.constant_count() as u32).checked_sub(1)
+            && let ConstantRecord::Vector(indexes) = image.constant(PoolIdx(last))?
+            && let Some(first) = indexes.iter().next()
+            && let ConstantRecord::Symbol(number) = image.constant(first)?
+            && image.symbol(number)?.name == MARKER
+        {
+            items = indexes.iter().skip(1).collect();
+        }
+        Ok(Definitions { items })
+    }
+
+    /// The row of `symbol`.
+    pub(super) fn find(
+        &self,
+        image: &ModuleImage,
+        packages: &[Arc<str>],
+        symbol: &Symbol,
+    ) -> Option<Definition> {
+        let wanted = (&**symbol.package()?, symbol.name());
+        let (mut low, mut high) = (0, self.items.len() / ROW);
+        while low < high {
+            let middle = low.midpoint(high);
+            let row = &self.items[middle * ROW..][..ROW];
+            let ConstantRecord::Symbol(number) = image.constant(row[0]).ok()? else { return None };
+            let record = image.symbol(number).ok()?;
+            let SymbolHome::Package(package) = record.home else { return None };
+            match (&**packages.get(package as usize)?, record.name).cmp(&wanted) {
+                std::cmp::Ordering::Less => low = middle + 1,
+                std::cmp::Ordering::Greater => high = middle,
+                std::cmp::Ordering::Equal => {
+                    let number = |index| match image.constant(index) {
+                        Ok(ConstantRecord::Function(number)) => Some(number.0),
+                        _ => None,
+                    };
+                    return Some(Definition { function: number(row[1]), macro_function: number(row[2]) });
+                }
+            }
+        }
+        None
+    }
+}
+
+/// Turns the top-level forms of `module` that do nothing but define functions and macros into a table, for an image.
+///
+/// The module must stay the only one in its file: its last constant becomes the table.
+#[must_use]
+pub fn prepare(mut module: Module) -> Module {
+    let mut rows: BTreeMap<(Arc<str>, String), (PoolIdx, [Option<PoolIdx>; 2])> = BTreeMap::new();
+    let mut toplevel = Vec::new();
+    for number in std::mem::take(&mut module.toplevel) {
+        let Some(defined) = definitions_of(&module, number) else {
+            toplevel.push(number);
+            continue;
+        };
+        for Defined { symbol, function, is_macro } in defined {
+            let Constant::Symbol(name) = &module.constants[symbol.0 as usize] else { continue };
+            let Some(package) = name.package() else { continue };
+            let row = rows.entry((package.clone(), name.name().to_owned()));
+            row.or_insert((symbol, [None; 2])).1[usize::from(is_macro)] = Some(function);
+        }
+    }
+    module.toplevel = toplevel;
+    let mut add = |constant| {
+        module.constants.push(constant);
+        PoolIdx(module.constants.len() as u32 - 1)
+    };
+    let none = add(Constant::Nil);
+    let mut items = vec![add(Constant::Symbol(Symbol::esl(MARKER)))];
+    for (symbol, functions) in rows.into_values() {
+        items.push(symbol);
+        items.extend(functions.map(|function| function.unwrap_or(none)));
+    }
+    add(Constant::Vector(items));
+    module
+}
+
+struct Defined {
+    symbol: PoolIdx,
+    function: PoolIdx,
+    is_macro: bool,
+}
+
+/// What a top-level function defines, if its code does nothing else: it is run as far as constants go.
+fn definitions_of(module: &Module, FunctionNumber(number): FunctionNumber) -> Option<Vec<Defined>> {
+    let function = &module.functions[number as usize];
+    let mut registers: [Option<PoolIdx>; 256] = [None; 256];
+    let mut defined = Vec::new();
+    let mut pc = 0;
+    loop {
+        let instruction = Instr::decode(&function.code, pc)?;
+        pc += instruction.opcode().words();
+        let mut call = |builtin: u32, window: u8, count: u8| {
+            let is_macro = match Builtin::from_number(builtin)? {
+                Builtin::SetFunction => false,
+                Builtin::SetMacro => true,
+                _ => return None,
+            };
+            let first = usize::from(window) + 2;
+            if count != 2 {
+                return None;
+            }
+            let (symbol, function) = (registers[first]?, registers[first + 1]?);
+            let of = |index: PoolIdx| &module.constants[index.0 as usize];
+            let is_interned = matches!(of(symbol), Constant::Symbol(name) if name.package().is_some());
+            let Constant::Function(number) = of(function) else { return None };
+            let is_closed = module.functions[number.0 as usize].captures.is_empty();
+            if !is_interned || !is_closed {
+                return None;
+            }
+            defined.push(Defined { symbol, function, is_macro });
+            registers[usize::from(window)] = Some(symbol);
+            Some(())
+        };
+        match instruction {
+            Instr::LoadConst { dst, constant } => {
+                registers[usize::from(dst.0)] = Some(function.constants[usize::from(constant.0)]);
+            }
+            Instr::MakeClosure { dst, function: constant } => {
+                registers[usize::from(dst.0)] = Some(function.constants[usize::from(constant.0)]);
+            }
+            Instr::Move { dst, src } => registers[usize::from(dst.0)] = registers[usize::from(src.0)],
+            // What they put there is no definition's business.
+            Instr::LoadNil { first, count } => {
+                registers[usize::from(first.0)..][..usize::from(count.0)].fill(None);
+            }
+            Instr::LoadTrue { dst } => registers[usize::from(dst.0)] = None,
+            Instr::CallBuiltin { window, count, builtin, .. } => call(builtin.0, window.0, count.0)?,
+            Instr::TailCallBuiltin { window, count, builtin } => {
+                call(builtin.0, window.0, count.0)?;
+                return Some(defined);
+            }
+            Instr::Return { .. } => return if defined.is_empty() { None } else { Some(defined) },
+            _ => return None,
+        }
+    }
+}

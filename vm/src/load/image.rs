@@ -1,0 +1,337 @@
+//! The image of the library: a module that is loaded piece by piece.
+//!
+//! A function of the image is a stub with its number until it is called for the first time; then its code is decoded,
+//! and with it those constants that it names and nobody has named before. What was made is kept in simple vectors of the
+//! heap, by number, so that everybody gets the same.
+//!
+//! The image may come with *definitions*: instead of a top-level form that runs when the machine starts, a row in a
+//! table that is looked at when a symbol object is made. So a start does nothing for functions that a program does not
+//! use. [`super::prepare`] makes the rows when the library is built.
+
+use std::sync::Arc;
+
+use esl_bytecode::file::{ConstantRecord, ModuleImage, SymbolHome};
+use esl_bytecode::module::{Function, FunctionNumber, PoolIdx};
+use esl_bytecode::symbol::Symbol;
+
+use super::definitions::{Definition, Definitions};
+use super::{LoadError, Parts, Verified, character, debug, integer, make_code, own_constants, ratio};
+use crate::heap::{AllocError, Heap};
+use crate::raise::Exit;
+use crate::shape::{Shape, Sort};
+use crate::stub;
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::world::World;
+
+/// The images that a machine runs from.
+#[derive(Default)]
+pub(crate) struct Images(Vec<Image>);
+
+/// One image, and what was made of it.
+struct Image {
+    module: Arc<ModuleImage>,
+    packages: Vec<Arc<str>>,
+    definitions: Definitions,
+    /// Symbol objects by number in the image, [`Value::UNSUPPLIED`] where there is none yet.
+    symbols: Value,
+    /// Values of the pool, likewise.
+    pool: Value,
+    /// Functions by number, likewise: for one without captures its Function, for one with captures its Code.
+    functions: Value,
+    /// The code of functions that were not called yet. Its owner is the number of the image; capture 0 of the function
+    /// is its number in the image.
+    lazy: Value,
+}
+
+impl Images {
+    /// Calls `visit` with everything that was made of the images.
+    pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
+        for image in &self.0 {
+            [image.symbols, image.pool, image.functions, image.lazy].into_iter().for_each(&mut *visit);
+        }
+    }
+
+    /// The definitions of `symbol`, and the number of the image that has them.
+    pub(crate) fn definition(&self, symbol: &Symbol) -> Option<(usize, Definition)> {
+        let find = |(number, image): (usize, &Image)| {
+            Some((number, image.definitions.find(&image.module, &image.packages, symbol)?))
+        };
+        self.0.iter().enumerate().find_map(find)
+    }
+
+    /// Decodes a function.
+    pub(crate) fn decode(&self, image: usize, function: u32) -> Option<Function> {
+        self.0.get(image)?.module.function(FunctionNumber(function)).ok()
+    }
+
+    /// Name of a source of an image.
+    fn source(&self, image: usize, source: u32) -> Option<String> {
+        self.0.get(image)?.module.sources().ok()?.into_iter().nth(source as usize)
+    }
+}
+
+/// Takes an image in: a list of the functions that run its top-level forms, in order.
+///
+/// # Errors
+/// [`LoadError`].
+pub(crate) fn open(heap: &mut Heap, world: &mut World, module: Arc<ModuleImage>) -> Result<Value, LoadError> {
+    let number = world.images.0.len();
+    let packages = module.packages()?.into_iter().map(Arc::from).collect();
+    let shape = Shape::other(Sort::Lazy, 0);
+    let word = stub::word(stub::LAZY, 0);
+    let image = Image {
+        packages,
+        definitions: Definitions::of(&module)?,
+        symbols: heap.alloc_vector_filled(module.symbol_count(), Value::UNSUPPLIED)?,
+        pool: heap.alloc_vector_filled(module.constant_count(), Value::UNSUPPLIED)?,
+        functions: heap.alloc_vector_filled(module.function_count(), Value::UNSUPPLIED)?,
+        lazy: heap.alloc_stub(Value::NIL, Value::index(number), shape, 1, word)?,
+        module: module.clone(),
+    };
+    world.images.0.push(image);
+    let mut loader = ImageLoader { heap, world, image: number };
+    let mut toplevel = Vec::new();
+    for function in module.toplevel()? {
+        toplevel.push(loader.function(function)?);
+    }
+    Ok(heap.list(&toplevel)?)
+}
+
+/// The function of an image with this number, which has no captures.
+///
+/// # Errors
+/// As for every allocation.
+pub(crate) fn function(
+    heap: &mut Heap,
+    world: &mut World,
+    image: usize,
+    number: u32,
+) -> Result<Value, AllocError> {
+    ImageLoader { heap, world, image }.function(FunctionNumber(number))
+}
+
+/// Work on one image.
+struct ImageLoader<'a> {
+    heap: &'a mut Heap,
+    world: &'a mut World,
+    image: usize,
+}
+
+impl ImageLoader<'_> {
+    fn image(&self) -> &Image {
+        &self.world.images.0[self.image]
+    }
+
+    fn module(&self) -> Arc<ModuleImage> {
+        self.image().module.clone()
+    }
+
+    fn made(&self, table: Value, index: u32) -> Option<Value> {
+        let made = *self.heap.vector(table)?.get(index as usize)?;
+        if made == Value::UNSUPPLIED { None } else { Some(made) }
+    }
+
+    /// A function without captures: a stub, if nobody asked for it before.
+    fn function(&mut self, number: FunctionNumber) -> Result<Value, AllocError> {
+        let table = self.image().functions;
+        if let Some(function) = self.made(table, number.0) {
+            return Ok(function);
+        }
+        let function = self.heap.alloc_function(self.image().lazy, &[Value::index(number.0 as usize)])?;
+        self.heap.vector_set(table, number.0 as usize, function);
+        Ok(function)
+    }
+
+    fn symbol(&mut self, number: u32) -> Result<Value, LoadError> {
+        let table = self.image().symbols;
+        if let Some(object) = self.made(table, number) {
+            return Ok(object);
+        }
+        let module = self.module();
+        let record = module.symbol(number)?;
+        let symbol = match record.home {
+            SymbolHome::Package(package) => {
+                Symbol::new(&self.image().packages[package as usize], record.name)
+            }
+            SymbolHome::Uninterned(id) => Symbol::uninterned(id, record.name),
+        };
+        let object = self.world.intern(self.heap, &symbol)?;
+        self.heap.vector_set(table, number as usize, object);
+        Ok(object)
+    }
+
+    /// The value of a constant other than a function with captures. Data refer to earlier entries only, so a stack of
+    /// what is being made comes to an end.
+    fn constant(&mut self, index: PoolIdx) -> Result<Value, LoadError> {
+        let table = self.image().pool;
+        if let Some(value) = self.made(table, index.0) {
+            return Ok(value);
+        }
+        let module = self.module();
+        let mut under_way = vec![index];
+        while let Some(&next) = under_way.last() {
+            if self.made(table, next.0).is_some() {
+                // It was required more than once.
+                under_way.pop();
+                continue;
+            }
+            let height = under_way.len();
+            let record = module.constant(next)?;
+            match &record {
+                ConstantRecord::Cons(car, cdr) => self.require(table, [*car, *cdr], &mut under_way),
+                ConstantRecord::Vector(items) | ConstantRecord::Array(_, items) => {
+                    self.require(table, items.iter(), &mut under_way);
+                }
+                _ => {}
+            }
+            if under_way.len() > height {
+                continue;
+            }
+            let value = self.make(record, table)?;
+            self.heap.vector_set(table, next.0 as usize, value);
+            under_way.pop();
+        }
+        Ok(self.made(table, index.0).unwrap_or(Value::NIL))
+    }
+
+    /// Adds those of `parts` to `under_way` that are not made yet.
+    fn require(&self, table: Value, parts: impl IntoIterator<Item = PoolIdx>, under_way: &mut Vec<PoolIdx>) {
+        under_way.extend(parts.into_iter().filter(|part| self.made(table, part.0).is_none()));
+    }
+
+    /// Makes the value of a record whose parts are made.
+    fn make(&mut self, record: ConstantRecord<'_>, table: Value) -> Result<Value, LoadError> {
+        let pool = |heap: &Heap, PoolIdx(index): PoolIdx| {
+            heap.vector(table).and_then(|pool| pool.get(index as usize)).copied().unwrap_or(Value::NIL)
+        };
+        Ok(match record {
+            ConstantRecord::Nil => Value::NIL,
+            ConstantRecord::True => Value::T,
+            ConstantRecord::Symbol(number) | ConstantRecord::Class(number) => self.symbol(number)?,
+            ConstantRecord::Fixnum(value) => match Value::fixnum(value) {
+                Some(fixnum) => fixnum,
+                None => integer(self.heap, &value.into())?,
+            },
+            ConstantRecord::Integer(value) => integer(self.heap, &value)?,
+            ConstantRecord::Ratio(numerator, denominator) => ratio(self.heap, &numerator, &denominator)?,
+            ConstantRecord::Float(value) => self.heap.float(value)?,
+            ConstantRecord::Character(c) => character(c),
+            ConstantRecord::String(text) => self.heap.alloc_str(text)?,
+            ConstantRecord::Cons(car, cdr) => {
+                let (car, cdr) = (pool(self.heap, car), pool(self.heap, cdr));
+                self.heap.cons(car, cdr)?
+            }
+            ConstantRecord::Vector(items) => {
+                let items: Vec<Value> = items.iter().map(|item| pool(self.heap, item)).collect();
+                self.heap.alloc_vector(&items)?
+            }
+            ConstantRecord::Array(dimensions, items) => {
+                let items: Vec<Value> = items.iter().map(|item| pool(self.heap, item)).collect();
+                super::array(self.heap, &dimensions, &items)?
+            }
+            ConstantRecord::Function(number) => self.function(number)?,
+        })
+    }
+
+    /// The Code of a function, ready to run. Functions with captures that it makes closures of are made ready with it,
+    /// and those inside them.
+    fn code(&mut self, number: FunctionNumber) -> Result<Value, LoadError> {
+        let module = self.module();
+        let first = self.start(&module, number)?;
+        let mut to_fill = vec![(number, first)];
+        while let Some((number, code)) = to_fill.pop() {
+            for (index, constant) in module.function(number)?.constants.into_iter().enumerate() {
+                let ConstantRecord::Function(inner) = module.constant(constant)? else { continue };
+                if module.capture_count(inner)? == 0 {
+                    continue;
+                }
+                let table = self.image().functions;
+                let inner_code = match self.made(table, inner.0) {
+                    Some(code) => code,
+                    None => {
+                        let code = self.start(&module, inner)?;
+                        self.heap.vector_set(table, inner.0 as usize, code);
+                        to_fill.push((inner, code));
+                        code
+                    }
+                };
+                self.heap.code_set_constant(code, index, inner_code);
+            }
+        }
+        Ok(first)
+    }
+
+    /// A Code in which functions with captures are still missing among the constants.
+    fn start(&mut self, module: &ModuleImage, number: FunctionNumber) -> Result<Value, LoadError> {
+        let function = module.function(number)?;
+        let mut missing = None;
+        let constants = own_constants(&function, |index| {
+            let value = match module.constant(index) {
+                Ok(ConstantRecord::Function(inner)) => match module.capture_count(inner) {
+                    Ok(0) => self.function(inner).map_err(LoadError::from),
+                    Ok(_) => Ok(Value::NIL),
+                    Err(error) => Err(error.into()),
+                },
+                _ => self.constant(index),
+            };
+            value.unwrap_or_else(|error| {
+                missing = Some(error);
+                Value::NIL
+            })
+        });
+        if let Some(error) = missing {
+            return Err(error);
+        }
+        let name = match function.name {
+            Some(index) => self.constant(index)?,
+            None => Value::NIL,
+        };
+        let debug = Value::index(number.0 as usize);
+        let parts = Parts { function: &function, constants: &constants, name, debug };
+        // The image is part of this program: its build has verified it.
+        Ok(make_code(self.heap, &Verified(()), &parts, Value::index(self.image))?)
+    }
+}
+
+/// The number of image and function behind the stub or the code of a function of an image.
+pub(super) fn origin(heap: &Heap, function: Value) -> Option<(usize, u32)> {
+    let code = heap.code(heap.function_code(function)?)?;
+    let image = code.owner.as_index()?;
+    let number = match Shape::unpack(code.spare[0]).sort {
+        Sort::Lazy => heap.function_captures(function)?.first()?.as_index()?,
+        _ => code.debug.as_index()?,
+    };
+    Some((image, number as u32))
+}
+
+impl Vm {
+    /// Puts the code of a function of an image in place of its stub.
+    ///
+    /// # Errors
+    /// [`Exit::Collect`] without room, or a failure if the image is damaged.
+    pub(crate) fn make_ready(&mut self, function: Value) -> Result<(), Exit> {
+        let is_lazy = self
+            .heap
+            .function_code(function)
+            .and_then(|code| self.heap.code(code))
+            .is_some_and(|code| Shape::unpack(code.spare[0]).sort == Sort::Lazy);
+        let Some((image, number)) = origin(&self.heap, function).filter(|_| is_lazy) else { return Ok(()) };
+        let mut loader = ImageLoader { heap: &mut self.heap, world: &mut self.world, image };
+        let code = loader.code(FunctionNumber(number));
+        let code = self.loaded(code)?;
+        self.heap.function_set_code(function, code);
+        self.charge(self.heap.code_words(code).map_or(0, <[u32]>::len));
+        Ok(())
+    }
+}
+
+/// Where word `pc` of a code of an image was written.
+pub(super) fn place_of(heap: &Heap, world: &World, code: Value, pc: u32) -> Option<debug::SourcePlace> {
+    let parts = heap.code(code)?;
+    let (image, number) = (parts.owner.as_index()?, parts.debug.as_index()?);
+    let function = world.images.decode(image, number as u32)?;
+    let entry = debug::entry_at(function.lines.into_iter(), pc)?;
+    let source = world.images.source(image, entry.source)?;
+    Some(debug::SourcePlace { source, line: entry.line, column: entry.column })
+}

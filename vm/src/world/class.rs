@@ -1,0 +1,202 @@
+//! Classes of structures and conditions.
+//!
+//! A Class is a record; [`slot`] names its slots. Every class has a *line*: the chain of first superclasses, from the
+//! root down to itself, as a simple vector. `A` is on the line of `B` exactly when the element of that vector at `A`'s
+//! depth is `A`, so the common test for a subclass is a few loads. Conditions may have several superclasses; what they
+//! inherit beside the line is in a list.
+//!
+//! Guarantees: a class of which instances exist never changes its slots. Defining a name again with the same
+//! superclasses and slots keeps the class, else the name gets a new one, and old instances stay what they are.
+
+use crate::heap::{AllocError, Heap, Kind};
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::world::World;
+
+/// Slots of a Class.
+pub(crate) mod slot {
+    /// Its name, a symbol.
+    pub(crate) const NAME: usize = 0;
+    /// List of its direct superclasses.
+    pub(crate) const SUPERS: usize = 1;
+    /// Simple vector of the classes on its line, itself last.
+    pub(crate) const LINE: usize = 2;
+    /// Index of itself in that vector.
+    pub(crate) const DEPTH: usize = 3;
+    /// List of the superclasses that are not on its line, direct or not.
+    pub(crate) const OTHERS: usize = 4;
+    /// List of the names of its slots, inherited ones first.
+    pub(crate) const SLOTS: usize = 5;
+    /// Number of its slots.
+    pub(crate) const COUNT: usize = 6;
+    /// What the library keeps about it.
+    pub(crate) const DATA: usize = 7;
+    /// How many slots a Class has.
+    pub(crate) const LEN: usize = 8;
+}
+
+/// The longest line. A program that goes beyond has lost its way, and the line of each class is a copy.
+pub(crate) const MAX_DEPTH: usize = 200;
+
+impl World {
+    /// The class of this name, a symbol.
+    pub(crate) fn find_class(&self, name: Value) -> Option<Value> {
+        self.classes.get(&name.bits()).copied()
+    }
+
+    /// Defines a class: of a symbol, Classes, names of slots (symbols), and data of the library.
+    ///
+    /// # Errors
+    /// As for every allocation; nothing is defined then.
+    pub(crate) fn define_class(
+        &mut self,
+        heap: &mut Heap,
+        name: Value,
+        supers: &[Value],
+        slots: &[Value],
+        data: Value,
+    ) -> Result<Value, AllocError> {
+        if let Some(class) = self.find_class(name)
+            && is_same_layout(heap, class, supers, slots)
+        {
+            heap.record_set(class, Kind::Class, slot::DATA, data);
+            return Ok(class);
+        }
+        let mut line = supers.first().map_or(Vec::new(), |&first| line_of(heap, first).to_vec());
+        let mut others: Vec<Value> = Vec::new();
+        for &class in supers {
+            for ancestor in ancestors(heap, class) {
+                if !line.contains(&ancestor) && !others.contains(&ancestor) {
+                    others.push(ancestor);
+                }
+            }
+        }
+        let depth = line.len();
+        line.push(Value::NIL);
+        let line = heap.alloc_vector(&line)?;
+        let mut record = [Value::NIL; slot::LEN];
+        record[slot::NAME] = name;
+        record[slot::SUPERS] = heap.list(supers)?;
+        record[slot::LINE] = line;
+        record[slot::DEPTH] = Value::index(depth);
+        record[slot::OTHERS] = heap.list(&others)?;
+        record[slot::SLOTS] = heap.list(slots)?;
+        record[slot::COUNT] = Value::index(slots.len());
+        record[slot::DATA] = data;
+        let class = heap.alloc_record(Kind::Class, 0, 0, &record)?;
+        heap.vector_set(line, depth, class);
+        if let Some(old) = self.classes.insert(name.bits(), class) {
+            heap.log_if_marking(old);
+        }
+        Ok(class)
+    }
+
+    /// Whether `class` is `ancestor` or inherits from it. False for what is no class.
+    #[inline]
+    pub(crate) fn is_subclass(&self, heap: &Heap, class: Value, ancestor: Value) -> bool {
+        if class == ancestor {
+            return heap.is(class, Kind::Class);
+        }
+        let Some(record) = heap.record(ancestor, Kind::Class) else { return false };
+        let depth = record[slot::DEPTH].as_index().unwrap_or(usize::MAX);
+        line_of(heap, class).get(depth) == Some(&ancestor)
+            || list(heap, class_slot(heap, class, slot::OTHERS)).any(|other| other == ancestor)
+    }
+}
+
+/// A slot of a Class; `NIL` for what is none.
+pub(crate) fn class_slot(heap: &Heap, class: Value, index: usize) -> Value {
+    heap.record(class, Kind::Class).map_or(Value::NIL, |record| record[index])
+}
+
+fn line_of(heap: &Heap, class: Value) -> &[Value] {
+    heap.vector(class_slot(heap, class, slot::LINE)).unwrap_or(&[])
+}
+
+/// A class and all that it inherits from.
+fn ancestors(heap: &Heap, class: Value) -> impl Iterator<Item = Value> {
+    let line = line_of(heap, class).iter().rev().copied();
+    line.chain(list(heap, class_slot(heap, class, slot::OTHERS)))
+}
+
+/// The items of a list of the machine's own, which is proper.
+fn list(heap: &Heap, list: Value) -> impl Iterator<Item = Value> {
+    let mut rest = list;
+    std::iter::from_fn(move || {
+        let pair = heap.as_cons(rest)?;
+        rest = pair.cdr;
+        Some(pair.car)
+    })
+}
+
+fn is_same_layout(heap: &Heap, class: Value, supers: &[Value], slots: &[Value]) -> bool {
+    list(heap, class_slot(heap, class, slot::SUPERS)).eq(supers.iter().copied())
+        && list(heap, class_slot(heap, class, slot::SLOTS)).eq(slots.iter().copied())
+}
+
+impl Vm {
+    /// The class of this name.
+    pub(crate) fn find_class(&self, name: Value) -> Option<Value> {
+        self.world.find_class(name)
+    }
+
+    /// The name of a class; `NIL` for what is none.
+    pub(crate) fn class_name(&self, class: Value) -> Value {
+        class_slot(&self.heap, class, slot::NAME)
+    }
+
+    /// Whether `value` is an instance of `class`, or of a class that inherits from it.
+    #[inline]
+    pub(crate) fn is_instance(&self, value: Value, class: Value) -> bool {
+        let own = self.heap.structure_class(value);
+        own.is_some_and(|own| self.world.is_subclass(&self.heap, own, class))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn world() -> (Heap, World) {
+        let mut heap = Heap::for_tests();
+        let world = World::new(&mut heap).unwrap();
+        (heap, world)
+    }
+
+    fn define(heap: &mut Heap, world: &mut World, name: &str, supers: &[Value], slots: &[&str]) -> Value {
+        let name = world.intern_esl(heap, name).unwrap();
+        let slots: Vec<Value> = slots.iter().map(|slot| world.intern_esl(heap, slot).unwrap()).collect();
+        world.define_class(heap, name, supers, &slots, Value::NIL).unwrap()
+    }
+
+    #[test]
+    fn a_subclass_is_told_by_its_line_or_its_other_ancestors() {
+        let (mut heap, mut world) = world();
+        let root = define(&mut heap, &mut world, "ROOT", &[], &[]);
+        let left = define(&mut heap, &mut world, "LEFT", &[root], &[]);
+        let right = define(&mut heap, &mut world, "RIGHT", &[root], &[]);
+        let both = define(&mut heap, &mut world, "BOTH", &[left, right], &[]);
+        let below = define(&mut heap, &mut world, "BELOW", &[both], &[]);
+        let all = [root, left, right, both, below];
+        let expected = ["*....", "**...", "*.*..", "****.", "*****"];
+        for (class, row) in all.iter().zip(expected) {
+            let found: String = all
+                .iter()
+                .map(|&ancestor| if world.is_subclass(&heap, *class, ancestor) { '*' } else { '.' })
+                .collect();
+            assert_eq!(found, row);
+        }
+        assert!(!world.is_subclass(&heap, Value::NIL, Value::NIL));
+    }
+
+    #[test]
+    fn a_class_is_kept_when_it_is_defined_again_with_the_same_slots() {
+        let (mut heap, mut world) = world();
+        let point = define(&mut heap, &mut world, "POINT", &[], &["X", "Y"]);
+        assert_eq!(define(&mut heap, &mut world, "POINT", &[], &["X", "Y"]), point);
+        let other = define(&mut heap, &mut world, "POINT", &[], &["X", "Y", "Z"]);
+        assert_ne!(other, point);
+        let name = class_slot(&heap, point, slot::NAME);
+        assert_eq!(world.find_class(name), Some(other));
+    }
+}
