@@ -326,16 +326,18 @@ fn describe_arity(min: usize, max: Option<u32>) -> String {
 /// Gives a new task its first frame: a starter that calls `function` with the list of arguments in its place.
 pub(crate) fn first_frame(task: &mut Task, starter: Value, function: Value, arguments: Value) {
     let stub = super::stubs::task_exit();
-    // SAFETY: a new stack has room for the link and the three registers of the starter, which is bytecode.
+    // SAFETY: a new stack has room for two links and the three registers of the starter, which is bytecode.
     unsafe {
         let start = task.stack.start();
+        // A link for the frame that the stub at the end of the task runs in.
         *start = starter;
-        *start.add(1) = Value::from_bits(stub.expose_provenance() as u64);
-        *start.add(2) = function;
-        *start.add(4) = arguments;
+        *start.add(2) = starter;
+        *start.add(3) = Value::from_bits(stub.expose_provenance() as u64);
+        *start.add(4) = function;
+        *start.add(6) = arguments;
         task.pc = (*code_of(starter)).entry;
     }
-    task.base = 2;
+    task.base = 4;
 }
 
 /// Lets go of everything that a task that has ended holds on its stacks.

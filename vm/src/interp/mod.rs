@@ -20,6 +20,8 @@ mod collect;
 mod control;
 mod raise;
 pub(crate) mod stubs;
+#[cfg(test)]
+mod tests;
 
 use esl_bytecode::for_each_opcode;
 

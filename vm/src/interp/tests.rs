@@ -1,0 +1,184 @@
+//! The loop on programs assembled by hand: calls, ticks, unwinding, tasks that take turns.
+
+use esl_bytecode::module::{Constant, Function, FunctionNumber, Module, Parameters, PoolIdx};
+use esl_bytecode::opcode::Instr;
+use esl_bytecode::operand::*;
+use esl_bytecode::symbol::Symbol;
+
+use crate::host::VirtualHost;
+use crate::load::{Alone, load};
+use crate::run::RunOutcome;
+use crate::task::TaskResult;
+use crate::value::Value;
+use crate::vm::{Config, Vm};
+
+/// A machine without a library.
+fn machine(config: Config) -> Vm {
+    Vm::new(config, Box::new(VirtualHost::new())).expect("there is room for an empty machine")
+}
+
+/// A function of some required parameters.
+fn function(required: u8, registers: u8, constants: &[u32], code: &[Instr]) -> Function {
+    let code = code.iter().flat_map(|instruction| {
+        let (word, aux) = instruction.encode();
+        std::iter::once(word).chain(aux)
+    });
+    Function {
+        parameters: Parameters::exactly(required),
+        registers,
+        constants: constants.iter().map(|&index| PoolIdx(index)).collect(),
+        code: code.collect(),
+        ..Function::default()
+    }
+}
+
+/// Loads the functions as a module of which the first runs at top level. Its pool is the symbol `F`, then the functions
+/// from the second on.
+fn install(vm: &mut Vm, functions: Vec<Function>) -> Value {
+    let mut constants = vec![Constant::Symbol(Symbol::esl("F"))];
+    constants.extend((1..functions.len()).map(|number| Constant::Function(FunctionNumber(number as u32))));
+    let module = Module {
+        constants,
+        functions,
+        toplevel: vec![FunctionNumber(0)],
+        ..Module::default()
+    };
+    let list = load(&mut vm.heap, &mut vm.world, &module, &mut Alone::default()).expect("the module is in order");
+    let toplevel = vm.heap.car(list).expect("one top-level function");
+    vm.pin(toplevel);
+    toplevel
+}
+
+/// `(f n)` with the naive definition of the Fibonacci numbers, defined as the second function of a module.
+fn fibonacci(vm: &mut Vm, n: i16) -> Value {
+    let main = function(
+        0,
+        4,
+        &[1, 0],
+        &[
+            Instr::LoadInt { dst: Dst(2), value: Int16(n) },
+            Instr::MakeClosure { dst: Dst(0), function: FunctionIdx(0) },
+            Instr::TailCall { window: Base(0), count: Count(1), pad: Pad(0) },
+        ],
+    );
+    let fib = function(
+        1,
+        5,
+        &[],
+        &[
+            Instr::JumpNotLessInt { left: Reg(0), value: Int16(2), to: Jump(1) },
+            Instr::Return { src: Reg(0) },
+            Instr::AddInt { dst: Dst(3), left: Reg(0), value: Int8(-1) },
+            Instr::CallSelf { window: Base(1), count: Count(1), want: Want::ONE, pad: Pad(0) },
+            Instr::AddInt { dst: Dst(4), left: Reg(0), value: Int8(-2) },
+            Instr::CallSelf { window: Base(2), count: Count(1), want: Want::ONE, pad: Pad(0) },
+            Instr::Add { dst: Dst(1), left: Reg(1), right: Reg(2) },
+            Instr::Return { src: Reg(1) },
+        ],
+    );
+    install(vm, vec![main, fib])
+}
+
+/// A loop that never ends.
+fn endless(vm: &mut Vm) -> Value {
+    install(vm, vec![function(0, 1, &[], &[Instr::Loop { to: Back24(-1) }])])
+}
+
+#[test]
+fn calls_return_their_values() {
+    let mut vm = machine(Config::default());
+    let main = fibonacci(&mut vm, 20);
+    assert_eq!(vm.call(main, &[], u64::MAX), Ok(vec![Value::small(6765)]));
+}
+
+#[test]
+fn a_run_takes_the_same_ticks_however_it_is_cut() {
+    let ticks = |slice, collect_always| {
+        let mut vm = machine(Config { slice, collect_always, ..Config::default() });
+        let main = fibonacci(&mut vm, 12);
+        let id = vm.spawn(main, &[]).unwrap();
+        assert_eq!(vm.run(u64::MAX), RunOutcome::Done);
+        assert_eq!(vm.result(id), TaskResult::Succeeded(vec![Value::small(144)]));
+        vm.ticks()
+    };
+    let expected = ticks(2000, false);
+    // 465 calls of the function, one of the top level, one of the starter.
+    assert_eq!(expected, 466);
+    for slice in [1, 2, 7, 100] {
+        assert_eq!(ticks(slice, false), expected, "slice {slice}");
+        assert_eq!(ticks(slice, true), expected, "slice {slice}, collecting");
+    }
+}
+
+#[test]
+fn the_budget_of_a_run_is_spent_to_the_tick() {
+    for slice in [1, 3, 2000] {
+        let mut vm = machine(Config { slice, budget: Some(12_345), ..Config::default() });
+        let main = endless(&mut vm);
+        vm.spawn(main, &[]).unwrap();
+        assert_eq!(vm.run(u64::MAX), RunOutcome::BudgetSpent);
+        assert_eq!(vm.ticks(), 12_345);
+    }
+}
+
+#[test]
+fn an_endless_loop_lets_others_run_and_can_be_aborted() {
+    let mut vm = machine(Config::default());
+    let main = endless(&mut vm);
+    let first = vm.spawn(main, &[]).unwrap();
+    let second = vm.spawn(main, &[]).unwrap();
+    assert_eq!(vm.run(100_000), RunOutcome::TicksUsed);
+    assert_eq!(vm.ticks_of(first), 50_000);
+    assert_eq!(vm.ticks_of(second), 50_000);
+    vm.abort(first);
+    assert_eq!(vm.run(10_000), RunOutcome::TicksUsed);
+    assert_eq!(vm.result(first), TaskResult::Aborted);
+    assert_eq!(vm.result(second), TaskResult::Running);
+    assert!(vm.ticks_of(first) <= 50_000);
+}
+
+#[test]
+fn a_throw_runs_the_cleanups_between_it_and_its_catch() {
+    // (catch tag (unwind-protect (throw tag 7) (setq x 5))) => 7, x => 5
+    let main = function(
+        0,
+        6,
+        &[],
+        &[
+            Instr::LoadInt { dst: Dst(0), value: Int16(0) },
+            Instr::NewTag { dst: Dst(1) },
+            Instr::PushCatch { window: Base(2), tag: Reg(1), want: Want::ONE, to: Jump(10) },
+            Instr::PushCleanup { window: Base(3), to: Jump(4) },
+            Instr::LoadInt { dst: Dst(3), value: Int16(7) },
+            Instr::SetValues { first: Base(3), count: Count(1) },
+            Instr::Throw { tag: Reg(1), kind: Count(0) },
+            Instr::EnterCleanup {},
+            Instr::LoadInt { dst: Dst(0), value: Int16(5) },
+            Instr::EndCleanup {},
+            Instr::LoadNil { first: Base(2), count: Count(1) },
+            Instr::PopControl { count: Count(1) },
+            Instr::Move { dst: Dst(3), src: Reg(0) },
+            Instr::ReturnValues { first: Base(2), count: Count(2) },
+        ],
+    );
+    let mut vm = machine(Config::default());
+    let main = install(&mut vm, vec![main]);
+    assert_eq!(vm.call(main, &[], u64::MAX), Ok(vec![Value::small(7), Value::small(5)]));
+}
+
+#[test]
+fn without_a_library_a_failure_ends_the_task_and_says_why() {
+    let car = function(
+        0,
+        2,
+        &[],
+        &[
+            Instr::LoadInt { dst: Dst(0), value: Int16(5) },
+            Instr::Car { dst: Dst(0), list: Reg(0) },
+            Instr::Return { src: Reg(0) },
+        ],
+    );
+    let mut vm = machine(Config::default());
+    let main = install(&mut vm, vec![car]);
+    assert_eq!(vm.call(main, &[], u64::MAX), Err(":TYPE-ERROR 5 LIST".into()));
+}
