@@ -4,10 +4,12 @@
 //! verifier and disassembler, literal data, and the traits by which each calls on the other.
 #![forbid(unsafe_code)]
 
+pub mod assembler;
 pub mod builtin;
 pub mod compile;
 pub mod datum;
 pub mod diagnostic;
+pub mod disasm;
 pub mod file;
 pub mod link;
 pub mod module;

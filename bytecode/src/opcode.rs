@@ -436,6 +436,17 @@ macro_rules! define_opcodes {
                     $( Instr::$name { $( $field ),* } => { $( visit($field.role()); )* } )*
                 }
             }
+
+            /// Calls `visit` with each operand's type, as its operand newtype is called, its text and its role.
+            pub fn visit_texts(&self, mut visit: impl FnMut(&'static str, &dyn fmt::Display, Role)) {
+                #[allow(unused, reason = "some instructions have no operands")]
+                let visit = &mut visit;
+                match *self {
+                    $( Instr::$name { $( $field ),* } => {
+                        $( visit(stringify!($ty), &$field, $field.role()); )*
+                    } )*
+                }
+            }
         }
 
         impl fmt::Display for Instr {
