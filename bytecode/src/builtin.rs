@@ -308,4 +308,19 @@ define_builtins! {
     SetSlotOf = internal "%SET-SLOT" ("class index instance value");
     /// Whether `object` is an instance of the structure class named `class` or a subclass.
     IsInstance = internal "%INSTANCE-P" ("class object");
+
+    // ---- failures and the control stack
+    /// How many entries the control stack has.
+    ControlHeight = internal "%CONTROL-HEIGHT" ("");
+    /// The innermost handlers below `height` that no mask hides: index of the entry, whether it is one of cases, and its
+    /// types, or its list of `(type . function)`. `NIL` if there are none.
+    NextHandler = internal "%NEXT-HANDLER" ("height");
+    /// Unwinds to the entry with this index, of the cases of a `handler-case`, and has one of them take the condition.
+    TakeCase = internal "%TAKE-CASE" ("index case condition");
+    /// Ends the running task as failed, with this condition.
+    EndTask = internal "%END-TASK" ("condition");
+    /// Ends the run with this status, from 0 to 255. The remaining tasks are aborted.
+    Exit = internal "%EXIT" ("status");
+    /// The innermost `limit` frames, each a list of the function's name, and source, line and column if known.
+    Backtrace = internal "%BACKTRACE" ("limit");
 }

@@ -309,4 +309,10 @@ impl crate::vm::Vm {
             Err(error) => self.raise(error.into()),
         }
     }
+
+    /// Where word `pc` of a code was written.
+    pub(crate) fn source_place(&self, code: Value, pc: u32) -> Option<SourcePlace> {
+        image::place_of(&self.heap, &self.world, code, pc)
+            .or_else(|| debug::place_of(&self.heap, self.heap.code(code)?.debug, pc))
+    }
 }

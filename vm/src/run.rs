@@ -118,6 +118,12 @@ impl Vm {
         }
     }
 
+    /// Asks for the end of every task but the running one.
+    pub(crate) fn abort_others(&mut self) {
+        let others: Vec<TaskId> = self.tasks.keys().collect();
+        others.into_iter().for_each(|id| self.abort(id));
+    }
+
     /// Makes a task runnable that waits for something from outside: the instruction at which it waits is done again.
     pub(crate) fn wake(&mut self, id: TaskId) {
         if let Some(Some(task)) = self.tasks.get_mut(id)

@@ -98,6 +98,9 @@ pub struct Vm {
     /// The text of a failure that no library was there to deal with.
     pub(crate) last_words: Option<String>,
 
+    /// The status that the program has asked to end with.
+    pub(crate) exit_status: Option<u8>,
+
     /// Limits and settings.
     pub(crate) config: Config,
 }
@@ -140,6 +143,7 @@ impl Vm {
             charged: 0,
             collected_at: None,
             last_words: None,
+            exit_status: None,
             config,
         })
     }
@@ -192,6 +196,11 @@ impl Vm {
     /// A flag that makes the machine abort a task at the end of its slice when it is set.
     pub fn interrupt_flag(&self) -> Arc<AtomicBool> {
         self.interrupt.clone()
+    }
+
+    /// The status that the program has asked to end with.
+    pub fn exit_status(&self) -> Option<u8> {
+        self.exit_status
     }
 
     /// Names the task that an interrupt aborts.

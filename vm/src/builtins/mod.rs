@@ -41,8 +41,19 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::SetMacro => define::set_macro,
         Builtin::ProclaimSpecial => define::proclaim_special,
         Builtin::DefineConstant => define::define_constant,
+        Builtin::Funcall => control::funcall,
+        Builtin::Apply => control::apply,
+        Builtin::Values => control::values,
+        Builtin::ValuesList => control::values_list,
+        Builtin::ControlHeight => control::control_height,
+        Builtin::NextHandler => control::next_handler,
+        Builtin::TakeCase => control::take_case,
+        Builtin::EndTask => control::end_task,
+        Builtin::Exit => control::exit,
+        Builtin::Backtrace => control::backtrace,
     }
 }
 
+mod control;
 mod define;
 mod stream;

@@ -187,8 +187,8 @@ pub(crate) struct FrameAt {
     pub function: Value,
     /// Word of its code at which it stands: at the instruction, or for a caller behind the call.
     pub word: usize,
-    /// Whether a failure of this frame's instruction is being handled above it.
-    pub is_failing: bool,
+    /// Whether `word` is that of the instruction itself, because it is the one that runs, or one that failed.
+    pub is_exact: bool,
 }
 
 impl Vm {
@@ -198,7 +198,7 @@ impl Vm {
         let mut frames = Vec::new();
         let Some(task) = self.running.as_ref() else { return frames };
         let (mut pc, mut base) = (self.cpu.pc, self.cpu.base);
-        let mut is_failing = false;
+        let mut is_exact = true;
         // SAFETY: frames are linked as `call` and the loop link them, down to the root, whose link is a stub's.
         unsafe {
             while frames.len() < limit && base.addr() >= task.stack.start().addr() + 2 * size_of::<Value>() {
@@ -206,16 +206,16 @@ impl Vm {
                 let code = code_of(function);
                 let start = code.byte_add((*code).words_offset()).cast::<u32>().cast_const();
                 let word = pc.addr().wrapping_sub(start.addr()) / size_of::<u32>();
-                frames.push(FrameAt { function, word, is_failing });
+                frames.push(FrameAt { function, word, is_exact });
                 let return_to: *const u32 = std::ptr::with_exposed_provenance((*base.sub(1)).bits() as usize);
                 if return_to == stubs::task_exit() {
                     break;
                 }
                 let window = (*return_to.sub(2) >> 8 & 0xff) as usize;
                 base = base.sub(2 + window);
-                is_failing = stubs::is_error_return(return_to);
+                is_exact = stubs::is_error_return(return_to);
                 pc = return_to;
-                if is_failing {
+                if is_exact {
                     let nregs = (*code_of(*base.sub(2))).nregs as usize;
                     pc = std::ptr::with_exposed_provenance((*base.add(nregs)).bits() as usize);
                 }

@@ -1,0 +1,130 @@
+//! Calls, multiple values, and what the library needs to signal a failure: the handlers on the control stack, the end of
+//! a task, backtraces.
+
+use crate::control::End;
+use crate::interp::call::MAX_SPREAD;
+use crate::raise::{Exit, Outcome, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// `(funcall function &rest arguments)`
+pub(super) fn funcall(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.request_call(arguments[0], &arguments[1..]);
+    Err(Exit::Call)
+}
+
+/// `(apply function argument &rest arguments)`
+pub(super) fn apply(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (&list, given) = arguments[1..].split_last().expect("the table asks for two arguments");
+    let mut spread = given.to_vec();
+    let mut rest = list;
+    while let Some(pair) = vm.heap.as_cons(rest) {
+        if spread.len() == MAX_SPREAD {
+            return vm.program_error(format!("more than {MAX_SPREAD} arguments"));
+        }
+        spread.push(pair.car);
+        rest = pair.cdr;
+    }
+    if rest.is_true() {
+        return vm.type_error(list, "LIST");
+    }
+    vm.charge(spread.len());
+    vm.request_call(arguments[0], &spread);
+    Err(Exit::Call)
+}
+
+/// `(values &rest values)`
+pub(super) fn values(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.values.clear();
+    vm.values.extend_from_slice(arguments);
+    Err(Exit::Values)
+}
+
+/// `(values-list list)`
+pub(super) fn values_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let mut rest = arguments[0];
+    vm.values.clear();
+    while let Some(pair) = vm.heap.as_cons(rest) {
+        if vm.values.len() == MAX_SPREAD {
+            return vm.program_error(format!("more than {MAX_SPREAD} values"));
+        }
+        vm.values.push(pair.car);
+        rest = pair.cdr;
+    }
+    if rest.is_true() {
+        return vm.type_error(arguments[0], "LIST");
+    }
+    vm.charge(vm.values.len());
+    Err(Exit::Values)
+}
+
+/// `(%control-height)`: how many entries the control stack has, for `%next-handler` and `%with-mask`.
+pub(super) fn control_height(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    Ok(Value::index(vm.task().control.entries.len()))
+}
+
+/// `(%next-handler height)`
+pub(super) fn next_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(height) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
+    let mut steps = 0;
+    let found = vm.task().control.find_handlers(height, &mut steps);
+    vm.charge(steps);
+    let Some(found) = found else { return Ok(Value::NIL) };
+    vm.values.clear();
+    vm.values.extend([Value::index(found.index), Value::boolean(found.is_case), found.data]);
+    Err(Exit::Values)
+}
+
+/// `(%take-case index case condition)`
+pub(super) fn take_case(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    use crate::control::{EntryKind, Target, Unwinding};
+    let Some(index) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
+    let control = &mut vm.task_mut().control;
+    match control.entries.get(index) {
+        Some(entry) if entry.kind == EntryKind::HandlerCase => {
+            let values = arguments[1..].to_vec();
+            control.unwinding = Some(Unwinding { target: Target::Entry(index), values });
+            Err(Exit::Unwind)
+        }
+        _ => vm.raise(Raised::Control("the handlers to take a condition are no longer there".into())),
+    }
+}
+
+/// `(%end-task condition)`
+pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.begin_end(End::Failed(arguments[0]));
+    Err(Exit::Unwind)
+}
+
+/// `(%exit status)`
+pub(super) fn exit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let status = arguments[0].as_index().and_then(|status| u8::try_from(status).ok());
+    let Some(status) = status else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
+    vm.exit_status = Some(status);
+    vm.abort_others();
+    vm.begin_end(End::Aborted);
+    Err(Exit::Unwind)
+}
+
+/// `(%backtrace limit)`
+pub(super) fn backtrace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let limit = arguments[0].as_index().unwrap_or(usize::MAX).min(super::LIMIT);
+    let mut rows = Vec::new();
+    for frame in vm.frames(limit) {
+        let Some(code) = vm.heap.function_code(frame.function) else { continue };
+        let name = vm.heap.code(code).map_or(Value::NIL, |code| code.name);
+        // A caller stands behind its call.
+        let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
+        let row = match vm.source_place(code, word as u32) {
+            Some(place) => {
+                let source = vm.heap.alloc_str(&place.source)?;
+                let (line, column) = (Value::index(place.line as usize), Value::index(place.column as usize));
+                vm.heap.list(&[name, source, line, column])?
+            }
+            None => vm.heap.list(&[name])?,
+        };
+        rows.push(row);
+    }
+    vm.charge(rows.len() * 64);
+    Ok(vm.heap.list(&rows)?)
+}
