@@ -12,6 +12,7 @@ pub mod value;
 pub mod vm;
 
 mod control;
+mod datum;
 mod describe;
 mod interp;
 mod load;

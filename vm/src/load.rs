@@ -25,6 +25,7 @@ use crate::raise::{Exit, Raised};
 use crate::shape::{Shape, Sort, capture_word};
 use crate::stub;
 use crate::value::Value;
+use crate::vm::Vm;
 use crate::world::World;
 
 mod debug;
@@ -300,7 +301,16 @@ impl From<LoadError> for Raised {
     }
 }
 
-impl crate::vm::Vm {
+impl Vm {
+    /// Where in the source word `pc` of a code was written.
+    pub(crate) fn source_place(&self, code: Value, pc: u32) -> Option<SourcePlace> {
+        let parts = self.heap.code(code)?;
+        if parts.owner.is_fixnum() {
+            return image::place_of(&self.heap, &self.world, code, pc);
+        }
+        debug::place_of(&self.heap, parts.debug, pc)
+    }
+
     /// Gives what became of a load to the program: no room means that the operation is done again after a collection.
     pub(crate) fn loaded<T>(&mut self, result: Result<T, LoadError>) -> Result<T, Exit> {
         match result {

@@ -9,6 +9,7 @@
 //! *companion* objects, which [`World::object_of`] gives.
 //! Not here: what may be redefined is asked by the builtins; values of task-local bindings (`control`).
 
+use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 use std::sync::Arc;
@@ -62,7 +63,9 @@ pub(crate) struct World {
     /// The objects of symbols that have a package.
     symbols: GivenMap<Symbol, Value>,
     /// The names of symbol objects, by address: filled when somebody asks.
-    names: GivenMap<u64, Symbol>,
+    names: RefCell<GivenMap<u64, Symbol>>,
+    /// The next number for an uninterned symbol of the compiler.
+    fresh: Cell<u32>,
     /// The objects of packages.
     package_objects: HashMap<Arc<str>, Value>,
     /// The companions of `NIL` and `T`.
@@ -88,7 +91,8 @@ impl World {
             known: Known::NONE,
             is_open: true,
             symbols: GivenMap::default(),
-            names: GivenMap::default(),
+            names: RefCell::default(),
+            fresh: Cell::new(0),
             package_objects: HashMap::new(),
             nil: Value::NIL,
             t: Value::NIL,
@@ -263,22 +267,26 @@ impl World {
     }
 
     /// The name of a symbol as the compiler knows it. `None` if `v` is no symbol, or one without a package.
-    pub(crate) fn name_of(&mut self, heap: &Heap, v: Value) -> Option<Symbol> {
+    pub(crate) fn name_of(&self, heap: &Heap, v: Value) -> Option<Symbol> {
         let object = self.object_of(heap, v)?;
-        if let Some(symbol) = self.names.get(&object.bits()) {
+        if let Some(symbol) = self.names.borrow().get(&object.bits()) {
             return Some(symbol.clone());
         }
-        let symbol = self.read_name(heap, object)?;
-        self.names.insert(object.bits(), symbol.clone());
+        let symbol = heap.symbol(object)?;
+        let home: Arc<str> = self.package_name(heap, symbol.package)?.into();
+        let symbol = Symbol::new(&home, &heap.string_text(symbol.name)?);
+        // Only interned symbols live as long as the table.
+        if self.symbols.contains_key(&symbol) {
+            self.names.borrow_mut().insert(object.bits(), symbol.clone());
+        }
         Some(symbol)
     }
 
-    /// As [`World::name_of`], without remembering it.
-    pub(crate) fn read_name(&self, heap: &Heap, v: Value) -> Option<Symbol> {
-        let object = self.object_of(heap, v)?;
-        let symbol = heap.symbol(object)?;
-        let home: Arc<str> = self.package_name(heap, symbol.package)?.into();
-        Some(Symbol::new(&home, &heap.string_text(symbol.name)?))
+    /// A number for a fresh uninterned symbol of the compiler.
+    pub(crate) fn fresh(&self) -> u32 {
+        let number = self.fresh.get();
+        self.fresh.set(number.wrapping_add(1));
+        number
     }
 
     /// The name of a package object.

@@ -1,0 +1,426 @@
+//! Between the data of the compiler and the objects of the program, both ways, with identity.
+//!
+//! A [`Unit`] is what one compilation remembers: which object was made from which datum and the other way round, so that
+//!
+//! * parts of a form that a macro passes through come back as the data that they were, with their spans;
+//! * what is shared stays shared, and an uninterned symbol stays the same symbol, whichever way it goes;
+//! * an object that no datum can describe goes as a number, and comes back as itself.
+//!
+//! A macro may have changed its form in place. So an object is given back as the datum that it was made from only if
+//! its parts still are; else it becomes a new datum at the old place.
+//!
+//! Guarantees: walks use no native stack in proportion to the depth. Circular and oversized structure is refused with
+//! a text.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::Arc;
+
+use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::{Home, Symbol};
+
+use crate::heap::layout::Array;
+use crate::heap::{AllocError, Heap, Kind};
+use crate::load::{Shared, array, character, integer, ratio};
+use crate::number::Int;
+use crate::value::Value;
+use crate::world::{GivenMap, World};
+
+/// The most nodes that an object may have to become a datum.
+const MAX_NODES: usize = 4_000_000;
+
+/// Why an object does not become a datum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum DatumError {
+    /// It contains itself.
+    Circular,
+    /// It is too large.
+    TooLarge,
+}
+
+impl fmt::Display for DatumError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            DatumError::Circular => f.write_str("the form contains itself, so it cannot be compiled"),
+            DatumError::TooLarge => write!(f, "the form has more than {MAX_NODES} parts"),
+        }
+    }
+}
+
+impl std::error::Error for DatumError {}
+
+/// What one compilation remembers of objects and data.
+#[derive(Default)]
+pub(crate) struct Unit {
+    /// Objects that no datum can describe, by number.
+    objects: Vec<Value>,
+    object_ids: GivenMap<u64, u32>,
+    /// Uninterned symbols.
+    uninterned: HashMap<u32, Value>,
+    uninterned_ids: GivenMap<u64, u32>,
+    /// By the address of the object: the object, and its datum.
+    data: GivenMap<u64, (Value, Datum)>,
+    /// By the address of the datum: the datum, and its object.
+    values: GivenMap<u64, (Datum, Value)>,
+    /// Nodes that were walked over since this was last asked.
+    work: u64,
+}
+
+impl Shared for Unit {
+    fn uninterned(&self, id: u32) -> Option<Value> {
+        self.uninterned.get(&id).copied()
+    }
+
+    fn note_uninterned(&mut self, id: u32, object: Value) {
+        self.uninterned.insert(id, object);
+        self.uninterned_ids.insert(object.bits(), id);
+    }
+
+    fn object(&self, id: u32) -> Option<Value> {
+        self.objects.get(id as usize).copied()
+    }
+}
+
+/// What a walk from datum to object does next.
+enum ToValue<'a> {
+    Visit(&'a Datum),
+    Build(&'a Datum),
+}
+
+/// What a walk from object to datum does next.
+enum ToDatum {
+    Visit(Value),
+    Build(Value),
+}
+
+impl Unit {
+    /// Calls `visit` with every object that is remembered.
+    pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
+        self.objects.iter().copied().for_each(&mut *visit);
+        self.uninterned.values().copied().for_each(&mut *visit);
+        self.data.values().for_each(|&(value, _)| visit(value));
+        self.values.values().for_each(|&(_, value)| visit(value));
+    }
+
+    /// Nodes that were walked over since this was last asked.
+    pub(crate) fn take_work(&mut self) -> u64 {
+        std::mem::take(&mut self.work)
+    }
+
+    /// The number by which data refer to an object.
+    pub(crate) fn pin(&mut self, object: Value) -> ObjectId {
+        let next = self.objects.len() as u32;
+        let id = *self.object_ids.entry(object.bits()).or_insert(next);
+        if id == next {
+            self.objects.push(object);
+        }
+        ObjectId(id)
+    }
+
+    /// An object by its number.
+    pub(crate) fn pinned(&self, ObjectId(id): ObjectId) -> Option<Value> {
+        self.object(id)
+    }
+
+    fn remember(&mut self, datum: &Datum, value: Value) {
+        self.data.insert(value.bits(), (value, datum.clone()));
+        self.values.insert(datum.identity() as u64, (datum.clone(), value));
+    }
+
+    /// The object for a datum.
+    ///
+    /// # Errors
+    /// As for every allocation. What was made is remembered, so that a second attempt goes on from there.
+    pub(crate) fn to_value(
+        &mut self,
+        heap: &mut Heap,
+        world: &mut World,
+        datum: &Datum,
+    ) -> Result<Value, AllocError> {
+        let mut steps = vec![ToValue::Visit(datum)];
+        let mut made: Vec<Value> = Vec::new();
+        while let Some(step) = steps.pop() {
+            match step {
+                ToValue::Visit(datum) => {
+                    self.work += 1;
+                    if let Some(&(_, value)) = self.values.get(&(datum.identity() as u64)) {
+                        made.push(value);
+                        continue;
+                    }
+                    match datum.kind() {
+                        DatumKind::Cons(car, cdr) => {
+                            steps.extend([ToValue::Build(datum), ToValue::Visit(cdr), ToValue::Visit(car)]);
+                        }
+                        DatumKind::Vector(items) | DatumKind::Array(_, items) => {
+                            steps.push(ToValue::Build(datum));
+                            steps.extend(items.iter().rev().map(ToValue::Visit));
+                        }
+                        _ => made.push(self.atom_to_value(heap, world, datum)?),
+                    }
+                }
+                ToValue::Build(datum) => {
+                    let parts = match datum.kind() {
+                        DatumKind::Vector(items) | DatumKind::Array(_, items) => items.len(),
+                        _ => 2,
+                    };
+                    let parts = made.split_off(made.len() - parts);
+                    let value = match datum.kind() {
+                        DatumKind::Vector(_) => heap.alloc_vector(&parts)?,
+                        DatumKind::Array(dimensions, _) => array(heap, dimensions, &parts)?,
+                        _ => heap.cons(parts[0], parts[1])?,
+                    };
+                    self.remember(datum, value);
+                    made.push(value);
+                }
+            }
+        }
+        Ok(made.pop().unwrap_or(Value::NIL))
+    }
+
+    fn atom_to_value(
+        &mut self,
+        heap: &mut Heap,
+        world: &mut World,
+        datum: &Datum,
+    ) -> Result<Value, AllocError> {
+        Ok(match datum.kind() {
+            DatumKind::Symbol(symbol) => self.symbol_to_value(heap, world, symbol)?,
+            DatumKind::Integer(value) => integer(heap, value)?,
+            DatumKind::Ratio(numerator, denominator) => ratio(heap, numerator, denominator)?,
+            DatumKind::Float(value) => heap.float(*value)?,
+            DatumKind::Character(c) => character(*c),
+            DatumKind::String(text) => {
+                let value = heap.alloc_str(text)?;
+                self.remember(datum, value);
+                value
+            }
+            DatumKind::Object(id) => self.pinned(*id).unwrap_or(Value::NIL),
+            DatumKind::Nil | DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) => Value::NIL,
+        })
+    }
+
+    /// The object of a symbol.
+    ///
+    /// # Errors
+    /// As for every allocation.
+    pub(crate) fn symbol_to_value(
+        &mut self,
+        heap: &mut Heap,
+        world: &mut World,
+        symbol: &Symbol,
+    ) -> Result<Value, AllocError> {
+        let Home::Uninterned(id) = *symbol.home() else { return world.intern(heap, symbol) };
+        if let Some(object) = self.uninterned(id) {
+            return Ok(object);
+        }
+        let object = world.intern(heap, symbol)?;
+        self.note_uninterned(id, object);
+        Ok(object)
+    }
+
+    /// The datum for an object. What no datum is remembered for gets the place `span`.
+    ///
+    /// # Errors
+    /// [`DatumError`] if the object is circular or too large.
+    pub(crate) fn to_datum(
+        &mut self,
+        heap: &Heap,
+        world: &World,
+        object: Value,
+        span: Span,
+    ) -> Result<Datum, DatumError> {
+        let mut steps = vec![ToDatum::Visit(object)];
+        let mut made: Vec<Datum> = Vec::new();
+        // What this walk has met: `None` while it is inside.
+        let mut met: GivenMap<u64, Option<Datum>> = GivenMap::default();
+        let mut nodes = 0;
+        while let Some(step) = steps.pop() {
+            match step {
+                ToDatum::Visit(object) => {
+                    nodes += 1;
+                    if nodes > MAX_NODES {
+                        return Err(DatumError::TooLarge);
+                    }
+                    let parts = parts_of(heap, object);
+                    if parts.is_none() {
+                        made.push(self.atom_to_datum(heap, world, object, span));
+                        continue;
+                    }
+                    match met.get(&object.bits()) {
+                        Some(Some(datum)) => made.push(datum.clone()),
+                        Some(None) => return Err(DatumError::Circular),
+                        None => {
+                            met.insert(object.bits(), None);
+                            steps.push(ToDatum::Build(object));
+                            visit_parts(parts, &mut steps);
+                        }
+                    }
+                }
+                ToDatum::Build(object) => {
+                    let count = match parts_of(heap, object) {
+                        Some(Parts::Pair(..)) => 2,
+                        Some(Parts::Items(_, items)) => items.len(),
+                        None => 0,
+                    };
+                    let parts = made.split_off(made.len() - count);
+                    let datum = self.compound(heap, object, parts, span);
+                    met.insert(object.bits(), Some(datum.clone()));
+                    made.push(datum);
+                }
+            }
+        }
+        self.work += nodes as u64;
+        Ok(made.pop().unwrap_or_else(|| Datum::nil(span)))
+    }
+
+    /// The datum of an object with these parts: the one that it was made from, unless its parts are others now.
+    fn compound(&mut self, heap: &Heap, object: Value, parts: Vec<Datum>, span: Span) -> Datum {
+        let known = self.data.get(&object.bits()).map(|(_, datum)| datum.clone());
+        if let Some(known) = &known
+            && are_parts(known, &parts)
+        {
+            return known.clone();
+        }
+        let span = known.map_or(span, |known| known.span());
+        let datum = match parts_of(heap, object) {
+            Some(Parts::Items(None, _)) => Datum::new(DatumKind::Vector(parts.into()), span),
+            Some(Parts::Items(Some(dimensions), _)) => {
+                let dimensions = dimensions.iter().map(|size| size.as_index().unwrap_or(0) as u32).collect();
+                Datum::new(DatumKind::Array(dimensions, parts.into()), span)
+            }
+            _ => {
+                let mut parts = parts.into_iter();
+                match (parts.next(), parts.next()) {
+                    (Some(car), Some(cdr)) => Datum::cons(car, cdr, span),
+                    _ => Datum::nil(span),
+                }
+            }
+        };
+        self.remember(&datum, object);
+        datum
+    }
+
+    fn atom_to_datum(&mut self, heap: &Heap, world: &World, object: Value, span: Span) -> Datum {
+        if let Some((_, datum)) = self.data.get(&object.bits())
+            && let DatumKind::String(text) = datum.kind()
+            && heap.string(object).is_some_and(|characters| text.chars().map(u32::from).eq(characters.iter().copied()))
+        {
+            return datum.clone();
+        }
+        let kind = self.atom_kind(heap, world, object);
+        let datum = match kind {
+            Some(DatumKind::Symbol(symbol)) => Datum::symbol(symbol, span),
+            Some(kind) => Datum::new(kind, span),
+            None => Datum::new(DatumKind::Object(self.pin(object)), span),
+        };
+        if matches!(datum.kind(), DatumKind::String(_)) {
+            self.remember(&datum, object);
+        }
+        datum
+    }
+
+    /// What datum describes an atom, if there is one.
+    fn atom_kind(&mut self, heap: &Heap, world: &World, object: Value) -> Option<DatumKind> {
+        if object.is_nil() {
+            return Some(DatumKind::Nil);
+        }
+        if world.is_symbol(heap, object) {
+            return Some(DatumKind::Symbol(self.symbol_to_datum(heap, world, object)?));
+        }
+        if let Some(n) = Int::of(heap, object) {
+            return Some(DatumKind::Integer(n.to_big()));
+        }
+        if let Some((numerator, denominator)) = heap.ratio(object) {
+            let (numerator, denominator) = (Int::of(heap, numerator)?, Int::of(heap, denominator)?);
+            return Some(DatumKind::Ratio(numerator.to_big(), denominator.to_big()));
+        }
+        if let Some(x) = heap.as_double(object) {
+            return Some(DatumKind::Float(x));
+        }
+        if let Some(code) = object.as_character() {
+            return Some(DatumKind::Character(char::from_u32(code)?));
+        }
+        let text: Option<String> = heap.string(object)?.iter().map(|&code| char::from_u32(code)).collect();
+        Some(DatumKind::String(Arc::from(text?)))
+    }
+
+    /// The compiler's name for a symbol.
+    pub(crate) fn symbol_to_datum(&mut self, heap: &Heap, world: &World, object: Value) -> Option<Symbol> {
+        if let Some(symbol) = world.name_of(heap, object) {
+            return Some(symbol);
+        }
+        let name = heap.string_text(heap.symbol(object)?.name)?;
+        if let Some(&id) = self.uninterned_ids.get(&object.bits()) {
+            return Some(Symbol::uninterned(id, &name));
+        }
+        let id = world.fresh();
+        self.note_uninterned(id, object);
+        Some(Symbol::uninterned(id, &name))
+    }
+}
+
+/// The parts of an object that is no atom.
+enum Parts<'a> {
+    Pair(Value, Value),
+    /// Dimensions, unless it is a simple vector, and elements.
+    Items(Option<&'a [Value]>, &'a [Value]),
+}
+
+fn parts_of(heap: &Heap, object: Value) -> Option<Parts<'_>> {
+    if let Some(pair) = heap.as_cons(object) {
+        return Some(Parts::Pair(pair.car, pair.cdr));
+    }
+    match heap.kind(object)? {
+        Kind::SimpleVector => Some(Parts::Items(None, heap.vector(object)?)),
+        Kind::Array => {
+            let dimensions = heap.array_dimensions(object)?;
+            let array = heap.array(object)?;
+            // Fill pointers and adjustability are beyond what a datum says, and so are elements that are no values.
+            let is_plain = array.header.flags & (Array::HAS_FILL_POINTER | Array::ADJUSTABLE) == 0;
+            let items = heap.vector(array.data).filter(|_| is_plain && dimensions.len() != 1)?;
+            Some(Parts::Items(Some(dimensions), items))
+        }
+        _ => None,
+    }
+}
+
+/// Adds visits to `steps`, the first part on top.
+fn visit_parts(parts: Option<Parts<'_>>, steps: &mut Vec<ToDatum>) {
+    match parts {
+        Some(Parts::Pair(car, cdr)) => steps.extend([ToDatum::Visit(cdr), ToDatum::Visit(car)]),
+        Some(Parts::Items(_, items)) => steps.extend(items.iter().rev().copied().map(ToDatum::Visit)),
+        None => {}
+    }
+}
+
+/// Whether `datum` has just these parts.
+fn are_parts(datum: &Datum, parts: &[Datum]) -> bool {
+    match datum.kind() {
+        DatumKind::Cons(car, cdr) => {
+            parts.len() == 2 && is_equivalent(car, &parts[0]) && is_equivalent(cdr, &parts[1])
+        }
+        DatumKind::Vector(items) | DatumKind::Array(_, items) => {
+            items.len() == parts.len() && items.iter().zip(parts).all(|(a, b)| is_equivalent(a, b))
+        }
+        _ => false,
+    }
+}
+
+/// Whether both are the same node, or atoms that a program cannot tell apart.
+fn is_equivalent(a: &Datum, b: &Datum) -> bool {
+    a.is_same(b)
+        || match (a.kind(), b.kind()) {
+            (DatumKind::Nil, DatumKind::Nil) => true,
+            (DatumKind::Symbol(a), DatumKind::Symbol(b)) => a == b,
+            (DatumKind::Integer(a), DatumKind::Integer(b)) => a == b,
+            (DatumKind::Ratio(a, b), DatumKind::Ratio(c, d)) => (a, b) == (c, d),
+            (DatumKind::Float(a), DatumKind::Float(b)) => a.to_bits() == b.to_bits(),
+            (DatumKind::Character(a), DatumKind::Character(b)) => a == b,
+            (DatumKind::Object(a), DatumKind::Object(b)) => a == b,
+            _ => false,
+        }
+}
+
+#[cfg(test)]
+mod tests;
