@@ -45,6 +45,28 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::Apply => control::apply,
         Builtin::Values => control::values,
         Builtin::ValuesList => control::values_list,
+        Builtin::Identity => types::identity,
+        Builtin::Eq => types::eq,
+        Builtin::Eql => types::eql,
+        Builtin::Not => types::null,
+        Builtin::Null => types::null,
+        Builtin::Consp => types::consp,
+        Builtin::Atom => types::atom,
+        Builtin::Listp => types::listp,
+        Builtin::Symbolp => types::symbolp,
+        Builtin::Keywordp => types::keywordp,
+        Builtin::Numberp => types::numberp,
+        Builtin::Realp => types::realp,
+        Builtin::Rationalp => types::rationalp,
+        Builtin::Integerp => types::integerp,
+        Builtin::Floatp => types::floatp,
+        Builtin::Characterp => types::characterp,
+        Builtin::Stringp => types::stringp,
+        Builtin::Vectorp => types::vectorp,
+        Builtin::SimpleVectorp => types::simple_vector_p,
+        Builtin::Arrayp => types::arrayp,
+        Builtin::Functionp => types::functionp,
+        Builtin::HashTablep => types::hash_table_p,
         Builtin::ControlHeight => control::control_height,
         Builtin::NextHandler => control::next_handler,
         Builtin::TakeCase => control::take_case,
@@ -57,3 +79,4 @@ pub const fn native(builtin: Builtin) -> Native {
 mod control;
 mod define;
 mod stream;
+pub(crate) mod types;
