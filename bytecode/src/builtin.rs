@@ -323,4 +323,6 @@ define_builtins! {
     Exit = internal "%EXIT" ("status");
     /// The innermost `limit` frames, each a list of the function's name, and source, line and column if known.
     Backtrace = internal "%BACKTRACE" ("limit");
+    /// Calls the embedder's function with this number.
+    CallHost = internal "%CALL-HOST" ("number &rest arguments");
 }

@@ -15,6 +15,7 @@ pub mod link;
 pub mod module;
 pub mod opcode;
 pub mod operand;
+pub mod package;
 pub mod span;
 pub mod symbol;
 pub mod verify;

@@ -1,0 +1,499 @@
+//! Packages: which symbol a name denotes, and how a symbol is written.
+//!
+//! A package maps names to symbols. Those that are *present* in it have an entry of its own; others it *inherits*: the
+//! external symbols of the packages that it uses. A name is looked up in this order, and a name that is not found
+//! becomes a new symbol with the package as its home. Two symbols are the same if home and name are.
+//!
+//! Besides the rules of Common Lisp there is one shorthand: a package may *export again* all that another exports, but
+//! for the names of which it has symbols of its own. So `ESL` stands for the whole language without a thousand entries.
+//!
+//! Names that are the same in every program are kept as sorted lists (`names`), and get an entry when they are first
+//! read: a machine starts without filling tables.
+//!
+//! Not here: which package is the current one, and what a symbol stands for (the virtual machine).
+
+mod standard;
+
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::fmt;
+use std::ops::{Index, IndexMut};
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
+use crate::compile::InternError;
+use crate::symbol::{Home, KEYWORD_PACKAGE, Symbol};
+
+pub use standard::{CL_NAMES, TAKEN_OVER};
+
+/// A package: its number in the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct PackageId(u32);
+
+/// In what way a package has a symbol.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// It is present and not exported.
+    Internal,
+    /// It is exported.
+    External,
+    /// A package that is used exports it.
+    Inherited,
+}
+
+/// How a symbol is written, besides its name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Qualifier {
+    /// By its name.
+    None,
+    /// `:`, a keyword.
+    Keyword,
+    /// `#:`, a symbol that is at home nowhere.
+    Uninterned,
+    /// The package's name and `:`.
+    External(Arc<str>),
+    /// The package's name and `::`.
+    Internal(Arc<str>),
+}
+
+/// What a package has under a name.
+#[derive(Clone, Debug)]
+struct Entry {
+    home: PackageId,
+    external: bool,
+    /// Whether it hides what is inherited under the same name.
+    shadowing: bool,
+    /// The symbol, once somebody has asked for it.
+    symbol: Option<Symbol>,
+}
+
+/// What is known of one package.
+#[derive(Clone, Debug)]
+struct Package {
+    name: Arc<str>,
+    nicknames: Vec<Arc<str>>,
+    uses: Vec<PackageId>,
+    exports_again: Option<PackageId>,
+    /// Names of external symbols that are at home here and may have no entry yet, sorted.
+    names: &'static [&'static str],
+    symbols: FxHashMap<Cow<'static, str>, Entry>,
+}
+
+/// All packages of a program.
+#[derive(Clone, Debug)]
+pub struct Packages {
+    table: Table,
+    by_name: FxHashMap<Arc<str>, PackageId>,
+}
+
+/// Why packages are not changed as asked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PackageError {
+    /// There is another package of this name or nickname.
+    NameTaken(String),
+    /// The package belongs to the standard, and is as it is.
+    Standard(Arc<str>),
+    /// The symbol is not to be found in the package.
+    NotAccessible(Symbol),
+    /// Two symbols would go by this name in the package.
+    Conflict {
+        /// The name.
+        name: String,
+        /// The package.
+        package: Arc<str>,
+    },
+}
+
+/// The packages by number. An index that another table has given is a mistake of the caller.
+#[derive(Clone, Debug, Default)]
+struct Table(Vec<Package>);
+
+impl Index<PackageId> for Table {
+    type Output = Package;
+
+    fn index(&self, PackageId(number): PackageId) -> &Package {
+        &self.0[number as usize]
+    }
+}
+
+impl IndexMut<PackageId> for Table {
+    fn index_mut(&mut self, PackageId(number): PackageId) -> &mut Package {
+        &mut self.0[number as usize]
+    }
+}
+
+impl Packages {
+    fn empty() -> Packages {
+        Packages { table: Table::default(), by_name: FxHashMap::default() }
+    }
+
+    fn add(&mut self, name: Arc<str>, nicknames: Vec<Arc<str>>) -> PackageId {
+        let id = PackageId(self.table.0.len() as u32);
+        for name in nicknames.iter().chain([&name]) {
+            self.by_name.insert(name.clone(), id);
+        }
+        self.table.0.push(Package {
+            name,
+            nicknames,
+            uses: Vec::new(),
+            exports_again: None,
+            names: &[],
+            symbols: FxHashMap::default(),
+        });
+        id
+    }
+
+    /// All packages, the oldest first.
+    pub fn all(&self) -> impl ExactSizeIterator<Item = PackageId> + use<> {
+        (0..self.table.0.len() as u32).map(PackageId)
+    }
+
+    /// The package of this name or nickname.
+    pub fn named(&self, name: &str) -> Option<PackageId> {
+        self.by_name.get(name).copied()
+    }
+
+    /// The name of a package.
+    pub fn name(&self, package: PackageId) -> &Arc<str> {
+        &self.table[package].name
+    }
+
+    /// Its other names.
+    pub fn nicknames(&self, package: PackageId) -> &[Arc<str>] {
+        &self.table[package].nicknames
+    }
+
+    /// The packages whose external symbols it inherits.
+    pub fn uses(&self, package: PackageId) -> &[PackageId] {
+        &self.table[package].uses
+    }
+
+    /// A new package without symbols.
+    ///
+    /// # Errors
+    /// [`PackageError::NameTaken`] for a name that is in use; [`PackageError::Conflict`] as for [`Packages::use_package`].
+    pub fn make_package(
+        &mut self,
+        name: &str,
+        nicknames: &[&str],
+        uses: &[PackageId],
+    ) -> Result<PackageId, PackageError> {
+        for name in nicknames.iter().chain([&name]) {
+            if self.by_name.contains_key(*name) {
+                return Err(PackageError::NameTaken((*name).to_owned()));
+            }
+        }
+        for (i, &used) in uses.iter().enumerate() {
+            self.check_inherited(name, used, &uses[..i])?;
+        }
+        let id = self.add(name.into(), nicknames.iter().map(|&name| name.into()).collect());
+        for used in uses {
+            if !self.table[id].uses.contains(used) {
+                self.table[id].uses.push(*used);
+            }
+        }
+        Ok(id)
+    }
+
+    /// Makes known that the symbol `name` is at home in `package`. For the tables of an image: nothing is checked.
+    pub fn register(&mut self, package: PackageId, name: impl Into<Cow<'static, str>>, external: bool) {
+        let entry = Entry { home: package, external, shadowing: false, symbol: None };
+        self.table[package].symbols.insert(name.into(), entry);
+    }
+
+    /// Makes room for as many symbols more.
+    pub fn reserve(&mut self, package: PackageId, symbols: usize) {
+        self.table[package].symbols.reserve(symbols);
+    }
+
+    /// The home of the external symbol `name` of `package`, and the package of which it is an external entry.
+    fn external(&self, package: PackageId, name: &str) -> Option<Found> {
+        let mut at = package;
+        loop {
+            if let Some(entry) = self.table[at].symbols.get(name) {
+                return entry.external.then_some(Found { home: entry.home, entry_of: at });
+            }
+            if self.table[at].names.binary_search(&name).is_ok() {
+                return Some(Found { home: at, entry_of: at });
+            }
+            // A package exports again only what an older one exports.
+            at = self.table[at].exports_again?;
+        }
+    }
+
+    /// Where the symbol that `name` denotes in `package` comes from.
+    fn look_up(&self, package: PackageId, name: &str) -> Option<(Found, Status)> {
+        let this = &self.table[package];
+        if let Some(entry) = this.symbols.get(name) {
+            let status = if entry.external { Status::External } else { Status::Internal };
+            return Some((Found { home: entry.home, entry_of: package }, status));
+        }
+        if let Some(found) = self.external(package, name) {
+            return Some((found, Status::External));
+        }
+        let inherited = this.uses.iter().find_map(|&used| self.external(used, name));
+        inherited.map(|found| (found, Status::Inherited))
+    }
+
+    /// The symbol that `name` denotes in `package`, if there is one.
+    pub fn find(&self, package: PackageId, name: &str) -> Option<(Symbol, Status)> {
+        let (found, status) = self.look_up(package, name)?;
+        let known = self.table[found.entry_of].symbols.get(name).and_then(|entry| entry.symbol.clone());
+        Some((known.unwrap_or_else(|| Symbol::new(&self.table[found.home].name, name)), status))
+    }
+
+    /// The symbol that `name` denotes in `package`; a new one, at home there, if there was none (then there is no
+    /// status). In `KEYWORD` new symbols are external.
+    pub fn intern(&mut self, package: PackageId, name: &str) -> (Symbol, Option<Status>) {
+        match self.look_up(package, name) {
+            Some((found, status)) => (self.symbol(found, name), Some(status)),
+            None => {
+                self.register(package, name.to_owned(), package == PackageId::KEYWORD);
+                (self.symbol(Found { home: package, entry_of: package }, name), None)
+            }
+        }
+    }
+
+    /// The symbol that was found, kept for the next time.
+    fn symbol(&mut self, Found { home, entry_of }: Found, name: &str) -> Symbol {
+        if let Some(Entry { symbol: Some(symbol), .. }) = self.table[entry_of].symbols.get(name) {
+            return symbol.clone();
+        }
+        let symbol = Symbol::new(&self.table[home].name, name);
+        match self.table[entry_of].symbols.get_mut(name) {
+            Some(entry) => entry.symbol = Some(symbol.clone()),
+            // It is one of the names that have no entry until they are read.
+            None => {
+                let entry = Entry { home, external: true, shadowing: false, symbol: Some(symbol.clone()) };
+                self.table[entry_of].symbols.insert(name.to_owned().into(), entry);
+            }
+        }
+        symbol
+    }
+
+    /// The symbol that a text denotes when it is read: `name` in the `current` package; or `prefix:name`, or, if
+    /// `internal`, `prefix::name`. An empty prefix is that of keywords.
+    ///
+    /// # Errors
+    /// [`InternError::NoPackage`] if there is none called `prefix`; [`InternError::NotExternal`] if it does not export
+    /// such a symbol, also for `prefix::name` if it belongs to the standard and has no such name.
+    pub fn read(
+        &mut self,
+        current: PackageId,
+        prefix: Option<&str>,
+        name: &str,
+        internal: bool,
+    ) -> Result<Symbol, InternError> {
+        let package = match prefix {
+            None => current,
+            Some("") => PackageId::KEYWORD,
+            Some(prefix) => self.named(prefix).ok_or_else(|| InternError::NoPackage(prefix.to_owned()))?,
+        };
+        let adds_symbols = package != PackageId::CL;
+        let may_intern = prefix.is_none() || internal || package == PackageId::KEYWORD;
+        match self.look_up(package, name) {
+            Some((found, Status::External)) => Ok(self.symbol(found, name)),
+            Some((found, _)) if may_intern => Ok(self.symbol(found, name)),
+            Some(_) => Err(InternError::NotExternal { exists: true }),
+            None if may_intern && adds_symbols => Ok(self.intern(package, name).0),
+            None => Err(InternError::NotExternal { exists: false }),
+        }
+    }
+
+    /// How `symbol` is written while `current` is the current package.
+    pub fn qualifier(&self, symbol: &Symbol, current: PackageId) -> Qualifier {
+        let home = match symbol.home() {
+            Home::Uninterned(_) => return Qualifier::Uninterned,
+            Home::Package(home) if **home == *KEYWORD_PACKAGE => return Qualifier::Keyword,
+            Home::Package(home) => home,
+        };
+        let home_id = self.named(home);
+        let is_same = |found: Found| Some(found.home) == home_id;
+        if self.look_up(current, symbol.name()).is_some_and(|(found, _)| is_same(found)) {
+            return Qualifier::None;
+        }
+        let external = home_id.and_then(|home| self.external(home, symbol.name())).is_some_and(is_same);
+        if external { Qualifier::External(home.clone()) } else { Qualifier::Internal(home.clone()) }
+    }
+
+    /// Makes `symbol`, which `package` has in some way, external in it.
+    ///
+    /// # Errors
+    /// [`PackageError::NotAccessible`] if the package does not have it; [`PackageError::Conflict`] if a package that
+    /// uses this one has another symbol of that name; [`PackageError::Standard`] for `COMMON-LISP`.
+    pub fn export(&mut self, package: PackageId, symbol: &Symbol) -> Result<(), PackageError> {
+        let name = symbol.name();
+        let (found, status) = self
+            .look_up(package, name)
+            .filter(|(found, _)| self.is_at(symbol, found.home))
+            .ok_or_else(|| PackageError::NotAccessible(symbol.clone()))?;
+        if status == Status::External {
+            return Ok(());
+        }
+        self.check_open(package)?;
+        for user in self.all().filter(|&user| self.table[user].uses.contains(&package)) {
+            let entry = self.table[user].symbols.get(name);
+            if entry.is_some_and(|entry| entry.shadowing) {
+                continue;
+            }
+            if self.look_up(user, name).is_some_and(|(other, _)| other.home != found.home) {
+                return Err(self.conflict(user, name));
+            }
+        }
+        let symbol = symbol.clone();
+        let entry =
+            Entry { home: found.home, external: true, shadowing: false, symbol: Some(symbol.clone()) };
+        let entry = self.table[package].symbols.entry(Cow::Owned(name_of(&symbol))).or_insert(entry);
+        entry.external = true;
+        Ok(())
+    }
+
+    /// Makes `symbol` present in `package`.
+    ///
+    /// # Errors
+    /// [`PackageError::Conflict`] if it has another symbol of that name; [`PackageError::NotAccessible`] for a symbol
+    /// without a home; [`PackageError::Standard`] for `COMMON-LISP`.
+    pub fn import(&mut self, package: PackageId, symbol: &Symbol) -> Result<(), PackageError> {
+        let home = symbol.package().and_then(|home| self.named(home));
+        let home = home.ok_or_else(|| PackageError::NotAccessible(symbol.clone()))?;
+        let name = symbol.name();
+        if self.look_up(package, name).is_some_and(|(found, _)| found.home != home) {
+            return Err(self.conflict(package, name));
+        }
+        self.check_open(package)?;
+        let entry = Entry { home, external: false, shadowing: false, symbol: Some(symbol.clone()) };
+        self.table[package].symbols.entry(Cow::Owned(name_of(symbol))).or_insert(entry);
+        Ok(())
+    }
+
+    /// Gives `package` a symbol `name` of its own, that hides any inherited one.
+    ///
+    /// # Errors
+    /// [`PackageError::Standard`] for `COMMON-LISP`.
+    pub fn shadow(&mut self, package: PackageId, name: &str) -> Result<(), PackageError> {
+        self.check_open(package)?;
+        if !self.table[package].symbols.contains_key(name) {
+            self.register(package, name.to_owned(), false);
+        }
+        if let Some(entry) = self.table[package].symbols.get_mut(name) {
+            entry.shadowing = true;
+        }
+        Ok(())
+    }
+
+    /// Lets `package` inherit what `used` exports.
+    ///
+    /// # Errors
+    /// [`PackageError::Conflict`] if it has another symbol by one of the names, that does not shadow;
+    /// [`PackageError::Standard`] for `COMMON-LISP`.
+    pub fn use_package(&mut self, package: PackageId, used: PackageId) -> Result<(), PackageError> {
+        if package == used || self.table[package].uses.contains(&used) {
+            return Ok(());
+        }
+        self.check_open(package)?;
+        let this = &self.table[package];
+        for (name, entry) in this.symbols.iter().filter(|(_, entry)| !entry.shadowing) {
+            if self.external(used, name).is_some_and(|found| found.home != entry.home) {
+                return Err(self.conflict(package, name));
+            }
+        }
+        let uses = this.uses.clone();
+        let name = this.name.clone();
+        self.check_inherited(&name, used, &uses)?;
+        self.table[package].uses.push(used);
+        Ok(())
+    }
+
+    /// Checks that no two of the packages that `user` uses or is about to use export different symbols by one name,
+    /// unless it has a symbol of its own by that name.
+    fn check_inherited(&self, user: &str, used: PackageId, others: &[PackageId]) -> Result<(), PackageError> {
+        let own = self.named(user).map(|id| &self.table[id].symbols);
+        for &other in others {
+            for name in self.external_names(used) {
+                let has_own = own.is_some_and(|symbols| symbols.contains_key(name));
+                let clash = |found: Found| {
+                    self.external(used, name).is_some_and(|new| new.home != found.home) && !has_own
+                };
+                if self.external(other, name).is_some_and(clash) {
+                    return Err(PackageError::Conflict { name: name.to_owned(), package: user.into() });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Names of all external symbols of a package, sorted.
+    pub fn external_names(&self, package: PackageId) -> BTreeSet<&str> {
+        let mut names = BTreeSet::new();
+        let mut at = Some(package);
+        while let Some(here) = at {
+            names.extend(self.table[here].names);
+            names.extend(self.table[here].symbols.keys().map(|name| &**name));
+            at = self.table[here].exports_again;
+        }
+        names.retain(|name| self.external(package, name).is_some());
+        names
+    }
+
+    fn is_at(&self, symbol: &Symbol, home: PackageId) -> bool {
+        symbol.is_in(&self.table[home].name)
+    }
+
+    fn check_open(&self, package: PackageId) -> Result<(), PackageError> {
+        if package == PackageId::CL {
+            return Err(PackageError::Standard(self.table[package].name.clone()));
+        }
+        Ok(())
+    }
+
+    fn conflict(&self, package: PackageId, name: &str) -> PackageError {
+        PackageError::Conflict { name: name.to_owned(), package: self.table[package].name.clone() }
+    }
+}
+
+/// Where a symbol is at home, and of which package's entry it comes.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    home: PackageId,
+    entry_of: PackageId,
+}
+
+fn name_of(symbol: &Symbol) -> String {
+    symbol.name().to_owned()
+}
+
+impl fmt::Display for Qualifier {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Qualifier::None => Ok(()),
+            Qualifier::Keyword => f.write_str(":"),
+            Qualifier::Uninterned => f.write_str("#:"),
+            Qualifier::External(package) => write!(f, "{package}:"),
+            Qualifier::Internal(package) => write!(f, "{package}::"),
+        }
+    }
+}
+
+impl fmt::Display for PackageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            PackageError::NameTaken(name) => write!(f, "there is a package `{name}` already"),
+            PackageError::Standard(name) => write!(f, "the package `{name}` cannot be changed"),
+            PackageError::NotAccessible(symbol) => {
+                write!(f, "the symbol `{symbol}` is not in the package: import it first")
+            }
+            PackageError::Conflict { name, package } => {
+                write!(
+                    f,
+                    "two symbols would go by the name `{name}` in the package `{package}`: shadow it first"
+                )
+            }
+        }
+    }
+}
+
+impl std::error::Error for PackageError {}
+
+#[cfg(test)]
+mod tests;
