@@ -1,1 +1,126 @@
-//! Conformance programs of ESL and their runner.
+//! What a conformance program says of itself: expectations beside its lines, and headers. See `README.md` for the format.
+#![forbid(unsafe_code)]
+
+/// Under which conditions a program runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Setting {
+    /// As a user runs it.
+    Default,
+    /// With slices of one tick.
+    Slice1,
+    /// With a collection at every safepoint.
+    GcStress,
+}
+
+impl Setting {
+    /// All of them.
+    pub const ALL: [Setting; 3] = [Setting::Default, Setting::Slice1, Setting::GcStress];
+
+    /// Its name in headers.
+    pub fn name(self) -> &'static str {
+        match self {
+            Setting::Default => "default",
+            Setting::Slice1 => "slice1",
+            Setting::GcStress => "gc-stress",
+        }
+    }
+}
+
+/// What a program expects of itself.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Expectations {
+    /// Lines of standard output, without those that are empty.
+    pub output: Vec<String>,
+    /// Cause and line of the failure that ends the main task.
+    pub failure: Option<(String, usize)>,
+    /// Line and code of compile errors.
+    pub errors: Vec<(usize, String)>,
+    /// Line and code of warnings.
+    pub warnings: Vec<(usize, String)>,
+    /// The exit status, when it is not the one that follows from the rest.
+    pub status: Option<u8>,
+    /// Further options of `eslvm`.
+    pub options: Vec<String>,
+    /// The settings under which it runs.
+    pub settings: Vec<Setting>,
+}
+
+impl Expectations {
+    /// Reads the comments of a program.
+    ///
+    /// # Errors
+    /// The line and what is wrong with it.
+    pub fn parse(text: &str) -> Result<Expectations, String> {
+        let mut found = Expectations { settings: Setting::ALL.to_vec(), ..Expectations::default() };
+        let mut in_header = true;
+        for (index, line) in text.lines().enumerate() {
+            let number = index + 1;
+            in_header &= line.starts_with(';');
+            if in_header {
+                found.header(line.trim_start_matches(';').trim()).map_err(|error| format!("line {number}: {error}"))?;
+            }
+            let Some((_, comment)) = line.split_once("; expect") else { continue };
+            found.expectation(comment, number).map_err(|error| format!("line {number}: {error}"))?;
+        }
+        Ok(found)
+    }
+
+    fn header(&mut self, line: &str) -> Result<(), String> {
+        if let Some(options) = line.strip_prefix("options:") {
+            self.options.extend(options.split_whitespace().map(String::from));
+        } else if let Some(settings) = line.strip_prefix("settings:") {
+            // Names come first, separated by commas; the reason follows.
+            let is_named = |setting: &&Setting| {
+                settings.split([',', ' ']).filter(|word| !word.is_empty()).any(|word| word == setting.name())
+            };
+            self.settings = Setting::ALL.iter().filter(is_named).copied().collect();
+            if self.settings.is_empty() {
+                return Err("no setting is named".into());
+            }
+        }
+        Ok(())
+    }
+
+    fn expectation(&mut self, comment: &str, line: usize) -> Result<(), String> {
+        let (kind, value) = comment.split_once(':').ok_or("expected a colon after `expect`")?;
+        match kind.trim() {
+            "" => self.output.push(value.strip_prefix(' ').unwrap_or(value).trim_end().to_string()),
+            "failure" if self.failure.is_none() => self.failure = Some((value.trim().to_string(), line)),
+            "failure" => return Err("a second failure".into()),
+            "error" => self.errors.push((line, value.trim().to_string())),
+            "warning" => self.warnings.push((line, value.trim().to_string())),
+            "status" => self.status = Some(value.trim().parse().map_err(|_| "expected a number from 0 to 255")?),
+            other => return Err(format!("`expect {other}` is not known")),
+        }
+        Ok(())
+    }
+
+    /// The exit status that it expects.
+    pub fn expected_status(&self) -> u8 {
+        self.status.unwrap_or(match (&self.errors[..], &self.failure) {
+            ([], None) => 0,
+            ([], Some(_)) => 1,
+            _ => 3,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comments_are_read() {
+        let text = "; A title.\n; options: --memory 64M\n; settings: default, slice1 too slow else\n\
+                    (print 1) ; expect: 1\n(foo)   ; expect warning: undefined-function\n\
+                    ; expect: two  \n(car 1) ; expect failure: :type-error\n";
+        let found = Expectations::parse(text).unwrap();
+        assert_eq!(found.output, ["1", "two"]);
+        assert_eq!(found.failure, Some((":type-error".into(), 7)));
+        assert_eq!(found.warnings, [(5, "undefined-function".into())]);
+        assert_eq!(found.options, ["--memory", "64M"]);
+        assert_eq!(found.settings, [Setting::Default, Setting::Slice1]);
+        assert_eq!(found.expected_status(), 1);
+        assert!(Expectations::parse("(x) ; expect sorrow: 1").is_err());
+    }
+}
