@@ -2,3 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod core;
+pub mod diagnostic;
+pub mod lower;
+mod resolve;
+pub mod reader;

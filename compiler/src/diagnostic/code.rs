@@ -1,0 +1,305 @@
+//! The table of diagnostic codes: each with its severity, what it means, a program that has it and the same program
+//! repaired.
+//!
+//! A row makes a constant, through which diagnostics are made ([`Code::at`]), so that no code is reported that is not
+//! in the table. `docs/diagnostics.md` is generated from it. To add a code, add a row at the end of its stage, run
+//! `ESL_BLESS=1 cargo test -p esl-compiler --test diagnostics`, and look at the difference.
+//!
+//! The programs are complete files. Where no short program shows the fault, they are empty.
+
+use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::span::Span;
+
+/// A kind of diagnostic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Code {
+    /// The code itself, such as `unclosed-list`. Codes are never renamed: programs and tools look for them.
+    pub name: &'static str,
+    /// Error or warning.
+    pub severity: Severity,
+    /// The part of the compiler that reports it.
+    pub stage: Stage,
+    /// What it means, in one line.
+    pub summary: &'static str,
+    /// A program that has it; empty if no short one does.
+    pub failing: &'static str,
+    /// The same program without it.
+    pub repaired: &'static str,
+}
+
+impl Code {
+    /// A diagnostic of this code and its severity at `span`.
+    pub fn at(&self, span: Span, message: impl Into<String>) -> Diagnostic {
+        match self.severity {
+            Severity::Error => Diagnostic::error(self.name, message, span),
+            Severity::Warning => Diagnostic::warning(self.name, message, span),
+        }
+    }
+}
+
+/// A part of the compiler.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// Text to data.
+    Reader,
+    /// Data to the core language: macros, special forms, names.
+    Expander,
+    /// The core language to code.
+    Lowering,
+}
+
+impl Stage {
+    /// All of them, in order.
+    pub const ALL: [Stage; 3] = [Stage::Reader, Stage::Expander, Stage::Lowering];
+
+    /// What the stage does, as a heading.
+    pub fn title(self) -> &'static str {
+        match self {
+            Stage::Reader => "Reading the text",
+            Stage::Expander => "Checking forms and names",
+            Stage::Lowering => "Making code",
+        }
+    }
+}
+
+/// The code called `name`.
+pub fn find(name: &str) -> Option<&'static Code> {
+    ALL.iter().copied().find(|code| code.name == name)
+}
+
+macro_rules! codes {
+    ($($stage:ident { $($constant:ident = $name:literal $severity:ident
+        #[doc = $summary:literal] fails: $failing:literal repaired: $repaired:literal)* })*) => {
+        $($(
+            #[doc = $summary]
+            pub const $constant: &Code = &Code {
+                name: $name,
+                severity: Severity::$severity,
+                stage: Stage::$stage,
+                summary: $summary.trim_ascii(),
+                failing: $failing,
+                repaired: $repaired,
+            };
+        )*)*
+
+        /// All codes, in the order of the table.
+        pub const ALL: &[&Code] = &[$($($constant),*),*];
+    };
+}
+
+codes! {
+Reader {
+
+INVALID_UTF_8 = "invalid-utf-8" Error
+    /// The file is not text in UTF-8.
+    fails: ""
+    repaired: ""
+
+SOURCE_TOO_LARGE = "source-too-large" Error
+    /// The file is 4 GiB or larger.
+    fails: ""
+    repaired: ""
+
+TOO_MANY_ERRORS = "too-many-errors" Error
+    /// So many errors were found in one file that the rest of it was not read.
+    fails: ""
+    repaired: ""
+
+UNCLOSED_LIST = "unclosed-list" Error
+    /// The text ends within a list, vector or array.
+    fails: "(defun area (width height)\n  (* width height)\n\n(print (area 3 4))\n"
+    repaired: "(defun area (width height)\n  (* width height))\n\n(print (area 3 4))\n"
+
+UNEXPECTED_CLOSE = "unexpected-close" Error
+    /// A `)` closes nothing.
+    fails: "(print (+ 1 2)))\n"
+    repaired: "(print (+ 1 2))\n"
+
+UNCLOSED_STRING = "unclosed-string" Error
+    /// The text ends within a string.
+    fails: "(print \"hello)\n"
+    repaired: "(print \"hello\")\n"
+
+UNCLOSED_COMMENT = "unclosed-comment" Error
+    /// The text ends within a comment that began with `#|`. Such comments nest: each `#|` needs its own `|#`.
+    fails: "#| first #| second |#\n(print 1)\n"
+    repaired: "#| first #| second |# |#\n(print 1)\n"
+
+UNCLOSED_BAR = "unclosed-bar" Error
+    /// The text ends within a name that is written between bars.
+    fails: "(print '|hello)\n"
+    repaired: "(print '|hello|)\n"
+
+UNFINISHED_DATUM = "unfinished-datum" Error
+    /// The text ends after a mark such as `'`, which needs something to stand before.
+    fails: "(print 1)\n'\n"
+    repaired: "(print 1)\n'a\n"
+
+UNFINISHED_ESCAPE = "unfinished-escape" Error
+    /// The text ends after `\` or `#\`, which take the next character.
+    fails: "(print 1)\n#\\"
+    repaired: "(print 1)\n#\\a"
+
+INVALID_TOKEN = "invalid-token" Error
+    /// Characters that form neither a number nor a name nor anything else that can be read.
+    fails: "(print #b102)\n"
+    repaired: "(print #b101)\n"
+
+INVALID_CHARACTER = "invalid-character" Error
+    /// A control character, an unusual blank or an invisible mark outside of strings, comments and bars.
+    fails: "(print\u{a0}1)\n"
+    repaired: "(print 1)\n"
+
+INVALID_CHARACTER_NAME = "invalid-character-name" Error
+    /// `#\` before a name that no character has.
+    fails: "(print #\\Blank)\n"
+    repaired: "(print #\\Space)\n"
+
+TOKEN_TOO_LONG = "token-too-long" Error
+    /// A name of more than 65,536 bytes, or a number with too many digits.
+    fails: ""
+    repaired: ""
+
+FLOAT_OUT_OF_RANGE = "float-out-of-range" Error
+    /// A float that is too large for a double.
+    fails: "(print 1e400)\n"
+    repaired: "(print 1e300)\n"
+
+DOTTED_LIST = "dotted-list" Error
+    /// A dot that does not stand before the last element of a list.
+    fails: "(print '(1 . 2 3))\n"
+    repaired: "(print '(1 2 . 3))\n"
+
+MISSING_DATUM = "missing-datum" Error
+    /// A `)` comes right after a mark such as `'`, which needs something to stand before.
+    fails: "(print (list 1 '))\n"
+    repaired: "(print (list 1 'a))\n"
+
+COMMA_OUTSIDE_BACKQUOTE = "comma-outside-backquote" Error
+    /// A comma with no backquote around it that it belongs to.
+    fails: "(print '(1 ,(+ 1 1)))\n"
+    repaired: "(print `(1 ,(+ 1 1)))\n"
+
+MISPLACED_SPLICE = "misplaced-splice" Error
+    /// `,@` where there is no list that it could insert elements into.
+    fails: "(print `,@(list 1 2))\n"
+    repaired: "(print `(,@(list 1 2)))\n"
+
+NESTED_TOO_DEEPLY = "nested-too-deeply" Error
+    /// Lists within lists, more than 2,000 deep.
+    fails: ""
+    repaired: ""
+
+MALFORMED_LITERAL = "malformed-literal" Error
+    /// A vector or array whose elements do not fit its size.
+    fails: "(print #2A((1 2) (3)))\n"
+    repaired: "(print #2A((1 2) (3 4)))\n"
+
+UNKNOWN_LABEL = "unknown-label" Error
+    /// `#n#` with no `#n=` before it, or `#n=` twice with the same number.
+    fails: "(print '(#1=a #2#))\n"
+    repaired: "(print '(#1=a #1#))\n"
+
+CIRCULAR_LITERAL = "circular-literal" Error
+    /// `#n#` within the object that `#n=` labels.
+    fails: "(print '#1=(a . #1#))\n"
+    repaired: "(print '(a a a))\n"
+
+LITERAL_TOO_LARGE = "literal-too-large" Error
+    /// A few `#n#` or `#n(` that stand for millions of elements.
+    fails: "(print #99999999(a))\n"
+    repaired: "(print (make-array 99999999 :initial-element 'a))\n"
+
+UNKNOWN_PACKAGE = "unknown-package" Error
+    /// The part of a name before `:` is not the name of a package.
+    fails: "(print (lisp:list 1 2))\n"
+    repaired: "(print (cl:list 1 2))\n"
+
+NOT_EXTERNAL = "not-external" Error
+    /// `package:name` where the package offers no such name.
+    fails: "(print (cl:lst 1 2))\n"
+    repaired: "(print (cl:list 1 2))\n"
+
+NOT_IN_SUBSET = "not-in-subset" Error
+    /// Something of Common Lisp that ESL leaves out.
+    fails: "(print #c(1 2))\n"
+    repaired: "(print '(1 2))\n"
+
+}
+Expander {
+
+MALFORMED_FORM = "malformed-form" Error
+    /// A special form or standard macro whose parts are not what it takes.
+    fails: "(let (x 1)\n  (print x))\n"
+    repaired: "(let ((x 1))\n  (print x))\n"
+
+MALFORMED_LAMBDA_LIST = "malformed-lambda-list" Error
+    /// A parameter list that is none.
+    fails: "(defun area (width 4)\n  (* width 4))\n"
+    repaired: "(defun area (width &optional (height 4))\n  (* width height))\n"
+
+DUPLICATE_PARAMETER = "duplicate-parameter" Error
+    /// Two parameters, or two variables of one `let`, with the same name.
+    fails: "(defun area (side side)\n  (* side side))\n"
+    repaired: "(defun area (width height)\n  (* width height))\n"
+
+UNKNOWN_BLOCK = "unknown-block" Error
+    /// `return` or `return-from` with no block of that name around it.
+    fails: "(defun first-even (numbers)\n  (dolist (n numbers)\n    (when (evenp n) (return-from first-evn n))))\n"
+    repaired: "(defun first-even (numbers)\n  (dolist (n numbers)\n    (when (evenp n) (return-from first-even n))))\n"
+
+UNKNOWN_TAG = "unknown-tag" Error
+    /// `go` to a tag that no `tagbody` around it has.
+    fails: "(tagbody\n  (go done)\n end)\n"
+    repaired: "(tagbody\n  (go end)\n end)\n"
+
+UNDEFINED_FUNCTION = "undefined-function" Warning
+    /// A call of a function that is defined nowhere so far. It may be defined by the time the call is made.
+    fails: "(print (squar 3))\n"
+    repaired: "(defun square (x)\n  (* x x))\n(print (square 3))\n"
+
+UNDEFINED_VARIABLE = "undefined-variable" Warning
+    /// A variable that is bound or defined nowhere so far.
+    fails: "(defun area (width)\n  (* width heigth))\n"
+    repaired: "(defun area (width height)\n  (* width height))\n"
+
+WRONG_ARGUMENT_COUNT = "wrong-argument-count" Warning
+    /// A call with more or fewer arguments than the function takes.
+    fails: "(defun area (width height)\n  (* width height))\n(print (area 3))\n"
+    repaired: "(defun area (width height)\n  (* width height))\n(print (area 3 4))\n"
+
+UNUSED_VARIABLE = "unused-variable" Warning
+    /// A variable that is bound but never read.
+    fails: "(defun area (width height)\n  (* width width))\n"
+    repaired: "(defun area (width height)\n  (* width height))\n"
+
+UNREACHABLE_CODE = "unreachable-code" Warning
+    /// Code that cannot run, since what comes before it always leaves.
+    fails: "(defun sign (x)\n  (return-from sign (signum x))\n  (print x))\n"
+    repaired: "(defun sign (x)\n  (print x)\n  (signum x))\n"
+
+ASSIGNMENT_TO_CONSTANT = "assignment-to-constant" Error
+    /// An assignment to a constant, or a binding of one.
+    fails: "(setq pi 3)\n"
+    repaired: "(defvar *pi* 3)\n"
+
+MACRO_FAILED = "macro-failed" Error
+    /// A macro failed while its call was expanded.
+    fails: "(defmacro twice (form)\n  (list 'progn form (car 'form)))\n(twice (print 1))\n"
+    repaired: "(defmacro twice (form)\n  (list 'progn form form))\n(twice (print 1))\n"
+
+LOCKED_NAME = "locked-name" Error
+    /// A definition of a name that belongs to the language.
+    fails: "(defun car (x)\n  x)\n"
+    repaired: "(defun my-car (x)\n  x)\n"
+
+}
+Lowering {
+
+FUNCTION_TOO_LARGE = "function-too-large" Error
+    /// A function whose code passes the limits of the virtual machine.
+    fails: ""
+    repaired: ""
+
+}
+}

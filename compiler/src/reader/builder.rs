@@ -1,0 +1,384 @@
+//! Data from tokens: the actions of the grammar.
+//!
+//! Guarantees: every datum carries the span of its text. A token that denotes nothing is reported, and the empty list
+//! stands in for it, so that one faulty name does not hide the next.
+//! Not here: what counts as which token (`lexer`), where a datum ends (`scan`), what backquote means (the expander,
+//! which finds `(esl::%backquote …)`, `(esl::%unquote …)` and `(esl::%unquote-splicing …)`).
+
+use std::sync::{Arc, LazyLock};
+
+use esl_bytecode::compile::{Environment, InternError};
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::span::{SourceId, Span};
+use esl_bytecode::symbol::{KEYWORD_PACKAGE, Symbol};
+use rustc_hash::FxHashMap;
+
+use crate::diagnostic::code;
+
+use super::MAX_ERRORS;
+use super::character;
+use super::literal;
+use super::name::{self, MAX_NAME, Name, Prefix, shorten};
+use super::number::{self, Fault, Number};
+use super::scan::label_number;
+
+/// An abbreviation of a list of two elements.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Mark {
+    Quote,
+    Backquote,
+    Comma,
+    CommaAt,
+    Function,
+}
+
+/// Symbols that the reader itself puts into data.
+struct Names {
+    quote: Symbol,
+    function: Symbol,
+    backquote: Symbol,
+    unquote: Symbol,
+    splice: Symbol,
+    logical_value: Symbol,
+    keyword: Arc<str>,
+}
+
+static NAMES: LazyLock<Names> = LazyLock::new(|| Names {
+    quote: Symbol::cl("QUOTE"),
+    function: Symbol::cl("FUNCTION"),
+    backquote: Symbol::esl("%BACKQUOTE"),
+    unquote: Symbol::esl("%UNQUOTE"),
+    splice: Symbol::esl("%UNQUOTE-SPLICING"),
+    logical_value: Symbol::esl("LOGICAL-VALUE"),
+    keyword: KEYWORD_PACKAGE.into(),
+});
+
+/// Builds the data of one text.
+pub(crate) struct Builder<'a> {
+    environment: &'a mut dyn Environment,
+    text: &'a str,
+    source: SourceId,
+    labels: FxHashMap<u32, Datum>,
+    /// How many more elements `#n(…)` may fill in.
+    room: &'a mut usize,
+    buffer: String,
+    /// What was wrong so far.
+    pub(super) errors: Vec<Diagnostic>,
+}
+
+impl<'a> Builder<'a> {
+    pub(super) fn new(
+        environment: &'a mut dyn Environment,
+        text: &'a str,
+        source: SourceId,
+        room: &'a mut usize,
+    ) -> Builder<'a> {
+        let (labels, errors) = (FxHashMap::default(), Vec::new());
+        Builder { environment, text, source, labels, room, buffer: String::new(), errors }
+    }
+
+    fn span(&self, start: u32, end: u32) -> Span {
+        Span::new(self.source, start, end)
+    }
+
+    fn slice(&self, start: u32, end: u32) -> &'a str {
+        &self.text[start as usize..end as usize]
+    }
+
+    /// Reports a fault; the empty list stands in for the datum.
+    fn fail(&mut self, diagnostic: Diagnostic) -> Datum {
+        let span = diagnostic.primary.span;
+        if self.errors.len() < MAX_ERRORS {
+            self.errors.push(diagnostic);
+        }
+        Datum::nil(span)
+    }
+
+    /// A number or a name without escapes.
+    pub(super) fn atom(&mut self, start: u32, end: u32) -> Datum {
+        let token = self.slice(start, end);
+        if let Some(number) = number::parse(token) {
+            return self.number(number, start, end);
+        }
+        if token.len() > MAX_NAME {
+            return self.too_long(start, end);
+        }
+        if token.contains(':') {
+            return self.name(start, end);
+        }
+        if token.starts_with('.') && token.bytes().all(|byte| byte == b'.') {
+            let span = self.span(start, end);
+            return self
+                .fail(code::INVALID_TOKEN.at(span, format!("expected a name, found only dots, `{token}`")));
+        }
+        let mut folded = std::mem::take(&mut self.buffer);
+        folded.clear();
+        folded.extend(token.chars().map(name::fold));
+        let datum = self.intern(None, &folded, false, start, end);
+        self.buffer = folded;
+        datum
+    }
+
+    /// A name with escapes.
+    pub(super) fn escaped(&mut self, start: u32, end: u32) -> Datum {
+        if (end - start) as usize > MAX_NAME {
+            return self.too_long(start, end);
+        }
+        self.name(start, end)
+    }
+
+    fn name(&mut self, start: u32, end: u32) -> Datum {
+        let span = self.span(start, end);
+        match name::parse(self.slice(start, end)) {
+            Ok(Name { prefix: Prefix::None, name }) => self.intern(None, &name, false, start, end),
+            Ok(Name { prefix: Prefix::Keyword, name }) => {
+                Datum::symbol(Symbol::new(&NAMES.keyword, &name), span)
+            }
+            Ok(Name { prefix: Prefix::Package { package, internal }, name }) => {
+                self.intern(Some(&package), &name, internal, start, end)
+            }
+            Err(message) => self.fail(code::INVALID_TOKEN.at(span, message)),
+        }
+    }
+
+    fn intern(&mut self, package: Option<&str>, name: &str, internal: bool, start: u32, end: u32) -> Datum {
+        let span = self.span(start, end);
+        let found = self.environment.intern(package, name, internal);
+        let prefix = package.unwrap_or_default();
+        match found {
+            Ok(symbol) => Datum::symbol(symbol, span),
+            Err(InternError::NoPackage(package)) => {
+                let message = format!("expected the name of a package, found `{}`", shorten(&package));
+                self.fail(code::UNKNOWN_PACKAGE.at(span, message))
+            }
+            Err(InternError::NotExternal { exists: true }) => {
+                let message = format!("`{}` is internal to the package `{prefix}`", shorten(name));
+                let help = format!(
+                    "write `{}::{}` to use it all the same",
+                    prefix.to_lowercase(),
+                    name.to_lowercase()
+                );
+                self.fail(code::NOT_EXTERNAL.at(span, message).help(help))
+            }
+            Err(InternError::NotExternal { exists: false }) => {
+                let message = format!("the package `{prefix}` has no symbol `{}`", shorten(name));
+                self.fail(code::NOT_EXTERNAL.at(span, message))
+            }
+        }
+    }
+
+    fn number(&mut self, number: Result<Number, Fault>, start: u32, end: u32) -> Datum {
+        let span = self.span(start, end);
+        match number {
+            Ok(Number::Integer(value)) => Datum::new(DatumKind::Integer(value), span),
+            Ok(Number::Ratio(numerator, denominator)) => {
+                Datum::new(DatumKind::Ratio(numerator, denominator), span)
+            }
+            Ok(Number::Float(value)) => Datum::new(DatumKind::Float(value), span),
+            Err(Fault::ZeroDenominator) => {
+                self.fail(code::INVALID_TOKEN.at(span, "expected a denominator other than zero, found zero"))
+            }
+            Err(Fault::OutOfRange) => {
+                let message = format!("expected a float of at most {:e}, found a larger one", f64::MAX);
+                self.fail(code::FLOAT_OUT_OF_RANGE.at(span, message))
+            }
+            Err(Fault::TooLong(limit)) => {
+                let message = format!("expected a number of at most {limit} digits, found more");
+                self.fail(code::TOKEN_TOO_LONG.at(span, message))
+            }
+        }
+    }
+
+    fn too_long(&mut self, start: u32, end: u32) -> Datum {
+        let message = format!("expected a name of at most {MAX_NAME} bytes, found {}", end - start);
+        self.fail(code::TOKEN_TOO_LONG.at(self.span(start, end), message))
+    }
+
+    /// `#x`, `#b`, `#o`, `#nr`
+    pub(super) fn radix(&mut self, start: u32, end: u32) -> Datum {
+        let span = self.span(start, end);
+        let token = &self.slice(start, end)[1..];
+        let letter = token.find(|c: char| !c.is_ascii_digit()).unwrap_or(0);
+        let radix = match token.as_bytes()[letter].to_ascii_lowercase() {
+            b'x' => Some(16),
+            b'o' => Some(8),
+            b'b' => Some(2),
+            _ => name::digits(&token[..letter]).filter(|radix| (2..=36).contains(radix)),
+        };
+        let Some(radix) = radix else {
+            let message = format!("expected a radix from 2 to 36, found `#{}`", shorten(&token[..=letter]));
+            return self.fail(code::INVALID_TOKEN.at(span, message).help("write it as in `#36rZZ`"));
+        };
+        let digits = &token[letter + 1..];
+        match number::parse_radix(digits, radix) {
+            Some(number) => self.number(number, start, end),
+            None => {
+                let found = if digits.is_empty() { "none".into() } else { format!("`{}`", shorten(digits)) };
+                let message = format!("expected an integer or ratio in base {radix}, found {found}");
+                self.fail(code::INVALID_TOKEN.at(span, message))
+            }
+        }
+    }
+
+    /// `"…"`
+    pub(super) fn string(&mut self, start: u32, end: u32) -> Datum {
+        let span = self.span(start, end);
+        let written = self.slice(start + 1, end - 1);
+        if !written.contains('\\') {
+            return Datum::string(written, span);
+        }
+        let mut value = String::with_capacity(written.len());
+        let mut rest = written.chars();
+        while let Some(c) = rest.next() {
+            if c == '\\' {
+                value.extend(rest.next());
+            } else {
+                value.push(c);
+            }
+        }
+        Datum::string(&value, span)
+    }
+
+    /// `#\x`
+    pub(super) fn character(&mut self, start: u32, end: u32) -> Datum {
+        let span = self.span(start, end);
+        let name = self.slice(start + 2, end);
+        if let Some(c) = character::parse(name) {
+            return Datum::new(DatumKind::Character(c), span);
+        }
+        let message =
+            format!("expected a character or the name of one after `#\\`, found `{}`", shorten(name));
+        let help = match character::similar(name) {
+            Some(meant) => format!("did you mean `#\\{meant}`?"),
+            None => "names are `Space`, `Newline`, `Tab`, … and numbers such as `U+00E9`".into(),
+        };
+        self.fail(code::INVALID_CHARACTER_NAME.at(span, message).help(help))
+    }
+
+    /// `#:name`
+    pub(super) fn uninterned(&mut self, start: u32, end: u32) -> Datum {
+        match self.plain_name(start, end) {
+            Ok(name) => {
+                let symbol = Symbol::uninterned(self.environment.fresh(), &name);
+                Datum::symbol(symbol, self.span(start, end))
+            }
+            Err(fault) => fault,
+        }
+    }
+
+    /// `#?variable`: `(esl:logical-value ?variable)`
+    pub(super) fn logical_variable(&mut self, start: u32, end: u32) -> Datum {
+        let span = self.span(start, end);
+        match self.plain_name(start, end) {
+            Ok(name) => {
+                let variable = self.intern(None, &format!("?{name}"), false, start, end);
+                Datum::list([Datum::symbol(NAMES.logical_value.clone(), span), variable], span)
+            }
+            Err(fault) => fault,
+        }
+    }
+
+    /// The name after `#:` or `#?`, which has no package.
+    fn plain_name(&mut self, start: u32, end: u32) -> Result<String, Datum> {
+        if (end - start) as usize > MAX_NAME {
+            return Err(self.too_long(start, end));
+        }
+        let (mark, text) = (self.slice(start, start + 2), self.slice(start + 2, end));
+        let found = match name::parse(text) {
+            Ok(Name { prefix: Prefix::None, name }) => return Ok(name),
+            _ if text.is_empty() => "none".to_owned(),
+            _ => format!("`{}`", shorten(text)),
+        };
+        let message = format!("expected a name without a package after `{mark}`, found {found}");
+        Err(self.fail(code::INVALID_TOKEN.at(self.span(start, end), message)))
+    }
+
+    /// `#<…>`
+    pub(super) fn unreadable(&mut self, start: u32, end: u32) -> Datum {
+        let message = format!("expected a datum, found `{}`", shorten(self.slice(start, end)));
+        let help = "objects that print like this cannot be read; name them by a variable";
+        self.fail(code::INVALID_TOKEN.at(self.span(start, end), message).help(help))
+    }
+
+    /// `#` with nothing known after it.
+    pub(super) fn unknown(&mut self, start: u32, end: u32) -> Datum {
+        let message =
+            format!("expected a character that has a meaning after `#`, found `{}`", self.slice(start, end));
+        self.fail(code::INVALID_TOKEN.at(self.span(start, end), message))
+    }
+
+    /// A list of a mark's symbol and `datum`; the mark ends before `middle`.
+    pub(super) fn marked(&mut self, mark: Mark, start: u32, middle: u32, datum: Datum) -> Datum {
+        let symbol = match mark {
+            Mark::Quote => &NAMES.quote,
+            Mark::Function => &NAMES.function,
+            Mark::Backquote => &NAMES.backquote,
+            Mark::Comma => &NAMES.unquote,
+            Mark::CommaAt => &NAMES.splice,
+        };
+        let span = self.span(start, middle).to(datum.span());
+        Datum::list([Datum::symbol(symbol.clone(), self.span(start, middle)), datum], span)
+    }
+
+    /// `(…)`, or with a tail, `(… . tail)`
+    pub(super) fn list(&mut self, start: u32, items: Vec<Datum>, tail: Option<Datum>, end: u32) -> Datum {
+        let span = self.span(start, end);
+        let tail = tail.unwrap_or_else(|| Datum::nil(span));
+        Datum::list_with_tail(items, tail, span)
+    }
+
+    /// `#(…)` or `#n(…)`; the elements begin after `middle`.
+    pub(super) fn vector(&mut self, start: u32, middle: u32, items: Vec<Datum>, end: u32) -> Datum {
+        let span = self.span(start, end);
+        let length = self.slice(start + 1, middle - 1);
+        let fault = match (length, name::digits(length)) {
+            ("", _) => literal::vector(None, items, self.room),
+            (_, Some(length)) => literal::vector(Some(length), items, self.room),
+            _ => Err(None),
+        };
+        match fault {
+            Ok(items) => Datum::new(DatumKind::Vector(items), span),
+            Err(Some(message)) => self.fail(code::MALFORMED_LITERAL.at(span, message)),
+            Err(None) => {
+                let message = "expected a vector of moderate length, found too many elements to fill in";
+                self.fail(
+                    code::LITERAL_TOO_LARGE
+                        .at(span, message)
+                        .help("use `make-array` with `:initial-element`"),
+                )
+            }
+        }
+    }
+
+    /// `#nA` before its contents; it ends before `middle`.
+    pub(super) fn array(&mut self, start: u32, middle: u32, contents: Datum) -> Datum {
+        let span = self.span(start, middle).to(contents.span());
+        let rank = name::digits(self.slice(start + 1, middle - 1));
+        let Some(rank) = rank.filter(|&rank| rank <= literal::MAX_RANK) else {
+            let max = literal::MAX_RANK;
+            let message = format!("expected a rank of at most {max}, found `{}`", self.slice(start, middle));
+            return self.fail(code::INVALID_TOKEN.at(self.span(start, middle), message));
+        };
+        match literal::array(rank, contents) {
+            Ok(kind) => Datum::new(kind, span),
+            Err((place, message)) => self.fail(code::MALFORMED_LITERAL.at(place, message)),
+        }
+    }
+
+    /// `#n=` before its datum; it ends before `middle`.
+    pub(super) fn label(&mut self, start: u32, middle: u32, datum: Datum) -> Datum {
+        // The scanner has seen to it that the number is one.
+        if let Some(number) = label_number(self.text, start, middle) {
+            self.labels.insert(number, datum.clone());
+        }
+        datum
+    }
+
+    /// `#n#`
+    pub(super) fn reference(&mut self, start: u32, end: u32) -> Datum {
+        let found = label_number(self.text, start, end).and_then(|number| self.labels.get(&number));
+        // The scanner has seen to it that there is one.
+        found.cloned().unwrap_or_else(|| Datum::nil(self.span(start, end)))
+    }
+}

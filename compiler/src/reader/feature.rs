@@ -1,0 +1,93 @@
+//! Feature expressions: what stands between `#+` or `#-` and the datum that is read or left out.
+//!
+//! An expression is a name, or `(and …)`, `(or …)`, `(not …)` over expressions. Names are compared without their
+//! package. They are evaluated on their tokens, with an explicit stack.
+
+use super::lexer::Token;
+use super::name;
+use super::scan::Lexeme;
+
+/// The features of this implementation.
+pub const FEATURES: [&str; 2] = ["ESL", "COMMON-LISP"];
+
+/// Why an expression is none.
+#[derive(Debug)]
+pub(super) struct Fault {
+    pub(super) start: u32,
+    pub(super) end: u32,
+    pub(super) message: String,
+}
+
+/// `(and …)`, `(or …)` or `(not …)` so far.
+struct Operation {
+    operator: Operator,
+    value: bool,
+    operands: u32,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Operator {
+    And,
+    Or,
+    Not,
+}
+
+/// Whether the feature expression with these tokens, which is balanced, holds.
+pub(super) fn holds(text: &str, lexemes: &[Lexeme]) -> Result<bool, Fault> {
+    let mut operations: Vec<Operation> = Vec::new();
+    let mut lexemes = lexemes.iter();
+    while let Some(lexeme) = lexemes.next() {
+        let value = match lexeme.token {
+            Token::Open => {
+                let operator = lexemes.next().map_or(Err(lexeme), |next| operator(text, next).ok_or(next));
+                let operator =
+                    operator.map_err(|found| fault(found, "expected `and`, `or` or `not`", text))?;
+                operations.push(Operation { operator, value: operator == Operator::And, operands: 0 });
+                continue;
+            }
+            Token::Close => match operations.pop() {
+                Some(Operation { operator: Operator::Not, operands, .. }) if operands != 1 => {
+                    return Err(fault(lexeme, "expected exactly one feature after `not`", text));
+                }
+                Some(operation) => operation.value,
+                None => return Err(fault(lexeme, "expected a feature", text)),
+            },
+            Token::Atom | Token::Escaped => {
+                let name = feature(text, lexeme).ok_or_else(|| fault(lexeme, "expected a feature", text))?;
+                FEATURES.contains(&name.as_str())
+            }
+            _ => return Err(fault(lexeme, "expected a feature", text)),
+        };
+        let Some(outer) = operations.last_mut() else { return Ok(value) };
+        outer.operands += 1;
+        outer.value = match outer.operator {
+            Operator::And => outer.value && value,
+            Operator::Or => outer.value || value,
+            Operator::Not => !value,
+        };
+    }
+    Err(Fault { start: 0, end: 0, message: "expected a feature".into() })
+}
+
+fn operator(text: &str, lexeme: &Lexeme) -> Option<Operator> {
+    match feature(text, lexeme)?.as_str() {
+        "AND" => Some(Operator::And),
+        "OR" => Some(Operator::Or),
+        "NOT" => Some(Operator::Not),
+        _ => None,
+    }
+}
+
+/// The name of a feature or operator.
+fn feature(text: &str, lexeme: &Lexeme) -> Option<String> {
+    if !matches!(lexeme.token, Token::Atom | Token::Escaped) {
+        return None;
+    }
+    let parts = name::parse(&text[lexeme.start as usize..lexeme.end as usize]).ok()?;
+    Some(parts.name)
+}
+
+fn fault(found: &Lexeme, expected: &str, text: &str) -> Fault {
+    let shown = name::shorten(&text[found.start as usize..found.end as usize]);
+    Fault { start: found.start, end: found.end, message: format!("{expected}, found `{shown}`") }
+}

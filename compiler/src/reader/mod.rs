@@ -1,0 +1,263 @@
+//! The reader: source text to data.
+//!
+//! Text goes through four steps. The [`lexer`] finds tokens; `scan` collects those of the next top-level datum; the
+//! grammar (`grammar.lalrpop`) parses them; `builder` makes the datum. One datum is read at a time, since the one
+//! before may have changed the package in which its names are looked up.
+//!
+//! Guarantees: whatever the text, reading ends, in time in proportion to its length, without native recursion and
+//! with a datum or a diagnostic for every part of it. After an error it goes on behind the faulty datum or, if that has
+//! no end, at the next form that begins in column 0.
+//! Not here: reader macros, which ESL does not have; `read` on streams (the library, over [`read_datum`]).
+
+mod bare;
+mod builder;
+mod character;
+mod feature;
+mod grammar;
+pub mod lexer;
+mod literal;
+mod name;
+mod number;
+mod print;
+mod scan;
+
+use std::sync::Arc;
+
+use esl_bytecode::compile::Environment;
+use esl_bytecode::datum::Datum;
+use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::span::{SourceId, Span};
+use lalrpop_util::ParseError;
+
+use crate::diagnostic::code;
+
+pub use bare::{BareEnvironment, read_anything};
+pub use character::CHARACTER_NAMES;
+pub use feature::FEATURES;
+pub use literal::MAX_RANK;
+pub use name::{MAX_NAME, fold};
+pub use number::{MAX_DIGITS, MAX_RATIO_DIGITS};
+pub use print::print;
+pub use scan::MAX_DEPTH;
+
+use builder::Builder;
+use lexer::Token;
+use scan::{Lexeme, Scan, Scanner};
+
+/// After so many errors in one text, the rest is not read.
+const MAX_ERRORS: usize = 100;
+
+/// So many elements may be filled into the vectors `#n(…)` of one text.
+const MAX_FILL: usize = 1 << 20;
+
+/// Reads a text, one top-level datum at a time.
+#[derive(Debug)]
+pub struct Reader {
+    text: Arc<str>,
+    position: usize,
+    scanner: Scanner,
+    room: usize,
+    /// Diagnostics to be given out before reading on, the first one last.
+    waiting: Vec<Diagnostic>,
+    errors: usize,
+}
+
+impl Reader {
+    /// A reader at the beginning of `text`. A byte order mark, and a first line that begins with `#!`, are skipped.
+    pub fn new(source: SourceId, text: impl Into<Arc<str>>) -> Reader {
+        let text = text.into();
+        let position = preamble(&text);
+        let mut waiting = Vec::new();
+        if !is_readable(&text) {
+            waiting.push(too_large(source));
+        }
+        Reader { text, position, scanner: Scanner::new(source), room: MAX_FILL, waiting, errors: 0 }
+    }
+
+    /// The byte from which the next datum is looked for.
+    pub fn position(&self) -> usize {
+        self.position
+    }
+
+    /// The next datum, or a diagnostic about it; `None` at the end of the text. One faulty datum may give several
+    /// diagnostics in a row.
+    pub fn next(&mut self, environment: &mut dyn Environment) -> Option<Result<Datum, Box<Diagnostic>>> {
+        if self.waiting.is_empty() {
+            if !is_readable(&self.text) {
+                return None;
+            }
+            match read(&mut self.scanner, environment, &self.text, self.position, &mut self.room) {
+                Read::Datum(datum, end) => {
+                    self.position = end;
+                    return Some(Ok(datum));
+                }
+                Read::Errors(mut errors, resume) => {
+                    self.position = resume;
+                    errors.reverse();
+                    self.waiting = errors;
+                }
+                Read::End => self.position = self.text.len(),
+            }
+        }
+        let error = self.waiting.pop()?;
+        self.errors += 1;
+        let is_over = self.waiting.is_empty() && self.position == self.text.len();
+        if self.errors == MAX_ERRORS && !is_over {
+            let message = format!("expected fewer than {MAX_ERRORS} errors, found so many");
+            let last = code::TOO_MANY_ERRORS.at(error.primary.span, message);
+            self.waiting = vec![last.label("the text is not read any further")];
+            self.position = self.text.len();
+        }
+        Some(Err(Box::new(error)))
+    }
+}
+
+/// Reads one datum of `text` from byte `start` on: the datum, `None` at the end of the text, and the offset after it.
+/// A blank after the datum is not part of it.
+///
+/// # Errors
+/// The first fault of the datum. [`is_unfinished`] tells whether more text could mend it: that is reported only if
+/// nothing else is wrong.
+pub fn read_datum(
+    environment: &mut dyn Environment,
+    text: &str,
+    start: usize,
+) -> Result<(Option<Datum>, usize), Box<Diagnostic>> {
+    let source = SourceId::default();
+    if !is_readable(text) {
+        return Err(Box::new(too_large(source)));
+    }
+    let start = text.ceil_char_boundary(start);
+    match read(&mut Scanner::new(source), environment, text, start, &mut { MAX_FILL }) {
+        Read::Datum(datum, end) => Ok((Some(datum), end)),
+        Read::End => Ok((None, text.len())),
+        Read::Errors(mut errors, _) => {
+            let wrong = errors.iter().position(|error| !is_unfinished(error.code));
+            Err(Box::new(errors.swap_remove(wrong.unwrap_or(0))))
+        }
+    }
+}
+
+/// Whether a diagnostic of this code says only that the text ends too early, so that a REPL waits for another line.
+pub fn is_unfinished(code: &str) -> bool {
+    let codes = [
+        code::UNCLOSED_LIST,
+        code::UNCLOSED_STRING,
+        code::UNCLOSED_COMMENT,
+        code::UNCLOSED_BAR,
+        code::UNFINISHED_DATUM,
+        code::UNFINISHED_ESCAPE,
+    ];
+    codes.iter().any(|unfinished| unfinished.name == code)
+}
+
+/// The text of a file.
+///
+/// # Errors
+/// `invalid-utf-8`, with the offset of the first byte that is not UTF-8; `source-too-large`.
+pub fn decode(source: SourceId, bytes: Vec<u8>) -> Result<String, Box<Diagnostic>> {
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let (at, bytes) = (error.utf8_error().valid_up_to(), error.as_bytes());
+        let line = bytes[..at].iter().filter(|&&byte| byte == b'\n').count() + 1;
+        let message =
+            format!("expected text in UTF-8, found byte 0x{:02X} at offset {at}, line {line}", bytes[at]);
+        let at = u32::try_from(at).unwrap_or(u32::MAX - 1);
+        let diagnostic = code::INVALID_UTF_8.at(Span::new(source, at, at + 1), message);
+        Box::new(diagnostic.help("save the file as UTF-8, or convert it, for instance with `iconv`"))
+    })?;
+    if is_readable(&text) { Ok(text) } else { Err(Box::new(too_large(source))) }
+}
+
+/// What came of reading one datum.
+enum Read {
+    Datum(Datum, usize),
+    /// What is wrong, in order, at least one; and where to go on.
+    Errors(Vec<Diagnostic>, usize),
+    End,
+}
+
+fn read(
+    scanner: &mut Scanner,
+    environment: &mut dyn Environment,
+    text: &str,
+    from: usize,
+    room: &mut usize,
+) -> Read {
+    let end = match scanner.scan(text, from) {
+        Scan::Datum(end) => end,
+        Scan::Errors(resume) => return Read::Errors(std::mem::take(&mut scanner.errors), resume),
+        Scan::End => return Read::End,
+    };
+    let source = scanner.source();
+    let mut builder = Builder::new(environment, text, source, room);
+    let tokens = scanner.lexemes.iter().map(|lexeme| (lexeme.start, lexeme.token, lexeme.end));
+    let parsed = grammar::DatumParser::new().parse(&mut builder, tokens);
+    let mut errors = builder.errors;
+    match parsed {
+        Ok(datum) if errors.is_empty() => return Read::Datum(datum, end),
+        Ok(_) => {}
+        Err(error) => errors.push(explain(&error, &scanner.lexemes, text, source)),
+    }
+    Read::Errors(errors, end)
+}
+
+/// What the grammar found wrong. The tokens are balanced, so that it is about dots, or about a mark before a `)`.
+fn explain<E>(
+    error: &ParseError<u32, Token, E>,
+    lexemes: &[Lexeme],
+    text: &str,
+    source: SourceId,
+) -> Diagnostic {
+    let place = match error {
+        ParseError::UnrecognizedToken { token, .. } | ParseError::ExtraToken { token } => token.0,
+        _ => u32::MAX,
+    };
+    let at = lexemes.partition_point(|lexeme| lexeme.start < place).min(lexemes.len() - 1);
+    let span = |lexeme: &Lexeme| Span::new(source, lexeme.start, lexeme.end);
+    let found = &lexemes[at];
+    let previous = at.checked_sub(1).map(|at| &lexemes[at]);
+    let mark = previous.filter(|previous| is_mark(previous.token));
+    match (found.token, previous.map(|previous| previous.token)) {
+        (Token::Close, Some(Token::Dot)) => code::DOTTED_LIST
+            .at(span(found), "expected the last element of the list after the dot, found `)`"),
+        (Token::Dot, None) => {
+            code::DOTTED_LIST.at(span(found), "expected a form, found a dot outside of a list")
+        }
+        (Token::Dot, Some(Token::Open | Token::Vector)) => {
+            code::DOTTED_LIST.at(span(found), "expected an element before the dot, found none")
+        }
+        (found_token @ (Token::Dot | Token::Close), Some(_)) if mark.is_some() => {
+            let mark = mark.expect("just tested");
+            let shown = &text[mark.start as usize..mark.end as usize];
+            let found_shown = if found_token == Token::Dot { "a dot" } else { "`)`" };
+            code::MISSING_DATUM
+                .at(span(found), format!("expected a datum after `{shown}`, found {found_shown}"))
+                .also(span(mark), "this stands before nothing")
+        }
+        (Token::Dot, _) => code::DOTTED_LIST
+            .at(span(found), "expected a dot only before the last element of a list, found one elsewhere"),
+        _ => code::DOTTED_LIST
+            .at(span(found), "expected `)` after the element that follows the dot, found more"),
+    }
+}
+
+fn is_mark(token: Token) -> bool {
+    use Token::{Array, Backquote, Comma, CommaAt, Function, Label, Quote};
+    matches!(token, Quote | Backquote | Comma | CommaAt | Function | Array | Label)
+}
+
+/// The length of what is skipped at the beginning of a text.
+fn preamble(text: &str) -> usize {
+    let mark = if text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 };
+    let rest = &text[mark..];
+    if rest.starts_with("#!") { mark + rest.find('\n').unwrap_or(rest.len()) } else { mark }
+}
+
+/// Spans have offsets of 32 bits; the last one is kept free.
+fn is_readable(text: &str) -> bool {
+    text.len() < u32::MAX as usize
+}
+
+fn too_large(source: SourceId) -> Diagnostic {
+    code::SOURCE_TOO_LARGE.at(Span::new(source, 0, 0), "expected a text of less than 4 GiB, found more")
+}

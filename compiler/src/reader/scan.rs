@@ -1,0 +1,371 @@
+//! Finding the extent of the next datum on the token stream.
+//!
+//! The meaning of a name depends on the current package, which the form before it may have changed; so the reader
+//! works through a text one top-level datum at a time. The scanner collects the tokens of one, which the grammar then
+//! parses. On the way it does what depends on more than the grammar sees: it leaves out what `#+` and `#-` exclude,
+//! keeps nesting within bounds, and checks commas and labels.
+//!
+//! Guarantees: nesting is on a stack of frames of its own; after an error the scanner goes on at a place from which
+//! the following forms can be read, and all calls together look at each byte of the text a bounded number of times.
+//! Not here: dots, and marks with nothing after them (the grammar), what tokens denote (`builder`).
+
+mod check;
+mod recover;
+
+use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::span::{SourceId, Span};
+use logos::Logos;
+use rustc_hash::FxHashMap;
+
+use crate::diagnostic::code;
+
+use super::MAX_ERRORS;
+use super::feature;
+use super::lexer::Token;
+
+pub(super) use check::label_number;
+
+/// Lists within lists, marks and vectors included, can be so deep.
+pub const MAX_DEPTH: usize = 2000;
+
+/// No offset: texts are shorter.
+const NONE: u32 = u32::MAX;
+
+/// A token and where it is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lexeme {
+    pub(super) token: Token,
+    pub(super) start: u32,
+    pub(super) end: u32,
+}
+
+/// What is open around the current token.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Open {
+    /// A list or vector, until its `)`.
+    List,
+    /// A mark that takes one datum.
+    Prefix,
+    Backquote,
+    Comma,
+    Array,
+    /// `#n=`; the number, and what [`Scanner::deepest`] and [`Scanner::tokens`] were outside.
+    Label {
+        number: u32,
+        deepest: usize,
+        tokens: u64,
+    },
+    /// `#+` or `#-` before its feature expression.
+    Feature {
+        wanted: bool,
+    },
+    /// `#+` or `#-` after it: the datum that it is about.
+    Conditional {
+        kept: bool,
+    },
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Frame {
+    open: Open,
+    /// Where its token is.
+    start: u32,
+    end: u32,
+    /// Index of its token in [`Scanner::lexemes`].
+    lexeme: usize,
+    /// Backquotes less commas around it.
+    backquotes: u32,
+    /// The first `(` within it that is in column 0.
+    column_0: u32,
+}
+
+/// A list without an end, and where the next form probably begins.
+#[derive(Clone, Copy, Debug)]
+struct Unclosed {
+    start: u32,
+    column_0: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum LabelState {
+    Open,
+    Done { height: usize, tokens: u64 },
+}
+
+/// What a scan found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scan {
+    /// A datum, whose tokens are [`Scanner::lexemes`]; it ends before this offset.
+    Datum(usize),
+    /// No datum but [`Scanner::errors`]; go on at this offset.
+    Errors(usize),
+    /// The end of the text.
+    End,
+}
+
+/// The scanner. It is kept from one datum to the next for its buffers and for what it learnt about the text.
+#[derive(Debug, Default)]
+pub(super) struct Scanner {
+    source: SourceId,
+    /// The tokens of the datum.
+    pub(super) lexemes: Vec<Lexeme>,
+    /// What is wrong with it so far.
+    pub(super) errors: Vec<Diagnostic>,
+    frames: Vec<Frame>,
+    /// How many of the frames are lists.
+    lists: usize,
+    /// How many lists are open beyond [`MAX_DEPTH`]. They have no frames.
+    excess: u64,
+    /// Whether that has been reported.
+    is_too_deep: bool,
+    /// How many of the frames are left out by a feature.
+    excluded: u32,
+    backquotes: u32,
+    labels: FxHashMap<u32, LabelState>,
+    /// The deepest nesting since the innermost label.
+    deepest: usize,
+    /// Tokens that the datum would have if all labels were written out.
+    tokens: u64,
+    /// The lists that are known not to be closed before the end of the text, in order.
+    unclosed: Vec<Unclosed>,
+    runaways: u32,
+}
+
+impl Scanner {
+    pub(super) fn source(&self) -> SourceId {
+        self.source
+    }
+
+    pub(super) fn new(source: SourceId) -> Scanner {
+        Scanner { source, ..Scanner::default() }
+    }
+
+    /// Collects the tokens of the next datum of `text` from byte `from` on.
+    pub(super) fn scan(&mut self, text: &str, from: usize) -> Scan {
+        self.reset();
+        let mut lexer = Token::lexer(&text[from..]);
+        while let Some(token) = lexer.next() {
+            let (start, end) = ((from + lexer.span().start) as u32, (from + lexer.span().end) as u32);
+            let token = match token {
+                Ok(token) => token,
+                Err(error) => return Scan::Errors(self.runaway(error, text, start, end)),
+            };
+            let is_done = match token {
+                Token::Open | Token::Vector => {
+                    if self.lists == 0 {
+                        // Scanned before, up to the end of the text: do not go there again.
+                        if let Ok(known) = self.unclosed.binary_search_by_key(&start, |list| list.start) {
+                            let list = self.unclosed[known];
+                            return Scan::Errors(self.unclosed_list(list.start, end, list.column_0, text));
+                        }
+                    }
+                    if token == Token::Open && is_column_0(text, start) {
+                        self.note_column_0(start);
+                    }
+                    self.push(Open::List, token, start, end);
+                    false
+                }
+                Token::Close => {
+                    if self.frames.is_empty() && self.excess == 0 {
+                        return Scan::Errors(self.unexpected_close(text, start));
+                    }
+                    self.close(text, start, end)
+                }
+                Token::Stray => {
+                    self.stray(text, start, end);
+                    false
+                }
+                token => self.token(token, text, start, end),
+            };
+            if is_done {
+                return if self.errors.is_empty() {
+                    Scan::Datum(end as usize)
+                } else {
+                    Scan::Errors(end as usize)
+                };
+            }
+        }
+        self.end(text)
+    }
+
+    fn reset(&mut self) {
+        self.lexemes.clear();
+        self.errors.clear();
+        self.frames.clear();
+        self.lists = 0;
+        self.excess = 0;
+        self.is_too_deep = false;
+        self.excluded = 0;
+        self.backquotes = 0;
+        self.labels.clear();
+        self.deepest = 0;
+        self.tokens = 0;
+    }
+
+    /// Takes a token other than a parenthesis. True if it completes the top-level datum.
+    fn token(&mut self, token: Token, text: &str, start: u32, end: u32) -> bool {
+        match token {
+            Token::Quote | Token::Function => self.push(Open::Prefix, token, start, end),
+            Token::Backquote => {
+                self.push(Open::Backquote, token, start, end);
+                self.backquotes += 1;
+            }
+            Token::Comma | Token::CommaAt => {
+                self.check_comma(token, start, end);
+                self.push(Open::Comma, token, start, end);
+                self.backquotes = self.backquotes.saturating_sub(1);
+            }
+            Token::Array => {
+                self.push(Open::Array, token, start, end);
+                self.backquotes = 0;
+            }
+            Token::Label => {
+                let open = self.open_label(text, start, end);
+                self.push(open, token, start, end);
+            }
+            Token::FeaturePresent | Token::FeatureAbsent => {
+                self.push(Open::Feature { wanted: token == Token::FeaturePresent }, token, start, end);
+                self.excluded += 1;
+            }
+            Token::ReadEval | Token::Structure | Token::Pathname | Token::Complex => {
+                self.refuse(token, text, start, end);
+                self.push(Open::Prefix, token, start, end);
+            }
+            Token::Dot => {
+                self.add(token, start, end);
+                return self.lists == 0 && self.excess == 0;
+            }
+            _ => {
+                match token {
+                    Token::Reference => self.check_reference(text, start, end),
+                    Token::BitVector => self.refuse(token, text, start, end),
+                    _ => {}
+                }
+                self.add(token, start, end);
+                return self.complete(text);
+            }
+        }
+        false
+    }
+
+    fn add(&mut self, token: Token, start: u32, end: u32) {
+        self.lexemes.push(Lexeme { token, start, end });
+        self.tokens = self.tokens.saturating_add(1);
+    }
+
+    fn push(&mut self, open: Open, token: Token, start: u32, end: u32) {
+        if self.frames.len() == MAX_DEPTH {
+            self.too_deep(start, end);
+            // Marks beyond the limit are dropped, lists are counted, so that the end of the datum is found.
+            self.excess += u64::from(open == Open::List);
+            return;
+        }
+        let (lexeme, backquotes) = (self.lexemes.len(), self.backquotes);
+        self.frames.push(Frame { open, start, end, lexeme, backquotes, column_0: NONE });
+        self.lists += usize::from(open == Open::List);
+        self.deepest = self.deepest.max(self.frames.len());
+        self.add(token, start, end);
+    }
+
+    fn pop(&mut self) -> Option<Frame> {
+        let frame = self.frames.pop()?;
+        self.lists -= usize::from(frame.open == Open::List);
+        self.backquotes = frame.backquotes;
+        if matches!(frame.open, Open::Feature { .. } | Open::Conditional { kept: false }) {
+            self.excluded -= 1;
+        }
+        Some(frame)
+    }
+
+    /// Takes a `)`. True if it completes the top-level datum.
+    fn close(&mut self, text: &str, start: u32, end: u32) -> bool {
+        if self.excess > 0 {
+            self.excess -= 1;
+            return self.complete(text);
+        }
+        self.add(Token::Close, start, end);
+        while let Some(frame) = self.pop() {
+            match frame.open {
+                Open::List => return self.complete(text),
+                // What is excluded never reaches the grammar: its marks are checked here.
+                Open::Feature { .. } | Open::Conditional { .. } => {
+                    let mark = &text[frame.start as usize..frame.end as usize];
+                    let span = self.span(start, end);
+                    self.error(
+                        code::MISSING_DATUM
+                            .at(span, format!("expected a datum for `{mark}`, found `)`"))
+                            .also(self.span(frame.start, frame.end), "this needs a feature and a datum"),
+                    );
+                }
+                _ => {}
+            }
+        }
+        // Only marks were open: the grammar says what is wrong with the datum.
+        true
+    }
+
+    /// A datum is complete: so are the marks before it. True if nothing is left open.
+    fn complete(&mut self, text: &str) -> bool {
+        if self.excess > 0 {
+            return false;
+        }
+        while let Some(&frame) = self.frames.last() {
+            match frame.open {
+                Open::List => return false,
+                Open::Feature { wanted } => {
+                    self.pop();
+                    let test = &self.lexemes[frame.lexeme + 1..];
+                    let kept = match feature::holds(text, test) {
+                        Ok(holds) => holds == wanted,
+                        Err(fault) => {
+                            let span = self.span(fault.start, fault.end);
+                            self.error(code::INVALID_TOKEN.at(span, fault.message));
+                            true
+                        }
+                    };
+                    self.lexemes.truncate(frame.lexeme);
+                    self.frames.push(Frame { open: Open::Conditional { kept }, ..frame });
+                    self.excluded += u32::from(!kept);
+                    return false;
+                }
+                Open::Conditional { kept: false } => {
+                    self.pop();
+                    self.lexemes.truncate(frame.lexeme);
+                    return false;
+                }
+                Open::Label { number, deepest, tokens } => {
+                    self.pop();
+                    let height = self.deepest.saturating_sub(self.frames.len() + 1);
+                    self.labels.insert(number, LabelState::Done { height, tokens: self.tokens - tokens });
+                    self.deepest = self.deepest.max(deepest);
+                }
+                _ => {
+                    self.pop();
+                }
+            }
+        }
+        true
+    }
+
+    /// Remembers for all open frames that have none yet that a `(` at the beginning of a line lies within them.
+    fn note_column_0(&mut self, start: u32) {
+        // Frames that have one are below those that have none.
+        for frame in self.frames.iter_mut().rev().take_while(|frame| frame.column_0 == NONE) {
+            frame.column_0 = start;
+        }
+    }
+
+    fn error(&mut self, diagnostic: Diagnostic) {
+        if self.errors.len() < MAX_ERRORS {
+            self.errors.push(diagnostic);
+        }
+    }
+
+    fn span(&self, start: u32, end: u32) -> Span {
+        Span::new(self.source, start, end)
+    }
+}
+
+fn is_column_0(text: &str, start: u32) -> bool {
+    start == 0 || text.as_bytes()[start as usize - 1] == b'\n'
+}

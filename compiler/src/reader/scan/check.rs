@@ -1,0 +1,116 @@
+//! What depends on more of a datum than the grammar sees: commas, labels, and what the subset leaves out.
+
+use crate::diagnostic::code;
+use crate::reader::lexer::Token;
+use crate::reader::name;
+
+use super::{LabelState, MAX_DEPTH, Open, Scanner};
+
+/// A datum with labels may stand for a tree of so many tokens.
+const MAX_TREE: u64 = 1 << 24;
+
+impl Scanner {
+    pub(super) fn check_comma(&mut self, token: Token, start: u32, end: u32) {
+        if self.excluded > 0 {
+            return;
+        }
+        let span = self.span(start, end);
+        if self.backquotes == 0 {
+            let in_array = self.frames.iter().any(|frame| frame.open == Open::Array);
+            let place = if in_array { "in an array literal" } else { "outside of a backquote" };
+            return self.error(code::COMMA_OUTSIDE_BACKQUOTE.at(span, format!("comma {place}")));
+        }
+        if token == Token::CommaAt {
+            let parent = self.frames.last().map(|frame| frame.open);
+            let after_dot = self.lexemes.last().is_some_and(|last| last.token == Token::Dot);
+            if parent == Some(Open::Backquote) {
+                self.error(
+                    code::MISPLACED_SPLICE
+                        .at(span, "expected `,@` within a list, found it right after the backquote")
+                        .help("put it into a list, or take `,` to insert the value itself"),
+                );
+            } else if parent == Some(Open::List) && after_dot {
+                self.error(
+                    code::MISPLACED_SPLICE
+                        .at(span, "expected one datum after the dot, found `,@`")
+                        .help("leave the dot out, or take `,` to make the value the rest of the list"),
+                );
+            }
+        }
+    }
+
+    pub(super) fn open_label(&mut self, text: &str, start: u32, end: u32) -> Open {
+        if self.excluded > 0 {
+            return Open::Prefix;
+        }
+        let Some(number) = label_number(text, start, end) else {
+            let span = self.span(start, end);
+            self.error(code::INVALID_TOKEN.at(span, "the number of a label is too large"));
+            return Open::Prefix;
+        };
+        if self.labels.insert(number, LabelState::Open).is_some() {
+            let span = self.span(start, end);
+            self.error(code::UNKNOWN_LABEL.at(span, format!("label `#{number}=` is defined twice")));
+        }
+        let open = Open::Label { number, deepest: self.deepest, tokens: self.tokens };
+        self.deepest = self.frames.len();
+        open
+    }
+
+    pub(super) fn check_reference(&mut self, text: &str, start: u32, end: u32) {
+        if self.excluded > 0 {
+            return;
+        }
+        let span = self.span(start, end);
+        let state = label_number(text, start, end).and_then(|number| self.labels.get(&number).copied());
+        match state {
+            Some(LabelState::Done { height, tokens }) => {
+                let depth = self.frames.len() + height;
+                self.deepest = self.deepest.max(depth);
+                self.tokens = self.tokens.saturating_add(tokens);
+                if depth > MAX_DEPTH {
+                    self.too_deep(start, end);
+                } else if self.tokens > MAX_TREE {
+                    self.error(
+                        code::LITERAL_TOO_LARGE
+                            .at(span, format!("labels stand for more than {MAX_TREE} tokens if written out")),
+                    );
+                }
+            }
+            Some(LabelState::Open) => self.error(
+                code::CIRCULAR_LITERAL
+                    .at(span, "a literal cannot contain itself")
+                    .help("build circular structure at run time, with `setf` or `nconc`"),
+            ),
+            None => {
+                let label = &text[start as usize..end as usize];
+                self.error(
+                    code::UNKNOWN_LABEL.at(span, format!("no label before `{label}` has this number")),
+                );
+            }
+        }
+    }
+
+    pub(super) fn refuse(&mut self, token: Token, text: &str, start: u32, end: u32) {
+        if self.excluded > 0 {
+            return;
+        }
+        let (what, help) = match token {
+            Token::ReadEval => ("evaluation while reading", "use a macro, `load-time-value` or a variable"),
+            Token::Structure => ("a literal structure", "call its constructor"),
+            Token::BitVector => ("a bit vector", "use an integer with `logbitp`, or a vector of 0 and 1"),
+            Token::Pathname => ("a path", "use a string"),
+            _ => ("a complex number", "keep real and imaginary part in a list or a structure"),
+        };
+        let mark = text[start as usize..end as usize].chars().take(2).collect::<String>();
+        let span = self.span(start, end);
+        self.error(
+            code::NOT_IN_SUBSET.at(span, format!("`{mark}`, {what}, is not in the subset")).help(help),
+        );
+    }
+}
+
+/// The number in `#n=` or `#n#`.
+pub(in crate::reader) fn label_number(text: &str, start: u32, end: u32) -> Option<u32> {
+    name::digits(&text[start as usize + 1..end as usize - 1])
+}

@@ -1,0 +1,91 @@
+//! The table of codes and the page made from it.
+
+use std::collections::HashSet;
+use std::fs;
+use std::path::Path;
+
+use esl_bytecode::span::SourceId;
+use esl_compiler::diagnostic::{Stage, code, document};
+use esl_compiler::reader::{BareEnvironment, Reader};
+
+#[test]
+fn codes_are_words_joined_by_hyphens_and_differ() {
+    let mut seen = HashSet::new();
+    for code in code::ALL {
+        assert!(seen.insert(code.name), "{} is there twice", code.name);
+        assert!(
+            code.name.bytes().all(|b| b == b'-' || b.is_ascii_lowercase() || b.is_ascii_digit()),
+            "{}",
+            code.name
+        );
+        assert!(code.summary.ends_with('.'), "{}: {}", code.name, code.summary);
+        assert_eq!(code.failing.is_empty(), code.repaired.is_empty(), "{}", code.name);
+        assert_eq!(code::find(code.name), Some(*code));
+    }
+    assert_eq!(code::find("no-such-code"), None);
+}
+
+/// The codes that reading `program` reports. Packages are those of the language, and `CL` offers only `LIST`.
+fn reported(program: &str) -> Vec<&'static str> {
+    struct Strict(BareEnvironment);
+    use esl_bytecode::compile::{Environment, Global, GlobalFunction, InternError};
+    use esl_bytecode::datum::Datum;
+    use esl_bytecode::symbol::Symbol;
+    impl Environment for Strict {
+        fn global(&self, symbol: &Symbol) -> Global {
+            self.0.global(symbol)
+        }
+        fn setf_function(&self, symbol: &Symbol) -> GlobalFunction {
+            self.0.setf_function(symbol)
+        }
+        fn property(&self, symbol: &Symbol, indicator: &Symbol) -> Option<Datum> {
+            self.0.property(symbol, indicator)
+        }
+        fn intern(
+            &mut self,
+            package: Option<&str>,
+            name: &str,
+            internal: bool,
+        ) -> Result<Symbol, InternError> {
+            if package == Some("CL") && name != "LIST" {
+                return Err(InternError::NotExternal { exists: false });
+            }
+            self.0.intern(package, name, internal)
+        }
+        fn fresh(&mut self) -> u32 {
+            self.0.fresh()
+        }
+        fn similar(&self, symbol: &Symbol, variable: bool) -> Vec<Symbol> {
+            self.0.similar(symbol, variable)
+        }
+    }
+    let mut environment = Strict(BareEnvironment::new());
+    let mut reader = Reader::new(SourceId::default(), program);
+    std::iter::from_fn(|| reader.next(&mut environment))
+        .filter_map(|read| read.err().map(|error| error.code))
+        .collect()
+}
+
+#[test]
+fn the_programs_of_the_reader_s_codes_have_them_and_the_repaired_ones_do_not() {
+    for code in code::ALL {
+        let expected =
+            if code.stage == Stage::Reader && !code.failing.is_empty() { vec![code.name] } else { vec![] };
+        assert_eq!(reported(code.failing), expected, "{}", code.failing);
+        assert_eq!(reported(code.repaired), [""; 0], "{}", code.repaired);
+    }
+}
+
+#[test]
+fn the_page_of_the_manual_is_up_to_date() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/diagnostics.md");
+    let page = document::markdown();
+    if std::env::var_os("ESL_BLESS").is_some() {
+        fs::write(&path, &page).expect("docs/ can be written");
+    }
+    let found = fs::read_to_string(&path).unwrap_or_default().replace("\r\n", "\n");
+    assert!(
+        found == page,
+        "docs/diagnostics.md is out of date; run ESL_BLESS=1 cargo test -p esl-compiler --test diagnostics"
+    );
+}
