@@ -345,6 +345,26 @@ impl Unit {
         Some(DatumKind::String(Arc::from(text?)))
     }
 
+    /// As [`Unit::to_datum`]; what no datum can describe becomes an object as a whole.
+    pub(crate) fn to_datum_or_object(
+        &mut self,
+        heap: &Heap,
+        world: &World,
+        object: Value,
+        span: Span,
+    ) -> Datum {
+        self.to_datum(heap, world, object, span)
+            .unwrap_or_else(|_| Datum::new(DatumKind::Object(self.pin(object)), span))
+    }
+
+    /// The object of an uninterned symbol, if it was met.
+    pub(crate) fn find_uninterned(&self, symbol: &Symbol) -> Option<Value> {
+        match symbol.home() {
+            Home::Uninterned(id) => self.uninterned(*id),
+            Home::Package(_) => None,
+        }
+    }
+
     /// The compiler's name for a symbol.
     pub(crate) fn symbol_to_datum(&mut self, heap: &Heap, world: &World, object: Value) -> Option<Symbol> {
         if let Some(symbol) = world.name_of(heap, object) {

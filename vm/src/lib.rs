@@ -3,6 +3,7 @@
 #![deny(unsafe_code)]
 
 pub mod builtins;
+pub mod embed;
 pub mod heap;
 pub mod host;
 pub mod raise;
@@ -14,6 +15,7 @@ pub mod vm;
 mod control;
 mod datum;
 mod describe;
+mod environment;
 mod interp;
 mod load;
 mod number;

@@ -34,7 +34,7 @@ mod image;
 
 pub use debug::SourcePlace;
 pub use definitions::prepare;
-pub(crate) use image::{Images, function as image_function, open as open_image};
+pub(crate) use image::{Images, function as image_function, open as open_image, origin as image_origin};
 
 /// Says that a module has passed the verifier, or is part of this program.
 pub(crate) struct Verified(());
@@ -318,11 +318,5 @@ impl Vm {
             Err(LoadError::Alloc(error)) => Err(error.into()),
             Err(error) => self.raise(error.into()),
         }
-    }
-
-    /// Where word `pc` of a code was written.
-    pub(crate) fn source_place(&self, code: Value, pc: u32) -> Option<SourcePlace> {
-        image::place_of(&self.heap, &self.world, code, pc)
-            .or_else(|| debug::place_of(&self.heap, self.heap.code(code)?.debug, pc))
     }
 }

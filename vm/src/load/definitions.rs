@@ -3,6 +3,7 @@
 //! The table is the last constant of the image, a vector: the symbol `ESL::%DEFINITIONS`, then for each defined symbol,
 //! ordered by package and name, the symbol, its function and its macro function (`NIL` for none).
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -58,13 +59,10 @@ impl Definitions {
         while low < high {
             let middle = low.midpoint(high);
             let row = &self.items[middle * ROW..][..ROW];
-            let ConstantRecord::Symbol(number) = image.constant(row[0]).ok()? else { return None };
-            let record = image.symbol(number).ok()?;
-            let SymbolHome::Package(package) = record.home else { return None };
-            match (&**packages.get(package as usize)?, record.name).cmp(&wanted) {
-                std::cmp::Ordering::Less => low = middle + 1,
-                std::cmp::Ordering::Greater => high = middle,
-                std::cmp::Ordering::Equal => {
+            match name_of(image, packages, row[0])?.cmp(&wanted) {
+                Ordering::Less => low = middle + 1,
+                Ordering::Greater => high = middle,
+                Ordering::Equal => {
                     let number = |index| match image.constant(index) {
                         Ok(ConstantRecord::Function(number)) => Some(number.0),
                         _ => None,
@@ -75,6 +73,27 @@ impl Definitions {
         }
         None
     }
+
+    /// Calls `visit` with each symbol that has a row.
+    pub(super) fn each(&self, image: &ModuleImage, packages: &[Arc<str>], visit: &mut dyn FnMut(&Symbol)) {
+        for row in self.items.chunks_exact(ROW) {
+            if let Some((package, name)) = name_of(image, packages, row[0]) {
+                visit(&Symbol::new(&package.into(), name));
+            }
+        }
+    }
+}
+
+/// Package and name of a constant that is a symbol.
+fn name_of<'a>(
+    image: &'a ModuleImage,
+    packages: &'a [Arc<str>],
+    index: PoolIdx,
+) -> Option<(&'a str, &'a str)> {
+    let ConstantRecord::Symbol(number) = image.constant(index).ok()? else { return None };
+    let record = image.symbol(number).ok()?;
+    let SymbolHome::Package(package) = record.home else { return None };
+    Some((packages.get(package as usize)?, record.name))
 }
 
 /// Turns the top-level forms of `module` that do nothing but define functions and macros into a table, for an image.

@@ -60,6 +60,13 @@ impl Images {
         self.0.iter().enumerate().find_map(find)
     }
 
+    /// Calls `visit` with every symbol that the images define.
+    pub(crate) fn each_definition(&self, visit: &mut dyn FnMut(&Symbol)) {
+        for image in &self.0 {
+            image.definitions.each(&image.module, &image.packages, visit);
+        }
+    }
+
     /// Decodes a function.
     pub(crate) fn decode(&self, image: usize, function: u32) -> Option<Function> {
         self.0.get(image)?.module.function(FunctionNumber(function)).ok()
@@ -295,7 +302,7 @@ impl ImageLoader<'_> {
 }
 
 /// The number of image and function behind the stub or the code of a function of an image.
-pub(super) fn origin(heap: &Heap, function: Value) -> Option<(usize, u32)> {
+pub(crate) fn origin(heap: &Heap, function: Value) -> Option<(usize, u32)> {
     let code = heap.code(heap.function_code(function)?)?;
     let image = code.owner.as_index()?;
     let number = match Shape::unpack(code.spare[0]).sort {

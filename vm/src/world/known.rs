@@ -46,6 +46,7 @@ macro_rules! define_known {
 
 define_known! {
     quote = cl "QUOTE";
+    package = cl "*PACKAGE*";
     function = cl "FUNCTION";
     lambda = cl "LAMBDA";
     setf = cl "SETF";
@@ -58,6 +59,7 @@ define_known! {
     // Properties under which the machine keeps data on a symbol.
     variable_documentation = esl "%VARIABLE-DOCUMENTATION";
     accessor = esl "%ACCESSOR";
+    // Variables of the library that the machine looks at.
     instead = esl "%INSTEAD";
     // Answers and options in keywords.
     internal = keyword "INTERNAL";

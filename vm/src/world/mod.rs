@@ -16,8 +16,10 @@ use std::sync::Arc;
 
 use esl_bytecode::builtin::{BUILTINS, Builtin, Visibility};
 use esl_bytecode::file::ModuleImage;
+use esl_bytecode::package::{PackageId, Packages};
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Home, KEYWORD_PACKAGE, Symbol};
 
+use crate::datum::Unit;
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{AllocError, Heap, Kind};
 use crate::load::{self, Images, LoadError};
@@ -27,6 +29,7 @@ use crate::value::Value;
 
 pub(crate) mod class;
 mod known;
+mod package;
 
 pub(crate) use known::Known;
 
@@ -66,8 +69,12 @@ pub(crate) struct World {
     names: RefCell<GivenMap<u64, Symbol>>,
     /// The next number for an uninterned symbol of the compiler.
     fresh: Cell<u32>,
+    /// The rules of packages.
+    packages: Packages,
     /// The objects of packages.
-    package_objects: HashMap<Arc<str>, Value>,
+    package_objects: HashMap<PackageId, Value>,
+    /// Packages in which symbols are at home, by name.
+    homes: HashMap<Arc<str>, (PackageId, Value)>,
     /// The companions of `NIL` and `T`.
     nil: Value,
     t: Value,
@@ -75,6 +82,8 @@ pub(crate) struct World {
     undefined: Value,
     /// Modules that are loaded piece by piece.
     pub(crate) images: Images,
+    /// What the compilation that is under way remembers.
+    pub(crate) unit: RefCell<Unit>,
     /// Structure and condition classes by the address of their names.
     classes: GivenMap<u64, Value>,
 }
@@ -93,11 +102,14 @@ impl World {
             symbols: GivenMap::default(),
             names: RefCell::default(),
             fresh: Cell::new(0),
+            packages: Packages::standard(),
             package_objects: HashMap::new(),
+            homes: HashMap::new(),
             nil: Value::NIL,
             t: Value::NIL,
             undefined,
             images: Images::default(),
+            unit: RefCell::default(),
             classes: GivenMap::default(),
         };
         world.nil = world.make_constant(heap, &Symbol::cl("NIL"), Value::NIL)?;
@@ -161,12 +173,24 @@ impl World {
         self.symbols.get(symbol).copied()
     }
 
+    /// Calls `visit` with every symbol of which there is an object, and the symbol as a program sees it.
+    pub(crate) fn each_symbol(&self, visit: &mut dyn FnMut(&Symbol, Value)) {
+        self.symbols.iter().for_each(|(symbol, &value)| visit(symbol, value));
+    }
+
     /// A new object for `symbol`, with its builtin function if it names one.
     fn make_object(&mut self, heap: &mut Heap, symbol: &Symbol) -> Result<Value, AllocError> {
         let name = heap.alloc_str(symbol.name())?;
         let (package, flags) = match symbol.package() {
             None => (Value::NIL, 0),
-            Some(home) => (self.package_object(heap, home)?, home_flags(home)),
+            Some(name) => {
+                let (home, object) = self.home(heap, name)?;
+                if self.packages.find(home, symbol.name()).is_none() {
+                    let is_external = home == PackageId::KEYWORD;
+                    self.packages.register(home, symbol.name().to_owned(), is_external);
+                }
+                (object, home_flags(name))
+            }
         };
         let object = self.make_symbol(heap, name, package, flags)?;
         if flags & SymbolObject::KEYWORD != 0 {
@@ -202,7 +226,11 @@ impl World {
     ///
     /// # Errors
     /// [`LoadError`].
-    pub(crate) fn open_image(&mut self, heap: &mut Heap, image: Arc<ModuleImage>) -> Result<Value, LoadError> {
+    pub(crate) fn open_image(
+        &mut self,
+        heap: &mut Heap,
+        image: Arc<ModuleImage>,
+    ) -> Result<Value, LoadError> {
         let toplevel = load::open_image(heap, self, image)?;
         // Symbols that are there already have missed the definitions.
         let symbols: Vec<(Symbol, Value)> = self.symbols.iter().map(|(s, &v)| (s.clone(), v)).collect();
@@ -236,17 +264,6 @@ impl World {
         let shape = Shape::other(Sort::Native, number as u16);
         let code = heap.alloc_stub(name, Value::NIL, shape, 0, stub::native_word(builtin))?;
         heap.alloc_function(code, &[])
-    }
-
-    /// The object of the package of this name.
-    fn package_object(&mut self, heap: &mut Heap, name: &Arc<str>) -> Result<Value, AllocError> {
-        if let Some(&object) = self.package_objects.get(name) {
-            return Ok(object);
-        }
-        let text = heap.alloc_str(name)?;
-        let object = heap.alloc_record(Kind::Package, 0, 0, &[text])?;
-        self.package_objects.insert(name.clone(), object);
-        Ok(object)
     }
 
     /// The symbol object of a symbol: the companion of `NIL` and `T`, others are their own. `None` if `v` is no symbol.
@@ -287,11 +304,6 @@ impl World {
         let number = self.fresh.get();
         self.fresh.set(number.wrapping_add(1));
         number
-    }
-
-    /// The name of a package object.
-    pub(crate) fn package_name(&self, heap: &Heap, package: Value) -> Option<String> {
-        heap.string_text(*heap.record(package, Kind::Package)?.first()?)
     }
 
     /// The function of a symbol, unless it has none. `None`, too, if `v` is no symbol.
@@ -336,6 +348,7 @@ impl World {
         self.symbols.values().copied().for_each(&mut *visit);
         self.package_objects.values().copied().for_each(&mut *visit);
         self.images.roots(visit);
+        self.unit.borrow().roots(visit);
         self.classes.values().copied().for_each(&mut *visit);
     }
 }

@@ -1,0 +1,206 @@
+//! What names mean, for a compiler that works on the program of this machine.
+//!
+//! Guarantees: no question is answered by running the program, and none makes an object, so asking is cheap and can be
+//! done in the middle of a builtin.
+//! Not here: running macros for a compiler outside of the machine (`host`), compiling at run time (`builtins::eval`).
+
+use esl_bytecode::builtin::BUILTINS;
+use esl_bytecode::compile::{
+    Accessor, Arity, Environment, Global, GlobalFunction, GlobalVariable, InternError,
+};
+use esl_bytecode::datum::Datum;
+use esl_bytecode::module::Parameters;
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
+
+use crate::heap::Heap;
+use crate::heap::layout::Symbol as SymbolObject;
+use crate::shape::{Shape, Sort};
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::world::{World, find_builtin, setf_cell};
+
+mod host;
+mod similar;
+
+impl Environment for Vm {
+    fn global(&self, symbol: &Symbol) -> Global {
+        let is_locked = symbol.package().is_some_and(|home| is_of_language(home)) && !self.world.is_open;
+        let Some(object) = self.object_for(symbol) else {
+            return Global {
+                function: undefined_so_far(&self.world, symbol),
+                variable: if symbol.is_keyword() {
+                    GlobalVariable::Constant(Datum::symbol(symbol.clone(), Span::default()))
+                } else {
+                    GlobalVariable::Undefined
+                },
+                accessor: None,
+                locked: is_locked,
+                instead: self.instead_of(symbol),
+            };
+        };
+        let function = self.function_info(object);
+        let instead = match function {
+            GlobalFunction::Undefined => self.instead_of(symbol),
+            _ => None,
+        };
+        Global {
+            function,
+            variable: self.variable_info(object),
+            accessor: self.accessor_info(object),
+            locked: is_locked,
+            instead,
+        }
+    }
+
+    fn setf_function(&self, symbol: &Symbol) -> GlobalFunction {
+        self.global(&setf_cell(symbol)).function
+    }
+
+    fn property(&self, symbol: &Symbol, indicator: &Symbol) -> Option<Datum> {
+        let indicator = self.value_for(indicator)?;
+        let value = property(&self.heap, self.object_for(symbol)?, indicator)?;
+        let unit = &mut self.world.unit.borrow_mut();
+        Some(unit.to_datum_or_object(&self.heap, &self.world, value, Span::default()))
+    }
+
+    fn intern(&mut self, package: Option<&str>, name: &str, internal: bool) -> Result<Symbol, InternError> {
+        self.read_symbol(package, name, internal)
+    }
+
+    fn fresh(&mut self) -> u32 {
+        self.world.fresh()
+    }
+
+    fn similar(&self, symbol: &Symbol, variable: bool) -> Vec<Symbol> {
+        similar::similar(self, symbol, variable)
+    }
+}
+
+fn is_of_language(home: &str) -> bool {
+    matches!(home, CL_PACKAGE | ESL_PACKAGE | KEYWORD_PACKAGE)
+}
+
+/// What a symbol names of which no object was made yet: a builtin, or something of the library.
+fn undefined_so_far(world: &World, symbol: &Symbol) -> GlobalFunction {
+    if let Some((image, definition)) = world.images.definition(symbol) {
+        if definition.macro_function.is_some() {
+            return GlobalFunction::Macro;
+        }
+        if let Some(number) = definition.function {
+            let arity = world.images.decode(image, number).map(|function| arity_of(&function.parameters));
+            return GlobalFunction::Function(arity);
+        }
+    }
+    match find_builtin(symbol) {
+        Some(builtin) => GlobalFunction::Function(Some(builtin.info().arity)),
+        None => GlobalFunction::Undefined,
+    }
+}
+
+fn arity_of(parameters: &Parameters) -> Arity {
+    let min = u32::from(parameters.required);
+    let has_more = parameters.rest || parameters.keys.is_some();
+    Arity { min, max: if has_more { None } else { Some(min + u32::from(parameters.optional)) } }
+}
+
+/// The value of `indicator` in the property list of a symbol object.
+pub(crate) fn property(heap: &Heap, object: Value, indicator: Value) -> Option<Value> {
+    let mut plist = heap.symbol(object)?.plist;
+    while let Some(entry) = heap.as_cons(plist) {
+        let rest = heap.as_cons(entry.cdr)?;
+        if entry.car == indicator {
+            return Some(rest.car);
+        }
+        plist = rest.cdr;
+    }
+    None
+}
+
+impl Vm {
+    /// The symbol, as the program sees it, if there is an object of it already.
+    fn value_for(&self, symbol: &Symbol) -> Option<Value> {
+        match symbol.package() {
+            Some(_) => self.world.find(symbol),
+            None => self.world.unit.borrow().find_uninterned(symbol),
+        }
+    }
+
+    /// The object of a symbol, if there is one already.
+    fn object_for(&self, symbol: &Symbol) -> Option<Value> {
+        self.world.object_of(&self.heap, self.value_for(symbol)?)
+    }
+
+    fn function_info(&self, object: Value) -> GlobalFunction {
+        if self.world.macro_function_of(&self.heap, object).is_some() {
+            return GlobalFunction::Macro;
+        }
+        match self.world.function_of(&self.heap, object) {
+            Some(function) => GlobalFunction::Function(self.arity(function)),
+            None => GlobalFunction::Undefined,
+        }
+    }
+
+    /// How many arguments a function takes, if that is known without decoding damaged code.
+    pub(crate) fn arity(&self, function: Value) -> Option<Arity> {
+        let code = self.heap.code(self.heap.function_code(function)?)?;
+        let shape = Shape::unpack(code.spare[0]);
+        match shape.sort {
+            Sort::Native => BUILTINS.get(usize::from(shape.number)).map(|info| info.arity),
+            Sort::Undefined => None,
+            Sort::Lazy => {
+                let (image, number) = crate::load::image_origin(&self.heap, function)?;
+                Some(arity_of(&self.world.images.decode(image, number)?.parameters))
+            }
+            Sort::Bytecode => {
+                let min = u32::from(shape.required);
+                let has_more = shape.rest || shape.takes_keys;
+                Some(Arity { min, max: if has_more { None } else { Some(min + u32::from(shape.optional)) } })
+            }
+        }
+    }
+
+    fn variable_info(&self, object: Value) -> GlobalVariable {
+        let Some(cell) = self.heap.symbol(object) else { return GlobalVariable::Undefined };
+        if cell.header.flags & SymbolObject::CONSTANT != 0 {
+            let unit = &mut self.world.unit.borrow_mut();
+            let value = unit.to_datum_or_object(&self.heap, &self.world, cell.value, Span::default());
+            return GlobalVariable::Constant(value);
+        }
+        if cell.header.flags & SymbolObject::SPECIAL != 0 {
+            GlobalVariable::Special
+        } else {
+            GlobalVariable::Undefined
+        }
+    }
+
+    /// What `%define-accessor` has recorded.
+    fn accessor_info(&self, object: Value) -> Option<Accessor> {
+        let record = property(&self.heap, object, self.world.known.accessor)?;
+        let class = self.heap.as_cons(record)?;
+        let slot = self.heap.as_cons(class.cdr)?;
+        Some(Accessor {
+            class: self.world.name_of(&self.heap, class.car)?,
+            slot: u16::try_from(slot.car.as_index()?).ok()?,
+            read_only: slot.cdr.is_true(),
+        })
+    }
+
+    /// What the library says to use in place of a function that it leaves out: `*instead*` is a list of pairs of
+    /// strings, the name and the text.
+    fn instead_of(&self, symbol: &Symbol) -> Option<String> {
+        if !symbol.is_in(CL_PACKAGE) {
+            return None;
+        }
+        let mut list = self.heap.symbol(self.world.known.instead)?.value;
+        while let Some(pair) = self.heap.as_cons(list) {
+            list = pair.cdr;
+            let entry = self.heap.as_cons(pair.car)?;
+            let name = self.heap.string(entry.car)?;
+            if symbol.name().chars().map(u32::from).eq(name.iter().copied()) {
+                return self.heap.string_text(entry.cdr);
+            }
+        }
+        None
+    }
+}

@@ -1,0 +1,117 @@
+//! Names that a misspelt one may have been meant to be.
+
+use esl_bytecode::builtin::BUILTINS;
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
+
+use crate::heap::layout::Symbol as SymbolObject;
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// How many names are given.
+const MOST: usize = 3;
+
+/// Names like `symbol` that are defined, the likeliest first.
+pub(super) fn similar(vm: &Vm, symbol: &Symbol, variable: bool) -> Vec<Symbol> {
+    let limit = match symbol.name().chars().count() {
+        0..=2 => 0,
+        3..=5 => 1,
+        6..=9 => 2,
+        _ => 3,
+    };
+    let mut found: Vec<(usize, Symbol)> = Vec::new();
+    let mut consider = |candidate: &Symbol| {
+        if candidate == symbol || candidate.name().starts_with('%') || candidate.name().starts_with('(') {
+            return;
+        }
+        if let Some(distance) = distance(symbol.name(), candidate.name(), limit) {
+            let entry = (distance, candidate.clone());
+            if !found.iter().any(|(_, other)| other == candidate) {
+                found.push(entry);
+            }
+        }
+    };
+    vm.world.each_symbol(&mut |candidate, value| {
+        if is_visible(candidate, symbol) && is_defined(vm, value, variable) {
+            consider(candidate);
+        }
+    });
+    if !variable {
+        for info in BUILTINS {
+            consider(&Symbol::new(&info.package().into(), info.name));
+        }
+        vm.world.images.each_definition(&mut consider);
+    }
+    // Of equal distance, names of the program's own come first, then in the order of the alphabet.
+    found.sort_by_key(|(distance, candidate)| {
+        let is_foreign = candidate.package() != symbol.package();
+        (*distance, is_foreign, candidate.name().to_owned())
+    });
+    found.into_iter().take(MOST).map(|(_, candidate)| candidate).collect()
+}
+
+/// Whether a program that writes `symbol` would think of `candidate`.
+fn is_visible(candidate: &Symbol, symbol: &Symbol) -> bool {
+    match candidate.package() {
+        None => false,
+        Some(home) if &**home == KEYWORD_PACKAGE => false,
+        Some(home) => matches!(&**home, CL_PACKAGE | ESL_PACKAGE) || Some(home) == symbol.package(),
+    }
+}
+
+fn is_defined(vm: &Vm, value: Value, variable: bool) -> bool {
+    let Some(object) = vm.world.object_of(&vm.heap, value) else { return false };
+    if !variable {
+        return vm.world.function_of(&vm.heap, object).is_some()
+            || vm.world.macro_function_of(&vm.heap, object).is_some();
+    }
+    let flags = vm.heap.symbol(object).map_or(0, |cell| cell.header.flags);
+    flags & (SymbolObject::SPECIAL | SymbolObject::CONSTANT) != 0
+}
+
+/// The number of characters to insert, delete, replace or swap with their neighbour to make `a` into `b`, if it is at
+/// most `limit`.
+fn distance(a: &str, b: &str, limit: usize) -> Option<usize> {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    if a.len().abs_diff(b.len()) > limit {
+        return None;
+    }
+    // Rows of the table of distances between prefixes: the one before the last, the last, and the next.
+    let mut before: Vec<usize> = Vec::new();
+    let mut last: Vec<usize> = (0..=b.len()).collect();
+    for i in 1..=a.len() {
+        let mut next = vec![i];
+        for j in 1..=b.len() {
+            let replaced = last[j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            let mut best = replaced.min(last[j] + 1).min(next[j - 1] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                best = best.min(before[j - 2] + 1);
+            }
+            next.push(best);
+        }
+        if next.iter().all(|&n| n > limit) {
+            return None;
+        }
+        before = std::mem::replace(&mut last, next);
+    }
+    last.last().copied().filter(|&n| n <= limit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_count_edits_up_to_a_limit() {
+        let table = [
+            ("PRINT", "PRINT", Some(0)),
+            ("PRNIT", "PRINT", Some(1)),
+            ("PRIN", "PRINT", Some(1)),
+            ("PLINTS", "PRINT", Some(2)),
+            ("COND", "PRINT", None),
+            ("", "AB", Some(2)),
+        ];
+        for (a, b, expected) in table {
+            assert_eq!(distance(a, b, 2), expected, "{a} {b}");
+        }
+    }
+}
