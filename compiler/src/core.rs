@@ -101,6 +101,23 @@ pub struct Lambda {
     pub body: NodeId,
 }
 
+impl Lambda {
+    /// Whether it takes required parameters only.
+    pub fn is_exact(&self) -> bool {
+        self.optional.is_empty() && self.rest.is_none() && self.keys.is_none()
+    }
+
+    /// Whether it takes just `count` arguments.
+    pub fn takes_exactly(&self, count: usize) -> bool {
+        self.is_exact() && self.required.len() == count
+    }
+
+    /// Whether it is the global function `name`.
+    pub fn is_named(&self, name: &Symbol) -> bool {
+        self.name.as_ref().and_then(Datum::as_symbol) == Some(name)
+    }
+}
+
 /// A parameter. Parameters become visible, and special ones bound, one after another from left to right.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter {

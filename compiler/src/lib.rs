@@ -4,5 +4,5 @@
 pub mod core;
 pub mod diagnostic;
 pub mod lower;
-mod resolve;
 pub mod reader;
+mod resolve;

@@ -1,0 +1,247 @@
+//! Turns a finished graph into words and line entries: chooses jump instructions and fills in distances.
+
+use esl_bytecode::module::{LineEntry, MAX_CODE};
+use esl_bytecode::opcode::{Instr, Substitute};
+use esl_bytecode::operand::*;
+use esl_bytecode::span::Span;
+
+use super::graph::{Cond, Exit, Graph, Label};
+use super::lines::SourceLines;
+
+/// A function's code is longer than [`MAX_CODE`].
+#[derive(Debug)]
+pub(crate) struct TooLong;
+
+/// An instruction in its place, with the segment to which it jumps.
+struct Placed {
+    instr: Instr,
+    target: Option<Label>,
+    span: Span,
+}
+
+/// The words and line entries of `graph`.
+///
+/// # Errors
+/// [`TooLong`] if there are too many words.
+pub(crate) fn assemble(graph: &Graph, lines: &SourceLines) -> Result<(Vec<u32>, Vec<LineEntry>), TooLong> {
+    let positions = graph.positions();
+    let mut placed: Vec<Placed> = Vec::new();
+    // Index into `placed` at which each segment begins, by position.
+    let mut starts = Vec::with_capacity(graph.order.len());
+    for (position, label) in graph.order.iter().enumerate() {
+        starts.push(placed.len());
+        let segment = &graph.segments[label.index()];
+        placed.extend(segment.ops.iter().map(|op| Placed {
+            instr: op.instr,
+            target: op.landing,
+            span: op.span,
+        }));
+        let mut put = |instr, target| placed.push(Placed { instr, target: Some(target), span: segment.span });
+        let next = graph.order.get(position + 1).copied();
+        let is_back = |label: Label| positions[label.index()] <= position;
+        let go = |label| {
+            if is_back(label) { Instr::Loop { to: Back24(0) } } else { Instr::JumpAlways { to: Jump24(0) } }
+        };
+        match segment.exit {
+            Exit::End => {}
+            Exit::Fall(to) => debug_assert_eq!(Some(to), next, "a cleanup follows its protected part"),
+            Exit::Jump(to) => {
+                if Some(to) != next {
+                    put(go(to), to);
+                }
+            }
+            Exit::Branch { cond, holds, fails } => {
+                // The edge that gets the conditional jump: the one that is not next, or that has a jump of its own.
+                let prefers_fails = Some(holds) == next
+                    || (Some(fails) != next && jump(cond, true, is_back(holds)).is_none())
+                    || (Some(fails) != next && is_back(fails) && !is_back(holds) && cond.loops(false));
+                let (sense, taken, other) =
+                    if prefers_fails { (false, fails, holds) } else { (true, holds, fails) };
+                if let Some(instr) = jump(cond, sense, is_back(taken)) {
+                    put(instr, taken);
+                    if Some(other) != next {
+                        put(go(other), other);
+                    }
+                } else if let (false, Some(instr)) = (is_back(other), jump(cond, !sense, false)) {
+                    put(instr, other);
+                    put(go(taken), taken);
+                } else {
+                    // Both go back, or the sense is missing: over a jump to what follows it.
+                    let instr = jump(cond, !sense, false).or_else(|| jump(cond, sense, false));
+                    let (over, first, second) = match jump(cond, !sense, false) {
+                        Some(_) => (instr, taken, other),
+                        None => (instr, other, taken),
+                    };
+                    if let Some(instr) = over {
+                        placed.push(Placed { instr: retarget(instr, 1), target: None, span: segment.span });
+                    }
+                    placed.push(Placed { instr: go(first), target: Some(first), span: segment.span });
+                    if Some(second) != next {
+                        placed.push(Placed { instr: go(second), target: Some(second), span: segment.span });
+                    }
+                }
+            }
+        }
+    }
+    encode(&placed, &starts, &positions, lines)
+}
+
+fn encode(
+    placed: &[Placed],
+    starts: &[usize],
+    positions: &[usize],
+    lines: &SourceLines,
+) -> Result<(Vec<u32>, Vec<LineEntry>), TooLong> {
+    let mut offsets = Vec::with_capacity(placed.len() + 1);
+    let mut length = 0usize;
+    for item in placed {
+        offsets.push(length);
+        length += item.instr.opcode().words();
+    }
+    offsets.push(length);
+    if length > MAX_CODE {
+        return Err(TooLong);
+    }
+    let mut code = Vec::with_capacity(length);
+    let mut entries: Vec<LineEntry> = Vec::new();
+    for (index, item) in placed.iter().enumerate() {
+        let mut instr = item.instr;
+        if let Some(target) = item.target {
+            let start = offsets[starts[positions[target.index()]]];
+            instr = retarget(instr, start as i32 - offsets[index + 1] as i32);
+        }
+        if shows_its_line(&instr) {
+            note_line(&mut entries, offsets[index], item.span, lines);
+        }
+        let (word, aux) = instr.encode();
+        code.push(word);
+        code.extend(aux);
+    }
+    Ok((code, entries))
+}
+
+/// Whether a backtrace may point at the instruction: it can fail, call, or end the task's slice.
+fn shows_its_line(instr: &Instr) -> bool {
+    instr.opcode().substitute() != Substitute::Silent
+        || matches!(
+            instr,
+            Instr::Loop { .. }
+                | Instr::LoopIfNil { .. }
+                | Instr::LoopIfNotNil { .. }
+                | Instr::LoopIfCons { .. }
+        )
+}
+
+fn note_line(entries: &mut Vec<LineEntry>, pc: usize, span: Span, lines: &SourceLines) {
+    // What the compiler made up has an empty span, and counts to the code before it.
+    if span == Span::default() && !entries.is_empty() {
+        return;
+    }
+    let Some((line, column)) = lines.line_and_column(span) else { return };
+    let source = span.source.0;
+    if entries.last().is_some_and(|last| (last.source, last.line, last.column) == (source, line, column)) {
+        return;
+    }
+    entries.push(LineEntry { pc: pc as u32, source, line, column });
+}
+
+/// The instruction that jumps, forward or back, when `cond` holds (`sense`) or fails; `None` if there is none.
+fn jump(cond: Cond, sense: bool, is_back: bool) -> Option<Instr> {
+    if is_back {
+        return loop_back(cond, sense);
+    }
+    let to = Jump(0);
+    let near = Jump16(0);
+    Some(match (cond, sense) {
+        (Cond::Nil(test), true) => Instr::JumpIfNil { test, to: near },
+        (Cond::Nil(test), false) => Instr::JumpIfNotNil { test, to: near },
+        (Cond::Cons(test), true) => Instr::JumpIfCons { test, to: near },
+        (Cond::Cons(test), false) => Instr::JumpIfNotCons { test, to: near },
+        (Cond::Supplied(test), true) => Instr::JumpIfSupplied { test, to: near },
+        (Cond::Eq(left, right), true) => Instr::JumpEq { left, right, to },
+        (Cond::Eq(left, right), false) => Instr::JumpNotEq { left, right, to },
+        (Cond::Eql(left, right), true) => Instr::JumpEql { left, right, to },
+        (Cond::Eql(left, right), false) => Instr::JumpNotEql { left, right, to },
+        (Cond::EqlConst(left, constant), true) => Instr::JumpEqlConst { left, constant, to },
+        (Cond::EqlConst(left, constant), false) => Instr::JumpNotEqlConst { left, constant, to },
+        (Cond::Type(test, code), true) => Instr::JumpIfType { test, code, to },
+        (Cond::Type(test, code), false) => Instr::JumpIfNotType { test, code, to },
+        (Cond::Instance(test, class), false) => Instr::JumpIfNotInstance { test, class, to },
+        (Cond::NumEq(left, right), true) => Instr::JumpNumEq { left, right, to },
+        (Cond::NumEq(left, right), false) => Instr::JumpNotNumEq { left, right, to },
+        (Cond::Less(left, right), true) => Instr::JumpLess { left, right, to },
+        (Cond::Less(left, right), false) => Instr::JumpNotLess { left, right, to },
+        (Cond::LessEq(left, right), true) => Instr::JumpLessEq { left, right, to },
+        (Cond::LessEq(left, right), false) => Instr::JumpNotLessEq { left, right, to },
+        (Cond::NumEqInt(left, value), true) => Instr::JumpNumEqInt { left, value, to },
+        (Cond::NumEqInt(left, value), false) => Instr::JumpNotNumEqInt { left, value, to },
+        (Cond::LessInt(left, value), true) => Instr::JumpLessInt { left, value, to },
+        (Cond::LessInt(left, value), false) => Instr::JumpNotLessInt { left, value, to },
+        (Cond::GreaterInt(left, value), true) => Instr::JumpGreaterInt { left, value, to },
+        (Cond::GreaterInt(left, value), false) => Instr::JumpNotGreaterInt { left, value, to },
+        (Cond::Instance(..), true) | (Cond::Supplied(_), false) | (Cond::Count { .. }, _) => return None,
+    })
+}
+
+fn loop_back(cond: Cond, sense: bool) -> Option<Instr> {
+    Some(match (cond, sense) {
+        (Cond::Nil(test), true) => Instr::LoopIfNil { test, to: Back16(0) },
+        (Cond::Nil(test), false) => Instr::LoopIfNotNil { test, to: Back16(0) },
+        (Cond::Cons(test), true) => Instr::LoopIfCons { test, to: Back16(0) },
+        (Cond::Less(left, right), true) => Instr::LoopLess { left, right, to: Back(0) },
+        (Cond::Less(left, right), false) => Instr::LoopNotLess { left, right, to: Back(0) },
+        (Cond::Count { counter, limit, step }, true) => {
+            Instr::LoopCount { counter, limit, step, to: Back(0) }
+        }
+        _ => return None,
+    })
+}
+
+/// The instruction with its jump's distance set.
+fn retarget(instr: Instr, distance: i32) -> Instr {
+    let near = Jump16(distance as i16);
+    let back = Back16(distance as i16);
+    let far = Jump(distance);
+    let mut instr = instr;
+    match &mut instr {
+        Instr::JumpAlways { to } => *to = Jump24(distance),
+        Instr::JumpIfNil { to, .. }
+        | Instr::JumpIfNotNil { to, .. }
+        | Instr::JumpIfCons { to, .. }
+        | Instr::JumpIfNotCons { to, .. }
+        | Instr::JumpIfSupplied { to, .. } => *to = near,
+        Instr::JumpEq { to, .. }
+        | Instr::JumpNotEq { to, .. }
+        | Instr::JumpEql { to, .. }
+        | Instr::JumpNotEql { to, .. }
+        | Instr::JumpEqlConst { to, .. }
+        | Instr::JumpNotEqlConst { to, .. }
+        | Instr::JumpIfType { to, .. }
+        | Instr::JumpIfNotType { to, .. }
+        | Instr::JumpNumEq { to, .. }
+        | Instr::JumpNotNumEq { to, .. }
+        | Instr::JumpLess { to, .. }
+        | Instr::JumpNotLess { to, .. }
+        | Instr::JumpLessEq { to, .. }
+        | Instr::JumpNotLessEq { to, .. }
+        | Instr::JumpNumEqInt { to, .. }
+        | Instr::JumpNotNumEqInt { to, .. }
+        | Instr::JumpLessInt { to, .. }
+        | Instr::JumpNotLessInt { to, .. }
+        | Instr::JumpGreaterInt { to, .. }
+        | Instr::JumpNotGreaterInt { to, .. }
+        | Instr::JumpIfNotInstance { to, .. }
+        | Instr::PushCatch { to, .. }
+        | Instr::PushCleanup { to, .. }
+        | Instr::PushHandlerCase { to, .. } => *to = far,
+        Instr::Loop { to } => *to = Back24(distance),
+        Instr::LoopIfNil { to, .. } | Instr::LoopIfNotNil { to, .. } | Instr::LoopIfCons { to, .. } => {
+            *to = back
+        }
+        Instr::LoopLess { to, .. } | Instr::LoopNotLess { to, .. } | Instr::LoopCount { to, .. } => {
+            *to = Back(distance)
+        }
+        _ => unreachable!("only jumps and pushes have targets"),
+    }
+    instr
+}

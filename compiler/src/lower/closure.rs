@@ -1,0 +1,124 @@
+//! Functions as values, and local functions.
+
+use esl_bytecode::builtin::Builtin;
+use esl_bytecode::module::{Capture, CaptureSource};
+use esl_bytecode::opcode::Instr;
+use esl_bytecode::operand::*;
+use esl_bytecode::symbol::Symbol;
+
+use super::dest::Dest;
+use super::frame::Frame;
+use crate::core::*;
+use crate::resolve::{FunctionKind, Lexical};
+
+impl<'a> Frame<'_, 'a> {
+    /// The global function kept in a symbol.
+    pub(super) fn function_ref(&mut self, symbol: &Symbol, dest: Dest) {
+        let symbol = self.symbol_index(symbol);
+        self.compute(dest, |dst| Instr::FunctionRef { dst, symbol });
+    }
+
+    /// A builtin as a function.
+    pub(super) fn builtin_ref(&mut self, builtin: Builtin, dest: Dest) {
+        let info = builtin.info();
+        let symbol = Symbol::new(&info.package().into(), info.name);
+        self.function_ref(&symbol, dest);
+    }
+
+    /// The closure of a lambda that is written here.
+    pub(super) fn lambda(&mut self, lambda: LambdaId, dest: Dest) {
+        if let Dest::Effect = dest {
+            return;
+        }
+        if self.builder.resolution.captures(lambda).is_empty() {
+            return self.constant_function(lambda, dest);
+        }
+        self.set_captures(lambda, &[]);
+        let function = self.function_index(lambda);
+        self.compute(dest, |dst| Instr::MakeClosure { dst, function });
+    }
+
+    /// A function that captures nothing.
+    pub(super) fn constant_function(&mut self, lambda: LambdaId, dest: Dest) {
+        let constant = ConstIdx(self.function_index(lambda).0);
+        self.compute(dest, |dst| Instr::LoadConst { dst, constant });
+    }
+
+    fn function_index(&mut self, lambda: LambdaId) -> FunctionIdx {
+        let number = self.builder.number(lambda);
+        let entry = self.builder.pool.function(number);
+        FunctionIdx(self.constant_index(entry))
+    }
+
+    /// A local function as a value.
+    pub(super) fn function_value(&mut self, variable: VarId, lambda: LambdaId, dest: Dest) {
+        if let Dest::Effect = dest {
+            return;
+        }
+        match self.builder.resolution.function_kind(lambda) {
+            FunctionKind::Closure => {
+                let place = self.place(variable);
+                self.fetch(place, dest);
+            }
+            _ => self.constant_function(lambda, dest),
+        }
+    }
+
+    /// Notes where the closure of a lambda, made here, takes its captures from. Closures of `unmade` come later.
+    /// Returns which captures those are.
+    fn set_captures(&mut self, lambda: LambdaId, unmade: &[VarId]) -> Vec<(Index, VarId)> {
+        let core = self.core;
+        let mut late = Vec::new();
+        let mut captures = Vec::new();
+        for index in 0..self.builder.resolution.captures(lambda).len() {
+            let resolution = &self.builder.resolution;
+            let lexical = resolution.captures(lambda)[index];
+            let is_own = resolution.frame(lexical.owner(core)) == self.lambda;
+            let boxed = matches!(lexical, Lexical::Variable(variable) if resolution.is_boxed(variable));
+            let source = match lexical {
+                Lexical::Variable(variable) if unmade.contains(&variable) => {
+                    late.push((Index(index.min(255) as u8), variable));
+                    CaptureSource::Later
+                }
+                _ if !is_own => CaptureSource::Capture(self.capture_index(lexical).0),
+                Lexical::Variable(variable) => CaptureSource::Register(self.register(variable)),
+                Lexical::Block(block) => CaptureSource::Register(self.builder.blocks[block.index()]),
+                Lexical::Tagbody(tagbody) => CaptureSource::Register(self.builder.tagbodies[tagbody.index()]),
+            };
+            captures.push(Capture { source, boxed });
+        }
+        if captures.len() > usize::from(u8::MAX) {
+            self.excess = Some("captured variables");
+        }
+        self.builder.captures[lambda.index()] = captures;
+        late
+    }
+
+    /// Binds local functions around a body. Constants and inlined functions need nothing here.
+    pub(super) fn functions(&mut self, definitions: &[(VarId, LambdaId)], body: NodeId, dest: Dest) {
+        let top = self.registers.top();
+        let resolution = &self.builder.resolution;
+        let closures = definitions
+            .iter()
+            .filter(|(_, lambda)| resolution.function_kind(*lambda) == FunctionKind::Closure);
+        let closures: Vec<(VarId, LambdaId)> = closures.copied().collect();
+        let mut unmade: Vec<VarId> = closures.iter().map(|&(variable, _)| variable).collect();
+        unmade.reverse();
+        let mut patches: Vec<(u8, Index, VarId)> = Vec::new();
+        for &(variable, lambda) in &closures {
+            let late = self.set_captures(lambda, &unmade);
+            let function = self.function_index(lambda);
+            let register = self.registers.take(1);
+            self.builder.variables[variable.index()] = register;
+            self.emit(Instr::MakeClosure { dst: Dst(register), function });
+            patches.extend(late.into_iter().map(|(index, captured)| (register, index, captured)));
+            unmade.pop();
+        }
+        for (closure, index, captured) in patches {
+            let src = Reg(self.register(captured));
+            self.emit(Instr::PatchCapture { closure: Reg(closure), index, src });
+        }
+        self.form(body, dest);
+        self.registers.release(top);
+    }
+}

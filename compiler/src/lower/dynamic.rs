@@ -1,0 +1,135 @@
+//! Forms that stand on the control stack while their body runs: cleanups, handlers, masks and scopes.
+
+use esl_bytecode::opcode::Instr;
+use esl_bytecode::operand::*;
+
+use super::dest::Dest;
+use super::frame::{Extent, Frame};
+use super::graph::{Cond, Exit};
+use crate::core::*;
+
+impl Frame<'_, '_> {
+    /// The protected form and its cleanup, which control enters from it and unwindings enter from anywhere in it:
+    ///
+    /// ```text
+    ///       push-cleanup landing at `cleanup`
+    ///       the protected form
+    ///       enter-cleanup
+    /// cleanup: the cleanup
+    ///       end-cleanup
+    /// ```
+    pub(super) fn unwind_protect(&mut self, protected: NodeId, cleanup: NodeId, dest: Dest) {
+        let top = self.registers.top();
+        let is_single = self.builder.resolution.is_single(protected);
+        // A single value waits in a register below the window, all of them in the value list.
+        let inner = match dest {
+            Dest::Effect => Dest::Effect,
+            Dest::All | Dest::Values(..) => Dest::All,
+            Dest::Tail if !is_single => Dest::All,
+            _ => {
+                // Defined also when an unwinding comes along.
+                let register = self.registers.take(1);
+                self.emit(Instr::LoadNil { first: Base(register), count: Count(1) });
+                Dest::Keep(register)
+            }
+        };
+        let depth = self.extents.len();
+        let landing = self.graph.label();
+        let window = Base(self.registers.top());
+        self.push_entry(Instr::PushCleanup { window, to: Jump(0) }, landing, Extent::Cleanup);
+        self.form(protected, inner);
+        let returns = self.graph.is_open();
+        self.emit(Instr::EnterCleanup {});
+        self.graph.leave(Exit::Fall(landing), self.span);
+        self.graph.bind(landing);
+        self.form(cleanup, Dest::Effect);
+        self.emit(Instr::EndCleanup {});
+        self.extents.truncate(depth);
+        self.registers.release(top);
+        match (inner, dest) {
+            // Control never comes back from the cleanup either.
+            _ if !returns => self.deliver_nil(dest),
+            (Dest::Keep(register), _) => self.deliver(register, dest),
+            (Dest::All, Dest::Values(first, count)) => {
+                self.registers.reserve(first, usize::from(count));
+                self.emit(Instr::GetValues { first: Base(first), count: Count(count) });
+            }
+            _ => self.finish(inner, dest),
+        }
+    }
+
+    pub(super) fn progv(&mut self, symbols: NodeId, values: NodeId, body: NodeId, dest: Dest) {
+        let top = self.registers.top();
+        let depth = self.extents.len();
+        let symbols = self.operand(symbols, &[values]);
+        let values = self.operand(values, &[]);
+        let window = Base(self.registers.top());
+        self.emit(Instr::PushScope { window });
+        self.open(Extent::Control);
+        self.emit(Instr::BindList { symbols, values });
+        self.form_inside(body, dest, depth);
+        self.registers.release(top);
+    }
+
+    pub(super) fn handlers(&mut self, handlers: NodeId, body: NodeId, dest: Dest) {
+        let top = self.registers.top();
+        let depth = self.extents.len();
+        let handlers = self.operand(handlers, &[]);
+        self.registers.release(top);
+        self.emit(Instr::PushHandlers { window: Base(top), handlers });
+        self.open(Extent::Control);
+        self.form_inside(body, dest, depth);
+    }
+
+    pub(super) fn mask(&mut self, from: NodeId, body: NodeId, dest: Dest) {
+        let top = self.registers.top();
+        let depth = self.extents.len();
+        let from = self.operand(from, &[]);
+        self.registers.release(top);
+        self.emit(Instr::PushMask { window: Base(top), from });
+        self.open(Extent::Control);
+        self.form_inside(body, dest, depth);
+    }
+
+    pub(super) fn handler_case(&mut self, body: NodeId, clauses: &[HandlerClause], dest: Dest) {
+        if clauses.is_empty() {
+            return self.form(body, dest);
+        }
+        let depth = self.extents.len();
+        let (landing, end) = (self.graph.label(), self.graph.label());
+        let window = self.registers.top();
+        let types = clauses.iter().map(|clause| self.builder.pool.datum(&clause.condition_type)).collect();
+        let types = self.builder.pool.vector(types);
+        let types = VectorIdx(self.constant_index(types));
+        self.push_entry(
+            Instr::PushHandlerCase { window: Base(window), types, to: Jump(0) },
+            landing,
+            Extent::Control,
+        );
+        self.form_inside(body, dest, depth);
+        self.join(end, dest);
+        self.graph.bind(landing);
+        let index = self.registers.take(1);
+        let condition = self.registers.take(1);
+        for (number, clause) in clauses.iter().enumerate() {
+            let next = self.graph.label();
+            if number + 1 < clauses.len() {
+                let this = self.graph.label();
+                let number = Int16(number.min(i16::MAX as usize) as i16);
+                self.branch(Cond::NumEqInt(Reg(index), number), this, next);
+                self.graph.bind(this);
+            }
+            self.builder.variables[clause.variable.index()] = condition;
+            self.box_variable(clause.variable);
+            self.form(clause.body, dest);
+            self.join(end, dest);
+            self.graph.bind(next);
+        }
+        // What follows the last clause is not reached.
+        self.graph.leave(Exit::Jump(end), self.span);
+        self.registers.release(window);
+        if dest.goes_on() {
+            self.graph.bind(end);
+        }
+    }
+}

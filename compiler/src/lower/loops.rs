@@ -1,0 +1,182 @@
+//! Calls that become jumps, assignments in parallel, and the shapes of loops that profit.
+//!
+//! A loop is best when each turn executes one jump, which is conditional and goes back. [`super::fuse`] brings this
+//! about for every loop that begins with a short test:
+//!
+//! ```lisp
+//! (tagbody                                 ; while
+//!  top  (if test nil (go end))
+//!       body…
+//!       (go top)
+//!  end)
+//! (tagbody                                 ; the same, test last
+//!       (go test)
+//!  top  body…
+//!  test (if test (go top)))
+//! ```
+//!
+//! Tests that can jump back by themselves are `x`, `(not x)`, `(null x)`, `(consp x)` with `x` a variable, and
+//! `(< a b)`, `(> a b)` and their negations with `a` and `b` variables: bind a limit to a variable, even a constant
+//! one, and end a loop that includes its limit by `(if (> i limit) (go end))`.
+//!
+//! Counting up is one instruction for the step, the comparison and the jump when the step, by a literal integer
+//! that fits a byte, comes right before the test, and the test that goes on is `(< i limit)`:
+//!
+//! ```lisp
+//! (let ((i 0) (limit n))                   ; dotimes
+//!   (tagbody
+//!    top  (if (< i limit) nil (go end))
+//!         body…
+//!         (setq i (+ i 1))
+//!         (go top)
+//!    end))
+//! ```
+//!
+//! Variables that are both assigned and captured by a closure live in boxes and miss all this: bind a fresh variable to
+//! the counter around the body if the body may make closures.
+//!
+//! Also recognised: `(let ((t1 e1) …) (setq v1 t1 …) …)`, as `psetq` and `do` make it, assigns in parallel without the
+//! temporaries; and tail calls of the running function and of inlined local functions are parallel assignments of the
+//! parameters and a jump.
+
+use super::dest::Dest;
+use super::frame::Frame;
+use super::graph::Label;
+use super::variable::Place;
+use crate::core::*;
+
+/// An inlined function whose body is being lowered.
+#[derive(Clone, Copy)]
+pub(super) struct LoopState {
+    head: Label,
+    depth: usize,
+}
+
+impl<'a> Frame<'_, 'a> {
+    /// Enters an inlined function, or jumps to its head from inside.
+    pub(super) fn call_inline(&mut self, lambda: LambdaId, arguments: &'a [NodeId], dest: Dest) {
+        if let Some(state) = self.loops.get(&lambda).copied() {
+            debug_assert_eq!(
+                state.depth,
+                self.extents.len(),
+                "self calls of inlined functions are in tail position"
+            );
+            return self.jump_to_function(lambda, state.head, arguments);
+        }
+        let text = &self.core.lambdas[lambda.index()];
+        let top = self.registers.top();
+        let depth = self.extents.len();
+        let is_loop = self.builder.resolution.is_self_called(lambda);
+        for (parameter, &argument) in text.required.iter().zip(arguments) {
+            if is_loop || parameter.is_special || self.builder.resolution.is_assigned(parameter.variable) {
+                let register = self.registers.top();
+                self.form(argument, Dest::Fresh(register));
+                self.builder.variables[parameter.variable.index()] = self.registers.take(1);
+            } else {
+                self.bind_lexical(parameter.variable, argument);
+            }
+        }
+        if is_loop {
+            let head = self.graph.label();
+            self.graph.bind(head);
+            self.loops.insert(lambda, LoopState { head, depth });
+        }
+        for &parameter in &text.required {
+            if parameter.is_special || self.builder.resolution.is_assigned(parameter.variable) {
+                self.settle(parameter);
+            }
+        }
+        self.form_inside(text.body, dest, depth);
+        self.loops.remove(&lambda);
+        self.registers.release(top);
+    }
+
+    /// Gives the parameters of a function new values and jumps to `head`, in front of the code that boxes them.
+    pub(super) fn jump_to_function(&mut self, lambda: LambdaId, head: Label, arguments: &'a [NodeId]) {
+        let text = &self.core.lambdas[lambda.index()];
+        let targets: Vec<VarId> = text.required.iter().map(|parameter| parameter.variable).collect();
+        self.assign(&targets, arguments);
+        self.jump(head);
+    }
+
+    /// Sets the registers of `targets` to the values of forms, all of which are computed before the first is set.
+    fn assign(&mut self, targets: &[VarId], values: &[NodeId]) {
+        let top = self.registers.top();
+        let mut waiting: Vec<(u8, u8)> = Vec::new();
+        for (index, (&target, &value)) in targets.iter().zip(values).enumerate() {
+            let register = self.register(target);
+            let later = &values[index + 1..];
+            let resolution = &self.builder.resolution;
+            let is_set_later = resolution.is_set_in(target, later);
+            if self.is_plain_read(value, target) && !is_set_later {
+                continue;
+            }
+            if is_set_later || resolution.is_read_in(target, later) {
+                let temporary = self.registers.top();
+                self.form(value, Dest::Fresh(temporary));
+                waiting.push((register, self.registers.take(1)));
+            } else {
+                self.form(value, Dest::Keep(register));
+            }
+        }
+        for (register, temporary) in waiting {
+            self.move_to(register, temporary);
+        }
+        self.registers.release(top);
+    }
+
+    /// Whether `node` reads `variable` from its register.
+    fn is_plain_read(&self, node: NodeId, variable: VarId) -> bool {
+        matches!(self.core.nodes[node.index()].kind, NodeKind::Local(read) if read == variable)
+            && !self.builder.resolution.is_boxed(variable)
+    }
+
+    /// Lowers `(let ((t1 e1) …) (setq v1 t1) … rest…)` without temporaries, if that is what the form is.
+    pub(super) fn parallel_assignment(
+        &mut self,
+        bindings: &'a [(Target, NodeId)],
+        body: NodeId,
+        dest: Dest,
+    ) -> bool {
+        let NodeKind::Progn(forms) = &self.core.nodes[body.index()].kind else { return false };
+        // With one binding there is no temporary to save, and all forms but those that assign must be left over.
+        let count = bindings.len();
+        if count < 2 || forms.len() < count || (forms.len() == count && !matches!(dest, Dest::Effect)) {
+            return false;
+        }
+        let mut targets = Vec::with_capacity(count);
+        let mut values = Vec::with_capacity(count);
+        for ((target, value), &form) in bindings.iter().zip(forms) {
+            let Target::Lexical(temporary) = *target else { return false };
+            let NodeKind::SetLocal(variable, read) = self.core.nodes[form.index()].kind else { return false };
+            let NodeKind::Local(source) = self.core.nodes[read.index()].kind else { return false };
+            // The temporary must serve for this alone.
+            let resolution = &self.builder.resolution;
+            let is_plain = source == temporary
+                && !resolution.is_assigned(temporary)
+                && resolution.reads_of(temporary) == 1
+                && matches!(self.place(variable), Place::Register(_));
+            if !is_plain {
+                return false;
+            }
+            targets.push(variable);
+            values.push(*value);
+        }
+        // Values of a sequential `let` do not refer to the temporaries either, since each is read just once.
+        let mut seen = targets.clone();
+        seen.sort_unstable();
+        seen.dedup();
+        if seen.len() != targets.len() {
+            return false;
+        }
+        self.assign(&targets, &values);
+        self.progn_rest(&forms[count..], dest);
+        true
+    }
+
+    fn progn_rest(&mut self, forms: &[NodeId], dest: Dest) {
+        if !forms.is_empty() {
+            self.progn(forms, dest);
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Lowering: the core language to bytecode.
+//!
+//! The code generator is driven by destinations: every form is told where its value is wanted ([`dest::Dest`]) and puts
+//! it there, so that few moves are needed and tests never make a boolean. Each function becomes a graph of segments,
+//! which is improved ([`fuse`]) and then written out ([`assemble`]).
+//!
+//! Guarantees: what is emitted passes the verifier. A form that is too large for the format gives a diagnostic.
+//! Not here: what names mean (the expander), linking modules (`esl_bytecode::link`).
+//!
+//! The walk recurses on the native stack, which is extended as needed ([`frame::Frame::form`]); its depth is the depth
+//! of the core tree, which the expander bounds.
+//!
+//! Source: Dybvig, Hieb and Butler 1990, "Destination-driven code generation".
+
+mod arithmetic;
+mod assemble;
+mod call;
+mod closure;
+mod dest;
+mod dynamic;
+mod exit;
+mod frame;
+mod fuse;
+mod graph;
+mod lines;
+mod loops;
+pub(crate) mod operator;
+mod pool;
+mod regalloc;
+mod structure;
+mod test;
+mod values;
+mod variable;
+
+#[cfg(test)]
+mod tests;
+
+use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::module::{Capture, FunctionNumber, Module};
+
+use crate::core::{Core, LambdaId};
+use crate::resolve::{Resolution, resolve};
+pub use lines::SourceLines;
+use pool::Pool;
+
+/// Lowers a top-level form to a module whose only top-level function it is.
+///
+/// # Errors
+/// `function-too-large`, for each function that does not fit the format.
+pub fn lower(core: &Core, lines: &SourceLines) -> Result<Module, Vec<Diagnostic>> {
+    let mut builder = Builder::new(core, lines);
+    let toplevel = builder.number(LambdaId(0));
+    let mut functions = Vec::new();
+    // Functions get their numbers when code that refers to them is lowered, and are lowered in that order.
+    while let Some(&lambda) = builder.numbered.get(functions.len()) {
+        functions.push(frame::function(&mut builder, lambda));
+    }
+    for (function, lambda) in functions.iter_mut().zip(&builder.numbered) {
+        function.captures = std::mem::take(&mut builder.captures[lambda.index()]);
+    }
+    if !builder.diagnostics.is_empty() {
+        return Err(builder.diagnostics);
+    }
+    Ok(Module {
+        sources: lines.names().map(str::to_string).collect(),
+        constants: builder.pool.finish(),
+        functions,
+        toplevel: vec![toplevel],
+    })
+}
+
+/// The module that is being made.
+struct Builder<'a> {
+    core: &'a Core,
+    resolution: Resolution,
+    lines: &'a SourceLines,
+    pool: Pool,
+    numbers: Vec<Option<FunctionNumber>>,
+    numbered: Vec<LambdaId>,
+    /// Where the captures of each lambda come from, by lambda; known when the code that makes its closure is lowered.
+    captures: Vec<Vec<Capture>>,
+    /// The register of each variable, while it is bound, in the frame that owns it; so for the tags of blocks and
+    /// tagbodies.
+    variables: Vec<u8>,
+    blocks: Vec<u8>,
+    tagbodies: Vec<u8>,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(core: &'a Core, lines: &'a SourceLines) -> Builder<'a> {
+        Builder {
+            core,
+            resolution: resolve(core),
+            lines,
+            pool: Pool::default(),
+            numbers: vec![None; core.lambdas.len()],
+            numbered: Vec::new(),
+            captures: vec![Vec::new(); core.lambdas.len()],
+            variables: vec![0; core.variables.len()],
+            blocks: vec![0; core.blocks.len()],
+            tagbodies: vec![0; core.tagbodies.len()],
+            diagnostics: Vec::new(),
+        }
+    }
+
+    /// The number of a lambda's function in the module.
+    fn number(&mut self, lambda: LambdaId) -> FunctionNumber {
+        let next = FunctionNumber(self.numbered.len() as u32);
+        *self.numbers[lambda.index()].get_or_insert_with(|| {
+            self.numbered.push(lambda);
+            next
+        })
+    }
+}

@@ -1,0 +1,256 @@
+//! Builtins that have instructions of their own.
+//!
+//! What is opened up here behaves as the function does, also when it fails: the operands are evaluated in order, and
+//! one instruction does the work, so that a value put in its place stands for the whole call. Sums and products of more
+//! than two numbers are the exception.
+
+use esl_bytecode::builtin::Builtin;
+use esl_bytecode::opcode::{Instr, TypeCode};
+use esl_bytecode::operand::*;
+
+use super::call::{MAX_DIRECT, Target};
+use super::dest::Dest;
+use super::frame::Frame;
+use crate::core::*;
+
+type Unary = fn(Dst, Reg) -> Instr;
+pub(super) type Binary = fn(Dst, Reg, Reg) -> Instr;
+
+/// A comparison of numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Comparison {
+    Equal,
+    Less,
+    LessEqual,
+    Greater,
+    GreaterEqual,
+}
+
+/// How a builtin is opened up, given that it has the number of arguments that it says.
+#[derive(Clone, Copy)]
+enum Shape {
+    /// One argument, one instruction.
+    Unary(Unary),
+    /// Two arguments, one instruction.
+    Binary(Binary),
+    /// Two arguments or more, joined from left to right.
+    Fold(Binary),
+    /// One number, to which a literal is added.
+    AddInt(i8),
+    /// One number, multiplied by -1.
+    Negate,
+    /// One number, by which 1 is divided.
+    Reciprocal,
+    /// Two numbers compared.
+    Compare(Comparison),
+    /// One number compared with a literal.
+    CompareInt(Comparison, i16),
+    /// The quotient, if nobody asks for the remainder.
+    Quotient(Binary),
+    IsType(TypeCode),
+    Not,
+    Eq,
+    Eql,
+    /// An instruction for effect on the first two arguments; the call gives one of them.
+    Store(fn(Reg, Reg) -> Instr, usize),
+    /// The same with three, of which it gives the last.
+    StoreAt(fn(Reg, Reg, Reg) -> Instr),
+    List,
+    ListStar,
+    Identity,
+    Values,
+    ValuesList,
+    Funcall,
+    Apply,
+}
+
+/// How a call with `count` arguments is opened up, if at all.
+fn shape(builtin: Builtin, count: usize) -> Option<Shape> {
+    use Builtin as B;
+    use Shape::*;
+    Some(match (builtin, count) {
+        (B::Add, 2..) => Fold(|dst, left, right| Instr::Add { dst, left, right }),
+        (B::Subtract, 2..) => Fold(|dst, left, right| Instr::Sub { dst, left, right }),
+        (B::Multiply, 2..) => Fold(|dst, left, right| Instr::Mul { dst, left, right }),
+        (B::Divide, 2..) => Fold(|dst, left, right| Instr::Div { dst, left, right }),
+        (B::LogAnd, 2..) => Fold(|dst, left, right| Instr::LogAnd { dst, left, right }),
+        (B::LogIor, 2..) => Fold(|dst, left, right| Instr::LogIor { dst, left, right }),
+        (B::LogXor, 2..) => Fold(|dst, left, right| Instr::LogXor { dst, left, right }),
+        (B::Subtract, 1) => Negate,
+        (B::Divide, 1) => Reciprocal,
+        (B::Increment, 1) => AddInt(1),
+        (B::Decrement, 1) => AddInt(-1),
+        (B::Floor, 1 | 2) => Quotient(|dst, left, right| Instr::Floor { dst, left, right }),
+        (B::Truncate, 1 | 2) => Quotient(|dst, left, right| Instr::Truncate { dst, left, right }),
+        (B::Mod, 2) => Binary(|dst, left, right| Instr::Mod { dst, left, right }),
+        (B::Rem, 2) => Binary(|dst, left, right| Instr::Rem { dst, left, right }),
+        (B::Ash, 2) => Binary(|dst, left, right| Instr::Ash { dst, left, right }),
+        (B::NumEqual, 2) => Compare(Comparison::Equal),
+        (B::Less, 2) => Compare(Comparison::Less),
+        (B::LessEqual, 2) => Compare(Comparison::LessEqual),
+        (B::Greater, 2) => Compare(Comparison::Greater),
+        (B::GreaterEqual, 2) => Compare(Comparison::GreaterEqual),
+        (B::Zerop, 1) => CompareInt(Comparison::Equal, 0),
+        (B::Plusp, 1) => CompareInt(Comparison::Greater, 0),
+        (B::Minusp, 1) => CompareInt(Comparison::Less, 0),
+        (B::Not | B::Null, 1) => Not,
+        (B::Eq, 2) => Eq,
+        (B::Eql, 2) => Eql,
+        (B::Consp, 1) => IsType(TypeCode::Cons),
+        (B::Atom, 1) => IsType(TypeCode::Atom),
+        (B::Listp, 1) => IsType(TypeCode::List),
+        (B::Symbolp, 1) => IsType(TypeCode::Symbol),
+        (B::Keywordp, 1) => IsType(TypeCode::Keyword),
+        (B::Numberp, 1) => IsType(TypeCode::Number),
+        (B::Realp, 1) => IsType(TypeCode::Real),
+        (B::Rationalp, 1) => IsType(TypeCode::Rational),
+        (B::Integerp, 1) => IsType(TypeCode::Integer),
+        (B::Floatp, 1) => IsType(TypeCode::Float),
+        (B::Characterp, 1) => IsType(TypeCode::Character),
+        (B::Stringp, 1) => IsType(TypeCode::String),
+        (B::Vectorp, 1) => IsType(TypeCode::Vector),
+        (B::SimpleVectorp, 1) => IsType(TypeCode::SimpleVector),
+        (B::Arrayp, 1) => IsType(TypeCode::Array),
+        (B::Functionp, 1) => IsType(TypeCode::Function),
+        (B::HashTablep, 1) => IsType(TypeCode::HashTable),
+        (B::Car | B::First, 1) => Unary(|dst, list| Instr::Car { dst, list }),
+        (B::Cdr | B::Rest, 1) => Unary(|dst, list| Instr::Cdr { dst, list }),
+        (B::Cadr | B::Second, 1) => Unary(|dst, list| Instr::Cadr { dst, list }),
+        (B::Cddr, 1) => Unary(|dst, list| Instr::Cddr { dst, list }),
+        (B::Cons, 2) => Binary(|dst, car, cdr| Instr::Cons { dst, car, cdr }),
+        (B::Svref, 2) => Binary(|dst, vector, index| Instr::VectorRef { dst, vector, index }),
+        (B::Aref, 2) => Binary(|dst, array, index| Instr::ArrayRef { dst, array, index }),
+        (B::Rplaca, 2) => Store(|pair, value| Instr::SetCar { pair, value }, 0),
+        (B::Rplacd, 2) => Store(|pair, value| Instr::SetCdr { pair, value }, 0),
+        (B::SetCar, 2) => Store(|pair, value| Instr::SetCar { pair, value }, 1),
+        (B::SetCdr, 2) => Store(|pair, value| Instr::SetCdr { pair, value }, 1),
+        (B::SetSvref, 3) => StoreAt(|vector, index, value| Instr::VectorSet { vector, index, value }),
+        (B::SetAref, 3) => StoreAt(|array, index, value| Instr::ArraySet { array, index, value }),
+        (B::List, _) => List,
+        (B::ListStar, 1..=MAX_DIRECT) => ListStar,
+        (B::Identity, 1) => Identity,
+        (B::Values, _) => Values,
+        (B::ValuesList, 1) => ValuesList,
+        (B::Funcall, 1..) => Funcall,
+        (B::Apply, 2..) => Apply,
+        _ => return None,
+    })
+}
+
+/// Whether the builtin always returns exactly one value, as far as is known here.
+pub(crate) fn returns_one(builtin: Builtin) -> bool {
+    use Builtin as B;
+    let several =
+        matches!(builtin, B::Floor | B::Truncate | B::Values | B::ValuesList | B::Funcall | B::Apply);
+    let opened = (0..=3).any(|count| shape(builtin, count).is_some());
+    (opened && !several) || matches!(builtin, B::Append | B::Vector | B::NumNotEqual)
+}
+
+impl<'a> Frame<'_, 'a> {
+    pub(super) fn builtin(&mut self, builtin: Builtin, arguments: &'a [NodeId], dest: Dest) {
+        let top = self.registers.top();
+        let Some(shape) = shape(builtin, arguments.len()) else {
+            return self.emit_call(Target::Builtin(builtin), arguments, dest);
+        };
+        match (shape, arguments) {
+            (Shape::Unary(instr), [object]) => {
+                let src = self.operand(*object, &[]);
+                self.registers.release(top);
+                self.compute(dest, |dst| instr(dst, src));
+            }
+            (Shape::Binary(instr), [left, right]) => {
+                let (left, right) = self.operands(*left, *right);
+                self.registers.release(top);
+                self.compute(dest, |dst| instr(dst, left, right));
+            }
+            (Shape::Negate, [number]) => {
+                self.with_literal(|dst, x, one| Instr::Mul { dst, left: x, right: one }, *number, -1, dest)
+            }
+            (Shape::Reciprocal, [number]) => {
+                self.with_literal(|dst, x, one| Instr::Div { dst, left: one, right: x }, *number, 1, dest);
+            }
+            (Shape::Fold(instr), _) => self.fold(builtin, instr, arguments, dest),
+            (Shape::AddInt(value), [number]) => {
+                let left = self.operand(*number, &[]);
+                self.registers.release(top);
+                self.compute(dest, |dst| Instr::AddInt { dst, left, value: Int8(value) });
+            }
+            (Shape::Compare(comparison), [left, right]) => self.compare(comparison, *left, *right, dest),
+            (Shape::CompareInt(comparison, value), [number]) => {
+                self.compare_int(comparison, *number, value, dest)
+            }
+            (Shape::Quotient(instr), [_, ..]) if gives_one(dest) => match arguments {
+                [number, divisor] => {
+                    let (left, right) = self.operands(*number, *divisor);
+                    self.registers.release(top);
+                    self.compute(dest, |dst| instr(dst, left, right));
+                }
+                _ => self.with_literal(instr, arguments[0], 1, dest),
+            },
+            (Shape::IsType(code), [object]) => self.is_type(code, *object, dest),
+            (Shape::Not, [object]) => self.not(*object, dest),
+            (Shape::Eq, [left, right]) => self.identical(false, *left, *right, dest),
+            (Shape::Eql, [left, right]) => self.identical(true, *left, *right, dest),
+            (Shape::Store(instr, result), [object, value]) => {
+                let operands = self.operands(*object, *value);
+                self.emit(instr(operands.0, operands.1));
+                self.registers.release(top);
+                self.deliver(if result == 0 { operands.0.0 } else { operands.1.0 }, dest);
+            }
+            (Shape::StoreAt(instr), [object, index, value]) => {
+                let object = self.operand(*object, &[*index, *value]);
+                let (index, value) = self.operands(*index, *value);
+                self.emit(instr(object, index, value));
+                self.registers.release(top);
+                self.deliver(value.0, dest);
+            }
+            (Shape::List, _) => self.list(arguments, dest),
+            (Shape::ListStar, _) => self.list_star(arguments, dest),
+            (Shape::Identity, [form]) => self.single(*form, dest),
+            (Shape::Values, _) => self.values(arguments, dest),
+            (Shape::ValuesList, [list]) => self.values_list(*list, dest),
+            (Shape::Funcall, [function, arguments @ ..]) => self.call_value(*function, arguments, dest),
+            (Shape::Apply, [function, arguments @ ..]) => {
+                self.apply_form(|frame, dest| frame.form(*function, dest), arguments, dest);
+            }
+            _ => self.emit_call(Target::Builtin(builtin), arguments, dest),
+        }
+    }
+
+    /// Two operands, evaluated in order.
+    pub(super) fn operands(&mut self, left: NodeId, right: NodeId) -> (Reg, Reg) {
+        let first = self.operand(left, &[right]);
+        (first, self.operand(right, &[]))
+    }
+
+    /// One instruction on a form's value and a literal.
+    fn with_literal(&mut self, instr: Binary, form: NodeId, literal: i16, dest: Dest) {
+        let top = self.registers.top();
+        let operand = self.operand(form, &[]);
+        let register = self.registers.take(1);
+        self.emit(Instr::LoadInt { dst: Dst(register), value: Int16(literal) });
+        self.registers.release(top);
+        self.compute(dest, |dst| instr(dst, operand, Reg(register)));
+    }
+
+    fn list_star(&mut self, forms: &[NodeId], dest: Dest) {
+        if let [form] = forms {
+            return self.single(*form, dest);
+        }
+        let top = self.registers.top();
+        self.arguments(forms);
+        self.registers.release(top);
+        let mut rest = top.saturating_add(forms.len() as u8 - 1);
+        for offset in (1..forms.len() as u8 - 1).rev() {
+            let register = top.saturating_add(offset);
+            self.emit(Instr::Cons { dst: Dst(register), car: Reg(register), cdr: Reg(rest) });
+            rest = register;
+        }
+        self.compute(dest, |dst| Instr::Cons { dst, car: Reg(top), cdr: Reg(rest) });
+    }
+}
+
+/// Whether a destination takes one value at most.
+fn gives_one(dest: Dest) -> bool {
+    !matches!(dest, Dest::All | Dest::Tail | Dest::Values(..))
+}

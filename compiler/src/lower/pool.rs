@@ -1,0 +1,195 @@
+//! The constant pool of the module that is being made.
+//!
+//! Guarantees: the same datum node becomes one entry, so that sharing in a literal is kept; equal symbols, numbers and
+//! characters become one entry; entries refer to earlier entries only. A datum of any depth is converted without
+//! native recursion.
+
+use esl_bytecode::BigInt;
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::module::{Constant, FunctionNumber, PoolIdx};
+use esl_bytecode::symbol::Symbol;
+use rustc_hash::FxHashMap;
+
+/// What makes two constants one: for literals with an identity their node, otherwise their value.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+enum Key {
+    Nil,
+    True,
+    Symbol(Symbol),
+    Integer(BigInt),
+    Ratio(BigInt, BigInt),
+    /// The bits of the float, so that the zeros differ.
+    Float(u64),
+    Character(char),
+    Function(FunctionNumber),
+    Class(Symbol),
+    Object(u32),
+    Node(usize),
+}
+
+/// A constant pool. The data given to it must live until it is finished, since nodes are told apart by address.
+#[derive(Debug, Default)]
+pub(crate) struct Pool {
+    constants: Vec<Constant>,
+    known: FxHashMap<Key, PoolIdx>,
+}
+
+impl Pool {
+    /// The constants.
+    pub(crate) fn finish(self) -> Vec<Constant> {
+        self.constants
+    }
+
+    /// The entry for `symbol`, which may be `NIL` or `T`.
+    pub(crate) fn symbol(&mut self, symbol: &Symbol) -> PoolIdx {
+        if symbol.is_cl("NIL") {
+            self.enter(Key::Nil, Constant::Nil)
+        } else if symbol.is_cl("T") {
+            self.enter(Key::True, Constant::True)
+        } else {
+            self.enter(Key::Symbol(symbol.clone()), Constant::Symbol(symbol.clone()))
+        }
+    }
+
+    /// The entry for an integer.
+    pub(crate) fn integer(&mut self, value: &BigInt) -> PoolIdx {
+        self.enter(Key::Integer(value.clone()), Constant::Integer(value.clone()))
+    }
+
+    /// The entry for a function of the module.
+    pub(crate) fn function(&mut self, function: FunctionNumber) -> PoolIdx {
+        self.enter(Key::Function(function), Constant::Function(function))
+    }
+
+    /// The entry for the structure class named `name`.
+    pub(crate) fn class(&mut self, name: &Symbol) -> PoolIdx {
+        self.enter(Key::Class(name.clone()), Constant::Class(name.clone()))
+    }
+
+    /// A new entry for a vector of entries, which is nobody else's.
+    pub(crate) fn vector(&mut self, items: Vec<PoolIdx>) -> PoolIdx {
+        self.push(Constant::Vector(items))
+    }
+
+    /// The entry for a datum.
+    pub(crate) fn datum(&mut self, datum: &Datum) -> PoolIdx {
+        // A datum is on the stack until its parts have entries.
+        let mut pending = vec![datum];
+        while let Some(&top) = pending.last() {
+            if self.lookup(top).is_some() {
+                pending.pop();
+                continue;
+            }
+            let before = pending.len();
+            let mut part = |part| {
+                let found = self.lookup(part);
+                if found.is_none() {
+                    pending.push(part);
+                }
+                found.unwrap_or(PoolIdx(0))
+            };
+            let constant = match top.kind() {
+                DatumKind::Cons(car, cdr) => Constant::Cons(part(car), part(cdr)),
+                DatumKind::Vector(items) => Constant::Vector(items.iter().map(part).collect()),
+                DatumKind::Array(dimensions, items) => {
+                    Constant::Array(dimensions.to_vec(), items.iter().map(part).collect())
+                }
+                _ => self.leaf(top),
+            };
+            if pending.len() == before {
+                self.enter(key(top), constant);
+                pending.pop();
+            }
+        }
+        self.lookup(datum).unwrap_or(PoolIdx(0))
+    }
+
+    fn lookup(&self, datum: &Datum) -> Option<PoolIdx> {
+        self.known.get(&key(datum)).copied()
+    }
+
+    fn leaf(&self, datum: &Datum) -> Constant {
+        match datum.kind() {
+            DatumKind::Nil => Constant::Nil,
+            DatumKind::Symbol(symbol) if symbol.is_cl("NIL") => Constant::Nil,
+            DatumKind::Symbol(symbol) if symbol.is_cl("T") => Constant::True,
+            DatumKind::Symbol(symbol) => Constant::Symbol(symbol.clone()),
+            DatumKind::Integer(value) => Constant::Integer(value.clone()),
+            DatumKind::Ratio(numerator, denominator) => {
+                Constant::Ratio(numerator.clone(), denominator.clone())
+            }
+            DatumKind::Float(value) => Constant::Float(*value),
+            DatumKind::Character(c) => Constant::Character(*c),
+            DatumKind::String(text) => Constant::String(text.clone()),
+            DatumKind::Object(id) => Constant::Object(*id),
+            DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) => {
+                unreachable!("compound data are handled by the caller")
+            }
+        }
+    }
+
+    fn enter(&mut self, key: Key, constant: Constant) -> PoolIdx {
+        if let Some(&index) = self.known.get(&key) {
+            return index;
+        }
+        let index = self.push(constant);
+        self.known.insert(key, index);
+        index
+    }
+
+    fn push(&mut self, constant: Constant) -> PoolIdx {
+        self.constants.push(constant);
+        PoolIdx(self.constants.len() as u32 - 1)
+    }
+}
+
+fn key(datum: &Datum) -> Key {
+    match datum.kind() {
+        DatumKind::Nil => Key::Nil,
+        DatumKind::Symbol(symbol) if symbol.is_cl("NIL") => Key::Nil,
+        DatumKind::Symbol(symbol) if symbol.is_cl("T") => Key::True,
+        DatumKind::Symbol(symbol) => Key::Symbol(symbol.clone()),
+        DatumKind::Integer(value) => Key::Integer(value.clone()),
+        DatumKind::Ratio(numerator, denominator) => Key::Ratio(numerator.clone(), denominator.clone()),
+        DatumKind::Float(value) => Key::Float(value.to_bits()),
+        DatumKind::Character(c) => Key::Character(*c),
+        DatumKind::Object(id) => Key::Object(id.0),
+        DatumKind::String(_) | DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) => {
+            Key::Node(datum.identity())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use esl_bytecode::span::Span;
+
+    #[test]
+    fn sharing_is_kept_and_equal_atoms_are_merged() {
+        let span = Span::default();
+        let shared = Datum::list([Datum::integer(1, span)], span);
+        let copy = Datum::list([Datum::integer(1, span)], span);
+        let whole = Datum::list([shared.clone(), shared.clone(), copy], span);
+        let mut pool = Pool::default();
+        let index = pool.datum(&whole);
+        assert_eq!(pool.datum(&whole), index);
+        let part = pool.datum(&shared);
+        let constants = pool.finish();
+        // NIL, 1, the shared list, its copy, and the three pairs of the whole.
+        assert_eq!(constants.len(), 7);
+        assert!(matches!(constants[index.0 as usize], Constant::Cons(car, _) if car == part));
+    }
+
+    #[test]
+    fn a_deep_datum_needs_no_native_stack() {
+        let span = Span::default();
+        let mut deep = Datum::nil(span);
+        for _ in 0..300_000 {
+            deep = Datum::list([deep], span);
+        }
+        let mut pool = Pool::default();
+        let top = pool.datum(&deep);
+        assert_eq!(top.0 as usize + 1, pool.finish().len());
+    }
+}

@@ -1,0 +1,214 @@
+//! Variables: reading, setting and binding them.
+
+use esl_bytecode::opcode::Instr;
+use esl_bytecode::operand::{Dst, Index, Reg};
+use esl_bytecode::symbol::Symbol;
+
+use super::dest::Dest;
+use super::frame::{Extent, Frame};
+use crate::core::*;
+use crate::resolve::Lexical;
+
+/// Where a variable is found from the running code.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Place {
+    /// In a register.
+    Register(u8),
+    /// In the box in a register.
+    Box(u8),
+    /// Among the captures.
+    Capture(Index),
+    /// In a box among the captures.
+    CaptureBox(Index),
+}
+
+impl<'a> Frame<'_, 'a> {
+    /// The register of a variable that this frame owns.
+    pub(super) fn register(&self, variable: VarId) -> u8 {
+        self.builder.variables[variable.index()]
+    }
+
+    /// The number of a capture of this frame.
+    pub(super) fn capture_index(&mut self, lexical: Lexical) -> Index {
+        let index = self.builder.resolution.capture_index(self.lambda, lexical);
+        let Some(index) = index else { unreachable!("what is owned by another frame is captured") };
+        if index > usize::from(u8::MAX) {
+            self.excess = Some("captured variables");
+        }
+        Index(index.min(255) as u8)
+    }
+
+    /// Where to find a variable, or the closure of a local function.
+    pub(super) fn place(&mut self, variable: VarId) -> Place {
+        let resolution = &self.builder.resolution;
+        let is_boxed = resolution.is_boxed(variable);
+        if resolution.frame(self.core.variables[variable.index()].owner) == self.lambda {
+            let register = self.register(variable);
+            return if is_boxed { Place::Box(register) } else { Place::Register(register) };
+        }
+        let index = self.capture_index(Lexical::Variable(variable));
+        if is_boxed { Place::CaptureBox(index) } else { Place::Capture(index) }
+    }
+
+    pub(super) fn local(&mut self, variable: VarId, dest: Dest) {
+        if let Some(lambda) = self.builder.resolution.function(variable) {
+            return self.function_value(variable, lambda, dest);
+        }
+        let place = self.place(variable);
+        self.fetch(place, dest);
+    }
+
+    /// Passes on what is in a place.
+    pub(super) fn fetch(&mut self, place: Place, dest: Dest) {
+        if let Dest::Effect = dest {
+            return;
+        }
+        match place {
+            Place::Register(register) => self.deliver(register, dest),
+            Place::Box(register) => self.compute(dest, |dst| Instr::BoxRef { dst, cell: Reg(register) }),
+            Place::Capture(index) => self.compute(dest, |dst| Instr::CaptureRef { dst, index }),
+            Place::CaptureBox(index) => self.compute(dest, |dst| Instr::CaptureBoxRef { dst, index }),
+        }
+    }
+
+    pub(super) fn set_local(&mut self, variable: VarId, value: NodeId, dest: Dest) {
+        match self.place(variable) {
+            Place::Register(register) => {
+                self.form(value, Dest::Keep(register));
+                self.deliver(register, dest);
+            }
+            place => {
+                let top = self.registers.top();
+                let src = self.operand(value, &[]);
+                self.emit(match place {
+                    Place::Box(register) => Instr::BoxSet { cell: Reg(register), src },
+                    Place::CaptureBox(index) => Instr::CaptureBoxSet { src, index },
+                    _ => unreachable!("a variable that is captured and assigned lives in a box"),
+                });
+                self.deliver(src.0, dest);
+                self.registers.release(top);
+            }
+        }
+    }
+
+    /// A register that holds the value of `node` until the forms `later` have been evaluated. May take a register.
+    pub(super) fn operand(&mut self, node: NodeId, later: &[NodeId]) -> Reg {
+        if let Some(register) = self.plain_variable(node, later) {
+            return Reg(register);
+        }
+        let register = self.registers.top();
+        self.form(node, Dest::Fresh(register));
+        Reg(self.registers.take(1))
+    }
+
+    /// The register of the variable that `node` reads, if it keeps its value while the forms `later` are evaluated.
+    pub(super) fn plain_variable(&mut self, node: NodeId, later: &[NodeId]) -> Option<u8> {
+        let NodeKind::Local(variable) = self.core.nodes[node.index()].kind else { return None };
+        let resolution = &self.builder.resolution;
+        if resolution.function(variable).is_some() || resolution.is_set_in(variable, later) {
+            return None;
+        }
+        match self.place(variable) {
+            Place::Register(register) => Some(register),
+            _ => None,
+        }
+    }
+
+    pub(super) fn special(&mut self, symbol: &Symbol, dest: Dest) {
+        let symbol = self.symbol_index(symbol);
+        self.compute(dest, |dst| Instr::SymbolValue { dst, symbol });
+    }
+
+    pub(super) fn set_special(&mut self, symbol: &Symbol, value: NodeId, dest: Dest) {
+        let top = self.registers.top();
+        let src = self.operand(value, &[]);
+        let symbol = self.symbol_index(symbol);
+        self.emit(Instr::SetSymbolValue { src, symbol });
+        self.deliver(src.0, dest);
+        self.registers.release(top);
+    }
+
+    pub(super) fn let_form(
+        &mut self,
+        sequential: bool,
+        bindings: &'a [(Target, NodeId)],
+        body: NodeId,
+        dest: Dest,
+    ) {
+        if self.parallel_assignment(bindings, body, dest) {
+            return;
+        }
+        let top = self.registers.top();
+        let depth = self.extents.len();
+        // Special bindings of a parallel `let` are made when all values are there.
+        let mut waiting: Vec<(&Symbol, u8)> = Vec::new();
+        for (target, value) in bindings {
+            match target {
+                Target::Lexical(variable) => self.bind_lexical(*variable, *value),
+                Target::Special(symbol) => {
+                    let temporary = self.registers.top();
+                    if sequential {
+                        let src = self.operand(*value, &[]);
+                        self.bind_special(symbol, src.0);
+                        self.registers.release(temporary);
+                    } else {
+                        self.form(*value, Dest::Fresh(temporary));
+                        waiting.push((symbol, self.registers.take(1)));
+                    }
+                }
+            }
+        }
+        for (symbol, register) in waiting {
+            self.bind_special(symbol, register);
+        }
+        self.form_inside(body, dest, depth);
+        self.registers.release(top);
+    }
+
+    /// Binds a lexical variable to the value of a form.
+    pub(super) fn bind_lexical(&mut self, variable: VarId, value: NodeId) {
+        if !self.builder.resolution.is_used(variable) {
+            return self.form(value, Dest::Effect);
+        }
+        if let Some(register) = self.alias(variable, value) {
+            self.builder.variables[variable.index()] = register;
+            return;
+        }
+        let register = self.registers.top();
+        self.form(value, Dest::Fresh(register));
+        self.builder.variables[variable.index()] = self.registers.take(1);
+        self.box_variable(variable);
+    }
+
+    /// The register of another variable that `variable` can share, since neither ever changes.
+    fn alias(&mut self, variable: VarId, value: NodeId) -> Option<u8> {
+        let NodeKind::Local(other) = self.core.nodes[value.index()].kind else { return None };
+        let resolution = &self.builder.resolution;
+        let changes = resolution.is_assigned(variable)
+            || resolution.is_assigned(other)
+            // Jumps for self calls assign parameters.
+            || [variable, other]
+                .iter()
+                .any(|one| resolution.is_self_called(self.core.variables[one.index()].owner) && self.is_parameter(*one));
+        if changes { None } else { self.plain_variable(value, &[]) }
+    }
+
+    fn is_parameter(&self, variable: VarId) -> bool {
+        let owner = &self.core.lambdas[self.core.variables[variable.index()].owner.index()];
+        owner.required.iter().any(|parameter| parameter.variable == variable)
+    }
+
+    /// Moves a variable that has just got its value into a box, if it lives in one.
+    pub(super) fn box_variable(&mut self, variable: VarId) {
+        if self.builder.resolution.is_boxed(variable) {
+            let register = self.register(variable);
+            self.emit(Instr::MakeBox { dst: Dst(register), src: Reg(register) });
+        }
+    }
+
+    pub(super) fn bind_special(&mut self, symbol: &Symbol, register: u8) {
+        let symbol = self.symbol_index(symbol);
+        self.emit(Instr::Bind { src: Reg(register), symbol });
+        self.open(Extent::Binding);
+    }
+}

@@ -1,0 +1,246 @@
+//! Decides which local functions become part of the frame that calls them.
+//!
+//! A function is inlined if it takes just required parameters, is only called, with the right number of arguments, and
+//! all its calls but one are tail calls of itself: then these are jumps, and the one from outside enters the loop. A
+//! function of a `let` over lambda, `((lambda (x) …) 1)`, is the case without jumps; a named loop is the case with
+//! them. Functions that tail-call each other become one loop when each but one is called from one place only.
+
+use rustc_hash::FxHashMap;
+
+use super::children::{children, lambda_nodes};
+use crate::core::*;
+
+/// Who runs where.
+pub(super) struct Inlining {
+    /// The lambda in whose frame each lambda runs.
+    pub(super) frames: Vec<LambdaId>,
+    /// The lambda of each local function.
+    pub(super) functions: FxHashMap<VarId, LambdaId>,
+}
+
+/// A call of a local function: from which lambda, in tail position of it or not, with the right number of arguments.
+#[derive(Clone, Copy)]
+struct Site {
+    lambda: LambdaId,
+    tail: bool,
+    fits: bool,
+}
+
+/// All that the decision depends on.
+struct Survey {
+    functions: FxHashMap<VarId, LambdaId>,
+    order: Vec<VarId>,
+    sites: Vec<Vec<Site>>,
+    /// Functions that are used otherwise than by a call.
+    values: Vec<bool>,
+    /// Blocks that are left from another lambda or across a cleanup.
+    escaping: Vec<bool>,
+    /// Lambdas that are called where they are written, and from where.
+    hosts: Vec<Option<(LambdaId, bool)>>,
+}
+
+/// How often the decision is repeated, since one function may become inlinable by another.
+const ROUNDS: usize = 8;
+
+pub(super) fn decide(core: &Core) -> Inlining {
+    // Which blocks escape decides what is in tail position.
+    let escaping = survey(core, &vec![false; core.blocks.len()]).escaping;
+    let survey = survey(core, &escaping);
+    let mut hosts = survey.hosts;
+    for _ in 0..ROUNDS {
+        let mut changed = false;
+        for &name in survey.order.iter().rev() {
+            let lambda = survey.functions[&name];
+            let text = &core.lambdas[lambda.index()];
+            let is_plain = text.is_exact() && text.required.iter().all(|parameter| !parameter.is_special);
+            if hosts[lambda.index()].is_some() || survey.values[name.index()] || !is_plain {
+                continue;
+            }
+            if let Some(host) = only_caller(lambda, &survey.sites[name.index()], &hosts) {
+                hosts[lambda.index()] = Some(host);
+                changed = true;
+            }
+        }
+        if !changed {
+            break;
+        }
+    }
+    let frames =
+        (0..core.lambdas.len()).map(|index| settle(LambdaId(index as u32), true, &hosts).0).collect();
+    Inlining { frames, functions: survey.functions }
+}
+
+/// The lambda that a lambda runs in, and whether a place in tail position of it still is.
+fn settle(mut lambda: LambdaId, mut tail: bool, hosts: &[Option<(LambdaId, bool)>]) -> (LambdaId, bool) {
+    while let Some((host, host_tail)) = hosts[lambda.index()] {
+        lambda = host;
+        tail &= host_tail;
+    }
+    (lambda, tail)
+}
+
+/// The one call from outside, if all other calls of the function are tail calls of itself.
+fn only_caller(
+    lambda: LambdaId,
+    sites: &[Site],
+    hosts: &[Option<(LambdaId, bool)>],
+) -> Option<(LambdaId, bool)> {
+    let mut outside = None;
+    for site in sites {
+        let (frame, tail) = settle(site.lambda, site.tail, hosts);
+        if !site.fits {
+            return None;
+        }
+        if frame == lambda {
+            if !tail {
+                return None;
+            }
+        } else if outside.replace((site.lambda, site.tail)).is_some() {
+            return None;
+        }
+    }
+    outside
+}
+
+/// A node to be visited: in which lambda, in tail position or not, under how many dynamic extents and cleanups.
+#[derive(Clone, Copy)]
+struct Visit {
+    lambda: LambdaId,
+    tail: bool,
+    extents: u32,
+    cleanups: u32,
+}
+
+impl Visit {
+    fn no_tail(self) -> Visit {
+        Visit { tail: false, ..self }
+    }
+
+    fn inside(self) -> Visit {
+        Visit { tail: false, extents: self.extents + 1, ..self }
+    }
+}
+
+fn survey(core: &Core, escaping: &[bool]) -> Survey {
+    let mut survey = Survey {
+        functions: FxHashMap::default(),
+        order: Vec::new(),
+        sites: vec![Vec::new(); core.variables.len()],
+        values: vec![false; core.variables.len()],
+        escaping: vec![false; core.blocks.len()],
+        hosts: vec![None; core.lambdas.len()],
+    };
+    let top = Visit { lambda: LambdaId(0), tail: true, extents: 0, cleanups: 0 };
+    let mut blocks = vec![top; core.blocks.len()];
+    let mut pending = Vec::new();
+    enter_lambda(core, LambdaId(0), &mut pending);
+    while let Some((node, at)) = pending.pop() {
+        let kind = &core.nodes[node.index()].kind;
+        // Whether the last child is in tail position when the node is.
+        let mut last = at.no_tail();
+        let mut rest = at.no_tail();
+        match kind {
+            NodeKind::Local(variable) => survey.values[variable.index()] = true,
+            NodeKind::Lambda(lambda) => enter_lambda(core, *lambda, &mut pending),
+            NodeKind::If(..) => {
+                let NodeKind::If(test, consequent, alternative) = kind else { unreachable!("just matched") };
+                pending.extend([(*test, rest), (*consequent, at), (*alternative, at)]);
+                continue;
+            }
+            NodeKind::Progn(_) | NodeKind::And(_) | NodeKind::Or(_) => last = at,
+            NodeKind::Let { bindings, .. } => {
+                last = if bindings.iter().any(|(target, _)| is_special(target)) { at.inside() } else { at };
+                // Later values of a sequential `let` are computed under earlier special bindings.
+                rest = if last.tail { rest } else { at.inside() };
+            }
+            NodeKind::BindValues(targets, ..) => {
+                last = if targets.iter().any(is_special) { at.inside() } else { at };
+            }
+            NodeKind::Functions { definitions, body } => {
+                for &(name, lambda) in definitions {
+                    if survey.functions.insert(name, lambda).is_none() {
+                        survey.order.push(name);
+                    }
+                    enter_lambda(core, lambda, &mut pending);
+                }
+                pending.push((*body, at));
+                continue;
+            }
+            NodeKind::Block(block, _) => {
+                last = if escaping[block.index()] { at.inside() } else { at };
+                blocks[block.index()] = last;
+            }
+            NodeKind::ReturnFrom(block, _) => {
+                let home = blocks[block.index()];
+                if home.lambda != at.lambda || home.cleanups != at.cleanups {
+                    survey.escaping[block.index()] = true;
+                } else if home.extents == at.extents {
+                    last.tail = home.tail;
+                }
+            }
+            NodeKind::UnwindProtect(..) => {
+                rest = Visit { cleanups: at.cleanups + 1, ..at.inside() };
+                last = rest;
+            }
+            NodeKind::Catch(..) | NodeKind::Progv(..) | NodeKind::Handlers(..) | NodeKind::Mask(..) => {
+                last = at.inside();
+            }
+            NodeKind::Tagbody(..) => {
+                // Its tags may need an entry that stands while the forms run.
+                last = at.inside();
+                rest = at.inside();
+            }
+            NodeKind::HandlerCase(body, clauses) => {
+                pending.push((*body, at.inside()));
+                pending.extend(clauses.iter().map(|clause| (clause.body, at)));
+                continue;
+            }
+            NodeKind::Call(Callee::Value(function), arguments) => {
+                if let NodeKind::Lambda(lambda) = core.nodes[function.index()].kind
+                    && core.lambdas[lambda.index()].takes_exactly(arguments.len())
+                {
+                    survey.hosts[lambda.index()] = Some((at.lambda, at.tail));
+                    enter_lambda(core, lambda, &mut pending);
+                    pending.extend(arguments.iter().map(|&argument| (argument, rest)));
+                    continue;
+                }
+            }
+            NodeKind::Call(Callee::Local(name), arguments) => {
+                let fits = survey
+                    .functions
+                    .get(name)
+                    .is_some_and(|lambda| core.lambdas[lambda.index()].takes_exactly(arguments.len()));
+                survey.sites[name.index()].push(Site { lambda: at.lambda, tail: at.tail, fits });
+            }
+            NodeKind::Apply(Callee::Local(name), _) => survey.values[name.index()] = true,
+            _ => {}
+        }
+        let from = pending.len();
+        children(kind, &mut |child| pending.push((child, rest)));
+        if pending.len() > from
+            && let Some(end) = pending.last_mut()
+        {
+            end.1 = last;
+        }
+    }
+    survey
+}
+
+fn is_special(target: &Target) -> bool {
+    matches!(target, Target::Special(_))
+}
+
+fn enter_lambda(core: &Core, lambda: LambdaId, pending: &mut Vec<(NodeId, Visit)>) {
+    let text = &core.lambdas[lambda.index()];
+    let parameters = text.required.iter().chain(&text.rest);
+    let optional = text.optional.iter().chain(text.keys.iter().flatten().map(|key| &key.optional));
+    let mut parameters =
+        parameters.copied().chain(optional.flat_map(|o| [o.parameter].into_iter().chain(o.supplied)));
+    let has_special = parameters.any(|parameter| parameter.is_special);
+    let extents = u32::from(has_special);
+    let visit = Visit { lambda, tail: false, extents, cleanups: 0 };
+    lambda_nodes(text, &mut |node| pending.push((node, visit)));
+    if let Some((_, body)) = pending.last_mut() {
+        body.tail = !has_special;
+    }
+}
