@@ -68,8 +68,20 @@ struct Model {
     may_survive: BTreeSet<usize>,
     /// The collector gets a slice after one in so many steps.
     laziness: usize,
+    /// Factor on the lengths of objects.
+    bulk: usize,
+    totals: Totals,
+}
+
+/// What shows that the test has come to the interesting places.
+#[derive(Default, Debug)]
+struct Totals {
+    /// Cycles that ended in the ordinary way.
     cycles: usize,
+    /// Collections because the limit was reached.
     forced: usize,
+    /// Objects not marked yet whose address was overwritten while marking.
+    barriers: usize,
 }
 
 const GLOBALS: usize = 8;
@@ -81,8 +93,23 @@ fn raw_element(object: usize, index: usize) -> u32 {
     (object as u32).wrapping_mul(0x9E37_79B9).wrapping_add(index as u32) | 1
 }
 
+/// The slots of an object as the heap has them.
+fn heap_slots(heap: &Heap, kind: Option<Kind>, v: Value) -> Vec<Value> {
+    match kind {
+        None => vec![heap.car(v).unwrap(), heap.cdr(v).unwrap()],
+        Some(Kind::Code) => {
+            let code = heap.code(v).unwrap();
+            let mut slots = vec![code.name, code.debug, code.owner];
+            slots.extend(heap.code_constants(v).unwrap());
+            slots
+        }
+        Some(kind) if kind.is_record() => heap.record(v, kind).unwrap().to_vec(),
+        Some(_) => vec![],
+    }
+}
+
 impl Model {
-    fn new(seed: u64, config: HeapConfig, laziness: usize) -> Model {
+    fn new(seed: u64, config: HeapConfig, laziness: usize, bulk: usize) -> Model {
         // SAFETY: the values stay in this model.
         let heap = unsafe { Heap::new(config) };
         let stack = || TaskStack { values: Vec::new(), scanned_in: 0 };
@@ -96,8 +123,8 @@ impl Model {
             running: 0,
             may_survive: BTreeSet::new(),
             laziness,
-            cycles: 0,
-            forced: 0,
+            bulk,
+            totals: Totals::default(),
         };
         model.globals[CODE] = model.make(Some(Kind::Code), 3, 0).unwrap();
         model.globals[FUNCTION] = model.make(Some(Kind::Function), 1, 0).unwrap();
@@ -124,22 +151,32 @@ impl Model {
         }
     }
 
+    /// Some object that the running task can get at, by a few reads of the heap.
     fn pick_object(&mut self) -> Option<usize> {
-        (0..4).find_map(|_| match self.pick() {
-            Shade::Object(object) => Some(object),
-            Shade::Plain(_) => None,
-        })
+        let mut found = None;
+        let mut shade = self.pick();
+        for _ in 0..self.random.below(6) {
+            let Shade::Object(object) = shade else { break };
+            found = Some(object);
+            let slots = &self.shadows[&object].slots;
+            if slots.is_empty() {
+                break;
+            }
+            shade = slots[self.random.below(slots.len())];
+        }
+        found
     }
 
     /// A length: mostly short, sometimes medium, rarely large.
     fn length(&mut self) -> usize {
         let scale = if cfg!(miri) { 16 } else { 1 };
-        match self.random.below(64) {
-            0 => self.random.below(4000) / scale,
-            1..4 => self.random.below(900) / scale,
-            4..20 => self.random.below(40),
-            _ => self.random.below(6),
-        }
+        self.bulk
+            * match self.random.below(64) {
+                0 => self.random.below(4000) / scale,
+                1..4 => self.random.below(900) / scale,
+                4..20 => self.random.below(40),
+                _ => self.random.below(6),
+            }
     }
 
     /// Makes an object of random values with its shadow; collects when the heap says so.
@@ -154,7 +191,7 @@ impl Model {
         let value = match self.make_value(object, kind, &shades, raw_len) {
             Err(AllocError::NeedCollection) => {
                 self.collect_fully(&shades);
-                self.forced += 1;
+                self.totals.forced += 1;
                 self.make_value(object, kind, &shades, raw_len)?
             }
             other => other?,
@@ -241,6 +278,26 @@ impl Model {
         Ok(())
     }
 
+    /// Moves the values of the running task's stack into a new vector, or forgets them: so structures grow deep, and
+    /// most objects are in use through the heap alone.
+    fn bundle(&mut self) {
+        let values = std::mem::take(&mut self.tasks[self.running].values);
+        if self.random.one_in(8) {
+            return;
+        }
+        let (slots, first) = (values.len(), values[0]);
+        if let Ok(vector) = self.make_with(Kind::SimpleVector, slots, first) {
+            let Shade::Object(object) = vector else { unreachable!("a vector is an object") };
+            for (index, &shade) in values.iter().enumerate() {
+                let shadow = self.shadows.get_mut(&object).unwrap();
+                shadow.slots[index] = shade;
+                let (v, new) = (shadow.value, self.value(shade));
+                self.heap.vector_set(v, index, new).unwrap();
+            }
+            self.tasks[self.running].values.push(vector);
+        }
+    }
+
     /// As `make`, with a given first slot.
     fn make_with(&mut self, kind: Kind, slots: usize, first: Shade) -> Result<Shade, AllocError> {
         let mut shades: Vec<Shade> = (0..slots).map(|_| self.pick()).collect();
@@ -264,10 +321,12 @@ impl Model {
         }
     }
 
-    /// Overwrites a slot of an object, through the heap's own functions, which hold the barrier.
+    /// Overwrites a slot of an object, through the heap's own functions, which hold the barrier. The running task
+    /// may have read the old value first, and then holds the only reference to it.
     fn store(&mut self) {
         let Some(object) = self.pick_object() else { return };
         let new = self.pick();
+        let reads = self.random.one_in(2);
         let value = self.value(new);
         let shadow = self.shadows.get_mut(&object).unwrap();
         if shadow.slots.is_empty() {
@@ -275,6 +334,8 @@ impl Model {
         }
         let index = self.random.below(shadow.slots.len());
         let heap = &mut self.heap;
+        let old = heap_slots(heap, shadow.kind, shadow.value)[index];
+        let tests_barrier = heap.phase() == Phase::Marking && !heap.is_marked(old);
         let stored = match shadow.kind {
             None if index == 0 => heap.set_car(shadow.value, value),
             None => heap.set_cdr(shadow.value, value),
@@ -293,7 +354,11 @@ impl Model {
             Some(kind) => heap.record_set(shadow.value, kind, index, value),
         };
         if stored.is_some() {
-            shadow.slots[index] = new;
+            let old = std::mem::replace(&mut shadow.slots[index], new);
+            if reads {
+                self.tasks[self.running].values.push(old);
+            }
+            self.totals.barriers += usize::from(tests_barrier);
         }
     }
 
@@ -314,12 +379,9 @@ impl Model {
                 }
             }
             13..15 => {
-                let stack = &mut self.tasks[running].values;
-                let keep = self.random.below(stack.len() + 1);
-                if self.random.one_in(4) || stack.len() > 60 {
-                    stack.truncate(keep);
-                } else {
-                    stack.pop();
+                self.tasks[running].values.pop();
+                if self.tasks[running].values.len() > 30 {
+                    self.bundle();
                 }
             }
             15 => {
@@ -346,7 +408,7 @@ impl Model {
                 let values = (0..3).map(|_| self.pick()).collect();
                 self.tasks.push(TaskStack { values, scanned_in: self.heap.cycle_id() });
             }
-            17 if self.tasks.len() > 2 => {
+            17 if self.random.one_in(20) => {
                 let task = self.random.below(self.tasks.len());
                 self.tasks.swap_remove(task);
                 self.enter(0);
@@ -375,12 +437,12 @@ impl Model {
     fn collector_step(&mut self) {
         match self.heap.phase() {
             Phase::Idle => {
-                if self.heap.gc_due() || self.random.one_in(200) {
+                if self.heap.gc_due() || self.random.one_in(50) {
                     self.begin_cycle();
                 }
             }
             Phase::Marking => {
-                let visits = 1 + self.random.below(40) as u32;
+                let visits = 1 + self.random.below(8) as u32;
                 let SliceOutcome::Drained { .. } = self.heap.slice(visits) else { return };
                 let waiting = |task: &TaskStack| task.scanned_in != self.heap.cycle_id();
                 match self.tasks.iter().position(waiting) {
@@ -426,7 +488,7 @@ impl Model {
         // SAFETY: everything reachable was seen to be marked just now.
         unsafe { self.heap.end_marking() };
         self.check_live();
-        self.cycles += 1;
+        self.totals.cycles += 1;
     }
 
     fn check_live(&self) {
@@ -474,18 +536,7 @@ impl Model {
         let (heap, v) = (&self.heap, shadow.value);
         let expected: Vec<Value> = shadow.slots.iter().map(|&shade| self.value(shade)).collect();
         assert_eq!(heap.kind(v), shadow.kind, "object {object}");
-        let actual = match shadow.kind {
-            None => vec![heap.car(v).unwrap(), heap.cdr(v).unwrap()],
-            Some(Kind::Code) => {
-                let code = heap.code(v).unwrap();
-                let mut slots = vec![code.name, code.debug, code.owner];
-                slots.extend(heap.code_constants(v).unwrap());
-                slots
-            }
-            Some(kind) if kind.is_record() => heap.record(v, kind).unwrap().to_vec(),
-            Some(_) => vec![],
-        };
-        assert_eq!(actual, expected, "slots of object {object}");
+        assert_eq!(heap_slots(heap, shadow.kind, v), expected, "slots of object {object}");
         let mut raw = (0..shadow.raw_len).map(|i| raw_element(object, i));
         let same = match shadow.kind {
             Some(Kind::Code) => heap.code_words(v).unwrap().iter().copied().eq(raw),
@@ -526,24 +577,20 @@ impl Model {
     }
 }
 
-struct Totals {
-    cycles: usize,
-    forced: usize,
-}
-
-fn run(seeds: std::ops::Range<u64>, steps: usize, laziness: usize, config: HeapConfig) -> Totals {
-    let (seeds, steps) = if cfg!(miri) { (seeds.start..seeds.start + 1, steps / 40) } else { (seeds, steps) };
-    let mut totals = Totals { cycles: 0, forced: 0 };
+fn run(seeds: std::ops::Range<u64>, laziness: usize, bulk: usize, config: HeapConfig) -> Totals {
+    let (seeds, steps) = if cfg!(miri) { (seeds.start..seeds.start + 1, 600) } else { (seeds, 10_000) };
+    let mut totals = Totals::default();
     for seed in seeds {
         // The seed is what a failure needs to be repeated.
         let outcome = std::panic::catch_unwind(|| {
-            let mut model = Model::new(seed, config.clone(), laziness);
+            let mut model = Model::new(seed, config.clone(), laziness, bulk);
             model.run(steps);
-            (model.cycles, model.forced)
+            model.totals
         });
-        let (cycles, forced) = outcome.unwrap_or_else(|_| panic!("seed {seed} fails with {config:?}"));
-        totals.cycles += cycles;
-        totals.forced += forced;
+        let one = outcome.unwrap_or_else(|_| panic!("seed {seed} fails with {config:?}"));
+        totals.cycles += one.cycles;
+        totals.forced += one.forced;
+        totals.barriers += one.barriers;
     }
     totals
 }
@@ -551,23 +598,20 @@ fn run(seeds: std::ops::Range<u64>, steps: usize, laziness: usize, config: HeapC
 #[test]
 fn what_is_in_use_survives() {
     let config = HeapConfig { cycle_floor: 64 << 10, ..HeapConfig::default() };
-    assert!(run(0..6, 10_000, 1, config).cycles > 0);
+    let totals = run(0..6, 5, 1, config);
+    assert!(cfg!(miri) || totals.cycles > 20 && totals.barriers > 50, "{totals:?}");
 }
 
 #[test]
 fn what_is_in_use_survives_a_full_mark_stack() {
     let config = HeapConfig { cycle_floor: 64 << 10, mark_stack: 3, ..HeapConfig::default() };
-    assert!(run(100..106, 10_000, 1, config).cycles > 0);
+    let totals = run(100..106, 5, 1, config);
+    assert!(cfg!(miri) || totals.cycles > 20 && totals.barriers > 50, "{totals:?}");
 }
 
 #[test]
 fn what_is_in_use_survives_at_the_limit() {
     let config = HeapConfig { limit: 3 << 19, cycle_floor: 1 << 20, ..HeapConfig::default() };
-    let totals = run(200..206, 10_000, 300, config);
-    assert!(
-        cfg!(miri) || totals.cycles > 0 && totals.forced > 0,
-        "{} cycles, {} forced",
-        totals.cycles,
-        totals.forced
-    );
+    let totals = run(200..206, 20, 5, config);
+    assert!(cfg!(miri) || totals.cycles > 5 && totals.forced > 5, "{totals:?}");
 }

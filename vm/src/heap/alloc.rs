@@ -23,7 +23,7 @@ use std::ptr::NonNull;
 /// Greatest object, in bytes, for which the first region moves on to its next hole.
 const SMALL: usize = 256;
 /// A hole is used in pieces of this many bytes, so that slices come in time; also what one slice is owed for.
-pub(super) const PIECE: usize = 32 << 10;
+pub(super) const PIECE: usize = 16 << 10;
 /// Blocks that one refill sweeps in vain before it takes a new arena, if it may.
 const REFILL_SWEEPS: usize = 8;
 /// The first region leaves a block with less than this many free bytes alone until the limit is reached.

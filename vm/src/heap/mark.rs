@@ -237,6 +237,7 @@ impl Heap {
     /// Follows what is marked until nothing is left or the budget is spent.
     fn follow(&mut self, left: &mut i64) -> SliceOutcome {
         while *left > 0 {
+            debug_assert!(self.marker.stack.len() <= self.marker.capacity);
             if let Some(v) = self.marker.stack.pop() {
                 self.visit(v, left);
             } else if let Some((v, from)) = self.marker.pieces.pop() {

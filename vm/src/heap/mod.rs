@@ -63,7 +63,7 @@ use sweep::Sweep;
 pub const RESERVE: usize = 1 << 20;
 
 /// Visits of an ordinary slice: well under 100 µs.
-pub const SLICE_VISITS: u32 = 2000;
+pub const SLICE_VISITS: u32 = 1000;
 
 /// What a heap may use, and when it collects.
 #[derive(Clone, Debug)]
@@ -312,5 +312,17 @@ mod tests {
         let mut heap = Heap::for_tests();
         let cell = heap.cons(Value::T, Value::NIL).unwrap();
         assert_eq!((heap.car(cell), heap.cdr(cell)), (Some(Value::T), Some(Value::NIL)));
+    }
+
+    #[test]
+    #[cfg(debug_assertions)]
+    fn freed_memory_is_poisoned() {
+        let mut heap = Heap::for_tests();
+        let dead = heap.cons(Value::T, Value::NIL).unwrap();
+        let live = heap.cons(Value::T, Value::NIL).unwrap();
+        // SAFETY: `dead` is followed below, but its arena is kept by `live`.
+        unsafe { heap.collect_fully(|heap| heap.mark(live)) };
+        assert_eq!((heap.car(dead), heap.cdr(dead)), (Some(Value::POISON), Some(Value::POISON)));
+        assert_eq!(heap.car(live), Some(Value::T));
     }
 }
