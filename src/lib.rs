@@ -1,1 +1,30 @@
-//! ESL.
+//! ESL, the Execution Support Language: programs that decide, while the world changes, what an agent does next.
+//!
+//! This crate puts the compiler, the virtual machine and the library together. [`Engine`] is for programs in Rust that
+//! want to run ESL; [`program`] is what the commands `eslc` and `eslvm` are made of.
+//!
+//! ```
+//! use esl::{Data, Engine};
+//!
+//! let mut engine = Engine::new()?;
+//! engine.register("READ-SENSOR", &["NUMBER"], "The temperature at a sensor, in degrees.", |arguments| {
+//!     let number = arguments[0].as_integer().ok_or("the sensor's number must be an integer")?;
+//!     Ok(Data::Float(20.0 + 0.5 * number as f64))
+//! })?;
+//! engine.eval("(defun warm-p (sensor) (> (read-sensor sensor) 21))")?;
+//! let warm = engine.eval("(loop for sensor from 0 to 5 when (warm-p sensor) collect sensor)")?;
+//! assert_eq!(warm.to_string(), "(3 4 5)");
+//! # Ok::<(), esl::Error>(())
+//! ```
+#![forbid(unsafe_code)]
+
+pub mod command;
+pub mod data;
+pub mod engine;
+pub mod program;
+pub mod repl;
+
+pub use data::Data;
+pub use engine::{Engine, Error};
+pub use esl_vm::host;
+pub use esl_vm::vm::Config;

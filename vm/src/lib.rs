@@ -12,10 +12,12 @@ pub mod task;
 pub mod value;
 pub mod vm;
 
+mod character;
 mod control;
 mod datum;
 mod describe;
 mod environment;
+mod equality;
 mod interp;
 mod load;
 mod number;

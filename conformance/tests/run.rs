@@ -1,0 +1,148 @@
+//! Runs every program of `programs/` and compares what it does with what its comments say.
+//!
+//! Each program is one test. It is compiled once; then it runs from the compiled module and from the bytes of the file that
+//! the module would be written to, under every setting that it does not exclude.
+#![allow(clippy::print_stderr, reason = "a runner of tests reports")]
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use esl::Config;
+use esl::host::VirtualHost;
+use esl::program::{self, Compiled, Program, Source};
+use esl_bytecode::diagnostic::Severity;
+use esl_conformance::{Expectations, Setting};
+use libtest_mimic::{Arguments, Failed, Trial};
+
+fn main() -> ExitCode {
+    let arguments = Arguments::from_args();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("programs");
+    let mut paths = Vec::new();
+    find_programs(&folder, &mut paths);
+    paths.sort();
+    let trials = paths.into_iter().map(|path| {
+        let name = path.strip_prefix(&folder).unwrap_or(&path).display().to_string();
+        Trial::test(name.clone(), move || check(&name, &path))
+    });
+    libtest_mimic::run(&arguments, trials.collect()).exit_code()
+}
+
+fn find_programs(folder: &Path, paths: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("the folder of programs is there") {
+        let path = entry.expect("the folder of programs can be read").path();
+        if path.is_dir() {
+            find_programs(&path, paths);
+        } else if path.extension().is_some_and(|extension| extension == "esl") {
+            paths.push(path);
+        }
+    }
+}
+
+fn check(name: &str, path: &Path) -> Result<(), Failed> {
+    let text = std::fs::read_to_string(path)?;
+    let expected = Expectations::parse(&text)?;
+    let compiled = program::compile(&[Source::new(name, text)]);
+    check_diagnostics(&expected, &compiled)?;
+    let Some(program) = compiled.program else { return Ok(()) };
+    let bytes = program.to_bytes()?;
+    let from_file = Program::from_bytes(&bytes)?;
+    for &setting in &expected.settings {
+        let config = config(&expected.options, setting)?;
+        for (form, program) in [("from source", &program), ("from bytecode", &from_file)] {
+            run(&expected, program, config.clone())
+                .map_err(|text| Failed::from(format!("{form}, setting {}:\n{text}", setting.name())))?;
+        }
+    }
+    Ok(())
+}
+
+fn check_diagnostics(expected: &Expectations, compiled: &Compiled) -> Result<(), Failed> {
+    let found = |severity: Severity| {
+        let mut rows: Vec<(usize, String)> = compiled
+            .diagnostics
+            .iter()
+            .filter(|diagnostic| diagnostic.severity == severity)
+            .map(|diagnostic| {
+                let place = compiled.sources.place(diagnostic.primary.span);
+                (place.map_or(0, |place| place.line as usize), diagnostic.code.to_string())
+            })
+            .collect();
+        rows.sort();
+        rows
+    };
+    let compare = |what: &str, expected: &[(usize, String)], found: Vec<(usize, String)>| {
+        let mut expected = expected.to_vec();
+        expected.sort();
+        if expected == found {
+            return Ok(());
+        }
+        let messages: Vec<String> =
+            compiled.diagnostics.iter().map(|found| format!("{}: {}", found.code, found.message)).collect();
+        Err(Failed::from(format!(
+            "{what} differ\nexpected {expected:?}\nfound    {found:?}\n{}",
+            messages.join("\n")
+        )))
+    };
+    compare("errors", &expected.errors, found(Severity::Error))?;
+    if expected.errors.is_empty() {
+        compare("warnings", &expected.warnings, found(Severity::Warning))?;
+    }
+    Ok(())
+}
+
+/// The configuration that a program's options and a setting ask for.
+fn config(options: &[String], setting: Setting) -> Result<Config, Failed> {
+    let mut config = Config::default();
+    for pair in options.chunks(2) {
+        let [option, value] = pair else { return Err(format!("`{}` needs a value", pair[0]).into()) };
+        match option.as_str() {
+            "--memory" => config.memory = esl::command::parse_size(value)?,
+            "--budget" => config.budget = Some(value.parse()?),
+            "--slice" => config.slice = value.parse()?,
+            "--seed" => config.seed = value.parse()?,
+            _ => return Err(format!("the option `{option}` is not known here").into()),
+        }
+    }
+    match setting {
+        Setting::Default => {}
+        Setting::Slice1 => config.slice = 1,
+        Setting::GcStress => config.collect_always = true,
+    }
+    Ok(config)
+}
+
+fn run(expected: &Expectations, program: &Program, config: Config) -> Result<(), String> {
+    let host = VirtualHost::new();
+    let captured = host.captured();
+    let report = program::run(program, config, Box::new(host))?;
+    let (output, errors) = (captured.output(), captured.error());
+    let lines: Vec<&str> = output.lines().map(str::trim_end).filter(|line| !line.is_empty()).collect();
+    if lines != expected.output {
+        let first = lines.iter().zip(&expected.output).position(|(found, expected)| found != expected);
+        let first = first.unwrap_or(lines.len().min(expected.output.len()));
+        return Err(format!(
+            "output differs from line {} on\nexpected {:?}\nfound    {:?}\nstandard error:\n{errors}",
+            first + 1,
+            expected.output.get(first..).unwrap_or(&[]),
+            &lines[first..],
+        ));
+    }
+    let status = report.ended.status();
+    if status != expected.expected_status() {
+        return Err(format!(
+            "ended with status {status} ({:?}), expected {}\nstandard error:\n{errors}",
+            report.ended,
+            expected.expected_status()
+        ));
+    }
+    if let Some((cause, line)) = &expected.failure {
+        let first = format!("Failure {cause}, no recovery available.");
+        if !errors.lines().any(|line| line == first) {
+            return Err(format!("expected the failure {cause}\nstandard error:\n{errors}"));
+        }
+        if !errors.contains(&format!(":{line}:")) {
+            return Err(format!("expected line {line} in the backtrace\nstandard error:\n{errors}"));
+        }
+    }
+    Ok(())
+}

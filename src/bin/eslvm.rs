@@ -1,0 +1,124 @@
+//! `eslvm`: runs ESL programs, and talks with people.
+#![forbid(unsafe_code)]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "commands print")]
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+use esl::Config;
+use esl::command::{self, Input, NOT_COMPILED, USAGE, complain};
+use esl::host::RealHost;
+use esl::program::{self, Ended, Program};
+use esl_compiler::diagnostic::{Format, Renderer};
+
+/// The virtual machine of ESL, the Execution Support Language.
+#[derive(Parser)]
+#[command(name = "eslvm", version, propagate_version = true, max_term_width = 100)]
+struct Command {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    /// Run a program
+    ///
+    /// Exit status: 0 success, or what the program asks for; 1 a failure left the main task; 2 wrong usage or an
+    /// unreadable file; 3 the program does not compile or is refused; 5 the budget or the memory is spent.
+    Run {
+        #[command(flatten)]
+        limits: Limits,
+        /// Print figures of the run to standard error when it is over
+        #[arg(long)]
+        stats: bool,
+        /// A source or bytecode file; `-` is a source from standard input
+        file: PathBuf,
+        /// Arguments of the program
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARG")]
+        arguments: Vec<String>,
+    },
+    /// Evaluate what is typed
+    Repl {
+        #[command(flatten)]
+        limits: Limits,
+    },
+}
+
+#[derive(Args)]
+struct Limits {
+    /// Choose another legal order of what the language leaves open
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Ticks that a task runs before the next one has its turn
+    #[arg(long, value_name = "TICKS", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
+    slice: u32,
+    /// End the run with status 5 after so many ticks
+    #[arg(long, value_name = "TICKS")]
+    budget: Option<u64>,
+    /// Limit of the memory for objects, such as 64M or 2G
+    #[arg(long, value_name = "SIZE", default_value = "1G", value_parser = command::parse_size)]
+    memory: usize,
+}
+
+impl Limits {
+    fn config(&self) -> Config {
+        Config {
+            memory: self.memory,
+            slice: self.slice,
+            budget: self.budget,
+            seed: self.seed,
+            ..Config::default()
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let status = match command::parse::<Command>().action {
+        Action::Run { limits, stats, file, arguments } => run(&file, arguments, &limits, stats),
+        Action::Repl { limits } => esl::repl::run(limits.config()),
+    };
+    ExitCode::from(status.unwrap_or_else(|status| status))
+}
+
+/// The program in a file, compiled if it is a source.
+fn program(file: &Path) -> Result<Program, u8> {
+    let source = match command::read_program(file)? {
+        Input::Program(program) => return Ok(program),
+        Input::Source(source) => source,
+    };
+    let compiled = program::compile(&[source]);
+    let color = std::io::stderr().is_terminal();
+    command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
+    compiled.program.ok_or(NOT_COMPILED)
+}
+
+fn run(file: &Path, arguments: Vec<String>, limits: &Limits, stats: bool) -> Result<u8, u8> {
+    let program = program(file)?;
+    let setup = |text| {
+        complain(text);
+        USAGE
+    };
+    let host = Box::new(RealHost::new(arguments));
+    let mut machine = program::machine(limits.config(), host).map_err(setup)?;
+    command::interrupt_on_signal(machine.interrupt_flag());
+    let started = std::time::Instant::now();
+    let report = program::run_in(&mut machine, &program).map_err(setup)?;
+    match report.ended {
+        Ended::BudgetSpent => complain(format_args!("the budget of {} ticks is spent", report.ticks)),
+        Ended::Deadlocked => complain("deadlock: every task waits for something that cannot come"),
+        Ended::Interrupted => complain("interrupted"),
+        _ => {}
+    }
+    if stats {
+        let heap = report.heap;
+        eprintln!("ticks         {:>14}", report.ticks);
+        eprintln!("seconds       {:>14.3}", started.elapsed().as_secs_f64());
+        eprintln!("allocated     {:>14} bytes", heap.allocated);
+        eprintln!("peak heap     {:>14} bytes", heap.peak);
+        eprintln!("collections   {:>14}", heap.cycles);
+        eprintln!("longest slice {:>14} objects", heap.longest_slice);
+    }
+    Ok(report.ended.status())
+}

@@ -1,0 +1,210 @@
+//! Values of programs as Rust sees them.
+
+use std::fmt;
+
+use esl_bytecode::BigInt;
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+
+/// A value that came from a program or goes to one.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Data {
+    /// `NIL`: false, and the empty list.
+    Nil,
+    /// `T`: true.
+    True,
+    /// An integer of 64 bits.
+    Integer(i64),
+    /// A larger integer, in decimal digits.
+    BigInteger(BigInt),
+    /// A ratio: numerator and denominator.
+    Ratio(BigInt, BigInt),
+    /// A double float.
+    Float(f64),
+    /// A character.
+    Character(char),
+    /// A string.
+    String(String),
+    /// A keyword, by its name: `:ON` is `Keyword("ON")`.
+    Keyword(String),
+    /// Another symbol, by its name.
+    Symbol(String),
+    /// A proper list, not empty.
+    List(Vec<Data>),
+    /// A list whose last `cdr` is not `NIL`: its elements, and that `cdr`.
+    DottedList(Vec<Data>, Box<Data>),
+    /// A vector.
+    Vector(Vec<Data>),
+}
+
+impl Data {
+    /// `T` or `NIL`.
+    pub fn boolean(value: bool) -> Data {
+        if value { Data::True } else { Data::Nil }
+    }
+
+    /// A list, which is `NIL` if there are no items.
+    pub fn list(items: impl IntoIterator<Item = Data>) -> Data {
+        let items: Vec<Data> = items.into_iter().collect();
+        if items.is_empty() { Data::Nil } else { Data::List(items) }
+    }
+
+    /// Whether it is anything but `NIL`.
+    pub fn is_true(&self) -> bool {
+        !matches!(self, Data::Nil)
+    }
+
+    /// The integer, if it is one of 64 bits.
+    pub fn as_integer(&self) -> Option<i64> {
+        match self {
+            Data::Integer(value) => Some(*value),
+            _ => None,
+        }
+    }
+
+    /// The number as a float, if it is a float or an integer of 64 bits.
+    pub fn as_float(&self) -> Option<f64> {
+        match self {
+            Data::Float(value) => Some(*value),
+            Data::Integer(value) => Some(*value as f64),
+            _ => None,
+        }
+    }
+
+    /// The string, if it is one.
+    pub fn as_str(&self) -> Option<&str> {
+        match self {
+            Data::String(value) => Some(value),
+            _ => None,
+        }
+    }
+
+    /// The elements, if it is a proper list; none for `NIL`.
+    pub fn as_list(&self) -> Option<&[Data]> {
+        match self {
+            Data::Nil => Some(&[]),
+            Data::List(items) => Some(items),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn to_datum(&self, package: &str) -> Datum {
+        let span = Span::default();
+        let list = |items: &[Data], tail: Datum| {
+            Datum::list_with_tail(items.iter().map(|item| item.to_datum(package)), tail, span)
+        };
+        let kind = match self {
+            Data::Nil => return Datum::nil(span),
+            Data::True => return Datum::symbol(Symbol::cl("T"), span),
+            Data::Integer(value) => DatumKind::Integer((*value).into()),
+            Data::BigInteger(value) => DatumKind::Integer(value.clone()),
+            Data::Ratio(numerator, denominator) => DatumKind::Ratio(numerator.clone(), denominator.clone()),
+            Data::Float(value) => DatumKind::Float(*value),
+            Data::Character(value) => DatumKind::Character(*value),
+            Data::String(value) => DatumKind::String(value.as_str().into()),
+            Data::Keyword(name) => DatumKind::Symbol(Symbol::keyword(name)),
+            Data::Symbol(name) => return Datum::symbol(Symbol::new(&package.into(), name), span),
+            Data::List(items) => return list(items, Datum::nil(span)),
+            Data::DottedList(items, tail) => return list(items, tail.to_datum(package)),
+            Data::Vector(items) => {
+                DatumKind::Vector(items.iter().map(|item| item.to_datum(package)).collect())
+            }
+        };
+        Datum::new(kind, span)
+    }
+
+    pub(crate) fn from_datum(datum: &Datum) -> Data {
+        match datum.kind() {
+            DatumKind::Nil => Data::Nil,
+            DatumKind::Symbol(symbol) if symbol.is_cl("T") => Data::True,
+            DatumKind::Symbol(symbol) if symbol.is_keyword() => Data::Keyword(symbol.name().into()),
+            DatumKind::Symbol(symbol) => Data::Symbol(symbol.name().into()),
+            DatumKind::Integer(value) => match i64::try_from(value) {
+                Ok(value) => Data::Integer(value),
+                Err(_) => Data::BigInteger(value.clone()),
+            },
+            DatumKind::Ratio(numerator, denominator) => Data::Ratio(numerator.clone(), denominator.clone()),
+            DatumKind::Float(value) => Data::Float(*value),
+            DatumKind::Character(value) => Data::Character(*value),
+            DatumKind::String(value) => Data::String(value.to_string()),
+            DatumKind::Vector(items) | DatumKind::Array(_, items) => {
+                Data::Vector(items.iter().map(Data::from_datum).collect())
+            }
+            DatumKind::Object(_) => Data::String(datum.to_string()),
+            DatumKind::Cons(..) => {
+                let mut elements = datum.elements();
+                let items: Vec<Data> = elements.by_ref().map(Data::from_datum).collect();
+                match elements.tail().kind() {
+                    DatumKind::Nil => Data::List(items),
+                    _ => Data::DottedList(items, Box::new(Data::from_datum(elements.tail()))),
+                }
+            }
+        }
+    }
+}
+
+impl fmt::Display for Data {
+    /// As the program would print it with `prin1`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sequence = |f: &mut fmt::Formatter<'_>, items: &[Data]| {
+            for (i, item) in items.iter().enumerate() {
+                if i > 0 {
+                    f.write_str(" ")?;
+                }
+                item.fmt(f)?;
+            }
+            Ok(())
+        };
+        match self {
+            Data::Nil => f.write_str("NIL"),
+            Data::True => f.write_str("T"),
+            Data::Integer(value) => value.fmt(f),
+            Data::BigInteger(value) => value.fmt(f),
+            Data::Ratio(numerator, denominator) => write!(f, "{numerator}/{denominator}"),
+            Data::Float(value) => write!(f, "{value:?}"),
+            Data::Character(value) => write!(f, "#\\{value}"),
+            Data::String(value) => write!(f, "\"{}\"", value.replace('\\', "\\\\").replace('"', "\\\"")),
+            Data::Keyword(name) => write!(f, ":{name}"),
+            Data::Symbol(name) => f.write_str(name),
+            Data::List(items) => {
+                f.write_str("(")?;
+                sequence(f, items)?;
+                f.write_str(")")
+            }
+            Data::DottedList(items, tail) => {
+                f.write_str("(")?;
+                sequence(f, items)?;
+                write!(f, " . {tail})")
+            }
+            Data::Vector(items) => {
+                f.write_str("#(")?;
+                sequence(f, items)?;
+                f.write_str(")")
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn data_survive_the_way_to_a_program_and_back() {
+        let data = Data::list([
+            Data::Nil,
+            Data::True,
+            Data::Integer(-5),
+            Data::Float(1.5),
+            Data::Character('x'),
+            Data::String("a \"b\"".into()),
+            Data::Keyword("ON".into()),
+            Data::Symbol("VALVE".into()),
+            Data::Vector(vec![Data::Integer(1)]),
+            Data::DottedList(vec![Data::Integer(1)], Box::new(Data::Integer(2))),
+        ]);
+        assert_eq!(Data::from_datum(&data.to_datum("ESL-USER")), data);
+        assert_eq!(data.to_string(), "(NIL T -5 1.5 #\\x \"a \\\"b\\\"\" :ON VALVE #(1) (1 . 2))");
+    }
+}

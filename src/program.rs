@@ -1,0 +1,201 @@
+//! Programs: compiling source files, keeping the result in a file, running it to its end.
+
+use std::sync::Arc;
+
+use esl_bytecode::compile::{Compile, drive};
+use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::module::Module;
+use esl_bytecode::verify::verify;
+use esl_bytecode::{disasm, file, link};
+use esl_compiler::diagnostic::Sources;
+use esl_compiler::session::Compiler;
+use esl_vm::host::{Host, RealHost};
+use esl_vm::run::RunOutcome;
+use esl_vm::task::TaskResult;
+use esl_vm::vm::{Config, Vm};
+
+/// A source text and what it is called in diagnostics and backtraces.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Its name: a path, or `<stdin>`.
+    pub name: String,
+    /// The text.
+    pub text: Arc<str>,
+}
+
+impl Source {
+    /// A source.
+    pub fn new(name: impl Into<String>, text: impl Into<Arc<str>>) -> Source {
+        Source { name: name.into(), text: text.into() }
+    }
+}
+
+/// A compiled program.
+#[derive(Clone, Debug)]
+pub struct Program {
+    module: Module,
+}
+
+/// What became of a compilation.
+#[derive(Debug)]
+pub struct Compiled {
+    /// The program, unless there was an error.
+    pub program: Option<Program>,
+    /// Everything that was found, in the order of the text.
+    pub diagnostics: Vec<Diagnostic>,
+    /// The sources that the diagnostics speak of.
+    pub sources: Sources,
+}
+
+impl Compiled {
+    /// Whether an error was found.
+    pub fn has_errors(&self) -> bool {
+        self.diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error)
+    }
+}
+
+/// The ticks that a macro, or another part of the program that runs at compile time, may take.
+const COMPILE_TIME_CONFIG: Config = Config {
+    memory: 1 << 30,
+    stack: 1 << 16,
+    slice: 2000,
+    budget: None,
+    seed: 0,
+    collect_always: false,
+};
+
+/// Compiles sources to one program that runs them in order.
+///
+/// Macros run in a machine of their own, and what they define is gone when the compilation is over.
+pub fn compile(sources: &[Source]) -> Compiled {
+    let mut table = Sources::new();
+    let mut diagnostics = Vec::new();
+    let mut modules = Vec::new();
+    let mut machine = match machine(COMPILE_TIME_CONFIG, Box::new(RealHost::new(Vec::new()))) {
+        Ok(machine) => machine,
+        Err(text) => {
+            let diagnostic = Diagnostic::error("macro-failed", text, Default::default());
+            return Compiled { program: None, diagnostics: vec![diagnostic], sources: table };
+        }
+    };
+    for source in sources {
+        let id = table.add(source.name.clone(), Some(source.text.clone()));
+        let compiler = Compiler::for_source(id);
+        let mut compilation = compiler.compile_text(&source.name, &source.text);
+        let (module, mut found) = drive(&mut *compilation, &mut machine);
+        diagnostics.append(&mut found);
+        modules.extend(module);
+    }
+    let is_complete = modules.len() == sources.len();
+    let program = is_complete.then(|| Program { module: link::link(modules) });
+    Compiled { program, diagnostics, sources: table }
+}
+
+impl Program {
+    /// Reads a program from the bytes of an `.eslb` file, and verifies it.
+    ///
+    /// # Errors
+    /// A text that says what is wrong and what to do.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Program, String> {
+        let module = file::read(bytes).map_err(|error| error.to_string())?;
+        verify(&module).map_err(|error| error.to_string())?;
+        Ok(Program { module })
+    }
+
+    /// The bytes of an `.eslb` file.
+    ///
+    /// # Errors
+    /// A text, if the program contains what cannot be written to a file.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, String> {
+        file::write(&self.module).map_err(|error| error.to_string())
+    }
+
+    /// The program as text, instruction by instruction.
+    pub fn disassemble(&self) -> String {
+        disasm::module(&self.module)
+    }
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// The program has come to its end, or has asked to end with this status.
+    Normally(u8),
+    /// A failure left the main task.
+    Failed,
+    /// A failure for want of memory left the main task.
+    HeapExhausted,
+    /// The budget of the run is spent.
+    BudgetSpent,
+    /// Everything waits for something that cannot come.
+    Deadlocked,
+    /// It was interrupted from outside.
+    Interrupted,
+}
+
+impl Ended {
+    /// The exit status of the command that ran it.
+    pub fn status(self) -> u8 {
+        match self {
+            Ended::Normally(status) => status,
+            Ended::Failed => 1,
+            Ended::Deadlocked => 4,
+            Ended::BudgetSpent | Ended::HeapExhausted => 5,
+            // As a shell reports a command that was ended by a signal.
+            Ended::Interrupted => 130,
+        }
+    }
+}
+
+/// What a run has done, beside its effects.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// How it ended.
+    pub ended: Ended,
+    /// Ticks that it took.
+    pub ticks: u64,
+    /// Figures of its heap.
+    pub heap: esl_vm::heap::HeapStats,
+}
+
+/// A machine with the library, and with a compiler for `eval` and `load`.
+///
+/// # Errors
+/// A text, if the limit of memory leaves no room for the library.
+pub fn machine(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, String> {
+    let no_room = |_| "the memory limit leaves no room for the library".to_string();
+    let mut machine = Vm::new(config, host).map_err(no_room)?;
+    machine.set_compiler(Box::new(Compiler::default()));
+    esl_stdlib::load(&mut machine)?;
+    Ok(machine)
+}
+
+/// Runs a program to its end.
+///
+/// # Errors
+/// A text, if the program could not be begun: no room for it, or damaged.
+pub fn run(program: &Program, config: Config, host: Box<dyn Host + Send>) -> Result<Report, String> {
+    let mut machine = machine(config, host)?;
+    run_in(&mut machine, program)
+}
+
+/// Runs a program in a machine that has the library.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Report, String> {
+    let functions = machine.load_module(&program.module).map_err(|error| error.to_string())?;
+    let main = machine.spawn_library("%RUN-TOPLEVEL", &[functions])?;
+    machine.set_interruptible(Some(main));
+    let outcome = machine.run(u64::MAX);
+    machine.flush();
+    let ended = match (outcome, machine.result(main)) {
+        (RunOutcome::BudgetSpent, _) => Ended::BudgetSpent,
+        (RunOutcome::Waiting, _) => Ended::Deadlocked,
+        (_, TaskResult::Failed(condition)) if machine.is_heap_exhausted(condition) => Ended::HeapExhausted,
+        (_, TaskResult::Failed(_)) => Ended::Failed,
+        (_, TaskResult::Aborted) if machine.exit_status().is_none() => Ended::Interrupted,
+        _ => Ended::Normally(machine.exit_status().unwrap_or(0)),
+    };
+    Ok(Report { ended, ticks: machine.ticks(), heap: machine.heap_stats() })
+}

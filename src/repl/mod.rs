@@ -1,0 +1,205 @@
+//! The REPL: reads forms, has them evaluated in a machine that lasts, prints their values.
+//!
+//! Lines are gathered until they hold a whole form. With a terminal there are line editing, history and completion; from a
+//! pipe forms are read alike and nothing but results is written. Reading, evaluating and printing are functions of the
+//! library; here is only what has to do with lines.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "the REPL talks with people")]
+
+mod editor;
+
+use std::io::{BufRead, IsTerminal, Write};
+
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_vm::host::RealHost;
+use esl_vm::task::TaskResult;
+use esl_vm::value::Value;
+use esl_vm::vm::{Config, Vm};
+
+use crate::command::{SUCCESS, USAGE, complain, interrupt_on_signal};
+use crate::program;
+
+/// The prompt, and the one for further lines of a form.
+const PROMPT: &str = "? ";
+const CONTINUATION: &str = "  ";
+
+/// Where lines come from.
+trait Lines {
+    /// The next line, without its newline; `None` at the end.
+    fn next(&mut self, prompt: &str) -> Line;
+    /// Notes a whole form for the history.
+    fn remember(&mut self, form: &str);
+}
+
+/// What reading a line gave.
+enum Line {
+    /// A line.
+    Text(String),
+    /// The person wants to drop what was typed so far.
+    Dropped,
+    /// There are no more lines.
+    End,
+    /// Reading failed.
+    Failed(String),
+}
+
+/// Lines from a pipe or a file.
+struct Pipe;
+
+impl Lines for Pipe {
+    fn next(&mut self, _prompt: &str) -> Line {
+        let mut line = String::new();
+        match std::io::stdin().lock().read_line(&mut line) {
+            Ok(0) => Line::End,
+            Ok(_) => Line::Text(line.trim_end_matches(['\n', '\r']).to_string()),
+            Err(error) => Line::Failed(error.to_string()),
+        }
+    }
+
+    fn remember(&mut self, _form: &str) {}
+}
+
+/// Runs the REPL until the end of the input or `:quit`. Gives the exit status.
+///
+/// # Errors
+/// The exit status, if the machine could not be made.
+pub fn run(config: Config) -> Result<u8, u8> {
+    let host = Box::new(RealHost::new(Vec::new()));
+    let machine = program::machine(config, host).map_err(|text| {
+        complain(text);
+        USAGE
+    })?;
+    let mut session = Session { machine };
+    interrupt_on_signal(session.machine.interrupt_flag());
+    if std::io::stdin().is_terminal() {
+        let mut editor = editor::Editor::new();
+        session.talk(&mut editor)
+    } else {
+        session.talk(&mut Pipe)
+    }
+}
+
+struct Session {
+    machine: Vm,
+}
+
+/// What is to be done after a form.
+enum Next {
+    /// Read the next one.
+    Form,
+    /// The text is the beginning of a form.
+    More,
+    /// End with this status.
+    Quit(u8),
+}
+
+impl Session {
+    fn talk(&mut self, lines: &mut dyn Lines) -> Result<u8, u8> {
+        let mut text = String::new();
+        loop {
+            let prompt = if text.is_empty() { PROMPT } else { CONTINUATION };
+            match lines.next(prompt) {
+                Line::Text(line) if text.is_empty() && line.trim_start().starts_with(':') && is_command(&line) => {
+                    if let Next::Quit(status) = self.command(line.trim()) {
+                        return Ok(status);
+                    }
+                    lines.remember(&line);
+                }
+                Line::Text(line) => {
+                    text.push_str(&line);
+                    text.push('\n');
+                    match self.evaluate(&text) {
+                        Next::More => {}
+                        Next::Form => lines.remember(std::mem::take(&mut text).trim_end()),
+                        Next::Quit(status) => return Ok(status),
+                    }
+                }
+                Line::Dropped => text.clear(),
+                Line::End => {
+                    if !text.trim().is_empty() {
+                        // The rest is no whole form: say so.
+                        self.call("%REPL-INCOMPLETE", &text);
+                        return Ok(crate::command::NOT_COMPILED);
+                    }
+                    self.machine.flush();
+                    return Ok(SUCCESS);
+                }
+                Line::Failed(reason) => {
+                    complain(format_args!("standard input cannot be read: {reason}"));
+                    return Err(USAGE);
+                }
+            }
+        }
+    }
+
+    /// Evaluates the forms of a text and prints their values, unless the last form is incomplete.
+    fn evaluate(&mut self, text: &str) -> Next {
+        match self.call("%REPL-EVALUATE", text) {
+            Some(value) => match self.machine.export(value).ok().as_ref().map(Datum::kind) {
+                Some(DatumKind::Symbol(symbol)) if symbol.name() == "MORE" => Next::More,
+                _ => self.next(),
+            },
+            None => self.next(),
+        }
+    }
+
+    /// What follows an evaluation: the next form, unless the program has asked for the end.
+    fn next(&self) -> Next {
+        self.machine.exit_status().map_or(Next::Form, Next::Quit)
+    }
+
+    fn command(&mut self, line: &str) -> Next {
+        let (command, argument) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        match command {
+            ":quit" | ":exit" => {
+                self.machine.flush();
+                return Next::Quit(SUCCESS);
+            }
+            ":load" => drop(self.call("%REPL-LOAD", argument.trim())),
+            ":bt" => drop(self.call("%REPL-BACKTRACE", "")),
+            _ => print!("{HELP}"),
+        }
+        self.next()
+    }
+
+    /// Calls a function of the library with a text, in a task that Ctrl-C aborts. `None` if it did not return.
+    fn call(&mut self, function: &str, text: &str) -> Option<Value> {
+        let text = self.machine.import(&Datum::string(text, Default::default())).ok()?;
+        let task = match self.machine.spawn_library(function, &[text]) {
+            Ok(task) => task,
+            Err(text) => {
+                complain(text);
+                return None;
+            }
+        };
+        self.machine.set_interruptible(Some(task));
+        self.machine.run(u64::MAX);
+        self.machine.set_interruptible(None);
+        let result = self.machine.result(task);
+        self.machine.forget(task);
+        self.machine.flush();
+        match result {
+            TaskResult::Succeeded(values) => values.first().copied(),
+            _ => {
+                if self.machine.exit_status().is_none() {
+                    println!("Aborted");
+                }
+                // What could not be written will be missed when the next value is.
+                _ = std::io::stdout().flush();
+                None
+            }
+        }
+    }
+}
+
+/// Whether a line that begins with a colon is a command of the REPL, not a keyword to be evaluated.
+fn is_command(line: &str) -> bool {
+    let word = line.split_whitespace().next().unwrap_or("");
+    matches!(word, ":quit" | ":exit" | ":load" | ":bt" | ":help")
+}
+
+const HELP: &str = "\
+:load FILE   evaluate the forms of a file
+:bt          show where the last failure came from
+:help        this list; (help 'name) says what a function does
+:quit        end
+";
