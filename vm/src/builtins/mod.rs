@@ -20,6 +20,9 @@ use crate::vm::Vm;
 /// Units of work (list cells, elements, nodes) that one call of a builtin may do.
 pub const LIMIT: usize = 4096;
 
+/// Elements that one call of a builtin may copy where that is little more than copying memory.
+pub(crate) const COPY_LIMIT: usize = 1 << 17;
+
 /// A function that is written in Rust. The number of arguments has been checked against the table.
 pub type Native = fn(&mut Vm, &[Value]) -> Outcome;
 
@@ -67,16 +70,77 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::Arrayp => types::arrayp,
         Builtin::Functionp => types::functionp,
         Builtin::HashTablep => types::hash_table_p,
+        Builtin::Add => number::add,
+        Builtin::Subtract => number::subtract,
+        Builtin::Multiply => number::multiply,
+        Builtin::Divide => number::divide,
+        Builtin::Increment => number::increment,
+        Builtin::Decrement => number::decrement,
+        Builtin::Floor => number::floor,
+        Builtin::Ceiling => number::ceiling,
+        Builtin::Truncate => number::truncate,
+        Builtin::Round => number::round,
+        Builtin::Mod => number::modulo,
+        Builtin::Rem => number::remainder,
+        Builtin::LogAnd => integer::logand,
+        Builtin::LogIor => integer::logior,
+        Builtin::LogXor => integer::logxor,
+        Builtin::Ash => integer::ash,
+        Builtin::NumEqual => number::num_equal,
+        Builtin::NumNotEqual => number::num_not_equal,
+        Builtin::Less => number::less,
+        Builtin::LessEqual => number::less_equal,
+        Builtin::Greater => number::greater,
+        Builtin::GreaterEqual => number::greater_equal,
+        Builtin::Zerop => number::zerop,
+        Builtin::Plusp => number::plusp,
+        Builtin::Minusp => number::minusp,
+
+        Builtin::Cons => list::cons,
+        Builtin::Car => list::car,
+        Builtin::Cdr => list::cdr,
+        Builtin::Cadr => list::cadr,
+        Builtin::Cddr => list::cddr,
+        Builtin::First => list::car,
+        Builtin::Rest => list::cdr,
+        Builtin::Second => list::cadr,
+        Builtin::Rplaca => list::rplaca,
+        Builtin::Rplacd => list::rplacd,
+        Builtin::SetCar => list::set_car,
+        Builtin::SetCdr => list::set_cdr,
+        Builtin::List => list::list,
+        Builtin::ListStar => list::list_star,
+        Builtin::Append => list::append,
+
+        Builtin::Vector => array::vector,
+        Builtin::Svref => array::svref,
+        Builtin::SetSvref => array::set_svref,
+        Builtin::Aref => array::aref,
+        Builtin::SetAref => array::set_aref,
+
+        Builtin::SlotOf => structure::slot,
+        Builtin::SetSlotOf => structure::set_slot,
+        Builtin::IsInstance => structure::is_instance,
         Builtin::ControlHeight => control::control_height,
         Builtin::NextHandler => control::next_handler,
         Builtin::TakeCase => control::take_case,
         Builtin::EndTask => control::end_task,
         Builtin::Exit => control::exit,
         Builtin::Backtrace => control::backtrace,
+        Builtin::CallHost => crate::embed::call_host,
     }
 }
 
+pub(crate) mod array;
 mod control;
 mod define;
+mod expect;
+mod float;
+mod integer;
+mod list;
+mod lookup;
+mod number;
+mod sequence;
 mod stream;
+mod structure;
 pub(crate) mod types;

@@ -10,7 +10,33 @@ use crate::vm::Vm;
 
 /// `(= a b)`.
 pub(crate) fn num_equal(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
-    Ok(compare(vm, "=", a, b, "NUMBER")? == Some(Ordering::Equal))
+    for v in [a, b] {
+        if !super::is_number(&vm.heap, v) {
+            return vm.type_error(v, "NUMBER");
+        }
+    }
+    Ok(same_value(&vm.heap, a, b))
+}
+
+/// Whether both are numbers of one value, whatever their types.
+pub(crate) fn same_value(heap: &Heap, a: Value, b: Value) -> bool {
+    if let (Some(x), Some(y)) = (heap.as_double(a), heap.as_double(b)) {
+        return x == y;
+    }
+    if eql(heap, a, b) {
+        return super::is_number(heap, a);
+    }
+    // Of one type, rationals have one representation; so one of them must be a double.
+    let (x, other) = match (heap.as_double(a), heap.as_double(b)) {
+        (Some(x), None) => (x, b),
+        (None, Some(x)) => (x, a),
+        _ => return false,
+    };
+    match Number::of(heap, other) {
+        Some(Number::Int(n)) => float_and_int(x, &n) == Some(Ordering::Equal),
+        Some(Number::Ratio(r)) => x.is_finite() && float::rational(x) == r,
+        _ => false,
+    }
 }
 
 /// `(< a b)`.

@@ -22,8 +22,8 @@ use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
-pub(crate) use arithmetic::{add, divide, multiply, negate, subtract};
-pub(crate) use compare::{eql, less, less_or_equal, num_equal, sign};
+pub(crate) use arithmetic::{add, check_gcd, divide, multiply, negate, subtract};
+pub(crate) use compare::{eql, less, less_or_equal, num_equal, same_value, sign};
 pub(crate) use integer::Int;
 pub(crate) use ratio::Ratio;
 pub(crate) use rounding::{Rounding, modulo, quotient, remainder};

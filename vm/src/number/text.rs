@@ -162,7 +162,7 @@ pub(crate) enum Parsed {
 pub(crate) fn parse_integer(characters: &[u32], start: usize, radix: u32) -> Parsed {
     let character = |at: usize| characters.get(at).copied().and_then(char::from_u32);
     let mut at = start;
-    while character(at).is_some_and(is_blank) {
+    while characters.get(at).copied().is_some_and(is_blank) {
         at += 1;
     }
     let is_negative = character(at) == Some('-');
@@ -196,6 +196,6 @@ pub(crate) fn parse_integer(characters: &[u32], start: usize, radix: u32) -> Par
 }
 
 /// What `parse-integer` skips.
-pub(crate) fn is_blank(c: char) -> bool {
-    matches!(c, ' ' | '\t' | '\n' | '\r' | '\x0c' | '\x0b' | '\u{8}' | '\u{a0}')
+pub(crate) fn is_blank(code: u32) -> bool {
+    matches!(code, 0x20 | 0x08..=0x0D | 0xA0)
 }

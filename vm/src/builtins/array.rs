@@ -1,0 +1,477 @@
+//! Arrays: how their elements are reached, whatever keeps them, and everything about dimensions and fill pointers.
+//!
+//! A simple vector, a string and a row of bytes are arrays of rank 1 by themselves; every other array is a record over
+//! one of these. What keeps the elements decides what they may be: any value, characters, or integers below 256.
+
+use smallvec::{SmallVec, smallvec};
+
+use crate::heap::layout::Array;
+use crate::heap::{Heap, Kind};
+use crate::raise::{Exit, Outcome, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+
+use super::COPY_LIMIT;
+
+/// The elements of an array.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Elements<'a> {
+    /// Any values.
+    Values(&'a [Value]),
+    /// Code points.
+    Characters(&'a [u32]),
+    /// Integers below 256.
+    Bytes(&'a [u8]),
+}
+
+impl<'a> Elements<'a> {
+    /// The elements in `data`, which an array may have or be.
+    fn of_data(heap: &'a Heap, data: Value) -> Option<Elements<'a>> {
+        Some(match heap.kind(data)? {
+            Kind::SimpleVector => Elements::Values(heap.vector(data)?),
+            Kind::String => Elements::Characters(heap.string(data)?),
+            Kind::Bytes => Elements::Bytes(heap.bytes(data)?),
+            _ => return None,
+        })
+    }
+
+    /// Their number.
+    pub(crate) fn len(self) -> usize {
+        match self {
+            Elements::Values(values) => values.len(),
+            Elements::Characters(characters) => characters.len(),
+            Elements::Bytes(bytes) => bytes.len(),
+        }
+    }
+
+    /// The element at `index`.
+    pub(crate) fn get(self, index: usize) -> Option<Value> {
+        match self {
+            Elements::Values(values) => values.get(index).copied(),
+            Elements::Characters(characters) => Value::character(*characters.get(index)?),
+            Elements::Bytes(bytes) => bytes.get(index).map(|&byte| Value::small(i32::from(byte))),
+        }
+    }
+
+    /// Those from `start` to before `end`, which are in order and in range.
+    pub(crate) fn part(self, start: usize, end: usize) -> Elements<'a> {
+        match self {
+            Elements::Values(values) => Elements::Values(&values[start..end]),
+            Elements::Characters(characters) => Elements::Characters(&characters[start..end]),
+            Elements::Bytes(bytes) => Elements::Bytes(&bytes[start..end]),
+        }
+    }
+}
+
+/// What keeps the elements of an array: the array itself if it is simple.
+pub(crate) fn data_of(heap: &Heap, array: Value) -> Option<Value> {
+    match heap.kind(array)? {
+        Kind::SimpleVector | Kind::String | Kind::Bytes => Some(array),
+        Kind::Array => heap.array(array).map(|array| array.data),
+        _ => None,
+    }
+}
+
+/// All elements of an array, those behind a fill pointer too.
+pub(crate) fn all_elements(heap: &Heap, array: Value) -> Option<Elements<'_>> {
+    let elements = Elements::of_data(heap, data_of(heap, array)?)?;
+    let size = total_size(heap, array)?.min(elements.len());
+    Some(elements.part(0, size))
+}
+
+/// The elements of a vector, up to its fill pointer.
+pub(crate) fn vector_elements(heap: &Heap, vector: Value) -> Option<Elements<'_>> {
+    let elements = all_elements(heap, vector)?;
+    match heap.array(vector) {
+        None => Some(elements),
+        Some(array) if array.header.aux == 1 => {
+            let length = array.fill.as_index().unwrap_or(usize::MAX).min(elements.len());
+            Some(elements.part(0, length))
+        }
+        Some(_) => None,
+    }
+}
+
+/// Number of elements of a vector, up to its fill pointer.
+pub(crate) fn vector_length(heap: &Heap, vector: Value) -> Option<usize> {
+    vector_elements(heap, vector).map(Elements::len)
+}
+
+/// Product of the dimensions.
+pub(crate) fn total_size(heap: &Heap, array: Value) -> Option<usize> {
+    match heap.array_dimensions(array) {
+        Some(dimensions) => {
+            dimensions.iter().try_fold(1usize, |size, v| size.checked_mul(v.as_index().unwrap_or(0)))
+        }
+        None => Elements::of_data(heap, array).map(Elements::len),
+    }
+}
+
+/// The dimensions, as counts.
+fn dimensions(heap: &Heap, array: Value) -> Option<SmallVec<[usize; 4]>> {
+    match heap.array_dimensions(array) {
+        Some(dimensions) => Some(dimensions.iter().map(|v| v.as_index().unwrap_or(0)).collect()),
+        None => total_size(heap, array).map(|size| smallvec![size]),
+    }
+}
+
+impl Vm {
+    /// What may be put in an array over `data`: the code or byte of `value` where it is not any value.
+    pub(crate) fn check_element(&mut self, data: Value, value: Value) -> Result<(), Exit> {
+        match self.heap.kind(data) {
+            Some(Kind::String) if !value.is_character() => self.type_error(value, "CHARACTER"),
+            Some(Kind::Bytes) if value.as_index().is_none_or(|byte| byte > 255) => {
+                self.specifier_error(value, "(UNSIGNED-BYTE 8)")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Stores an element of what keeps the elements of an array. `value` has been checked, and `index` is in range.
+    pub(crate) fn store_element(&mut self, data: Value, index: usize, value: Value) {
+        if self.heap.vector_set(data, index, value).is_some() {
+            return;
+        }
+        if let Some(code) = value.as_character()
+            && let Some(slot) = self.heap.string_mut(data).and_then(|characters| characters.get_mut(index))
+        {
+            *slot = code;
+        } else if let Some(byte) = value.as_index()
+            && let Some(slot) = self.heap.bytes_mut(data).and_then(|bytes| bytes.get_mut(index))
+        {
+            *slot = byte as u8;
+        }
+    }
+
+    /// Where the subscripts point, in row-major order.
+    fn row_major_index(&mut self, array: Value, subscripts: &[Value]) -> Result<usize, Exit> {
+        let Some(dimensions) = dimensions(&self.heap, array) else {
+            return self.type_error(array, "ARRAY");
+        };
+        if dimensions.len() != subscripts.len() {
+            return self.raise(Raised::Simple(format!(
+                "wrong number of subscripts, {}, for an array of rank {}",
+                subscripts.len(),
+                dimensions.len()
+            )));
+        }
+        let mut index = 0;
+        for (&subscript, &dimension) in subscripts.iter().zip(&dimensions) {
+            index = index * dimension + self.index_below(subscript, dimension)?;
+        }
+        Ok(index)
+    }
+
+    fn element(&mut self, array: Value, index: usize) -> Outcome {
+        match all_elements(&self.heap, array).and_then(|elements| elements.get(index)) {
+            Some(value) => Ok(value),
+            None => self.index_error(Value::index(index), total_size(&self.heap, array).unwrap_or(0)),
+        }
+    }
+
+    fn set_element(&mut self, array: Value, index: usize, value: Value) -> Outcome {
+        let Some(data) = data_of(&self.heap, array) else { return self.type_error(array, "ARRAY") };
+        self.check_element(data, value)?;
+        self.store_element(data, index, value);
+        Ok(value)
+    }
+
+    /// The array with a fill pointer that `v` is, and its fill pointer.
+    fn with_fill_pointer(&mut self, v: Value) -> Result<(Array, usize), Exit> {
+        match self.heap.array(v) {
+            Some(&array) if let Some(fill) = array.fill.as_index() => Ok((array, fill)),
+            _ => self.specifier_error(v, "(AND VECTOR (SATISFIES ARRAY-HAS-FILL-POINTER-P))"),
+        }
+    }
+}
+
+/// `vector`
+pub(super) fn vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.charge(arguments.len());
+    Ok(vm.heap.alloc_vector(arguments)?)
+}
+
+/// `svref`
+pub(super) fn svref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(elements) = vm.heap.vector(arguments[0]) else {
+        return vm.type_error(arguments[0], "SIMPLE-VECTOR");
+    };
+    match arguments[1].as_index().and_then(|index| elements.get(index)) {
+        Some(&value) => Ok(value),
+        None => {
+            let length = elements.len();
+            vm.index_error(arguments[1], length)
+        }
+    }
+}
+
+/// `%set-svref`
+pub(super) fn set_svref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[vector, index, value] = arguments else { unreachable!("the table says three") };
+    let Some(length) = vm.heap.vector(vector).map(<[Value]>::len) else {
+        return vm.type_error(vector, "SIMPLE-VECTOR");
+    };
+    let index = vm.index_below(index, length)?;
+    vm.heap.vector_set(vector, index, value);
+    Ok(value)
+}
+
+/// `aref`
+pub(super) fn aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    if let [array, index] = *arguments
+        && let Some(index) = index.as_index()
+        && let Some(elements) = Elements::of_data(&vm.heap, array)
+        && let Some(value) = elements.get(index)
+    {
+        return Ok(value);
+    }
+    let index = vm.row_major_index(arguments[0], &arguments[1..])?;
+    vm.element(arguments[0], index)
+}
+
+/// `%set-aref`
+pub(super) fn set_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [array, subscripts @ .., value] = arguments else {
+        return vm.program_error("a value and subscripts are expected");
+    };
+    let index = vm.row_major_index(*array, subscripts)?;
+    vm.set_element(*array, index, *value)
+}
+
+/// `row-major-aref`
+pub(super) fn row_major_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let size = array_size(vm, arguments[0])?;
+    let index = vm.index_below(arguments[1], size)?;
+    vm.element(arguments[0], index)
+}
+
+/// `%set-row-major-aref`
+pub(super) fn set_row_major_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let size = array_size(vm, arguments[0])?;
+    let index = vm.index_below(arguments[1], size)?;
+    vm.set_element(arguments[0], index, arguments[2])
+}
+
+/// `array-row-major-index`
+pub(super) fn array_row_major_index(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.row_major_index(arguments[0], &arguments[1..]).map(Value::index)
+}
+
+/// `array-in-bounds-p`
+pub(super) fn array_in_bounds_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(dimensions) = dimensions(&vm.heap, arguments[0]) else {
+        return vm.type_error(arguments[0], "ARRAY");
+    };
+    let subscripts = &arguments[1..];
+    if dimensions.len() != subscripts.len() {
+        return vm.row_major_index(arguments[0], subscripts).map(|_| Value::NIL);
+    }
+    for &subscript in subscripts {
+        vm.integer(subscript)?;
+    }
+    let is_below = |(v, &dimension): (&Value, &usize)| v.as_index().is_some_and(|index| index < dimension);
+    Ok(subscripts.iter().zip(&dimensions).all(is_below).into())
+}
+
+fn array_size(vm: &mut Vm, array: Value) -> Result<usize, Exit> {
+    match total_size(&vm.heap, array) {
+        Some(size) => Ok(size),
+        None => vm.type_error(array, "ARRAY"),
+    }
+}
+
+/// `array-total-size`
+pub(super) fn array_total_size(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    array_size(vm, arguments[0]).map(Value::index)
+}
+
+/// `array-rank`
+pub(super) fn array_rank(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match dimensions(&vm.heap, arguments[0]) {
+        Some(dimensions) => Ok(Value::index(dimensions.len())),
+        None => vm.type_error(arguments[0], "ARRAY"),
+    }
+}
+
+/// `array-dimensions`
+pub(super) fn array_dimensions(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match dimensions(&vm.heap, arguments[0]) {
+        Some(dimensions) => {
+            let dimensions: Vec<Value> = dimensions.into_iter().map(Value::index).collect();
+            Ok(vm.heap.list(&dimensions)?)
+        }
+        None => vm.type_error(arguments[0], "ARRAY"),
+    }
+}
+
+/// `array-dimension`
+pub(super) fn array_dimension(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match dimensions(&vm.heap, arguments[0]) {
+        Some(dimensions) => {
+            let axis = vm.index_below(arguments[1], dimensions.len())?;
+            Ok(Value::index(dimensions[axis]))
+        }
+        None => vm.type_error(arguments[0], "ARRAY"),
+    }
+}
+
+/// `array-has-fill-pointer-p`
+pub(super) fn array_has_fill_pointer_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    array_size(vm, arguments[0])?;
+    Ok(vm.heap.array(arguments[0]).is_some_and(|array| array.fill.is_fixnum()).into())
+}
+
+/// `adjustable-array-p`
+pub(super) fn adjustable_array_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    array_size(vm, arguments[0])?;
+    let flags = vm.heap.flags(arguments[0], Kind::Array).unwrap_or(0);
+    Ok((flags & Array::ADJUSTABLE != 0).into())
+}
+
+/// `%array-data`
+pub(super) fn array_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match data_of(&vm.heap, arguments[0]) {
+        Some(data) => Ok(data),
+        None => vm.type_error(arguments[0], "ARRAY"),
+    }
+}
+
+/// `fill-pointer`
+pub(super) fn fill_pointer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.with_fill_pointer(arguments[0]).map(|(_, fill)| Value::index(fill))
+}
+
+/// `%set-fill-pointer`
+pub(super) fn set_fill_pointer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.with_fill_pointer(arguments[0])?;
+    let size = array_size(vm, arguments[0])?;
+    let fill = vm.index_below(arguments[1], size + 1)?;
+    vm.heap.array_set_fill(arguments[0], Value::index(fill));
+    Ok(arguments[1])
+}
+
+/// `vector-push`
+pub(super) fn vector_push(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[value, vector] = arguments else { unreachable!("the table says two") };
+    let (array, fill) = vm.with_fill_pointer(vector)?;
+    if fill >= array_size(vm, vector)? {
+        return Ok(Value::NIL);
+    }
+    vm.check_element(array.data, value)?;
+    vm.store_element(array.data, fill, value);
+    vm.heap.array_set_fill(vector, Value::index(fill + 1));
+    Ok(Value::index(fill))
+}
+
+/// `vector-push-extend`
+pub(super) fn vector_push_extend(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (value, vector) = (arguments[0], arguments[1]);
+    let (array, fill) = vm.with_fill_pointer(vector)?;
+    let size = array_size(vm, vector)?;
+    if fill < size {
+        return vector_push(vm, &arguments[..2]);
+    }
+    vm.check_element(array.data, value)?;
+    // As SBCL: twice the size, unless the caller says by how much at least.
+    let extension = match arguments.get(2) {
+        Some(&extension) => match extension.as_index() {
+            Some(extension) if extension > 0 => extension,
+            _ => return vm.specifier_error(extension, "(INTEGER 1)"),
+        },
+        None => size.max(1),
+    };
+    let data = extended(vm, array.data, size.saturating_add(extension))?;
+    vm.heap.array_set_data(vector, data);
+    vm.heap.array_set_dimension(vector, 0, Value::index(size + extension));
+    vm.store_element(data, fill, value);
+    vm.heap.array_set_fill(vector, Value::index(fill + 1));
+    Ok(Value::index(fill))
+}
+
+/// A copy of `data` with room for `size` elements, the new ones zero, `NUL` or `0`.
+fn extended(vm: &mut Vm, data: Value, size: usize) -> Outcome {
+    let length = Elements::of_data(&vm.heap, data).map_or(0, Elements::len);
+    if length > COPY_LIMIT {
+        return Err(Exit::Slowly);
+    }
+    let new = match vm.heap.kind(data) {
+        Some(Kind::String) => vm.heap.alloc_string_filled(size, 0)?,
+        Some(Kind::Bytes) => vm.heap.alloc_bytes_filled(size, 0)?,
+        _ => vm.heap.alloc_vector_filled(size, Value::small(0))?,
+    };
+    vm.charge(size);
+    vm.copy_elements(data, 0, new, 0, length)?;
+    Ok(new)
+}
+
+/// `vector-pop`
+pub(super) fn vector_pop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (_, fill) = vm.with_fill_pointer(arguments[0])?;
+    let Some(last) = fill.checked_sub(1) else {
+        return vm.raise(Raised::Simple("there is nothing left to pop".into()));
+    };
+    let value = vm.element(arguments[0], last)?;
+    vm.heap.array_set_fill(arguments[0], Value::index(last));
+    Ok(value)
+}
+
+/// `%make-vector`
+pub(super) fn make_vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let size = vm.count(arguments[0])?;
+    let vector = vm.heap.alloc_vector_filled(size, arguments[1])?;
+    vm.charge(size);
+    Ok(vector)
+}
+
+/// `%make-array`: an array over data that is there.
+pub(super) fn make_array(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[dimensions, data, fill, adjustable] = arguments else { unreachable!("the table says four") };
+    let (sizes, fill) = shape(vm, dimensions, data, fill)?;
+    let mut flags = if fill.is_nil() { 0 } else { Array::HAS_FILL_POINTER };
+    if adjustable.is_true() {
+        flags |= Array::ADJUSTABLE;
+    }
+    Ok(vm.heap.alloc_array(flags, data, fill, &sizes)?)
+}
+
+/// `%adjust-array`: other dimensions, data and fill pointer for an array that has as many dimensions.
+pub(super) fn adjust_array(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[array, dimensions, data, fill] = arguments else { unreachable!("the table says four") };
+    let Some(rank) = vm.heap.array_dimensions(array).map(<[Value]>::len) else {
+        return vm.type_error(array, "ARRAY");
+    };
+    let (sizes, fill) = shape(vm, dimensions, data, fill)?;
+    if sizes.len() != rank {
+        return vm.raise(Raised::Simple(format!("the array has {rank} dimensions, not {}", sizes.len())));
+    }
+    vm.heap.array_set_data(array, data);
+    for (axis, &size) in sizes.iter().enumerate() {
+        vm.heap.array_set_dimension(array, axis, size);
+    }
+    vm.heap.array_set_fill(array, fill);
+    Ok(array)
+}
+
+/// Dimensions and fill pointer that suit the data.
+fn shape(vm: &mut Vm, dimensions: Value, data: Value, fill: Value) -> Result<(Vec<Value>, Value), Exit> {
+    let Some(room) = Elements::of_data(&vm.heap, data).map(Elements::len) else {
+        return vm.type_error(data, "VECTOR");
+    };
+    let sizes = vm.list_items(dimensions, 64)?;
+    let mut total = Some(1usize);
+    for &size in &sizes {
+        total = total.zip(Some(vm.count(size)?)).and_then(|(total, size)| total.checked_mul(size));
+    }
+    if total.is_none_or(|total| total > room) {
+        return vm.raise(Raised::Simple("the dimensions do not suit the number of elements".into()));
+    }
+    if fill.is_nil() {
+        return Ok((sizes, fill));
+    }
+    if sizes.len() != 1 {
+        return vm.raise(Raised::Simple("only vectors can have fill pointers".into()));
+    }
+    let size = sizes[0].as_index().unwrap_or(0);
+    let fill = if fill == Value::T { size } else { vm.index_below(fill, size + 1)? };
+    Ok((sizes, Value::index(fill)))
+}

@@ -1,0 +1,263 @@
+//! Integers: bits, divisors, roots, and their text.
+
+use crate::equality::characters_of;
+use crate::number::bits::{self, BitOperation};
+use crate::number::{Int, gcd, limit, power, text};
+use crate::raise::{Exit, Outcome, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+
+use super::COPY_LIMIT;
+
+/// Joins integers bit by bit.
+fn fold(vm: &mut Vm, operation: BitOperation, identity: i32, integers: &[Value]) -> Outcome {
+    match *integers {
+        [] => Ok(Value::small(identity)),
+        [only] => vm.integer(only).map(|_| only),
+        [first, ref rest @ ..] => {
+            let ceiling = vm.charged + limit::WORK_LIMIT as u64 / 64;
+            let mut result = first;
+            for &integer in rest {
+                if vm.charged > ceiling {
+                    return Err(Exit::Slowly);
+                }
+                result = bits::join(vm, operation, result, integer)?;
+            }
+            Ok(result)
+        }
+    }
+}
+
+/// `logand`
+pub(super) fn logand(vm: &mut Vm, integers: &[Value]) -> Outcome {
+    fold(vm, BitOperation::And, -1, integers)
+}
+
+/// `logior`
+pub(super) fn logior(vm: &mut Vm, integers: &[Value]) -> Outcome {
+    fold(vm, BitOperation::Or, 0, integers)
+}
+
+/// `logxor`
+pub(super) fn logxor(vm: &mut Vm, integers: &[Value]) -> Outcome {
+    fold(vm, BitOperation::Xor, 0, integers)
+}
+
+/// `logeqv` of two integers
+pub(super) fn logeqv(vm: &mut Vm, integers: &[Value]) -> Outcome {
+    // Each pair turns the bits over once; an even number of integers leaves them turned.
+    let joined = fold(vm, BitOperation::Xor, 0, integers)?;
+    if integers.len() % 2 == 0 { bits::complement(vm, joined) } else { Ok(joined) }
+}
+
+/// Joins two integers, either of them and the result turned over or not.
+fn joined(vm: &mut Vm, arguments: &[Value], operation: BitOperation, turned: [bool; 3]) -> Outcome {
+    let turn = |n: Int, turn: bool| if turn { n.complement() } else { n };
+    let a = turn(vm.integer(arguments[0])?, turned[0]);
+    let b = turn(vm.integer(arguments[1])?, turned[1]);
+    vm.charge(a.len() + b.len());
+    let result = turn(a.joined(operation, &b), turned[2]);
+    vm.integer_value("LOGAND", &result)
+}
+
+/// `logandc1`
+pub(super) fn logandc1(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    joined(vm, arguments, BitOperation::And, [true, false, false])
+}
+
+/// `logandc2`
+pub(super) fn logandc2(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    joined(vm, arguments, BitOperation::And, [false, true, false])
+}
+
+/// `lognand`
+pub(super) fn lognand(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    joined(vm, arguments, BitOperation::And, [false, false, true])
+}
+
+/// `lognor`
+pub(super) fn lognor(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    joined(vm, arguments, BitOperation::Or, [false, false, true])
+}
+
+/// `logorc1`
+pub(super) fn logorc1(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    joined(vm, arguments, BitOperation::Or, [true, false, false])
+}
+
+/// `logorc2`
+pub(super) fn logorc2(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    joined(vm, arguments, BitOperation::Or, [false, true, false])
+}
+
+/// `lognot`
+pub(super) fn lognot(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    bits::complement(vm, arguments[0])
+}
+
+/// `logtest`
+pub(super) fn logtest(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let joined = bits::join(vm, BitOperation::And, arguments[0], arguments[1])?;
+    Ok((joined != Value::small(0)).into())
+}
+
+/// `logbitp`
+pub(super) fn logbitp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(bits::bit(vm, arguments[0], arguments[1])?.into())
+}
+
+/// `logcount`
+pub(super) fn logcount(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let n = vm.integer(arguments[0])?;
+    vm.charge(n.len());
+    Ok(Value::index(n.count_bits() as usize))
+}
+
+/// `integer-length`
+pub(super) fn integer_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let n = vm.integer(arguments[0])?;
+    Ok(Value::index(n.length() as usize))
+}
+
+/// `ash`
+pub(super) fn ash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    bits::shift(vm, arguments[0], arguments[1])
+}
+
+/// `evenp`
+pub(super) fn evenp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok((!vm.integer(arguments[0])?.is_odd()).into())
+}
+
+/// `oddp`
+pub(super) fn oddp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(vm.integer(arguments[0])?.is_odd().into())
+}
+
+/// Size and position of a field: two counts.
+fn field(vm: &mut Vm, size: Value, position: Value) -> Result<(u64, u64), Exit> {
+    let mut count = |v: Value| match v.as_index() {
+        Some(n) => Ok(n as u64),
+        None => vm.type_error(v, "UNSIGNED-BYTE"),
+    };
+    Ok((count(size)?, count(position)?))
+}
+
+/// `%ldb`
+pub(super) fn load_byte(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (size, position) = field(vm, arguments[0], arguments[1])?;
+    let n = vm.integer(arguments[2])?;
+    let byte = bits::field(vm, size, position, &n)?;
+    vm.integer_value("LDB", &byte)
+}
+
+/// `%dpb`
+pub(super) fn deposit_byte(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (size, position) = field(vm, arguments[1], arguments[2])?;
+    let (new, n) = (vm.integer(arguments[0])?, vm.integer(arguments[3])?);
+    let result = bits::deposit(vm, &new, size, position, &n)?;
+    vm.integer_value("DPB", &result)
+}
+
+/// `gcd`
+pub(super) fn gcd(vm: &mut Vm, integers: &[Value]) -> Outcome {
+    let mut divisor = Int::ZERO;
+    for &v in integers {
+        let n = vm.integer(v)?;
+        crate::number::check_gcd(vm, divisor.len(), n.len())?;
+        divisor = gcd::gcd(&divisor, &n);
+    }
+    vm.integer_value("GCD", &divisor)
+}
+
+/// `%gcd-step`: two smaller integers with the same greatest common divisor, or the divisor and zero.
+pub(super) fn gcd_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (a, b) = (vm.integer(arguments[0])?, vm.integer(arguments[1])?);
+    let (long, short) = (a.len().max(b.len()), a.len().min(b.len()));
+    vm.check_work(2 * (long - short + 1), short)?;
+    let steps = gcd::steps_within_limit(long);
+    vm.charge(8 * long * steps);
+    let (a, b) = gcd::reduced(&a, &b, steps);
+    let (a, b) = (vm.integer_value("GCD", &a)?, vm.integer_value("GCD", &b)?);
+    vm.give_values(&[a, b])
+}
+
+/// `lcm`
+pub(super) fn lcm(vm: &mut Vm, integers: &[Value]) -> Outcome {
+    let mut multiple = Int::ONE;
+    for &v in integers {
+        let n = vm.integer(v)?;
+        crate::number::check_gcd(vm, multiple.len(), n.len())?;
+        let divisor = gcd::gcd(&multiple, &n);
+        multiple = if n.is_zero() || multiple.is_zero() {
+            Int::ZERO
+        } else {
+            multiple.times(&n.exact_quotient(&divisor)).abs()
+        };
+        vm.check_bits("LCM", multiple.bits())?;
+    }
+    vm.integer_value("LCM", &multiple)
+}
+
+/// `isqrt`
+pub(super) fn isqrt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    power::isqrt(vm, arguments[0])
+}
+
+/// A radix from 2 to 36.
+pub(crate) fn radix(vm: &mut Vm, v: Value) -> Result<u32, Exit> {
+    match v.as_index() {
+        Some(radix @ 2..=36) => Ok(radix as u32),
+        _ => vm.specifier_error(v, "(INTEGER 2 36)"),
+    }
+}
+
+/// `%integer-string`
+pub(super) fn integer_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let n = vm.integer(arguments[0])?;
+    let radix = radix(vm, arguments[1])?;
+    let text = text::integer_text(vm, &n, radix)?;
+    Ok(vm.heap.alloc_str(&text)?)
+}
+
+/// `%parse-integer`: the integer, or `NIL`, and the index where reading stopped.
+pub(super) fn parse_integer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[string, start, end, radix_value, junk_allowed] = arguments else {
+        unreachable!("the table says five")
+    };
+    let radix = radix(vm, radix_value)?;
+    let Some(length) = characters_of(&vm.heap, string).map(<[u32]>::len) else {
+        return vm.type_error(string, "STRING");
+    };
+    let (start, end) = vm.bounds(start, end, length)?;
+    if end - start > COPY_LIMIT {
+        return Err(Exit::Slowly);
+    }
+    let characters = &characters_of(&vm.heap, string).unwrap_or_default()[..end];
+    let parsed = text::parse_integer(characters, start, radix);
+    let rest_is_blank = |from: usize| characters[from..].iter().all(|&c| text::is_blank(c));
+    let problem = match &parsed {
+        text::Parsed::Integer(_, at) if junk_allowed.is_true() || rest_is_blank(*at) => None,
+        text::Parsed::TooLong => return Err(Exit::Slowly),
+        text::Parsed::Nothing(_) if junk_allowed.is_true() => None,
+        text::Parsed::Nothing(at) if *at == end => Some("no digits in string"),
+        _ => Some("junk in string"),
+    };
+    if let Some(problem) = problem {
+        let shown = characters[start..end.min(start + 80)].iter();
+        let shown: String =
+            shown.map(|&code| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
+        return vm.raise(Raised::Parse(format!("{problem} \"{shown}\"")));
+    }
+    let digits = (end - start).min(limit::PARSED_DIGITS);
+    vm.charge(end - start + digits * digits / 64);
+    let (value, at) = match parsed {
+        text::Parsed::Integer(n, at) => {
+            let at = if junk_allowed.is_true() { at } else { end };
+            (vm.integer_value("PARSE-INTEGER", &n)?, at)
+        }
+        text::Parsed::Nothing(at) => (Value::NIL, at),
+        text::Parsed::TooLong => return Err(Exit::Slowly),
+    };
+    vm.give_values(&[value, Value::index(at)])
+}

@@ -1,0 +1,217 @@
+//! Arithmetic, comparison and rounding for any number of arguments.
+
+use crate::number::{self, Number, Rounding, limit::WORK_LIMIT, rounding};
+use crate::raise::{Exit, Outcome};
+use crate::value::Value;
+use crate::vm::Vm;
+
+use super::LIMIT;
+
+/// The one of integers, where it is left out.
+const ONE: Value = Value::small(1);
+
+/// Joins numbers from the left. What several steps together may cost is bounded like one.
+fn fold(
+    vm: &mut Vm,
+    first: Value,
+    rest: &[Value],
+    step: impl Fn(&mut Vm, Value, Value) -> Outcome,
+) -> Outcome {
+    let ceiling = vm.charged + WORK_LIMIT as u64 / 64;
+    let mut result = first;
+    for &number in rest {
+        if vm.charged > ceiling {
+            return Err(Exit::Slowly);
+        }
+        result = step(vm, result, number)?;
+    }
+    Ok(result)
+}
+
+/// `+`
+pub(super) fn add(vm: &mut Vm, numbers: &[Value]) -> Outcome {
+    match *numbers {
+        [] => Ok(Value::small(0)),
+        [only] => vm.number(only, "NUMBER").map(|_| only),
+        [first, ref rest @ ..] => fold(vm, first, rest, number::add),
+    }
+}
+
+/// `*`
+pub(super) fn multiply(vm: &mut Vm, numbers: &[Value]) -> Outcome {
+    match *numbers {
+        [] => Ok(ONE),
+        [only] => vm.number(only, "NUMBER").map(|_| only),
+        [first, ref rest @ ..] => fold(vm, first, rest, number::multiply),
+    }
+}
+
+/// `-`
+pub(super) fn subtract(vm: &mut Vm, numbers: &[Value]) -> Outcome {
+    match *numbers {
+        [only] => number::negate(vm, only),
+        _ => fold(vm, numbers[0], &numbers[1..], number::subtract),
+    }
+}
+
+/// `/`
+pub(super) fn divide(vm: &mut Vm, numbers: &[Value]) -> Outcome {
+    match *numbers {
+        [only] => number::divide(vm, ONE, only),
+        _ => fold(vm, numbers[0], &numbers[1..], number::divide),
+    }
+}
+
+/// `1+`
+pub(super) fn increment(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    number::add(vm, arguments[0], ONE)
+}
+
+/// `1-`
+pub(super) fn decrement(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    number::subtract(vm, arguments[0], ONE)
+}
+
+/// Whether `holds` is true of all neighbours. All arguments are checked, also behind a pair for which it is not.
+fn chain(
+    vm: &mut Vm,
+    numbers: &[Value],
+    expected: &'static str,
+    holds: impl Fn(&mut Vm, Value, Value) -> Result<bool, Exit>,
+) -> Outcome {
+    if let Some(&wrong) = numbers.iter().find(|&&v| !number::is_number(&vm.heap, v)) {
+        return vm.type_error(wrong, expected);
+    }
+    for pair in numbers.windows(2) {
+        if !holds(vm, pair[0], pair[1])? {
+            return Ok(Value::NIL);
+        }
+    }
+    Ok(Value::T)
+}
+
+/// `=`
+pub(super) fn num_equal(vm: &mut Vm, numbers: &[Value]) -> Outcome {
+    chain(vm, numbers, "NUMBER", number::num_equal)
+}
+
+/// `<`
+pub(super) fn less(vm: &mut Vm, numbers: &[Value]) -> Outcome {
+    chain(vm, numbers, "REAL", number::less)
+}
+
+/// `<=`
+pub(super) fn less_equal(vm: &mut Vm, numbers: &[Value]) -> Outcome {
+    chain(vm, numbers, "REAL", number::less_or_equal)
+}
+
+/// `>`
+pub(super) fn greater(vm: &mut Vm, numbers: &[Value]) -> Outcome {
+    chain(vm, numbers, "REAL", |vm, a, b| number::less(vm, b, a))
+}
+
+/// `>=`
+pub(super) fn greater_equal(vm: &mut Vm, numbers: &[Value]) -> Outcome {
+    chain(vm, numbers, "REAL", |vm, a, b| number::less_or_equal(vm, b, a))
+}
+
+/// `/=`
+pub(super) fn num_not_equal(vm: &mut Vm, numbers: &[Value]) -> Outcome {
+    if numbers.len() * numbers.len() / 2 > LIMIT {
+        return Err(Exit::Slowly);
+    }
+    chain(vm, numbers, "NUMBER", |_, _, _| Ok(true))?;
+    for (at, &a) in numbers.iter().enumerate() {
+        for &b in &numbers[at + 1..] {
+            if number::num_equal(vm, a, b)? {
+                return Ok(Value::NIL);
+            }
+        }
+    }
+    Ok(Value::T)
+}
+
+/// `max`
+pub(super) fn max(vm: &mut Vm, numbers: &[Value]) -> Outcome {
+    chain(vm, numbers, "REAL", |_, _, _| Ok(true))?;
+    fold(vm, numbers[0], &numbers[1..], |vm, a, b| Ok(if number::less(vm, a, b)? { b } else { a }))
+}
+
+/// `min`
+pub(super) fn min(vm: &mut Vm, numbers: &[Value]) -> Outcome {
+    chain(vm, numbers, "REAL", |_, _, _| Ok(true))?;
+    fold(vm, numbers[0], &numbers[1..], |vm, a, b| Ok(if number::less(vm, b, a)? { b } else { a }))
+}
+
+/// `zerop`
+pub(super) fn zerop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok((number::sign(vm, arguments[0], "NUMBER")? == 0).into())
+}
+
+/// `plusp`
+pub(super) fn plusp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok((number::sign(vm, arguments[0], "REAL")? > 0).into())
+}
+
+/// `minusp`
+pub(super) fn minusp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok((number::sign(vm, arguments[0], "REAL")? < 0).into())
+}
+
+/// `abs`
+pub(super) fn abs(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match vm.number(arguments[0], "NUMBER")? {
+        Number::Float(x) => Ok(vm.heap.float(x.abs())?),
+        Number::Int(n) if !n.is_negative() => Ok(arguments[0]),
+        Number::Ratio(r) if !r.numerator.is_negative() => Ok(arguments[0]),
+        _ => number::negate(vm, arguments[0]),
+    }
+}
+
+/// `signum`
+pub(super) fn signum(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match vm.number(arguments[0], "NUMBER")? {
+        Number::Float(x) => Ok(vm.heap.float(if x == 0.0 { x } else { x.signum() })?),
+        Number::Int(n) => Ok(Value::small(n.signum())),
+        Number::Ratio(r) => Ok(Value::small(r.numerator.signum())),
+    }
+}
+
+/// Defines division by rounding mode.
+macro_rules! roundings {
+    ($( $(#[doc = $doc:literal])* $name:ident = $function:ident $rounding:ident; )*) => {
+        $( $(#[doc = $doc])* pub(super) fn $name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+            let divisor = arguments.get(1).copied().unwrap_or(ONE);
+            rounding::$function(vm, Rounding::$rounding, arguments[0], divisor)
+        } )*
+    };
+}
+
+roundings! {
+    /// `floor`
+    floor = both Floor;
+    /// `ceiling`
+    ceiling = both Ceiling;
+    /// `truncate`
+    truncate = both Truncate;
+    /// `round`
+    round = both Round;
+    /// `ffloor`
+    ffloor = both_with_float Floor;
+    /// `fceiling`
+    fceiling = both_with_float Ceiling;
+    /// `ftruncate`
+    ftruncate = both_with_float Truncate;
+    /// `fround`
+    fround = both_with_float Round;
+}
+
+/// `mod`
+pub(super) fn modulo(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    number::modulo(vm, arguments[0], arguments[1])
+}
+
+/// `rem`
+pub(super) fn remainder(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    number::remainder(vm, arguments[0], arguments[1])
+}

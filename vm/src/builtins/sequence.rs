@@ -1,0 +1,333 @@
+//! Lists and vectors alike: length, elements, parts, copies, reversal, and the ways between the two.
+//!
+//! Lists are walked up to [`LIMIT`] pairs. Vectors are copied up to [`COPY_LIMIT`] elements, which takes about as long.
+
+use crate::heap::Kind;
+use crate::raise::{Exit, Outcome};
+use crate::value::Value;
+use crate::vm::Vm;
+
+use super::array::{Elements, all_elements, data_of, vector_elements, vector_length};
+use super::expect::optional;
+use super::list::reverse_in_place;
+use super::{COPY_LIMIT, LIMIT};
+
+impl Vm {
+    /// Copies `count` elements between what keeps the elements of two arrays, as if by way of a third. The ranges are
+    /// inside.
+    ///
+    /// # Errors
+    /// `type-error` for the first element that the target cannot keep; nothing has been copied then.
+    pub(crate) fn copy_elements(
+        &mut self,
+        from: Value,
+        from_start: usize,
+        to: Value,
+        to_start: usize,
+        count: usize,
+    ) -> Result<(), Exit> {
+        self.charge(count);
+        let Some(elements) = all_elements(&self.heap, from) else { return Ok(()) };
+        let elements = Owned::of(elements.part(from_start, from_start + count));
+        if let Owned::Characters(characters) = &elements
+            && let Some(target) = self.heap.string_mut(to)
+        {
+            target[to_start..to_start + count].copy_from_slice(characters);
+            return Ok(());
+        }
+        let accepts_all = self.heap.is(to, Kind::SimpleVector);
+        let values = elements.into_values();
+        if !accepts_all {
+            for &value in &values {
+                self.check_element(to, value)?;
+            }
+        }
+        for (offset, &value) in values.iter().enumerate() {
+            self.store_element(to, to_start + offset, value);
+        }
+        Ok(())
+    }
+
+    /// The length of a vector; a type error for anything else.
+    pub(crate) fn vector_length(&mut self, v: Value) -> Result<usize, Exit> {
+        match vector_length(&self.heap, v) {
+            Some(length) => Ok(length),
+            None => self.type_error(v, "VECTOR"),
+        }
+    }
+}
+
+/// A new simple vector with these elements, of the kind that keeps them.
+fn new_vector(vm: &mut Vm, elements: &Owned) -> Outcome {
+    Ok(match elements {
+        Owned::Values(values) => vm.heap.alloc_vector(values)?,
+        Owned::Characters(characters) => vm.heap.alloc_string(characters)?,
+        Owned::Bytes(bytes) => vm.heap.alloc_bytes(bytes)?,
+    })
+}
+
+/// Elements out of the heap, to be put into it again.
+enum Owned {
+    Values(Vec<Value>),
+    Characters(Vec<u32>),
+    Bytes(Vec<u8>),
+}
+
+impl Owned {
+    fn of(elements: Elements<'_>) -> Owned {
+        match elements {
+            Elements::Values(values) => Owned::Values(values.to_vec()),
+            Elements::Characters(characters) => Owned::Characters(characters.to_vec()),
+            Elements::Bytes(bytes) => Owned::Bytes(bytes.to_vec()),
+        }
+    }
+
+    fn into_values(self) -> Vec<Value> {
+        match self {
+            Owned::Values(values) => values,
+            Owned::Characters(characters) => characters.into_iter().filter_map(Value::character).collect(),
+            Owned::Bytes(bytes) => bytes.into_iter().map(|byte| Value::small(i32::from(byte))).collect(),
+        }
+    }
+
+    fn reverse(&mut self) {
+        match self {
+            Owned::Values(values) => values.reverse(),
+            Owned::Characters(characters) => characters.reverse(),
+            Owned::Bytes(bytes) => bytes.reverse(),
+        }
+    }
+}
+
+/// `(length sequence)`
+pub(super) fn length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let sequence = arguments[0];
+    if let Some(length) = vector_length(&vm.heap, sequence) {
+        return Ok(Value::index(length));
+    }
+    if !sequence.is_list() {
+        return vm.type_error(sequence, "SEQUENCE");
+    }
+    super::list::list_length(vm, arguments)
+}
+
+/// `(elt sequence index)`
+pub(super) fn elt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[sequence, index] = arguments else { unreachable!("the table says two") };
+    if let Some(elements) = vector_elements(&vm.heap, sequence) {
+        let length = elements.len();
+        return match index.as_index().and_then(|index| elements.get(index)) {
+            Some(value) => Ok(value),
+            None => vm.index_error(index, length),
+        };
+    }
+    let pair = list_element(vm, sequence, index)?;
+    Ok(vm.heap.car(pair).unwrap_or(Value::NIL))
+}
+
+/// `(%set-elt sequence index value)`
+pub(super) fn set_elt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[sequence, index, value] = arguments else { unreachable!("the table says three") };
+    if let Some(length) = vector_length(&vm.heap, sequence) {
+        let index = vm.index_below(index, length)?;
+        let data = data_of(&vm.heap, sequence).unwrap_or(sequence);
+        vm.check_element(data, value)?;
+        vm.store_element(data, index, value);
+        return Ok(value);
+    }
+    let pair = list_element(vm, sequence, index)?;
+    vm.heap.set_car(pair, value);
+    Ok(value)
+}
+
+/// The pair of a list that has its element `index`.
+fn list_element(vm: &mut Vm, list: Value, index: Value) -> Outcome {
+    if !list.is_list() {
+        return vm.type_error(list, "SEQUENCE");
+    }
+    let Some(wanted) = index.as_index() else { return vm.type_error(index, "UNSIGNED-BYTE") };
+    let mut rest = list;
+    for at in 0..=wanted.min(LIMIT) {
+        match vm.heap.as_cons(rest) {
+            Some(_) if at == wanted => {
+                vm.charge(at);
+                return Ok(rest);
+            }
+            Some(pair) => rest = pair.cdr,
+            None if rest.is_nil() => return vm.index_error(index, at),
+            None => return vm.type_error(rest, "LIST"),
+        }
+    }
+    Err(Exit::Slowly)
+}
+
+/// `(subseq sequence start &optional end)`
+pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (sequence, start, end) = (arguments[0], arguments[1], optional(arguments, 2));
+    if let Some(elements) = vector_elements(&vm.heap, sequence) {
+        let length = elements.len();
+        let (start, end) = vm.bounds(start, end, length)?;
+        if end - start > COPY_LIMIT {
+            return Err(Exit::Slowly);
+        }
+        vm.charge(end - start);
+        let part = vector_elements(&vm.heap, sequence).map(|elements| Owned::of(elements.part(start, end)));
+        return part.map_or(Ok(Value::NIL), |part| new_vector(vm, &part));
+    }
+    if !sequence.is_list() {
+        return vm.type_error(sequence, "SEQUENCE");
+    }
+    if end.is_nil() || end.as_index().is_none_or(|end| end > LIMIT) {
+        let items = vm.list_items(sequence, LIMIT)?;
+        let (start, end) = vm.bounds(start, end, items.len())?;
+        return Ok(vm.heap.list(&items[start..end])?);
+    }
+    // Of a long list only the part up to the end is walked.
+    let mut items = Vec::new();
+    let mut rest = sequence;
+    let wanted = end.as_index().unwrap_or(0);
+    while items.len() < wanted {
+        match vm.heap.as_cons(rest) {
+            Some(pair) => {
+                items.push(pair.car);
+                rest = pair.cdr;
+            }
+            None if rest.is_nil() => return vm.bounds_error(start, end, items.len()),
+            None => return vm.type_error(rest, "LIST"),
+        }
+    }
+    vm.charge(wanted);
+    let (start, end) = vm.bounds(start, end, wanted)?;
+    Ok(vm.heap.list(&items[start..end])?)
+}
+
+/// `(copy-seq sequence)`
+pub(super) fn copy_seq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    subseq(vm, &[arguments[0], Value::small(0)])
+}
+
+/// `(reverse sequence)`
+pub(super) fn reverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let sequence = arguments[0];
+    if let Some(elements) = vector_elements(&vm.heap, sequence) {
+        let length = elements.len();
+        if length > COPY_LIMIT {
+            return Err(Exit::Slowly);
+        }
+        let mut reversed = Owned::of(elements);
+        vm.charge(length);
+        reversed.reverse();
+        return new_vector(vm, &reversed);
+    }
+    if !sequence.is_list() {
+        return vm.type_error(sequence, "SEQUENCE");
+    }
+    let mut items = vm.list_items(sequence, LIMIT)?;
+    items.reverse();
+    Ok(vm.heap.list(&items)?)
+}
+
+/// `(nreverse sequence)`
+pub(super) fn nreverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let sequence = arguments[0];
+    if let Some(length) = vector_length(&vm.heap, sequence) {
+        let data = data_of(&vm.heap, sequence).unwrap_or(sequence);
+        if length > COPY_LIMIT {
+            return Err(Exit::Slowly);
+        }
+        vm.charge(length);
+        if let Some(characters) = vm.heap.string_mut(data) {
+            characters[..length].reverse();
+            return Ok(sequence);
+        }
+        for (low, high) in (0..length / 2).map(|low| (low, length - 1 - low)) {
+            let elements = all_elements(&vm.heap, data);
+            if let Some((a, b)) = elements.and_then(|elements| elements.get(low).zip(elements.get(high))) {
+                vm.store_element(data, low, b);
+                vm.store_element(data, high, a);
+            }
+        }
+        return Ok(sequence);
+    }
+    if !sequence.is_list() {
+        return vm.type_error(sequence, "SEQUENCE");
+    }
+    // The walk comes first, so that nothing has changed where it ends badly.
+    super::list::list_length(vm, arguments)?;
+    Ok(reverse_in_place(vm, sequence, Value::NIL))
+}
+
+/// `(%fill vector item start end)`
+pub(super) fn fill(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[vector, item, start, end] = arguments else { unreachable!("the table says four") };
+    let length = vm.vector_length(vector)?;
+    let (start, end) = vm.bounds(start, end, length)?;
+    if end - start > COPY_LIMIT {
+        return Err(Exit::Slowly);
+    }
+    let data = data_of(&vm.heap, vector).unwrap_or(vector);
+    vm.check_element(data, item)?;
+    vm.charge(end - start);
+    if let Some(code) = item.as_character()
+        && let Some(characters) = vm.heap.string_mut(data)
+    {
+        characters[start..end].fill(code);
+        return Ok(vector);
+    }
+    for index in start..end {
+        vm.store_element(data, index, item);
+    }
+    Ok(vector)
+}
+
+/// `(%replace target source start1 end1 start2 end2)`, of vectors
+pub(super) fn replace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[target, source, start1, end1, start2, end2] = arguments else { unreachable!("the table says six") };
+    let (to_length, from_length) = (vm.vector_length(target)?, vm.vector_length(source)?);
+    let (to, to_end) = vm.bounds(start1, end1, to_length)?;
+    let (from, from_end) = vm.bounds(start2, end2, from_length)?;
+    let count = (to_end - to).min(from_end - from);
+    if count > COPY_LIMIT {
+        return Err(Exit::Slowly);
+    }
+    let to_data = data_of(&vm.heap, target).unwrap_or(target);
+    let from_data = data_of(&vm.heap, source).unwrap_or(source);
+    vm.copy_elements(from_data, from, to_data, to, count)?;
+    Ok(target)
+}
+
+/// `(%list-vector list)`
+pub(super) fn list_vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let items = vm.list_items(arguments[0], LIMIT)?;
+    Ok(vm.heap.alloc_vector(&items)?)
+}
+
+/// `(%list-string list)`
+pub(super) fn list_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let items = vm.list_items(arguments[0], LIMIT)?;
+    let mut characters = Vec::with_capacity(items.len());
+    for item in items {
+        match item.as_character() {
+            Some(code) => characters.push(code),
+            None => return vm.type_error(item, "CHARACTER"),
+        }
+    }
+    Ok(vm.heap.alloc_string(&characters)?)
+}
+
+/// `(%vector-list vector start end)`
+pub(super) fn vector_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[vector, start, end] = arguments else { unreachable!("the table says three") };
+    let length = vm.vector_length(vector)?;
+    let (start, end) = vm.bounds(start, end, length)?;
+    if end - start > LIMIT {
+        return Err(Exit::Slowly);
+    }
+    vm.charge(end - start);
+    let mut list = Value::NIL;
+    for index in (start..end).rev() {
+        let item = vector_elements(&vm.heap, vector).and_then(|elements| elements.get(index));
+        list = vm.heap.cons(item.unwrap_or(Value::NIL), list)?;
+    }
+    Ok(list)
+}

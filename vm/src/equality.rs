@@ -1,0 +1,282 @@
+//! When objects count as the same: `eq`, `eql`, `equal`, `equalp`, and hashes that agree with them.
+//!
+//! Guarantees: no native stack in proportion to depth; a comparison stops when the work it was given is used up, and
+//! says so; a hash looks at a bounded part of an object. Equal objects have equal hashes, and the hashes of a run are the
+//! same in every run of the same program.
+//! Not here: functions of the program as tests, which ESL calls; hash tables and `equalp`, where ESL compares as soon
+//! as two different tables meet.
+
+use smallvec::{SmallVec, smallvec};
+
+use crate::builtins::array::{Elements, all_elements, vector_elements};
+use crate::character;
+use crate::heap::{Heap, Kind};
+use crate::number::{self, Int, Number};
+use crate::value::Value;
+
+/// The tests that the machine knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Test {
+    /// One object.
+    Eq,
+    /// One object, or numbers of one type and value.
+    Eql,
+    /// The same structure of pairs and strings.
+    Equal,
+    /// The same structure; case of letters and type of numbers do not matter.
+    Equalp,
+}
+
+/// Whether `a` and `b` are the same by `test`. `None` when that takes more than `work`, from which what was done is
+/// taken, or when only ESL can tell.
+#[inline]
+pub(crate) fn same(heap: &Heap, test: Test, a: Value, b: Value, work: &mut usize) -> Option<bool> {
+    if a == b {
+        return Some(true);
+    }
+    match test {
+        Test::Eq => Some(false),
+        Test::Eql => Some(number::eql(heap, a, b)),
+        // What is no address has no inside.
+        Test::Equal if !(a.is_address() && b.is_address()) => Some(false),
+        _ => walk(heap, test == Test::Equalp, a, b, work),
+    }
+}
+
+/// Compares with an explicit stack.
+fn walk(heap: &Heap, loosely: bool, a: Value, b: Value, work: &mut usize) -> Option<bool> {
+    let mut open: SmallVec<[(Value, Value); 16]> = smallvec![(a, b)];
+    while let Some((a, b)) = open.pop() {
+        if number::eql(heap, a, b) {
+            continue;
+        }
+        *work = work.checked_sub(1)?;
+        if let (Some(left), Some(right)) = (heap.as_cons(a), heap.as_cons(b)) {
+            open.push((left.cdr, right.cdr));
+            open.push((left.car, right.car));
+            continue;
+        }
+        let is_same = if loosely {
+            loosely_same(heap, a, b, &mut open, work)?
+        } else {
+            same_strings(heap, a, b, work)?
+        };
+        if !is_same {
+            return Some(false);
+        }
+    }
+    Some(true)
+}
+
+/// The characters of a string, up to its fill pointer.
+pub(crate) fn characters_of(heap: &Heap, v: Value) -> Option<&[u32]> {
+    if let Some(characters) = heap.string(v) {
+        return Some(characters);
+    }
+    match vector_elements(heap, v)? {
+        Elements::Characters(characters) => Some(characters),
+        _ => None,
+    }
+}
+
+fn same_strings(heap: &Heap, a: Value, b: Value, work: &mut usize) -> Option<bool> {
+    let (Some(a), Some(b)) = (characters_of(heap, a), characters_of(heap, b)) else { return Some(false) };
+    if a.len() != b.len() {
+        return Some(false);
+    }
+    *work = work.checked_sub(a.len() / 64)?;
+    Some(a == b)
+}
+
+/// One pair of objects by `equalp`; the pairs of their parts go to `open`.
+fn loosely_same(
+    heap: &Heap,
+    a: Value,
+    b: Value,
+    open: &mut SmallVec<[(Value, Value); 16]>,
+    work: &mut usize,
+) -> Option<bool> {
+    if let (Some(a), Some(b)) = (a.as_character(), b.as_character()) {
+        return Some(character::fold(a) == character::fold(b));
+    }
+    if number::is_number(heap, a) || number::is_number(heap, b) {
+        return Some(number::same_value(heap, a, b));
+    }
+    match (heap.kind(a), heap.kind(b)) {
+        (Some(Kind::Structure), Some(Kind::Structure)) => {
+            if heap.structure_class(a) != heap.structure_class(b) {
+                return Some(false);
+            }
+            let (left, right) = (heap.structure_slots(a)?, heap.structure_slots(b)?);
+            *work = work.checked_sub(left.len())?;
+            open.extend(left.iter().copied().zip(right.iter().copied()));
+            Some(true)
+        }
+        (Some(Kind::HashTable), Some(Kind::HashTable)) => None,
+        _ => same_arrays(heap, a, b, open, work),
+    }
+}
+
+fn same_arrays(
+    heap: &Heap,
+    a: Value,
+    b: Value,
+    open: &mut SmallVec<[(Value, Value); 16]>,
+    work: &mut usize,
+) -> Option<bool> {
+    let vectors = vector_elements(heap, a).zip(vector_elements(heap, b));
+    let pair = vectors.or_else(|| {
+        let same_shape = heap.array_dimensions(a)? == heap.array_dimensions(b)?;
+        if same_shape { all_elements(heap, a).zip(all_elements(heap, b)) } else { None }
+    });
+    let Some((left, right)) = pair else { return Some(false) };
+    if left.len() != right.len() {
+        return Some(false);
+    }
+    if let (Elements::Characters(left), Elements::Characters(right)) = (left, right) {
+        *work = work.checked_sub(left.len() / 16)?;
+        return Some(
+            left.iter().zip(right).all(|(&a, &b)| a == b || character::fold(a) == character::fold(b)),
+        );
+    }
+    *work = work.checked_sub(left.len())?;
+    open.extend((0..left.len()).rev().filter_map(|index| left.get(index).zip(right.get(index))));
+    Some(true)
+}
+
+/// Parts of an object that its hash looks at.
+const HASHED_PARTS: usize = 64;
+/// Characters of a string that its hash looks at.
+const HASHED_CHARACTERS: usize = 4096;
+
+/// Mixes a word into a hash.
+#[inline]
+fn mix(hash: u64, word: u64) -> u64 {
+    (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+}
+
+/// Spreads what is in the upper bits of a product over the lower ones.
+#[inline]
+fn finish(hash: u64) -> u32 {
+    ((hash >> 32) ^ hash) as u32
+}
+
+/// A hash of `v` that agrees with `test`.
+#[inline]
+pub(crate) fn hash(heap: &Heap, test: Test, v: Value) -> u32 {
+    if !v.is_address() && test != Test::Equalp {
+        return finish(mix(0, v.bits()));
+    }
+    let word = match test {
+        Test::Eq => heap.identity(v),
+        Test::Eql => number_hash(heap, v).unwrap_or_else(|| heap.identity(v)),
+        Test::Equal => return finish(parts_hash(heap, v, false)),
+        Test::Equalp => return finish(parts_hash(heap, v, true)),
+    };
+    finish(mix(0, word))
+}
+
+/// What `sxhash` gives: as the hash of `equal`, and the same for a symbol of the same name in another run.
+pub(crate) fn sxhash(heap: &Heap, v: Value) -> u32 {
+    match heap.symbol(v).and_then(|symbol| heap.string(symbol.name)) {
+        Some(name) => finish(characters_hash(name, false)),
+        None => hash(heap, Test::Equal, v),
+    }
+}
+
+/// A number that equal numbers of one type share; `None` for what is no boxed number.
+fn number_hash(heap: &Heap, v: Value) -> Option<u64> {
+    let limbs = |v: Value, hash: u64| match heap.bignum(v) {
+        Some(n) => n.limbs.iter().fold(mix(hash, u64::from(n.negative)), |hash, &limb| mix(hash, limb)),
+        None => mix(hash, v.bits()),
+    };
+    match heap.kind(v)? {
+        Kind::Bignum => Some(limbs(v, 1)),
+        Kind::Float => heap.as_double(v).map(f64::to_bits),
+        Kind::Ratio => heap.ratio(v).map(|(numerator, denominator)| limbs(denominator, limbs(numerator, 2))),
+        _ => None,
+    }
+}
+
+/// A number that numbers of equal value share, whatever their type: a rational that equals a double is the one that
+/// the double rounds to.
+fn value_hash(n: &Number) -> u64 {
+    let x = match n {
+        Number::Float(x) => *x,
+        Number::Int(n) => n.to_f64(),
+        Number::Ratio(r) => r.to_f64(),
+    };
+    if x.is_infinite()
+        && let Number::Int(n) = n
+    {
+        return n.limbs().1.iter().fold(3, |hash, &limb| mix(hash, limb));
+    }
+    // Minus zero is zero.
+    (x + 0.0).to_bits()
+}
+
+fn characters_hash(characters: &[u32], loosely: bool) -> u64 {
+    let step = characters.len() / HASHED_CHARACTERS + 1;
+    let sampled = characters.iter().step_by(step);
+    let start = mix(4, characters.len() as u64);
+    if loosely {
+        sampled.fold(start, |hash, &code| mix(hash, u64::from(character::fold(code))))
+    } else {
+        sampled.fold(start, |hash, &code| mix(hash, u64::from(code)))
+    }
+}
+
+/// The hash of pairs, strings and, `loosely`, arrays and structures, from the first parts in the order of reading.
+fn parts_hash(heap: &Heap, v: Value, loosely: bool) -> u64 {
+    let mut open: SmallVec<[Value; 16]> = smallvec![v];
+    let mut hash = 0;
+    let mut visited = 0;
+    while let Some(v) = open.pop() {
+        visited += 1;
+        if visited > HASHED_PARTS {
+            break;
+        }
+        if let Some(pair) = heap.as_cons(v) {
+            hash = mix(hash, 5);
+            open.push(pair.cdr);
+            open.push(pair.car);
+        } else if loosely {
+            hash = loose_hash(heap, v, hash, &mut open);
+        } else if let Some(characters) = characters_of(heap, v) {
+            hash = mix(hash, characters_hash(characters, false));
+        } else {
+            hash = mix(hash, number_hash(heap, v).unwrap_or_else(|| heap.identity(v)));
+        }
+    }
+    hash
+}
+
+fn loose_hash(heap: &Heap, v: Value, hash: u64, open: &mut SmallVec<[Value; 16]>) -> u64 {
+    if let Some(code) = v.as_character() {
+        return mix(hash, u64::from(character::fold(code)));
+    }
+    if let Some(n) = Number::of(heap, v) {
+        return mix(hash, value_hash(&n));
+    }
+    if let Some(elements) = vector_elements(heap, v).or_else(|| all_elements(heap, v)) {
+        // A string and a vector of the same characters are the same: elements are hashed one by one.
+        let shown = elements.len().min(HASHED_PARTS);
+        open.extend((0..shown).rev().filter_map(|index| elements.get(index)));
+        return mix(hash, elements.len() as u64);
+    }
+    match heap.kind(v) {
+        Some(Kind::Structure) => {
+            let slots = heap.structure_slots(v).unwrap_or_default();
+            open.extend(slots.iter().take(HASHED_PARTS).rev().copied());
+            mix(hash, heap.identity(heap.structure_class(v).unwrap_or(Value::NIL)))
+        }
+        Some(Kind::HashTable) => mix(hash, 7),
+        _ => mix(hash, heap.identity(v)),
+    }
+}
+
+/// The bits of an integer that a hash given by a program may have.
+pub(crate) fn given_hash(n: &Int) -> u32 {
+    let limbs = n.limbs().1;
+    finish(mix(0, limbs.first().copied().unwrap_or(0)))
+}
