@@ -207,41 +207,41 @@ define_builtins! {
 
     // ---- numbers
     /// The sum; 0 of no numbers.
-    Add = cl "+" ("&rest numbers");
+    Add = cl "+" ("&rest numbers") slowly "%SLOW-+";
     /// The first number less the others; the negative of a single one.
-    Subtract = cl "-" ("number &rest numbers");
+    Subtract = cl "-" ("number &rest numbers") slowly "%SLOW--";
     /// The product; 1 of no numbers.
-    Multiply = cl "*" ("&rest numbers");
+    Multiply = cl "*" ("&rest numbers") slowly "%SLOW-*";
     /// The first number divided by the others; the reciprocal of a single one. Exact for integers and ratios.
-    Divide = cl "/" ("number &rest numbers");
+    Divide = cl "/" ("number &rest numbers") slowly "%SLOW-/";
     /// `number` plus one.
     Increment = cl "1+" ("number");
     /// `number` less one.
     Decrement = cl "1-" ("number");
     /// Quotient rounded towards minus infinity, and remainder.
-    Floor = cl "FLOOR" ("number &optional divisor");
+    Floor = cl "FLOOR" ("number &optional divisor") slowly "%SLOW-FLOOR";
     /// Quotient rounded towards plus infinity, and remainder.
-    Ceiling = cl "CEILING" ("number &optional divisor");
+    Ceiling = cl "CEILING" ("number &optional divisor") slowly "%SLOW-CEILING";
     /// Quotient rounded towards zero, and remainder.
-    Truncate = cl "TRUNCATE" ("number &optional divisor");
+    Truncate = cl "TRUNCATE" ("number &optional divisor") slowly "%SLOW-TRUNCATE";
     /// Quotient rounded to the nearest integer, halves to the even one, and remainder.
-    Round = cl "ROUND" ("number &optional divisor");
+    Round = cl "ROUND" ("number &optional divisor") slowly "%SLOW-ROUND";
     /// The remainder of `floor`.
-    Mod = cl "MOD" ("number divisor");
+    Mod = cl "MOD" ("number divisor") slowly "%SLOW-MOD";
     /// The remainder of `truncate`.
-    Rem = cl "REM" ("number divisor");
+    Rem = cl "REM" ("number divisor") slowly "%SLOW-REM";
     /// The numbers' bitwise and; -1 of none.
-    LogAnd = cl "LOGAND" ("&rest integers");
+    LogAnd = cl "LOGAND" ("&rest integers") slowly "%SLOW-LOGAND";
     /// The numbers' bitwise or; 0 of none.
-    LogIor = cl "LOGIOR" ("&rest integers");
+    LogIor = cl "LOGIOR" ("&rest integers") slowly "%SLOW-LOGIOR";
     /// The numbers' bitwise exclusive or; 0 of none.
-    LogXor = cl "LOGXOR" ("&rest integers");
+    LogXor = cl "LOGXOR" ("&rest integers") slowly "%SLOW-LOGXOR";
     /// `integer` shifted left by `count` bits, right if that is negative.
     Ash = cl "ASH" ("integer count");
     /// Whether all numbers are equal.
     NumEqual = cl "=" ("number &rest numbers");
     /// Whether no two numbers are equal.
-    NumNotEqual = cl "/=" ("number &rest numbers");
+    NumNotEqual = cl "/=" ("number &rest numbers") slowly "%SLOW-/=";
     /// Whether the numbers increase.
     Less = cl "<" ("number &rest numbers");
     /// Whether the numbers never decrease.
@@ -287,7 +287,7 @@ define_builtins! {
     /// A list of the objects that ends in the last of them.
     ListStar = cl "LIST*" ("object &rest objects");
     /// The lists joined: all but the last are copied.
-    Append = cl "APPEND" ("&rest lists") slowly "SLOW-APPEND";
+    Append = cl "APPEND" ("&rest lists") slowly "%SLOW-APPEND";
 
     // ---- arrays
     /// A fresh simple vector of `objects`.

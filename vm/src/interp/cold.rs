@@ -41,9 +41,13 @@ fn operation(word: u32) -> Operation {
     unsafe { std::mem::transmute(word as u8) }
 }
 
-/// The builtin that does the work of an instruction in the cases that the loop does not know.
-fn builtin(operation: Operation) -> Native {
-    let builtin = match operation {
+/// The builtin that does what an instruction does.
+fn builtin(operation: Operation) -> Builtin {
+    match operation {
+        Operation::Add | Operation::AddInt => Builtin::Add,
+        Operation::Sub => Builtin::Subtract,
+        Operation::Mul => Builtin::Multiply,
+        Operation::Div => Builtin::Divide,
         Operation::Floor => Builtin::Floor,
         Operation::Truncate => Builtin::Truncate,
         Operation::Mod => Builtin::Mod,
@@ -56,9 +60,25 @@ fn builtin(operation: Operation) -> Native {
         Operation::VectorSet => Builtin::SetSvref,
         Operation::ArrayRef => Builtin::Aref,
         Operation::ArraySet => Builtin::SetAref,
-        _ => unreachable!("the loop asks for the builtins of these instructions only"),
-    };
-    NATIVES[builtin as usize]
+        _ => unreachable!("these instructions have no builtin"),
+    }
+}
+
+/// The implementation of the builtin that does what an instruction does.
+fn native(operation: Operation) -> Native {
+    NATIVES[builtin(operation) as usize]
+}
+
+/// Has the ESL twin of a builtin do what is too much work for one instruction: its call takes the instruction's place.
+#[cold]
+fn ask_twin(vm: &mut Vm, builtin: Builtin, arguments: &[Value]) -> Outcome {
+    match vm.slow_twin(builtin.number() as u16) {
+        Some(function) => {
+            vm.request_call(function, arguments);
+            Err(Exit::Call)
+        }
+        None => vm.program_error(format!("{} has too much to do at once", builtin.info().name)),
+    }
 }
 
 /// Arithmetic and comparisons that give a value.
@@ -83,13 +103,13 @@ pub(super) unsafe fn arithmetic(vm: &mut Vm, pc: *const u32, base: *mut Value) -
             Operation::NumEq => number::num_equal(vm, left, right).map(Value::boolean),
             Operation::Less => number::less(vm, left, right).map(Value::boolean),
             Operation::LessEq => number::less_or_equal(vm, left, right).map(Value::boolean),
-            operation => {
-                match builtin(operation)(vm, &[left, right]) {
-                    // Of quotient and remainder the instruction wants the first.
-                    Err(Exit::Values) => Ok(vm.values.first().copied().unwrap_or(Value::NIL)),
-                    outcome => outcome,
-                }
-            }
+            operation => native(operation)(vm, &[left, right]),
+        };
+        let outcome = match outcome {
+            // Of quotient and remainder the instruction wants the first.
+            Err(Exit::Values) => Ok(vm.values.first().copied().unwrap_or(Value::NIL)),
+            Err(Exit::Slowly) => ask_twin(vm, builtin(operation(word)), &[left, right]),
+            outcome => outcome,
         };
         finish(base, dst, outcome)
     }
@@ -226,10 +246,10 @@ pub(super) unsafe fn array(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sig
         let (x, y, z) = (*base.add(a), *base.add(b), *base.add(c));
         match operation(word) {
             operation @ (Operation::VectorRef | Operation::ArrayRef) => {
-                let outcome = builtin(operation)(vm, &[y, z]);
+                let outcome = native(operation)(vm, &[y, z]);
                 finish(base, a, outcome)
             }
-            operation => match builtin(operation)(vm, &[x, y, z]) {
+            operation => match native(operation)(vm, &[x, y, z]) {
                 Ok(_) => Signal::Next,
                 Err(exit) => Signal::Exit(exit),
             },

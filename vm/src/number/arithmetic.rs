@@ -19,7 +19,7 @@ pub(crate) fn add(vm: &mut Vm, a: Value, b: Value) -> Outcome {
             vm.integer_value("+", &x.plus(&y))
         }
         Pair::Ratios(x, y) => {
-            check_ratios(vm, &x, &y)?;
+            check_sum(vm, &x, &y)?;
             vm.ratio_value("+", &x.plus(&y))
         }
         Pair::Floats(x, y) => vm.float_value("+", x + y),
@@ -40,7 +40,7 @@ pub(crate) fn subtract(vm: &mut Vm, a: Value, b: Value) -> Outcome {
             vm.integer_value("-", &x.minus(&y))
         }
         Pair::Ratios(x, y) => {
-            check_ratios(vm, &x, &y)?;
+            check_sum(vm, &x, &y)?;
             vm.ratio_value("-", &x.plus(&y.negated()))
         }
         Pair::Floats(x, y) => vm.float_value("-", x - y),
@@ -144,6 +144,15 @@ pub(crate) fn typed_operands(
 /// Charges for arithmetic on ratios, unless their parts are too large for one operation.
 pub(crate) fn check_ratios(vm: &mut Vm, x: &Ratio, y: &Ratio) -> Result<(), Exit> {
     check_gcd(vm, x.len(), y.len())
+}
+
+/// As [`check_ratios`], for a sum: with an integer it takes one product and no divisor, so that of a ratio and a fixnum is
+/// never too much.
+fn check_sum(vm: &mut Vm, x: &Ratio, y: &Ratio) -> Result<(), Exit> {
+    if x.denominator.is_one() || y.denominator.is_one() {
+        return vm.check_work(2 * x.len(), y.len());
+    }
+    check_ratios(vm, x, y)
 }
 
 /// Charges for a greatest common divisor of integers of `a` and `b` limbs, unless that is too much for one operation.
