@@ -24,6 +24,16 @@ pub fn link(modules: impl IntoIterator<Item = Module>) -> Module {
     linker.linked
 }
 
+/// As [`link`], for modules of one compilation unit: an uninterned symbol of one is that of the same number in another,
+/// and keeps its number. All of them have the same sources, or none.
+pub fn join(modules: impl IntoIterator<Item = Module>) -> Module {
+    let mut linker = Linker { is_one_unit: true, ..Linker::default() };
+    for module in modules {
+        linker.add(module);
+    }
+    linker.linked
+}
+
 #[derive(Default)]
 struct Linker {
     linked: Module,
@@ -33,6 +43,8 @@ struct Linker {
     uninterned: HashMap<Symbol, Symbol>,
     /// How many uninterned symbols there are.
     fresh: u32,
+    /// Whether uninterned symbols keep their identity from one module to the next.
+    is_one_unit: bool,
 }
 
 /// A constant without identity.
@@ -92,17 +104,20 @@ impl Places {
 impl Linker {
     fn add(&mut self, module: Module) {
         self.uninterned.clear();
+        let is_same_text = self.is_one_unit && self.linked.sources == module.sources;
         let mut places = Places {
             constants: Vec::with_capacity(module.constants.len()),
             first_function: self.linked.functions.len() as u32,
-            first_source: self.linked.sources.len() as u32,
+            first_source: if is_same_text { 0 } else { self.linked.sources.len() as u32 },
         };
         for mut constant in module.constants {
             self.renumber(&mut constant, &places);
             let index = self.place(constant);
             places.constants.push(index);
         }
-        self.linked.sources.extend(module.sources);
+        if !is_same_text {
+            self.linked.sources.extend(module.sources);
+        }
         self.linked.functions.extend(module.functions.into_iter().map(|mut function| {
             relocate(&mut function, &places);
             function
@@ -132,7 +147,7 @@ impl Linker {
     }
 
     fn renumber_symbol(&mut self, symbol: &mut Symbol) {
-        if let Home::Uninterned(_) = symbol.home() {
+        if let (Home::Uninterned(_), false) = (symbol.home(), self.is_one_unit) {
             let fresh = &mut self.fresh;
             let renumbered = self.uninterned.entry(symbol.clone()).or_insert_with_key(|symbol| {
                 *fresh += 1;
@@ -220,6 +235,15 @@ mod tests {
         let linked = link([module(vec![g(7), g(9), g(7)]), module(vec![g(7)])]);
         assert_eq!(linked.constants, [g(0), g(1), g(2)]);
         assert_eq!(linked.functions[0].constants, [0, 1, 0].map(PoolIdx));
+    }
+
+    #[test]
+    fn modules_of_one_unit_share_symbols_and_sources() {
+        let g = |id| Constant::Symbol(Symbol::uninterned(id, "G"));
+        let part = |id| Module { sources: vec!["a.esl".into()], ..module(vec![g(id)]) };
+        let joined = join([part(7), part(9), part(7)]);
+        assert_eq!(joined.constants, [g(7), g(9)]);
+        assert_eq!(joined.sources, ["a.esl"]);
     }
 
     #[test]

@@ -99,6 +99,15 @@ impl Symbol {
     }
 }
 
+/// The symbol that keeps the global function `(setf symbol)`: one of the same package, named as it is written.
+pub fn setf_cell(symbol: &Symbol) -> Symbol {
+    let name = format!("(SETF {})", symbol.name());
+    match symbol.home() {
+        Home::Package(package) => Symbol::new(package, &name),
+        Home::Uninterned(id) => Symbol::uninterned(*id, &name),
+    }
+}
+
 /// FNV-1a: symbols are hashed once, when they are made.
 fn fnv(mut hash: u64, bytes: &[u8]) -> u64 {
     for &byte in bytes {

@@ -3,6 +3,8 @@
 
 pub mod core;
 pub mod diagnostic;
+pub mod expand;
 pub mod lower;
 pub mod reader;
 mod resolve;
+pub mod session;

@@ -288,6 +288,16 @@ MACRO_FAILED = "macro-failed" Error
     fails: "(defmacro twice (form)\n  (list 'progn form (car 'form)))\n(twice (print 1))\n"
     repaired: "(defmacro twice (form)\n  (list 'progn form form))\n(twice (print 1))\n"
 
+COMPILE_TIME_FAILURE = "compile-time-failure" Error
+    /// A form that is evaluated while the file is compiled failed then.
+    fails: "(eval-when (:compile-toplevel :load-toplevel :execute)\n  (car 'table))\n"
+    repaired: "(eval-when (:compile-toplevel :load-toplevel :execute)\n  (car '(table)))\n"
+
+UNKNOWN_DECLARATION = "unknown-declaration" Warning
+    /// A declaration that means nothing.
+    fails: "(defun area (side)\n  (declare (ignorabel side))\n  0)\n"
+    repaired: "(defun area (side)\n  (declare (ignorable side))\n  0)\n"
+
 LOCKED_NAME = "locked-name" Error
     /// A definition of a name that belongs to the language.
     fails: "(defun car (x)\n  x)\n"

@@ -1,0 +1,201 @@
+//! Taking lists apart by pattern: macro lambda lists and `destructuring-bind`.
+//!
+//! A pattern becomes a row of bindings of a `let*`, each variable bound to a piece of the list. The number of elements
+//! is checked first, by functions of the library, all internal to the package `ESL`; `context` is the name of the macro
+//! or the pattern, for their messages:
+//!
+//! * `(%check-arguments list minimum maximum context)` gives `list` back, or fails with a `program-error`, if it is
+//!   not a list of that many elements. Without a maximum (`NIL`) only the first `minimum` conses are looked at.
+//! * `(%check-keys list keys allow-other-keys context)` gives `list` back, or fails with a `program-error`, if it is
+//!   not a list of keys and values, or has other keys than the list `keys` without allowing them.
+//! * `(%key-tail list key)` gives the tail of a list of keys and values that begins with the value of `key`, or `NIL`.
+
+use esl_bytecode::compile::Environment;
+use esl_bytecode::datum::Datum;
+use esl_bytecode::symbol::Symbol;
+
+use super::body::Body;
+use super::form::{Checked, Form, Make};
+use super::lambda::LambdaText;
+use super::lambda_list::{Kind, LambdaList, Optional};
+use super::machine::{Job, Machine, To};
+use crate::diagnostic::code;
+
+/// How deeply patterns may be nested.
+const MAX_PATTERN_DEPTH: usize = 100;
+
+/// The bindings that a pattern is becoming.
+struct Row<'e> {
+    make: Make,
+    environment: &'e mut dyn Environment,
+    /// The quoted name of the macro, or pattern.
+    context: Datum,
+    bindings: Vec<(Datum, Datum)>,
+    depth: usize,
+}
+
+impl Row<'_> {
+    fn bind(&mut self, name: &str, form: Datum) -> Datum {
+        let variable = self.make.fresh(self.environment, name);
+        self.bindings.push((variable.clone(), form));
+        variable
+    }
+
+    /// Binds a variable, or the variables of a pattern, to the value of a form.
+    fn receive(&mut self, variable: &Datum, form: Datum) -> Checked {
+        if variable.as_symbol().is_some() {
+            self.bindings.push((variable.clone(), form));
+            return Ok(());
+        }
+        self.depth += 1;
+        if self.depth > MAX_PATTERN_DEPTH {
+            let message = format!("patterns are nested more than {MAX_PATTERN_DEPTH} deep");
+            return Err(Box::new(code::NESTED_TOO_DEEPLY.at(variable.span(), message)));
+        }
+        let list = LambdaList::parse(variable, Kind::Pattern, self.make.0)?;
+        let whole = self.bind("LIST", form);
+        self.pattern(&list, &whole, &whole)?;
+        self.depth -= 1;
+        Ok(())
+    }
+
+    /// Binds the variables of `list`: `whole` is what `&whole` gets, `arguments` the form of the list to take apart.
+    fn pattern(&mut self, list: &LambdaList, whole: &Datum, arguments: &Datum) -> Checked {
+        let make = self.make;
+        if let Some(variable) = &list.whole {
+            self.receive(variable, whole.clone())?;
+        }
+        let arity = list.arity();
+        let number = |count: u32| Datum::integer(count, make.0);
+        let maximum = arity.max.map_or_else(|| make.nil(), number);
+        let check = [arguments.clone(), number(arity.min), maximum, self.context.clone()];
+        let mut rest = self.bind("ARGUMENTS", make.call_esl("%CHECK-ARGUMENTS", check));
+
+        let required = list.required.len();
+        let is_over = list.optional.is_empty() && list.rest.is_none() && list.keys.is_none();
+        for (index, pair) in list.required.chunks(2).enumerate() {
+            self.receive(&pair[0], make.call_cl("CAR", [rest.clone()]))?;
+            if let Some(second) = pair.get(1) {
+                self.receive(second, make.call_cl("CADR", [rest.clone()]))?;
+            }
+            if !(is_over && 2 * (index + 1) >= required) {
+                let step = if pair.len() == 2 { "CDDR" } else { "CDR" };
+                rest = self.bind("ARGUMENTS", make.call_cl(step, [rest]));
+            }
+        }
+        for optional in &list.optional {
+            let is_given = make.call_cl("CONSP", [rest.clone()]);
+            self.defaulted(optional, is_given, make.call_cl("CAR", [rest.clone()]))?;
+            let tail = make.call_cl("CDR", [rest.clone()]);
+            // With a rest parameter, the list may be dotted.
+            let tail = match list.rest {
+                Some(_) => make.cl("IF", [make.call_cl("CONSP", [rest.clone()]), tail, rest]),
+                None => tail,
+            };
+            rest = self.bind("ARGUMENTS", tail);
+        }
+        if let Some(variable) = &list.rest {
+            self.receive(variable, rest.clone())?;
+        }
+        if let Some(keys) = &list.keys {
+            let names = make.items(keys.iter().map(|key| make.symbol(&key.key)));
+            let allow = if list.allow_other_keys { make.symbol(&Symbol::cl("T")) } else { make.nil() };
+            let check = [rest, make.quote(names), allow, self.context.clone()];
+            let keyed = self.bind("KEYS", make.call_esl("%CHECK-KEYS", check));
+            for key in keys {
+                let find = make.call_esl("%KEY-TAIL", [keyed.clone(), make.quote(make.symbol(&key.key))]);
+                let tail = self.bind("KEY", find);
+                self.defaulted(&key.optional, tail.clone(), make.call_cl("CAR", [tail]))?;
+            }
+        }
+        for (variable, value) in &list.aux {
+            self.receive(variable, value.clone())?;
+        }
+        Ok(())
+    }
+
+    /// Binds an optional parameter: to `value` if `is_given`, otherwise to its default.
+    fn defaulted(&mut self, optional: &Optional, is_given: Datum, value: Datum) -> Checked {
+        let make = self.make;
+        let chosen = make.cl("IF", [is_given.clone(), value, optional.default.clone()]);
+        self.receive(&optional.variable, chosen)?;
+        if let Some(supplied) = &optional.supplied {
+            let flag = make.cl("IF", [is_given, make.symbol(&Symbol::cl("T")), make.nil()]);
+            self.bindings.push((supplied.clone(), flag));
+        }
+        Ok(())
+    }
+}
+
+/// `(destructuring-bind pattern form . body)`
+pub(super) fn destructuring_bind(
+    machine: &mut Machine,
+    environment: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
+    form.takes(2..=usize::MAX, "needs a pattern and a form")?;
+    // The bindings keep the place where they were written, so that unused variables are reported.
+    let make = Make(form.datum.span());
+    let context = make.quote(form.args[0].clone());
+    let mut row = Row { make, environment, context, bindings: Vec::new(), depth: 0 };
+    row.receive_list(&form.args[0], form.args[1].clone())?;
+    let whole = make.let_in_order(row.bindings, form.args[2..].to_vec());
+    machine.schedule([Job::Expand(whole, to)]);
+    Ok(())
+}
+
+impl Row<'_> {
+    /// As [`Row::receive`], for what must be a pattern.
+    fn receive_list(&mut self, pattern: &Datum, form: Datum) -> Checked {
+        if pattern.as_symbol().is_some() {
+            // `(destructuring-bind x …)` is a dotted pattern of no elements.
+            self.bindings.push((pattern.clone(), form));
+            return Ok(());
+        }
+        self.receive(pattern, form)
+    }
+}
+
+/// `(%macro-lambda shown name lambda-list . body)`: the function of the macro `name`, a function of a form and an
+/// environment, which is shown to people as `shown`.
+pub(super) fn macro_lambda(
+    machine: &mut Machine,
+    environment: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
+    form.takes(3..=usize::MAX, "needs two names and a lambda list")?;
+    let symbol = form.symbol(1, "needs the name of a macro")?;
+    let make = Make(form.datum.span());
+    let list = LambdaList::parse(&form.args[2], Kind::Macro, form.at(form.args[2].span()))?;
+    let mut body = machine.take_body(&form.args[3..], true, &form, to.origin)?;
+
+    let call = make.fresh(environment, "FORM");
+    let around = make.fresh(environment, "ENVIRONMENT");
+    let context = make.quote(form.args[1].clone());
+    let mut row = Row { make, environment, context, bindings: Vec::new(), depth: 0 };
+    if let Some(variable) = &list.environment {
+        row.bindings.push((variable.clone(), around.clone()));
+    }
+    row.pattern(&list, &call, &make.call_cl("CDR", [call.clone()]))?;
+    let bindings = row.bindings;
+
+    let block = std::iter::once(make.symbol(&symbol)).chain(std::mem::take(&mut body.forms));
+    let block = make.cl("BLOCK", block);
+    let inner = std::mem::take(&mut body.declarations).into_iter().chain([block]).collect();
+    let function = LambdaText {
+        name: Some(form.args[0].clone()),
+        shown: form.args[2].clone(),
+        list: LambdaList { required: vec![call, around], ..LambdaList::default() },
+        body: Body {
+            documentation: body.documentation,
+            forms: vec![make.let_in_order(bindings, inner)],
+            ..Body::default()
+        },
+        block: None,
+        form: form.datum.span(),
+    };
+    machine.closure(function, to);
+    Ok(())
+}

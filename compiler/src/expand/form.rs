@@ -1,0 +1,288 @@
+//! Forms: taking them apart, making them, and quoting them in messages.
+
+use esl_bytecode::compile::Environment;
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+
+use crate::diagnostic::code;
+
+/// The outcome of looking at a form.
+pub(super) type Checked<T = ()> = Result<T, Box<Diagnostic>>;
+
+/// A compound form.
+#[derive(Clone, Debug)]
+pub(super) struct Form {
+    /// All of it.
+    pub(super) datum: Datum,
+    /// Its operator, for messages.
+    pub(super) operator: Symbol,
+    /// Its arguments.
+    pub(super) args: Vec<Datum>,
+    /// Where it was written, or the form around it, or the macro call that made it.
+    pub(super) span: Span,
+}
+
+impl Form {
+    /// A diagnostic about this form: its operator, then what is wrong.
+    pub(super) fn malformed(&self, what: &str) -> Box<Diagnostic> {
+        self.malformed_at(self.span, what)
+    }
+
+    /// A diagnostic about the part of this form at `span`.
+    pub(super) fn malformed_at(&self, span: Span, what: &str) -> Box<Diagnostic> {
+        let span = if is_known(span) { span } else { self.span };
+        Box::new(code::MALFORMED_FORM.at(span, format!("{} {what}", name(&self.operator))))
+    }
+
+    /// Checks the number of arguments.
+    pub(super) fn takes(&self, count: std::ops::RangeInclusive<usize>, what: &str) -> Checked {
+        if count.contains(&self.args.len()) { Ok(()) } else { Err(self.malformed(what)) }
+    }
+
+    /// The form with the given span in place of an unknown one.
+    pub(super) fn at(&self, span: Span) -> Span {
+        if is_known(span) { span } else { self.span }
+    }
+
+    /// Argument `index` as the name of a variable, block or the like. `NIL` is none.
+    pub(super) fn symbol(&self, index: usize, what: &str) -> Checked<Symbol> {
+        match self.args.get(index).and_then(Datum::as_symbol) {
+            Some(symbol) => Ok(symbol.clone()),
+            None => {
+                let span = self.args.get(index).map_or(self.span, Datum::span);
+                Err(self.malformed_at(span, what))
+            }
+        }
+    }
+}
+
+/// Whether a span says where something was written. Data that a program made have an empty one.
+pub(super) fn is_known(span: Span) -> bool {
+    span.end > span.start
+}
+
+/// A name as messages show it: in backticks, in lower case as people write it, unless it has lower case of its own.
+pub(super) fn name(symbol: &Symbol) -> String {
+    format!("`{}`", plain(symbol))
+}
+
+/// A name in lower case, without backticks.
+pub(super) fn plain(symbol: &Symbol) -> String {
+    let text = symbol.to_string();
+    if text.chars().any(char::is_lowercase) { text } else { text.to_lowercase() }
+}
+
+/// How many characters of a form a message quotes.
+const QUOTED: usize = 40;
+
+/// The beginning of a datum as messages show it.
+pub(super) fn quoted(datum: &Datum) -> String {
+    let text = on_one_line(datum, QUOTED);
+    let short: String = text.chars().take(QUOTED).collect();
+    if short.len() < text.len() { format!("`{short}…`") } else { format!("`{short}`") }
+}
+
+/// A datum on one line, in lower case, cut off soon after `limit` characters: a form may be as long as a file.
+pub(super) fn on_one_line(datum: &Datum, limit: usize) -> String {
+    enum Part<'a> {
+        Datum(&'a Datum),
+        Tail(&'a Datum),
+        Text(&'static str),
+    }
+    let mut text = String::new();
+    let mut parts = vec![Part::Datum(datum)];
+    while let Some(part) = parts.pop() {
+        // Bytes for characters: this only decides when to stop.
+        if text.len() > 4 * limit || text.len() > limit && text.chars().count() > limit {
+            break;
+        }
+        match part {
+            Part::Text(piece) => text.push_str(piece),
+            Part::Tail(tail) => match tail.kind() {
+                DatumKind::Nil => text.push(')'),
+                DatumKind::Cons(car, cdr) => {
+                    text.push(' ');
+                    parts.extend([Part::Tail(cdr), Part::Datum(car)]);
+                }
+                _ => {
+                    text.push_str(" . ");
+                    parts.extend([Part::Text(")"), Part::Datum(tail)]);
+                }
+            },
+            Part::Datum(datum) => match datum.kind() {
+                DatumKind::Nil => text.push_str("()"),
+                DatumKind::Symbol(symbol) => text.push_str(&plain(symbol)),
+                DatumKind::Cons(car, cdr) => match abbreviation(car, cdr) {
+                    Some((mark, quoted)) => {
+                        text.push_str(mark);
+                        parts.push(Part::Datum(quoted));
+                    }
+                    None => {
+                        text.push('(');
+                        parts.extend([Part::Tail(cdr), Part::Datum(car)]);
+                    }
+                },
+                DatumKind::Vector(items) => {
+                    text.push_str("#(");
+                    parts.push(Part::Text(")"));
+                    for (index, item) in items.iter().take(limit).enumerate().rev() {
+                        parts.push(Part::Datum(item));
+                        if index > 0 {
+                            parts.push(Part::Text(" "));
+                        }
+                    }
+                }
+                DatumKind::Array(..) => text.push_str("#A(…)"),
+                DatumKind::String(value) => {
+                    let shown: String = value.chars().take(limit).collect();
+                    text.push_str(&format!("\"{}\"", shown.replace('\\', "\\\\").replace('"', "\\\"")));
+                }
+                _ => text.push_str(&datum.to_string()),
+            },
+        }
+    }
+    text
+}
+
+/// The mark with which people write a form such as `(quote x)`, and what it stands before.
+pub(super) fn abbreviation<'a>(car: &'a Datum, cdr: &'a Datum) -> Option<(&'static str, &'a Datum)> {
+    let operator = car.as_symbol()?;
+    let (argument, rest) = cdr.as_cons()?;
+    let mark = match operator.name() {
+        "QUOTE" if operator.is_cl("QUOTE") => "'",
+        "FUNCTION" if operator.is_cl("FUNCTION") => "#'",
+        "%BACKQUOTE" if is_esl(operator, "%BACKQUOTE") => "`",
+        "%UNQUOTE" if is_esl(operator, "%UNQUOTE") => ",",
+        "%UNQUOTE-SPLICING" if is_esl(operator, "%UNQUOTE-SPLICING") => ",@",
+        _ => return None,
+    };
+    rest.is_nil().then_some((mark, argument))
+}
+
+/// Whether `symbol` is the symbol `name` of the package `ESL`.
+pub(super) fn is_esl(symbol: &Symbol, name: &str) -> bool {
+    symbol.name() == name && symbol.is_in(esl_bytecode::symbol::ESL_PACKAGE)
+}
+
+/// The operator of a compound form that begins with a symbol.
+pub(super) fn operator(datum: &Datum) -> Option<&Symbol> {
+    datum.as_cons()?.0.as_symbol()
+}
+
+/// Whether `datum` is a list that begins with the symbol `name` of the package `COMMON-LISP`.
+pub(super) fn is_cl_form(datum: &Datum, name: &str) -> bool {
+    operator(datum).is_some_and(|symbol| symbol.is_cl(name))
+}
+
+/// The arguments of a compound form, if it is a proper list.
+pub(super) fn arguments(datum: &Datum) -> Option<Vec<Datum>> {
+    let (_, rest) = datum.as_cons()?;
+    Some(rest.as_list()?.into_iter().cloned().collect())
+}
+
+/// Whether evaluating `datum` is certain to give the same value without effect: a literal or a quoted datum.
+pub(super) fn is_constant(datum: &Datum) -> bool {
+    match datum.kind() {
+        DatumKind::Symbol(symbol) => symbol.is_keyword() || symbol.is_cl("T"),
+        DatumKind::Cons(..) => is_cl_form(datum, "QUOTE"),
+        _ => true,
+    }
+}
+
+/// The datum that a constant form (see [`is_constant`]) evaluates to.
+pub(super) fn constant_value(datum: &Datum) -> Option<Datum> {
+    match datum.kind() {
+        DatumKind::Cons(car, cdr) if car.as_symbol().is_some_and(|symbol| symbol.is_cl("QUOTE")) => {
+            let (value, rest) = cdr.as_cons()?;
+            rest.is_nil().then(|| value.clone())
+        }
+        _ => is_constant(datum).then(|| datum.clone()),
+    }
+}
+
+/// A fresh uninterned symbol.
+pub(super) fn fresh(environment: &mut dyn Environment, name: &str) -> Symbol {
+    Symbol::uninterned(environment.fresh(), name)
+}
+
+/// Makes forms that all come from one place in the source.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Make(pub(super) Span);
+
+impl Make {
+    /// A symbol.
+    pub(super) fn symbol(self, symbol: &Symbol) -> Datum {
+        Datum::symbol(symbol.clone(), self.0)
+    }
+
+    /// A fresh uninterned symbol.
+    pub(super) fn fresh(self, environment: &mut dyn Environment, name: &str) -> Datum {
+        Datum::symbol(fresh(environment, name), self.0)
+    }
+
+    /// The empty list.
+    pub(super) fn nil(self) -> Datum {
+        Datum::nil(self.0)
+    }
+
+    /// A list.
+    pub(super) fn list<const N: usize>(self, items: [Datum; N]) -> Datum {
+        Datum::list(items, self.0)
+    }
+
+    /// A list of as many items as there are.
+    pub(super) fn items(self, items: impl IntoIterator<Item = Datum>) -> Datum {
+        Datum::list(items.into_iter().collect::<Vec<_>>(), self.0)
+    }
+
+    /// `(operator . args)`, the operator a symbol of the package `COMMON-LISP`.
+    pub(super) fn cl(self, operator: &str, args: impl IntoIterator<Item = Datum>) -> Datum {
+        let operator = self.symbol(&Symbol::cl(operator));
+        self.items(std::iter::once(operator).chain(args))
+    }
+
+    /// `(operator . args)`, the operator a symbol of the package `ESL`.
+    pub(super) fn esl(self, operator: &str, args: impl IntoIterator<Item = Datum>) -> Datum {
+        let operator = self.symbol(&Symbol::esl(operator));
+        self.items(std::iter::once(operator).chain(args))
+    }
+
+    /// A call of the global function `function`, whatever local function has its name.
+    pub(super) fn call(self, function: &Symbol, args: impl IntoIterator<Item = Datum>) -> Datum {
+        self.esl("%CALL-GLOBAL", std::iter::once(self.symbol(function)).chain(args))
+    }
+
+    /// A call of the standard function `function`.
+    pub(super) fn call_cl(self, function: &str, args: impl IntoIterator<Item = Datum>) -> Datum {
+        self.call(&Symbol::cl(function), args)
+    }
+
+    /// A call of the function `function` of the package `ESL`.
+    pub(super) fn call_esl(self, function: &str, args: impl IntoIterator<Item = Datum>) -> Datum {
+        self.call(&Symbol::esl(function), args)
+    }
+
+    /// A quoted datum.
+    pub(super) fn quote(self, datum: Datum) -> Datum {
+        self.cl("QUOTE", [datum])
+    }
+
+    /// `(let* bindings . body)`, or the body alone if nothing is bound.
+    pub(super) fn let_in_order(self, bindings: Vec<(Datum, Datum)>, body: Vec<Datum>) -> Datum {
+        if bindings.is_empty() {
+            return self.progn(body);
+        }
+        let bindings = self.items(bindings.into_iter().map(|(name, value)| self.list([name, value])));
+        self.cl("LET*", std::iter::once(bindings).chain(body))
+    }
+
+    /// `(progn . body)`, or the one form of the body.
+    pub(super) fn progn(self, mut body: Vec<Datum>) -> Datum {
+        match body.len() {
+            1 => body.swap_remove(0),
+            _ => self.cl("PROGN", body),
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! `%handler-case`, on which the library builds `handler-case`.
+
+use esl_bytecode::compile::Environment;
+use esl_bytecode::datum::Datum;
+use esl_bytecode::symbol::Symbol;
+
+use super::form::{Checked, Form, Make, fresh};
+use super::machine::{Job, Machine, To};
+use super::scope::{Entry, Variable};
+use super::variable::report_unused;
+use crate::core::{HandlerClause, NodeKind};
+
+/// `(%handler-case form (type ([variable]) . body)*)`: runs `form`; a condition of a clause's type that is signalled in
+/// it unwinds to here and runs the body.
+pub(super) fn handler_case(
+    machine: &mut Machine,
+    environment: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
+    form.takes(1..=usize::MAX, "needs a form")?;
+    let (protected, job) = machine.part(form.args[0].clone(), to);
+    let mut jobs = vec![job];
+    let mut clauses = Vec::new();
+    for clause in &form.args[1..] {
+        let shape = "needs clauses of a type, a list of at most one variable, and forms";
+        let parts = clause.as_list().unwrap_or_default();
+        let [condition_type, variables, body @ ..] = parts.as_slice() else {
+            return Err(form.malformed_at(clause.span(), shape));
+        };
+        let variables = variables.as_list();
+        let bound: Option<Datum> = match variables.as_deref() {
+            Some([]) => None,
+            Some([variable]) => Some((*variable).clone()),
+            _ => return Err(form.malformed_at(clause.span(), shape)),
+        };
+        let forms: Vec<Datum> = body.iter().map(|&form| form.clone()).collect();
+        let mut body = machine.take_body(&forms, false, &form, to.origin)?;
+        let name: Symbol = match &bound {
+            Some(datum) => machine.variable_name(environment, datum, &form, "bound")?,
+            None => fresh(environment, "CONDITION"),
+        };
+        let inside = machine.child(to);
+        let variable = machine.variable(name.clone(), inside.span, to);
+        let mut entries = Vec::new();
+        if let Some(datum) = &bound {
+            if machine.is_special(environment, &name, &body) {
+                // The condition arrives in a lexical variable; the special one is bound to it.
+                let make = Make(to.span);
+                let condition = fresh(environment, "CONDITION");
+                entries.push(Entry::Variable(condition.clone(), Variable::Lexical(variable), None));
+                let bindings = make.list([make.list([datum.clone(), make.symbol(&condition)])]);
+                body.forms = vec![make.cl("LET", std::iter::once(bindings).chain(forms))];
+                body.specials.clear();
+            } else {
+                let report = if body.ignored.contains(&name) {
+                    None
+                } else {
+                    report_unused(&name, datum, form.datum.span())
+                };
+                entries.push(Entry::Variable(name.clone(), Variable::Lexical(variable), report));
+            }
+        }
+        entries.extend(body.free_specials(&[name]));
+        clauses.push(HandlerClause {
+            condition_type: (*condition_type).clone(),
+            variable,
+            body: inside.node,
+        });
+        let count = entries.len();
+        jobs.push(Job::Enter(entries));
+        jobs.extend(machine.body(body.forms, inside));
+        jobs.push(Job::Leave(count));
+    }
+    machine.fill(to, NodeKind::HandlerCase(protected, clauses));
+    machine.schedule(jobs);
+    Ok(())
+}

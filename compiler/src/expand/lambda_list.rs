@@ -1,0 +1,299 @@
+//! Lambda lists: ordinary ones, those of macros, and those of `destructuring-bind`.
+//!
+//! One parser reads all three. Where an ordinary lambda list has a variable, the other two may have a pattern, which
+//! is a lambda list again; [`super::destructure`] takes patterns apart.
+
+use esl_bytecode::compile::Arity;
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+
+use super::form::{Checked, is_known, plain, quoted};
+use crate::diagnostic::code;
+
+/// Which lambda list is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// That of a function.
+    Ordinary,
+    /// That of a macro: `&whole`, `&environment`, `&body`, patterns, a dotted end.
+    Macro,
+    /// That of `destructuring-bind`, or a pattern: as a macro's, without `&environment`.
+    Pattern,
+}
+
+/// An optional parameter.
+#[derive(Clone, Debug)]
+pub(super) struct Optional {
+    /// The variable or pattern.
+    pub(super) variable: Datum,
+    /// The default's form.
+    pub(super) default: Datum,
+    /// The variable that tells whether there was an argument.
+    pub(super) supplied: Option<Datum>,
+}
+
+/// A key parameter.
+#[derive(Clone, Debug)]
+pub(super) struct Key {
+    /// The symbol that selects it.
+    pub(super) key: Symbol,
+    /// The rest.
+    pub(super) optional: Optional,
+}
+
+/// A lambda list taken apart.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LambdaList {
+    /// The variable or pattern after `&whole`.
+    pub(super) whole: Option<Datum>,
+    /// The variable after `&environment`.
+    pub(super) environment: Option<Datum>,
+    /// The required parameters.
+    pub(super) required: Vec<Datum>,
+    /// The optional parameters.
+    pub(super) optional: Vec<Optional>,
+    /// The rest parameter.
+    pub(super) rest: Option<Datum>,
+    /// The key parameters; `None` without `&key`.
+    pub(super) keys: Option<Vec<Key>>,
+    /// Whether other keys are allowed.
+    pub(super) allow_other_keys: bool,
+    /// The auxiliary variables and their values' forms.
+    pub(super) aux: Vec<(Datum, Datum)>,
+}
+
+/// The part of a lambda list that is being read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Part {
+    Required,
+    Optional,
+    Rest,
+    AfterRest,
+    Key,
+    AfterKey,
+    Aux,
+}
+
+impl LambdaList {
+    /// Reads a lambda list. `span` is used where the list itself has none.
+    pub(super) fn parse(list: &Datum, kind: Kind, span: Span) -> Checked<LambdaList> {
+        Parser { kind, span, part: Part::Required, parsed: LambdaList::default() }.parse(list)
+    }
+
+    /// How many arguments a function of this lambda list takes.
+    pub(super) fn arity(&self) -> Arity {
+        let min = self.required.len() as u32;
+        let is_open = self.rest.is_some() || self.keys.is_some();
+        Arity { min, max: (!is_open).then(|| min + self.optional.len() as u32) }
+    }
+}
+
+struct Parser {
+    kind: Kind,
+    span: Span,
+    part: Part,
+    parsed: LambdaList,
+}
+
+impl Parser {
+    fn parse(mut self, list: &Datum) -> Checked<LambdaList> {
+        let mut elements = list.elements();
+        while let Some(item) = elements.next() {
+            match item.as_symbol().filter(|symbol| symbol.name().starts_with('&') && symbol.name().len() > 1)
+            {
+                Some(keyword) => {
+                    let keyword = keyword.clone();
+                    let follower = if matches!(keyword.name(), "&WHOLE" | "&ENVIRONMENT") {
+                        elements.next()
+                    } else {
+                        None
+                    };
+                    self.keyword(&keyword, item, follower)?;
+                }
+                None => self.parameter(item)?,
+            }
+        }
+        let tail = elements.tail();
+        if !tail.is_nil() {
+            if self.kind == Kind::Ordinary || self.parsed.rest.is_some() || self.part > Part::Optional {
+                return Err(self.wrong(tail, "the lambda list ends in a dot and something that is no list"));
+            }
+            self.variable(tail)?;
+            self.parsed.rest = Some(tail.clone());
+        }
+        if self.part == Part::Rest {
+            return Err(self.wrong(list, "`&rest` needs the name of a variable after it"));
+        }
+        Ok(self.parsed)
+    }
+
+    fn keyword(&mut self, keyword: &Symbol, item: &Datum, follower: Option<&Datum>) -> Checked {
+        let name = keyword.name();
+        let goes_on = |part| self.part < part && self.part != Part::Rest;
+        let next = match name {
+            "&OPTIONAL" if goes_on(Part::Optional) => Part::Optional,
+            "&REST" if goes_on(Part::Rest) => Part::Rest,
+            "&BODY" if goes_on(Part::Rest) && self.kind != Kind::Ordinary => Part::Rest,
+            "&KEY" if goes_on(Part::Key) => Part::Key,
+            "&ALLOW-OTHER-KEYS" if self.part == Part::Key => Part::AfterKey,
+            "&AUX" if goes_on(Part::Aux) => Part::Aux,
+            "&WHOLE" if self.kind != Kind::Ordinary && self.is_fresh() => {
+                let Some(variable) = follower else {
+                    return Err(self.wrong(item, "`&whole` needs the name of a variable after it"));
+                };
+                self.variable(variable)?;
+                self.parsed.whole = Some(variable.clone());
+                return Ok(());
+            }
+            "&ENVIRONMENT" if self.kind == Kind::Macro && self.parsed.environment.is_none() => {
+                match follower.filter(|variable| variable.as_symbol().is_some()) {
+                    Some(variable) => self.parsed.environment = Some(variable.clone()),
+                    None => {
+                        return Err(self.wrong(item, "`&environment` needs the name of a variable after it"));
+                    }
+                }
+                return Ok(());
+            }
+            "&OPTIONAL" | "&REST" | "&BODY" | "&KEY" | "&ALLOW-OTHER-KEYS" | "&AUX" | "&WHOLE"
+            | "&ENVIRONMENT" => {
+                let message = format!("`{}` cannot stand here in a lambda list", plain(keyword));
+                return Err(self.wrong(item, &message).with_order(self.kind));
+            }
+            _ => {
+                let message = format!("`{}` is no lambda list keyword", plain(keyword));
+                return Err(self.wrong(item, &message).with_order(self.kind));
+            }
+        };
+        match next {
+            Part::Key => self.parsed.keys = Some(Vec::new()),
+            Part::AfterKey => self.parsed.allow_other_keys = true,
+            _ => {}
+        }
+        self.part = next;
+        Ok(())
+    }
+
+    /// Whether nothing but `&whole`'s place has been read.
+    fn is_fresh(&self) -> bool {
+        self.part == Part::Required && self.parsed.required.is_empty() && self.parsed.whole.is_none()
+    }
+
+    fn parameter(&mut self, item: &Datum) -> Checked {
+        match self.part {
+            Part::Required => {
+                self.variable(item)?;
+                self.parsed.required.push(item.clone());
+            }
+            Part::Optional => {
+                let optional = self.optional(item)?;
+                self.parsed.optional.push(optional);
+            }
+            Part::Rest => {
+                self.variable(item)?;
+                self.parsed.rest = Some(item.clone());
+                self.part = Part::AfterRest;
+            }
+            Part::Key => {
+                let key = self.key(item)?;
+                self.parsed.keys.get_or_insert_default().push(key);
+            }
+            Part::Aux => {
+                let Optional { variable, default, supplied } = self.optional(item)?;
+                if let Some(extra) = supplied {
+                    return Err(self.wrong(&extra, "an `&aux` variable takes a value only"));
+                }
+                self.parsed.aux.push((variable, default));
+            }
+            Part::AfterRest => return Err(self.wrong(item, "only one name can follow `&rest`")),
+            Part::AfterKey => return Err(self.wrong(item, "no name can follow `&allow-other-keys`")),
+        }
+        Ok(())
+    }
+
+    /// `name`, `(name)`, `(name default)` or `(name default supplied)`
+    fn optional(&mut self, item: &Datum) -> Checked<Optional> {
+        let Some((variable, rest)) = item.as_cons() else {
+            self.variable(item)?;
+            return Ok(Optional { variable: item.clone(), default: Datum::nil(item.span()), supplied: None });
+        };
+        self.variable(variable)?;
+        self.with_default(variable.clone(), rest, item)
+    }
+
+    fn with_default(&mut self, variable: Datum, rest: &Datum, item: &Datum) -> Checked<Optional> {
+        let rest = rest.as_list();
+        let (default, supplied) = match rest.as_deref() {
+            Some([]) => (Datum::nil(item.span()), None),
+            Some([default]) => ((*default).clone(), None),
+            Some([default, supplied]) => {
+                if supplied.as_symbol().is_none() {
+                    return Err(
+                        self.wrong(supplied, "the third part of a parameter is the name of a variable")
+                    );
+                }
+                ((*default).clone(), Some((*supplied).clone()))
+            }
+            _ => {
+                let message = "a parameter is a name, or a list of a name, a default and a variable";
+                return Err(self.wrong(item, message));
+            }
+        };
+        Ok(Optional { variable, default, supplied })
+    }
+
+    /// As [`Parser::optional`]; or with `(key name)` in place of the name.
+    fn key(&mut self, item: &Datum) -> Checked<Key> {
+        if let Some((head, rest)) = item.as_cons()
+            && head.as_cons().is_some()
+        {
+            let pair = head.as_list();
+            let Some([key, variable]) = pair.as_deref() else {
+                return Err(self.wrong(head, "a key and its variable are written `((:key name) default)`"));
+            };
+            let Some(symbol) = key.as_symbol() else {
+                return Err(self.wrong(key, "a key is a symbol"));
+            };
+            self.variable(variable)?;
+            let optional = self.with_default((*variable).clone(), rest, item)?;
+            return Ok(Key { key: symbol.clone(), optional });
+        }
+        let optional = self.optional(item)?;
+        match optional.variable.as_symbol() {
+            Some(symbol) => Ok(Key { key: Symbol::keyword(symbol.name()), optional }),
+            None => Err(self.wrong(item, "a key parameter is a name, or begins with `(:key name)`")),
+        }
+    }
+
+    /// Checks that `item` can receive an argument.
+    fn variable(&self, item: &Datum) -> Checked {
+        let is_pattern =
+            self.kind != Kind::Ordinary && matches!(item.kind(), DatumKind::Cons(..) | DatumKind::Nil);
+        if item.as_symbol().is_some() || is_pattern {
+            return Ok(());
+        }
+        Err(self.wrong(item, &format!("a parameter is a name, not {}", quoted(item))))
+    }
+
+    fn wrong(&self, item: &Datum, message: &str) -> Box<esl_bytecode::diagnostic::Diagnostic> {
+        let span = if is_known(item.span()) { item.span() } else { self.span };
+        Box::new(code::MALFORMED_LAMBDA_LIST.at(span, message))
+    }
+}
+
+trait WithOrder {
+    fn with_order(self, kind: Kind) -> Self;
+}
+
+impl WithOrder for Box<esl_bytecode::diagnostic::Diagnostic> {
+    /// Says in which order the keywords stand.
+    fn with_order(self, kind: Kind) -> Self {
+        let order = match kind {
+            Kind::Ordinary => "`&optional`, `&rest`, `&key`, `&allow-other-keys`, `&aux`",
+            Kind::Macro | Kind::Pattern => {
+                "`&whole`, `&optional`, `&rest` or `&body`, `&key`, `&allow-other-keys`, `&aux`"
+            }
+        };
+        Box::new((*self).help(format!("the keywords are, in this order: {order}")))
+    }
+}

@@ -1,0 +1,157 @@
+//! Local functions and macros: `flet`, `labels`, `macrolet`.
+
+use esl_bytecode::compile::Environment;
+use esl_bytecode::datum::Datum;
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+
+use super::binding::check_distinct;
+use super::body::Body;
+use super::form::{Checked, Form, Make};
+use super::lambda::{FunctionName, LambdaText};
+use super::machine::{Job, Machine, To};
+use super::scope::{Entry, Function};
+use crate::core::NodeKind;
+
+/// A local definition taken apart: its name and the parts after it.
+struct Definition {
+    name: FunctionName,
+    lambda_list: Datum,
+    body: Vec<Datum>,
+}
+
+fn definitions(machine: &Machine, environment: &dyn Environment, form: &Form) -> Checked<Vec<Definition>> {
+    let shape = "needs a list of definitions, such as `((f (x) (* x x)))`";
+    let Some(items) = form.args.first().and_then(Datum::as_list) else {
+        return Err(form.malformed(shape));
+    };
+    let mut definitions = Vec::new();
+    for item in items {
+        let Some((head, rest)) = item.as_cons() else {
+            return Err(form.malformed_at(item.span(), shape));
+        };
+        let Some(name) = FunctionName::of(head) else {
+            return Err(form.malformed_at(head.span(), "needs a name at the beginning of each definition"));
+        };
+        let Some(parts) = rest.as_list().filter(|parts| !parts.is_empty()) else {
+            let what = format!("needs a lambda list after the name {}", name.name.shown());
+            return Err(form.malformed_at(item.span(), &what));
+        };
+        if !name.name.is_setf {
+            machine.check_definable(environment, &name.cell, form.at(head.span()))?;
+        }
+        let body = parts[1..].iter().map(|&part| part.clone()).collect();
+        definitions.push(Definition { name, lambda_list: parts[0].clone(), body });
+    }
+    let names: Vec<(&Symbol, Span)> =
+        definitions.iter().map(|definition| (&definition.name.cell, definition.name.datum.span())).collect();
+    check_distinct(names, form)?;
+    Ok(definitions)
+}
+
+/// `(flet ((name lambda-list . body)*) . body)`
+pub(super) fn flet(machine: &mut Machine, environment: &mut dyn Environment, form: Form, to: To) -> Checked {
+    local_functions(machine, environment, &form, to, false)
+}
+
+/// `(labels ((name lambda-list . body)*) . body)`
+pub(super) fn labels(
+    machine: &mut Machine,
+    environment: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
+    local_functions(machine, environment, &form, to, true)
+}
+
+fn local_functions(
+    machine: &mut Machine,
+    environment: &mut dyn Environment,
+    form: &Form,
+    to: To,
+    recursive: bool,
+) -> Checked {
+    let make = Make(to.span);
+    let mut texts: Vec<(FunctionName, LambdaText)> = Vec::new();
+    for Definition { name, lambda_list, body } in definitions(machine, environment, form)? {
+        let shown = make.items([make.symbol(&form.operator), name.datum.clone()]);
+        let block = Some(name.block());
+        let text =
+            machine.lambda_text(environment, Some(shown), &lambda_list, &body, block, form, to.origin)?;
+        texts.push((name, text));
+    }
+    let body = machine.take_body(&form.args[1..], false, form, to.origin)?;
+
+    let mut functions = Vec::new();
+    let mut entries = Vec::new();
+    let mut lambdas = Vec::new();
+    for (name, text) in texts {
+        let span = super::body::span_of(&name.datum, to.span);
+        let variable = machine.variable(name.name.symbol.clone(), span, to);
+        entries.push(Entry::Function(name.cell, Function::Local(variable, text.arity())));
+        let lambda = machine.lambda(to);
+        functions.push((variable, lambda));
+        lambdas.push(Job::Lambda(Box::new(text), lambda, to));
+    }
+    let inside = machine.child(to);
+    machine.fill(to, NodeKind::Functions { definitions: functions, body: inside.node });
+
+    let free = body.free_specials(&[]);
+    let count = entries.len() + free.len();
+    let mut jobs = Vec::new();
+    if recursive {
+        jobs.push(Job::Enter(entries));
+        jobs.extend(lambdas);
+    } else {
+        jobs.extend(lambdas);
+        jobs.push(Job::Enter(entries));
+    }
+    jobs.push(Job::Enter(free));
+    jobs.extend(machine.body(body.forms, inside));
+    jobs.push(Job::Leave(count));
+    machine.schedule(jobs);
+    Ok(())
+}
+
+/// The jobs that define the macros of a `macrolet`, how many names they enter, and the body.
+pub(super) fn local_macros(
+    machine: &mut Machine,
+    environment: &mut dyn Environment,
+    form: &Form,
+    to: To,
+) -> Checked<(Vec<Job>, usize, Body)> {
+    let make = Make(to.span);
+    let mut jobs = Vec::new();
+    let mut names = Vec::new();
+    for Definition { name, lambda_list, body } in definitions(machine, environment, form)? {
+        if name.name.is_setf {
+            return Err(form.malformed_at(name.datum.span(), "needs a symbol as the name of a macro"));
+        }
+        // The definition keeps the place where it was written, so that its unused variables are reported.
+        let definition = Make(form.datum.span());
+        let shown = make.items([make.symbol(&form.operator), name.datum.clone()]);
+        let parts = [shown, name.datum.clone(), lambda_list].into_iter().chain(body);
+        jobs.push(Job::Macro(definition.esl("%MACRO-LAMBDA", parts), to));
+        names.push(name.cell);
+    }
+    let body = machine.take_body(&form.args[1..], false, form, to.origin)?;
+    let free = body.free_specials(&[]);
+    let count = names.len() + free.len();
+    jobs.push(Job::EnterMacros(names));
+    jobs.push(Job::Enter(free));
+    Ok((jobs, count, body))
+}
+
+/// `(macrolet ((name lambda-list . body)*) . body)`
+pub(super) fn macrolet(
+    machine: &mut Machine,
+    environment: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
+    let (mut jobs, count, mut body) = local_macros(machine, environment, &form, to)?;
+    jobs.extend(machine.body(std::mem::take(&mut body.forms), to));
+    jobs.push(Job::Leave(count));
+    machine.schedule(jobs);
+    Ok(())
+}

@@ -1,0 +1,123 @@
+//! The expander: forms to the core language. It runs macros' calls, checks special forms, and resolves names.
+//!
+//! [`Expander`] is a machine of steps: it never runs a macro itself but stops with [`Event::Macro`], and goes on when
+//! it is told the expansion. It takes no native stack in proportion to the program, see [`machine`].
+//!
+//! # Operators for the library
+//!
+//! Besides the operators of the standard that [`operator`] lists, these, internal to the package `ESL`, are there for
+//! the library's macros to expand into:
+//!
+//! | operator | what it does |
+//! |---|---|
+//! | `(%named-lambda name lambda-list . body)` | a function that is shown as `name`; if that is a function's name, it is also the block around the body |
+//! | `(%macro-lambda shown name lambda-list . body)` | the function of a macro: takes a form and an environment, takes the form apart; see [`destructure`] for the library functions that it calls |
+//! | `(%call-global name argument*)` | calls the global function `name`, or `(setf name)`, whatever local function has its name |
+//! | `(%apply-global name argument* list)` | likewise, the last argument a list of arguments |
+//! | `(%modify (old (name form)*) place new [result])` | replaces the value of a place by that of `new`, where `old` is the value it had; see [`modify`] |
+//! | `(%handler-case form (type ([variable]) . body)*)` | unwinds to here and runs a body when a condition of the type is signalled |
+//! | `(%with-handlers list . body)` | runs the body with the list of `(type . function)` as handlers |
+//! | `(%with-mask height . body)` | runs the body with control entries from that height on masked |
+//! | `(%backquote template)`, `(%unquote form)`, `(%unquote-splicing form)` | what the reader makes of `` ` ``, `,` and `,@` |
+//!
+//! Calls of the functions `(%slot 'class index instance)`, `(%set-slot 'class index instance value)` and
+//! `(%instance-p 'class object)` are opened up if class and index are literal.
+//!
+//! # What the library records
+//!
+//! The property `%setf` of a symbol `f` says how `(f argument…)` is set:
+//!
+//! * a symbol `u` (short `defsetf`): by `(u argument… value)`, where `u` is a function or macro that returns the value;
+//! * a list `(m n)` (long `defsetf`): by the form `(m (store…) argument…)` with `n` stores, where `m` is a macro, the
+//!   arguments are constants or variables, and each store is a variable that holds a new value;
+//! * a list `(:expander m)` (`define-setf-expander`): the macro `m`, called with the place as its form, returns the list
+//!   of five parts: variables, forms, stores, writer, reader.
+//!
+//! The property `%symbol-macro` of a symbol is the form that it stands for as a variable (`define-symbol-macro`).
+//!
+//! # What the expander calls
+//!
+//! The library functions of [`destructure`], and for places `(%putf list indicator value)`, the property list with that
+//! value; `(%remf list indicator)`, the property list without it and whether it was there; and the standard's `dpb`,
+//! `deposit-field`, `adjoin`, `replace`, `nthcdr` and `c…r`.
+
+mod backquote;
+mod binding;
+mod body;
+mod call;
+mod control;
+mod define;
+mod destructure;
+mod form;
+mod handler;
+mod lambda;
+mod lambda_list;
+mod local;
+mod machine;
+mod modify;
+pub mod operator;
+mod place;
+pub mod print;
+mod scope;
+mod toplevel;
+mod unit;
+mod variable;
+
+use esl_bytecode::compile::{Answer, Environment};
+use esl_bytecode::datum::Datum;
+use esl_bytecode::diagnostic::Diagnostic;
+
+pub use machine::{Chunk, Event, Purpose};
+
+use machine::Machine;
+use toplevel::Top;
+
+/// Expands the forms of one compilation unit, one after another.
+#[derive(Debug)]
+pub struct Expander {
+    machine: Machine,
+}
+
+impl Expander {
+    /// An expander for the library, which may define what belongs to the language, or for a program.
+    pub fn new(is_library: bool) -> Expander {
+        Expander { machine: Machine::new(is_library) }
+    }
+
+    /// Begins a form of a file. The one before must be [`Event::Done`].
+    pub fn begin_file_form(&mut self, form: Datum) {
+        self.machine.begin(form, Top::file());
+    }
+
+    /// Begins a form for `eval`: the last chunk that is to be emitted gives its value.
+    pub fn begin_evaluation(&mut self, form: Datum) {
+        self.machine.begin(form, Top::evaluate());
+    }
+
+    /// Works until something is needed from outside. `charge` is called with the number of jobs done.
+    pub fn run(&mut self, environment: &mut dyn Environment, charge: &mut dyn FnMut(u64)) -> Event {
+        self.machine.run(environment, charge)
+    }
+
+    /// Takes the answer to the last event.
+    pub fn answer(&mut self, answer: Answer) {
+        self.machine.answer(answer);
+    }
+
+    /// Takes what was found so far.
+    pub fn take_diagnostics(&mut self) -> Vec<Diagnostic> {
+        self.machine.take_diagnostics()
+    }
+
+    /// What is found at the end of the unit: names that nobody has defined, calls that do not fit.
+    pub fn finish(&mut self, environment: &dyn Environment) -> Vec<Diagnostic> {
+        let mut findings = self.machine.take_diagnostics();
+        findings.extend(self.machine.unit.finish(environment));
+        findings
+    }
+
+    /// Whether an error has been found.
+    pub fn has_failed(&self) -> bool {
+        self.machine.errors() > 0
+    }
+}

@@ -1,0 +1,368 @@
+//! Forms that set places: `setf`, `psetf`, `incf`, `push` and their like, and `%modify`, of which others are made.
+//!
+//! The order of evaluation is the standard's: subforms of the place from left to right, then further arguments, then
+//! the old value is read, and the new one stored. Only `push` and `pushnew` evaluate their item first.
+
+use esl_bytecode::compile::Environment;
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::symbol::Symbol;
+
+use super::form::{Checked, Form, Make, is_cl_form, is_constant};
+use super::machine::{Job, Machine, To};
+use super::place::Place;
+use super::scope::{Variable, Visible};
+use crate::core::NodeKind;
+
+/// What is to be done with places that were found.
+#[derive(Debug)]
+pub(super) enum PlaceUse {
+    /// Makes the place `(values place…)` of the newest places.
+    Values(usize),
+    /// Makes a `getf` place of the newest place.
+    Getf(Form),
+    /// Makes an `ldb` or `mask-field` place of the newest place.
+    Field(Form),
+    /// Stores the values of a form.
+    Setf(Datum),
+    /// Stores the values of forms, after all of them are computed.
+    Psetf(Vec<Datum>),
+    /// Moves values from place to place, the first one to the last place.
+    Rotatef(usize),
+    /// Moves values from place to place, the value of the form to the last one.
+    Shiftf(usize, Datum),
+    /// Replaces a value by one computed from it.
+    Modify(Change),
+}
+
+/// How a new value is made of the old one.
+#[derive(Debug)]
+pub(super) enum Change {
+    /// `(function old argument…)`, the arguments evaluated before the old value is read.
+    Call(Symbol, Vec<Datum>),
+    /// `(function item old argument…)`, the item evaluated before the place.
+    Push(Symbol, Datum, Vec<Datum>),
+    /// The tail of the old value; the result is its head.
+    Pop,
+    /// The old value without the property; the result is whether there was one.
+    Remf(Datum),
+    /// The value of a form in which a variable is bound to the old value, after further bindings.
+    Bound {
+        /// The variable.
+        old: Datum,
+        /// The further bindings.
+        bindings: Vec<(Datum, Datum)>,
+        /// The form.
+        new: Datum,
+        /// The form whose values are the result, instead of the new value.
+        result: Option<Datum>,
+    },
+}
+
+impl Machine {
+    /// Uses the newest places.
+    pub(super) fn use_places(
+        &mut self,
+        environment: &mut dyn Environment,
+        usage: PlaceUse,
+        to: To,
+    ) -> Checked {
+        let make = Make(to.span);
+        let form = match usage {
+            PlaceUse::Values(count) => {
+                self.values_place(environment, count, to);
+                return Ok(());
+            }
+            PlaceUse::Getf(form) => {
+                self.getf_place(environment, &form, to);
+                return Ok(());
+            }
+            PlaceUse::Field(form) => {
+                self.field_place(environment, &form, to);
+                return Ok(());
+            }
+            PlaceUse::Setf(value) => self.sound(1).map(|places| places[0].set(value)),
+            PlaceUse::Psetf(values) => {
+                self.sound(values.len()).map(|places| store_all(&places, &values, None, make))
+            }
+            PlaceUse::Rotatef(count) => self.sound(count).map(|places| rotate(&places, make)),
+            PlaceUse::Shiftf(count, value) => {
+                let old = make.fresh(environment, "OLD");
+                self.sound(count).map(|places| shift(&places, value, old, make))
+            }
+            PlaceUse::Modify(change) => match self.sound(1) {
+                Some(places) => Some(self.modify(environment, &places[0], change, make)),
+                None => None,
+            },
+        };
+        match form {
+            Some(form) => self.schedule([Job::Expand(form, to)]),
+            None => self.fill(to, NodeKind::Constant(make.nil())),
+        }
+        Ok(())
+    }
+
+    /// The newest places, if nothing is wrong with them.
+    fn sound(&mut self, count: usize) -> Option<Vec<Place>> {
+        let places = self.take_places(count);
+        (!places.iter().any(|place| place.is_broken)).then_some(places)
+    }
+
+    fn modify(&self, environment: &mut dyn Environment, place: &Place, change: Change, make: Make) -> Datum {
+        let mut bindings = Vec::new();
+        // Binds a form unless evaluating it later makes no difference.
+        let bind = |form: &Datum, bindings: &mut Vec<(Datum, Datum)>, environment: &mut dyn Environment| {
+            if is_inert(form) || (place.is_variable() && self.is_plain_variable(form)) {
+                return form.clone();
+            }
+            let name = make.fresh(environment, "ARGUMENT");
+            bindings.push((name.clone(), form.clone()));
+            name
+        };
+        match change {
+            Change::Call(function, args) => {
+                bindings.extend(place.temporaries.iter().cloned());
+                let args: Vec<Datum> = args.iter().map(|arg| bind(arg, &mut bindings, environment)).collect();
+                let new = make.call(&function, std::iter::once(place.reader.clone()).chain(args));
+                make.let_in_order(bindings, vec![place.write(new)])
+            }
+            Change::Push(function, item, args) => {
+                // In front of a variable, the item is evaluated first in any case.
+                let item = if place.is_variable() && args.iter().all(is_inert) {
+                    item
+                } else {
+                    bind(&item, &mut bindings, environment)
+                };
+                bindings.extend(place.temporaries.iter().cloned());
+                let args: Vec<Datum> = args.iter().map(|arg| bind(arg, &mut bindings, environment)).collect();
+                let new = make.call(&function, [item, place.reader.clone()].into_iter().chain(args));
+                make.let_in_order(bindings, vec![place.write(new)])
+            }
+            Change::Pop => {
+                let old = make.fresh(environment, "OLD");
+                bindings.extend(place.temporaries.iter().cloned());
+                bindings.push((old.clone(), place.reader.clone()));
+                let new = place.write(make.call_cl("CDR", [old.clone()]));
+                make.let_in_order(bindings, vec![new, make.call_cl("CAR", [old])])
+            }
+            Change::Remf(indicator) => {
+                bindings.extend(place.temporaries.iter().cloned());
+                let indicator = bind(&indicator, &mut bindings, environment);
+                let list = make.fresh(environment, "LIST");
+                let found = make.fresh(environment, "FOUND");
+                let names = make.list([list.clone(), found.clone()]);
+                let removed = make.call_esl("%REMF", [place.reader.clone(), indicator]);
+                let store = make.cl("MULTIPLE-VALUE-BIND", [names, removed, place.write(list), found]);
+                make.let_in_order(bindings, vec![store])
+            }
+            Change::Bound { old, bindings: further, new, result } => {
+                bindings.extend(place.temporaries.iter().cloned());
+                bindings.extend(further);
+                bindings.push((old, place.reader.clone()));
+                let mut body = vec![place.write(new)];
+                body.extend(result);
+                make.let_in_order(bindings, body)
+            }
+        }
+    }
+
+    /// Whether `form` is a variable, reading which has no effect.
+    fn is_plain_variable(&self, form: &Datum) -> bool {
+        let is_macro = |symbol| match self.scope.variable(symbol, self.level()) {
+            Visible::Is(Variable::Lexical(_)) => false,
+            Visible::Is(_) | Visible::No | Visible::OutOfReach => true,
+        };
+        form.as_symbol().is_some_and(|symbol| !is_macro(symbol))
+    }
+}
+
+/// Whether it does not matter when, or whether, a form is evaluated.
+fn is_inert(form: &Datum) -> bool {
+    is_constant(form) || is_cl_form(form, "FUNCTION") || is_cl_form(form, "LAMBDA")
+}
+
+/// Binds all temporaries and values in order, then stores the values, then gives `result`.
+fn store_all(places: &[Place], values: &[Datum], result: Option<Datum>, make: Make) -> Datum {
+    let mut body: Vec<Datum> = places.iter().map(Place::write_stores).collect();
+    body.push(result.unwrap_or_else(|| make.nil()));
+    let mut bindings: Vec<(Datum, Datum)> = Vec::new();
+    // From the last place to the first, so that a place with several values can enclose those after it.
+    for (place, value) in places.iter().zip(values).rev() {
+        if let [store] = place.stores.as_slice() {
+            let own = place.temporaries.iter().cloned().chain([(store.clone(), value.clone())]);
+            bindings.splice(0..0, own);
+        } else {
+            let inside = make.let_in_order(std::mem::take(&mut bindings), std::mem::take(&mut body));
+            let stores = make.items(place.stores.iter().cloned());
+            body = vec![make.cl("MULTIPLE-VALUE-BIND", [stores, value.clone(), inside])];
+            bindings = place.temporaries.clone();
+        }
+    }
+    make.let_in_order(bindings, body)
+}
+
+/// All subforms, then the values read in order, then stored one place on.
+fn rotate(places: &[Place], make: Make) -> Datum {
+    let temporaries: Vec<(Datum, Datum)> =
+        places.iter().flat_map(|place| place.temporaries.iter().cloned()).collect();
+    let mut body: Vec<Datum> = places.iter().map(Place::write_stores).collect();
+    body.push(make.nil());
+    // The place before each takes its value; the last takes the first one's, which is read first.
+    let mut inside = make.progn(body);
+    for (index, place) in places.iter().enumerate().rev() {
+        let taker = &places[(index + places.len() - 1) % places.len()];
+        inside = bind_stores(taker, place.reader.clone(), inside, make);
+    }
+    make.let_in_order(temporaries, vec![inside])
+}
+
+/// As [`rotate`], the last place taking the value of a form, and the first one's old value the result.
+fn shift(places: &[Place], value: Datum, old: Datum, make: Make) -> Datum {
+    let temporaries: Vec<(Datum, Datum)> =
+        places.iter().flat_map(|place| place.temporaries.iter().cloned()).collect();
+    let Some((first, others)) = places.split_first() else { return value };
+    let is_single = first.stores.len() == 1;
+    let mut body: Vec<Datum> = places.iter().map(Place::write_stores).collect();
+    body.push(if is_single { old.clone() } else { make.call_cl("VALUES-LIST", [old.clone()]) });
+    let mut inside = make.progn(body);
+    let readers: Vec<Datum> = others.iter().map(|place| place.reader.clone()).chain([value]).collect();
+    for (taker, value) in places.iter().zip(readers).rev() {
+        inside = bind_stores(taker, value, inside, make);
+    }
+    let reader = first.reader.clone();
+    let kept = if is_single { reader } else { make.cl("MULTIPLE-VALUE-LIST", [reader]) };
+    let bindings = temporaries.into_iter().chain([(old, kept)]).collect();
+    make.let_in_order(bindings, vec![inside])
+}
+
+fn bind_stores(place: &Place, value: Datum, inside: Datum, make: Make) -> Datum {
+    match place.stores.as_slice() {
+        [store] => make.let_in_order(vec![(store.clone(), value)], vec![inside]),
+        stores => make.cl("MULTIPLE-VALUE-BIND", [make.items(stores.iter().cloned()), value, inside]),
+    }
+}
+
+/// `(setf {place form}*)`
+pub(super) fn setf(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    let make = Make(to.span);
+    match form.args.as_slice() {
+        [place, value] => {
+            let usage = PlaceUse::Setf(value.clone());
+            machine.schedule([Job::Place(place.clone(), to), Job::Use(Box::new(usage), to)]);
+        }
+        args if args.len() % 2 == 1 => return Err(form.malformed("needs a value for each place")),
+        args => {
+            let pairs: Vec<Datum> =
+                args.chunks(2).map(|pair| make.cl("SETF", pair.iter().cloned())).collect();
+            let jobs = machine.body(pairs, to);
+            machine.schedule(jobs);
+        }
+    }
+    Ok(())
+}
+
+/// `(psetf {place form}*)`
+pub(super) fn psetf(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    if form.args.len() % 2 == 1 {
+        return Err(form.malformed("needs a value for each place"));
+    }
+    let mut jobs: Vec<Job> = form.args.iter().step_by(2).map(|place| Job::Place(place.clone(), to)).collect();
+    let values = form.args.iter().skip(1).step_by(2).cloned().collect();
+    jobs.push(Job::Use(Box::new(PlaceUse::Psetf(values)), to));
+    machine.schedule(jobs);
+    Ok(())
+}
+
+/// `(rotatef place*)`
+pub(super) fn rotatef(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    if form.args.is_empty() {
+        machine.fill(to, NodeKind::Constant(Datum::nil(to.span)));
+        return Ok(());
+    }
+    let count = form.args.len();
+    let mut jobs: Vec<Job> = form.args.into_iter().map(|place| Job::Place(place, to)).collect();
+    jobs.push(Job::Use(Box::new(PlaceUse::Rotatef(count)), to));
+    machine.schedule(jobs);
+    Ok(())
+}
+
+/// `(shiftf place+ form)`
+pub(super) fn shiftf(machine: &mut Machine, _: &mut dyn Environment, mut form: Form, to: To) -> Checked {
+    form.takes(2..=usize::MAX, "needs at least one place and a form")?;
+    let value = form.args.pop().expect("the number of arguments was checked");
+    let count = form.args.len();
+    let mut jobs: Vec<Job> = form.args.into_iter().map(|place| Job::Place(place, to)).collect();
+    jobs.push(Job::Use(Box::new(PlaceUse::Shiftf(count, value)), to));
+    machine.schedule(jobs);
+    Ok(())
+}
+
+fn change(machine: &mut Machine, place: &Datum, change: Change, to: To) -> Checked {
+    machine.schedule([Job::Place(place.clone(), to), Job::Use(Box::new(PlaceUse::Modify(change)), to)]);
+    Ok(())
+}
+
+/// `(incf place [delta])`
+pub(super) fn incf(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    add(machine, &form, "+", to)
+}
+
+/// `(decf place [delta])`
+pub(super) fn decf(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    add(machine, &form, "-", to)
+}
+
+fn add(machine: &mut Machine, form: &Form, function: &str, to: To) -> Checked {
+    form.takes(1..=2, "takes a place and at most one form")?;
+    let delta = form.args.get(1).cloned().unwrap_or_else(|| Datum::integer(1, to.span));
+    change(machine, &form.args[0], Change::Call(Symbol::cl(function), vec![delta]), to)
+}
+
+/// `(push item place)`
+pub(super) fn push(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    form.takes(2..=2, "takes an item and a place")?;
+    change(machine, &form.args[1], Change::Push(Symbol::cl("CONS"), form.args[0].clone(), Vec::new()), to)
+}
+
+/// `(pushnew item place . keys)`
+pub(super) fn pushnew(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    form.takes(2..=usize::MAX, "takes an item, a place and keyword arguments")?;
+    let keys = form.args[2..].to_vec();
+    change(machine, &form.args[1], Change::Push(Symbol::cl("ADJOIN"), form.args[0].clone(), keys), to)
+}
+
+/// `(pop place)`
+pub(super) fn pop(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    form.takes(1..=1, "takes a place")?;
+    change(machine, &form.args[0], Change::Pop, to)
+}
+
+/// `(remf place indicator)`
+pub(super) fn remf(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    form.takes(2..=2, "takes a place and an indicator")?;
+    change(machine, &form.args[0], Change::Remf(form.args[1].clone()), to)
+}
+
+/// `(%modify (old (name form)*) place new [result])`: evaluates the subforms of the place, then binds the names to the
+/// forms one after another, then `old` to the old value, and stores the value of `new`. Gives that value, or those of
+/// `result`, which is evaluated last.
+pub(super) fn modify(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    form.takes(3..=4, "takes names, a place, the new value and at most one result")?;
+    let names = form.args[0].as_list().unwrap_or_default();
+    let Some((old, further)) =
+        names.split_first().filter(|(old, _)| matches!(old.kind(), DatumKind::Symbol(_)))
+    else {
+        return Err(form.malformed("needs a name for the old value"));
+    };
+    let mut bindings = Vec::new();
+    for binding in further {
+        match binding.as_list().as_deref() {
+            Some([name, value]) if name.as_symbol().is_some() => {
+                bindings.push(((*name).clone(), (*value).clone()))
+            }
+            _ => return Err(form.malformed_at(binding.span(), "needs one name and one form in each binding")),
+        }
+    }
+    let result = form.args.get(3).cloned();
+    let bound = Change::Bound { old: (*old).clone(), bindings, new: form.args[2].clone(), result };
+    change(machine, &form.args[1], bound, to)
+}

@@ -1,0 +1,234 @@
+//! What can be said of a compilation unit only at its end: which of the functions and variables that it uses nobody
+//! has defined, and which calls do not fit their functions.
+
+use esl_bytecode::compile::{Arity, Environment, GlobalFunction, GlobalVariable};
+use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use super::form::name;
+use crate::diagnostic::code;
+
+/// How many uses of an undefined name are shown besides the first.
+const SHOWN: usize = 3;
+
+/// A call of a global function.
+#[derive(Debug)]
+struct Call {
+    function: Name,
+    /// Number of arguments; `None` if it is not known, or the function is only referred to.
+    arguments: Option<u32>,
+    span: Span,
+}
+
+/// The name of a global function.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(super) struct Name {
+    /// The symbol, in the case of `(setf f)` the symbol `f`.
+    pub(super) symbol: Symbol,
+    /// Whether it is `(setf symbol)`.
+    pub(super) is_setf: bool,
+}
+
+impl Name {
+    pub(super) fn plain(symbol: &Symbol) -> Name {
+        Name { symbol: symbol.clone(), is_setf: false }
+    }
+
+    pub(super) fn setf(symbol: &Symbol) -> Name {
+        Name { symbol: symbol.clone(), is_setf: true }
+    }
+
+    /// The name as messages show it.
+    pub(super) fn shown(&self) -> String {
+        if self.is_setf {
+            format!("`(setf {})`", super::form::plain(&self.symbol))
+        } else {
+            name(&self.symbol)
+        }
+    }
+}
+
+/// Uses and definitions of global names in a compilation unit.
+#[derive(Debug, Default)]
+pub(super) struct Unit {
+    calls: Vec<Call>,
+    variables: Vec<(Symbol, Span)>,
+    /// Functions that the unit defines; without an arity if there are several that differ.
+    functions: FxHashMap<Name, Option<Arity>>,
+    /// Macros whose definitions are wrong: calls of them are not looked at.
+    broken_macros: FxHashSet<Symbol>,
+}
+
+impl Unit {
+    /// Notes a call or a reference.
+    pub(super) fn note_call(&mut self, function: Name, arguments: Option<usize>, span: Span) {
+        let arguments = arguments.map(|count| u32::try_from(count).unwrap_or(u32::MAX));
+        self.calls.push(Call { function, arguments, span });
+    }
+
+    /// Notes a use of a variable that nobody has defined so far.
+    pub(super) fn note_variable(&mut self, symbol: &Symbol, span: Span) {
+        self.variables.push((symbol.clone(), span));
+    }
+
+    /// Notes a definition.
+    pub(super) fn note_definition(&mut self, function: Name, arity: Arity) {
+        self.functions
+            .entry(function)
+            .and_modify(|known| {
+                if *known != Some(arity) {
+                    *known = None;
+                }
+            })
+            .or_insert(Some(arity));
+    }
+
+    /// Notes that the definition of a function is wrong: calls of it are not looked at.
+    pub(super) fn note_broken_function(&mut self, function: Name) {
+        self.functions.insert(function, None);
+    }
+
+    /// Notes that the definition of a macro is wrong.
+    pub(super) fn note_broken_macro(&mut self, symbol: &Symbol) {
+        self.broken_macros.insert(symbol.clone());
+    }
+
+    /// Whether the definition of this macro is wrong.
+    pub(super) fn is_broken_macro(&self, symbol: &Symbol) -> bool {
+        self.broken_macros.contains(symbol)
+    }
+
+    /// What is to be said at the end of the unit.
+    pub(super) fn finish(&mut self, environment: &dyn Environment) -> Vec<Diagnostic> {
+        let mut findings = Vec::new();
+        let mut undefined: Vec<(Name, Vec<Span>)> = Vec::new();
+        let mut known: FxHashMap<Name, usize> = FxHashMap::default();
+        for call in std::mem::take(&mut self.calls) {
+            let arity = match self.functions.get(&call.function) {
+                Some(arity) => *arity,
+                None => match global(environment, &call.function) {
+                    GlobalFunction::Function(arity) => arity,
+                    // A call made before the macro was defined; the call fails when it is made.
+                    GlobalFunction::Macro => {
+                        let message =
+                            format!("{} is used as a function here, and a macro", call.function.shown());
+                        findings.push(
+                            code::UNDEFINED_FUNCTION.at(call.span, message).help("define the macro first"),
+                        );
+                        continue;
+                    }
+                    GlobalFunction::Undefined => {
+                        match known.get(&call.function) {
+                            Some(&index) => undefined[index].1.push(call.span),
+                            None => {
+                                known.insert(call.function.clone(), undefined.len());
+                                undefined.push((call.function, vec![call.span]));
+                            }
+                        }
+                        continue;
+                    }
+                },
+            };
+            if let (Some(arity), Some(count)) = (arity, call.arguments)
+                && !accepts(arity, count)
+            {
+                findings.push(wrong_count(&call.function.shown(), arity, count, call.span));
+            }
+        }
+        findings.extend(
+            undefined.into_iter().map(|(function, uses)| undefined_function(environment, &function, &uses)),
+        );
+        findings.extend(self.undefined_variables(environment));
+        findings
+    }
+
+    fn undefined_variables(&mut self, environment: &dyn Environment) -> Vec<Diagnostic> {
+        let mut uses: Vec<(Symbol, Vec<Span>)> = Vec::new();
+        let mut known: FxHashMap<Symbol, usize> = FxHashMap::default();
+        for (symbol, span) in std::mem::take(&mut self.variables) {
+            if !matches!(environment.global(&symbol).variable, GlobalVariable::Undefined) {
+                continue;
+            }
+            let index = *known.entry(symbol.clone()).or_insert(uses.len());
+            match uses.get_mut(index) {
+                Some((_, spans)) => spans.push(span),
+                None => uses.push((symbol, vec![span])),
+            }
+        }
+        uses.into_iter()
+            .map(|(symbol, spans)| {
+                let message = format!("no variable is called {}", name(&symbol));
+                let diagnostic = with_uses(code::UNDEFINED_VARIABLE.at(spans[0], message), &spans[1..]);
+                with_similar(environment, diagnostic, &symbol, true)
+            })
+            .collect()
+    }
+}
+
+fn global(environment: &dyn Environment, function: &Name) -> GlobalFunction {
+    if function.is_setf {
+        environment.setf_function(&function.symbol)
+    } else {
+        environment.global(&function.symbol).function
+    }
+}
+
+fn undefined_function(environment: &dyn Environment, function: &Name, uses: &[Span]) -> Diagnostic {
+    if !function.is_setf
+        && let Some(instead) = environment.global(&function.symbol).instead
+    {
+        let message = format!("{} is not part of ESL", function.shown());
+        return Diagnostic::warning(code::NOT_IN_SUBSET.name, message, uses[0]).help(instead);
+    }
+    let message = format!("no function is called {}", function.shown());
+    let diagnostic = with_uses(code::UNDEFINED_FUNCTION.at(uses[0], message), &uses[1..]);
+    if function.is_setf {
+        let place = super::form::plain(&function.symbol);
+        return diagnostic
+            .help(format!("define it with `(defun (setf {place}) (value …) …)` or `(defsetf {place} …)`"));
+    }
+    with_similar(environment, diagnostic, &function.symbol, false)
+}
+
+fn with_uses(mut diagnostic: Diagnostic, further: &[Span]) -> Diagnostic {
+    for &span in further.iter().filter(|span| **span != diagnostic.primary.span).take(SHOWN) {
+        diagnostic.secondary.push(esl_bytecode::diagnostic::Label { span, text: "and here".into() });
+    }
+    diagnostic
+}
+
+fn with_similar(
+    environment: &dyn Environment,
+    diagnostic: Diagnostic,
+    symbol: &Symbol,
+    variable: bool,
+) -> Diagnostic {
+    match environment.similar(symbol, variable).first() {
+        Some(similar) => diagnostic.help(format!("did you mean {}?", name(similar))),
+        None => diagnostic,
+    }
+}
+
+/// Whether a function of this arity takes `count` arguments.
+pub(super) fn accepts(arity: Arity, count: u32) -> bool {
+    count >= arity.min && arity.max.is_none_or(|max| count <= max)
+}
+
+/// The warning about a call with the wrong number of arguments.
+pub(super) fn wrong_count(function: &str, arity: Arity, count: u32, span: Span) -> Diagnostic {
+    let takes = match (arity.min, arity.max) {
+        (0, Some(0)) => "no arguments".to_string(),
+        (min, Some(max)) if min == max => arguments(min),
+        (0, Some(max)) => format!("at most {}", arguments(max)),
+        (min, None) => format!("at least {}", arguments(min)),
+        (min, Some(max)) => format!("{min} to {}", arguments(max)),
+    };
+    let message = format!("{function} takes {takes}, but is given {count}");
+    code::WRONG_ARGUMENT_COUNT.at(span, message)
+}
+
+fn arguments(count: u32) -> String {
+    if count == 1 { "1 argument".to_string() } else { format!("{count} arguments") }
+}

@@ -1,0 +1,211 @@
+//! Compilations: from a text, or from a form, to a module.
+//!
+//! A compilation takes one top-level form after another through the reader, the expander and the lowering. Each becomes
+//! a chunk, a small module; those that are needed at compile time are loaded at once ([`Step::Load`]), and all that
+//! belong to the program are joined at the end. Everything that is found on the way is reported together, in the order
+//! of the text; an error in one form does not keep the others from being looked at.
+//!
+//! Not here: running anything. Whoever drives the compilation does that, see [`esl_bytecode::compile`].
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use esl_bytecode::compile::{Answer, Compilation, Compile, Environment, Step};
+use esl_bytecode::datum::Datum;
+use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::link::join;
+use esl_bytecode::module::Module;
+use esl_bytecode::span::SourceId;
+
+use crate::diagnostic::{Renderer, Sources};
+use crate::expand::{Chunk, Event, Expander};
+use crate::lower::{SourceLines, lower};
+use crate::reader::{Reader, read_datum};
+
+/// The compiler.
+#[derive(Debug, Default)]
+pub struct Compiler {
+    /// The number that diagnostics give to the source.
+    source: SourceId,
+    is_library: bool,
+    /// The text that was compiled last, for drawing its diagnostics.
+    sources: Arc<Mutex<Sources>>,
+}
+
+impl Compiler {
+    /// A compiler whose diagnostics call the text that it is given source number `source`.
+    pub fn for_source(source: SourceId) -> Compiler {
+        Compiler { source, ..Compiler::default() }
+    }
+
+    /// The same, for the library, which may define what belongs to the language.
+    #[must_use]
+    pub fn for_library(self) -> Compiler {
+        Compiler { is_library: true, ..self }
+    }
+
+    fn session(&self, input: Input, lines: SourceLines) -> Session {
+        Session {
+            input,
+            source: self.source,
+            lines,
+            expander: Expander::new(self.is_library),
+            chunks: Vec::new(),
+            diagnostics: Vec::new(),
+        }
+    }
+}
+
+impl Compile for Compiler {
+    fn compile_form(&self, form: Datum) -> Box<dyn Compilation> {
+        Box::new(self.session(Input::Form(Some(form)), SourceLines::new()))
+    }
+
+    fn compile_text(&self, name: &str, text: &str) -> Box<dyn Compilation> {
+        let text: Arc<str> = text.into();
+        let mut sources = Sources::new();
+        for _ in 0..self.source.0 {
+            sources.add("", None);
+        }
+        sources.add(name, Some(text.clone()));
+        *self.sources.lock().unwrap_or_else(PoisonError::into_inner) = sources;
+        let mut lines = SourceLines::new();
+        let source = lines.add(name, text.clone());
+        Box::new(self.session(Input::Text(Reader::new(source, text)), lines))
+    }
+
+    fn read(
+        &self,
+        environment: &mut dyn Environment,
+        text: &str,
+        start: usize,
+    ) -> Result<(Option<Datum>, usize), Box<Diagnostic>> {
+        read_datum(environment, text, start)
+    }
+
+    fn render(&self, diagnostic: &Diagnostic) -> String {
+        let sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
+        Renderer::default().render(diagnostic, &sources)
+    }
+}
+
+/// Where forms come from.
+#[derive(Debug)]
+enum Input {
+    /// A text, all forms of which are compiled.
+    Text(Reader),
+    /// A form to be evaluated.
+    Form(Option<Datum>),
+}
+
+/// A compilation under way.
+struct Session {
+    input: Input,
+    source: SourceId,
+    lines: SourceLines,
+    expander: Expander,
+    /// What belongs to the program.
+    chunks: Vec<Module>,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl Compilation for Session {
+    fn step(
+        &mut self,
+        environment: &mut dyn Environment,
+        answer: Answer,
+        charge: &mut dyn FnMut(u64),
+    ) -> Step {
+        self.expander.answer(answer);
+        loop {
+            match self.expander.run(environment, charge) {
+                Event::Macro(call) => return Step::Expand(call),
+                Event::Chunk(chunk) => {
+                    if let Some(step) = self.chunk(*chunk, charge) {
+                        return step;
+                    }
+                }
+                Event::Done => {
+                    self.diagnostics.extend(self.expander.take_diagnostics());
+                    if !self.next_form(environment) {
+                        return self.finish(environment);
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Session {
+    /// Begins the next form, if there is one.
+    fn next_form(&mut self, environment: &mut dyn Environment) -> bool {
+        match &mut self.input {
+            Input::Form(form) => match form.take() {
+                Some(form) => {
+                    self.expander.begin_evaluation(form);
+                    true
+                }
+                None => false,
+            },
+            Input::Text(reader) => {
+                while let Some(read) = reader.next(environment) {
+                    match read {
+                        Ok(form) => {
+                            self.expander.begin_file_form(form);
+                            return true;
+                        }
+                        Err(diagnostic) => self.diagnostics.push(*diagnostic),
+                    }
+                }
+                false
+            }
+        }
+    }
+
+    /// Lowers a chunk, and keeps it or has it loaded, or both.
+    fn chunk(&mut self, chunk: Chunk, charge: &mut dyn FnMut(u64)) -> Option<Step> {
+        let Chunk { core, purpose } = chunk;
+        charge(core.nodes.len() as u64);
+        let module = match lower(&core, &self.lines) {
+            Ok(module) => module,
+            Err(diagnostics) => {
+                self.diagnostics.extend(diagnostics);
+                if purpose.load || purpose.keep {
+                    self.expander.answer(Answer::Start);
+                }
+                return None;
+            }
+        };
+        match (purpose.load, purpose.emit) {
+            (true, true) => {
+                self.chunks.push(module.clone());
+                Some(Step::Load { module, keep: purpose.keep })
+            }
+            (true, false) => Some(Step::Load { module, keep: purpose.keep }),
+            (false, _) => {
+                self.chunks.push(module);
+                None
+            }
+        }
+    }
+
+    /// Ends the compilation.
+    fn finish(&mut self, environment: &mut dyn Environment) -> Step {
+        self.diagnostics.extend(self.expander.finish(environment));
+        let mut diagnostics = std::mem::take(&mut self.diagnostics);
+        diagnostics.sort_by_key(|diagnostic| (diagnostic.primary.span.start, diagnostic.primary.span.end));
+        for diagnostic in &mut diagnostics {
+            self.renumber(diagnostic);
+        }
+        let has_failed = diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error);
+        let module = (!has_failed).then(|| join(std::mem::take(&mut self.chunks)));
+        Step::Done(module, diagnostics)
+    }
+
+    /// Within the compilation, its source has the number 0.
+    fn renumber(&self, diagnostic: &mut Diagnostic) {
+        diagnostic.primary.span.source = self.source;
+        for label in &mut diagnostic.secondary {
+            label.span.source = self.source;
+        }
+    }
+}

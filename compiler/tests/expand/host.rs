@@ -1,0 +1,213 @@
+//! A compile-time host without a virtual machine: macros are Rust functions on data, modules are only counted.
+
+use std::collections::HashMap;
+
+use esl_bytecode::compile::{
+    Accessor, Arity, CompileTimeHost, Environment, Global, GlobalFunction, GlobalVariable, InternError,
+    MacroCall, MacroRef,
+};
+use esl_bytecode::datum::{Datum, ObjectId};
+use esl_bytecode::module::{Constant, Module};
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+use esl_compiler::reader::{BareEnvironment, read_datum};
+
+/// A macro: takes the form, gives the expansion or the text of a failure.
+pub type Macro = Box<dyn FnMut(&mut BareEnvironment, &[Datum]) -> Result<Datum, String> + Send>;
+
+/// The host.
+pub struct FakeHost {
+    pub bare: BareEnvironment,
+    pub globals: HashMap<Symbol, Global>,
+    pub setf_functions: Vec<Symbol>,
+    pub properties: HashMap<(Symbol, Symbol), Datum>,
+    pub macros: HashMap<Symbol, Macro>,
+    /// The functions of local macros, in the order in which they will be loaded.
+    pub local_macros: Vec<Macro>,
+    objects: usize,
+    /// What was loaded: whether to keep, and the symbols among the constants.
+    pub loaded: Vec<(bool, String)>,
+}
+
+impl FakeHost {
+    pub fn new() -> FakeHost {
+        let mut host = FakeHost {
+            bare: BareEnvironment::new(),
+            globals: HashMap::new(),
+            setf_functions: Vec::new(),
+            properties: HashMap::new(),
+            macros: HashMap::new(),
+            local_macros: Vec::new(),
+            objects: 0,
+            loaded: Vec::new(),
+        };
+        host.define_macro("when", "(if #1 (progn . #2...))");
+        host.define_macro("dolist", "(block nil (let ((rest nil)) (tagbody again . #2...)))");
+        host.define_macro("twice", "(progn #1 #1)");
+        host.define_macro("endless", "(endless)");
+        host.define_macro("wrong", "(let 5)");
+        host.define_macro("first-of", "(car #1)");
+        let failing = host.symbol("failing");
+        host.globals.entry(failing.clone()).or_default().function = GlobalFunction::Macro;
+        host.macros.insert(failing, Box::new(|_, _| Err("it did not work".into())));
+        host.function("f", 1, Some(1));
+        host.function("g", 0, None);
+        host.function("getf", 2, Some(3));
+        for name in
+            ["nthcdr", "dpb", "ldb", "replace", "subseq", "adjoin", "gethash", "print", "find-package"]
+        {
+            host.function(name, 0, None);
+        }
+        for name in
+            ["esl::%putf", "esl::%remf", "esl::%check-arguments", "esl::%check-keys", "esl::%key-tail"]
+        {
+            host.function(name, 0, None);
+        }
+        for name in ["*x*", "*y*", "*package*"] {
+            let symbol = host.symbol(name);
+            host.globals.entry(symbol).or_default().variable = GlobalVariable::Special;
+        }
+        let pi = Datum::integer(3, Span::default());
+        let limit = host.symbol("limit");
+        host.globals.entry(limit).or_default().variable = GlobalVariable::Constant(pi);
+        let car = Symbol::cl("CAR");
+        host.globals.entry(car).or_default().locked = true;
+        let accessor = Accessor { class: host.symbol("point"), slot: 1, read_only: false };
+        let point_y = host.symbol("point-y");
+        host.function("point-y", 1, Some(1));
+        host.globals.entry(point_y).or_default().accessor = Some(accessor);
+        let fixed = Accessor { class: host.symbol("point"), slot: 0, read_only: true };
+        let point_x = host.symbol("point-x");
+        host.globals.entry(point_x).or_default().accessor = Some(fixed);
+        let open = host.symbol("open-file");
+        host.globals.entry(open).or_default().instead = Some("use `with-input-from-string`".into());
+        host
+    }
+
+    pub fn read(&mut self, text: &str) -> Datum {
+        let (datum, _) = read_datum(&mut self.bare, text, 0).expect("the text reads");
+        without_spans(&datum.expect("there is a datum"))
+    }
+
+    pub fn symbol(&mut self, name: &str) -> Symbol {
+        self.read(name).as_symbol().expect("a symbol").clone()
+    }
+
+    pub fn function(&mut self, name: &str, min: u32, max: Option<u32>) {
+        let symbol = self.symbol(name);
+        self.globals.entry(symbol).or_default().function = GlobalFunction::Function(Some(Arity { min, max }));
+    }
+
+    pub fn property(&mut self, symbol: &str, indicator: &str, value: &str) {
+        let key = (self.symbol(symbol), self.symbol(indicator));
+        let value = self.read(value);
+        self.properties.insert(key, value);
+    }
+
+    /// A macro by template: `#1` stands for the first argument, `(… . #2...)` for those from the second on.
+    pub fn define_macro(&mut self, name: &str, template: &str) {
+        let symbol = self.symbol(name);
+        self.globals.entry(symbol.clone()).or_default().function = GlobalFunction::Macro;
+        let expander = self.template(template);
+        self.macros.insert(symbol, expander);
+    }
+
+    pub fn template(&mut self, template: &str) -> Macro {
+        let template = self.read(&template.replace('#', "argument-"));
+        Box::new(move |_, args| Ok(fill(&template, args)))
+    }
+}
+
+/// What a program's data look like: no place in the source.
+pub fn without_spans(datum: &Datum) -> Datum {
+    use esl_bytecode::datum::DatumKind;
+    let none = Span::default();
+    match datum.kind() {
+        DatumKind::Cons(car, cdr) => Datum::cons(without_spans(car), without_spans(cdr), none),
+        kind => Datum::new(kind.clone(), none),
+    }
+}
+
+fn fill(template: &Datum, args: &[Datum]) -> Datum {
+    if let Some(symbol) = template.as_symbol()
+        && let Some(number) = symbol.name().strip_prefix("ARGUMENT-")
+    {
+        return match number.strip_suffix("...") {
+            Some(number) => {
+                let from = number.parse::<usize>().expect("a number") - 1;
+                Datum::list(args.get(from..).unwrap_or_default().to_vec(), Span::default())
+            }
+            None => {
+                let index = number.parse::<usize>().expect("a number") - 1;
+                args.get(index).cloned().unwrap_or_else(|| Datum::nil(Span::default()))
+            }
+        };
+    }
+    match template.as_cons() {
+        Some((car, cdr)) => Datum::cons(fill(car, args), fill(cdr, args), Span::default()),
+        None => template.clone(),
+    }
+}
+
+impl Environment for FakeHost {
+    fn global(&self, symbol: &Symbol) -> Global {
+        self.globals.get(symbol).cloned().unwrap_or_default()
+    }
+
+    fn setf_function(&self, symbol: &Symbol) -> GlobalFunction {
+        let is_defined = self.setf_functions.contains(symbol);
+        if is_defined { GlobalFunction::Function(None) } else { GlobalFunction::Undefined }
+    }
+
+    fn property(&self, symbol: &Symbol, indicator: &Symbol) -> Option<Datum> {
+        self.properties.get(&(symbol.clone(), indicator.clone())).cloned()
+    }
+
+    fn intern(&mut self, package: Option<&str>, name: &str, internal: bool) -> Result<Symbol, InternError> {
+        self.bare.intern(package, name, internal)
+    }
+
+    fn fresh(&mut self) -> u32 {
+        self.bare.fresh()
+    }
+
+    fn similar(&self, symbol: &Symbol, variable: bool) -> Vec<Symbol> {
+        let is_like = |other: &&Symbol| {
+            let global = &self.globals[*other];
+            let is_defined = match variable {
+                true => !matches!(global.variable, GlobalVariable::Undefined),
+                false => global.function != GlobalFunction::Undefined,
+            };
+            is_defined && *other != symbol && other.name().get(..2) == symbol.name().get(..2)
+        };
+        let mut similar: Vec<Symbol> = self.globals.keys().filter(is_like).cloned().collect();
+        similar.sort_by(|a, b| a.name().cmp(b.name()));
+        similar
+    }
+}
+
+impl CompileTimeHost for FakeHost {
+    fn expand(&mut self, call: &MacroCall) -> Result<Datum, String> {
+        let args: Vec<Datum> = call.form.as_list().ok_or("no list")?.into_iter().skip(1).cloned().collect();
+        let expander = match &call.function {
+            MacroRef::Global(symbol) => self.macros.get_mut(symbol),
+            MacroRef::Local(ObjectId(number)) => self.local_macros.get_mut(*number as usize),
+        };
+        expander.ok_or("there is no such macro")?(&mut self.bare, &args)
+    }
+
+    fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, String> {
+        let symbols = module.constants.iter().filter_map(|constant| match constant {
+            Constant::Symbol(symbol) => Some(symbol.name().to_lowercase()),
+            _ => None,
+        });
+        let symbols: Vec<String> = symbols.collect();
+        // What the functions for definitions would do.
+        self.loaded.push((keep, symbols.join(" ")));
+        if keep {
+            self.objects += 1;
+            return Ok(Some(ObjectId(self.objects as u32 - 1)));
+        }
+        Ok(None)
+    }
+}
