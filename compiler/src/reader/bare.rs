@@ -1,39 +1,30 @@
 //! Reading without a program around it: for tests, fuzzing and tools.
 
-use std::sync::Arc;
-
 use esl_bytecode::compile::{Environment, Global, GlobalFunction, InternError};
 use esl_bytecode::datum::Datum;
+use esl_bytecode::package::{PackageId, Packages};
 use esl_bytecode::span::SourceId;
-use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol, USER_PACKAGE};
-use rustc_hash::FxHashMap;
+use esl_bytecode::symbol::Symbol;
 
 use super::{Reader, decode};
 
-/// An environment with the standard packages in which nothing is defined. A name without a package belongs to
-/// `ESL-USER`, `NIL` and `T` apart; every name of a package is external.
-#[derive(Debug, Default)]
+/// An environment with the standard packages, in `ESL-USER`, in which nothing is defined.
+#[derive(Clone, Debug)]
 pub struct BareEnvironment {
-    symbols: FxHashMap<String, Symbol>,
-    packages: FxHashMap<String, Arc<str>>,
+    packages: Packages,
     uninterned: u32,
 }
 
 impl BareEnvironment {
-    /// An environment without symbols.
+    /// An environment in which the standard packages are as at the start of a program.
     pub fn new() -> BareEnvironment {
-        BareEnvironment::default()
+        BareEnvironment { packages: Packages::standard(), uninterned: 0 }
     }
+}
 
-    fn package(&mut self, name: &str) -> Option<Arc<str>> {
-        let home = match name {
-            "CL" | CL_PACKAGE => CL_PACKAGE,
-            "KEYWORD" => KEYWORD_PACKAGE,
-            "ESL" => ESL_PACKAGE,
-            USER_PACKAGE => USER_PACKAGE,
-            _ => return None,
-        };
-        Some(self.packages.entry(home.into()).or_insert_with(|| home.into()).clone())
+impl Default for BareEnvironment {
+    fn default() -> BareEnvironment {
+        BareEnvironment::new()
     }
 }
 
@@ -50,19 +41,8 @@ impl Environment for BareEnvironment {
         None
     }
 
-    fn intern(&mut self, package: Option<&str>, name: &str, _: bool) -> Result<Symbol, InternError> {
-        if let Some(package) = package {
-            let home = self.package(package).ok_or_else(|| InternError::NoPackage(package.into()))?;
-            return Ok(Symbol::new(&home, name));
-        }
-        if let Some(symbol) = self.symbols.get(name) {
-            return Ok(symbol.clone());
-        }
-        let home = if matches!(name, "NIL" | "T") { CL_PACKAGE } else { USER_PACKAGE };
-        let home = self.package(home).expect("a standard package");
-        let symbol = Symbol::new(&home, name);
-        self.symbols.insert(name.into(), symbol.clone());
-        Ok(symbol)
+    fn intern(&mut self, package: Option<&str>, name: &str, internal: bool) -> Result<Symbol, InternError> {
+        self.packages.read(PackageId::USER, package, name, internal)
     }
 
     fn fresh(&mut self) -> u32 {

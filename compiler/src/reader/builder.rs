@@ -163,7 +163,12 @@ impl<'a> Builder<'a> {
             }
             Err(InternError::NotExternal { exists: false }) => {
                 let message = format!("the package `{prefix}` has no symbol `{}`", shorten(name));
-                self.fail(code::NOT_EXTERNAL.at(span, message))
+                let mut diagnostic = code::NOT_EXTERNAL.at(span, message);
+                let wanted = Symbol::new(&prefix.into(), name);
+                if let Some(similar) = self.environment.similar(&wanted, false).first() {
+                    diagnostic = diagnostic.help(format!("did you mean `{}`?", similar.name()));
+                }
+                self.fail(diagnostic)
             }
         }
     }

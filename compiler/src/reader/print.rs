@@ -6,7 +6,8 @@
 use std::fmt::Write;
 
 use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
-use esl_bytecode::symbol::{ESL_PACKAGE, Home, Symbol};
+use esl_bytecode::package::Qualifier;
+use esl_bytecode::symbol::{ESL_PACKAGE, Symbol};
 use logos::Logos;
 
 use super::character::CHARACTER_NAMES;
@@ -25,18 +26,27 @@ enum Work<'a> {
     Text(&'static str),
 }
 
-/// The text of `datum`. A symbol is written without its package if `is_visible` says that it reads back so.
-pub fn print(datum: &Datum, is_visible: &dyn Fn(&Symbol) -> bool) -> String {
+/// The text of `datum`. What stands before the name of a symbol is up to `qualifier`, usually
+/// [`Packages::qualifier`](esl_bytecode::package::Packages::qualifier).
+pub fn print(datum: &Datum, qualifier: &dyn Fn(&Symbol) -> Qualifier) -> String {
     let mut out = String::new();
     let mut work = vec![Work::Datum(datum, 0, false)];
     while let Some(item) = work.pop() {
         match item {
             Work::Text(text) => out.push_str(text),
             Work::Datum(datum, level, can_splice) => {
-                print_one(datum, level, can_splice, is_visible, &mut out, &mut work)
+                print_one(datum, level, can_splice, qualifier, &mut out, &mut work)
             }
             Work::Rest(rest, level) => match rest.kind() {
                 DatumKind::Nil => out.push(')'),
+                // `(a . ,b)` is `(a %unquote b)`.
+                DatumKind::Cons(car, cdr)
+                    if mark(car, cdr, level, false).is_some_and(|mark| mark.0 == ",") =>
+                {
+                    out.push_str(" . ");
+                    work.push(Work::Text(")"));
+                    work.push(Work::Datum(rest, level, false));
+                }
                 DatumKind::Cons(car, cdr) => {
                     out.push(' ');
                     work.push(Work::Rest(cdr, level));
@@ -60,7 +70,7 @@ fn print_one<'a>(
     datum: &'a Datum,
     level: u32,
     can_splice: bool,
-    is_visible: &dyn Fn(&Symbol) -> bool,
+    qualifier: &dyn Fn(&Symbol) -> Qualifier,
     out: &mut String,
     work: &mut Vec<Work<'a>>,
 ) {
@@ -68,7 +78,7 @@ fn print_one<'a>(
     let _ = match datum.kind() {
         DatumKind::Nil => write!(out, "NIL"),
         DatumKind::Symbol(symbol) => {
-            print_symbol(symbol, is_visible, out);
+            print_symbol(symbol, qualifier, out);
             Ok(())
         }
         DatumKind::Integer(value) => write!(out, "{value}"),
@@ -164,13 +174,17 @@ fn mark<'a>(
     }
 }
 
-fn print_symbol(symbol: &Symbol, is_visible: &dyn Fn(&Symbol) -> bool, out: &mut String) {
-    match symbol.home() {
-        Home::Uninterned(_) => out.push_str("#:"),
-        Home::Package(_) if symbol.is_keyword() => out.push(':'),
-        Home::Package(_) if is_visible(symbol) => {}
-        Home::Package(package) => {
-            print_name(package, out);
+fn print_symbol(symbol: &Symbol, qualifier: &dyn Fn(&Symbol) -> Qualifier, out: &mut String) {
+    match qualifier(symbol) {
+        Qualifier::None => {}
+        Qualifier::Keyword => out.push(':'),
+        Qualifier::Uninterned => out.push_str("#:"),
+        Qualifier::External(package) => {
+            print_name(&package, out);
+            out.push(':');
+        }
+        Qualifier::Internal(package) => {
+            print_name(&package, out);
             out.push_str("::");
         }
     }

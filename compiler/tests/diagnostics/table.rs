@@ -25,45 +25,12 @@ fn codes_are_words_joined_by_hyphens_and_differ() {
     assert_eq!(code::find("no-such-code"), None);
 }
 
-/// The codes that reading `program` reports. Packages are those of the language, and `CL` offers only `LIST`.
+/// The codes that reading `program` reports.
 fn reported(program: &str) -> Vec<&'static str> {
-    struct Strict(BareEnvironment);
-    use esl_bytecode::compile::{Environment, Global, GlobalFunction, InternError};
-    use esl_bytecode::datum::Datum;
-    use esl_bytecode::symbol::Symbol;
-    impl Environment for Strict {
-        fn global(&self, symbol: &Symbol) -> Global {
-            self.0.global(symbol)
-        }
-        fn setf_function(&self, symbol: &Symbol) -> GlobalFunction {
-            self.0.setf_function(symbol)
-        }
-        fn property(&self, symbol: &Symbol, indicator: &Symbol) -> Option<Datum> {
-            self.0.property(symbol, indicator)
-        }
-        fn intern(
-            &mut self,
-            package: Option<&str>,
-            name: &str,
-            internal: bool,
-        ) -> Result<Symbol, InternError> {
-            if package == Some("CL") && name != "LIST" {
-                return Err(InternError::NotExternal { exists: false });
-            }
-            self.0.intern(package, name, internal)
-        }
-        fn fresh(&mut self) -> u32 {
-            self.0.fresh()
-        }
-        fn similar(&self, symbol: &Symbol, variable: bool) -> Vec<Symbol> {
-            self.0.similar(symbol, variable)
-        }
-    }
-    let mut environment = Strict(BareEnvironment::new());
+    let mut environment = BareEnvironment::new();
     let mut reader = Reader::new(SourceId::default(), program);
-    std::iter::from_fn(|| reader.next(&mut environment))
-        .filter_map(|read| read.err().map(|error| error.code))
-        .collect()
+    let read = std::iter::from_fn(|| reader.next(&mut environment));
+    read.filter_map(|read| read.err().map(|error| error.code)).collect()
 }
 
 #[test]

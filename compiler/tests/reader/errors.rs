@@ -60,6 +60,7 @@ fn tokens_that_denote_nothing() {
 #[test]
 fn names_of_unknown_packages() {
     check("unknown-package", "(lisp:list foo::bar |a b|:c)");
+    check("not-external", "(cl:lst cl::lst cl:||)\nesl::own\nesl:own");
 }
 
 #[test]

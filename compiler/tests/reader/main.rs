@@ -11,7 +11,9 @@ mod tokens;
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::package::{PackageId, Packages, Qualifier};
 use esl_bytecode::span::SourceId;
+use esl_bytecode::symbol::USER_PACKAGE;
 use esl_compiler::diagnostic::{Renderer, Sources};
 use esl_compiler::reader::{BareEnvironment, Reader, print};
 
@@ -35,11 +37,12 @@ fn codes(text: &str) -> Vec<&'static str> {
     read_all(text).into_iter().filter_map(|read| read.err().map(|error| error.code)).collect()
 }
 
-/// A datum as text, packages shown where they are not the current one of [`BareEnvironment`].
+/// A datum as text, symbols of `ESL-USER` without the package.
 fn show(datum: &Datum) -> String {
-    print(datum, &|symbol| match symbol.name() {
-        "NIL" | "T" => symbol.is_cl("T"),
-        _ => symbol.is_in("ESL-USER"),
+    let packages = Packages::standard();
+    print(datum, &|symbol| match symbol.package() {
+        Some(home) if **home == *USER_PACKAGE => Qualifier::None,
+        _ => packages.qualifier(symbol, PackageId::USER),
     })
 }
 

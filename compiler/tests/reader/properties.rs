@@ -2,6 +2,7 @@
 
 use esl_bytecode::BigInt;
 use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::package::{CL_NAMES, PackageId, Packages};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::reader::lexer::Token;
@@ -28,11 +29,14 @@ fn symbols() -> impl Strategy<Value = Symbol> {
         "[a-zA-Z0-9 ().|\\\\:#'\",;éßλ\u{a0}\u{0}-]{0,6}",
         "[0-9+./e-]{1,5}",
     ];
-    (name, 0..4_u8).prop_map(|(name, package)| match package {
-        0 => Symbol::keyword(&name),
-        1 => Symbol::cl(&name),
-        2 => Symbol::esl(&name),
-        _ => Symbol::new(&"ESL-USER".into(), &name),
+    (name, 0..4_u8, prop::sample::select(CL_NAMES.to_vec())).prop_map(|(name, package, cl)| {
+        let in_package = |package| Packages::standard().intern(package, &name).0;
+        match package {
+            0 => Symbol::keyword(&name),
+            1 => Symbol::cl(cl),
+            2 => in_package(PackageId::ESL),
+            _ => in_package(PackageId::USER),
+        }
     })
 }
 
