@@ -325,4 +325,201 @@ define_builtins! {
     Backtrace = internal "%BACKTRACE" ("limit");
     /// Calls the embedder's function with this number.
     CallHost = internal "%CALL-HOST" ("number &rest arguments");
+
+    // ---- symbols
+    /// The name of a symbol, a string that is not to be changed.
+    SymbolName = cl "SYMBOL-NAME" ("symbol");
+    /// The home package of a symbol, or `NIL`.
+    SymbolPackage = cl "SYMBOL-PACKAGE" ("symbol");
+    /// The property list of a symbol.
+    SymbolPlist = cl "SYMBOL-PLIST" ("symbol");
+    /// Makes `plist` the property list of `symbol`, and returns it.
+    SetSymbolPlist = internal "%SET-SYMBOL-PLIST" ("symbol plist");
+    /// The property `indicator` of `symbol`, or `default`.
+    Get = cl "GET" ("symbol indicator &optional default") slowly "SLOW-GET";
+    /// Makes `value` the property `indicator` of `symbol`, and returns it.
+    Put = internal "%PUT" ("symbol indicator value") slowly "SLOW-PUT";
+    /// Removes the property `indicator` of `symbol`; whether it had one.
+    Remprop = cl "REMPROP" ("symbol indicator") slowly "SLOW-REMPROP";
+    /// The value of the special variable `symbol`.
+    SymbolValue = cl "SYMBOL-VALUE" ("symbol");
+    /// Sets the special variable `symbol`, and returns `value`.
+    Set = cl "SET" ("symbol value");
+    /// Whether the special variable `symbol` has a value.
+    Boundp = cl "BOUNDP" ("symbol");
+    /// Takes the value of the special variable `symbol` away.
+    Makunbound = cl "MAKUNBOUND" ("symbol");
+    /// Whether `name`, a symbol or `(setf symbol)`, names a global function or macro.
+    Fboundp = cl "FBOUNDP" ("name");
+    /// The global function, or macro function, named by `symbol`.
+    SymbolFunction = cl "SYMBOL-FUNCTION" ("symbol");
+    /// The global function, or macro function, named by `name`, a symbol or `(setf symbol)`.
+    Fdefinition = cl "FDEFINITION" ("name");
+    /// Takes the function or macro named by `name` away.
+    Fmakunbound = cl "FMAKUNBOUND" ("name");
+    /// The symbol that keeps the function called `name`: itself, or for `(setf symbol)` one of the same package.
+    FunctionCell = internal "%FUNCTION-CELL" ("name");
+    /// The macro function of `symbol`, global or in `environment`, or `NIL`.
+    MacroFunction = cl "MACRO-FUNCTION" ("symbol &optional environment");
+    /// Whether `symbol` is proclaimed special.
+    SpecialVariableP = internal "%SPECIAL-P" ("symbol");
+    /// Whether `symbol` is a constant.
+    ConstantSymbolP = internal "%CONSTANT-P" ("symbol");
+    /// Whether `symbol` belongs to the language and may not be redefined.
+    LockedP = internal "%LOCKED-P" ("symbol");
+    /// A fresh symbol without a package.
+    MakeSymbol = cl "MAKE-SYMBOL" ("name");
+    /// A fresh symbol without a package, named by `prefix` and a number: `*gensym-counter*`, or `prefix` itself.
+    Gensym = cl "GENSYM" ("&optional prefix");
+    /// The name of a function, as its definition gives it, or `NIL`.
+    FunctionName = internal "%FUNCTION-NAME" ("function");
+    /// The lambda list of a function as it was written.
+    FunctionLambdaList = internal "%FUNCTION-LAMBDA-LIST" ("function");
+    /// The documentation string of a function, or `NIL`.
+    FunctionDocumentation = internal "%FUNCTION-DOCUMENTATION" ("function");
+    /// The least and the greatest number of arguments of a function; `NIL` in place of the second without a limit.
+    FunctionArity = internal "%FUNCTION-ARITY" ("function");
+
+    // ---- packages
+    /// The package of this name or nickname, or `NIL`.
+    FindPackage = cl "FIND-PACKAGE" ("name");
+    /// Whether `object` is a package.
+    Packagep = cl "PACKAGEP" ("object");
+    /// The name of a package.
+    PackageName = cl "PACKAGE-NAME" ("package");
+    /// The other names of a package.
+    PackageNicknames = cl "PACKAGE-NICKNAMES" ("package");
+    /// The packages whose external symbols `package` inherits.
+    PackageUseList = cl "PACKAGE-USE-LIST" ("package");
+    /// All packages.
+    ListAllPackages = cl "LIST-ALL-PACKAGES" ("");
+    /// The package of this name, made if there is none, with these nicknames, and using these packages.
+    MakePackage = internal "%MAKE-PACKAGE" ("name nicknames uses");
+    /// Lets `package` inherit the external symbols of `packages`, a package or a list of packages.
+    UsePackage = cl "USE-PACKAGE" ("packages &optional package");
+    /// Makes `symbols`, a symbol or a list of symbols, external in `package`.
+    Export = cl "EXPORT" ("symbols &optional package");
+    /// Makes `symbols`, a symbol or a list of symbols, present in `package`.
+    Import = cl "IMPORT" ("symbols &optional package");
+    /// Gives `package` symbols of its own by these names.
+    Shadow = cl "SHADOW" ("names &optional package");
+    /// The symbol that `name` denotes in `package`, made if there is none; and how the package has it, `NIL` for new.
+    Intern = cl "INTERN" ("name &optional package");
+    /// The symbol that `name` denotes in `package`, and how the package has it; `NIL` twice if there is none.
+    FindSymbol = cl "FIND-SYMBOL" ("name &optional package");
+    /// All external symbols of a package, by name.
+    ExternalSymbols = internal "%EXTERNAL-SYMBOLS" ("package");
+    /// What is written before the name of a symbol in the current package: a string such as `:`, or `NIL`.
+    SymbolQualifier = internal "%SYMBOL-QUALIFIER" ("symbol");
+
+    // ---- structures and their classes
+    /// The class of this name, kept if it has these superclasses (classes or their names) and slots (symbols), else made.
+    MakeClass = internal "%MAKE-CLASS" ("name supers slots data");
+    /// The class of this name, or `NIL`.
+    FindClass = internal "%FIND-CLASS" ("name");
+    /// The class of a structure or condition, `NIL` for everything else.
+    ClassOf = internal "%CLASS-OF" ("object");
+    /// Whether `object` is a class.
+    Classp = internal "%CLASSP" ("object");
+    /// The name of a class.
+    ClassName = internal "%CLASS-NAME" ("class");
+    /// The direct superclasses of a class.
+    ClassSupers = internal "%CLASS-SUPERS" ("class");
+    /// The names of the slots of a class, inherited ones first.
+    ClassSlots = internal "%CLASS-SLOTS" ("class");
+    /// What the library keeps about a class.
+    ClassData = internal "%CLASS-DATA" ("class");
+    /// Makes `data` what the library keeps about a class, and returns it.
+    SetClassData = internal "%SET-CLASS-DATA" ("class data");
+    /// Whether `class` is `ancestor` or inherits from it.
+    SubclassP = internal "%SUBCLASS-P" ("class ancestor");
+    /// A fresh instance of a class, or of the class of that name. Slots without a value are `NIL`.
+    MakeStructure = internal "%MAKE-STRUCTURE" ("class &rest values");
+    /// A copy of a structure.
+    CopyStructure = cl "COPY-STRUCTURE" ("structure");
+    /// Whether `object` is an instance of some class.
+    Structurep = internal "%STRUCTUREP" ("object");
+    /// Slot `index` of a structure of any class.
+    StructureRef = internal "%STRUCTURE-REF" ("instance index");
+    /// Makes `value` slot `index` of a structure of any class, and returns `value`.
+    SetStructureRef = internal "%SET-STRUCTURE-REF" ("instance index value");
+    /// Records that the function `name` reads slot `slot` of the class named `class`. Comes after the function.
+    DefineAccessor = internal "%DEFINE-ACCESSOR" ("name class slot read-only");
+
+    // ---- reading and compiling at run time
+    /// A handle of the compilation of `form`.
+    BeginCompilation = internal "%BEGIN-COMPILATION" ("form");
+    /// A handle of a text that is compiled form by form.
+    OpenText = internal "%OPEN-TEXT" ("text");
+    /// A handle of the compilation of the next form of a text, `NIL` at its end.
+    NextForm = internal "%NEXT-FORM" ("handle");
+    /// Tells a compilation what became of its last step, and returns the next one: `:expand` function form environment,
+    /// `:load` functions keep, or `:done` functions diagnostics.
+    CompilationStep = internal "%COMPILATION-STEP" ("handle kind outcome");
+    /// Ends a compilation, or lets go of a text.
+    EndCompilation = internal "%END-COMPILATION" ("handle");
+    /// Reads a datum: whether there was one, or `:unfinished`; the datum; and the index after it.
+    ReadDatum = internal "%READ-FROM-STRING" ("string &optional start end");
+    /// Reads a datum from a stream: whether there was one, or `:unfinished`; and the datum.
+    ReadStream = internal "%READ" ("&optional stream");
+
+    // ---- streams
+    /// Standard input, output or error: 0, 1 or 2.
+    StandardStream = internal "%STANDARD-STREAM" ("number");
+    /// A stream that reads the characters of `string` from `start` to before `end`.
+    MakeStringInput = internal "%MAKE-STRING-INPUT" ("string start end");
+    /// How many characters of its string such a stream has read.
+    StringInputPosition = internal "%STRING-INPUT-POSITION" ("stream");
+    /// A stream that gathers what is written to it.
+    MakeStringOutput = internal "%MAKE-STRING-OUTPUT" ("");
+    /// What a string stream has gathered since this was last asked.
+    GetOutputStreamString = cl "GET-OUTPUT-STREAM-STRING" ("stream");
+    /// A stream that reads a text file.
+    OpenInput = internal "%OPEN-INPUT" ("path");
+    /// A stream that writes a text file: 0 replaces it, 1 appends to it, 2 fails if there is one.
+    OpenOutput = internal "%OPEN-OUTPUT" ("path mode");
+    /// Closes a stream; with `abort`, what it has gathered is dropped. Whether it was open.
+    CloseStream = internal "%CLOSE" ("stream abort");
+    /// The text of a file.
+    FileText = internal "%FILE-TEXT" ("path");
+    /// Whether there is a file of this name.
+    FileExistsP = internal "%FILE-EXISTS-P" ("path");
+    /// Removes a file.
+    DeleteFile = internal "%DELETE-FILE" ("path");
+    /// Whether `object` is a stream.
+    Streamp = cl "STREAMP" ("object");
+    /// Whether a stream can be read from.
+    InputStreamP = cl "INPUT-STREAM-P" ("stream");
+    /// Whether a stream can be written to.
+    OutputStreamP = cl "OUTPUT-STREAM-P" ("stream");
+    /// Whether a stream is open.
+    OpenStreamP = cl "OPEN-STREAM-P" ("stream");
+    /// `:standard`, `:string` or `:file`, and the name of the file.
+    StreamSort = internal "%STREAM-SORT" ("stream");
+    /// Characters since the last line end that was written to a stream.
+    StreamColumn = internal "%STREAM-COLUMN" ("stream");
+    /// The next character of a stream. Waits for standard input.
+    ReadChar = cl "READ-CHAR" ("&optional stream eof-error-p eof-value recursive-p");
+    /// The next character of a stream, or `NIL` if it would have to wait.
+    ReadCharNoHang = cl "READ-CHAR-NO-HANG" ("&optional stream eof-error-p eof-value recursive-p");
+    /// Whether a character of a stream is there to be read.
+    Listen = cl "LISTEN" ("&optional stream");
+    /// The next character of a stream, which stays there; with `T`, after white space; with a character, up to that.
+    PeekChar = cl "PEEK-CHAR" ("&optional peek-type stream eof-error-p eof-value recursive-p") slowly "SLOW-PEEK-CHAR";
+    /// Puts the character that was read last back into a stream.
+    UnreadChar = cl "UNREAD-CHAR" ("character &optional stream");
+    /// The next line of a stream, and whether it has no line end. Waits for standard input.
+    ReadLine = cl "READ-LINE" ("&optional stream eof-error-p eof-value recursive-p");
+    /// Writes a character to a stream, and returns it.
+    WriteChar = cl "WRITE-CHAR" ("character &optional stream");
+    /// Writes a part of a string to a stream, and returns the string.
+    WriteStringPart = internal "%WRITE-STRING" ("string stream start end");
+    /// Ends the line that is being written to a stream.
+    Terpri = cl "TERPRI" ("&optional stream");
+    /// Ends the line that is being written to a stream, unless it is empty; whether it did.
+    FreshLine = cl "FRESH-LINE" ("&optional stream");
+    /// Writes what a stream has gathered.
+    FinishOutput = cl "FINISH-OUTPUT" ("&optional stream");
+    /// Writes what a stream has gathered.
+    ForceOutput = cl "FORCE-OUTPUT" ("&optional stream");
 }

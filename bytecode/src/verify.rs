@@ -58,7 +58,7 @@
 //! * **M3.** Frames for recoveries and interrupts lie at or above `registers` of the frame that they interrupt.
 //! * **M4.** An unwinding lands as V10 says. A running cleanup that another unwinding passes is dropped.
 //! * **M5.** The value list always consists of objects. `enter-cleanup` keeps it for `end-cleanup`. A `throw` that is tried
-//!   again throws the values that it had.
+//!   again throws the values that it had. A `list-to-values` that is recovered from leaves it empty.
 //! * **M6.** Everything that depends on data is checked when it happens: types of operands (`push-mask` and
 //!   `push-handlers` too), index and slot bounds, arity, the length of spread lists, the sizes of the stacks.
 //!

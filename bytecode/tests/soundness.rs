@@ -1,0 +1,511 @@
+//! The verifier against a model of the interpreter that knows what each register really holds.
+//!
+//! Random code that the verifier accepts is run by the model, which takes every freedom that a real run has: tests go
+//! either way, instructions fail and are recovered from in all ways, anything that can land an unwinding does. Whatever
+//! the interpreter may assume (V1 to V11), the model checks.
+
+mod support;
+
+use esl_bytecode::disasm;
+use esl_bytecode::module::{CaptureSource, Constant, Function, FunctionNumber, Module};
+use esl_bytecode::opcode::{Instr, Opcode, Substitute};
+use esl_bytecode::operand::{Base, Count, Role, Want};
+use esl_bytecode::verify::verify;
+use support::{Random, module_with_random_code};
+
+/// What a register holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cell {
+    /// A link word or a leftover of another frame.
+    Garbage,
+    Object,
+    /// A closure of this function, made by this frame.
+    Closure(u32),
+    Box,
+    Marker,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Catch {
+        to: usize,
+        want: Want,
+    },
+    HandlerCase {
+        to: usize,
+    },
+    Cleanup {
+        to: usize,
+    },
+    /// It came about by `enter-cleanup`, or by an unwinding to the entry with this index, or to somewhere below this
+    /// frame.
+    Running {
+        unwinding: Option<Target>,
+        value_list: bool,
+    },
+    Scope,
+    Other,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Target {
+    Entry(usize),
+    Caller,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    kind: Kind,
+    window: u8,
+    bindings: usize,
+}
+
+/// How a binding came about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Binding {
+    One,
+    OfList,
+}
+
+/// What comes after an instruction.
+enum Next {
+    Instruction,
+    Jump(usize),
+    Left,
+}
+
+struct Model<'a> {
+    module: &'a Module,
+    function: &'a Function,
+    random: &'a mut Random,
+    registers: Vec<Cell>,
+    entries: Vec<Entry>,
+    bindings: Vec<Binding>,
+    /// Whether the value list is as this frame set it.
+    value_list: bool,
+    pc: usize,
+}
+
+impl<'a> Model<'a> {
+    fn new(module: &'a Module, random: &'a mut Random) -> Model<'a> {
+        let function = &module.functions[0];
+        let parameters = &function.parameters;
+        let mut registers = vec![Cell::Garbage; usize::from(function.registers)];
+        let rest = usize::from(parameters.required + parameters.optional);
+        for (number, register) in registers[..parameters.registers()].iter_mut().enumerate() {
+            let certain = number < usize::from(parameters.required) || (parameters.rest && number == rest);
+            *register = if certain || random.once_in(2) { Cell::Object } else { Cell::Marker };
+        }
+        Model {
+            module,
+            function,
+            random,
+            registers,
+            entries: Vec::new(),
+            bindings: Vec::new(),
+            value_list: false,
+            pc: 0,
+        }
+    }
+
+    /// Runs up to `limit` instructions.
+    fn run(&mut self, limit: usize) {
+        for _ in 0..limit {
+            let instr = Instr::decode(&self.function.code, self.pc).expect("V1: an instruction");
+            let next = self.pc + instr.opcode().words();
+            let outcome =
+                if self.random.once_in(6) { self.fail(instr, next) } else { self.step(instr, next) };
+            match outcome {
+                Next::Instruction => self.pc = next,
+                Next::Jump(to) => self.pc = to,
+                Next::Left => return,
+            }
+        }
+    }
+
+    fn read(&self, register: u8) {
+        let cell = self.registers[usize::from(register)];
+        assert!(matches!(cell, Cell::Object | Cell::Closure(_)), "V6: r{register} holds {cell:?}");
+    }
+
+    fn read_all(&self, Base(first): Base, Count(count): Count) {
+        (0..count).for_each(|i| self.read(first + i));
+    }
+
+    fn read_box(&self, register: u8) {
+        assert_eq!(self.registers[usize::from(register)], Cell::Box, "V7: r{register}");
+    }
+
+    fn write(&mut self, register: u8, cell: Cell) {
+        self.registers[usize::from(register)] = cell;
+    }
+
+    fn write_all(&mut self, Base(first): Base, count: u8) {
+        (0..count).for_each(|i| self.write(first + i, Cell::Object));
+    }
+
+    /// Frames of others have lain over the registers from here on, and used the value list.
+    fn others_ran(&mut self, from: u8) {
+        self.registers[usize::from(from)..].fill(Cell::Garbage);
+        self.value_list = false;
+    }
+
+    /// The operands of `instr` must be in order, since it may look at them before it fails.
+    fn fail(&mut self, instr: Instr, next: usize) -> Next {
+        let substitute = instr.opcode().substitute();
+        if substitute == Substitute::Silent {
+            return self.step(instr, next);
+        }
+        self.others_ran(self.function.registers);
+        if self.random.once_in(2) {
+            return self.unwind_somewhere();
+        }
+        match (substitute, instr) {
+            (Substitute::Value, _) => {
+                let mut first = None;
+                instr.visit_operands(|role| first = first.or(Some(role)));
+                let Some(Role::Write(register)) = first else { panic!("no first operand: {instr}") };
+                self.write(register, Cell::Object);
+                Next::Instruction
+            }
+            (Substitute::Test, _) => self.maybe_jump(instr, next),
+            (Substitute::Call, instr) => match window(instr) {
+                Some((window, want)) => {
+                    self.deliver(window, want);
+                    Next::Instruction
+                }
+                None => Next::Left,
+            },
+            (Substitute::Effect, _) => {
+                // M5: the value list is empty then, and not what others have left.
+                self.value_list = matches!(instr, Instr::ListToValues { .. });
+                Next::Instruction
+            }
+            (Substitute::Never | Substitute::Silent, _) => self.step(instr, next),
+        }
+    }
+
+    fn unwind_somewhere(&mut self) -> Next {
+        let targets: Vec<usize> = (0..self.entries.len())
+            .filter(|&at| matches!(self.entries[at].kind, Kind::Catch { .. } | Kind::HandlerCase { .. }))
+            .collect();
+        let target = match targets.is_empty() || self.random.once_in(4) {
+            true => Target::Caller,
+            false => Target::Entry(self.random.pick(&targets)),
+        };
+        self.unwind(target)
+    }
+
+    fn unwind(&mut self, target: Target) -> Next {
+        while let Some(entry) = self.entries.pop() {
+            self.bindings.truncate(entry.bindings);
+            if target == Target::Entry(self.entries.len()) {
+                self.others_ran(entry.window);
+                match entry.kind {
+                    Kind::Catch { to, want } => {
+                        self.deliver(Base(entry.window), want);
+                        return Next::Jump(to);
+                    }
+                    Kind::HandlerCase { to } => {
+                        self.write_all(Base(entry.window), 2);
+                        return Next::Jump(to);
+                    }
+                    kind => panic!("landed at {kind:?}"),
+                }
+            }
+            if let Kind::Cleanup { to } = entry.kind {
+                self.others_ran(entry.window);
+                let kind = Kind::Running { unwinding: Some(target), value_list: false };
+                self.entries.push(Entry { kind, ..entry });
+                return Next::Jump(to);
+            }
+        }
+        Next::Left
+    }
+
+    fn deliver(&mut self, window: Base, want: Want) {
+        self.write_all(window, want.registers());
+        self.value_list = want == Want::ALL;
+    }
+
+    fn call(&mut self, window: Base, count: Count, want: Want) -> Next {
+        assert!(u32::from(window.0) + 2 + u32::from(count.0) <= u32::from(self.function.registers), "V3");
+        self.read_all(Base(window.0 + 2), count);
+        for entry in &self.entries {
+            assert!(window.0 >= entry.window, "V10");
+        }
+        self.others_ran(window.0);
+        if self.random.once_in(3) {
+            return self.unwind_somewhere();
+        }
+        self.deliver(window, want);
+        Next::Instruction
+    }
+
+    fn leave(&self) -> Next {
+        assert!(self.entries.is_empty() && self.bindings.is_empty(), "V9: leaves something behind");
+        Next::Left
+    }
+
+    fn maybe_jump(&mut self, instr: Instr, next: usize) -> Next {
+        let mut to = None;
+        instr.visit_operands(|role| {
+            if let Role::Forward(distance) | Role::Backward(distance) = role {
+                to = next.checked_add_signed(distance as isize);
+            }
+        });
+        let always = matches!(instr.opcode(), Opcode::JumpAlways | Opcode::Loop);
+        match to {
+            Some(to) if always || self.random.once_in(2) => {
+                if to < next {
+                    self.value_list = false;
+                }
+                Next::Jump(to)
+            }
+            _ => Next::Instruction,
+        }
+    }
+
+    fn push(&mut self, kind: Kind, window: Base) {
+        self.entries.push(Entry { kind, window: window.0, bindings: self.bindings.len() });
+    }
+
+    fn step(&mut self, instr: Instr, next: usize) -> Next {
+        let landing = |distance: i32| next.checked_add_signed(distance as isize).expect("V2");
+        match instr {
+            Instr::Move { dst, src } => {
+                let cell = self.registers[usize::from(src.0)];
+                assert!(!matches!(cell, Cell::Garbage | Cell::Marker), "V6: moves {cell:?}");
+                self.write(dst.0, cell);
+            }
+            Instr::LoadNil { first, count } => self.write_all(first, count.0),
+            Instr::List { dst, first, count } => {
+                self.read_all(first, count);
+                self.write(dst.0, Cell::Object);
+            }
+            Instr::JumpIfSupplied { test, to } => match self.registers[usize::from(test.0)] {
+                Cell::Marker => {}
+                Cell::Object => return Next::Jump(landing(to.0.into())),
+                cell => panic!("V6: tests {cell:?}"),
+            },
+            Instr::LoopCount { counter, limit, .. } => {
+                self.read(counter.0);
+                self.read(limit.0);
+                self.write(counter.0, Cell::Object);
+                return self.maybe_jump(instr, next);
+            }
+            Instr::MakeBox { dst, src } => {
+                self.read(src.0);
+                self.write(dst.0, Cell::Box);
+            }
+            Instr::BoxRef { dst, cell } => {
+                self.read_box(cell.0);
+                self.write(dst.0, Cell::Object);
+            }
+            Instr::BoxSet { cell, src } => {
+                self.read_box(cell.0);
+                self.read(src.0);
+            }
+            Instr::MakeClosure { dst, function } => {
+                let index = self.function.constants[usize::from(function.0)];
+                let Constant::Function(number) = self.module.constants[index.0 as usize] else {
+                    panic!("V4")
+                };
+                for capture in &self.module.functions[number.0 as usize].captures {
+                    match capture.source {
+                        CaptureSource::Register(register) if capture.boxed => self.read_box(register),
+                        CaptureSource::Register(register) => self.read(register),
+                        CaptureSource::Capture(own) => {
+                            assert_eq!(self.function.captures[usize::from(own)].boxed, capture.boxed, "V8");
+                        }
+                        CaptureSource::Later => assert!(!capture.boxed, "V8"),
+                    }
+                }
+                self.write(dst.0, Cell::Closure(number.0));
+            }
+            Instr::PatchCapture { closure, index, src } => {
+                self.read(src.0);
+                let Cell::Closure(number) = self.registers[usize::from(closure.0)] else { panic!("V8") };
+                let capture = self.module.functions[number as usize].captures[usize::from(index.0)];
+                assert_eq!(capture.source, CaptureSource::Later, "V8");
+            }
+            Instr::CaptureRef { dst, index } => {
+                let boxed = self.function.captures[usize::from(index.0)].boxed;
+                self.write(dst.0, if boxed { Cell::Box } else { Cell::Object });
+            }
+            Instr::CaptureBoxRef { dst, index } => {
+                assert!(self.function.captures[usize::from(index.0)].boxed, "V7");
+                self.write(dst.0, Cell::Object);
+            }
+            Instr::CaptureBoxSet { src, index } => {
+                assert!(self.function.captures[usize::from(index.0)].boxed, "V7");
+                self.read(src.0);
+            }
+            Instr::Bind { src, .. } => {
+                self.read(src.0);
+                self.bindings.push(Binding::One);
+            }
+            Instr::Unbind { count } => {
+                let since = self.entries.last().map_or(0, |entry| entry.bindings);
+                for _ in 0..count.0 {
+                    assert!(self.bindings.len() > since, "V9: unbinds too much");
+                    assert_eq!(self.bindings.pop(), Some(Binding::One), "V9");
+                }
+            }
+            Instr::BindList { symbols, values } => {
+                self.read(symbols.0);
+                self.read(values.0);
+                assert_eq!(self.entries.last().map(|entry| entry.kind), Some(Kind::Scope), "V9");
+                let count = self.random.below(3);
+                self.bindings.extend(std::iter::repeat_n(Binding::OfList, count));
+            }
+            Instr::Call { window, count, want, .. } | Instr::Apply { window, count, want, .. } => {
+                self.read(window.0);
+                return self.call(window, count, want);
+            }
+            Instr::CallGlobal { window, count, want, .. }
+            | Instr::CallSelf { window, count, want, .. }
+            | Instr::CallBuiltin { window, count, want, .. } => return self.call(window, count, want),
+            Instr::TailCall { window, count, .. } | Instr::TailApply { window, count, .. } => {
+                self.read(window.0);
+                self.read_all(Base(window.0 + 2), count);
+                return self.leave();
+            }
+            Instr::TailCallGlobal { window, count, .. } | Instr::TailCallBuiltin { window, count, .. } => {
+                self.read_all(Base(window.0 + 2), count);
+                return self.leave();
+            }
+            Instr::Return { src } => {
+                self.read(src.0);
+                return self.leave();
+            }
+            Instr::ReturnValues { first, count } => {
+                self.read_all(first, count);
+                return self.leave();
+            }
+            Instr::ReturnAll {} => {
+                assert!(self.value_list, "V11");
+                return self.leave();
+            }
+            Instr::SetValues { first, count } => {
+                self.read_all(first, count);
+                self.value_list = true;
+            }
+            Instr::GetValues { first, count } => {
+                assert!(self.value_list, "V11");
+                self.write_all(first, count.0);
+            }
+            Instr::ValuesToList { dst } => {
+                assert!(self.value_list, "V11");
+                self.write(dst.0, Cell::Object);
+            }
+            Instr::ListToValues { src } => {
+                self.read(src.0);
+                self.value_list = true;
+            }
+            Instr::PushCatch { window, tag, want, to } => {
+                self.read(tag.0);
+                self.push(Kind::Catch { to: landing(to.0), want }, window);
+            }
+            Instr::PushCleanup { window, to } => self.push(Kind::Cleanup { to: landing(to.0) }, window),
+            Instr::PushHandlerCase { window, to, .. } => {
+                self.push(Kind::HandlerCase { to: landing(to.0) }, window);
+            }
+            Instr::PushHandlers { window, handlers: read } | Instr::PushMask { window, from: read } => {
+                self.read(read.0);
+                self.push(Kind::Other, window);
+            }
+            Instr::PushScope { window } => self.push(Kind::Scope, window),
+            Instr::PopControl { count } => {
+                for _ in 0..count.0 {
+                    let entry = self.entries.pop().expect("V9: pops what it pushed");
+                    assert!(!matches!(entry.kind, Kind::Cleanup { .. } | Kind::Running { .. }), "V9");
+                    self.bindings.truncate(entry.bindings);
+                }
+            }
+            Instr::EnterCleanup {} => {
+                let value_list = std::mem::take(&mut self.value_list);
+                let entry = self.entries.last_mut().expect("V9: a cleanup");
+                assert!(matches!(entry.kind, Kind::Cleanup { .. }), "V9");
+                assert_eq!(entry.bindings, self.bindings.len(), "V9");
+                entry.kind = Kind::Running { unwinding: None, value_list };
+            }
+            Instr::EndCleanup {} => {
+                let entry = self.entries.pop().expect("V9: a running cleanup");
+                assert_eq!(entry.bindings, self.bindings.len(), "V9");
+                match entry.kind {
+                    Kind::Running { unwinding: None, value_list } => self.value_list = value_list,
+                    Kind::Running { unwinding: Some(target), .. } => return self.unwind(target),
+                    kind => panic!("V9: ends {kind:?}"),
+                }
+            }
+            Instr::Throw { tag, .. } => {
+                self.read(tag.0);
+                assert!(self.value_list, "V11");
+                return self.unwind_somewhere();
+            }
+            _ => {
+                let mut reads = Vec::new();
+                let mut write = None;
+                instr.visit_operands(|role| match role {
+                    Role::Read(register) => reads.push(register),
+                    Role::Write(register) => write = Some(register),
+                    _ => {}
+                });
+                reads.iter().for_each(|&register| self.read(register));
+                if let Some(register) = write {
+                    self.write(register, Cell::Object);
+                }
+                return self.maybe_jump(instr, next);
+            }
+        }
+        Next::Instruction
+    }
+}
+
+/// The window and the wanted values of a call that comes back.
+fn window(instr: Instr) -> Option<(Base, Want)> {
+    match instr {
+        Instr::Call { window, want, .. }
+        | Instr::CallGlobal { window, want, .. }
+        | Instr::CallSelf { window, want, .. }
+        | Instr::CallBuiltin { window, want, .. }
+        | Instr::Apply { window, want, .. } => Some((window, want)),
+        _ => None,
+    }
+}
+
+#[test]
+fn what_is_verified_keeps_its_promises() {
+    let cases: u64 = std::env::var("ESL_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(40_000);
+    let mut accepted = 0;
+    let mut used = std::collections::BTreeMap::new();
+    for seed in 0..cases {
+        let module = module_with_random_code(&mut Random(seed));
+        if verify(&module).is_err() {
+            continue;
+        }
+        accepted += 1;
+        let run = std::panic::AssertUnwindSafe(|| {
+            for round in 0..10 {
+                Model::new(&module, &mut Random(seed ^ (round << 32))).run(100);
+            }
+        });
+        if let Err(failure) = std::panic::catch_unwind(run) {
+            println!("seed {seed}:\n{}", disasm::function(&module, FunctionNumber(0)));
+            std::panic::resume_unwind(failure);
+        }
+        let mut pc = 0;
+        while let Some(instr) = Instr::decode(&module.functions[0].code, pc) {
+            *used.entry(instr.opcode().mnemonic()).or_insert(0) += 1;
+            pc += instr.opcode().words();
+        }
+    }
+    // The test is worth something only if enough code passes, and not just trivial code.
+    assert!(accepted * 100 >= cases * 3, "only {accepted} of {cases} pass");
+    for mnemonic in
+        ["push-catch", "end-cleanup", "patch-capture", "capture-box-ref", "jump-if-supplied", "box-ref"]
+    {
+        assert!(used.get(mnemonic).copied().unwrap_or(0) >= 5, "{mnemonic}: {used:?}");
+    }
+}
