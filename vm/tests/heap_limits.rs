@@ -93,7 +93,7 @@ fn too_large_is_told_from_too_little_left() {
 
 #[test]
 fn holes_of_one_cons_are_used() {
-    let mut heap = heap(HeapConfig { limit: scaled(2 << 20), ..HeapConfig::default() });
+    let mut heap = heap(HeapConfig { limit: scaled(1 << 20), ..HeapConfig::default() });
     let mut cells = Vec::new();
     while let Ok(cell) = heap.cons(Value::NIL, Value::NIL) {
         cells.push(cell);
@@ -109,7 +109,7 @@ fn holes_of_one_cons_are_used() {
 
 #[test]
 fn small_remainders_are_used_at_the_limit() {
-    let mut heap = heap(HeapConfig { limit: scaled(2 << 20), ..HeapConfig::default() });
+    let mut heap = heap(HeapConfig { limit: scaled(1 << 20), ..HeapConfig::default() });
     let mut cells = Vec::new();
     while let Ok(cell) = heap.cons(Value::NIL, Value::NIL) {
         cells.push(cell);

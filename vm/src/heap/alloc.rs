@@ -22,7 +22,8 @@ use std::ptr::NonNull;
 
 /// Greatest object, in bytes, for which the first region moves on to its next hole.
 const SMALL: usize = 256;
-/// A hole is used in pieces of this many bytes, so that slices come in time; also what one slice is owed for.
+/// A hole is used in pieces of this many bytes, so that slices come in time; also what one slice is owed for. Together
+/// with `SLICE_VISITS` this is the pace: one visit for every cons allocated.
 pub(super) const PIECE: usize = 16 << 10;
 /// Blocks that one refill sweeps in vain before it takes a new arena, if it may.
 const REFILL_SWEEPS: usize = 8;
@@ -90,7 +91,9 @@ impl Region {
             return None;
         }
         self.next = start + bytes;
-        NonNull::new(std::ptr::with_exposed_provenance_mut(start))
+        debug_assert!(start != 0 && bytes != 0);
+        // SAFETY: `bytes` is not zero, so there is a hole, and no hole is at address zero.
+        Some(unsafe { NonNull::new_unchecked(std::ptr::with_exposed_provenance_mut(start)) })
     }
 
     /// Bytes allocated and not counted yet.

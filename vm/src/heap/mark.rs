@@ -128,7 +128,7 @@ impl Heap {
         }
     }
 
-    /// Whether marking is under way and `v` is marked already. What has no address counts as marked.
+    /// Whether `v` is marked in the cycle under way; of no meaning when none is. What has no address counts as marked.
     pub fn is_marked(&self, v: Value) -> bool {
         if !v.is_address() {
             return true;
@@ -214,7 +214,8 @@ impl Heap {
         }
     }
 
-    /// Runs a slice of marking or sweeping of about `max_visits` objects, more when the heap has run ahead.
+    /// Runs a slice of marking or sweeping of about `max_visits` objects, twice as many when the heap has run ahead. Every
+    /// slice pays for 16 KiB allocated; ask [`Heap::gc_due`] whether the next is due already.
     pub fn slice(&mut self, max_visits: u32) -> SliceOutcome {
         let behind = self.pacing.since_cycle > 2 * self.pacing.threshold + self.stats.live;
         let budget = i64::from(max_visits) * if behind { 2 } else { 1 };

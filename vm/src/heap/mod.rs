@@ -62,7 +62,10 @@ use sweep::Sweep;
 /// Bytes that [`Heap::open_reserve`] adds to the limit.
 pub const RESERVE: usize = 1 << 20;
 
-/// Visits of an ordinary slice: well under 100 µs.
+/// Visits of an ordinary slice.
+///
+/// With 100 MB live a slice takes 3 µs on a list in order of allocation, 85 µs on a random graph of vectors, and 200 µs on
+/// a list linked in random order, where every visit waits for memory (cloud Xeon, 2.5 GHz).
 pub const SLICE_VISITS: u32 = 1000;
 
 /// What a heap may use, and when it collects.
