@@ -26,12 +26,7 @@ impl Frame<'_, '_> {
             Dest::Effect => Dest::Effect,
             Dest::All | Dest::Values(..) => Dest::All,
             Dest::Tail if !is_single => Dest::All,
-            _ => {
-                // Defined also when an unwinding comes along.
-                let register = self.registers.take(1);
-                self.emit(Instr::LoadNil { first: Base(register), count: Count(1) });
-                Dest::Keep(register)
-            }
+            _ => Dest::Keep(self.registers.take(1)),
         };
         let depth = self.extents.len();
         let landing = self.graph.label();

@@ -1,0 +1,46 @@
+//! Random programs are lowered, verified, and do what the tree says.
+
+use proptest::prelude::*;
+
+use super::{generate, machine, model, module, notation};
+use esl_bytecode::disasm;
+
+/// Runs a program in both ways, if the model ends soon enough.
+fn check(text: &str) {
+    // The handler is outside of the function, so that the program itself is in tail position.
+    let text = format!(
+        "(progn (setq *a* 1) (setq *b* 2) (handler-case (apply (lambda () {text}) nil) (error (c) (note c))))"
+    );
+    let module = module(&text);
+    let Some(expected) = model::run(&notation::core(&text), 20_000) else { return };
+    let found = std::panic::catch_unwind(|| machine::run(&module, 2_000_000));
+    match found {
+        Ok(found) if found.as_ref() == Some(&expected) => {}
+        Ok(found) => panic!("expected {expected:?}\nfound {found:?}\n{text}\n{}", disasm::module(&module)),
+        Err(_) => panic!("the machine panics, expected {expected:?}\n{text}\n{}", disasm::module(&module)),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(ProptestConfig::default().cases * 4))]
+    #[test]
+    fn programs_do_what_the_tree_says(choices in proptest::collection::vec(any::<u8>(), 0..300)) {
+        check(&generate::program(&choices));
+    }
+}
+
+#[test]
+fn values_that_change_while_others_are_computed() {
+    for text in [
+        "(labels ((f (k a b) (if (< 0 k) (f (- k 1) b (+ a b)) (list a b)))) (f 3 1 2))",
+        "(labels ((f (k a b) (if (< 0 k) (f (- k 1) (lambda () (list a b)) a) (apply a nil)))) (f 3 1 2))",
+        "(labels ((f (k a) (if (< 0 k) (f (- k 1) (progn (setq k 7) (note k) a)) (list k a)))) (f 1 2))",
+        "(let ((a 1) (b 2)) (let ((c b) (d a)) (progn (setq a c) (setq b d) (list a b))))",
+        "(let ((a 1)) (list a (setq a 2) a (+ a (setq a 3)) (+ (setq a 4) a)))",
+        "(let ((a 1)) (let ((b a)) (setq a 2) (list a b)))",
+        "(let ((a 1)) (+ a (progn (apply (lambda () (setq a 5)) nil) 1) a))",
+        "(let ((f (lambda (x y) (list x y))) (a 1)) (funcall f a (progn (setq f 3) (setq a 4))))",
+    ] {
+        check(text);
+    }
+}
