@@ -37,11 +37,12 @@ mod error;
 mod fingerprint;
 mod function;
 mod image;
+mod whole;
 mod write;
 
 pub use error::{Problem, ReadError, WriteError};
 pub use fingerprint::{BUILTIN_TABLE, OPCODE_TABLE};
-pub use image::{ConstantRecord, ImageBytes, ModuleImage, PoolIndexes, SymbolHome, SymbolRecord, Symbols};
+pub use image::{ConstantRecord, ImageBytes, ModuleImage, PoolIndexes, SymbolHome, SymbolRecord};
 pub use write::write;
 
 use crate::module::Module;

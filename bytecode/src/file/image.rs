@@ -11,8 +11,7 @@ use super::{
     FORMAT_VERSION, HEADER_LENGTH, MAGIC, NONE, Problem, ReadError, SECTION_ENTRY, SECTION_TABLE, Section,
     function, tag,
 };
-use crate::module::{Constant, Function, FunctionNumber, Module, PoolIdx};
-use crate::symbol::Symbol;
+use crate::module::{Function, FunctionNumber, PoolIdx};
 
 /// The bytes of a file, embedded in the program or shared.
 #[derive(Clone, Debug)]
@@ -43,11 +42,12 @@ pub struct ModuleImage {
     bytes: ImageBytes,
     /// Where the sections are, in the order of [`Section::ALL`].
     sections: [Range<usize>; Section::ALL.len()],
-    /// Offset in the file of the first symbol's record, and how many there are. The names follow.
-    symbol_records: usize,
-    symbol_count: usize,
-    constant_count: usize,
-    function_count: usize,
+    /// Offset in the section of the first symbol's record, and how many there are. The names follow.
+    pub(super) symbol_records: usize,
+    pub(super) symbol_count: usize,
+    package_count: usize,
+    pub(super) constant_count: usize,
+    pub(super) function_count: usize,
 }
 
 /// Where a symbol of a file is at home.
@@ -158,22 +158,25 @@ impl ModuleImage {
             sections,
             symbol_records: 0,
             symbol_count: 0,
+            package_count: 0,
             constant_count: 0,
             function_count: 0,
         };
         image.constant_count = image.section(Section::Constants).count(4)?;
         image.function_count = image.section(Section::Index).count(8)?;
         let mut symbols = image.section(Section::Symbols);
-        for _ in 0..symbols.count(4)? {
+        let length = symbols.rest().len();
+        let package_count = symbols.count(4)?;
+        for _ in 0..package_count {
             symbols.text()?;
         }
         let symbol_count = symbols.count(16)?;
-        image.symbol_records = image.sections[Section::Symbols.position()].end - symbols.rest().len();
-        image.symbol_count = symbol_count;
+        let symbol_records = length - symbols.rest().len();
+        image = ModuleImage { symbol_records, symbol_count, package_count, ..image };
         Ok(image)
     }
 
-    fn section(&self, section: Section) -> Cursor<'_> {
+    pub(super) fn section(&self, section: Section) -> Cursor<'_> {
         let range = self.sections[section.position()].clone();
         let start = range.start;
         // The header's check has seen that the sections lie within the file.
@@ -224,20 +227,8 @@ impl ModuleImage {
     }
 
     /// All symbols, by number.
-    ///
-    /// # Errors
-    /// [`ReadError::Damaged`].
-    pub fn symbols(&self) -> Result<Symbols<'_>, ReadError> {
-        let packages = self.section(Section::Symbols).u32()?;
-        let section = &self.sections[Section::Symbols.position()];
-        let mut from = Cursor::new(
-            &self.bytes[self.symbol_records..section.end],
-            self.symbol_records,
-            Some(Section::Symbols),
-        );
-        let records = from.clone().narrowed(from.bytes(self.symbol_count * 16)?);
-        let names = std::str::from_utf8(from.rest()).map_err(|_| from.damaged(Problem::Utf8))?;
-        Ok(Symbols { records, names, packages: packages as usize, left: self.symbol_count })
+    pub fn symbols(&self) -> impl ExactSizeIterator<Item = Result<SymbolRecord<'_>, ReadError>> {
+        (0..self.symbol_count as u32).map(|number| self.symbol(number))
     }
 
     /// One symbol.
@@ -245,22 +236,25 @@ impl ModuleImage {
     /// # Errors
     /// [`ReadError::Damaged`], also if there is no such symbol.
     pub fn symbol(&self, number: u32) -> Result<SymbolRecord<'_>, ReadError> {
-        let section = &self.sections[Section::Symbols.position()];
         if number as usize >= self.symbol_count {
             let problem = Problem::Index { of: "symbols", found: number, count: self.symbol_count as u32 };
             return Err(self.section(Section::Symbols).damaged(problem));
         }
-        let at = self.symbol_records + number as usize * 16;
-        let mut record = Cursor::new(&self.bytes[at..section.end], at, Some(Section::Symbols));
-        let (package, id, start, length) = (record.u32()?, record.u32()?, record.u32()?, record.u32()?);
-        let home = match package {
-            NONE => SymbolHome::Uninterned(id),
-            package => SymbolHome::Package(package),
+        let mut record = self.part(Section::Symbols, self.symbol_records + number as usize * 16, 16)?;
+        let here = record.clone();
+        let home = match (record.u32()?, record.u32()?) {
+            (NONE, id) => SymbolHome::Uninterned(id),
+            (found, _) if found as usize >= self.package_count => {
+                let count = self.package_count as u32;
+                return Err(here.damaged(Problem::Index { of: "packages", found, count }));
+            }
+            (package, _) => SymbolHome::Package(package),
         };
-        let names = self.symbol_records + self.symbol_count * 16 - section.start;
-        let name = self.part(Section::Symbols, names.saturating_add(start as usize), length as usize)?;
-        let name = std::str::from_utf8(name.rest()).map_err(|_| name.damaged(Problem::Utf8))?;
-        Ok(SymbolRecord { home, name })
+        let names = self.symbol_records + self.symbol_count * 16;
+        let start = names.saturating_add(record.u32()? as usize);
+        let name = self.part(Section::Symbols, start, record.u32()? as usize)?;
+        let text = std::str::from_utf8(name.rest()).map_err(|_| name.damaged(Problem::Utf8))?;
+        Ok(SymbolRecord { home, name: text })
     }
 
     /// How many constants there are.
@@ -282,7 +276,7 @@ impl ModuleImage {
     }
 
     /// Where the record of a constant begins, after the offsets.
-    fn constant_offset(&self, PoolIdx(index): PoolIdx) -> Result<u32, ReadError> {
+    pub(super) fn constant_offset(&self, PoolIdx(index): PoolIdx) -> Result<u32, ReadError> {
         let here = self.section(Section::Constants);
         if index as usize >= self.constant_count {
             let count = self.constant_count as u32;
@@ -291,7 +285,7 @@ impl ModuleImage {
         self.part(Section::Constants, 4 + index as usize * 4, 4)?.u32()
     }
 
-    fn read_constant<'a>(
+    pub(super) fn read_constant<'a>(
         &'a self,
         from: &mut Cursor<'a>,
         PoolIdx(own): PoolIdx,
@@ -357,7 +351,10 @@ impl ModuleImage {
     }
 
     /// Offset and length of a function's record.
-    fn function_place(&self, FunctionNumber(number): FunctionNumber) -> Result<(u32, u32), ReadError> {
+    pub(super) fn function_place(
+        &self,
+        FunctionNumber(number): FunctionNumber,
+    ) -> Result<(u32, u32), ReadError> {
         let here = self.section(Section::Index);
         if number as usize >= self.function_count {
             let count = self.function_count as u32;
@@ -380,137 +377,6 @@ impl ModuleImage {
         }
         from.end()?;
         Ok(toplevel)
-    }
-
-    /// The whole module. Records must lie one after the other: so one byte of the file ends up in one place only, and
-    /// a small file cannot become a large module.
-    ///
-    /// # Errors
-    /// [`ReadError::Damaged`].
-    pub fn to_module(&self) -> Result<Module, ReadError> {
-        let symbols = self.all_symbols()?;
-        let mut functions = Vec::with_capacity(self.function_count);
-        let mut end = 0;
-        for number in 0..self.function_count as u32 {
-            let (offset, length) = self.function_place(FunctionNumber(number))?;
-            if offset != end {
-                return Err(self.section(Section::Index).damaged(Problem::Gap));
-            }
-            end = offset.saturating_add(length);
-            functions.push(self.function(FunctionNumber(number))?);
-        }
-        if end as usize != self.section(Section::Functions).rest().len() {
-            return Err(self.section(Section::Functions).damaged(Problem::Trailing));
-        }
-        let index_length = 4 + self.function_count * 8;
-        if self.section(Section::Index).rest().len() != index_length {
-            return Err(self.section(Section::Index).damaged(Problem::Trailing));
-        }
-        Ok(Module {
-            sources: self.sources()?,
-            constants: self.all_constants(&symbols)?,
-            functions,
-            toplevel: self.toplevel()?,
-        })
-    }
-
-    fn all_symbols(&self) -> Result<Vec<Symbol>, ReadError> {
-        let packages: Vec<Arc<str>> = self.packages()?.into_iter().map(Arc::from).collect();
-        let mut symbols = Vec::with_capacity(self.symbol_count);
-        let records = self.symbols()?;
-        let mut left = records.names.len();
-        for record in records {
-            let SymbolRecord { home, name } = record?;
-            // The writer gives each symbol its own piece of the names.
-            left = left
-                .checked_sub(name.len())
-                .ok_or_else(|| self.section(Section::Symbols).damaged(Problem::Gap))?;
-            symbols.push(match home {
-                SymbolHome::Package(number) => Symbol::new(&packages[number as usize], name),
-                SymbolHome::Uninterned(id) => Symbol::uninterned(id, name),
-            });
-        }
-        if left != 0 {
-            return Err(self.section(Section::Symbols).damaged(Problem::Trailing));
-        }
-        Ok(symbols)
-    }
-
-    fn all_constants(&self, symbols: &[Symbol]) -> Result<Vec<Constant>, ReadError> {
-        let mut constants = Vec::with_capacity(self.constant_count);
-        let mut from = self.section(Section::Constants);
-        from.bytes(4 + self.constant_count * 4)?;
-        let length = from.rest().len();
-        for index in (0..self.constant_count as u32).map(PoolIdx) {
-            if self.constant_offset(index)? as usize != length - from.rest().len() {
-                return Err(from.damaged(Problem::Gap));
-            }
-            let symbol = |number: u32| symbols[number as usize].clone();
-            constants.push(match self.read_constant(&mut from, index)? {
-                ConstantRecord::Nil => Constant::Nil,
-                ConstantRecord::True => Constant::True,
-                ConstantRecord::Symbol(number) => Constant::Symbol(symbol(number)),
-                ConstantRecord::Fixnum(value) => Constant::Integer(value.into()),
-                ConstantRecord::Integer(value) => Constant::Integer(value),
-                ConstantRecord::Ratio(numerator, denominator) => Constant::Ratio(numerator, denominator),
-                ConstantRecord::Float(value) => Constant::Float(value),
-                ConstantRecord::Character(value) => Constant::Character(value),
-                ConstantRecord::String(value) => Constant::String(value.into()),
-                ConstantRecord::Cons(car, cdr) => Constant::Cons(car, cdr),
-                ConstantRecord::Vector(items) => Constant::Vector(items.iter().collect()),
-                ConstantRecord::Array(dimensions, items) => {
-                    Constant::Array(dimensions, items.iter().collect())
-                }
-                ConstantRecord::Function(number) => Constant::Function(number),
-                ConstantRecord::Class(number) => Constant::Class(symbol(number)),
-            });
-        }
-        from.end()?;
-        Ok(constants)
-    }
-}
-
-/// Iterator over the symbols of a file.
-#[derive(Clone, Debug)]
-pub struct Symbols<'a> {
-    records: Cursor<'a>,
-    names: &'a str,
-    packages: usize,
-    left: usize,
-}
-
-impl<'a> Symbols<'a> {
-    fn read(&mut self) -> Result<SymbolRecord<'a>, ReadError> {
-        let here = self.records.clone();
-        let package = self.records.u32()?;
-        let id = self.records.u32()?;
-        let home = if package == NONE {
-            SymbolHome::Uninterned(id)
-        } else {
-            let count = self.packages;
-            if package as usize >= count {
-                let problem = Problem::Index { of: "packages", found: package, count: count as u32 };
-                return Err(here.damaged(problem));
-            }
-            SymbolHome::Package(package)
-        };
-        let start = self.records.u32()?;
-        let end = u64::from(start) + u64::from(self.records.u32()?);
-        let name = usize::try_from(end).ok().and_then(|end| self.names.get(start as usize..end));
-        let Some(name) = name else {
-            let problem = Problem::Index { of: "the names", found: start, count: self.names.len() as u32 };
-            return Err(here.damaged(problem));
-        };
-        Ok(SymbolRecord { home, name })
-    }
-}
-
-impl<'a> Iterator for Symbols<'a> {
-    type Item = Result<SymbolRecord<'a>, ReadError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        self.left = self.left.checked_sub(1)?;
-        Some(self.read())
     }
 }
 

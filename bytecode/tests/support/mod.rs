@@ -206,6 +206,10 @@ fn random_block(random: &mut Random, palette: &Palette, depth: usize, opcodes: &
         // Sometimes the end is missing.
         if !random.once_in(20) {
             opcodes.push(end);
+            // Control that lands behind the region may do so without company.
+            if end == Opcode::PopControl && random.once_in(3) {
+                opcodes.push(Opcode::Return);
+            }
         }
         if let Some(end) = end_after {
             random_block(random, palette, depth + 1, opcodes);
@@ -226,7 +230,8 @@ fn region_end(opcodes: &[Opcode], at: usize) -> usize {
             Opcode::PopControl | Opcode::EnterCleanup => {
                 open -= 1;
                 if open == 0 {
-                    return (index + 1).min(opcodes.len() - 1);
+                    let behind_return = opcodes.get(index + 1) == Some(&Opcode::Return);
+                    return (index + 1 + usize::from(behind_return)).min(opcodes.len() - 1);
                 }
             }
             _ => {}
