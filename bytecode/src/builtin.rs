@@ -204,6 +204,15 @@ define_builtins! {
     Functionp = cl "FUNCTIONP" ("object");
     /// Whether `object` is a hash table.
     HashTablep = cl "HASH-TABLE-P" ("object");
+    /// Whether both are equal numbers or characters, strings of the same characters, or pairs of equal parts.
+    Equal = cl "EQUAL" ("left right") slowly "%SLOW-EQUAL";
+    /// Whether both look alike: as `equal`, but case and the type of numbers do not matter, and arrays, structures
+    /// and hash tables are compared by their parts.
+    Equalp = cl "EQUALP" ("left right") slowly "%SLOW-EQUALP";
+    /// A number that `equal` objects share.
+    Sxhash = cl "SXHASH" ("object");
+    /// Whether `object` is a string without a fill pointer.
+    SimpleStringp = cl "SIMPLE-STRING-P" ("object");
 
     // ---- numbers
     /// The sum; 0 of no numbers.
@@ -256,6 +265,246 @@ define_builtins! {
     Plusp = cl "PLUSP" ("number");
     /// Whether `number` is below zero.
     Minusp = cl "MINUSP" ("number");
+    /// The greatest of the numbers.
+    Max = cl "MAX" ("number &rest numbers");
+    /// The least of the numbers.
+    Min = cl "MIN" ("number &rest numbers");
+    /// The number without its sign.
+    Abs = cl "ABS" ("number");
+    /// -1, 0 or 1, as `number` is below, at or above zero, as a number of its type.
+    Signum = cl "SIGNUM" ("number");
+    /// As `floor`, with the quotient as a float.
+    FFloor = cl "FFLOOR" ("number &optional divisor") slowly "%SLOW-FFLOOR";
+    /// As `ceiling`, with the quotient as a float.
+    FCeiling = cl "FCEILING" ("number &optional divisor") slowly "%SLOW-FCEILING";
+    /// As `truncate`, with the quotient as a float.
+    FTruncate = cl "FTRUNCATE" ("number &optional divisor") slowly "%SLOW-FTRUNCATE";
+    /// As `round`, with the quotient as a float.
+    FRound = cl "FROUND" ("number &optional divisor") slowly "%SLOW-FROUND";
+    /// `base` to the power of `power`: exact for rationals and integer powers.
+    Expt = cl "EXPT" ("base power") slowly "%SLOW-EXPT";
+    /// The square root, a float. That of a negative number is an `arithmetic-error`.
+    Sqrt = cl "SQRT" ("number");
+    /// e to the power of `number`.
+    Exp = cl "EXP" ("number");
+    /// The logarithm, natural unless a base is given. That of a negative number is an `arithmetic-error`.
+    Log = cl "LOG" ("number &optional base");
+    /// The sine.
+    Sin = cl "SIN" ("radians");
+    /// The cosine.
+    Cos = cl "COS" ("radians");
+    /// The tangent.
+    Tan = cl "TAN" ("radians");
+    /// The angle with this sine.
+    Asin = cl "ASIN" ("number");
+    /// The angle with this cosine.
+    Acos = cl "ACOS" ("number");
+    /// The angle with this tangent; of two arguments, the angle of the point with `number` above and `divisor` to the
+    /// right.
+    Atan = cl "ATAN" ("number &optional divisor");
+    /// The hyperbolic sine.
+    Sinh = cl "SINH" ("number");
+    /// The hyperbolic cosine.
+    Cosh = cl "COSH" ("number");
+    /// The hyperbolic tangent.
+    Tanh = cl "TANH" ("number");
+    /// The number with this hyperbolic sine.
+    Asinh = cl "ASINH" ("number");
+    /// The number with this hyperbolic cosine.
+    Acosh = cl "ACOSH" ("number");
+    /// The number with this hyperbolic tangent.
+    Atanh = cl "ATANH" ("number");
+    /// What is above the line in lowest terms.
+    Numerator = cl "NUMERATOR" ("rational");
+    /// What is below the line in lowest terms; 1 for an integer.
+    Denominator = cl "DENOMINATOR" ("rational");
+    /// The rational of exactly this value.
+    Rational = cl "RATIONAL" ("number");
+    /// The simplest rational that reads as this float.
+    Rationalize = cl "RATIONALIZE" ("number");
+    /// The nearest float.
+    Float = cl "FLOAT" ("number &optional prototype");
+    /// Fraction from 0.5 to below 1, exponent, and sign as a float.
+    DecodeFloat = cl "DECODE-FLOAT" ("float");
+    /// Mantissa, exponent and sign as integers.
+    IntegerDecodeFloat = cl "INTEGER-DECODE-FLOAT" ("float");
+    /// `float` times two to the power of `exponent`.
+    ScaleFloat = cl "SCALE-FLOAT" ("float exponent");
+    /// `magnitude`, which is 1.0 unless given, with the sign of `float`.
+    FloatSign = cl "FLOAT-SIGN" ("float &optional magnitude");
+    /// Number of binary digits of the type of `float`.
+    FloatDigits = cl "FLOAT-DIGITS" ("float");
+    /// Base of the representation of floats.
+    FloatRadix = cl "FLOAT-RADIX" ("float");
+    /// Number of significant binary digits of `float`.
+    FloatPrecision = cl "FLOAT-PRECISION" ("float");
+    /// The float as `prin1` writes it.
+    FloatString = internal "%FLOAT-STRING" ("float");
+    /// Where the point goes and the decimal digits of a float without its sign: the value is 0.digits times ten to
+    /// the first value. Without `position` the shortest digits that read back; else those down to ten to the power of
+    /// `position`.
+    DecimalDigits = internal "%FLOAT-DIGITS" ("float &optional position");
+    /// A random state: from the seed of the run for `NIL`, from an integer as the seed, or a copy.
+    MakeRandomState = internal "%MAKE-RANDOM-STATE" ("source");
+    /// A number from 0 to below `limit`, of its type; moves `state` on.
+    Random = internal "%RANDOM" ("limit state");
+    /// Whether `object` is a random state.
+    RandomStatep = cl "RANDOM-STATE-P" ("object");
+
+    // ---- integers
+    /// Whether `integer` is even.
+    Evenp = cl "EVENP" ("integer");
+    /// Whether `integer` is odd.
+    Oddp = cl "ODDP" ("integer");
+    /// The greatest common divisor; 0 of none.
+    Gcd = cl "GCD" ("&rest integers") slowly "%SLOW-GCD";
+    /// Two smaller integers with the same greatest common divisor as `left` and `right`; the second is 0 when the
+    /// first is the divisor.
+    GcdStep = internal "%GCD-STEP" ("left right") slowly "%SLOW-GCD-STEP";
+    /// The least common multiple; 1 of none.
+    Lcm = cl "LCM" ("&rest integers") slowly "%SLOW-LCM";
+    /// The greatest integer whose square is not above `integer`.
+    Isqrt = cl "ISQRT" ("integer") slowly "%SLOW-ISQRT";
+    /// The numbers' bitwise equivalence; -1 of none.
+    LogEqv = cl "LOGEQV" ("&rest integers") slowly "%SLOW-LOGEQV";
+    /// All bits turned over.
+    LogNot = cl "LOGNOT" ("integer");
+    /// Bits of `right` that are not in `left`.
+    LogAndC1 = cl "LOGANDC1" ("left right");
+    /// Bits of `left` that are not in `right`.
+    LogAndC2 = cl "LOGANDC2" ("left right");
+    /// Bits that are not in both.
+    LogNand = cl "LOGNAND" ("left right");
+    /// Bits that are in neither.
+    LogNor = cl "LOGNOR" ("left right");
+    /// Bits of `right` and those that are not in `left`.
+    LogOrC1 = cl "LOGORC1" ("left right");
+    /// Bits of `left` and those that are not in `right`.
+    LogOrC2 = cl "LOGORC2" ("left right");
+    /// Whether the numbers have a bit in common.
+    LogTest = cl "LOGTEST" ("left right");
+    /// Whether bit `index` is set.
+    LogBitp = cl "LOGBITP" ("index integer");
+    /// Number of ones; of zeros in a negative integer.
+    LogCount = cl "LOGCOUNT" ("integer");
+    /// Bits that the integer takes in two's complement, the sign not counted.
+    IntegerLength = cl "INTEGER-LENGTH" ("integer");
+    /// The field of `size` bits from `position` up.
+    LoadByte = internal "%LDB" ("size position integer");
+    /// `integer` with the field of `size` bits from `position` up taken from `new`.
+    DepositByte = internal "%DPB" ("new size position integer");
+    /// The digits of `integer` in `radix`, with its sign.
+    IntegerString = internal "%INTEGER-STRING" ("integer radix") slowly "%SLOW-INTEGER-STRING";
+    /// The integer that part of a string is, and where reading stopped.
+    ParseInteger = internal "%PARSE-INTEGER" ("string start end radix junk-allowed") slowly "%SLOW-PARSE-INTEGER";
+
+    // ---- characters
+    /// The code of a character.
+    CharCode = cl "CHAR-CODE" ("character");
+    /// The code of a character.
+    CharInt = cl "CHAR-INT" ("character");
+    /// The character with this code.
+    CodeChar = cl "CODE-CHAR" ("code");
+    /// The character that a character, or a string or symbol of one, stands for.
+    ToCharacter = cl "CHARACTER" ("designator");
+    /// The upper case of a letter; other characters as they are.
+    CharUpcase = cl "CHAR-UPCASE" ("character");
+    /// The lower case of a letter; other characters as they are.
+    CharDowncase = cl "CHAR-DOWNCASE" ("character");
+    /// Whether `character` is a letter in upper case.
+    UpperCasep = cl "UPPER-CASE-P" ("character");
+    /// Whether `character` is a letter in lower case.
+    LowerCasep = cl "LOWER-CASE-P" ("character");
+    /// Whether `character` is a letter with upper and lower case.
+    BothCasep = cl "BOTH-CASE-P" ("character");
+    /// Whether `character` is a letter.
+    AlphaCharp = cl "ALPHA-CHAR-P" ("character");
+    /// Whether `character` is a letter or a digit.
+    Alphanumericp = cl "ALPHANUMERICP" ("character");
+    /// Whether `character` prints as itself.
+    GraphicCharp = cl "GRAPHIC-CHAR-P" ("character");
+    /// Whether `character` is one that every Common Lisp has.
+    StandardCharp = cl "STANDARD-CHAR-P" ("character");
+    /// The weight of a digit, `NIL` for any other character.
+    DigitCharp = cl "DIGIT-CHAR-P" ("character &optional radix");
+    /// The digit of this weight, `NIL` if there is none.
+    DigitChar = cl "DIGIT-CHAR" ("weight &optional radix");
+    /// The name of a character, `NIL` if it has none.
+    CharName = cl "CHAR-NAME" ("character");
+    /// The character of this name, `NIL` if there is none.
+    NameChar = cl "NAME-CHAR" ("name");
+    /// Whether all characters are the same.
+    CharEqualExactly = cl "CHAR=" ("character &rest characters");
+    /// Whether no two characters are the same.
+    CharNotEqualExactly = cl "CHAR/=" ("character &rest characters");
+    /// Whether the codes increase.
+    CharLess = cl "CHAR<" ("character &rest characters");
+    /// Whether the codes decrease.
+    CharGreater = cl "CHAR>" ("character &rest characters");
+    /// Whether the codes never decrease.
+    CharLessEqual = cl "CHAR<=" ("character &rest characters");
+    /// Whether the codes never increase.
+    CharGreaterEqual = cl "CHAR>=" ("character &rest characters");
+    /// As `char=`, whatever the case.
+    CharEqual = cl "CHAR-EQUAL" ("character &rest characters");
+    /// As `char/=`, whatever the case.
+    CharNotEqual = cl "CHAR-NOT-EQUAL" ("character &rest characters");
+    /// As `char<`, whatever the case.
+    CharLessp = cl "CHAR-LESSP" ("character &rest characters");
+    /// As `char>`, whatever the case.
+    CharGreaterp = cl "CHAR-GREATERP" ("character &rest characters");
+    /// As `char<=`, whatever the case.
+    CharNotGreaterp = cl "CHAR-NOT-GREATERP" ("character &rest characters");
+    /// As `char>=`, whatever the case.
+    CharNotLessp = cl "CHAR-NOT-LESSP" ("character &rest characters");
+
+    // ---- strings
+    /// The string that a string, symbol or character stands for.
+    String = cl "STRING" ("designator");
+    /// Character `index` of a string.
+    Char = cl "CHAR" ("string index");
+    /// Character `index` of a string.
+    Schar = cl "SCHAR" ("string index");
+    /// Makes `character` character `index` of a string, and returns it.
+    SetChar = internal "%SET-CHAR" ("string index character");
+    /// A fresh string of `size` times `character`.
+    MakeString = internal "%MAKE-STRING" ("size character");
+    /// Whether two parts of strings are the same.
+    StringEqualExactly = internal "%STRING=" ("left right &optional start1 end1 start2 end2") slowly "%SLOW-STRING=";
+    /// Whether two parts of strings are the same, whatever the case.
+    StringEqualLoosely = internal "%STRING-EQUAL" ("left right &optional start1 end1 start2 end2") slowly "%SLOW-STRING-EQUAL";
+    /// -1, 0 or 1, as the first of two parts of strings is before, the same as, or behind the other, and the index in
+    /// the first where they begin to differ; with `fold`, whatever the case.
+    StringCompare = internal "%STRING-COMPARE" ("left right start1 end1 start2 end2 fold") slowly "%SLOW-STRING-COMPARE";
+    /// A fresh string, the part in upper case.
+    StringUpcase = internal "%STRING-UPCASE" ("string start end") slowly "%SLOW-STRING-UPCASE";
+    /// A fresh string, the part in lower case.
+    StringDowncase = internal "%STRING-DOWNCASE" ("string start end") slowly "%SLOW-STRING-DOWNCASE";
+    /// A fresh string, the words of the part capitalized.
+    StringCapitalize = internal "%STRING-CAPITALIZE" ("string start end") slowly "%SLOW-STRING-CAPITALIZE";
+    /// The string, the part changed to upper case.
+    NStringUpcase = internal "%NSTRING-UPCASE" ("string start end") slowly "%SLOW-NSTRING-UPCASE";
+    /// The string, the part changed to lower case.
+    NStringDowncase = internal "%NSTRING-DOWNCASE" ("string start end") slowly "%SLOW-NSTRING-DOWNCASE";
+    /// The string, the words of the part capitalized.
+    NStringCapitalize = internal "%NSTRING-CAPITALIZE" ("string start end") slowly "%SLOW-NSTRING-CAPITALIZE";
+    /// The string without the characters of `bag` at both ends.
+    StringTrim = cl "STRING-TRIM" ("bag string") slowly "%SLOW-STRING-TRIM";
+    /// The string without the characters of `bag` at its beginning.
+    StringLeftTrim = cl "STRING-LEFT-TRIM" ("bag string") slowly "%SLOW-STRING-LEFT-TRIM";
+    /// The string without the characters of `bag` at its end.
+    StringRightTrim = cl "STRING-RIGHT-TRIM" ("bag string") slowly "%SLOW-STRING-RIGHT-TRIM";
+    /// The strings joined.
+    StringConcat = internal "%STRING-CONCAT" ("&rest strings") slowly "%SLOW-STRING-CONCAT";
+    /// Where the pattern first is in a part of a string, or last with `from-end`; `NIL` if nowhere.
+    SearchString = internal "%SEARCH-STRING" ("pattern string start end from-end") slowly "%SLOW-SEARCH-STRING";
+    /// The string as `prin1` writes it.
+    StringEscaped = internal "%STRING-ESCAPED" ("string") slowly "%SLOW-STRING-ESCAPED";
+    /// The character as `prin1` writes it.
+    CharacterEscaped = internal "%CHARACTER-ESCAPED" ("character");
+    /// The name of a symbol as it is written, without package: in upper case (`case` 0), lower case (1) or
+    /// capitalized (2), between bars if `escape` and it would not read back.
+    SymbolNameString = internal "%SYMBOL-NAME-STRING" ("name case escape") slowly "%SLOW-SYMBOL-NAME-STRING";
 
     // ---- lists
     /// A fresh pair.
@@ -288,6 +537,173 @@ define_builtins! {
     ListStar = cl "LIST*" ("object &rest objects");
     /// The lists joined: all but the last are copied.
     Append = cl "APPEND" ("&rest lists") slowly "%SLOW-APPEND";
+    /// The car of the car.
+    Caar = cl "CAAR" ("list");
+    /// The cdr of the car.
+    Cdar = cl "CDAR" ("list");
+    /// The car of the car of the car.
+    Caaar = cl "CAAAR" ("list");
+    /// The car of the car of the cdr.
+    Caadr = cl "CAADR" ("list");
+    /// The car of the cdr of the car.
+    Cadar = cl "CADAR" ("list");
+    /// The car of the cdr of the cdr.
+    Caddr = cl "CADDR" ("list");
+    /// The cdr of the car of the car.
+    Cdaar = cl "CDAAR" ("list");
+    /// The cdr of the car of the cdr.
+    Cdadr = cl "CDADR" ("list");
+    /// The cdr of the cdr of the car.
+    Cddar = cl "CDDAR" ("list");
+    /// The cdr of the cdr of the cdr.
+    Cdddr = cl "CDDDR" ("list");
+    /// The car of the car of the car of the car.
+    Caaaar = cl "CAAAAR" ("list");
+    /// The car of the car of the car of the cdr.
+    Caaadr = cl "CAAADR" ("list");
+    /// The car of the car of the cdr of the car.
+    Caadar = cl "CAADAR" ("list");
+    /// The car of the car of the cdr of the cdr.
+    Caaddr = cl "CAADDR" ("list");
+    /// The car of the cdr of the car of the car.
+    Cadaar = cl "CADAAR" ("list");
+    /// The car of the cdr of the car of the cdr.
+    Cadadr = cl "CADADR" ("list");
+    /// The car of the cdr of the cdr of the car.
+    Caddar = cl "CADDAR" ("list");
+    /// The car of the cdr of the cdr of the cdr.
+    Cadddr = cl "CADDDR" ("list");
+    /// The cdr of the car of the car of the car.
+    Cdaaar = cl "CDAAAR" ("list");
+    /// The cdr of the car of the car of the cdr.
+    Cdaadr = cl "CDAADR" ("list");
+    /// The cdr of the car of the cdr of the car.
+    Cdadar = cl "CDADAR" ("list");
+    /// The cdr of the car of the cdr of the cdr.
+    Cdaddr = cl "CDADDR" ("list");
+    /// The cdr of the cdr of the car of the car.
+    Cddaar = cl "CDDAAR" ("list");
+    /// The cdr of the cdr of the car of the cdr.
+    Cddadr = cl "CDDADR" ("list");
+    /// The cdr of the cdr of the cdr of the car.
+    Cdddar = cl "CDDDAR" ("list");
+    /// The cdr of the cdr of the cdr of the cdr.
+    Cddddr = cl "CDDDDR" ("list");
+    /// The third item of a list, `NIL` if there is none.
+    Third = cl "THIRD" ("list");
+    /// The fourth item of a list, `NIL` if there is none.
+    Fourth = cl "FOURTH" ("list");
+    /// The fifth item of a list, `NIL` if there is none.
+    Fifth = cl "FIFTH" ("list");
+    /// The sixth item of a list, `NIL` if there is none.
+    Sixth = cl "SIXTH" ("list");
+    /// The seventh item of a list, `NIL` if there is none.
+    Seventh = cl "SEVENTH" ("list");
+    /// The eighth item of a list, `NIL` if there is none.
+    Eighth = cl "EIGHTH" ("list");
+    /// The ninth item of a list, `NIL` if there is none.
+    Ninth = cl "NINTH" ("list");
+    /// The tenth item of a list, `NIL` if there is none.
+    Tenth = cl "TENTH" ("list");
+    /// Whether a list is empty; for anything but a list it fails.
+    Endp = cl "ENDP" ("list");
+    /// Item `index` of a list, `NIL` if there is none.
+    Nth = cl "NTH" ("index list") slowly "%SLOW-NTH";
+    /// The list without its first `count` items.
+    Nthcdr = cl "NTHCDR" ("count list") slowly "%SLOW-NTHCDR";
+    /// The last `count` pairs of a list, one unless said otherwise.
+    Last = cl "LAST" ("list &optional count") slowly "%SLOW-LAST";
+    /// A copy of the list without its last `count` pairs, one unless said otherwise.
+    Butlast = cl "BUTLAST" ("list &optional count") slowly "%SLOW-BUTLAST";
+    /// The list, its last `count` pairs cut off.
+    NButlast = cl "NBUTLAST" ("list &optional count") slowly "%SLOW-NBUTLAST";
+    /// Number of items of a list, `NIL` if it is circular.
+    ListLength = cl "LIST-LENGTH" ("list") slowly "%SLOW-LIST-LENGTH";
+    /// A fresh list of `size` times `item`.
+    MakeList = internal "%MAKE-LIST" ("size item") slowly "%SLOW-MAKE-LIST";
+    /// `alist` with a pair of `key` and `value` in front.
+    Acons = cl "ACONS" ("key value alist");
+    /// The lists joined: the end of each is changed to the next.
+    NConc = cl "NCONC" ("&rest lists") slowly "%SLOW-NCONC";
+    /// The items of `list` in reverse order, in front of `tail`.
+    RevAppend = cl "REVAPPEND" ("list tail") slowly "%SLOW-REVAPPEND";
+    /// As `revappend`, from the pairs of `list`.
+    NReconc = cl "NRECONC" ("list tail") slowly "%SLOW-NRECONC";
+    /// A fresh list of the same items.
+    CopyList = cl "COPY-LIST" ("list") slowly "%SLOW-COPY-LIST";
+    /// A fresh list with fresh pairs for those that are its items.
+    CopyAlist = cl "COPY-ALIST" ("alist") slowly "%SLOW-COPY-ALIST";
+    /// A fresh tree of pairs with the same leaves.
+    CopyTree = cl "COPY-TREE" ("tree") slowly "%SLOW-COPY-TREE";
+    /// A fresh list of the items in front of the tail that is `object`.
+    Ldiff = cl "LDIFF" ("list object") slowly "%SLOW-LDIFF";
+    /// Whether `object` is a tail of `list`.
+    Tailp = cl "TAILP" ("object list") slowly "%SLOW-TAILP";
+    /// `alist` with a pair for each key and datum in front.
+    Pairlis = cl "PAIRLIS" ("keys data &optional alist") slowly "%SLOW-PAIRLIS";
+    /// The tail of `list` that begins with an item `eq` to `item`, or `NIL`.
+    MemberEq = internal "%MEMBER-EQ" ("item list") slowly "%SLOW-MEMBER-EQ";
+    /// The tail of `list` that begins with an item `eql` to `item`, or `NIL`.
+    MemberEql = internal "%MEMBER-EQL" ("item list") slowly "%SLOW-MEMBER-EQL";
+    /// The tail of `list` that begins with an item `equal` to `item`, or `NIL`.
+    MemberEqual = internal "%MEMBER-EQUAL" ("item list") slowly "%SLOW-MEMBER-EQUAL";
+    /// The first pair of `alist` whose key is `eq` to `item`, or `NIL`.
+    AssocEq = internal "%ASSOC-EQ" ("item alist") slowly "%SLOW-ASSOC-EQ";
+    /// The first pair of `alist` whose key is `eql` to `item`, or `NIL`.
+    AssocEql = internal "%ASSOC-EQL" ("item alist") slowly "%SLOW-ASSOC-EQL";
+    /// The first pair of `alist` whose key is `equal` to `item`, or `NIL`.
+    AssocEqual = internal "%ASSOC-EQUAL" ("item alist") slowly "%SLOW-ASSOC-EQUAL";
+    /// The first pair of `alist` whose value is `eq` to `item`, or `NIL`.
+    RassocEq = internal "%RASSOC-EQ" ("item alist") slowly "%SLOW-RASSOC-EQ";
+    /// The first pair of `alist` whose value is `eql` to `item`, or `NIL`.
+    RassocEql = internal "%RASSOC-EQL" ("item alist") slowly "%SLOW-RASSOC-EQL";
+    /// The first pair of `alist` whose value is `equal` to `item`, or `NIL`.
+    RassocEqual = internal "%RASSOC-EQUAL" ("item alist") slowly "%SLOW-RASSOC-EQUAL";
+    /// `list` with `item` in front, unless it has it.
+    AdjoinEql = internal "%ADJOIN-EQL" ("item list") slowly "%SLOW-ADJOIN-EQL";
+    /// The value of a property of a property list, `default` if there is none.
+    Getf = cl "GETF" ("plist indicator &optional default") slowly "%SLOW-GETF";
+    /// The property list with this property: changed if it is there, else with it in front.
+    Putf = internal "%PUTF" ("plist indicator value") slowly "%SLOW-PUTF";
+    /// The property list without this property, and whether it was there.
+    Remf = internal "%REMF" ("plist indicator") slowly "%SLOW-REMF";
+    /// Indicator and value of the first property that is among `indicators`, and the tail that begins there; three
+    /// times `NIL` if there is none.
+    GetProperties = cl "GET-PROPERTIES" ("plist indicators") slowly "%SLOW-GET-PROPERTIES";
+
+    // ---- sequences
+    /// Number of elements.
+    Length = cl "LENGTH" ("sequence") slowly "%SLOW-LENGTH";
+    /// Element `index` of a list or vector.
+    Elt = cl "ELT" ("sequence index") slowly "%SLOW-ELT";
+    /// Makes `value` element `index` of a list or vector, and returns `value`.
+    SetElt = internal "%SET-ELT" ("sequence index value") slowly "%SLOW-SET-ELT";
+    /// A fresh sequence of the elements from `start` to before `end`.
+    Subseq = cl "SUBSEQ" ("sequence start &optional end") slowly "%SLOW-SUBSEQ";
+    /// A fresh sequence of the same elements.
+    CopySeq = cl "COPY-SEQ" ("sequence") slowly "%SLOW-COPY-SEQ";
+    /// A fresh sequence of the elements in reverse order.
+    Reverse = cl "REVERSE" ("sequence") slowly "%SLOW-REVERSE";
+    /// The sequence turned round in place.
+    NReverse = cl "NREVERSE" ("sequence") slowly "%SLOW-NREVERSE";
+    /// Makes `item` every element of a part of a vector, and returns the vector.
+    Fill = internal "%FILL" ("vector item start end") slowly "%SLOW-FILL";
+    /// Copies a part of the vector `source` over a part of the vector `target`, and returns that.
+    Replace = internal "%REPLACE" ("target source start1 end1 start2 end2") slowly "%SLOW-REPLACE";
+    /// A fresh simple vector of the items of a list.
+    ListVector = internal "%LIST-VECTOR" ("list") slowly "%SLOW-LIST-VECTOR";
+    /// A fresh string of the characters in a list.
+    ListString = internal "%LIST-STRING" ("list") slowly "%SLOW-LIST-STRING";
+    /// A fresh list of the elements of a part of a vector.
+    VectorList = internal "%VECTOR-LIST" ("vector start end") slowly "%SLOW-VECTOR-LIST";
+    /// Index of the first element, or the last with `from-end`, that is `eql` to `item`; `NIL` if there is none.
+    PositionEql = internal "%POSITION-EQL" ("item sequence start end from-end") slowly "%SLOW-POSITION-EQL";
+    /// Index of the first element, or the last with `from-end`, that is `equal` to `item`; `NIL` if there is none.
+    PositionEqual = internal "%POSITION-EQUAL" ("item sequence start end from-end") slowly "%SLOW-POSITION-EQUAL";
+    /// Number of elements that are `eql` to `item`.
+    CountEql = internal "%COUNT-EQL" ("item sequence start end") slowly "%SLOW-COUNT-EQL";
+    /// The list without the items that are `eql` to `item`.
+    RemoveEql = internal "%REMOVE-EQL" ("item list") slowly "%SLOW-REMOVE-EQL";
 
     // ---- arrays
     /// A fresh simple vector of `objects`.
@@ -300,6 +716,83 @@ define_builtins! {
     Aref = cl "AREF" ("array &rest subscripts");
     /// Sets the element of `array` that the subscripts select to the last argument, and returns that.
     SetAref = internal "%SET-AREF" ("array &rest subscripts-and-value");
+    /// Element `index` of an array, counted row by row.
+    RowMajorAref = cl "ROW-MAJOR-AREF" ("array index");
+    /// Makes `value` element `index` of an array, counted row by row, and returns `value`.
+    SetRowMajorAref = internal "%SET-ROW-MAJOR-AREF" ("array index value");
+    /// The index, counted row by row, of the element that the subscripts select.
+    ArrayRowMajorIndex = cl "ARRAY-ROW-MAJOR-INDEX" ("array &rest subscripts");
+    /// Whether the subscripts select an element.
+    ArrayInBoundsp = cl "ARRAY-IN-BOUNDS-P" ("array &rest subscripts");
+    /// Number of elements, those behind a fill pointer too.
+    ArrayTotalSize = cl "ARRAY-TOTAL-SIZE" ("array");
+    /// Number of dimensions.
+    ArrayRank = cl "ARRAY-RANK" ("array");
+    /// List of the dimensions.
+    ArrayDimensions = cl "ARRAY-DIMENSIONS" ("array");
+    /// Dimension number `axis`.
+    ArrayDimension = cl "ARRAY-DIMENSION" ("array axis");
+    /// Whether the array has a fill pointer.
+    ArrayHasFillPointerp = cl "ARRAY-HAS-FILL-POINTER-P" ("array");
+    /// Whether the array was made to be adjustable.
+    AdjustableArrayp = cl "ADJUSTABLE-ARRAY-P" ("array");
+    /// What keeps the elements: a simple vector or string, the array itself if it is one.
+    ArrayData = internal "%ARRAY-DATA" ("array");
+    /// The fill pointer of a vector.
+    FillPointer = cl "FILL-POINTER" ("vector");
+    /// Makes `index` the fill pointer of a vector, and returns it.
+    SetFillPointer = internal "%SET-FILL-POINTER" ("vector index");
+    /// Puts `object` where the fill pointer is and moves that on; the index, or `NIL` if the vector is full.
+    VectorPush = cl "VECTOR-PUSH" ("object vector");
+    /// As `vector-push`; a full vector grows.
+    VectorPushExtend = cl "VECTOR-PUSH-EXTEND" ("object vector &optional extension") slowly "%SLOW-VECTOR-PUSH-EXTEND";
+    /// The element in front of the fill pointer, which moves back to it.
+    VectorPop = cl "VECTOR-POP" ("vector");
+    /// A fresh simple vector of `size` times `object`.
+    MakeVector = internal "%MAKE-VECTOR" ("size object");
+    /// An array that is not simple, over the simple vector or string `data`; `fill-pointer` is `NIL`, `T` or an
+    /// index.
+    MakeArray = internal "%MAKE-ARRAY" ("dimensions data fill-pointer adjustable");
+    /// Gives an array that is not simple other dimensions, data and fill pointer, and returns it.
+    AdjustArray = internal "%ADJUST-ARRAY" ("array dimensions data fill-pointer");
+
+    // ---- hash tables
+    /// A hash table: `test` is 0 for `eq`, 1 for `eql`, 2 for `equal`, 3 for `equalp`, 4 for the functions of a
+    /// program.
+    MakeHashTable = internal "%MAKE-HASH-TABLE" ("test size test-function hash-function");
+    /// The value of `key`, or `default`, and whether the table has it.
+    Gethash = cl "GETHASH" ("key table &optional default") slowly "%SLOW-GETHASH";
+    /// Makes `value` the value of `key`, and returns it.
+    Puthash = internal "%PUTHASH" ("key table value") slowly "%SLOW-PUTHASH";
+    /// Takes `key` out of the table; whether it was there.
+    Remhash = cl "REMHASH" ("key table") slowly "%SLOW-REMHASH";
+    /// Takes everything out of the table, and returns it.
+    Clrhash = cl "CLRHASH" ("table");
+    /// Number of keys.
+    HashTableCount = cl "HASH-TABLE-COUNT" ("table");
+    /// Number of keys for which the table has room at present.
+    HashTableSize = cl "HASH-TABLE-SIZE" ("table");
+    /// The number of the test, as for `%make-hash-table`, and the functions of a program.
+    HashTableTest = internal "%HASH-TABLE-TEST" ("table");
+    /// The position behind the next entry from `position` on, its key and its value; `NIL` at the end. The first
+    /// position is 0.
+    TableNext = internal "%TABLE-NEXT" ("table position") slowly "%SLOW-TABLE-NEXT";
+    /// A later position with the same next entry, some free entries on.
+    TableSkip = internal "%TABLE-SKIP" ("table position");
+    /// The hash of a key.
+    TableHash = internal "%TABLE-HASH" ("table key");
+    /// The first entry whose key has this hash, or `NIL`.
+    TableFirst = internal "%TABLE-FIRST" ("table hash");
+    /// The entry after this one whose key has the same hash, or `NIL`.
+    TableAfter = internal "%TABLE-AFTER" ("table entry");
+    /// Key and value of an entry.
+    TableEntry = internal "%TABLE-ENTRY" ("table entry");
+    /// Gives an entry another value, and returns it.
+    SetTableValue = internal "%SET-TABLE-VALUE" ("table entry value");
+    /// Adds a key that the table does not have, and returns the value.
+    TableAdd = internal "%TABLE-ADD" ("table hash key value");
+    /// Takes an entry out of the table.
+    TableDelete = internal "%TABLE-DELETE" ("table entry");
 
     // ---- structures
     /// Slot `index` of `instance`, which must be an instance of the class named `class` or a subclass.

@@ -132,7 +132,7 @@ impl Unit {
     ///
     /// # Errors
     /// As for every allocation. What was made is remembered, so that a second attempt goes on from there.
-    pub(crate) fn to_value(
+    pub(crate) fn value_of(
         &mut self,
         heap: &mut Heap,
         world: &mut World,
@@ -156,7 +156,7 @@ impl Unit {
                             steps.push(ToValue::Build(datum));
                             steps.extend(items.iter().rev().map(ToValue::Visit));
                         }
-                        _ => made.push(self.atom_to_value(heap, world, datum)?),
+                        _ => made.push(self.atom_value(heap, world, datum)?),
                     }
                 }
                 ToValue::Build(datum) => {
@@ -178,14 +178,9 @@ impl Unit {
         Ok(made.pop().unwrap_or(Value::NIL))
     }
 
-    fn atom_to_value(
-        &mut self,
-        heap: &mut Heap,
-        world: &mut World,
-        datum: &Datum,
-    ) -> Result<Value, AllocError> {
+    fn atom_value(&mut self, heap: &mut Heap, world: &mut World, datum: &Datum) -> Result<Value, AllocError> {
         Ok(match datum.kind() {
-            DatumKind::Symbol(symbol) => self.symbol_to_value(heap, world, symbol)?,
+            DatumKind::Symbol(symbol) => self.symbol_object(heap, world, symbol)?,
             DatumKind::Integer(value) => integer(heap, value)?,
             DatumKind::Ratio(numerator, denominator) => ratio(heap, numerator, denominator)?,
             DatumKind::Float(value) => heap.float(*value)?,
@@ -204,7 +199,7 @@ impl Unit {
     ///
     /// # Errors
     /// As for every allocation.
-    pub(crate) fn symbol_to_value(
+    pub(crate) fn symbol_object(
         &mut self,
         heap: &mut Heap,
         world: &mut World,
@@ -223,7 +218,7 @@ impl Unit {
     ///
     /// # Errors
     /// [`DatumError`] if the object is circular or too large.
-    pub(crate) fn to_datum(
+    pub(crate) fn datum_of(
         &mut self,
         heap: &Heap,
         world: &World,
@@ -244,7 +239,7 @@ impl Unit {
                     }
                     let parts = parts_of(heap, object);
                     if parts.is_none() {
-                        made.push(self.atom_to_datum(heap, world, object, span));
+                        made.push(self.atom_datum(heap, world, object, span));
                         continue;
                     }
                     match met.get(&object.bits()) {
@@ -301,10 +296,12 @@ impl Unit {
         datum
     }
 
-    fn atom_to_datum(&mut self, heap: &Heap, world: &World, object: Value, span: Span) -> Datum {
+    fn atom_datum(&mut self, heap: &Heap, world: &World, object: Value, span: Span) -> Datum {
         if let Some((_, datum)) = self.data.get(&object.bits())
             && let DatumKind::String(text) = datum.kind()
-            && heap.string(object).is_some_and(|characters| text.chars().map(u32::from).eq(characters.iter().copied()))
+            && heap
+                .string(object)
+                .is_some_and(|characters| text.chars().map(u32::from).eq(characters.iter().copied()))
         {
             return datum.clone();
         }
@@ -326,7 +323,7 @@ impl Unit {
             return Some(DatumKind::Nil);
         }
         if world.is_symbol(heap, object) {
-            return Some(DatumKind::Symbol(self.symbol_to_datum(heap, world, object)?));
+            return Some(DatumKind::Symbol(self.symbol_name(heap, world, object)?));
         }
         if let Some(n) = Int::of(heap, object) {
             return Some(DatumKind::Integer(n.to_big()));
@@ -345,15 +342,9 @@ impl Unit {
         Some(DatumKind::String(Arc::from(text?)))
     }
 
-    /// As [`Unit::to_datum`]; what no datum can describe becomes an object as a whole.
-    pub(crate) fn to_datum_or_object(
-        &mut self,
-        heap: &Heap,
-        world: &World,
-        object: Value,
-        span: Span,
-    ) -> Datum {
-        self.to_datum(heap, world, object, span)
+    /// As [`Unit::datum_of`]; what no datum can describe becomes an object as a whole.
+    pub(crate) fn datum_or_object(&mut self, heap: &Heap, world: &World, object: Value, span: Span) -> Datum {
+        self.datum_of(heap, world, object, span)
             .unwrap_or_else(|_| Datum::new(DatumKind::Object(self.pin(object)), span))
     }
 
@@ -366,7 +357,7 @@ impl Unit {
     }
 
     /// The compiler's name for a symbol.
-    pub(crate) fn symbol_to_datum(&mut self, heap: &Heap, world: &World, object: Value) -> Option<Symbol> {
+    pub(crate) fn symbol_name(&mut self, heap: &Heap, world: &World, object: Value) -> Option<Symbol> {
         if let Some(symbol) = world.name_of(heap, object) {
             return Some(symbol);
         }

@@ -28,7 +28,7 @@ impl Vm {
     pub fn export(&mut self, value: Value) -> Result<Datum, String> {
         let mut unit = Unit::default();
         let datum = unit
-            .to_datum(&self.heap, &self.world, value, Span::default())
+            .datum_of(&self.heap, &self.world, value, Span::default())
             .map_err(|error| error.to_string())?;
         self.charge(unit.take_work() as usize);
         Ok(datum)
@@ -40,7 +40,7 @@ impl Vm {
     /// [`Exit::Collect`] without room.
     pub fn import(&mut self, datum: &Datum) -> Result<Value, Exit> {
         let mut unit = Unit::default();
-        let value = unit.to_value(&mut self.heap, &mut self.world, datum)?;
+        let value = unit.value_of(&mut self.heap, &mut self.world, datum)?;
         self.charge(unit.take_work() as usize);
         Ok(value)
     }

@@ -11,14 +11,14 @@ use esl_bytecode::compile::{
 use esl_bytecode::datum::Datum;
 use esl_bytecode::module::Parameters;
 use esl_bytecode::span::Span;
-use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol, setf_cell};
 
 use crate::heap::Heap;
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::shape::{Shape, Sort};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::{World, find_builtin, setf_cell};
+use crate::world::{World, find_builtin};
 
 mod host;
 mod similar;
@@ -61,7 +61,7 @@ impl Environment for Vm {
         let indicator = self.value_for(indicator)?;
         let value = property(&self.heap, self.object_for(symbol)?, indicator)?;
         let unit = &mut self.world.unit.borrow_mut();
-        Some(unit.to_datum_or_object(&self.heap, &self.world, value, Span::default()))
+        Some(unit.datum_or_object(&self.heap, &self.world, value, Span::default()))
     }
 
     fn intern(&mut self, package: Option<&str>, name: &str, internal: bool) -> Result<Symbol, InternError> {
@@ -164,7 +164,7 @@ impl Vm {
         let Some(cell) = self.heap.symbol(object) else { return GlobalVariable::Undefined };
         if cell.header.flags & SymbolObject::CONSTANT != 0 {
             let unit = &mut self.world.unit.borrow_mut();
-            let value = unit.to_datum_or_object(&self.heap, &self.world, cell.value, Span::default());
+            let value = unit.datum_or_object(&self.heap, &self.world, cell.value, Span::default());
             return GlobalVariable::Constant(value);
         }
         if cell.header.flags & SymbolObject::SPECIAL != 0 {

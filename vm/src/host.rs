@@ -17,7 +17,7 @@ mod real;
 mod record;
 mod virtual_host;
 
-pub(crate) use console::{Character, Console, column_after, encode};
+pub(crate) use console::{Console, Taken, column_after, encode};
 pub use real::{FileAccess, MessageSender, RealHost};
 pub use record::{Record, Recording, RecordingHost, ReplayHost};
 pub use virtual_host::{Captured, VirtualHost};
@@ -169,6 +169,11 @@ pub trait Host {
 
     /// The messages that have arrived, in order.
     fn receive(&mut self) -> Vec<Message>;
+
+    /// The status with which a program ends whose standard output nobody reads any more. It did nothing wrong.
+    fn broken_output_status(&self) -> u8 {
+        0
+    }
 
     /// Whether somebody may still send messages. While this is so, a run in which everything waits is not deadlocked
     /// if something waits for a message.

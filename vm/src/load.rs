@@ -14,6 +14,7 @@ use std::collections::HashMap;
 use std::fmt;
 
 use esl_bytecode::BigInt;
+use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::file::ReadError;
 use esl_bytecode::module::{Constant, Function, Module, PoolIdx};
 use esl_bytecode::symbol::{Home, Symbol};
@@ -117,7 +118,8 @@ pub(crate) fn load(
     shared: &mut dyn Shared,
 ) -> Result<Value, LoadError> {
     verify(module).map_err(LoadError::Refused)?;
-    Loader { heap, world, module, shared, verified: Verified(()), pool: Vec::new(), functions: Vec::new() }.load()
+    Loader { heap, world, module, shared, verified: Verified(()), pool: Vec::new(), functions: Vec::new() }
+        .load()
 }
 
 /// A module on its way into the heap.
@@ -309,6 +311,38 @@ impl Vm {
             return image::place_of(&self.heap, &self.world, code, pc);
         }
         debug::place_of(&self.heap, parts.debug, pc)
+    }
+
+    /// Lambda list and documentation of a function; `NIL` for what it has not.
+    ///
+    /// # Errors
+    /// `type-error` for what is no function, [`Exit::Collect`] without room.
+    pub(crate) fn texts_of_function(&mut self, function: Value) -> Result<(Value, Value), Exit> {
+        if let Some((image, number)) = image_origin(&self.heap, function) {
+            let texts = image::texts(&mut self.heap, &mut self.world, image, number);
+            return self.loaded(texts);
+        }
+        let code = self.heap.function_code(function).and_then(|code| self.heap.code(code)).copied();
+        let Some(code) = code else { return self.type_error(function, "FUNCTION") };
+        let shape = Shape::unpack(code.spare[0]);
+        if shape.sort == Sort::Native
+            && let Some(info) = BUILTINS.get(usize::from(shape.number))
+        {
+            let documentation: Vec<&str> = info.doc.iter().map(|line| line.trim()).collect();
+            let documentation = self.heap.alloc_str(&documentation.join(" "))?;
+            let mut parameters = Vec::new();
+            for word in info.lambda_list.split_whitespace() {
+                let word = word.to_uppercase();
+                let symbol = if word.starts_with('&') {
+                    self.world.intern_cl(&mut self.heap, &word)?
+                } else {
+                    self.world.intern_esl(&mut self.heap, &word)?
+                };
+                parameters.push(symbol);
+            }
+            return Ok((self.heap.list(&parameters)?, documentation));
+        }
+        Ok(debug::texts(&self.heap, code.debug).unwrap_or((Value::NIL, Value::NIL)))
     }
 
     /// Gives what became of a load to the program: no room means that the operation is done again after a collection.

@@ -1,5 +1,6 @@
 //! Definitions: what a symbol stands for as a function, macro, special variable or constant.
 
+use crate::environment::property;
 use crate::heap::Kind;
 use crate::heap::layout::Symbol;
 use crate::raise::{Exit, Outcome};
@@ -15,6 +16,11 @@ pub(crate) fn set_function(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
     vm.heap.symbol_set_function(symbol, function);
     vm.heap.symbol_set_macro_function(symbol, Value::NIL);
+    let accessor = vm.world.known.accessor;
+    if property(&vm.heap, symbol, accessor).is_some() {
+        // It reads a slot no more; `%define-accessor` comes after the definition.
+        super::symbol::remprop(vm, &[name, accessor])?;
+    }
     Ok(name)
 }
 
@@ -87,11 +93,13 @@ impl Vm {
     ///
     /// # Errors
     /// `type-error` if `v` is no symbol, `program-error` if it belongs to the language.
-    fn definable(&mut self, v: Value, what: &str) -> Result<Value, Exit> {
+    pub(crate) fn definable(&mut self, v: Value, what: &str) -> Result<Value, Exit> {
         let object = self.symbol_object(v)?;
         if self.world.is_locked(&self.heap, v) {
             let name = self.describe(v);
-            return self.program_error(format!("{name} belongs to the language and cannot be redefined as a {what}"));
+            return self.program_error(format!(
+                "{name} belongs to the language and cannot be redefined as a {what}"
+            ));
         }
         Ok(object)
     }

@@ -1,10 +1,654 @@
-//! Streams.
+//! Streams: the standard ones, and those that read from or write to a string or a text file.
+//!
+//! A Stream is a record; `aux` is its [`Sort`], [`slot`] names its slots. A file is read as a whole when it is opened;
+//! what is written to one is gathered, and goes out in blocks and when the stream is closed. Every output stream knows
+//! its column.
 
+use crate::builtins::array::{Elements, vector_elements};
+use crate::builtins::expect::optional;
+use crate::control::End;
+use crate::heap::{AllocError, Heap, Kind};
+use crate::host::{HostError, Output, Taken, WriteMode, column_after, encode};
+use crate::raise::{Exit, Outcome, Raised};
+use crate::value::Value;
 use crate::vm::Vm;
+
+/// Slots of a Stream.
+mod slot {
+    /// What it reads from or has gathered, a String.
+    pub(super) const BUFFER: usize = 0;
+    /// How much of that was read or written, in characters.
+    pub(super) const POSITION: usize = 1;
+    /// Where reading ends.
+    pub(super) const END: usize = 2;
+    /// Characters since the last line end that was written.
+    pub(super) const COLUMN: usize = 3;
+    /// Name of its file.
+    pub(super) const NAME: usize = 4;
+    /// Whether it is open.
+    pub(super) const OPEN: usize = 5;
+    /// How the next block is written to the file: number of a `WriteMode`.
+    pub(super) const MODE: usize = 6;
+    pub(super) const LEN: usize = 7;
+}
+
+/// What a stream is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u16)]
+enum Sort {
+    StandardInput = 0,
+    StandardOutput = 1,
+    StandardError = 2,
+    StringInput = 3,
+    StringOutput = 4,
+    FileOutput = 5,
+}
+
+impl Sort {
+    fn is_input(self) -> bool {
+        matches!(self, Sort::StandardInput | Sort::StringInput)
+    }
+}
+
+/// Characters that a file's stream gathers before it writes them.
+const BLOCK: usize = 1 << 16;
+/// Characters that `peek-char` skips at once.
+const SKIP_LIMIT: usize = 1 << 14;
+/// Characters of the first buffer of a string stream.
+const FIRST_BUFFER: usize = 24;
+
+/// What a stream has to read from.
+pub(crate) enum Source {
+    /// The rest of a string or file.
+    Text(String),
+    /// Standard input.
+    Console {
+        /// What has come in.
+        text: String,
+        /// Whether nothing more will.
+        is_at_end: bool,
+    },
+}
+
+fn make_stream(
+    heap: &mut Heap,
+    sort: Sort,
+    buffer: Value,
+    start: usize,
+    end: usize,
+) -> Result<Value, AllocError> {
+    let mut slots = [Value::NIL; slot::LEN];
+    slots[slot::BUFFER] = buffer;
+    slots[slot::POSITION] = Value::index(start);
+    slots[slot::END] = Value::index(end);
+    slots[slot::COLUMN] = Value::small(0);
+    slots[slot::OPEN] = Value::T;
+    slots[slot::MODE] = Value::small(0);
+    heap.alloc_record(Kind::Stream, 0, sort as u16, &slots)
+}
+
+/// Standard input, output and error.
+///
+/// # Errors
+/// As for every allocation.
+pub(crate) fn standard_streams(heap: &mut Heap) -> Result<[Value; 3], AllocError> {
+    let mut stream = |sort| make_stream(heap, sort, Value::NIL, 0, 0);
+    Ok([stream(Sort::StandardInput)?, stream(Sort::StandardOutput)?, stream(Sort::StandardError)?])
+}
 
 impl Vm {
     /// Writes what standard output has gathered.
     pub(crate) fn flush_output(&mut self) {
         self.console.flush(&mut *self.host);
     }
+
+    fn sort_of(&self, stream: Value) -> Option<Sort> {
+        let header = self.heap.header(stream).filter(|header| header.kind == Kind::Stream)?;
+        Some(match header.aux {
+            0 => Sort::StandardInput,
+            1 => Sort::StandardOutput,
+            2 => Sort::StandardError,
+            3 => Sort::StringInput,
+            4 => Sort::StringOutput,
+            _ => Sort::FileOutput,
+        })
+    }
+
+    fn stream_slot(&self, stream: Value, index: usize) -> Value {
+        self.heap.record(stream, Kind::Stream).map_or(Value::NIL, |slots| slots[index])
+    }
+
+    fn stream_index(&self, stream: Value, index: usize) -> usize {
+        self.stream_slot(stream, index).as_index().unwrap_or(0)
+    }
+
+    fn set_stream_slot(&mut self, stream: Value, index: usize, value: Value) {
+        self.heap.record_set(stream, Kind::Stream, index, value);
+    }
+
+    /// The open stream that `v` designates for reading or writing: `NIL` is the standard one, `T` the terminal.
+    fn designated_stream(&mut self, v: Value, is_input: bool) -> Result<(Value, Sort), Exit> {
+        let known = self.world.known;
+        let [input, output, _] = self.world.streams;
+        let (variable, terminal) =
+            if is_input { (known.standard_input, input) } else { (known.standard_output, output) };
+        let stream = match v {
+            Value::NIL => self.symbol_value(variable).unwrap_or(Value::NIL),
+            Value::T => terminal,
+            v => v,
+        };
+        let Some(sort) = self.sort_of(stream) else { return self.type_error(stream, "STREAM") };
+        if sort.is_input() != is_input {
+            let text = if is_input { "it is not open for reading" } else { "it is not open for writing" };
+            return self.raise(Raised::Stream(stream, text.into()));
+        }
+        if self.stream_slot(stream, slot::OPEN).is_nil() {
+            return self.raise(Raised::Stream(stream, "it is closed".into()));
+        }
+        Ok((stream, sort))
+    }
+
+    /// Gives the program what standard input has to say; `None` at the end.
+    fn taken<T>(&mut self, taken: Taken<T>) -> Result<Option<T>, Exit> {
+        match taken {
+            Taken::Next(value) => Ok(Some(value)),
+            Taken::End => Ok(None),
+            // The builtin is done again when the task is woken.
+            Taken::WouldBlock => Err(Exit::Park),
+            Taken::Failed(error) => {
+                let stream = self.world.streams[0];
+                self.raise(Raised::Stream(stream, format!("it cannot be read: {error}")))
+            }
+        }
+    }
+
+    fn next_character(&mut self, stream: Value, sort: Sort) -> Result<Option<u32>, Exit> {
+        if sort == Sort::StandardInput {
+            let taken = self.console.read(&mut *self.host);
+            return self.taken(taken);
+        }
+        let position = self.stream_index(stream, slot::POSITION);
+        if position >= self.stream_index(stream, slot::END) {
+            return Ok(None);
+        }
+        let buffer = self.stream_slot(stream, slot::BUFFER);
+        let character = self.heap.string(buffer).and_then(|characters| characters.get(position)).copied();
+        self.set_stream_slot(stream, slot::POSITION, Value::index(position + 1));
+        Ok(character)
+    }
+
+    fn give_back(&mut self, stream: Value, sort: Sort, character: u32) {
+        if sort == Sort::StandardInput {
+            self.console.unread(character);
+            return;
+        }
+        let position = self.stream_index(stream, slot::POSITION);
+        self.set_stream_slot(stream, slot::POSITION, Value::index(position.saturating_sub(1)));
+    }
+
+    /// What reading gives at the end: a failure, or the value given for it.
+    fn at_end(&mut self, stream: Value, arguments: &[Value], first: usize) -> Outcome {
+        let is_error = arguments.get(first).is_none_or(|v| v.is_true());
+        if is_error { self.raise(Raised::EndOfFile(stream)) } else { Ok(optional(arguments, first + 1)) }
+    }
+
+    /// Writes characters to an open output stream.
+    fn write_characters(&mut self, stream: Value, sort: Sort, characters: &[u32]) -> Result<(), Exit> {
+        self.charge(characters.len());
+        match sort {
+            Sort::StandardOutput => {
+                self.console.write(&mut *self.host, Output::Standard, characters);
+                self.check_output()
+            }
+            Sort::StandardError => {
+                self.console.write(&mut *self.host, Output::Error, characters);
+                Ok(())
+            }
+            _ => {
+                let position = self.stream_index(stream, slot::POSITION);
+                let end = position + characters.len();
+                let buffer = self.room_for(stream, position, end)?;
+                if let Some(room) = self.heap.string_mut(buffer).and_then(|all| all.get_mut(position..end)) {
+                    room.copy_from_slice(characters);
+                }
+                let column = column_after(self.stream_index(stream, slot::COLUMN), characters);
+                self.set_stream_slot(stream, slot::POSITION, Value::index(end));
+                self.set_stream_slot(stream, slot::COLUMN, Value::index(column));
+                if sort == Sort::FileOutput && end >= BLOCK { self.write_out(stream) } else { Ok(()) }
+            }
+        }
+    }
+
+    /// A buffer of at least `end` characters with what was gathered up to `position`.
+    fn room_for(&mut self, stream: Value, position: usize, end: usize) -> Result<Value, Exit> {
+        let buffer = self.stream_slot(stream, slot::BUFFER);
+        let capacity = self.heap.string(buffer).map_or(0, <[u32]>::len);
+        if end <= capacity {
+            return Ok(buffer);
+        }
+        let larger = self.heap.alloc_string_filled(end.max(capacity * 2).max(FIRST_BUFFER), 0)?;
+        let gathered = self.heap.string(buffer).map_or(Vec::new(), |all| all[..position].to_vec());
+        if let Some(room) = self.heap.string_mut(larger) {
+            room[..position].copy_from_slice(&gathered);
+        }
+        self.set_stream_slot(stream, slot::BUFFER, larger);
+        Ok(larger)
+    }
+
+    /// Writes what a file's stream has gathered.
+    fn write_out(&mut self, stream: Value) -> Result<(), Exit> {
+        let position = self.stream_index(stream, slot::POSITION);
+        let buffer = self.stream_slot(stream, slot::BUFFER);
+        let mut bytes = Vec::new();
+        encode(self.heap.string(buffer).map_or(&[], |all| &all[..position]), &mut bytes);
+        let mode = match self.stream_index(stream, slot::MODE) {
+            0 => WriteMode::Replace,
+            1 => WriteMode::Append,
+            _ => WriteMode::Create,
+        };
+        let name = self.text_of(self.stream_slot(stream, slot::NAME)).unwrap_or_default();
+        // What cannot be written is not tried again: the next block would fail too, and closing has to succeed.
+        self.set_stream_slot(stream, slot::POSITION, Value::small(0));
+        self.set_stream_slot(stream, slot::MODE, Value::small(1));
+        match self.host.write_file(&name, &bytes, mode) {
+            Ok(()) => Ok(()),
+            Err(error) => self.raise(Raised::Stream(stream, format!("it cannot be written: {error}"))),
+        }
+    }
+
+    /// What becomes of a program whose standard output could not be written: it fails, or if nobody reads it any more,
+    /// the run ends.
+    fn check_output(&mut self) -> Result<(), Exit> {
+        if self.console.is_broken() {
+            if self.exit_status.is_some() {
+                // The run ends already; its cleanups may go on writing.
+                return Ok(());
+            }
+            self.exit_status = Some(self.host.broken_output_status());
+            self.abort_others();
+            self.begin_end(End::Aborted);
+            return Err(Exit::Unwind);
+        }
+        match self.console.take_failure() {
+            None => Ok(()),
+            Some(error) => {
+                let stream = self.world.streams[1];
+                self.raise(Raised::Stream(stream, format!("it cannot be written: {error}")))
+            }
+        }
+    }
+
+    fn column_of(&self, stream: Value, sort: Sort) -> usize {
+        match sort {
+            Sort::StandardOutput => self.console.column(Output::Standard),
+            Sort::StandardError => self.console.column(Output::Error),
+            _ => self.stream_index(stream, slot::COLUMN),
+        }
+    }
+
+    /// The characters of a string, also of one with a fill pointer, from `start` to before `end`.
+    pub(crate) fn characters(&mut self, v: Value, start: Value, end: Value) -> Result<Vec<u32>, Exit> {
+        let length = match vector_elements(&self.heap, v) {
+            Some(elements @ Elements::Characters(_)) => elements.len(),
+            _ => return self.type_error(v, "STRING"),
+        };
+        let (start, end) = self.bounds(start, end, length)?;
+        match vector_elements(&self.heap, v) {
+            Some(Elements::Characters(characters)) => Ok(characters[start..end].to_vec()),
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    /// What a stream has to read from.
+    ///
+    /// # Errors
+    /// A failure if it is no open input stream.
+    pub(crate) fn source(&mut self, stream: Value) -> Result<Source, Exit> {
+        let (stream, sort) = self.designated_stream(stream, true)?;
+        if sort == Sort::StandardInput {
+            return Ok(Source::Console { text: self.console.pending(), is_at_end: self.console.is_at_end() });
+        }
+        let (start, end) = (self.stream_index(stream, slot::POSITION), self.stream_index(stream, slot::END));
+        let buffer = self.stream_slot(stream, slot::BUFFER);
+        let rest = self.heap.string(buffer).and_then(|all| all.get(start..end)).unwrap_or(&[]);
+        let text = |&code: &u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
+        Ok(Source::Text(rest.iter().map(text).collect()))
+    }
+
+    /// Takes so many characters from a stream of which `source` was the rest.
+    pub(crate) fn skip_source(&mut self, stream: Value, source: &Source, characters: usize) {
+        if matches!(source, Source::Console { .. }) {
+            self.console.skip(characters);
+        } else if let Ok((stream, _)) = self.designated_stream(stream, true) {
+            let position = self.stream_index(stream, slot::POSITION) + characters;
+            self.set_stream_slot(stream, slot::POSITION, Value::index(position));
+        }
+    }
+
+    /// Has more of standard input come in.
+    ///
+    /// # Errors
+    /// [`Exit::Park`] if there is none yet, or a failure.
+    pub(crate) fn more_input(&mut self) -> Result<(), Exit> {
+        let taken = self.console.fill(&mut *self.host);
+        self.taken(taken).map(|_| ())
+    }
+
+    fn file_error<T>(&mut self, what: &str, path: &str, error: &HostError) -> Result<T, Exit> {
+        self.raise(Raised::Simple(format!("cannot {what} {path}: {error}")))
+    }
+}
+
+// ---- making and closing
+
+/// `(%standard-stream number)`
+pub(super) fn standard_stream(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let index = vm.index_below(arguments[0], 3)?;
+    Ok(vm.world.streams[index])
+}
+
+/// `(%make-string-input string start end)`
+pub(super) fn make_string_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let characters = vm.characters(arguments[0], arguments[1], arguments[2])?;
+    vm.charge(characters.len());
+    let buffer = vm.heap.alloc_string(&characters)?;
+    Ok(make_stream(&mut vm.heap, Sort::StringInput, buffer, 0, characters.len())?)
+}
+
+/// `(%string-input-position stream)`
+pub(super) fn string_input_position(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (stream, _) = vm.designated_stream(arguments[0], true)?;
+    Ok(vm.stream_slot(stream, slot::POSITION))
+}
+
+/// `(%make-string-output)`
+pub(super) fn make_string_output(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    let buffer = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
+    Ok(make_stream(&mut vm.heap, Sort::StringOutput, buffer, 0, 0)?)
+}
+
+/// `(get-output-stream-string stream)`
+pub(super) fn get_output_stream_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let stream = arguments[0];
+    if vm.sort_of(stream) != Some(Sort::StringOutput) {
+        return vm.type_error(stream, "STRING-STREAM");
+    }
+    let length = vm.stream_index(stream, slot::POSITION);
+    let buffer = vm.stream_slot(stream, slot::BUFFER);
+    let gathered = vm.heap.string(buffer).map_or(Vec::new(), |all| all[..length].to_vec());
+    vm.charge(length);
+    let text = vm.heap.alloc_string(&gathered)?;
+    vm.set_stream_slot(stream, slot::POSITION, Value::small(0));
+    Ok(text)
+}
+
+/// `(%open-input path)`
+pub(super) fn open_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
+    let buffer = file_text(vm, arguments)?;
+    let length = vm.heap.string(buffer).map_or(0, <[u32]>::len);
+    let stream = make_stream(&mut vm.heap, Sort::StringInput, buffer, 0, length)?;
+    let name = vm.heap.alloc_str(&path)?;
+    vm.set_stream_slot(stream, slot::NAME, name);
+    Ok(stream)
+}
+
+/// `(%open-output path mode)`: 0 replaces the file, 1 appends, 2 makes it and fails if there is one.
+pub(super) fn open_output(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
+    let mode = vm.index_below(arguments[1], 3)?;
+    let buffer = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
+    let stream = make_stream(&mut vm.heap, Sort::FileOutput, buffer, 0, 0)?;
+    let name = vm.heap.alloc_str(&path)?;
+    vm.set_stream_slot(stream, slot::NAME, name);
+    vm.set_stream_slot(stream, slot::MODE, Value::index(mode));
+    // Written at once, so that a file that cannot be made fails here.
+    vm.write_out(stream)?;
+    Ok(stream)
+}
+
+/// `(%close stream abort)`
+pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let stream = arguments[0];
+    let Some(sort) = vm.sort_of(stream) else { return vm.type_error(stream, "STREAM") };
+    if vm.stream_slot(stream, slot::OPEN).is_nil() {
+        return Ok(Value::NIL);
+    }
+    match sort {
+        Sort::StandardInput | Sort::StandardOutput | Sort::StandardError => {
+            vm.flush_output();
+            return Ok(Value::T);
+        }
+        Sort::FileOutput if arguments[1].is_nil() => {
+            vm.set_stream_slot(stream, slot::OPEN, Value::NIL);
+            vm.write_out(stream)?;
+        }
+        _ => vm.set_stream_slot(stream, slot::OPEN, Value::NIL),
+    }
+    Ok(Value::T)
+}
+
+/// `(%file-text path)`
+pub(super) fn file_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
+    match vm.host.read_file(&path) {
+        Ok(bytes) => {
+            vm.charge(bytes.len());
+            Ok(vm.heap.alloc_str(&String::from_utf8_lossy(&bytes))?)
+        }
+        Err(error) => vm.file_error("read", &path, &error),
+    }
+}
+
+/// `(%file-exists-p path)`
+pub(super) fn file_exists_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
+    Ok(Value::boolean(vm.host.file_exists(&path)))
+}
+
+/// `(%delete-file path)`
+pub(super) fn delete_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
+    match vm.host.delete_file(&path) {
+        Ok(()) => Ok(Value::T),
+        Err(error) => vm.file_error("delete", &path, &error),
+    }
+}
+
+// ---- asking
+
+/// `(streamp object)`
+pub(super) fn streamp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(Value::boolean(vm.sort_of(arguments[0]).is_some()))
+}
+
+/// `(input-stream-p stream)`
+pub(super) fn input_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match vm.sort_of(arguments[0]) {
+        Some(sort) => Ok(Value::boolean(sort.is_input())),
+        None => vm.type_error(arguments[0], "STREAM"),
+    }
+}
+
+/// `(output-stream-p stream)`
+pub(super) fn output_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match vm.sort_of(arguments[0]) {
+        Some(sort) => Ok(Value::boolean(!sort.is_input())),
+        None => vm.type_error(arguments[0], "STREAM"),
+    }
+}
+
+/// `(open-stream-p stream)`
+pub(super) fn open_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match vm.sort_of(arguments[0]) {
+        Some(_) => Ok(vm.stream_slot(arguments[0], slot::OPEN)),
+        None => vm.type_error(arguments[0], "STREAM"),
+    }
+}
+
+/// `(%stream-sort stream)`: a keyword, and the name of its file.
+pub(super) fn stream_sort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(sort) = vm.sort_of(arguments[0]) else { return vm.type_error(arguments[0], "STREAM") };
+    let name = vm.stream_slot(arguments[0], slot::NAME);
+    let sort = match sort {
+        Sort::StandardInput | Sort::StandardOutput | Sort::StandardError => "STANDARD",
+        Sort::StringInput | Sort::StringOutput if name.is_nil() => "STRING",
+        _ => "FILE",
+    };
+    let sort = vm.world.keyword(&mut vm.heap, sort)?;
+    vm.give_values(&[sort, name])
+}
+
+/// `(%stream-column stream)`
+pub(super) fn stream_column(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (stream, sort) = vm.designated_stream(arguments[0], false)?;
+    Ok(Value::index(vm.column_of(stream, sort)))
+}
+
+// ---- reading
+
+/// `(read-char &optional stream (eof-error-p t) eof-value recursive-p)`
+pub(super) fn read_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (stream, sort) = vm.designated_stream(optional(arguments, 0), true)?;
+    match vm.next_character(stream, sort)? {
+        Some(code) => Ok(Value::character(code).unwrap_or(Value::NIL)),
+        None => vm.at_end(stream, arguments, 1),
+    }
+}
+
+/// `(read-char-no-hang &optional stream (eof-error-p t) eof-value recursive-p)`
+pub(super) fn read_char_no_hang(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match read_char(vm, arguments) {
+        Err(Exit::Park) => Ok(Value::NIL),
+        outcome => outcome,
+    }
+}
+
+/// `(listen &optional stream)`
+pub(super) fn listen(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (stream, sort) = vm.designated_stream(optional(arguments, 0), true)?;
+    match vm.next_character(stream, sort) {
+        Ok(Some(code)) => {
+            vm.give_back(stream, sort, code);
+            Ok(Value::T)
+        }
+        Ok(None) | Err(Exit::Park) => Ok(Value::NIL),
+        Err(exit) => Err(exit),
+    }
+}
+
+/// `(peek-char &optional peek-type stream (eof-error-p t) eof-value recursive-p)`
+pub(super) fn peek_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let wanted = optional(arguments, 0);
+    let (stream, sort) = vm.designated_stream(optional(arguments, 1), true)?;
+    for _ in 0..SKIP_LIMIT {
+        let Some(code) = vm.next_character(stream, sort)? else { return vm.at_end(stream, arguments, 2) };
+        let is_it = match wanted.as_character() {
+            Some(wanted) => code == wanted,
+            None => wanted.is_nil() || !char::from_u32(code).is_some_and(char::is_whitespace),
+        };
+        if is_it {
+            vm.give_back(stream, sort, code);
+            return Ok(Value::character(code).unwrap_or(Value::NIL));
+        }
+    }
+    // What was skipped stays so: whoever takes over goes on from there.
+    vm.charge(SKIP_LIMIT);
+    Err(Exit::Slowly)
+}
+
+/// `(unread-char character &optional stream)`
+pub(super) fn unread_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(code) = arguments[0].as_character() else { return vm.type_error(arguments[0], "CHARACTER") };
+    let (stream, sort) = vm.designated_stream(optional(arguments, 1), true)?;
+    vm.give_back(stream, sort, code);
+    Ok(Value::NIL)
+}
+
+/// `(read-line &optional stream (eof-error-p t) eof-value recursive-p)`
+pub(super) fn read_line(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (stream, sort) = vm.designated_stream(optional(arguments, 0), true)?;
+    let (line, is_cut) = if sort == Sort::StandardInput {
+        let taken = vm.console.read_line(&mut *vm.host);
+        let Some((line, is_cut)) = vm.taken(taken)? else { return end_of_line(vm, stream, arguments) };
+        vm.charge(line.len());
+        match vm.heap.alloc_string(&line) {
+            Ok(text) => (text, is_cut),
+            Err(error) => {
+                // The builtin will be done again.
+                vm.console.unread_line(&line, is_cut);
+                return Err(error.into());
+            }
+        }
+    } else {
+        let (start, end) = (vm.stream_index(stream, slot::POSITION), vm.stream_index(stream, slot::END));
+        if start >= end {
+            return end_of_line(vm, stream, arguments);
+        }
+        let buffer = vm.stream_slot(stream, slot::BUFFER);
+        let rest = vm.heap.string(buffer).map_or(&[][..], |all| &all[start..end]);
+        let length = rest.iter().position(|&c| c == u32::from('\n'));
+        let line = rest[..length.unwrap_or(rest.len())].to_vec();
+        vm.charge(line.len());
+        let text = vm.heap.alloc_string(&line)?;
+        let next = start + line.len() + usize::from(length.is_some());
+        vm.set_stream_slot(stream, slot::POSITION, Value::index(next));
+        (text, length.is_none())
+    };
+    vm.give_values(&[line, Value::boolean(is_cut)])
+}
+
+fn end_of_line(vm: &mut Vm, stream: Value, arguments: &[Value]) -> Outcome {
+    let value = vm.at_end(stream, arguments, 1)?;
+    vm.give_values(&[value, Value::T])
+}
+
+// ---- writing
+
+/// `(write-char character &optional stream)`
+pub(super) fn write_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(code) = arguments[0].as_character() else { return vm.type_error(arguments[0], "CHARACTER") };
+    let (stream, sort) = vm.designated_stream(optional(arguments, 1), false)?;
+    vm.write_characters(stream, sort, &[code])?;
+    Ok(arguments[0])
+}
+
+/// `(%write-string string stream start end)`
+pub(super) fn write_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[string, stream, start, end] = arguments else { unreachable!("the table says four") };
+    let characters = vm.characters(string, start, end)?;
+    let (stream, sort) = vm.designated_stream(stream, false)?;
+    vm.write_characters(stream, sort, &characters)?;
+    Ok(string)
+}
+
+/// `(terpri &optional stream)`
+pub(super) fn terpri(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (stream, sort) = vm.designated_stream(optional(arguments, 0), false)?;
+    vm.write_characters(stream, sort, &[u32::from('\n')])?;
+    Ok(Value::NIL)
+}
+
+/// `(fresh-line &optional stream)`
+pub(super) fn fresh_line(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (stream, sort) = vm.designated_stream(optional(arguments, 0), false)?;
+    if vm.column_of(stream, sort) == 0 {
+        return Ok(Value::NIL);
+    }
+    vm.write_characters(stream, sort, &[u32::from('\n')])?;
+    Ok(Value::T)
+}
+
+/// `(finish-output &optional stream)`, `(force-output &optional stream)`
+pub(super) fn finish_output(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (stream, sort) = vm.designated_stream(optional(arguments, 0), false)?;
+    match sort {
+        Sort::StandardOutput => {
+            vm.flush_output();
+            vm.check_output()?;
+        }
+        Sort::FileOutput => vm.write_out(stream)?,
+        _ => {}
+    }
+    Ok(Value::NIL)
 }

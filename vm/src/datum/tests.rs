@@ -16,11 +16,11 @@ impl Fixture {
     }
 
     fn to_value(&mut self, datum: &Datum) -> Value {
-        self.unit.to_value(&mut self.heap, &mut self.world, datum).unwrap()
+        self.unit.value_of(&mut self.heap, &mut self.world, datum).unwrap()
     }
 
     fn to_datum(&mut self, value: Value) -> Result<Datum, DatumError> {
-        self.unit.to_datum(&self.heap, &self.world, value, at(99))
+        self.unit.datum_of(&self.heap, &self.world, value, at(99))
     }
 }
 

@@ -3,8 +3,11 @@
 //! A unit is compiled at a time: [`Vm::begin_unit`] forgets what was remembered of the last one. Between calls the unit
 //! keeps everything alive that its data refer to.
 
+use std::sync::Arc;
+
 use esl_bytecode::compile::{CompileTimeHost, LocalDefinition, MacroCall, MacroRef};
 use esl_bytecode::datum::{Datum, ObjectId};
+use esl_bytecode::file::ModuleImage;
 use esl_bytecode::module::Module;
 
 use crate::datum::Unit;
@@ -32,11 +35,26 @@ impl Vm {
         self.with_room(|vm| vm.load_in_unit(module))
     }
 
-    fn load_in_unit(&mut self, module: &Module) -> Result<Value, LoadError> {
+    pub(crate) fn load_in_unit(&mut self, module: &Module) -> Result<Value, LoadError> {
         let mut unit = self.world.unit.take();
         let functions = crate::load::load(&mut self.heap, &mut self.world, module, &mut unit);
         self.world.unit.replace(unit);
         functions
+    }
+
+    /// Takes in an image, such as that of the library, and gives the functions that run its top-level forms, in order,
+    /// as a list. The image counts as verified.
+    ///
+    /// # Errors
+    /// [`LoadError`].
+    pub fn open_image(&mut self, image: ModuleImage) -> Result<Value, LoadError> {
+        let image = Arc::new(image);
+        self.with_room(|vm| vm.world.open_image(&mut vm.heap, image.clone()))
+    }
+
+    /// Closes the language: from here on, its names cannot be defined again.
+    pub fn seal(&mut self) {
+        self.world.is_open = false;
     }
 
     /// Does something outside of all tasks that may find no room: then once more, after a collection.
@@ -65,15 +83,15 @@ impl Vm {
         let function = match &call.function {
             MacroRef::Local(id) => unit.pinned(*id),
             MacroRef::Global(symbol) => {
-                let symbol = unit.symbol_to_value(&mut self.heap, &mut self.world, symbol)?;
+                let symbol = unit.symbol_object(&mut self.heap, &mut self.world, symbol)?;
                 self.world.macro_function_of(&self.heap, symbol)
             }
         };
         let Some(function) = function else { return Ok(None) };
-        let form = unit.to_value(&mut self.heap, &mut self.world, &call.form)?;
+        let form = unit.value_of(&mut self.heap, &mut self.world, &call.form)?;
         let mut environment = Value::NIL;
         for LocalDefinition { name, expander } in call.locals.iter().rev() {
-            let name = unit.symbol_to_value(&mut self.heap, &mut self.world, name)?;
+            let name = unit.symbol_object(&mut self.heap, &mut self.world, name)?;
             let expander = expander.and_then(|id| unit.pinned(id)).unwrap_or(Value::NIL);
             let entry = self.heap.cons(name, expander)?;
             environment = self.heap.cons(entry, environment)?;
@@ -114,7 +132,7 @@ impl CompileTimeHost for Vm {
         let values = self.call(function, &[form, environment], MACRO_TICKS)?;
         let expansion = values.first().copied().unwrap_or(Value::NIL);
         let mut unit = self.world.unit.borrow_mut();
-        let datum = unit.to_datum(&self.heap, &self.world, expansion, call.form.span());
+        let datum = unit.datum_of(&self.heap, &self.world, expansion, call.form.span());
         datum.map_err(|error| error.to_string())
     }
 

@@ -7,6 +7,8 @@
 //! Guarantees: once nobody reads standard output any more, everything written to it is dropped, and
 //! [`Console::is_broken`] says so: the run ends quietly.
 
+use std::collections::VecDeque;
+
 use super::{Host, HostError, Input, Output};
 
 /// Bytes that standard output gathers.
@@ -21,8 +23,8 @@ pub(crate) struct Console {
     broken: bool,
     /// Why standard output could not be written, until somebody asks.
     failure: Option<HostError>,
-    /// Decoded input, the next character last.
-    input: Vec<u32>,
+    /// Decoded input, in order.
+    input: VecDeque<u32>,
     /// The bytes of a character that has not come in whole.
     partial: Vec<u8>,
     at_end: bool,
@@ -30,9 +32,9 @@ pub(crate) struct Console {
 
 /// What standard input has to say.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Character {
-    /// A character.
-    Next(u32),
+pub(crate) enum Taken<T> {
+    /// This came in.
+    Next(T),
     /// Nothing yet.
     WouldBlock,
     /// There is no more.
@@ -94,64 +96,116 @@ impl Console {
     }
 
     /// Takes the next character of standard input.
-    pub(crate) fn read(&mut self, host: &mut dyn Host) -> Character {
+    pub(crate) fn read(&mut self, host: &mut dyn Host) -> Taken<u32> {
         loop {
-            if let Some(character) = self.input.pop() {
-                return Character::Next(character);
+            if let Some(character) = self.input.pop_front() {
+                return Taken::Next(character);
             }
-            if self.at_end {
-                return Character::End;
-            }
-            self.flush(host);
-            match host.read_input() {
-                Input::Data(bytes) => self.take_in(&bytes),
-                Input::WouldBlock => return Character::WouldBlock,
-                Input::Failed(error) => return Character::Failed(error),
-                Input::End => {
-                    self.at_end = true;
-                    if !std::mem::take(&mut self.partial).is_empty() {
-                        self.input.push(u32::from(char::REPLACEMENT_CHARACTER));
-                    }
-                }
+            match self.fill(host) {
+                Taken::Next(()) => {}
+                Taken::WouldBlock => return Taken::WouldBlock,
+                Taken::End => return Taken::End,
+                Taken::Failed(error) => return Taken::Failed(error),
             }
         }
     }
 
-    /// Gives a character back to standard input.
-    pub(crate) fn unread(&mut self, character: u32) {
-        self.input.push(character);
+    /// Takes the next line of standard input without its end, and whether that was missing.
+    pub(crate) fn read_line(&mut self, host: &mut dyn Host) -> Taken<(Vec<u32>, bool)> {
+        let mut searched = 0;
+        loop {
+            let end = self.input.iter().skip(searched).position(|&c| c == u32::from('\n'));
+            if let Some(end) = end.map(|end| searched + end) {
+                let line = self.input.drain(..end).collect();
+                self.input.pop_front();
+                return Taken::Next((line, false));
+            }
+            searched = self.input.len();
+            match self.fill(host) {
+                Taken::Next(()) => {}
+                Taken::WouldBlock => return Taken::WouldBlock,
+                Taken::End if self.input.is_empty() => return Taken::End,
+                Taken::End => return Taken::Next((self.input.drain(..).collect(), true)),
+                Taken::Failed(error) => return Taken::Failed(error),
+            }
+        }
     }
 
-    /// Drops what has come in and was not read.
-    pub(crate) fn clear_input(&mut self) {
-        self.input.clear();
+    /// Whether nothing more will come in.
+    pub(crate) fn is_at_end(&self) -> bool {
+        self.at_end
+    }
+
+    /// What has come in and was not read.
+    pub(crate) fn pending(&self) -> String {
+        let text = |&code: &u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
+        self.input.iter().map(text).collect()
+    }
+
+    /// Drops so many characters of what has come in.
+    pub(crate) fn skip(&mut self, characters: usize) {
+        self.input.drain(..characters.min(self.input.len()));
+    }
+
+    /// Gives a character back to standard input.
+    pub(crate) fn unread(&mut self, character: u32) {
+        self.input.push_front(character);
+    }
+
+    /// Gives a line back to standard input.
+    pub(crate) fn unread_line(&mut self, line: &[u32], is_cut: bool) {
+        if !is_cut {
+            self.unread(u32::from('\n'));
+        }
+        line.iter().rev().for_each(|&character| self.unread(character));
+    }
+
+    /// Has more input come in, in addition to what was not read yet.
+    pub(crate) fn fill(&mut self, host: &mut dyn Host) -> Taken<()> {
+        if self.at_end {
+            return Taken::End;
+        }
+        self.flush(host);
+        match host.read_input() {
+            Input::Data(bytes) => {
+                self.take_in(&bytes);
+                Taken::Next(())
+            }
+            Input::WouldBlock => Taken::WouldBlock,
+            Input::Failed(error) => Taken::Failed(error),
+            Input::End => {
+                self.at_end = true;
+                if std::mem::take(&mut self.partial).is_empty() {
+                    return Taken::End;
+                }
+                self.input.push_back(u32::from(char::REPLACEMENT_CHARACTER));
+                Taken::Next(())
+            }
+        }
     }
 
     fn take_in(&mut self, bytes: &[u8]) {
         self.partial.extend_from_slice(bytes);
         let bytes = std::mem::take(&mut self.partial);
-        let mut characters = Vec::new();
         let mut rest = &bytes[..];
         loop {
             match std::str::from_utf8(rest) {
                 Ok(text) => {
-                    characters.extend(text.chars().map(u32::from));
-                    break;
+                    self.input.extend(text.chars().map(u32::from));
+                    return;
                 }
                 Err(error) => {
                     let (valid, after) = rest.split_at(error.valid_up_to());
-                    characters.extend(String::from_utf8_lossy(valid).chars().map(u32::from));
+                    self.input.extend(String::from_utf8_lossy(valid).chars().map(u32::from));
                     let Some(length) = error.error_len() else {
                         self.partial = after.to_vec();
-                        break;
+                        return;
                     };
-                    characters.push(u32::from(char::REPLACEMENT_CHARACTER));
+                    self.input.push_back(u32::from(char::REPLACEMENT_CHARACTER));
                     rest = &after[length..];
                 }
             }
         }
-        characters.reverse();
-        self.input = characters;
     }
 }
 
@@ -190,8 +244,8 @@ mod tests {
         let mut text = String::new();
         loop {
             match console.read(host) {
-                Character::Next(c) => text.push(char::from_u32(c).unwrap()),
-                Character::End => return text,
+                Taken::Next(c) => text.push(char::from_u32(c).unwrap()),
+                Taken::End => return text,
                 other => panic!("{other:?}"),
             }
         }
@@ -215,6 +269,18 @@ mod tests {
         console.write(&mut host, Output::Standard, &codes("ab"));
         console.flush(&mut host);
         assert!(console.is_broken() && console.take_failure().is_none());
+    }
+
+    #[test]
+    fn lines_are_taken_whole() {
+        let mut host = VirtualHost::new().with_input("one\ntw").with_input("o\n\nend");
+        let mut console = Console::default();
+        let mut lines = Vec::new();
+        while let Taken::Next((line, is_cut)) = console.read_line(&mut host) {
+            lines.push((String::from_iter(line.iter().map(|&c| char::from_u32(c).unwrap())), is_cut));
+        }
+        let expected = [("one", false), ("two", false), ("", false), ("end", true)];
+        assert_eq!(lines, expected.map(|(line, is_cut)| (line.to_owned(), is_cut)));
     }
 
     #[test]

@@ -101,7 +101,7 @@ fn name_of<'a>(
 /// The module must stay the only one in its file: its last constant becomes the table.
 #[must_use]
 pub fn prepare(mut module: Module) -> Module {
-    let mut rows: BTreeMap<(Arc<str>, String), (PoolIdx, [Option<PoolIdx>; 2])> = BTreeMap::new();
+    let mut rows: BTreeMap<(Arc<str>, String), Row> = BTreeMap::new();
     let mut toplevel = Vec::new();
     for number in std::mem::take(&mut module.toplevel) {
         let Some(defined) = definitions_of(&module, number) else {
@@ -112,7 +112,8 @@ pub fn prepare(mut module: Module) -> Module {
             let Constant::Symbol(name) = &module.constants[symbol.0 as usize] else { continue };
             let Some(package) = name.package() else { continue };
             let row = rows.entry((package.clone(), name.name().to_owned()));
-            row.or_insert((symbol, [None; 2])).1[usize::from(is_macro)] = Some(function);
+            row.or_insert(Row { symbol, functions: [None; 2] }).functions[usize::from(is_macro)] =
+                Some(function);
         }
     }
     module.toplevel = toplevel;
@@ -122,12 +123,18 @@ pub fn prepare(mut module: Module) -> Module {
     };
     let none = add(Constant::Nil);
     let mut items = vec![add(Constant::Symbol(Symbol::esl(MARKER)))];
-    for (symbol, functions) in rows.into_values() {
+    for Row { symbol, functions } in rows.into_values() {
         items.push(symbol);
         items.extend(functions.map(|function| function.unwrap_or(none)));
     }
     add(Constant::Vector(items));
     module
+}
+
+/// A row under construction: the function, then the macro function.
+struct Row {
+    symbol: PoolIdx,
+    functions: [Option<PoolIdx>; 2],
 }
 
 struct Defined {

@@ -301,6 +301,19 @@ impl ImageLoader<'_> {
     }
 }
 
+/// Lambda list and documentation of a function of an image.
+pub(super) fn texts(
+    heap: &mut Heap,
+    world: &mut World,
+    image: usize,
+    number: u32,
+) -> Result<(Value, Value), LoadError> {
+    let mut loader = ImageLoader { heap, world, image };
+    let function = loader.module().function(FunctionNumber(number))?;
+    let mut constant = |index: Option<PoolIdx>| index.map_or(Ok(Value::NIL), |index| loader.constant(index));
+    Ok((constant(function.lambda_list)?, constant(function.documentation)?))
+}
+
 /// The number of image and function behind the stub or the code of a function of an image.
 pub(crate) fn origin(heap: &Heap, function: Value) -> Option<(usize, u32)> {
     let code = heap.code(heap.function_code(function)?)?;

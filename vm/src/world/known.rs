@@ -45,19 +45,18 @@ macro_rules! define_known {
 }
 
 define_known! {
-    quote = cl "QUOTE";
     package = cl "*PACKAGE*";
-    function = cl "FUNCTION";
-    lambda = cl "LAMBDA";
+    gensym_counter = cl "*GENSYM-COUNTER*";
+    standard_input = cl "*STANDARD-INPUT*";
+    standard_output = cl "*STANDARD-OUTPUT*";
+    error_output = cl "*ERROR-OUTPUT*";
     setf = cl "SETF";
     structure_object = cl "STRUCTURE-OBJECT";
-    error = cl "ERROR";
     raise = esl "%RAISE";
     allow_other_keys = keyword "ALLOW-OTHER-KEYS";
     stack_exhausted = keyword "STACK-EXHAUSTED";
     heap_exhausted = keyword "HEAP-EXHAUSTED";
     // Properties under which the machine keeps data on a symbol.
-    variable_documentation = esl "%VARIABLE-DOCUMENTATION";
     accessor = esl "%ACCESSOR";
     // Variables of the library that the machine looks at.
     instead = esl "%INSTEAD";
@@ -65,6 +64,5 @@ define_known! {
     internal = keyword "INTERNAL";
     external = keyword "EXTERNAL";
     inherited = keyword "INHERITED";
-    end_of_file = keyword "EOF";
-    would_block = keyword "WOULD-BLOCK";
+    unfinished = keyword "UNFINISHED";
 }

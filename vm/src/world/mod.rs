@@ -17,8 +17,10 @@ use std::sync::Arc;
 use esl_bytecode::builtin::{BUILTINS, Builtin, Visibility};
 use esl_bytecode::file::ModuleImage;
 use esl_bytecode::package::{PackageId, Packages};
-use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Home, KEYWORD_PACKAGE, Symbol};
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
+use crate::builtins::eval::Compiler;
+use crate::builtins::stream::standard_streams;
 use crate::datum::Unit;
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{AllocError, Heap, Kind};
@@ -75,6 +77,8 @@ pub(crate) struct World {
     package_objects: HashMap<PackageId, Value>,
     /// Packages in which symbols are at home, by name.
     homes: HashMap<Arc<str>, (PackageId, Value)>,
+    /// Standard input, output and error.
+    pub(crate) streams: [Value; 3],
     /// The companions of `NIL` and `T`.
     nil: Value,
     t: Value,
@@ -84,6 +88,8 @@ pub(crate) struct World {
     pub(crate) images: Images,
     /// What the compilation that is under way remembers.
     pub(crate) unit: RefCell<Unit>,
+    /// The compiler, and what programs compile.
+    pub(crate) compiler: Compiler,
     /// Structure and condition classes by the address of their names.
     classes: GivenMap<u64, Value>,
 }
@@ -105,16 +111,31 @@ impl World {
             packages: Packages::standard(),
             package_objects: HashMap::new(),
             homes: HashMap::new(),
+            streams: [Value::NIL; 3],
             nil: Value::NIL,
             t: Value::NIL,
             undefined,
             images: Images::default(),
             unit: RefCell::default(),
+            compiler: Compiler::default(),
             classes: GivenMap::default(),
         };
         world.nil = world.make_constant(heap, &Symbol::cl("NIL"), Value::NIL)?;
         world.t = world.make_constant(heap, &Symbol::cl("T"), Value::T)?;
         world.known = Known::intern(&mut world, heap)?;
+        world.streams = standard_streams(heap)?;
+        let [input, output, error] = world.streams;
+        let package = world.package_object(heap, PackageId::USER)?;
+        for (variable, value) in [
+            (world.known.package, package),
+            (world.known.gensym_counter, Value::small(1)),
+            (world.known.standard_input, input),
+            (world.known.standard_output, output),
+            (world.known.error_output, error),
+        ] {
+            heap.symbol_set_value(variable, value);
+            heap.set_flags(variable, Kind::Symbol, SymbolObject::LOCKED | SymbolObject::SPECIAL);
+        }
         Ok(world)
     }
 
@@ -345,20 +366,13 @@ impl World {
     pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
         self.known.visit(visit);
         [self.nil, self.t, self.undefined].into_iter().for_each(&mut *visit);
+        self.streams.into_iter().for_each(&mut *visit);
         self.symbols.values().copied().for_each(&mut *visit);
         self.package_objects.values().copied().for_each(&mut *visit);
         self.images.roots(visit);
         self.unit.borrow().roots(visit);
+        self.compiler.roots(visit);
         self.classes.values().copied().for_each(&mut *visit);
-    }
-}
-
-/// The symbol that keeps the function `(setf name)`: one of the same package, named as it is written.
-pub(crate) fn setf_cell(symbol: &Symbol) -> Symbol {
-    let name = format!("(SETF {})", symbol.name());
-    match symbol.home() {
-        Home::Package(package) => Symbol::new(package, &name),
-        Home::Uninterned(id) => Symbol::uninterned(*id, &name),
     }
 }
 

@@ -1,0 +1,187 @@
+//! Structures and their classes.
+
+use crate::builtins::LIMIT;
+use crate::heap::Kind;
+use crate::raise::{Exit, Expected, Outcome, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::world::class::{MAX_DEPTH, class_slot, slot};
+
+impl Vm {
+    /// The class that `v` is or names.
+    ///
+    /// # Errors
+    /// A failure if there is none.
+    fn class(&mut self, v: Value) -> Result<Value, Exit> {
+        if self.heap.is(v, Kind::Class) {
+            return Ok(v);
+        }
+        if let Some(class) = self.find_class(v) {
+            return Ok(class);
+        }
+        if !self.world.is_symbol(&self.heap, v) {
+            return self.type_error(v, "CLASS");
+        }
+        let name = self.describe(v);
+        self.program_error(format!("there is no structure or condition type {name}"))
+    }
+
+    /// Notes that `datum` is no instance of `class`.
+    fn instance_error<T>(&mut self, datum: Value, class: Value) -> Result<T, Exit> {
+        let name = if self.heap.is(class, Kind::Class) { self.class_name(class) } else { class };
+        self.raise(Raised::Type(datum, Expected::Specifier(name)))
+    }
+
+    fn index_in(&mut self, instance: Value, index: Value) -> Result<usize, Exit> {
+        let Some(slots) = self.heap.structure_slots(instance) else {
+            return self.instance_error(instance, self.world.known.structure_object);
+        };
+        let length = slots.len();
+        self.index_below(index, length)
+    }
+
+    fn slot_value(&self, instance: Value, index: usize) -> Value {
+        self.heap.structure_slots(instance).and_then(|slots| slots.get(index)).copied().unwrap_or(Value::NIL)
+    }
+}
+
+/// `(%make-class name supers slots data)`
+pub(super) fn make_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[name, supers, slots, data] = arguments else { unreachable!("the table says four") };
+    if !vm.heap.is(name, Kind::Symbol) {
+        return vm.type_error(name, "SYMBOL");
+    }
+    if vm.world.is_locked(&vm.heap, name) {
+        let name = vm.describe(name);
+        return vm.program_error(format!("{name} belongs to the language and cannot be redefined as a type"));
+    }
+    let mut classes = Vec::new();
+    for class in vm.list_items(supers, LIMIT)? {
+        classes.push(vm.class(class)?);
+    }
+    let slots = vm.list_items(slots, LIMIT)?;
+    let is_too_deep = classes.iter().any(|&class| {
+        class_slot(&vm.heap, class, slot::DEPTH).as_index().is_some_and(|depth| depth >= MAX_DEPTH)
+    });
+    if is_too_deep {
+        return vm.program_error(format!("types include each other more than {MAX_DEPTH} levels deep"));
+    }
+    Ok(vm.world.define_class(&mut vm.heap, name, &classes, &slots, data)?)
+}
+
+/// `(%find-class name)`
+pub(super) fn find_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(vm.find_class(arguments[0]).unwrap_or(Value::NIL))
+}
+
+/// `(%class-of object)`
+pub(super) fn class_of(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(vm.heap.structure_class(arguments[0]).unwrap_or(Value::NIL))
+}
+
+/// `(%classp object)`
+pub(super) fn classp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(Value::boolean(vm.heap.is(arguments[0], Kind::Class)))
+}
+
+/// `(%class-name class)`
+pub(super) fn class_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let class = vm.class(arguments[0])?;
+    Ok(vm.class_name(class))
+}
+
+/// `(%class-supers class)`
+pub(super) fn class_supers(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let class = vm.class(arguments[0])?;
+    Ok(class_slot(&vm.heap, class, slot::SUPERS))
+}
+
+/// `(%class-slots class)`
+pub(super) fn class_slots(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let class = vm.class(arguments[0])?;
+    Ok(class_slot(&vm.heap, class, slot::SLOTS))
+}
+
+/// `(%class-data class)`
+pub(super) fn class_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let class = vm.class(arguments[0])?;
+    Ok(class_slot(&vm.heap, class, slot::DATA))
+}
+
+/// `(%set-class-data class data)`
+pub(super) fn set_class_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let class = vm.class(arguments[0])?;
+    vm.heap.record_set(class, Kind::Class, slot::DATA, arguments[1]);
+    Ok(arguments[1])
+}
+
+/// `(%subclass-p class ancestor)`
+pub(super) fn subclass_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let class = vm.class(arguments[0])?;
+    let ancestor = vm.class(arguments[1])?;
+    Ok(Value::boolean(vm.world.is_subclass(&vm.heap, class, ancestor)))
+}
+
+/// `(%make-structure class &rest values)`: slots that get no value are `NIL`.
+pub(super) fn make_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let class = vm.class(arguments[0])?;
+    let count = class_slot(&vm.heap, class, slot::COUNT).as_index().unwrap_or(0);
+    let values = &arguments[1..];
+    if values.len() == count {
+        return Ok(vm.heap.alloc_structure(class, values)?);
+    }
+    if values.len() > count {
+        let name = vm.class_name(class);
+        let name = vm.describe(name);
+        let given = values.len();
+        return vm.program_error(format!("{name} has {count} slots, but {given} values were given"));
+    }
+    let mut slots = values.to_vec();
+    slots.resize(count, Value::NIL);
+    Ok(vm.heap.alloc_structure(class, &slots)?)
+}
+
+/// `(copy-structure structure)`
+pub(super) fn copy_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (Some(class), Some(slots)) =
+        (vm.heap.structure_class(arguments[0]), vm.heap.structure_slots(arguments[0]))
+    else {
+        return vm.instance_error(arguments[0], vm.world.known.structure_object);
+    };
+    let slots = slots.to_vec();
+    vm.charge(slots.len());
+    Ok(vm.heap.alloc_structure(class, &slots)?)
+}
+
+/// `(%structure-ref instance index)`
+pub(super) fn structure_ref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let index = vm.index_in(arguments[0], arguments[1])?;
+    Ok(vm.slot_value(arguments[0], index))
+}
+
+/// `(%set-structure-ref instance index value)`
+pub(super) fn set_structure_ref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let index = vm.index_in(arguments[0], arguments[1])?;
+    vm.heap.structure_set(arguments[0], index, arguments[2]);
+    Ok(arguments[2])
+}
+
+/// `(%structurep object)`
+pub(super) fn structurep(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(Value::boolean(vm.heap.is(arguments[0], Kind::Structure)))
+}
+
+/// `(%define-accessor name class slot read-only)`
+pub(super) fn define_accessor(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[name, class, index, read_only] = arguments else { unreachable!("the table says four") };
+    vm.definable(name, "function")?;
+    if !vm.heap.is(class, Kind::Symbol) {
+        return vm.type_error(class, "SYMBOL");
+    }
+    vm.index_below(index, usize::from(u16::MAX))?;
+    let record = vm.heap.cons(index, read_only)?;
+    let record = vm.heap.cons(class, record)?;
+    let indicator = vm.world.known.accessor;
+    super::symbol::put(vm, &[name, indicator, record])?;
+    Ok(name)
+}

@@ -1,0 +1,368 @@
+//! Reading and compiling at run time.
+//!
+//! `eval`, `load` and `macroexpand` are written in ESL. A compilation is a machine of steps that never runs a macro
+//! itself: `%compilation-step` tells the program what to call, and is told the outcome. So a task that compiles is
+//! preempted and aborted like any other, in the middle of a macro too.
+//!
+//! Step by step (`kind` and `outcome` are `:start nil` at first):
+//!
+//! ```text
+//! (%compilation-step handle kind outcome)
+//!   => :expand function form environment    call it, then answer :expansion value, or :failed text
+//!   => :load functions keep                 call them in order, then answer :loaded value, or :failed text
+//!   => :done functions diagnostics          over; NIL for functions if one of the diagnostics is an error
+//! ```
+//!
+//! Diagnostics are a list of `(severity code text)`. Whoever begins a compilation ends it with `%end-compilation`.
+
+use esl_bytecode::compile::{Answer, Compilation, Compile, Step};
+use esl_bytecode::datum::Datum;
+use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::span::Span;
+use slotmap::{Key, KeyData, SlotMap, new_key_type};
+
+use crate::builtins::expect::optional;
+use crate::builtins::stream::Source;
+use crate::datum::Unit;
+use crate::raise::{Exit, Outcome, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+
+new_key_type! {
+    /// Names a compilation that a program runs.
+    struct SessionId;
+}
+
+/// Whether a diagnostic with this code says that a text ends in the middle of a datum.
+fn is_unfinished(code: &str) -> bool {
+    code.starts_with("unclosed-") || code.starts_with("unfinished-")
+}
+
+/// What the program has a handle of.
+enum Session {
+    /// A compilation.
+    Compilation(Box<Running>),
+    /// A text of which form by form is compiled: all of it, and the byte where the next form begins.
+    Text(Box<str>, usize),
+    /// One that somebody works on.
+    Taken,
+}
+
+/// A compilation that a program runs.
+struct Running {
+    compilation: Box<dyn Compilation>,
+    unit: Unit,
+    /// What the compilation wants, until the program has been told: there may be no room at first.
+    step: Option<Step>,
+    /// Whether it waits for the value of a module that was to be loaded.
+    keeps: bool,
+}
+
+/// The compiler of a machine, and what programs compile.
+#[derive(Default)]
+pub(crate) struct Compiler {
+    compiler: Option<Box<dyn Compile>>,
+    sessions: SlotMap<SessionId, Session>,
+}
+
+impl Compiler {
+    /// Calls `visit` with every object that compilations remember.
+    pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
+        for session in self.sessions.values() {
+            if let Session::Compilation(running) = session {
+                running.unit.roots(visit);
+            }
+        }
+    }
+
+    fn add(&mut self, session: Session) -> Value {
+        let id = self.sessions.insert(session).data().as_ffi();
+        // A key's version stays far below the limit: it grows by two each time that a place is used again.
+        Value::handle(id as u32, (id >> 32) as u32 % Value::GENERATION_LIMIT).unwrap_or(Value::NIL)
+    }
+
+    fn find(&self, handle: Value) -> Option<SessionId> {
+        let (index, generation) = handle.as_handle()?;
+        let id = SessionId::from(KeyData::from_ffi(u64::from(generation) << 32 | u64::from(index)));
+        self.sessions.contains_key(id).then_some(id)
+    }
+}
+
+impl Vm {
+    /// Gives the machine a compiler, for `eval`, `load` and `read`.
+    pub fn set_compiler(&mut self, compiler: Box<dyn Compile>) {
+        self.world.compiler.compiler = Some(compiler);
+    }
+
+    /// Does something with the compiler, which may ask about the program meanwhile.
+    fn with_compiler<T>(&mut self, work: impl FnOnce(&mut Vm, &dyn Compile) -> T) -> Result<T, Exit> {
+        let Some(compiler) = self.world.compiler.compiler.take() else {
+            return self.program_error("this machine has no compiler");
+        };
+        let result = work(self, &*compiler);
+        self.world.compiler.compiler = Some(compiler);
+        Ok(result)
+    }
+
+    fn begin(&mut self, compilation: Box<dyn Compilation>, unit: Unit) -> Value {
+        let running = Running { compilation, unit, step: None, keeps: false };
+        self.world.compiler.add(Session::Compilation(Box::new(running)))
+    }
+
+    /// Takes a session out of the table; [`Vm::put_back`] puts it back.
+    fn take_session(&mut self, handle: Value) -> Result<(SessionId, Session), Exit> {
+        let sessions = &mut self.world.compiler;
+        if let Some(id) = sessions.find(handle)
+            && let Some(session) = sessions.sessions.get_mut(id)
+        {
+            return Ok((id, std::mem::replace(session, Session::Taken)));
+        }
+        self.program_error("this compilation is over")
+    }
+
+    fn put_back(&mut self, id: SessionId, session: Session) {
+        if let Some(place) = self.world.compiler.sessions.get_mut(id) {
+            *place = session;
+        }
+    }
+
+    /// `value` as data of a compilation.
+    fn as_form(&mut self, unit: &mut Unit, value: Value, span: Span) -> Result<Datum, Exit> {
+        let datum = unit.datum_of(&self.heap, &self.world, value, span);
+        self.charge(unit.take_work() as usize);
+        match datum {
+            Ok(datum) => Ok(datum),
+            Err(error) => self.program_error(error.to_string()),
+        }
+    }
+
+    /// The outcome of the last step, as the program tells it.
+    fn answer(&mut self, running: &mut Running, kind: Value, outcome: Value) -> Result<Answer, Exit> {
+        let kind = self.designated_text(kind)?;
+        let unit = &mut running.unit;
+        Ok(match &*kind {
+            "START" => Answer::Start,
+            "EXPANSION" => match unit.datum_of(&self.heap, &self.world, outcome, Span::default()) {
+                Ok(expansion) => Answer::Expansion(expansion),
+                Err(error) => Answer::Failed(error.to_string()),
+            },
+            "LOADED" if running.keeps => Answer::Object(unit.pin(outcome)),
+            "LOADED" => Answer::Loaded,
+            "FAILED" => Answer::Failed(self.designated_text(outcome)?),
+            _ => return self.program_error(format!("{kind} is no outcome of a step")),
+        })
+    }
+
+    /// Tells the program what a compilation wants.
+    fn tell(&mut self, step: &Step) -> Outcome {
+        let mut results = [Value::NIL; 4];
+        let kind = match step {
+            Step::Expand(call) => {
+                let prepared = self.macro_call(call);
+                match self.loaded(prepared)? {
+                    Some(call) => results[1..].copy_from_slice(&call),
+                    None => return self.program_error("the macro is not defined any more"),
+                }
+                "EXPAND"
+            }
+            Step::Load { module, keep } => {
+                let functions = self.load_in_unit(module);
+                results[1] = self.loaded(functions)?;
+                results[2] = Value::boolean(*keep);
+                "LOAD"
+            }
+            Step::Done(module, diagnostics) => {
+                if let Some(module) = module {
+                    let functions = self.load_in_unit(module);
+                    results[1] = self.loaded(functions)?;
+                }
+                results[2] = self.diagnostics(diagnostics)?;
+                "DONE"
+            }
+        };
+        results[0] = self.world.keyword(&mut self.heap, kind)?;
+        self.give_values(&results)
+    }
+
+    fn diagnostics(&mut self, diagnostics: &[Diagnostic]) -> Outcome {
+        let mut list = Value::NIL;
+        for diagnostic in diagnostics.iter().rev() {
+            let text = self.with_compiler(|_, compiler| compiler.render(diagnostic))?;
+            let severity = match diagnostic.severity {
+                Severity::Warning => "WARNING",
+                Severity::Error => "ERROR",
+            };
+            let severity = self.world.keyword(&mut self.heap, severity)?;
+            let code = self.world.keyword(&mut self.heap, &diagnostic.code.to_uppercase())?;
+            let text = self.heap.alloc_str(&text)?;
+            let entry = self.heap.list(&[severity, code, text])?;
+            list = self.heap.cons(entry, list)?;
+        }
+        Ok(list)
+    }
+
+    /// Reads a datum of `text` from byte `start` on.
+    fn read_datum(&mut self, text: &str, start: usize) -> Result<Read, Exit> {
+        let read = self.with_compiler(|vm, compiler| {
+            let read = compiler.read(vm, text, start);
+            read.map_err(|diagnostic| (is_unfinished(diagnostic.code), compiler.render(&diagnostic)))
+        })?;
+        let end = read.as_ref().map_or(text.len(), |&(_, end)| end);
+        self.charge(end.saturating_sub(start));
+        match read {
+            Ok((Some(datum), end)) => Ok(Read::Datum(datum, end)),
+            Ok((None, _)) => Ok(Read::End),
+            Err((true, _)) => Ok(Read::Unfinished),
+            Err((false, text)) => self.raise(Raised::Reader(text)),
+        }
+    }
+
+    /// A datum that was read, as an object.
+    fn read_object(&mut self, datum: &Datum) -> Outcome {
+        let mut unit = Unit::default();
+        let value = unit.value_of(&mut self.heap, &mut self.world, datum);
+        self.charge(unit.take_work() as usize);
+        Ok(value?)
+    }
+}
+
+/// What came of reading.
+enum Read {
+    /// A datum, and the offset of the byte after it.
+    Datum(Datum, usize),
+    /// There is nothing but white space.
+    End,
+    /// The datum goes on after the end of the text.
+    Unfinished,
+}
+
+/// `(%begin-compilation form)`
+pub(super) fn begin_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let mut unit = Unit::default();
+    let form = vm.as_form(&mut unit, arguments[0], Span::default())?;
+    let compilation = vm.with_compiler(|_, compiler| compiler.compile_form(form))?;
+    Ok(vm.begin(compilation, unit))
+}
+
+/// `(%open-text text)`
+pub(super) fn open_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(text) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
+    vm.charge(text.len());
+    Ok(vm.world.compiler.add(Session::Text(text.into(), 0)))
+}
+
+/// `(%next-form text)`: the compilation of the next form of a text, `NIL` at its end.
+pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (id, mut session) = vm.take_session(arguments[0])?;
+    let next = match &mut session {
+        Session::Text(text, position) => begin_form(vm, text, position),
+        _ => vm.program_error("there are no forms in a compilation"),
+    };
+    vm.put_back(id, session);
+    next
+}
+
+fn begin_form(vm: &mut Vm, text: &str, position: &mut usize) -> Outcome {
+    match vm.read_datum(text, *position)? {
+        Read::End => Ok(Value::NIL),
+        Read::Unfinished => vm.raise(Raised::Reader("the text ends inside of a form".into())),
+        Read::Datum(datum, end) => {
+            let compilation = vm.with_compiler(|_, compiler| compiler.compile_form(datum))?;
+            *position = end;
+            Ok(vm.begin(compilation, Unit::default()))
+        }
+    }
+}
+
+/// `(%compilation-step handle kind outcome)`
+pub(super) fn compilation_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (id, mut session) = vm.take_session(arguments[0])?;
+    let told = match &mut session {
+        Session::Compilation(running) => step(vm, running, arguments[1], arguments[2]),
+        _ => vm.program_error("a text is no compilation"),
+    };
+    vm.put_back(id, session);
+    told
+}
+
+fn step(vm: &mut Vm, running: &mut Running, kind: Value, outcome: Value) -> Outcome {
+    let step = match running.step.take() {
+        Some(step) => step,
+        None => {
+            let answer = vm.answer(running, kind, outcome)?;
+            let outer = vm.world.unit.replace(std::mem::take(&mut running.unit));
+            let mut nodes = 0;
+            let step = running.compilation.step(vm, answer, &mut |more| nodes += more);
+            running.unit = vm.world.unit.replace(outer);
+            // A node is worth more than a cell of a list.
+            vm.charge(nodes as usize * 16);
+            step
+        }
+    };
+    let outer = vm.world.unit.replace(std::mem::take(&mut running.unit));
+    let told = vm.tell(&step);
+    running.unit = vm.world.unit.replace(outer);
+    let work = running.unit.take_work();
+    vm.charge(work as usize);
+    running.keeps = matches!(step, Step::Load { keep: true, .. });
+    if told == Err(Exit::Collect) {
+        running.step = Some(step);
+    }
+    told
+}
+
+/// `(%end-compilation handle)`
+pub(super) fn end_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    if let Some(id) = vm.world.compiler.find(arguments[0]) {
+        vm.world.compiler.sessions.remove(id);
+    }
+    Ok(Value::NIL)
+}
+
+/// `(%read-from-string string start end)`: whether a datum was read, the datum, and where it ends. The first value is
+/// `NIL` at the end of the string, and `:unfinished` if the datum goes on behind it.
+pub(super) fn read_from_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let characters = vm.characters(arguments[0], optional(arguments, 1), optional(arguments, 2))?;
+    let first = optional(arguments, 1).as_index().unwrap_or(0);
+    let text: String =
+        characters.iter().map(|&code| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
+    match vm.read_datum(&text, 0)? {
+        Read::Datum(datum, end) => {
+            let object = vm.read_object(&datum)?;
+            let end = first + text[..end].chars().count();
+            vm.give_values(&[Value::T, object, Value::index(end)])
+        }
+        Read::End => vm.give_values(&[Value::NIL, Value::NIL, Value::index(first + characters.len())]),
+        Read::Unfinished => {
+            let unfinished = vm.world.known.unfinished;
+            vm.give_values(&[unfinished, Value::NIL, Value::index(first + characters.len())])
+        }
+    }
+}
+
+/// `(%read stream)`: as `%read-from-string`, without the end. What was read is taken from the stream.
+pub(super) fn read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    loop {
+        let source = vm.source(arguments[0])?;
+        let (text, may_grow) = match &source {
+            Source::Text(text) => (text.clone(), false),
+            Source::Console { text, is_at_end } => (text.clone(), !is_at_end),
+        };
+        let (status, object, end) = match vm.read_datum(&text, 0)? {
+            // What ends where the input does may go on in what is still to come.
+            Read::Datum(_, end) if may_grow && end == text.len() && !text.ends_with([')', '"']) => {
+                vm.more_input()?;
+                continue;
+            }
+            Read::Datum(datum, end) => (Value::T, vm.read_object(&datum)?, end),
+            Read::End | Read::Unfinished if may_grow => {
+                vm.more_input()?;
+                continue;
+            }
+            Read::End => (Value::NIL, Value::NIL, text.len()),
+            Read::Unfinished => (vm.world.known.unfinished, Value::NIL, text.len()),
+        };
+        vm.skip_source(arguments[0], &source, text[..end].chars().count());
+        return vm.give_values(&[status, object]);
+    }
+}

@@ -1,0 +1,298 @@
+//! Symbols: names, values, functions, properties.
+
+use esl_bytecode::symbol::setf_cell;
+
+use crate::builtins::array::{Elements, vector_elements};
+use crate::builtins::expect::optional;
+use crate::builtins::lookup;
+use crate::heap::Kind;
+use crate::heap::layout::Symbol;
+use crate::raise::{Exit, Outcome, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+
+impl Vm {
+    /// A copy of the fixed part of a symbol's object.
+    fn cell(&mut self, v: Value) -> Result<Symbol, Exit> {
+        let object = self.symbol_object(v)?;
+        match self.heap.symbol(object) {
+            Some(cell) => Ok(*cell),
+            None => self.type_error(v, "SYMBOL"),
+        }
+    }
+
+    /// The text of a string, symbol or character: what names a symbol or package.
+    ///
+    /// # Errors
+    /// `type-error` for anything else.
+    pub(crate) fn designated_text(&mut self, v: Value) -> Result<String, Exit> {
+        if let Some(text) = self.text_of(v) {
+            return Ok(text);
+        }
+        if let Some(code) = v.as_character() {
+            return Ok(char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER).into());
+        }
+        match self.world.object_of(&self.heap, v).and_then(|object| self.heap.symbol(object)) {
+            Some(cell) => Ok(self.heap.string_text(cell.name).unwrap_or_default()),
+            None => self.specifier_error(v, "(OR STRING SYMBOL CHARACTER)"),
+        }
+    }
+
+    /// The text of a string, also of one with a fill pointer.
+    pub(crate) fn text_of(&self, v: Value) -> Option<String> {
+        let text = |&code: &u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
+        match vector_elements(&self.heap, v)? {
+            Elements::Characters(characters) => Some(characters.iter().map(text).collect()),
+            Elements::Values(_) | Elements::Bytes(_) => None,
+        }
+    }
+
+    /// The symbol that keeps the function called `name`: itself, or for `(setf symbol)` one beside that.
+    ///
+    /// # Errors
+    /// `type-error` for what is no name of a function.
+    pub(crate) fn function_cell(&mut self, name: Value) -> Result<Value, Exit> {
+        if self.world.is_symbol(&self.heap, name) {
+            return Ok(name);
+        }
+        match self.heap.as_cons(name) {
+            Some(pair) if pair.car == self.world.known.setf => {
+                let rest = self.heap.as_cons(pair.cdr);
+                match rest.and_then(|rest| self.world.name_of(&self.heap, rest.car)) {
+                    Some(symbol) => Ok(self.world.intern(&mut self.heap, &setf_cell(&symbol))?),
+                    None => self.type_error(name, "SYMBOL"),
+                }
+            }
+            _ => self.type_error(name, "SYMBOL"),
+        }
+    }
+}
+
+/// `(symbol-name symbol)`
+pub(super) fn symbol_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(vm.cell(arguments[0])?.name)
+}
+
+/// `(symbol-package symbol)`
+pub(super) fn symbol_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(vm.cell(arguments[0])?.package)
+}
+
+/// `(symbol-plist symbol)`
+pub(super) fn symbol_plist(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(vm.cell(arguments[0])?.plist)
+}
+
+/// `(%set-symbol-plist symbol plist)`
+pub(super) fn set_symbol_plist(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[symbol, plist] = arguments else { unreachable!("the table says two") };
+    if !plist.is_list() {
+        return vm.type_error(plist, "LIST");
+    }
+    let object = vm.symbol_object(symbol)?;
+    vm.heap.symbol_set_plist(object, plist);
+    Ok(plist)
+}
+
+/// `(get symbol indicator &optional default)`
+pub(super) fn get(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let plist = vm.cell(arguments[0])?.plist;
+    lookup::getf(vm, &[plist, arguments[1], optional(arguments, 2)])
+}
+
+/// `(%put symbol indicator value)`
+pub(super) fn put(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[symbol, indicator, value] = arguments else { unreachable!("the table says three") };
+    let object = vm.symbol_object(symbol)?;
+    let plist = vm.cell(symbol)?.plist;
+    let plist = lookup::putf(vm, &[plist, indicator, value])?;
+    vm.heap.symbol_set_plist(object, plist);
+    Ok(value)
+}
+
+/// `(remprop symbol indicator)`
+pub(super) fn remprop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[symbol, indicator] = arguments else { unreachable!("the table says two") };
+    let object = vm.symbol_object(symbol)?;
+    let plist = vm.cell(symbol)?.plist;
+    match lookup::remf(vm, &[plist, indicator]) {
+        Err(Exit::Values) => {
+            let &[plist, was_there] = &vm.values[..] else { unreachable!("remf gives two values") };
+            vm.heap.symbol_set_plist(object, plist);
+            Ok(was_there)
+        }
+        other => other,
+    }
+}
+
+/// `(symbol-value symbol)`
+pub(super) fn symbol_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let object = vm.symbol_object(arguments[0])?;
+    match vm.symbol_value(object) {
+        Some(value) => Ok(value),
+        None => vm.raise(Raised::UnboundVariable(arguments[0])),
+    }
+}
+
+/// `(set symbol value)`
+pub(super) fn set(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[symbol, value] = arguments else { unreachable!("the table says two") };
+    let object = vm.symbol_object(symbol)?;
+    vm.set_symbol_value(object, value)?;
+    Ok(value)
+}
+
+/// `(boundp symbol)`
+pub(super) fn boundp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let object = vm.symbol_object(arguments[0])?;
+    Ok(Value::boolean(vm.symbol_value(object).is_some()))
+}
+
+/// `(makunbound symbol)`
+pub(super) fn makunbound(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let object = vm.symbol_object(arguments[0])?;
+    vm.set_symbol_value(object, Value::UNBOUND)?;
+    Ok(arguments[0])
+}
+
+/// `(fboundp name)`
+pub(super) fn fboundp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let symbol = vm.function_cell(arguments[0])?;
+    let is_bound = vm.world.function_of(&vm.heap, symbol).is_some()
+        || vm.world.macro_function_of(&vm.heap, symbol).is_some();
+    Ok(Value::boolean(is_bound))
+}
+
+/// `(symbol-function symbol)`, `(fdefinition name)`
+pub(super) fn fdefinition(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let symbol = vm.function_cell(arguments[0])?;
+    match vm.world.function_of(&vm.heap, symbol).or(vm.world.macro_function_of(&vm.heap, symbol)) {
+        Some(function) => Ok(function),
+        None => vm.raise(Raised::UndefinedFunction(arguments[0])),
+    }
+}
+
+/// `(fmakunbound name)`
+pub(super) fn fmakunbound(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let symbol = vm.function_cell(arguments[0])?;
+    let object = vm.definable(symbol, "function")?;
+    vm.world.remove_function(&mut vm.heap, symbol)?;
+    vm.heap.symbol_set_macro_function(object, Value::NIL);
+    Ok(arguments[0])
+}
+
+/// `(%function-cell name)`
+pub(super) fn function_cell(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.function_cell(arguments[0])
+}
+
+/// `(macro-function symbol &optional environment)`
+pub(super) fn macro_function(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let symbol = arguments[0];
+    let object = vm.symbol_object(symbol)?;
+    // The environment is a list of (name . expander), a local function's expander being NIL.
+    for local in vm.list_items(optional(arguments, 1), crate::builtins::LIMIT)? {
+        if let Some(pair) = vm.heap.as_cons(local)
+            && pair.car == symbol
+        {
+            return Ok(pair.cdr);
+        }
+    }
+    Ok(vm.world.macro_function_of(&vm.heap, object).unwrap_or(Value::NIL))
+}
+
+/// `(%special-p symbol)`
+pub(super) fn special_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let flags = vm.cell(arguments[0])?.header.flags;
+    Ok(Value::boolean(flags & Symbol::SPECIAL != 0))
+}
+
+/// `(%constant-p symbol)`
+pub(super) fn constant_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let flags = vm.cell(arguments[0])?.header.flags;
+    Ok(Value::boolean(flags & Symbol::CONSTANT != 0))
+}
+
+/// `(%locked-p symbol)`
+pub(super) fn locked_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.symbol_object(arguments[0])?;
+    Ok(Value::boolean(vm.world.is_locked(&vm.heap, arguments[0])))
+}
+
+/// `(make-symbol name)`
+pub(super) fn make_symbol(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(text) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
+    vm.charge(text.len());
+    let name = vm.heap.alloc_str(&text)?;
+    Ok(vm.world.make_symbol(&mut vm.heap, name, Value::NIL, 0)?)
+}
+
+/// `(gensym &optional (prefix "G"))`; an integer in place of the prefix is the number to use.
+pub(super) fn gensym(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let given = optional(arguments, 0);
+    let counter = vm.world.known.gensym_counter;
+    if given.as_index().is_some() {
+        return named_symbol(vm, "G", given);
+    }
+    let prefix = match given {
+        Value::NIL => "G".to_owned(),
+        _ => match vm.text_of(given) {
+            Some(text) => text,
+            None => return vm.specifier_error(given, "(OR STRING UNSIGNED-BYTE)"),
+        },
+    };
+    let number = match vm.symbol_value(counter) {
+        None => Value::small(1),
+        Some(value) if value.as_index().is_some() => value,
+        Some(other) => return vm.type_error(other, "UNSIGNED-BYTE"),
+    };
+    let symbol = named_symbol(vm, &prefix, number)?;
+    let next = number.as_fixnum().and_then(|n| Value::fixnum(n + 1)).unwrap_or(Value::small(0));
+    vm.set_symbol_value(counter, next)?;
+    Ok(symbol)
+}
+
+fn named_symbol(vm: &mut Vm, prefix: &str, number: Value) -> Outcome {
+    let number = number.as_fixnum().unwrap_or(0);
+    let name = vm.heap.alloc_str(&format!("{prefix}{number}"))?;
+    Ok(vm.world.make_symbol(&mut vm.heap, name, Value::NIL, 0)?)
+}
+
+/// `(%function-name function)`
+pub(super) fn function_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let code = vm.code_of_function(arguments[0])?;
+    Ok(vm.heap.code(code).map_or(Value::NIL, |code| code.name))
+}
+
+/// `(%function-lambda-list function)`
+pub(super) fn function_lambda_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(vm.texts_of_function(arguments[0])?.0)
+}
+
+/// `(%function-documentation function)`
+pub(super) fn function_documentation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(vm.texts_of_function(arguments[0])?.1)
+}
+
+/// `(%function-arity function)`
+pub(super) fn function_arity(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.code_of_function(arguments[0])?;
+    match vm.arity(arguments[0]) {
+        Some(arity) => {
+            let max = arity.max.map_or(Value::NIL, |max| Value::index(max as usize));
+            vm.give_values(&[Value::index(arity.min as usize), max])
+        }
+        None => vm.give_values(&[Value::NIL, Value::NIL]),
+    }
+}
+
+impl Vm {
+    /// The code of a function, loaded if it was a stub.
+    fn code_of_function(&mut self, v: Value) -> Result<Value, Exit> {
+        if !self.heap.is(v, Kind::Function) {
+            return self.type_error(v, "FUNCTION");
+        }
+        self.make_ready(v)?;
+        Ok(self.heap.function_code(v).unwrap_or(Value::NIL))
+    }
+}
