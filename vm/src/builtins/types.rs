@@ -51,7 +51,7 @@ fn is_vector(vm: &Vm, value: Value) -> bool {
     }
 }
 
-fn is_string(vm: &Vm, value: Value) -> bool {
+pub(super) fn is_string(vm: &Vm, value: Value) -> bool {
     match vm.heap.kind(value) {
         Some(Kind::String) => true,
         Some(Kind::Array) => {
@@ -124,4 +124,14 @@ pub(super) fn eq(_vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(eql left right)`
 pub(super) fn eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::boolean(number::eql(&vm.heap, arguments[0], arguments[1])))
+}
+
+/// `(simple-string-p object)`
+pub(super) fn simple_string_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(vm.heap.is(arguments[0], Kind::String).into())
+}
+
+/// `(random-state-p object)`
+pub(super) fn random_state_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(vm.heap.is(arguments[0], Kind::RandomState).into())
 }

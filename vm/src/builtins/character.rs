@@ -1,0 +1,182 @@
+//! Characters: codes, case, classes, digits, names, comparison.
+
+use crate::character;
+use crate::raise::{Exit, Outcome};
+use crate::value::Value;
+use crate::vm::Vm;
+
+use super::integer::radix;
+use super::types::is_string;
+
+/// The code of the character that `v` is; a type error for anything else.
+fn code(vm: &mut Vm, v: Value) -> Result<u32, Exit> {
+    match v.as_character() {
+        Some(code) => Ok(code),
+        None => vm.type_error(v, "CHARACTER"),
+    }
+}
+
+fn character_of(code: u32) -> Value {
+    Value::character(code).unwrap_or(Value::NIL)
+}
+
+/// `(char-code character)` and `(char-int character)`
+pub(super) fn char_code(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(Value::index(code(vm, arguments[0])? as usize))
+}
+
+/// `(code-char code)`
+pub(super) fn code_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let character = arguments[0].as_index().and_then(|code| Value::character(u32::try_from(code).ok()?));
+    match character {
+        Some(character) => Ok(character),
+        None => vm.index_error(arguments[0], Value::CHARACTER_LIMIT as usize),
+    }
+}
+
+/// `(character designator)`
+pub(super) fn to_character(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let v = arguments[0];
+    if v.is_character() {
+        return Ok(v);
+    }
+    let is_designator = is_string(vm, v) || vm.world.is_symbol(&vm.heap, v);
+    let string = if is_designator { vm.string_designator(v)? } else { Value::NIL };
+    match crate::equality::characters_of(&vm.heap, string) {
+        Some(&[code]) => Ok(character_of(code)),
+        _ => vm.specifier_error(v, "(OR CHARACTER (STRING 1))"),
+    }
+}
+
+/// Defines functions of one character.
+macro_rules! functions {
+    ($( $(#[$doc:meta])* $name:ident = |$code:ident| $result:expr; )*) => {
+        $( $(#[$doc])* pub(super) fn $name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+            let $code = code(vm, arguments[0])?;
+            Ok($result)
+        } )*
+    };
+}
+
+functions! {
+    /// `(char-upcase character)`
+    char_upcase = |code| character_of(character::upcase(code));
+    /// `(char-downcase character)`
+    char_downcase = |code| character_of(character::downcase(code));
+    /// `(upper-case-p character)`
+    upper_case_p = |code| character::is_upper(code).into();
+    /// `(lower-case-p character)`
+    lower_case_p = |code| character::is_lower(code).into();
+    /// `(both-case-p character)`
+    both_case_p = |code| (character::is_upper(code) || character::is_lower(code)).into();
+    /// `(alpha-char-p character)`
+    alpha_char_p = |code| character::is_alphabetic(code).into();
+    /// `(alphanumericp character)`
+    alphanumericp = |code| character::is_alphanumeric(code).into();
+    /// `(graphic-char-p character)`
+    graphic_char_p = |code| character::is_graphic(code).into();
+    /// `(standard-char-p character)`
+    standard_char_p = |code| (code == 10 || (0x20..0x7F).contains(&code)).into();
+}
+
+/// `(digit-char-p character &optional radix)`
+pub(super) fn digit_char_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let code = code(vm, arguments[0])?;
+    let radix = radix_argument(vm, arguments)?;
+    Ok(character::digit_weight(code, radix).map_or(Value::NIL, |weight| Value::index(weight as usize)))
+}
+
+/// `(digit-char weight &optional radix)`
+pub(super) fn digit_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let radix = radix_argument(vm, arguments)?;
+    let weight = vm.integer(arguments[0])?;
+    if weight.is_negative() {
+        return vm.type_error(arguments[0], "UNSIGNED-BYTE");
+    }
+    let weight = arguments[0].as_index().and_then(|weight| u32::try_from(weight).ok());
+    let digit = weight.and_then(|weight| char::from_digit(weight, radix));
+    Ok(digit.map_or(Value::NIL, |digit| character_of(digit.to_ascii_uppercase() as u32)))
+}
+
+fn radix_argument(vm: &mut Vm, arguments: &[Value]) -> Result<u32, Exit> {
+    match arguments.get(1) {
+        Some(&v) => radix(vm, v),
+        None => Ok(10),
+    }
+}
+
+/// `(char-name character)`
+pub(super) fn char_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let code = code(vm, arguments[0])?;
+    match character::name(code) {
+        Some(name) => Ok(vm.heap.alloc_str(&name)?),
+        None => Ok(Value::NIL),
+    }
+}
+
+/// `(name-char name)`
+pub(super) fn name_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let string = vm.string_designator(arguments[0])?;
+    let characters = crate::equality::characters_of(&vm.heap, string).unwrap_or_default();
+    if characters.len() > 64 {
+        return Ok(Value::NIL);
+    }
+    let name: Option<String> = characters.iter().map(|&code| char::from_u32(code)).collect();
+    Ok(name.and_then(|name| character::named(&name)).map_or(Value::NIL, character_of))
+}
+
+/// Whether `holds` is true of all neighbours, as codes. All arguments are checked, also behind a pair for which it is
+/// not.
+fn chain(vm: &mut Vm, arguments: &[Value], fold: bool, holds: impl Fn(u32, u32) -> bool) -> Outcome {
+    let mut codes = Vec::with_capacity(arguments.len());
+    for &v in arguments {
+        let code = code(vm, v)?;
+        codes.push(if fold { character::fold(code) } else { code });
+    }
+    vm.charge(codes.len());
+    Ok(codes.windows(2).all(|pair| holds(pair[0], pair[1])).into())
+}
+
+/// Defines comparisons, exact and without regard to case.
+macro_rules! comparisons {
+    ($( $exact:ident $loose:ident = $holds:expr; )*) => {
+        $(
+            #[doc = concat!("`", stringify!($exact), "`")]
+            pub(super) fn $exact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+                chain(vm, arguments, false, $holds)
+            }
+
+            #[doc = concat!("`", stringify!($loose), "`")]
+            pub(super) fn $loose(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+                chain(vm, arguments, true, $holds)
+            }
+        )*
+    };
+}
+
+comparisons! {
+    char_equal_exactly char_equal = |a, b| a == b;
+    char_less char_lessp = |a, b| a < b;
+    char_greater char_greaterp = |a, b| a > b;
+    char_less_equal char_not_greaterp = |a, b| a <= b;
+    char_greater_equal char_not_lessp = |a, b| a >= b;
+}
+
+/// Whether no two characters are the same.
+fn all_differ(vm: &mut Vm, arguments: &[Value], fold: bool) -> Outcome {
+    chain(vm, arguments, fold, |_, _| true)?;
+    let key = |v: &Value| v.as_character().map(|code| if fold { character::fold(code) } else { code });
+    let mut codes: Vec<Option<u32>> = arguments.iter().map(key).collect();
+    codes.sort_unstable();
+    Ok(codes.windows(2).all(|pair| pair[0] != pair[1]).into())
+}
+
+/// `char/=`
+pub(super) fn char_not_equal_exactly(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    all_differ(vm, arguments, false)
+}
+
+/// `char-not-equal`
+pub(super) fn char_not_equal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    all_differ(vm, arguments, true)
+}

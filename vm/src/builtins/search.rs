@@ -1,0 +1,134 @@
+//! Searching sequences by `eql` and `equal`: what `find`, `position`, `count` and `remove` do without a function of the
+//! program.
+
+use crate::builtins::array::{Elements, vector_elements};
+use crate::equality::{self, Test};
+use crate::number;
+use crate::raise::{Exit, Outcome};
+use crate::value::Value;
+use crate::vm::Vm;
+
+use super::{COPY_LIMIT, LIMIT};
+
+/// The index of an element that is the same as `item`, between two bounds, the first or the last of them.
+fn position(vm: &mut Vm, test: Test, arguments: &[Value]) -> Outcome {
+    let &[item, sequence, start, end, from_end] = arguments else { unreachable!("the table says five") };
+    let from_end = from_end.is_true();
+    if let Some(elements) = vector_elements(&vm.heap, sequence) {
+        let length = elements.len();
+        let (start, end) = vm.bounds(start, end, length)?;
+        let found = in_vector(vm, test, item, sequence, start..end, from_end)?;
+        return Ok(found.map_or(Value::NIL, Value::index));
+    }
+    if !sequence.is_list() {
+        return vm.type_error(sequence, "SEQUENCE");
+    }
+    let items = vm.list_items(sequence, LIMIT)?;
+    let (start, end) = vm.bounds(start, end, items.len())?;
+    let mut work = LIMIT;
+    let mut found = None;
+    for (at, &candidate) in items.iter().enumerate().take(end).skip(start) {
+        if equality::same(&vm.heap, test, item, candidate, &mut work).ok_or(Exit::Slowly)? {
+            found = Some(at);
+            if !from_end {
+                break;
+            }
+        }
+    }
+    Ok(found.map_or(Value::NIL, Value::index))
+}
+
+fn in_vector(
+    vm: &mut Vm,
+    test: Test,
+    item: Value,
+    vector: Value,
+    range: std::ops::Range<usize>,
+    from_end: bool,
+) -> Result<Option<usize>, Exit> {
+    let Some(elements) = vector_elements(&vm.heap, vector) else { return Ok(None) };
+    let limit = if test == Test::Equal { LIMIT } else { COPY_LIMIT };
+    if range.len() > limit {
+        return Err(Exit::Slowly);
+    }
+    let found = match (elements.part(range.start, range.end), item.as_character()) {
+        (Elements::Characters(characters), Some(code)) => {
+            let mut matches = characters.iter();
+            let is_it = |&other: &u32| other == code;
+            Ok(if from_end { matches.rposition(is_it) } else { matches.position(is_it) })
+        }
+        (Elements::Characters(_), None) => Ok(None),
+        (part, _) => {
+            let mut work = LIMIT;
+            let heap = &vm.heap;
+            let mut is_it = |index: usize| {
+                let candidate = part.get(index).unwrap_or(Value::UNBOUND);
+                equality::same(heap, test, item, candidate, &mut work)
+            };
+            let mut indexes = 0..part.len();
+            let mut found = Ok(None);
+            while let Some(index) = if from_end { indexes.next_back() } else { indexes.next() } {
+                match is_it(index) {
+                    Some(false) => {}
+                    Some(true) => {
+                        found = Ok(Some(index));
+                        break;
+                    }
+                    None => {
+                        found = Err(Exit::Slowly);
+                        break;
+                    }
+                }
+            }
+            found
+        }
+    };
+    vm.charge(range.len());
+    Ok(found?.map(|index| range.start + index))
+}
+
+/// `(%position-eql item sequence start end from-end)`
+pub(super) fn position_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    position(vm, Test::Eql, arguments)
+}
+
+/// `(%position-equal item sequence start end from-end)`
+pub(super) fn position_equal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    position(vm, Test::Equal, arguments)
+}
+
+/// `(%count-eql item sequence start end)`
+pub(super) fn count_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[item, sequence, start, end] = arguments else { unreachable!("the table says four") };
+    if let Some(elements) = vector_elements(&vm.heap, sequence) {
+        let length = elements.len();
+        let (start, end) = vm.bounds(start, end, length)?;
+        if end - start > COPY_LIMIT {
+            return Err(Exit::Slowly);
+        }
+        vm.charge(end - start);
+        let heap = &vm.heap;
+        let is_it = |index: &usize| {
+            vector_elements(heap, sequence)
+                .and_then(|elements| elements.get(*index))
+                .is_some_and(|candidate| number::eql(heap, item, candidate))
+        };
+        return Ok(Value::index((start..end).filter(is_it).count()));
+    }
+    if !sequence.is_list() {
+        return vm.type_error(sequence, "SEQUENCE");
+    }
+    let items = vm.list_items(sequence, LIMIT)?;
+    let (start, end) = vm.bounds(start, end, items.len())?;
+    let is_it = |candidate: &&Value| number::eql(&vm.heap, item, **candidate);
+    Ok(Value::index(items[start..end].iter().filter(is_it).count()))
+}
+
+/// `(%remove-eql item list)`
+pub(super) fn remove_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[item, list] = arguments else { unreachable!("the table says two") };
+    let items = vm.list_items(list, LIMIT)?;
+    let kept: Vec<Value> = items.iter().copied().filter(|&v| !number::eql(&vm.heap, item, v)).collect();
+    // As it was, where there was nothing to remove.
+    if kept.len() == items.len() { Ok(list) } else { Ok(vm.heap.list(&kept)?) }
+}

@@ -1,0 +1,284 @@
+//! Strings: designators, comparison, case, trimming, joining, searching.
+//!
+//! A string is a vector of code points, with or without a fill pointer. The functions with keyword arguments are
+//! written in ESL over these; a bound that is `NIL` is the beginning or the end.
+
+use std::cmp::Ordering;
+
+use crate::builtins::array::{all_elements, data_of};
+use crate::character;
+use crate::equality::characters_of;
+use crate::raise::{Exit, Outcome};
+use crate::value::Value;
+use crate::vm::Vm;
+
+use super::COPY_LIMIT;
+use super::expect::optional;
+use super::types::is_string;
+
+impl Vm {
+    /// The string that a designator stands for: a string itself, the name of a symbol, a character as a string of one.
+    pub(crate) fn string_designator(&mut self, v: Value) -> Outcome {
+        if characters_of(&self.heap, v).is_some() {
+            return Ok(v);
+        }
+        if let Some(code) = v.as_character() {
+            return Ok(self.heap.alloc_string(&[code])?);
+        }
+        match self.world.object_of(&self.heap, v).and_then(|object| self.heap.symbol(object)) {
+            Some(symbol) => Ok(symbol.name),
+            None => self.specifier_error(v, "(OR STRING SYMBOL CHARACTER)"),
+        }
+    }
+
+    /// A designator's string, and the bounds of a part of it.
+    fn designated_part(&mut self, v: Value, start: Value, end: Value) -> Result<(Value, usize, usize), Exit> {
+        let string = self.string_designator(v)?;
+        let (start, end) = self.bounds(start, end, text(self, string).len())?;
+        if end - start > COPY_LIMIT {
+            return Err(Exit::Slowly);
+        }
+        self.charge(end - start);
+        Ok((string, start, end))
+    }
+}
+
+/// The characters of a string.
+fn text(vm: &Vm, string: Value) -> &[u32] {
+    characters_of(&vm.heap, string).unwrap_or_default()
+}
+
+/// `(string designator)`
+pub(super) fn string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.string_designator(arguments[0])
+}
+
+/// The string and the index that `char` and its like are given.
+fn string_and_index(vm: &mut Vm, string: Value, index: Value) -> Result<usize, Exit> {
+    if !is_string(vm, string) {
+        return vm.type_error(string, "STRING");
+    }
+    // Like `aref`, it sees the characters behind a fill pointer.
+    let size = all_elements(&vm.heap, string).map_or(0, |elements| elements.len());
+    vm.index_below(index, size)
+}
+
+/// `(char string index)`
+pub(super) fn char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let index = string_and_index(vm, arguments[0], arguments[1])?;
+    Ok(all_elements(&vm.heap, arguments[0]).and_then(|elements| elements.get(index)).unwrap_or(Value::NIL))
+}
+
+/// `(%set-char string index character)`
+pub(super) fn set_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[string, index, character] = arguments else { unreachable!("the table says three") };
+    let index = string_and_index(vm, string, index)?;
+    let data = data_of(&vm.heap, string).unwrap_or(string);
+    vm.check_element(data, character)?;
+    vm.store_element(data, index, character);
+    Ok(character)
+}
+
+/// `(%make-string size character)`
+pub(super) fn make_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let size = vm.count(arguments[0])?;
+    let Some(code) = arguments[1].as_character() else { return vm.type_error(arguments[1], "CHARACTER") };
+    let string = vm.heap.alloc_string_filled(size, code)?;
+    vm.charge(size);
+    Ok(string)
+}
+
+/// How two parts of strings compare, and where in the first they begin to differ.
+fn compare(vm: &mut Vm, arguments: &[Value], fold: bool) -> Result<(Ordering, usize), Exit> {
+    let (a, start1, end1) =
+        vm.designated_part(arguments[0], optional(arguments, 2), optional(arguments, 3))?;
+    let (b, start2, end2) =
+        vm.designated_part(arguments[1], optional(arguments, 4), optional(arguments, 5))?;
+    let (left, right) = (&text(vm, a)[start1..end1], &text(vm, b)[start2..end2]);
+    let key = |code: u32| if fold { character::fold(code) } else { code };
+    let differ = left.iter().zip(right).position(|(&a, &b)| a != b && key(a) != key(b));
+    Ok(match differ {
+        Some(at) => (key(left[at]).cmp(&key(right[at])), start1 + at),
+        None => (left.len().cmp(&right.len()), start1 + left.len().min(right.len())),
+    })
+}
+
+/// Whether two parts of strings are the same; of different lengths they are not, without a look at them.
+fn same(vm: &mut Vm, arguments: &[Value], fold: bool) -> Outcome {
+    if let [a, b] = *arguments
+        && let (Some(left), Some(right)) = (characters_of(&vm.heap, a), characters_of(&vm.heap, b))
+        && left.len() != right.len()
+    {
+        return Ok(Value::NIL);
+    }
+    Ok((compare(vm, arguments, fold)?.0 == Ordering::Equal).into())
+}
+
+/// `(%string= left right &optional start1 end1 start2 end2)`
+pub(super) fn string_equal_exactly(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    same(vm, arguments, false)
+}
+
+/// `(%string-equal left right &optional start1 end1 start2 end2)`
+pub(super) fn string_equal_loosely(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    same(vm, arguments, true)
+}
+
+/// `(%string-compare left right start1 end1 start2 end2 fold)`: -1, 0 or 1, and the index of the first difference.
+pub(super) fn string_compare(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (order, at) = compare(vm, &arguments[..6], arguments[6].is_true())?;
+    vm.give_values(&[Value::small(order as i32), Value::index(at)])
+}
+
+/// A way to change the case of a word.
+#[derive(Clone, Copy)]
+enum Case {
+    Up,
+    Down,
+    Capital,
+}
+
+impl Case {
+    fn convert(self, characters: &mut [u32]) {
+        let mut in_word = false;
+        for code in characters {
+            *code = match self {
+                Case::Up => character::upcase(*code),
+                Case::Down => character::downcase(*code),
+                Case::Capital if in_word => character::downcase(*code),
+                Case::Capital => character::upcase(*code),
+            };
+            in_word = character::is_alphanumeric(*code);
+        }
+    }
+}
+
+/// A fresh string with a part of it in another case.
+fn converted(vm: &mut Vm, arguments: &[Value], case: Case) -> Outcome {
+    let (string, start, end) = vm.designated_part(arguments[0], arguments[1], arguments[2])?;
+    let mut characters = text(vm, string).to_vec();
+    if characters.len() > COPY_LIMIT {
+        return Err(Exit::Slowly);
+    }
+    case.convert(&mut characters[start..end]);
+    Ok(vm.heap.alloc_string(&characters)?)
+}
+
+/// The string itself, a part of it changed.
+fn converted_in_place(vm: &mut Vm, arguments: &[Value], case: Case) -> Outcome {
+    if !is_string(vm, arguments[0]) {
+        return vm.type_error(arguments[0], "STRING");
+    }
+    let (string, start, end) = vm.designated_part(arguments[0], arguments[1], arguments[2])?;
+    let data = data_of(&vm.heap, string).unwrap_or(string);
+    if let Some(characters) = vm.heap.string_mut(data) {
+        case.convert(&mut characters[start..end]);
+    }
+    Ok(string)
+}
+
+/// `(%string-upcase string start end)`
+pub(super) fn upcase(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    converted(vm, arguments, Case::Up)
+}
+
+/// `(%string-downcase string start end)`
+pub(super) fn downcase(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    converted(vm, arguments, Case::Down)
+}
+
+/// `(%string-capitalize string start end)`
+pub(super) fn capitalize(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    converted(vm, arguments, Case::Capital)
+}
+
+/// `(%nstring-upcase string start end)`
+pub(super) fn upcase_in_place(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    converted_in_place(vm, arguments, Case::Up)
+}
+
+/// `(%nstring-downcase string start end)`
+pub(super) fn downcase_in_place(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    converted_in_place(vm, arguments, Case::Down)
+}
+
+/// `(%nstring-capitalize string start end)`
+pub(super) fn capitalize_in_place(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    converted_in_place(vm, arguments, Case::Capital)
+}
+
+/// The string without the characters of a bag at its ends.
+fn trimmed(vm: &mut Vm, arguments: &[Value], left: bool, right: bool) -> Outcome {
+    let bag = match super::array::vector_elements(&vm.heap, arguments[0]) {
+        Some(elements) => {
+            (0..elements.len().min(COPY_LIMIT)).filter_map(|index| elements.get(index)).collect()
+        }
+        None if arguments[0].is_list() => vm.list_items(arguments[0], COPY_LIMIT)?,
+        None => return vm.type_error(arguments[0], "SEQUENCE"),
+    };
+    let (string, start, end) = vm.designated_part(arguments[1], Value::NIL, Value::NIL)?;
+    let characters = &text(vm, string)[start..end];
+    let bag: Vec<u32> = bag.into_iter().filter_map(Value::as_character).collect();
+    let is_kept = |code: &u32| !bag.contains(code);
+    let from = if left { characters.iter().position(is_kept).unwrap_or(characters.len()) } else { 0 };
+    let to =
+        if right { characters.iter().rposition(is_kept).map_or(from, |at| at + 1) } else { characters.len() };
+    let kept = characters[from..to.max(from)].to_vec();
+    let removed = end - start - kept.len();
+    vm.charge(bag.len().saturating_mul(removed));
+    Ok(vm.heap.alloc_string(&kept)?)
+}
+
+/// `(string-trim bag string)`
+pub(super) fn trim(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    trimmed(vm, arguments, true, true)
+}
+
+/// `(string-left-trim bag string)`
+pub(super) fn left_trim(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    trimmed(vm, arguments, true, false)
+}
+
+/// `(string-right-trim bag string)`
+pub(super) fn right_trim(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    trimmed(vm, arguments, false, true)
+}
+
+/// `(%string-concat &rest strings)`
+pub(super) fn concat(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let mut characters = Vec::new();
+    for &string in arguments {
+        let Some(more) = characters_of(&vm.heap, string) else { return vm.type_error(string, "STRING") };
+        if characters.len() + more.len() > COPY_LIMIT {
+            return Err(Exit::Slowly);
+        }
+        characters.extend_from_slice(more);
+    }
+    vm.charge(characters.len());
+    Ok(vm.heap.alloc_string(&characters)?)
+}
+
+/// `(%search-string pattern string start end from-end)`: where the pattern is, in the part of the string.
+pub(super) fn search(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[pattern, string, start, end, from_end] = arguments else { unreachable!("the table says five") };
+    for v in [pattern, string] {
+        if !is_string(vm, v) {
+            return vm.type_error(v, "STRING");
+        }
+    }
+    let (string, start, end) = vm.designated_part(string, start, end)?;
+    let length = text(vm, pattern).len();
+    if length.saturating_mul(end - start) > 8 * COPY_LIMIT {
+        return Err(Exit::Slowly);
+    }
+    vm.charge(length * (end - start) / 4);
+    let (pattern, part) = (text(vm, pattern), &text(vm, string)[start..end]);
+    let found = if length == 0 {
+        Some(if from_end.is_true() { part.len() } else { 0 })
+    } else if from_end.is_true() {
+        part.windows(length).rposition(|window| window == pattern)
+    } else {
+        part.windows(length).position(|window| window == pattern)
+    };
+    Ok(found.map_or(Value::NIL, |at| Value::index(start + at)))
+}

@@ -1,0 +1,235 @@
+//! Hash tables.
+//!
+//! Tables that compare by a test of the machine are searched here, within a limit of work; above it, and for tests that
+//! are functions of the program, the ESL twin walks the entries whose keys have the same hash.
+
+use crate::equality::{self, Test};
+use crate::raise::{Exit, Outcome};
+use crate::table::{Comparison, Table, Trouble};
+use crate::value::Value;
+use crate::vm::Vm;
+
+use super::LIMIT;
+use super::expect::optional;
+
+impl From<Trouble> for Exit {
+    fn from(trouble: Trouble) -> Exit {
+        match trouble {
+            Trouble::Slowly => Exit::Slowly,
+            Trouble::Room(error) => error.into(),
+        }
+    }
+}
+
+/// The table that `v` is; a type error for anything else.
+fn table(vm: &mut Vm, v: Value) -> Result<Table, Exit> {
+    match Table::of(&vm.heap, v) {
+        Some(table) => Ok(table),
+        None => vm.type_error(v, "HASH-TABLE"),
+    }
+}
+
+/// The test and hash of a key, and its entry if it has one.
+#[inline]
+fn find(vm: &mut Vm, table: Table, key: Value) -> Result<(u32, Option<usize>), Exit> {
+    let Comparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
+    let hash = equality::hash(&vm.heap, test, key);
+    let mut work = LIMIT;
+    let found = table.find(&vm.heap, test, key, hash, &mut work)?;
+    vm.charge(LIMIT - work);
+    Ok((hash, found))
+}
+
+/// `(%make-hash-table test size test-function hash-function)`
+pub(super) fn make_hash_table(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[test, size, test_function, hash_function] = arguments else { unreachable!("the table says four") };
+    let comparison = match test.as_index() {
+        Some(0) => Comparison::Native(Test::Eq),
+        Some(1) => Comparison::Native(Test::Eql),
+        Some(2) => Comparison::Native(Test::Equal),
+        Some(3) => Comparison::Native(Test::Equalp),
+        Some(4) => Comparison::Program,
+        _ => return vm.index_error(test, 5),
+    };
+    let size = vm.count(size)?;
+    let table = Table::new(&mut vm.heap, comparison, size, [test_function, hash_function])?;
+    vm.charge(size.min(LIMIT));
+    Ok(table)
+}
+
+/// `(gethash key table &optional default)`
+pub(super) fn gethash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let table = table(vm, arguments[1])?;
+    let (_, entry) = find(vm, table, arguments[0])?;
+    match entry.and_then(|entry| table.entry(&vm.heap, entry)) {
+        Some((_, value)) => vm.give_values(&[value, Value::T]),
+        None => vm.give_values(&[optional(arguments, 2), Value::NIL]),
+    }
+}
+
+/// `(%puthash key table value)`
+pub(super) fn puthash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[key, table_value, value] = arguments else { unreachable!("the table says three") };
+    let table = table(vm, table_value)?;
+    let (hash, entry) = find(vm, table, key)?;
+    match entry {
+        Some(entry) => table.set_value(&mut vm.heap, entry, value),
+        None => add(vm, table, hash, key, value)?,
+    }
+    Ok(value)
+}
+
+fn add(vm: &mut Vm, table: Table, hash: u32, key: Value, value: Value) -> Result<(), Exit> {
+    let room = table.room(&vm.heap);
+    table.add(&mut vm.heap, hash, key, value)?;
+    let grown = table.room(&vm.heap) - room;
+    vm.charge(4 * grown);
+    Ok(())
+}
+
+/// `(remhash key table)`
+pub(super) fn remhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let table = table(vm, arguments[1])?;
+    let (_, entry) = find(vm, table, arguments[0])?;
+    if let Some(entry) = entry {
+        table.delete(&mut vm.heap, entry);
+    }
+    Ok(entry.is_some().into())
+}
+
+/// `(clrhash table)`
+pub(super) fn clrhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let table = table(vm, arguments[0])?;
+    table.clear(&mut vm.heap)?;
+    Ok(arguments[0])
+}
+
+/// `(hash-table-count table)`
+pub(super) fn hash_table_count(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let table = table(vm, arguments[0])?;
+    Ok(Value::index(table.count(&vm.heap)))
+}
+
+/// `(hash-table-size table)`
+pub(super) fn hash_table_size(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let table = table(vm, arguments[0])?;
+    Ok(Value::index(table.room(&vm.heap)))
+}
+
+/// `(%hash-table-test table)`: the number of the test, and the functions of the program.
+pub(super) fn hash_table_test(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let table = table(vm, arguments[0])?;
+    let number = match table.comparison(&vm.heap) {
+        Comparison::Native(Test::Eq) => 0,
+        Comparison::Native(Test::Eql) => 1,
+        Comparison::Native(Test::Equal) => 2,
+        Comparison::Native(Test::Equalp) => 3,
+        Comparison::Program => 4,
+    };
+    let [test, hash] = table.functions(&vm.heap);
+    vm.give_values(&[Value::small(number), test, hash])
+}
+
+/// `(%table-next table position)`: the position behind the next entry, its key and its value; `NIL` at the end.
+pub(super) fn table_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let table = table(vm, arguments[0])?;
+    let position = vm.count(arguments[1])?;
+    let used = table.used(&vm.heap);
+    for at in position..used.min(position.saturating_add(LIMIT)) {
+        if let Some((key, value)) = table.entry(&vm.heap, at) {
+            vm.charge(at - position);
+            return vm.give_values(&[Value::index(at + 1), key, value]);
+        }
+    }
+    if used > position.saturating_add(LIMIT) {
+        return Err(Exit::Slowly);
+    }
+    vm.give_values(&[Value::NIL; 3])
+}
+
+/// `(%table-skip table position)`: a position from which the next entry is the same, at most [`LIMIT`] free ones on.
+pub(super) fn table_skip(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let table = table(vm, arguments[0])?;
+    let position = vm.count(arguments[1])?;
+    let end = table.used(&vm.heap).min(position.saturating_add(LIMIT)).max(position);
+    vm.charge(end - position);
+    let next = (position..end).find(|&at| table.entry(&vm.heap, at).is_some());
+    Ok(Value::index(next.unwrap_or(end)))
+}
+
+/// `(%table-hash table key)`: the hash of a key by the table's test of the machine.
+pub(super) fn table_hash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let table = table(vm, arguments[0])?;
+    let test = match table.comparison(&vm.heap) {
+        Comparison::Native(test) => test,
+        Comparison::Program => Test::Equalp,
+    };
+    Ok(Value::index(equality::hash(&vm.heap, test, arguments[1]) as usize))
+}
+
+/// The 32 bits of a hash: a fixnum as [`table_hash`] gives it, or any integer of a hash function of the program.
+fn hash_argument(vm: &mut Vm, v: Value) -> Result<u32, Exit> {
+    match v.as_index().and_then(|hash| u32::try_from(hash).ok()) {
+        Some(hash) => Ok(hash),
+        None => Ok(equality::given_hash(&vm.integer(v)?)),
+    }
+}
+
+fn entry_value(entry: Option<usize>) -> Value {
+    entry.map_or(Value::NIL, Value::index)
+}
+
+/// `(%table-first table hash)`: the first entry whose key has this hash, or `NIL`.
+pub(super) fn table_first(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let table = table(vm, arguments[0])?;
+    let hash = hash_argument(vm, arguments[1])?;
+    Ok(entry_value(table.first(&vm.heap, hash)))
+}
+
+/// `(%table-after table entry)`: the entry after this one whose key has the same hash, or `NIL`.
+pub(super) fn table_after(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (table, entry) = live_entry(vm, arguments)?;
+    Ok(entry_value(table.after(&vm.heap, entry)))
+}
+
+/// The table and the number of an entry that is in use.
+fn live_entry(vm: &mut Vm, arguments: &[Value]) -> Result<(Table, usize), Exit> {
+    let table = table(vm, arguments[0])?;
+    match arguments[1].as_index() {
+        Some(entry) if table.entry(&vm.heap, entry).is_some() => Ok((table, entry)),
+        _ => {
+            let used = table.used(&vm.heap);
+            vm.index_error(arguments[1], used)
+        }
+    }
+}
+
+/// `(%table-entry table entry)`: key and value; neither where the entry is free by now.
+pub(super) fn table_entry(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (table, entry) = live_entry(vm, arguments)?;
+    let (key, value) = table.entry(&vm.heap, entry).unwrap_or((Value::NIL, Value::NIL));
+    vm.give_values(&[key, value])
+}
+
+/// `(%set-table-value table entry value)`
+pub(super) fn set_table_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (table, entry) = live_entry(vm, arguments)?;
+    table.set_value(&mut vm.heap, entry, arguments[2]);
+    Ok(arguments[2])
+}
+
+/// `(%table-add table hash key value)`: adds a key that the table does not have.
+pub(super) fn table_add(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[table_value, hash, key, value] = arguments else { unreachable!("the table says four") };
+    let table = table(vm, table_value)?;
+    let hash = hash_argument(vm, hash)?;
+    add(vm, table, hash, key, value)?;
+    Ok(value)
+}
+
+/// `(%table-delete table entry)`
+pub(super) fn table_delete(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (table, entry) = live_entry(vm, arguments)?;
+    table.delete(&mut vm.heap, entry);
+    Ok(Value::T)
+}
