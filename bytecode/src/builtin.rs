@@ -829,11 +829,11 @@ define_builtins! {
     /// Makes `plist` the property list of `symbol`, and returns it.
     SetSymbolPlist = internal "%SET-SYMBOL-PLIST" ("symbol plist");
     /// The property `indicator` of `symbol`, or `default`.
-    Get = cl "GET" ("symbol indicator &optional default") slowly "SLOW-GET";
+    Get = cl "GET" ("symbol indicator &optional default") slowly "%SLOW-GET";
     /// Makes `value` the property `indicator` of `symbol`, and returns it.
-    Put = internal "%PUT" ("symbol indicator value") slowly "SLOW-PUT";
+    Put = internal "%PUT" ("symbol indicator value") slowly "%SLOW-PUT";
     /// Removes the property `indicator` of `symbol`; whether it had one.
-    Remprop = cl "REMPROP" ("symbol indicator") slowly "SLOW-REMPROP";
+    Remprop = cl "REMPROP" ("symbol indicator") slowly "%SLOW-REMPROP";
     /// The value of the special variable `symbol`.
     SymbolValue = cl "SYMBOL-VALUE" ("symbol");
     /// Sets the special variable `symbol`, and returns `value`.
@@ -998,7 +998,7 @@ define_builtins! {
     /// Whether a character of a stream is there to be read.
     Listen = cl "LISTEN" ("&optional stream");
     /// The next character of a stream, which stays there; with `T`, after white space; with a character, up to that.
-    PeekChar = cl "PEEK-CHAR" ("&optional peek-type stream eof-error-p eof-value recursive-p") slowly "SLOW-PEEK-CHAR";
+    PeekChar = cl "PEEK-CHAR" ("&optional peek-type stream eof-error-p eof-value recursive-p") slowly "%SLOW-PEEK-CHAR";
     /// Puts the character that was read last back into a stream.
     UnreadChar = cl "UNREAD-CHAR" ("character &optional stream");
     /// The next line of a stream, and whether it has no line end. Waits for standard input.
