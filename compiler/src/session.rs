@@ -26,7 +26,6 @@ use crate::reader::{Reader, read_datum};
 pub struct Compiler {
     /// The number that diagnostics give to the source.
     source: SourceId,
-    is_library: bool,
     /// The text that was compiled last, for drawing its diagnostics.
     sources: Arc<Mutex<Sources>>,
 }
@@ -37,18 +36,12 @@ impl Compiler {
         Compiler { source, ..Compiler::default() }
     }
 
-    /// The same, for the library, which may define what belongs to the language.
-    #[must_use]
-    pub fn for_library(self) -> Compiler {
-        Compiler { is_library: true, ..self }
-    }
-
     fn session(&self, input: Input, lines: SourceLines) -> Session {
         Session {
             input,
             source: self.source,
             lines,
-            expander: Expander::new(self.is_library),
+            expander: Expander::new(),
             chunks: Vec::new(),
             diagnostics: Vec::new(),
         }

@@ -9,7 +9,6 @@ use super::body::Body;
 use super::form::{Checked, Form, name};
 use super::machine::{Job, Machine, To};
 use super::scope::{Entry, Variable};
-use super::variable::report_unused;
 use crate::core::{NodeKind, Target};
 use crate::diagnostic::code;
 
@@ -40,7 +39,7 @@ impl Machine {
         let report = if body.ignored.contains(symbol) {
             None
         } else {
-            report_unused(symbol, datum, form.datum.span())
+            self.report_unused(symbol, datum, form.datum.span(), to.origin)
         };
         (Target::Lexical(variable), Entry::Variable(symbol.clone(), Variable::Lexical(variable), report))
     }

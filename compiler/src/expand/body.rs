@@ -141,7 +141,8 @@ impl Machine {
     pub(super) fn check_reachable(&mut self, forms: &[Datum], to: To) {
         for pair in forms.windows(2) {
             let [first, next] = pair else { continue };
-            if !(is_known(first.span()) && is_known(next.span())) || next.as_cons().is_none() {
+            let is_written = |form: &Datum| is_known(self.written(form.span(), to.origin));
+            if !(is_written(first) && is_written(next)) || next.as_cons().is_none() {
                 continue;
             }
             if let Some(leaver) = operator(first)

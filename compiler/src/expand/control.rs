@@ -101,8 +101,8 @@ pub(super) fn cond(machine: &mut Machine, _: &mut dyn Environment, form: Form, t
         let is_true = is_constant(&test) && !test.is_nil();
         if is_true {
             if let Some(next) = clauses.peek().and_then(|next| next.first())
-                && super::form::is_known(next.span())
-                && super::form::is_known(test.span())
+                && super::form::is_known(machine.written(next.span(), to.origin))
+                && super::form::is_known(machine.written(test.span(), to.origin))
             {
                 let message = format!("this clause is never reached: {} is always true", quoted(&test));
                 let diagnostic = code::UNREACHABLE_CODE.at(next.span(), message);

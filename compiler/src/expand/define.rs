@@ -8,7 +8,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
 use super::body::Body;
-use super::call::{builtin, quoted_symbol};
+use super::call::quoted_symbol;
 use super::form::{Checked, Form, Make, fresh, name, quoted};
 use super::lambda::FunctionName;
 use super::machine::{Job, Machine, Purpose, To};
@@ -23,14 +23,7 @@ impl Machine {
         symbol: &Symbol,
         span: Span,
     ) -> Checked {
-        if self.is_library {
-            return Ok(());
-        }
-        let is_known = super::operator::find(symbol).is_some() || builtin(symbol).is_some();
-        if is_known || environment.global(symbol).locked {
-            return Err(locked(symbol, span));
-        }
-        Ok(())
+        if environment.global(symbol).locked { Err(locked(symbol, span)) } else { Ok(()) }
     }
 
     /// Refuses calls of the functions that define, if what they define belongs to the language.
@@ -44,7 +37,7 @@ impl Machine {
             builtin,
             Builtin::SetFunction | Builtin::SetMacro | Builtin::ProclaimSpecial | Builtin::DefineConstant
         );
-        if !defines || self.is_library {
+        if !defines {
             return Ok(());
         }
         match form.args.iter().find_map(quoted_symbol) {

@@ -7,7 +7,6 @@ use esl_bytecode::symbol::Symbol;
 use super::form::{Checked, Form, Make, fresh};
 use super::machine::{Job, Machine, To};
 use super::scope::{Entry, Variable};
-use super::variable::report_unused;
 use crate::core::{HandlerClause, NodeKind};
 
 /// `(%handler-case form (type ([variable]) . body)*)`: runs `form`; a condition of a clause's type that is signalled in
@@ -56,7 +55,7 @@ pub(super) fn handler_case(
                 let report = if body.ignored.contains(&name) {
                     None
                 } else {
-                    report_unused(&name, datum, form.datum.span())
+                    machine.report_unused(&name, datum, form.datum.span(), to.origin)
                 };
                 entries.push(Entry::Variable(name.clone(), Variable::Lexical(variable), report));
             }

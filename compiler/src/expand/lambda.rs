@@ -12,7 +12,6 @@ use super::lambda_list::{Kind, LambdaList, Optional};
 use super::machine::{Job, Machine, To};
 use super::scope::{Entry, Function, Variable, Visible};
 use super::unit::Name;
-use super::variable::report_unused;
 use crate::core::{KeyParameter, Lambda, LambdaId, NodeId, NodeKind, OptionalParameter, Parameter, Target};
 use crate::diagnostic::code;
 
@@ -284,15 +283,19 @@ impl Filling<'_> {
         let (meaning, report) = if is_special {
             (Variable::Special, None)
         } else {
-            (Variable::Lexical(variable), self.report(&symbol, datum))
+            (Variable::Lexical(variable), self.report(machine, &symbol, datum))
         };
         self.jobs.push(Job::Enter(vec![Entry::Variable(symbol.clone(), meaning, report)]));
         self.bound.push(symbol);
         Parameter { variable, is_special }
     }
 
-    fn report(&self, symbol: &Symbol, datum: &Datum) -> Option<Span> {
-        if self.body.ignored.contains(symbol) { None } else { report_unused(symbol, datum, self.form) }
+    fn report(&self, machine: &Machine, symbol: &Symbol, datum: &Datum) -> Option<Span> {
+        if self.body.ignored.contains(symbol) {
+            None
+        } else {
+            machine.report_unused(symbol, datum, self.form, self.inside.origin)
+        }
     }
 
     fn optional(

@@ -158,12 +158,10 @@ pub(super) struct Machine {
     /// Whether the limit on depth was reported for this top-level form.
     is_too_deep: bool,
     pub(super) unit: Unit,
-    /// Whether the text is the library: it may define what belongs to the language.
-    pub(super) is_library: bool,
 }
 
 impl Machine {
-    pub(super) fn new(is_library: bool) -> Machine {
+    pub(super) fn new() -> Machine {
         Machine {
             jobs: Vec::new(),
             open: Vec::new(),
@@ -178,7 +176,6 @@ impl Machine {
             expansions: 0,
             is_too_deep: false,
             unit: Unit::default(),
-            is_library,
         }
     }
 
@@ -592,6 +589,13 @@ impl Machine {
             }
         }
         self.diagnostics.push(diagnostic);
+    }
+
+    /// `span`, if a form of that place was written there; an empty one, if the macro call `origin` has made it: what a
+    /// macro makes has the place of its call.
+    pub(super) fn written(&self, span: Span, origin: Option<u32>) -> Span {
+        let is_made = origin.is_some_and(|index| self.origins[index as usize].span == span);
+        if is_made { Span::default() } else { span }
     }
 
     /// The findings so far.

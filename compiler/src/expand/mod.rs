@@ -78,10 +78,16 @@ pub struct Expander {
     machine: Machine,
 }
 
+impl Default for Expander {
+    fn default() -> Expander {
+        Expander::new()
+    }
+}
+
 impl Expander {
-    /// An expander for the library, which may define what belongs to the language, or for a program.
-    pub fn new(is_library: bool) -> Expander {
-        Expander { machine: Machine::new(is_library) }
+    /// An expander that has seen nothing yet.
+    pub fn new() -> Expander {
+        Expander { machine: Machine::new() }
     }
 
     /// Begins a form of a file. The one before must be [`Event::Done`].

@@ -129,6 +129,23 @@ impl Machine {
     }
 }
 
+impl Machine {
+    /// Where an unused variable of this name, bound by a form at `form`, is to be reported, if at all: only if both were
+    /// written in the source. What macros bind for their own use is their own matter.
+    pub(super) fn report_unused(
+        &self,
+        symbol: &Symbol,
+        datum: &Datum,
+        form: Span,
+        origin: Option<u32>,
+    ) -> Option<Span> {
+        let place = self.written(datum.span(), origin);
+        let is_written =
+            is_known(place) && is_known(self.written(form, origin)) && symbol.package().is_some();
+        is_written.then_some(place)
+    }
+}
+
 /// `(setq {name form}*)`
 pub(super) fn setq(machine: &mut Machine, environment: &mut dyn Environment, form: Form, to: To) -> Checked {
     if form.args.len() % 2 == 1 {
@@ -207,11 +224,4 @@ pub(super) fn psetq(machine: &mut Machine, environment: &mut dyn Environment, fo
     body.push(make.nil());
     machine.schedule([Job::Expand(make.let_in_order(bindings, body), to)]);
     Ok(())
-}
-
-/// Whether an unused variable of this name, bound by `form`, is to be reported, and where: only if both were written
-/// in the source. What macros bind for their own use is their own matter.
-pub(super) fn report_unused(symbol: &Symbol, datum: &Datum, form: Span) -> Option<Span> {
-    let is_written = is_known(datum.span()) && is_known(form) && symbol.package().is_some();
-    is_written.then(|| datum.span())
 }

@@ -16,7 +16,7 @@ use host::FakeHost;
 /// Expands all forms of a text, and gives the chunks as text, and the findings.
 fn expand_in(host: &mut FakeHost, text: &str) -> (Vec<String>, Vec<Diagnostic>) {
     let mut reader = Reader::new(SourceId(0), text);
-    let mut expander = Expander::new(false);
+    let mut expander = Expander::new();
     let mut chunks = Vec::new();
     while let Some(form) = reader.next(host) {
         expander.begin_file_form(form.expect("the text reads"));
