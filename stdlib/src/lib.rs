@@ -1,1 +1,23 @@
 //! The ESL library, written in ESL, as a compiled image.
+//!
+//! The build step compiles the files of this package to one module, which is part of every executable. A machine maps it and
+//! makes a function ready when it is first called.
+#![forbid(unsafe_code)]
+
+use esl_bytecode::file::{ImageBytes, ModuleImage};
+use esl_vm::vm::Vm;
+
+/// The image: the bytes of an `.eslb` file.
+pub static IMAGE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/image.eslb"));
+
+/// Takes the library into a machine that has none.
+///
+/// # Errors
+/// A text, if the machine's limit of memory leaves no room for it.
+pub fn load(machine: &mut Vm) -> Result<(), String> {
+    let image = ModuleImage::open_trusted(ImageBytes::Static(IMAGE)).map_err(|error| error.to_string())?;
+    let functions = machine.open_image(image).map_err(|error| error.to_string())?;
+    machine.run_toplevel(functions, u64::MAX)?;
+    machine.seal();
+    Ok(())
+}
