@@ -12,7 +12,7 @@
 //! Guarantees: walks use no native stack in proportion to the depth. Circular and oversized structure is refused with
 //! a text.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
@@ -57,7 +57,7 @@ pub(crate) struct Unit {
     objects: Vec<Value>,
     object_ids: GivenMap<u64, u32>,
     /// Uninterned symbols.
-    uninterned: HashMap<u32, Value>,
+    uninterned: BTreeMap<u32, Value>,
     uninterned_ids: GivenMap<u64, u32>,
     /// By the address of the object: the object, and its datum.
     data: GivenMap<u64, (Value, Datum)>,

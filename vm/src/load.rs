@@ -10,7 +10,7 @@
 //! A constant that names a structure class is its symbol here. The machine puts the class in its place when an
 //! instruction first needs it, so code may be loaded before the class is defined, and sees the class as it is then.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::fmt;
 
 use esl_bytecode::BigInt;
@@ -91,7 +91,7 @@ pub(crate) trait Shared {
 
 /// A module that stands alone, as one from a file does.
 #[derive(Default)]
-pub(crate) struct Alone(HashMap<u32, Value>);
+pub(crate) struct Alone(BTreeMap<u32, Value>);
 
 impl Shared for Alone {
     fn uninterned(&self, id: u32) -> Option<Value> {
@@ -354,3 +354,6 @@ impl Vm {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -12,7 +12,7 @@ use esl_bytecode::module::Module;
 
 use crate::datum::Unit;
 use crate::heap::AllocError;
-use crate::load::LoadError;
+use crate::load::{Alone, LoadError, load};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -27,17 +27,22 @@ impl Vm {
         self.world.unit.replace(Unit::default());
     }
 
-    /// Loads a module and gives the functions that run its top-level forms, in order, as a list.
+    /// Loads a module that stands alone, such as one from a file, and gives the functions that run its top-level forms, in
+    /// order, as a list.
     ///
     /// # Errors
     /// [`LoadError`].
     pub fn load_module(&mut self, module: &Module) -> Result<Value, LoadError> {
-        self.with_room(|vm| vm.load_in_unit(module))
+        self.with_room(|vm| load(&mut vm.heap, &mut vm.world, module, &mut Alone::default()))
     }
 
+    /// Loads a module of the unit that is being compiled.
+    ///
+    /// # Errors
+    /// [`LoadError`].
     pub(crate) fn load_in_unit(&mut self, module: &Module) -> Result<Value, LoadError> {
         let mut unit = self.world.unit.take();
-        let functions = crate::load::load(&mut self.heap, &mut self.world, module, &mut unit);
+        let functions = load(&mut self.heap, &mut self.world, module, &mut unit);
         self.world.unit.replace(unit);
         functions
     }
@@ -137,7 +142,7 @@ impl CompileTimeHost for Vm {
     }
 
     fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, String> {
-        let functions = self.load_module(&module).map_err(|error| error.to_string())?;
+        let functions = self.with_room(|vm| vm.load_in_unit(&module)).map_err(|error| error.to_string())?;
         let value = self.run_toplevel(functions, LOAD_TICKS)?;
         Ok(keep.then(|| self.world.unit.borrow_mut().pin(value)))
     }

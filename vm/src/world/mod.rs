@@ -10,7 +10,7 @@
 //! Not here: what may be redefined is asked by the builtins; values of task-local bindings (`control`).
 
 use std::cell::{Cell, RefCell};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::hash::{BuildHasherDefault, Hasher};
 use std::sync::Arc;
 
@@ -74,9 +74,9 @@ pub(crate) struct World {
     /// The rules of packages.
     packages: Packages,
     /// The objects of packages.
-    package_objects: HashMap<PackageId, Value>,
+    package_objects: BTreeMap<PackageId, Value>,
     /// Packages in which symbols are at home, by name.
-    homes: HashMap<Arc<str>, (PackageId, Value)>,
+    homes: BTreeMap<Arc<str>, (PackageId, Value)>,
     /// Standard input, output and error.
     pub(crate) streams: [Value; 3],
     /// The companions of `NIL` and `T`.
@@ -109,8 +109,8 @@ impl World {
             names: RefCell::default(),
             fresh: Cell::new(0),
             packages: Packages::standard(),
-            package_objects: HashMap::new(),
-            homes: HashMap::new(),
+            package_objects: BTreeMap::new(),
+            homes: BTreeMap::new(),
             streams: [Value::NIL; 3],
             nil: Value::NIL,
             t: Value::NIL,
