@@ -1,7 +1,7 @@
 //! The contract between the ESL compiler and the ESL virtual machine.
 //!
-//! Here is what both must agree on and neither may own: the opcode table, the builtin table, the module format with its
-//! verifier and disassembler, literal data, and the traits by which each calls on the other.
+//! Here is what both must agree on and neither may own: the opcode table, the builtin table, modules with their file
+//! format, verifier and disassembler, literal data, packages, and the traits by which each calls on the other.
 #![forbid(unsafe_code)]
 
 pub mod assembler;
@@ -21,3 +21,8 @@ pub mod symbol;
 pub mod verify;
 
 pub use num_bigint::BigInt;
+
+/// The example of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
