@@ -23,7 +23,7 @@ use rustc_hash::FxHashMap;
 use crate::core::*;
 use capture::Captures;
 pub(crate) use capture::Lexical;
-use children::{children, lambda_nodes};
+pub(crate) use children::{children, lambda_nodes};
 
 /// What a local function is in the code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,6 +94,11 @@ impl Resolution {
     /// Whether the variable lives in a box.
     pub(crate) fn is_boxed(&self, variable: VarId) -> bool {
         !self.sets[variable.index()].is_empty() && self.captures.is_captured(variable)
+    }
+
+    /// Whether a closure captures the variable.
+    pub(crate) fn is_captured(&self, variable: VarId) -> bool {
+        self.captures.is_captured(variable)
     }
 
     /// Whether anything sets the variable after it is bound, apart from jumps of inlined functions.

@@ -13,41 +13,21 @@ use crate::core::*;
 
 impl Frame<'_, '_> {
     /// The datum of a constant.
-    fn literal(&self, node: NodeId) -> Option<&Datum> {
-        match &self.core.nodes[node.index()].kind {
-            NodeKind::Constant(datum) => Some(datum),
-            _ => None,
-        }
-    }
-
-    /// The value of a constant that fits an instruction.
-    fn literal_int(&self, node: NodeId) -> Option<Int16> {
-        self.literal(node).and_then(small_integer)
-    }
-
-    /// What `add-int` adds in place of `builtin` with `node` as its second argument.
-    fn addend(&self, builtin: Builtin, node: NodeId) -> Option<Int8> {
-        let Int16(value) = self.literal_int(node)?;
-        let addend = match builtin {
-            Builtin::Add => value,
-            // Less zero is not the same as plus zero: it keeps a negative zero.
-            Builtin::Subtract if value != 0 => value.checked_neg()?,
-            _ => return None,
-        };
-        i8::try_from(addend).ok().map(Int8)
+    pub(super) fn literal(&self, node: NodeId) -> Option<&Datum> {
+        literal(self.core, node)
     }
 
     /// Two numbers or more, joined from left to right.
     pub(super) fn fold(&mut self, builtin: Builtin, instr: Binary, numbers: &[NodeId], dest: Dest) {
         let top = self.registers.top();
         let mut numbers = numbers.to_vec();
-        if self.addend(builtin, numbers[0]).is_some() && builtin == Builtin::Add {
+        if addend(self.core, builtin, numbers[0]).is_some() && builtin == Builtin::Add {
             // A literal has no effects: it may as well come second.
             numbers.swap(0, 1);
         }
         let mut sum = self.operand(numbers[0], &numbers[1..]);
         for index in 1..numbers.len() {
-            let addend = self.addend(builtin, numbers[index]);
+            let addend = addend(self.core, builtin, numbers[index]);
             let step: Box<dyn FnOnce(Dst) -> Instr> = match addend {
                 Some(value) => {
                     let left = sum;
@@ -69,13 +49,13 @@ impl Frame<'_, '_> {
 
     pub(super) fn compare(&mut self, comparison: Comparison, left: NodeId, right: NodeId, dest: Dest) {
         if let Dest::Test { .. } = dest {
-            if let Some(Int16(value)) = self.literal_int(right)
+            if let Some(value) = literal_int(self.core, right)
                 && has_literal_form(comparison)
             {
                 return self.compare_int(comparison, left, value, dest);
             }
             let mirrored = mirror(comparison);
-            if let Some(Int16(value)) = self.literal_int(left)
+            if let Some(value) = literal_int(self.core, left)
                 && has_literal_form(mirrored)
             {
                 return self.compare_int(mirrored, right, value, dest);
@@ -88,10 +68,9 @@ impl Frame<'_, '_> {
     }
 
     /// Compares a form's value with a literal.
-    pub(super) fn compare_int(&mut self, comparison: Comparison, number: NodeId, value: i16, dest: Dest) {
+    pub(super) fn compare_int(&mut self, comparison: Comparison, number: NodeId, value: Int16, dest: Dest) {
         let top = self.registers.top();
         let left = self.operand(number, &[]);
-        let value = Int16(value);
         if let Dest::Test { holds, fails } = dest {
             let cond = match comparison {
                 Comparison::Equal => Some(Cond::NumEqInt(left, value)),
@@ -187,8 +166,33 @@ impl Frame<'_, '_> {
     }
 }
 
+/// The datum of a constant.
+fn literal(core: &Core, node: NodeId) -> Option<&Datum> {
+    match &core.nodes[node.index()].kind {
+        NodeKind::Constant(datum) => Some(datum),
+        _ => None,
+    }
+}
+
+/// The value of a constant that fits an instruction.
+pub(super) fn literal_int(core: &Core, node: NodeId) -> Option<Int16> {
+    literal(core, node).and_then(small_integer)
+}
+
+/// What `add-int` adds in place of `builtin` with `node` as its second argument.
+pub(super) fn addend(core: &Core, builtin: Builtin, node: NodeId) -> Option<Int8> {
+    let Int16(value) = literal_int(core, node)?;
+    let addend = match builtin {
+        Builtin::Add => value,
+        // Less zero is not the same as plus zero: it keeps a negative zero.
+        Builtin::Subtract if value != 0 => value.checked_neg()?,
+        _ => return None,
+    };
+    i8::try_from(addend).ok().map(Int8)
+}
+
 /// Whether there are jumps that compare with a literal in this way.
-fn has_literal_form(comparison: Comparison) -> bool {
+pub(super) fn has_literal_form(comparison: Comparison) -> bool {
     !matches!(comparison, Comparison::LessEqual | Comparison::GreaterEqual)
 }
 

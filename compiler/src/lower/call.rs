@@ -24,7 +24,7 @@ pub(super) enum Target<'a> {
     Builtin(Builtin),
     /// The running function.
     Itself,
-    /// The function in a place, which is fetched after the arguments.
+    /// The function in a place, which keeps it while the arguments are evaluated, or is a box.
     Place(Place),
     /// The function of a lambda that captures nothing.
     Constant(LambdaId),
@@ -33,9 +33,14 @@ pub(super) enum Target<'a> {
 }
 
 impl Target<'_> {
+    /// Whether what is called must be fetched before the arguments.
+    fn comes_first(self) -> bool {
+        matches!(self, Target::Form(_) | Target::Place(Place::Box(_) | Place::CaptureBox(_)))
+    }
+
     /// So many registers of the window are written only when the arguments are there.
     fn slack(self) -> u8 {
-        if matches!(self, Target::Form(_)) { 0 } else { 2 }
+        if self.comes_first() { 0 } else { 2 }
     }
 }
 
@@ -100,11 +105,9 @@ impl<'a> Frame<'_, 'a> {
                 let DatumKind::Symbol(name) = datum.kind() else { unreachable!("just matched") };
                 self.emit_call(Target::Global(name), arguments, dest);
             }
-            NodeKind::Local(variable) if self.builder.resolution.function(*variable).is_none() => {
-                let changes = self.builder.resolution.is_set_in(*variable, arguments);
-                let target =
-                    if changes { Target::Form(function) } else { Target::Place(self.place(*variable)) };
-                self.emit_call(target, arguments, dest);
+            NodeKind::Local(variable) if self.keeps_its_value(*variable, arguments) => {
+                let place = self.place(*variable);
+                self.emit_call(Target::Place(place), arguments, dest);
             }
             _ => self.emit_call(Target::Form(function), arguments, dest),
         }
@@ -164,7 +167,7 @@ impl<'a> Frame<'_, 'a> {
 
     /// Lowers a call whose callee and arguments are not opened up.
     pub(super) fn emit_call(&mut self, target: Target<'a>, arguments: &'a [NodeId], dest: Dest) {
-        if arguments.len() > MAX_DIRECT {
+        if arguments.len() > MAX_DIRECT && !matches!(target, Target::Itself) {
             return self.call_with_list(target, arguments, dest);
         }
         let top = self.registers.top();
@@ -174,17 +177,14 @@ impl<'a> Frame<'_, 'a> {
             _ => top,
         };
         let base = Base(window);
-        if let Target::Form(function) = target {
-            self.form(function, Dest::Fresh(window));
+        if target.comes_first() {
+            self.load_target(target, window);
         }
         let first = window.saturating_add(2);
         self.registers.take(usize::from(first.saturating_sub(top)));
         self.arguments(arguments);
-        let loaded = Dest::Fresh(window);
-        match target {
-            Target::Place(place) => self.fetch(place, loaded),
-            Target::Constant(lambda) => self.constant_function(lambda, loaded),
-            _ => {}
+        if !target.comes_first() && matches!(target, Target::Place(_) | Target::Constant(_)) {
+            self.load_target(target, window);
         }
         self.registers.release(top);
         self.registers.reserve(window, usize::from(dest.want().registers()));
@@ -217,6 +217,19 @@ impl<'a> Frame<'_, 'a> {
         self.results(window, dest);
     }
 
+    /// Puts what is called to `window`.
+    fn load_target(&mut self, target: Target<'a>, window: u8) {
+        let dest = Dest::Fresh(window);
+        match target {
+            Target::Global(name) => self.function_ref(name, dest),
+            Target::Builtin(builtin) => self.builtin_ref(builtin, dest),
+            Target::Place(place) => self.fetch(place, dest),
+            Target::Constant(lambda) => self.constant_function(lambda, dest),
+            Target::Form(function) => self.form(function, dest),
+            Target::Itself => unreachable!("a function that calls itself has its arguments in registers"),
+        }
+    }
+
     /// Passes on what a call has put into its window.
     fn results(&mut self, window: u8, dest: Dest) {
         match dest {
@@ -229,15 +242,7 @@ impl<'a> Frame<'_, 'a> {
     /// Lowers a call with very many arguments.
     fn call_with_list(&mut self, target: Target<'a>, arguments: &'a [NodeId], dest: Dest) {
         let window = self.registers.top();
-        let loaded = Dest::Fresh(window);
-        match target {
-            Target::Global(name) => self.function_ref(name, loaded),
-            Target::Builtin(builtin) => self.builtin_ref(builtin, loaded),
-            Target::Place(place) => self.fetch(place, loaded),
-            Target::Constant(lambda) => self.constant_function(lambda, loaded),
-            Target::Form(function) => self.form(function, loaded),
-            Target::Itself => unreachable!("a function has fewer parameters"),
-        }
+        self.load_target(target, window);
         self.registers.take(2);
         let list = self.registers.top();
         self.list(arguments, Dest::Fresh(list));

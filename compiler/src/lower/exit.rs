@@ -97,12 +97,18 @@ impl Frame<'_, '_> {
     pub(super) fn tagbody(&mut self, tagbody: TagbodyId, items: &[TagbodyItem], dest: Dest) {
         let count = items.iter().filter(|item| matches!(item, TagbodyItem::Tag)).count();
         let tags: Vec<Label> = (0..count).map(|_| self.graph.label()).collect();
+        let top = self.registers.top();
+        let has_literals = self.load_tagbody_literals(tagbody, items);
         if self.builder.resolution.tagbody_needs_catch(tagbody) {
             self.catching_tagbody(tagbody, items, tags);
         } else {
             let depth = self.extents.len();
             self.tagbody_forms(tagbody, items, TagbodyState { tags, depth });
         }
+        if has_literals {
+            self.literals = None;
+        }
+        self.registers.release(top);
         self.deliver_nil(dest);
     }
 

@@ -50,6 +50,10 @@ pub(super) struct Frame<'b, 'a> {
     pub(super) blocks: FxHashMap<BlockId, BlockState>,
     pub(super) tagbodies: FxHashMap<TagbodyId, TagbodyState>,
     pub(super) loops: FxHashMap<LambdaId, LoopState>,
+    /// Variables whose values are computed where they are read, once.
+    pub(super) substitutes: FxHashMap<VarId, NodeId>,
+    /// Registers of the literals of the loop around the form, if there is one.
+    pub(super) literals: Option<FxHashMap<PoolIdx, u8>>,
     /// Where the form was written that is being lowered.
     pub(super) span: Span,
     constants: Vec<PoolIdx>,
@@ -74,6 +78,8 @@ pub(super) fn function(builder: &mut Builder<'_>, lambda: LambdaId) -> Function 
         blocks: FxHashMap::default(),
         tagbodies: FxHashMap::default(),
         loops: FxHashMap::default(),
+        substitutes: FxHashMap::default(),
+        literals: None,
         span: text.span,
         constants: Vec::new(),
         constant_indexes: FxHashMap::default(),

@@ -1,8 +1,8 @@
 //! Improves a function's graph: what takes instructions in a hot loop is worth most.
 //!
 //! - Threading: an edge to an empty segment goes where that goes.
-//! - Rotation: a jump back to a short test becomes a copy of the test, so that each turn of a loop executes one
-//!   conditional jump back. See [`super::loops`] for the shapes of source that profit.
+//! - Rotation: a jump to the short test of a loop becomes a copy of the test, be it at the head of the loop or at its
+//!   end, so that each turn executes one conditional jump back. See [`super::loops`] for the shapes that profit.
 //! - Counting: an addition to a counter right before its comparison with a limit becomes one instruction with it.
 //! - Segments that control cannot get to are dropped.
 
@@ -98,19 +98,21 @@ fn drop_unreachable(graph: &mut Graph) {
     graph.order.retain(|label| reached[label.index()]);
 }
 
-/// Copies short tests at the head of loops to the jumps back to them.
+/// Copies the short tests of loops to the jumps to them.
 fn rotate(graph: &mut Graph) {
     let positions = graph.positions();
     for position in 0..graph.order.len() {
         let index = graph.order[position].index();
         let Exit::Jump(head) = graph.segments[index].exit else { continue };
-        if positions[head.index()] > position || head.index() == index {
+        if head.index() == index {
             continue;
         }
         let test = &graph.segments[head.index()];
         let Exit::Branch { cond, holds, fails } = test.exit else { continue };
-        // The copy pays if the test can then jump back by itself.
-        let is_back = |label: Label| positions[label.index()] <= position;
+        // The copy pays if a test can then jump back by itself: this one, from the end of a loop to its body, or, when
+        // the test stands at the end already, that one, now joined with what comes before it.
+        let from = position.max(positions[head.index()]);
+        let is_back = |label: Label| positions[label.index()] <= from;
         let pays = (is_back(holds) && cond.loops(true)) || (is_back(fails) && cond.loops(false));
         if !pays || test.ops.len() > ROTATED_LENGTH || test.ops.iter().any(|op| op.landing.is_some()) {
             continue;

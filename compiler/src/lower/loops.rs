@@ -76,6 +76,7 @@ impl<'a> Frame<'_, 'a> {
                 self.bind_lexical(parameter.variable, argument);
             }
         }
+        let has_literals = is_loop && self.load_body_literals(text.body);
         if is_loop {
             let head = self.graph.label();
             self.graph.bind(head);
@@ -88,6 +89,9 @@ impl<'a> Frame<'_, 'a> {
         }
         self.form_inside(text.body, dest, depth);
         self.loops.remove(&lambda);
+        if has_literals {
+            self.literals = None;
+        }
         self.registers.release(top);
     }
 

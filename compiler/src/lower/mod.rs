@@ -23,6 +23,7 @@ mod frame;
 mod fuse;
 mod graph;
 mod lines;
+mod literals;
 mod loops;
 pub(crate) mod operator;
 mod pool;

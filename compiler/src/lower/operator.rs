@@ -8,6 +8,7 @@ use esl_bytecode::builtin::Builtin;
 use esl_bytecode::opcode::{Instr, TypeCode};
 use esl_bytecode::operand::*;
 
+use super::arithmetic::{addend, has_literal_form, literal_int};
 use super::call::{MAX_DIRECT, Target};
 use super::dest::Dest;
 use super::frame::Frame;
@@ -44,7 +45,7 @@ enum Shape {
     /// Two numbers compared.
     Compare(Comparison),
     /// One number compared with a literal.
-    CompareInt(Comparison, i16),
+    CompareInt(Comparison, Int16),
     /// The quotient, if nobody asks for the remainder.
     Quotient(Binary),
     IsType(TypeCode),
@@ -90,9 +91,9 @@ fn shape(builtin: Builtin, count: usize) -> Option<Shape> {
         (B::LessEqual, 2) => Compare(Comparison::LessEqual),
         (B::Greater, 2) => Compare(Comparison::Greater),
         (B::GreaterEqual, 2) => Compare(Comparison::GreaterEqual),
-        (B::Zerop, 1) => CompareInt(Comparison::Equal, 0),
-        (B::Plusp, 1) => CompareInt(Comparison::Greater, 0),
-        (B::Minusp, 1) => CompareInt(Comparison::Less, 0),
+        (B::Zerop, 1) => CompareInt(Comparison::Equal, Int16(0)),
+        (B::Plusp, 1) => CompareInt(Comparison::Greater, Int16(0)),
+        (B::Minusp, 1) => CompareInt(Comparison::Less, Int16(0)),
         (B::Not | B::Null, 1) => Not,
         (B::Eq, 2) => Eq,
         (B::Eql, 2) => Eql,
@@ -144,6 +145,18 @@ pub(crate) fn returns_one(builtin: Builtin) -> bool {
         matches!(builtin, B::Floor | B::Truncate | B::Values | B::ValuesList | B::Funcall | B::Apply);
     let opened = (0..=3).any(|count| shape(builtin, count).is_some());
     (opened && !several) || matches!(builtin, B::Append | B::Vector | B::NumNotEqual)
+}
+
+/// Whether a call takes its argument `index`, if it is a literal, from a register that may be anywhere.
+pub(super) fn takes_literals(core: &Core, builtin: Builtin, arguments: &[NodeId], index: usize) -> bool {
+    match shape(builtin, arguments.len()) {
+        Some(Shape::Fold(_)) => addend(core, builtin, arguments[index]).is_none(),
+        Some(Shape::Compare(comparison)) => {
+            !has_literal_form(comparison) || literal_int(core, arguments[index]).is_none()
+        }
+        Some(Shape::Binary(_) | Shape::Quotient(_) | Shape::Store(..) | Shape::StoreAt(_)) => true,
+        _ => false,
+    }
 }
 
 impl<'a> Frame<'_, 'a> {
@@ -219,6 +232,11 @@ impl<'a> Frame<'_, 'a> {
 
     /// Two operands, evaluated in order.
     pub(super) fn operands(&mut self, left: NodeId, right: NodeId) -> (Reg, Reg) {
+        if self.literal(left).is_some() {
+            // A literal has no effects: loaded late it takes no register while the other is computed.
+            let second = self.operand(right, &[]);
+            return (self.operand(left, &[]), second);
+        }
         let first = self.operand(left, &[right]);
         (first, self.operand(right, &[]))
     }

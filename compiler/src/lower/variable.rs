@@ -54,6 +54,9 @@ impl<'a> Frame<'_, 'a> {
         if let Some(lambda) = self.builder.resolution.function(variable) {
             return self.function_value(variable, lambda, dest);
         }
+        if let Some(value) = self.substitutes.get(&variable) {
+            return self.single(*value, dest);
+        }
         let place = self.place(variable);
         self.fetch(place, dest);
     }
@@ -93,7 +96,7 @@ impl<'a> Frame<'_, 'a> {
 
     /// A register that holds the value of `node` until the forms `later` have been evaluated. May take a register.
     pub(super) fn operand(&mut self, node: NodeId, later: &[NodeId]) -> Reg {
-        if let Some(register) = self.plain_variable(node, later) {
+        if let Some(register) = self.plain_variable(node, later).or_else(|| self.loaded_literal(node)) {
             return Reg(register);
         }
         let register = self.registers.top();
@@ -104,14 +107,21 @@ impl<'a> Frame<'_, 'a> {
     /// The register of the variable that `node` reads, if it keeps its value while the forms `later` are evaluated.
     pub(super) fn plain_variable(&mut self, node: NodeId, later: &[NodeId]) -> Option<u8> {
         let NodeKind::Local(variable) = self.core.nodes[node.index()].kind else { return None };
-        let resolution = &self.builder.resolution;
-        if resolution.function(variable).is_some() || resolution.is_set_in(variable, later) {
+        if !self.keeps_its_value(variable, later) {
             return None;
         }
         match self.place(variable) {
             Place::Register(register) => Some(register),
             _ => None,
         }
+    }
+
+    /// Whether `variable` has a place, and holds the same while the forms `later` are evaluated.
+    pub(super) fn keeps_its_value(&self, variable: VarId, later: &[NodeId]) -> bool {
+        let resolution = &self.builder.resolution;
+        resolution.function(variable).is_none()
+            && !resolution.is_set_in(variable, later)
+            && !self.substitutes.contains_key(&variable)
     }
 
     pub(super) fn special(&mut self, symbol: &Symbol, dest: Dest) {
@@ -142,8 +152,19 @@ impl<'a> Frame<'_, 'a> {
         let depth = self.extents.len();
         // Special bindings of a parallel `let` are made when all values are there.
         let mut waiting: Vec<(&Symbol, u8)> = Vec::new();
-        for (target, value) in bindings {
+        for (index, (target, value)) in bindings.iter().enumerate() {
+            // What is evaluated right after this value.
+            let next = match bindings.get(index + 1) {
+                None if waiting.is_empty() => Some(body),
+                Some((_, next)) if sequential => Some(*next),
+                _ => None,
+            };
             match target {
+                Target::Lexical(variable)
+                    if next.is_some_and(|next| self.is_used_at_once(*variable, next)) =>
+                {
+                    self.substitutes.insert(*variable, *value);
+                }
                 Target::Lexical(variable) => self.bind_lexical(*variable, *value),
                 Target::Special(symbol) => {
                     let temporary = self.registers.top();
@@ -178,6 +199,53 @@ impl<'a> Frame<'_, 'a> {
         self.form(value, Dest::Fresh(register));
         self.builder.variables[variable.index()] = self.registers.take(1);
         self.box_variable(variable);
+    }
+
+    /// Whether the first thing that `next` does is to read `variable`, which nothing else refers to: then the value
+    /// may as well be computed there.
+    fn is_used_at_once(&self, variable: VarId, next: NodeId) -> bool {
+        let resolution = &self.builder.resolution;
+        if resolution.is_assigned(variable)
+            || resolution.is_captured(variable)
+            || resolution.reads_of(variable) != 1
+        {
+            return false;
+        }
+        let mut node = next;
+        // So far down is far enough.
+        for _ in 0..8 {
+            node = match &self.core.nodes[node.index()].kind {
+                NodeKind::Local(read) => return *read == variable,
+                NodeKind::SetLocal(_, value)
+                | NodeKind::SetSpecial(_, value)
+                | NodeKind::If(value, _, _)
+                | NodeKind::ReturnFrom(_, value)
+                | NodeKind::BindValues(_, value, _)
+                | NodeKind::FirstValues(value, _)
+                | NodeKind::Slot(_, _, value)
+                | NodeKind::SetSlot(_, _, value, _)
+                | NodeKind::IsInstance(_, value)
+                | NodeKind::Catch(value, _)
+                | NodeKind::Throw(value, _)
+                | NodeKind::Call(Callee::Value(value), _) => *value,
+                NodeKind::Progn(forms)
+                | NodeKind::And(forms)
+                | NodeKind::Or(forms)
+                | NodeKind::Values(forms) => match forms.first() {
+                    Some(first) => *first,
+                    None => return false,
+                },
+                NodeKind::Call(Callee::Global(_) | Callee::Builtin(_), arguments) => {
+                    match arguments.first() {
+                        Some(first) => *first,
+                        None => return false,
+                    }
+                }
+                NodeKind::Let { bindings, body, .. } => bindings.first().map_or(*body, |(_, value)| *value),
+                _ => return false,
+            };
+        }
+        false
     }
 
     /// The register of another variable that `variable` can share, since neither ever changes.

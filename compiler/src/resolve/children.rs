@@ -3,7 +3,7 @@
 use crate::core::*;
 
 /// Calls `visit` with the nodes right inside `kind`. The texts of lambdas are not inside.
-pub(super) fn children(kind: &NodeKind, visit: &mut dyn FnMut(NodeId)) {
+pub(crate) fn children(kind: &NodeKind, visit: &mut dyn FnMut(NodeId)) {
     let mut all = |nodes: &[NodeId]| nodes.iter().for_each(|&node| visit(node));
     match kind {
         NodeKind::Hole
@@ -62,7 +62,7 @@ pub(super) fn children(kind: &NodeKind, visit: &mut dyn FnMut(NodeId)) {
 }
 
 /// Calls `visit` with the nodes of a lambda: the defaults of its parameters, then its body.
-pub(super) fn lambda_nodes(lambda: &Lambda, visit: &mut dyn FnMut(NodeId)) {
+pub(crate) fn lambda_nodes(lambda: &Lambda, visit: &mut dyn FnMut(NodeId)) {
     lambda.optional.iter().for_each(|optional| visit(optional.default));
     lambda.keys.iter().flatten().for_each(|key| visit(key.optional.default));
     visit(lambda.body);

@@ -179,6 +179,9 @@ impl Generator<'_> {
             36 => format!("(let ((*a*{})){})", self.forms(1, depth), self.forms(2, depth)),
             37 => {
                 let lambda = self.lambda(depth);
+                if self.choose(2) == 0 {
+                    return format!("(let ((f {lambda})) (funcall f{}))", self.forms(1, depth));
+                }
                 format!("(funcall {lambda}{})", self.forms(1, depth))
             }
             38 => {

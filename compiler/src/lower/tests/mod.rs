@@ -1,6 +1,7 @@
 //! Tests of lowering, on core trees in a notation of their own.
 
 mod generate;
+mod listing;
 mod machine;
 mod model;
 mod notation;
@@ -27,4 +28,3 @@ fn module(text: &str) -> Module {
 fn code(text: &str) -> String {
     disasm::module(&module(text))
 }
-

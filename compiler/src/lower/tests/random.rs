@@ -40,6 +40,12 @@ fn values_that_change_while_others_are_computed() {
         "(let ((a 1)) (let ((b a)) (setq a 2) (list a b)))",
         "(let ((a 1)) (+ a (progn (apply (lambda () (setq a 5)) nil) 1) a))",
         "(let ((f (lambda (x y) (list x y))) (a 1)) (funcall f a (progn (setq f 3) (setq a 4))))",
+        "(let ((f (lambda (x) (note x)))) (funcall f 1))",
+        "(let ((f (lambda () 1))) (let ((g (lambda () (setq f (lambda (x) 2)) 3))) (setq f (lambda (x) 4)) (funcall f (apply g nil))))",
+        "(let ((x (note 1))) (let ((y (note x))) (if (< y 2) (note 3) 4)))",
+        "(let ((x (two 1))) x)",
+        "(let* ((a 1) (x (two a)) (y (list x))) (values y))",
+        "(let ((a 1)) (let ((x (setq a 2))) (+ x a)))",
     ] {
         check(text);
     }
