@@ -4,7 +4,8 @@
 //! of a function's code, V6 to V11 for what control can get to.
 //!
 //! * **V1, instructions.** Wherever control gets to in a function begins an instruction of the opcode table, with its
-//!   aux word. A function has at least one word of code and at most [`MAX_CODE`]; control does not run past the end.
+//!   aux word. Bits that no operand uses are zero, and so is an aux word that only fills up. A function has at least
+//!   one word of code and at most [`MAX_CODE`]; control does not run past the end.
 //! * **V2, jumps.** Every jump lands on the beginning of an instruction of the same function: a loop's at or before the
 //!   loop instruction, all others after the jump.
 //! * **V3, registers.** `registers` is at most [`MAX_REGISTERS`]. Every register operand is below it. A range fits:

@@ -6,12 +6,13 @@
 
 mod support;
 
+use esl_bytecode::assembler::assemble;
 use esl_bytecode::disasm;
 use esl_bytecode::module::{CaptureSource, Constant, Function, FunctionNumber, Module};
-use esl_bytecode::opcode::{Instr, Opcode, Substitute};
+use esl_bytecode::opcode::{Instr, OPCODES, Opcode, Substitute};
 use esl_bytecode::operand::{Base, Count, Role, Want};
 use esl_bytecode::verify::verify;
-use support::{Random, module_with_random_code};
+use support::{Random, build, module_with_random_code};
 
 /// What a register holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -507,5 +508,38 @@ fn what_is_verified_keeps_its_promises() {
         ["push-catch", "end-cleanup", "patch-capture", "capture-box-ref", "jump-if-supplied", "box-ref"]
     {
         assert!(used.get(mnemonic).copied().unwrap_or(0) >= 5, "{mnemonic}: {used:?}");
+    }
+}
+
+#[test]
+fn random_instructions_do_no_harm() {
+    for seed in 0..20_000 {
+        let random = &mut Random(seed);
+        let mut module = module_with_random_code(random);
+        let registers = random.next() as u8;
+        let code = &mut module.functions[0].code;
+        for _ in 0..random.below(8) {
+            // Small numbers mean something more often.
+            let largest = random.pick(&[1, 8, 1 << 16, 1 << 32]);
+            let opcode = random.pick(OPCODES).opcode;
+            let (word, aux) = build(opcode, |_| random.below(largest) as u32).encode();
+            let at = random.below(code.len());
+            code.splice(at..at, std::iter::once(word).chain(aux));
+        }
+        module.functions[0].registers = registers;
+        let _ = verify(&module);
+        disasm::module(&module);
+    }
+}
+
+#[test]
+fn the_assembler_undoes_the_disassembler() {
+    for seed in 0..2000 {
+        let module = module_with_random_code(&mut Random(seed));
+        let text = disasm::function(&module, FunctionNumber(0));
+        // A title and the size of the frame come first.
+        let is_listing = |line: &&str| !line.starts_with("  capture") && !line.starts_with("  ;");
+        let listing: Vec<&str> = text.lines().skip(2).filter(is_listing).collect();
+        assert_eq!(assemble(&listing.join("\n")).as_ref(), Ok(&module.functions[0].code), "{text}");
     }
 }

@@ -34,6 +34,8 @@ pub enum Fault {
     UnknownOpcode(u8),
     /// V1: the code ends before the aux word.
     MissingAux,
+    /// V1: bits that no operand uses are not zero.
+    SpareBits,
     /// V1: there is no code, or more than [`MAX_CODE`] words.
     CodeLength(usize),
     /// V1: control runs past the last instruction.
@@ -166,6 +168,7 @@ impl fmt::Display for Fault {
         match *self {
             Fault::UnknownOpcode(number) => write!(f, "no opcode has the number {number:#04x}"),
             Fault::MissingAux => f.write_str("the code ends before the aux word"),
+            Fault::SpareBits => f.write_str("bits that no operand uses must be zero"),
             Fault::CodeLength(length) => write!(f, "expected 1 to {MAX_CODE} words of code, found {length}"),
             Fault::FallsOff => f.write_str("control runs past the end of the code"),
             Fault::JumpTarget(word) => write!(f, "no instruction begins at the target, word {word}"),

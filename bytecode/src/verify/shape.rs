@@ -7,7 +7,7 @@ use crate::module::{
     Constant, Function, FunctionNumber, MAX_CAPTURES, MAX_CODE, MAX_REGISTERS, Module, Parameters, PoolIdx,
 };
 use crate::opcode::{Instr, Opcode, TypeCode};
-use crate::operand::{Base, Count, Role, Want};
+use crate::operand::{Base, Count, Pad, Role, Want};
 
 /// Where instructions begin, and to which of them control may come from elsewhere than the one before.
 #[derive(Clone, Debug)]
@@ -47,6 +47,9 @@ pub(super) fn verify(module: &Module, number: FunctionNumber) -> Result<Shape, V
         let number = code[pc] as u8;
         let opcode = Opcode::from_number(number).ok_or_else(|| here(Fault::UnknownOpcode(number)))?;
         let instr = Instr::decode(code, pc).ok_or_else(|| here(Fault::MissingAux))?;
+        if instr.encode().0 != code[pc] {
+            return Err(here(Fault::SpareBits));
+        }
         let next = pc + opcode.words();
         let target = Check { next, ..check }.instruction(instr).map_err(here)?;
         jumps.extend(target.map(|target| (pc, target)));
@@ -202,6 +205,11 @@ impl Check<'_> {
     /// What the roles of operands do not tell.
     fn own_rules(self, instr: Instr) -> Result<(), Fault> {
         match instr {
+            Instr::Call { pad: Pad(1..), .. }
+            | Instr::CallSelf { pad: Pad(1..), .. }
+            | Instr::Apply { pad: Pad(1..), .. }
+            | Instr::TailCall { pad: Pad(1..), .. }
+            | Instr::TailApply { pad: Pad(1..), .. } => Err(Fault::SpareBits),
             Instr::LoadNil { first, count }
             | Instr::List { first, count, .. }
             | Instr::ReturnValues { first, count }

@@ -108,6 +108,8 @@ fn v1_control_stays_within_instructions() {
     check_header(|f| f.code.push(0xC0), Err(Fault::UnknownOpcode(0xC0)));
     check_header(|f| f.code.push(0), Err(Fault::UnknownOpcode(0)));
     check_header(|f| f.code.push(0x68), Err(Fault::MissingAux));
+    check_header(|f| f.code[1] |= 1 << 31, Err(Fault::SpareBits));
+    check_header(|f| f.code.extend([0x68, 1]), Err(Fault::SpareBits));
 }
 
 #[test]
