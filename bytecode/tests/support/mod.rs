@@ -263,6 +263,7 @@ fn encode(opcodes: &[Opcode], palette: &Palette, random: &mut Random) -> Vec<u32
             "ConstIdx" => INTEGER,
             "ClassIdx" | "WideClassIdx" => CLASS,
             "VectorIdx" => TYPES,
+            "Pad" => 0,
             "Index" => random.below(2) as u32,
             "Jump" | "Jump16" | "Jump24" => {
                 let pushes =
