@@ -1,11 +1,16 @@
-//! Compiles the library to its image: every file of `load-order`, in that order, in one machine, so that each may use what
-//! the ones before it define.
+//! Compiles the library, file by file in the order of `load-order`, to its image.
+//!
+//! One machine runs the macros and takes in each file once that is compiled, so that each may use what the ones before it
+//! define. An error in the library is an error of the build; a warning is a warning, unless it is about a name that a
+//! later file defines.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use esl_bytecode::compile::{Compile, drive};
-use esl_bytecode::diagnostic::Severity;
-use esl_bytecode::span::SourceId;
+use esl_bytecode::compile::{Compile, Environment, GlobalFunction, GlobalVariable, drive};
+use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::module::Module;
+use esl_bytecode::symbol::ESL_PACKAGE;
 use esl_bytecode::{file, link};
 use esl_compiler::diagnostic::{Renderer, Sources};
 use esl_compiler::session::Compiler;
@@ -13,44 +18,105 @@ use esl_vm::host::VirtualHost;
 use esl_vm::vm::{Config, Vm};
 
 fn main() {
-    let folder = std::env::var("CARGO_MANIFEST_DIR").expect("cargo names the folder of the package");
-    let output = std::env::var("OUT_DIR").expect("cargo names the folder for what is built");
-    let folder = Path::new(&folder);
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed=load-order");
-    let order = std::fs::read_to_string(folder.join("load-order")).expect("`load-order` can be read");
-    let mut machine = Vm::new(Config::default(), Box::new(VirtualHost::new())).expect("there is memory for a machine");
-    let mut sources = Sources::new();
-    let mut modules = Vec::new();
+    let folder = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo names the folder of the package"));
+    let output = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo names the folder for what is built"));
+    match build(&folder) {
+        Ok(image) => std::fs::write(output.join("image.eslb"), image).expect("the image can be written"),
+        Err(text) => {
+            eprintln!("{text}");
+            std::process::exit(1);
+        }
+    }
+}
+
+/// The bytes of the image.
+fn build(folder: &Path) -> Result<Vec<u8>, String> {
+    let order = read(&folder.join("load-order"))?;
+    let machine = Vm::new(Config::default(), Box::new(VirtualHost::new())).map_err(|error| format!("{error:?}"))?;
+    let mut library = Library { machine, sources: Sources::new(), modules: Vec::new(), doubts: Vec::new() };
+    library.machine.set_compiler(Box::new(Compiler::default()));
     for name in order.lines().filter(|line| !line.is_empty() && !line.starts_with('#')) {
-        let name = format!("{name}.esl");
-        println!("cargo::rerun-if-changed={name}");
-        let text = std::fs::read_to_string(folder.join(&name));
-        let text = text.unwrap_or_else(|error| panic!("{name}, named in `load-order`, cannot be read: {error}"));
-        let id: SourceId = sources.add(format!("stdlib/{name}"), Some(text.as_str().into()));
-        machine.begin_unit();
-        let compiler = Compiler::for_source(id);
-        let (module, diagnostics) =
-            drive(&mut *compiler.compile_text(&format!("stdlib/{name}"), &text), &mut machine);
-        let mut is_sound = true;
-        for diagnostic in &diagnostics {
-            let rendered = Renderer::default().render(diagnostic, &sources);
-            if diagnostic.severity == Severity::Error {
-                is_sound = false;
-                eprintln!("{rendered}\n");
+        let path = folder.join(format!("{name}.esl"));
+        println!("cargo::rerun-if-changed={}", path.display());
+        library.add(&format!("stdlib/{name}.esl"), read(&path)?.into())?;
+    }
+    library.report_doubts();
+    let module = esl_vm::load::prepare(link::link(library.modules));
+    file::write(&module).map_err(|error| error.to_string())
+}
+
+fn read(path: &Path) -> Result<String, String> {
+    std::fs::read_to_string(path).map_err(|error| format!("{} cannot be read: {error}", path.display()))
+}
+
+/// What has been compiled so far.
+struct Library {
+    machine: Vm,
+    sources: Sources,
+    modules: Vec<Module>,
+    /// Warnings about names that were not defined when they were used.
+    doubts: Vec<Diagnostic>,
+}
+
+impl Library {
+    /// Compiles a file, and runs it in the machine.
+    fn add(&mut self, name: &str, text: Arc<str>) -> Result<(), String> {
+        self.machine.enter_package(ESL_PACKAGE).map_err(|error| format!("{error:?}"))?;
+        self.machine.begin_unit();
+        let source = self.sources.add(name, Some(text.clone()));
+        let mut compilation = Compiler::for_source(source).compile_text(name, &text);
+        let (module, diagnostics) = drive(&mut *compilation, &mut self.machine);
+        let (errors, warnings): (Vec<_>, Vec<_>) =
+            diagnostics.into_iter().partition(|diagnostic| diagnostic.severity == Severity::Error);
+        if !errors.is_empty() {
+            return Err(errors.iter().map(|error| self.render(error) + "\n").collect());
+        }
+        for warning in warnings {
+            if matches!(warning.code, "undefined-function" | "undefined-variable") {
+                self.doubts.push(warning);
             } else {
-                println!("cargo::warning={}", rendered.replace('\n', "\ncargo::warning="));
+                warn(&self.render(&warning));
             }
         }
-        let Some(module) = module.filter(|_| is_sound) else { panic!("{name} does not compile") };
-        // The files after this one are compiled with what this one defines.
-        let functions = machine.load_module(&module);
-        let functions = functions.unwrap_or_else(|error| panic!("{name} cannot be loaded: {error}"));
-        if let Err(failure) = machine.run_toplevel(functions, u64::MAX) {
-            panic!("{name} fails: {failure}");
-        }
-        modules.push(module);
+        let module = module.ok_or_else(|| format!("{name} gives no module"))?;
+        let functions = self.machine.load_module(&module).map_err(|error| format!("{name} cannot be loaded: {error}"))?;
+        self.machine.run_toplevel(functions, u64::MAX).map_err(|failure| format!("{name} fails: {failure}"))?;
+        self.modules.push(module);
+        Ok(())
     }
-    let image = file::write(&link::link(modules)).expect("the library holds nothing but data");
-    std::fs::write(Path::new(&output).join("image.eslb"), image).expect("the image can be written");
+
+    /// Reports the uses of names that no file has defined.
+    fn report_doubts(&mut self) {
+        for doubt in std::mem::take(&mut self.doubts) {
+            // The name is what the message quotes.
+            let quoted = doubt.message.split('`').nth(1).unwrap_or("").to_uppercase();
+            let setf = quoted.strip_prefix("(SETF ").and_then(|rest| rest.strip_suffix(')'));
+            let (package, name) = match setf.unwrap_or(&quoted).split_once(':') {
+                Some((package, name)) => (Some(package), name),
+                None => (None, setf.unwrap_or(&quoted)),
+            };
+            let is_defined = self.machine.intern(package, name, false).is_ok_and(|symbol| match doubt.code {
+                "undefined-function" if setf.is_some() => {
+                    !matches!(self.machine.setf_function(&symbol), GlobalFunction::Undefined)
+                }
+                "undefined-function" => {
+                    !matches!(self.machine.global(&symbol).function, GlobalFunction::Undefined)
+                }
+                _ => !matches!(self.machine.global(&symbol).variable, GlobalVariable::Undefined),
+            });
+            if !is_defined {
+                warn(&self.render(&doubt));
+            }
+        }
+    }
+
+    fn render(&self, diagnostic: &Diagnostic) -> String {
+        Renderer::default().render(diagnostic, &self.sources)
+    }
+}
+
+fn warn(text: &str) {
+    println!("cargo::warning={}", text.replace('\n', "\ncargo::warning="));
 }
