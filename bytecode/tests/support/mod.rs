@@ -126,8 +126,9 @@ const REGIONS: &[Region] = &[
 
 /// Code whose jumps all go to instructions. Often, what is pushed is popped.
 fn random_code(random: &mut Random) -> Vec<u32> {
+    let source = if random.once_in(2) { LEAVES } else { random.pick(THEMES) };
     let palette = Palette {
-        leaves: (0..random.below(6) + 2).map(|_| random.pick(LEAVES)).collect(),
+        leaves: (0..random.below(6) + 2).map(|_| random.pick(source)).collect(),
         regions: (0..random.below(3) + 1).map(|_| random.pick(REGIONS)).collect(),
         registers: random.below(4) + 2,
     };
@@ -188,6 +189,52 @@ const LEAVES: &[Opcode] = &[
     Opcode::Bind,
     Opcode::Unbind,
     Opcode::NewTag,
+];
+
+/// Opcodes that have to do with each other.
+const THEMES: &[&[Opcode]] = &[
+    &[
+        Opcode::MakeBox,
+        Opcode::MakeBox,
+        Opcode::BoxRef,
+        Opcode::BoxSet,
+        Opcode::Move,
+        Opcode::LoadInt,
+        Opcode::JumpIfNil,
+        Opcode::LoopIfNil,
+        Opcode::CallGlobal,
+    ],
+    &[
+        Opcode::MakeClosure,
+        Opcode::MakeClosure,
+        Opcode::PatchCapture,
+        Opcode::PatchCapture,
+        Opcode::Move,
+        Opcode::LoadInt,
+        Opcode::JumpIfNil,
+        Opcode::LoopIfNil,
+        Opcode::MakeBox,
+    ],
+    &[
+        Opcode::SetValues,
+        Opcode::GetValues,
+        Opcode::ListToValues,
+        Opcode::ReturnAll,
+        Opcode::CallGlobal,
+        Opcode::JumpIfNil,
+        Opcode::LoopIfNil,
+        Opcode::Throw,
+    ],
+    &[
+        Opcode::Bind,
+        Opcode::Unbind,
+        Opcode::BindList,
+        Opcode::PushScope,
+        Opcode::PopControl,
+        Opcode::JumpIfNil,
+        Opcode::EnterCleanup,
+        Opcode::EndCleanup,
+    ],
 ];
 
 fn random_block(random: &mut Random, palette: &Palette, depth: usize, opcodes: &mut Vec<Opcode>) {
