@@ -578,7 +578,7 @@ impl Model {
 }
 
 fn run(seeds: std::ops::Range<u64>, laziness: usize, bulk: usize, config: HeapConfig) -> Totals {
-    let (seeds, steps) = if cfg!(miri) { (seeds.start..seeds.start + 1, 600) } else { (seeds, 10_000) };
+    let (seeds, steps) = if cfg!(miri) { (seeds.start..seeds.start + 1, 500) } else { (seeds, 10_000) };
     let mut totals = Totals::default();
     for seed in seeds {
         // The seed is what a failure needs to be repeated.
@@ -611,7 +611,9 @@ fn what_is_in_use_survives_a_full_mark_stack() {
 
 #[test]
 fn what_is_in_use_survives_at_the_limit() {
-    let config = HeapConfig { limit: 3 << 19, cycle_floor: 1 << 20, ..HeapConfig::default() };
-    let totals = run(200..206, 20, 5, config);
+    // One arena, and half as much for large objects; arenas are smaller under Miri.
+    let (limit, bulk) = if cfg!(miri) { (3 << 15, 1) } else { (3 << 19, 5) };
+    let config = HeapConfig { limit, cycle_floor: 1 << 20, ..HeapConfig::default() };
+    let totals = run(200..206, 20, bulk, config);
     assert!(cfg!(miri) || totals.cycles > 5 && totals.forced > 5, "{totals:?}");
 }
