@@ -71,7 +71,7 @@ pub(crate) fn is_alphanumeric(code: u32) -> bool {
 pub(crate) fn is_graphic(code: u32) -> bool {
     match char::from_u32(code) {
         Some(' ') => true,
-        Some(c) => !c.is_control() && !(c.is_whitespace() || is_invisible(c)),
+        Some(c) => !(c.is_control() || c.is_whitespace() || is_invisible(c)),
         None => false,
     }
 }
@@ -83,7 +83,7 @@ fn is_invisible(c: char) -> bool {
         | 0xE000..=0xF8FF | 0xFDD0..=0xFDEF | 0xFFFE | 0xFFFF | 0xE0000..=0xE0FFF | 0xF_0000..=0x10_FFFF)
 }
 
-/// The weight of a digit in `radix`, from 2 to 36, if it is one. Decimal digits of every script count.
+/// The weight of a digit in `radix`, from 2 to 36, if it is one. Other scripts' digits do not count.
 pub(crate) fn digit_weight(code: u32, radix: u32) -> Option<u32> {
     char::from_u32(code)?.to_digit(radix)
 }

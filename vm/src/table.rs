@@ -77,7 +77,7 @@ impl Table {
     ///
     /// # Errors
     /// As for every allocation.
-    pub(crate) fn new(
+    pub(crate) fn make(
         heap: &mut Heap,
         comparison: Comparison,
         size: usize,
@@ -485,7 +485,7 @@ mod tests {
     }
 
     fn new(heap: &mut Heap, test: Test) -> Table {
-        let v = Table::new(heap, Comparison::Native(test), 0, [Value::NIL; 2]).unwrap();
+        let v = Table::make(heap, Comparison::Native(test), 0, [Value::NIL; 2]).unwrap();
         Table::of(heap, v).unwrap()
     }
 

@@ -116,7 +116,7 @@ pub(super) fn to_float(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if crate::number::is_float(&vm.heap, arguments[0]) {
         return Ok(arguments[0]);
     }
-    let x = vm.to_double("FLOAT", arguments[0], "REAL")?;
+    let x = vm.double_of("FLOAT", arguments[0], "REAL")?;
     Ok(vm.heap.float(x)?)
 }
 
@@ -230,5 +230,8 @@ pub(super) fn make_random_state(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `%random`
 pub(super) fn random(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    random::random(vm, arguments[0], arguments[1])
+    match crate::number::sign_of(&vm.heap, arguments[0]) {
+        Some(1) if vm.heap.ratio(arguments[0]).is_none() => random::random(vm, arguments[0], arguments[1]),
+        _ => vm.specifier_error(arguments[0], "(OR (INTEGER 1) (FLOAT (0)))"),
+    }
 }

@@ -47,7 +47,7 @@ pub(super) fn logxor(vm: &mut Vm, integers: &[Value]) -> Outcome {
 pub(super) fn logeqv(vm: &mut Vm, integers: &[Value]) -> Outcome {
     // Each pair turns the bits over once; an even number of integers leaves them turned.
     let joined = fold(vm, BitOperation::Xor, 0, integers)?;
-    if integers.len() % 2 == 0 { bits::complement(vm, joined) } else { Ok(joined) }
+    if integers.len().is_multiple_of(2) { bits::complement(vm, joined) } else { Ok(joined) }
 }
 
 /// Joins two integers, either of them and the result turned over or not.

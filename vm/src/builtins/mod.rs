@@ -483,3 +483,6 @@ mod print;
 mod search;
 mod string;
 mod table;
+
+#[cfg(test)]
+mod tests;

@@ -197,6 +197,11 @@ pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         }
     }
     vm.charge(wanted);
+    if start.as_index().is_none_or(|start| start > wanted) {
+        // The failure tells how long the list is.
+        let length = vm.list_items(sequence, LIMIT)?.len();
+        return vm.bounds_error(start, end, length);
+    }
     let (start, end) = vm.bounds(start, end, wanted)?;
     Ok(vm.heap.list(&items[start..end])?)
 }

@@ -52,7 +52,7 @@ pub(super) fn make_hash_table(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         _ => return vm.index_error(test, 5),
     };
     let size = vm.count(size)?;
-    let table = Table::new(&mut vm.heap, comparison, size, [test_function, hash_function])?;
+    let table = Table::make(&mut vm.heap, comparison, size, [test_function, hash_function])?;
     vm.charge(size.min(LIMIT));
     Ok(table)
 }

@@ -136,8 +136,8 @@ pub(crate) fn typed_operands(
         (Number::Ratio(x), Number::Int(y)) => Pair::Ratios(x, Ratio::integer(y)),
         (Number::Int(x), Number::Ratio(y)) => Pair::Ratios(Ratio::integer(x), y),
         (Number::Float(x), Number::Float(y)) => Pair::Floats(x, y),
-        (Number::Float(x), _) => Pair::Floats(x, vm.to_double(op, b, expected)?),
-        (_, Number::Float(y)) => Pair::Floats(vm.to_double(op, a, expected)?, y),
+        (Number::Float(x), _) => Pair::Floats(x, vm.double_of(op, b, expected)?),
+        (_, Number::Float(y)) => Pair::Floats(vm.double_of(op, a, expected)?, y),
     })
 }
 

@@ -51,7 +51,15 @@ pub(crate) fn less_or_equal(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exi
 
 /// −1, 0 or 1, as `a` is below, at or above zero.
 pub(crate) fn sign(vm: &mut Vm, a: Value, expected: &'static str) -> Result<i32, Exit> {
-    Ok(match vm.number(a, expected)? {
+    match sign_of(&vm.heap, a) {
+        Some(sign) => Ok(sign),
+        None => vm.type_error(a, expected),
+    }
+}
+
+/// As [`sign`]; nothing for what is no number.
+pub(crate) fn sign_of(heap: &Heap, a: Value) -> Option<i32> {
+    Some(match Number::of(heap, a)? {
         Number::Int(n) => n.signum(),
         Number::Ratio(r) => r.numerator.signum(),
         Number::Float(x) => i32::from(x > 0.0) - i32::from(x < 0.0),

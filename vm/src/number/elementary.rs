@@ -49,7 +49,7 @@ elementary! {
 impl Elementary {
     /// The function at `a`.
     pub(crate) fn apply(&self, vm: &mut Vm, a: Value) -> Outcome {
-        let x = vm.to_double(self.name, a, "NUMBER")?;
+        let x = vm.double_of(self.name, a, "NUMBER")?;
         if !(self.domain)(x) {
             return vm.raise(Raised::Arithmetic(self.name, "the result would be a complex number".into()));
         }
@@ -63,6 +63,6 @@ impl Elementary {
 
 /// `(atan y x)`: the angle of the point with these coordinates.
 pub(crate) fn angle(vm: &mut Vm, y: Value, x: Value) -> Outcome {
-    let (y, x) = (vm.to_double("ATAN", y, "REAL")?, vm.to_double("ATAN", x, "REAL")?);
+    let (y, x) = (vm.double_of("ATAN", y, "REAL")?, vm.double_of("ATAN", x, "REAL")?);
     vm.float_value("ATAN", libm::atan2(y, x))
 }

@@ -42,17 +42,13 @@ pub(crate) fn decode(x: f64) -> (i64, i32) {
 /// The rational with exactly the value of a finite double.
 pub(crate) fn rational(x: f64) -> Ratio {
     let (mantissa, exponent) = decode(x);
-    if exponent >= 0 {
-        return Ratio::integer(Int::from(mantissa).shifted_left(exponent as u64));
+    if mantissa == 0 || exponent >= 0 {
+        return Ratio::integer(Int::from(mantissa).shifted_left(u64::try_from(exponent).unwrap_or(0)));
     }
     let zeros = mantissa.trailing_zeros().min(exponent.unsigned_abs());
     Ratio {
         numerator: Int::from(mantissa >> zeros),
-        denominator: if mantissa == 0 {
-            Int::ONE
-        } else {
-            Int::ONE.shifted_left(u64::from(exponent.unsigned_abs() - zeros))
-        },
+        denominator: Int::ONE.shifted_left(u64::from(exponent.unsigned_abs() - zeros)),
     }
 }
 

@@ -23,10 +23,10 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 pub(crate) use arithmetic::{add, check_gcd, divide, multiply, negate, subtract};
-pub(crate) use compare::{eql, less, less_or_equal, num_equal, same_value, sign};
+pub(crate) use compare::{eql, less, less_or_equal, num_equal, same_value, sign, sign_of};
 pub(crate) use integer::Int;
 pub(crate) use ratio::Ratio;
-pub(crate) use rounding::{Rounding, modulo, quotient, remainder};
+pub(crate) use rounding::{Rounding, modulo, remainder};
 
 mod arithmetic;
 pub(crate) mod bits;
@@ -112,7 +112,7 @@ impl Vm {
 
     /// The double that `v` is or rounds to; a type error that names `expected` for what is no number, a failure of `op`
     /// for a rational that is too large.
-    pub(crate) fn to_double(
+    pub(crate) fn double_of(
         &mut self,
         op: &'static str,
         v: Value,
@@ -169,5 +169,7 @@ impl Vm {
     }
 }
 
+#[cfg(test)]
+mod properties;
 #[cfg(test)]
 mod tests;

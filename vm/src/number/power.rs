@@ -35,9 +35,9 @@ pub(crate) fn expt(vm: &mut Vm, base: Value, power: Value) -> Outcome {
             vm.ratio_value("EXPT", &if y.is_negative() { result.inverted() } else { result })
         }
         (_, y) => {
-            let x = vm.to_double("EXPT", base, "NUMBER")?;
+            let x = vm.double_of("EXPT", base, "NUMBER")?;
             let is_float = matches!(y, Number::Float(_));
-            let y = vm.to_double("EXPT", power, "NUMBER")?;
+            let y = vm.double_of("EXPT", power, "NUMBER")?;
             real_power(vm, [base, power], is_float, x, y)
         }
     }
@@ -95,7 +95,7 @@ fn real_power(vm: &mut Vm, operands: [Value; 2], is_float: bool, x: f64, y: f64)
 
 /// `(sqrt a)`
 pub(crate) fn sqrt(vm: &mut Vm, a: Value) -> Outcome {
-    let x = vm.to_double("SQRT", a, "NUMBER")?;
+    let x = vm.double_of("SQRT", a, "NUMBER")?;
     if x < 0.0 {
         return vm
             .raise(Raised::Arithmetic("SQRT", "the square root of a negative number is complex".into()));
@@ -123,14 +123,18 @@ pub(crate) fn isqrt(vm: &mut Vm, a: Value) -> Outcome {
 
 /// `(exp a)`
 pub(crate) fn exp(vm: &mut Vm, a: Value) -> Outcome {
-    let x = vm.to_double("EXP", a, "NUMBER")?;
+    let x = vm.double_of("EXP", a, "NUMBER")?;
     vm.float_value("EXP", libm::exp(x))
 }
+
+/// The natural logarithm of 2 in two parts, the first of which has so few bits that its products with counts are exact.
+const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;
+const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
 /// `(log a)`
 pub(crate) fn log(vm: &mut Vm, a: Value) -> Outcome {
     let (bits, x) = log_parts(vm, a)?;
-    vm.float_value("LOG", libm::log(x) + bits * std::f64::consts::LN_2)
+    vm.float_value("LOG", (libm::log(x) + bits * LN_2_LOW) + bits * LN_2_HIGH)
 }
 
 /// `(log a base)`

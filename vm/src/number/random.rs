@@ -121,7 +121,7 @@ impl Generator {
                 words.extend([drawn as u32, (drawn >> 32) as u32]);
             }
             words.truncate(bits.div_ceil(32));
-            if bits % 32 != 0
+            if !bits.is_multiple_of(32)
                 && let Some(last) = words.last_mut()
             {
                 *last &= (1 << (bits % 32)) - 1;

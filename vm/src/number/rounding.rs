@@ -56,18 +56,6 @@ enum Division {
     Float(Int, f64),
 }
 
-/// The quotient of `a` by `b`, an integer.
-pub(crate) fn quotient(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Outcome {
-    if let Some((quotient, _)) = small(rounding, a, b) {
-        return vm.integer_value("/", &quotient);
-    }
-    match division(vm, rounding, a, b)? {
-        Division::Ints(quotient, _) | Division::Ratio(quotient, _) | Division::Float(quotient, _) => {
-            vm.integer_value("/", &quotient)
-        }
-    }
-}
-
 /// The remainder that goes with `floor`.
 pub(crate) fn modulo(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     rest(vm, Rounding::Floor, a, b)

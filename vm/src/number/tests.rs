@@ -325,6 +325,6 @@ fn ratios_round_to_the_nearest_double() {
     ] {
         let mut vm = Vm::for_tests();
         let v = parse(&mut vm, ratio);
-        assert_eq!(vm.to_double("float", v, "REAL"), Ok(expected), "{ratio}");
+        assert_eq!(vm.double_of("float", v, "REAL"), Ok(expected), "{ratio}");
     }
 }
