@@ -59,18 +59,28 @@ pub(crate) fn is_lower(code: u32) -> bool {
 
 /// Whether it is a letter.
 pub(crate) fn is_alphabetic(code: u32) -> bool {
-    char::from_u32(code).is_some_and(char::is_alphabetic)
+    // What the standard library calls alphabetic takes in marks that go above letters.
+    char::from_u32(code).is_some_and(char::is_alphabetic) && !(0x300..0x370).contains(&code)
 }
 
 /// Whether it is a letter or a digit.
 pub(crate) fn is_alphanumeric(code: u32) -> bool {
-    char::from_u32(code).is_some_and(char::is_alphanumeric)
+    is_alphabetic(code) || char::from_u32(code).is_some_and(char::is_numeric) && !is_small_number(code)
 }
 
-/// Whether it prints as itself.
+/// Superscripts, fractions, and numbers in circles, which count as numbers but are no digits.
+fn is_small_number(code: u32) -> bool {
+    matches!(code, 0xB2 | 0xB3 | 0xB9 | 0xBC..=0xBE | 0x2070..=0x209F | 0x2150..=0x218F | 0x2460..=0x24FF | 0x2776..=0x2793)
+}
+
+/// Whether it is not for control.
 pub(crate) fn is_graphic(code: u32) -> bool {
+    (0x20..0x7F).contains(&code) || code >= 0xA0
+}
+
+/// Whether one can see it, and what it is, where it is printed.
+fn is_visible(code: u32) -> bool {
     match char::from_u32(code) {
-        Some(' ') => true,
         Some(c) => !(c.is_control() || c.is_whitespace() || is_invisible(c)),
         None => false,
     }
@@ -140,7 +150,7 @@ pub(crate) fn name(code: u32) -> Option<String> {
     if let Some((_, name)) = NAMES.iter().find(|&&(named, _)| named == code) {
         return Some((*name).into());
     }
-    if is_graphic(code) { None } else { Some(format!("U{code:X}")) }
+    if is_visible(code) { None } else { Some(format!("U{code:X}")) }
 }
 
 /// The character with this name, in any case.
