@@ -30,6 +30,9 @@ use crate::world::{GivenMap, World};
 /// The most nodes that an object may have to become a datum.
 const MAX_NODES: usize = 4_000_000;
 
+/// The most objects of which a unit remembers data.
+const MAX_REMEMBERED: usize = 1 << 19;
+
 /// Why an object does not become a datum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DatumError {
@@ -138,6 +141,11 @@ impl Unit {
         world: &mut World,
         datum: &Datum,
     ) -> Result<Value, AllocError> {
+        if self.data.len() > MAX_REMEMBERED {
+            // Of forms that old, no macro passes a part through.
+            self.data.clear();
+            self.values.clear();
+        }
         let mut steps = vec![ToValue::Visit(datum)];
         let mut made: Vec<Value> = Vec::new();
         while let Some(step) = steps.pop() {

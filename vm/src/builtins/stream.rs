@@ -4,9 +4,9 @@
 //! what is written to one is gathered, and goes out in blocks and when the stream is closed. Every output stream knows
 //! its column.
 
-use crate::builtins::array::{Elements, vector_elements};
 use crate::builtins::expect::optional;
 use crate::control::End;
+use crate::equality::characters_of;
 use crate::heap::{AllocError, Heap, Kind};
 use crate::host::{HostError, Output, Taken, WriteMode, column_after, encode};
 use crate::raise::{Exit, Outcome, Raised};
@@ -288,15 +288,11 @@ impl Vm {
 
     /// The characters of a string, also of one with a fill pointer, from `start` to before `end`.
     pub(crate) fn characters(&mut self, v: Value, start: Value, end: Value) -> Result<Vec<u32>, Exit> {
-        let length = match vector_elements(&self.heap, v) {
-            Some(elements @ Elements::Characters(_)) => elements.len(),
-            _ => return self.type_error(v, "STRING"),
+        let Some(length) = characters_of(&self.heap, v).map(<[u32]>::len) else {
+            return self.type_error(v, "STRING");
         };
         let (start, end) = self.bounds(start, end, length)?;
-        match vector_elements(&self.heap, v) {
-            Some(Elements::Characters(characters)) => Ok(characters[start..end].to_vec()),
-            _ => Ok(Vec::new()),
-        }
+        Ok(characters_of(&self.heap, v).map_or(Vec::new(), |characters| characters[start..end].to_vec()))
     }
 
     /// What a stream has to read from.

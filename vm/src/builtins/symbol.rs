@@ -2,9 +2,9 @@
 
 use esl_bytecode::symbol::setf_cell;
 
-use crate::builtins::array::{Elements, vector_elements};
 use crate::builtins::expect::optional;
 use crate::builtins::lookup;
+use crate::equality::characters_of;
 use crate::heap::Kind;
 use crate::heap::layout::Symbol;
 use crate::raise::{Exit, Outcome, Raised};
@@ -41,10 +41,7 @@ impl Vm {
     /// The text of a string, also of one with a fill pointer.
     pub(crate) fn text_of(&self, v: Value) -> Option<String> {
         let text = |&code: &u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
-        match vector_elements(&self.heap, v)? {
-            Elements::Characters(characters) => Some(characters.iter().map(text).collect()),
-            Elements::Values(_) | Elements::Bytes(_) => None,
-        }
+        Some(characters_of(&self.heap, v)?.iter().map(text).collect())
     }
 
     /// The symbol that keeps the function called `name`: itself, or for `(setf symbol)` one beside that.

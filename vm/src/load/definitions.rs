@@ -1,9 +1,10 @@
 //! The definitions of an image: which symbols have which of its functions, as a table instead of code that runs.
 //!
-//! The table is the last constant of the image, a vector: the symbol `ESL::%DEFINITIONS`, then for each defined symbol,
-//! ordered by package and name, the symbol, its function and its macro function (`NIL` for none).
+//! The table is the last constant of the image, a vector: the symbol `ESL::%DEFINITIONS`, then rows of three: a symbol,
+//! its function and its macro function (`NIL` for none). The number of rows is a power of two. A symbol is in the row
+//! that its hash says, or in the next free one; rows without a symbol begin with `NIL`. So finding a symbol takes about
+//! one look, and taking the table in takes none.
 
-use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -43,6 +44,9 @@ impl Definitions {
             && image.symbol(number)?.name == MARKER
         {
             items = indexes.iter().skip(1).collect();
+            if !(items.len() / ROW).is_power_of_two() {
+                items.clear();
+            }
         }
         Ok(Definitions { items })
     }
@@ -55,23 +59,20 @@ impl Definitions {
         symbol: &Symbol,
     ) -> Option<Definition> {
         let wanted = (&**symbol.package()?, symbol.name());
-        let (mut low, mut high) = (0, self.items.len() / ROW);
-        while low < high {
-            let middle = low.midpoint(high);
-            let row = &self.items[middle * ROW..][..ROW];
-            match name_of(image, packages, row[0])?.cmp(&wanted) {
-                Ordering::Less => low = middle + 1,
-                Ordering::Greater => high = middle,
-                Ordering::Equal => {
-                    let number = |index| match image.constant(index) {
-                        Ok(ConstantRecord::Function(number)) => Some(number.0),
-                        _ => None,
-                    };
-                    return Some(Definition { function: number(row[1]), macro_function: number(row[2]) });
-                }
+        let rows = self.items.len() / ROW;
+        let mut at = hash(wanted.0, wanted.1) as usize & rows.checked_sub(1)?;
+        loop {
+            let row = &self.items[at * ROW..][..ROW];
+            if name_of(image, packages, row[0])? == wanted {
+                let number = |index| match image.constant(index) {
+                    Ok(ConstantRecord::Function(number)) => Some(number.0),
+                    _ => None,
+                };
+                return Some(Definition { function: number(row[1]), macro_function: number(row[2]) });
             }
+            // There are free rows, so this ends.
+            at = (at + 1) & (rows - 1);
         }
-        None
     }
 
     /// Calls `visit` with each symbol that has a row.
@@ -82,6 +83,16 @@ impl Definitions {
             }
         }
     }
+}
+
+/// FNV-1a of a symbol's package and name. Images hold tables made with it.
+fn hash(package: &str, name: &str) -> u64 {
+    let bytes = package.bytes().chain([0xFF]).chain(name.bytes());
+    let hash = bytes.fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    });
+    // The low bits of a product know little of the high ones.
+    hash ^ hash >> 32
 }
 
 /// Package and name of a constant that is a symbol.
@@ -122,12 +133,18 @@ pub fn prepare(mut module: Module) -> Module {
         PoolIdx(module.constants.len() as u32 - 1)
     };
     let none = add(Constant::Nil);
-    let mut items = vec![add(Constant::Symbol(Symbol::esl(MARKER)))];
-    for Row { symbol, functions } in rows.into_values() {
-        items.push(symbol);
-        items.extend(functions.map(|function| function.unwrap_or(none)));
+    // At most two thirds full.
+    let count = (rows.len() + rows.len() / 2 + 1).next_power_of_two();
+    let mut table = vec![[none; ROW]; count];
+    for ((package, name), Row { symbol, functions }) in rows {
+        let mut at = hash(&package, &name) as usize & (count - 1);
+        while table[at][0] != none {
+            at = (at + 1) & (count - 1);
+        }
+        table[at] = [symbol, functions[0].unwrap_or(none), functions[1].unwrap_or(none)];
     }
-    add(Constant::Vector(items));
+    let marker = add(Constant::Symbol(Symbol::esl(MARKER)));
+    add(Constant::Vector([marker].into_iter().chain(table.into_iter().flatten()).collect()));
     module
 }
 

@@ -17,7 +17,9 @@ mod arrays;
 mod characters;
 mod lists;
 mod numbers;
+mod streams;
 mod strings;
+mod symbols;
 mod tables;
 
 /// Checks what a form gives: its values, or `type-error DATUM TYPE`, `slowly` and the like.
@@ -210,6 +212,10 @@ fn show_result(vm: &mut Vm, result: &Result<Vec<Value>, Exit>) -> String {
             Some(Raised::DivisionByZero(..)) => "division-by-zero".into(),
             Some(Raised::FloatOverflow(_)) => "floating-point-overflow".into(),
             Some(Raised::Arithmetic(..)) => "arithmetic-error".into(),
+            Some(Raised::UnboundVariable(symbol)) => format!("unbound-variable {}", show(vm, symbol)),
+            Some(Raised::EndOfFile(_)) => "end-of-file".into(),
+            Some(Raised::Stream(_, text)) => format!("stream-error: {text}"),
+            Some(Raised::Program(text)) => format!("program-error: {text}"),
             Some(Raised::Parse(text)) => format!("parse-error: {text}"),
             Some(Raised::Simple(text)) => format!("error: {text}"),
             other => format!("{other:?}"),

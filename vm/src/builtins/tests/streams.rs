@@ -1,0 +1,97 @@
+use super::{check_all, evaluate};
+use crate::host::{HostError, VirtualHost};
+use crate::vm::{Config, Vm};
+
+#[test]
+fn strings_are_read() {
+    check_all(&[
+        ("(%make-string-input \"ab c\" 0 nil)", "<Some(Stream)>"),
+        ("(peek-char nil $0)", "#\\a"),
+        ("(read-char $0)", "#\\a"),
+        ("(unread-char #\\a $0)", "NIL"),
+        ("(peek-char #\\b $0)", "#\\b"),
+        ("(read-char $0)", "#\\b"),
+        ("(peek-char t $0)", "#\\c"),
+        ("(%string-input-position $0)", "3"),
+        ("(read-line $0)", "\"c\" ; T"),
+        ("(read-line $0 nil 'end)", "END ; T"),
+        ("(read-char $0 nil)", "NIL"),
+        ("(read-char $0)", "end-of-file"),
+        ("(write-char #\\a $0)", "stream-error: it is not open for writing"),
+        ("(%close $0 nil)", "T"),
+        ("(read-char $0)", "stream-error: it is closed"),
+        ("(%close $0 nil)", "NIL"),
+        ("(read-char 5)", "type-error 5 STREAM"),
+        ("(input-stream-p $0)", "T"),
+        ("(open-stream-p $0)", "NIL"),
+    ]);
+}
+
+#[test]
+fn strings_are_gathered_and_columns_counted() {
+    check_all(&[
+        ("(%make-string-output)", "<Some(Stream)>"),
+        (
+            "(%write-string \"a long text that needs more than the first buffer\" $0 2 nil)",
+            "\"a long text that needs more than the first buffer\"",
+        ),
+        ("(%stream-column $0)", "47"),
+        ("(fresh-line $0)", "T"),
+        ("(fresh-line $0)", "NIL"),
+        ("(write-char #\\x $0)", "#\\x"),
+        ("(%stream-column $0)", "1"),
+        ("(get-output-stream-string $0)", "\"long text that needs more than the first buffer\\nx\""),
+        ("(get-output-stream-string $0)", "\"\""),
+        ("(%write-string 5 $0 0 nil)", "type-error 5 STRING"),
+        ("(get-output-stream-string 5)", "type-error 5 STRING-STREAM"),
+    ]);
+}
+
+fn machine(host: VirtualHost) -> Vm {
+    Vm::new(Config::default(), Box::new(host)).unwrap()
+}
+
+#[test]
+fn standard_streams_reach_the_host() {
+    let host = VirtualHost::new().with_input("one\ntwo");
+    let captured = host.captured();
+    let mut vm = machine(host);
+    assert_eq!(evaluate(&mut vm, "(%write-string \"prompt\" nil 0 nil)"), "\"prompt\"");
+    assert_eq!(captured.output(), "");
+    assert_eq!(evaluate(&mut vm, "(read-line)"), "\"one\" ; NIL");
+    assert_eq!(captured.output(), "prompt", "written before the program waits for an answer");
+    assert_eq!(evaluate(&mut vm, "(listen)"), "T");
+    assert_eq!(evaluate(&mut vm, "(read-line)"), "\"two\" ; T");
+    assert_eq!(evaluate(&mut vm, "(read-line t nil 'end)"), "END ; T");
+    assert_eq!(evaluate(&mut vm, "(write-char #\\! (%standard-stream 2))"), "#\\!");
+    assert_eq!(captured.error(), "!");
+}
+
+#[test]
+fn files_are_read_whole_and_written_in_blocks() {
+    let host = VirtualHost::new().with_file("in", "äb\n").with_file("log", "old\n");
+    let captured = host.captured();
+    let mut vm = machine(host);
+    assert_eq!(evaluate(&mut vm, "(read-line (%open-input \"in\"))"), "\"äb\" ; NIL");
+    assert_eq!(evaluate(&mut vm, "(%file-text \"in\")"), "\"äb\\n\"");
+    let missing = "error: cannot read none: there is no such file";
+    assert_eq!(evaluate(&mut vm, "(%open-input \"none\")"), missing);
+    let exists = "stream-error: it cannot be written: the file exists already";
+    assert_eq!(evaluate(&mut vm, "(%open-output \"log\" 2)"), exists);
+    assert_eq!(evaluate(&mut vm, "(%close (%open-output \"log\" 1) nil)"), "T");
+    assert_eq!(captured.file("log"), Some(b"old\n".to_vec()));
+    evaluate(&mut vm, "(set 'out (%open-output \"out\" 0))");
+    evaluate(&mut vm, "(write-char #\\x (symbol-value 'out))");
+    assert_eq!(captured.file("out"), Some(Vec::new()));
+    evaluate(&mut vm, "(%close (symbol-value 'out) nil)");
+    assert_eq!(captured.file("out"), Some(b"x".to_vec()));
+    assert_eq!(evaluate(&mut vm, "(%delete-file \"out\")"), "T");
+    assert_eq!(evaluate(&mut vm, "(%file-exists-p \"out\")"), "NIL");
+}
+
+#[test]
+fn refused_files_are_failures() {
+    let mut vm = machine(VirtualHost::new().without_files());
+    let refused = format!("error: cannot read in: {}", HostError::Refused);
+    assert_eq!(evaluate(&mut vm, "(%file-text \"in\")"), refused);
+}
