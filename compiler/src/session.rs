@@ -17,6 +17,7 @@ use esl_bytecode::module::Module;
 use esl_bytecode::span::SourceId;
 
 use crate::diagnostic::{Renderer, Sources};
+use crate::expand::print::print;
 use crate::expand::{Chunk, Event, Expander};
 use crate::lower::{SourceLines, lower};
 use crate::reader::{Reader, read_datum};
@@ -36,6 +37,24 @@ impl Compiler {
         Compiler { source, ..Compiler::default() }
     }
 
+    /// Begins to compile a whole text for the sake of what its macros expand to.
+    pub fn expand_text(&self, name: &str, text: &str) -> Expansion {
+        Expansion(Session { listing: Some(String::new()), ..self.text(name, text) })
+    }
+
+    fn text(&self, name: &str, text: &str) -> Session {
+        let text: Arc<str> = text.into();
+        let mut sources = Sources::new();
+        for _ in 0..self.source.0 {
+            sources.add("", None);
+        }
+        sources.add(name, Some(text.clone()));
+        *self.sources.lock().unwrap_or_else(PoisonError::into_inner) = sources;
+        let mut lines = SourceLines::new();
+        let source = lines.add(name, text.clone());
+        self.session(Input::Text(Box::new(Reader::new(source, text))), lines)
+    }
+
     fn session(&self, input: Input, lines: SourceLines) -> Session {
         Session {
             input,
@@ -44,6 +63,7 @@ impl Compiler {
             expander: Expander::new(),
             chunks: Vec::new(),
             diagnostics: Vec::new(),
+            listing: None,
         }
     }
 }
@@ -54,16 +74,7 @@ impl Compile for Compiler {
     }
 
     fn compile_text(&self, name: &str, text: &str) -> Box<dyn Compilation> {
-        let text: Arc<str> = text.into();
-        let mut sources = Sources::new();
-        for _ in 0..self.source.0 {
-            sources.add("", None);
-        }
-        sources.add(name, Some(text.clone()));
-        *self.sources.lock().unwrap_or_else(PoisonError::into_inner) = sources;
-        let mut lines = SourceLines::new();
-        let source = lines.add(name, text.clone());
-        Box::new(self.session(Input::Text(Reader::new(source, text)), lines))
+        Box::new(self.text(name, text))
     }
 
     fn read(
@@ -85,7 +96,7 @@ impl Compile for Compiler {
 #[derive(Debug)]
 enum Input {
     /// A text, all forms of which are compiled.
-    Text(Reader),
+    Text(Box<Reader>),
     /// A form to be evaluated.
     Form(Option<Datum>),
 }
@@ -99,6 +110,29 @@ struct Session {
     /// What belongs to the program.
     chunks: Vec<Module>,
     diagnostics: Vec<Diagnostic>,
+    /// What the forms were expanded to, if that is wanted.
+    listing: Option<String>,
+}
+
+/// A compilation of a text that also gives the program with its macros expanded.
+pub struct Expansion(Session);
+
+impl Expansion {
+    /// The expanded program so far, form by form.
+    pub fn text(&self) -> &str {
+        self.0.listing.as_deref().unwrap_or_default()
+    }
+}
+
+impl Compilation for Expansion {
+    fn step(
+        &mut self,
+        environment: &mut dyn Environment,
+        answer: Answer,
+        charge: &mut dyn FnMut(u64),
+    ) -> Step {
+        self.0.step(environment, answer, charge)
+    }
 }
 
 impl Compilation for Session {
@@ -158,6 +192,10 @@ impl Session {
     fn chunk(&mut self, chunk: Chunk, charge: &mut dyn FnMut(u64)) -> Option<Step> {
         let Chunk { core, purpose } = chunk;
         charge(core.nodes.len() as u64);
+        if let (Some(listing), true) = (&mut self.listing, purpose.emit) {
+            listing.push_str(&print(&core));
+            listing.push_str("\n\n");
+        }
         let module = match lower(&core, &self.lines) {
             Ok(module) => module,
             Err(diagnostics) => {

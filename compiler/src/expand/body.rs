@@ -99,11 +99,11 @@ impl Machine {
         };
         if symbol.is_cl("SPECIAL") {
             for name in names {
-                match name.as_symbol() {
+                match name.as_symbol().filter(|symbol| !symbol.is_keyword() && !symbol.is_cl("T")) {
                     Some(symbol) => body.specials.push(symbol.clone()),
                     None => {
                         return Err(
-                            form.malformed_at(name.span(), "declares something special that is no name")
+                            form.malformed_at(name.span(), "declares something special that is no variable")
                         );
                     }
                 }
@@ -114,7 +114,7 @@ impl Machine {
         } else if !(symbol.is_in(esl_bytecode::symbol::CL_PACKAGE) || WITHOUT_EFFECT.contains(&symbol.name()))
         {
             let message = format!("{} is no declaration", name(symbol));
-            let help = format!("to declare a type, write `(type {} …)`", super::form::plain(symbol));
+            let help = format!("a type is declared with `(type {} …)`", super::form::plain(symbol));
             self.report(code::UNKNOWN_DECLARATION.at(form.at(specifier.span()), message).help(help), origin);
         }
         Ok(())
@@ -160,6 +160,10 @@ impl Machine {
 
     /// Reports a variable that nobody has read, as it goes out of scope.
     pub(super) fn check_use(&mut self, gone: &Gone) {
+        // Where something was wrong, the variable may have been used in what was given up.
+        if self.is_failing() {
+            return;
+        }
         let variable = &self.core().variables[gone.variable.index()];
         if variable.is_read {
             return;

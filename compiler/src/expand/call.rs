@@ -15,6 +15,7 @@ use super::machine::{Job, Machine, To};
 use super::scope::{Function, Visible};
 use super::unit::{accepts, wrong_count};
 use crate::core::{Callee, NodeId, NodeKind};
+use crate::diagnostic::code;
 
 /// The builtins by name.
 static BY_NAME: LazyLock<FxHashMap<Symbol, Builtin>> = LazyLock::new(|| {
@@ -49,7 +50,7 @@ impl Machine {
     ) -> Checked {
         match self.scope.function(&form.operator, self.level()) {
             Visible::Is(Function::Local(variable, arity)) => {
-                self.call(environment, Target::Local(variable, arity), &form.args.clone(), &form, to)
+                self.call(environment, Target::Local(variable, arity), &form.args, &form, to)
             }
             Visible::Is(Function::Macro(Some(function))) => {
                 self.stop_for_form(MacroRef::Local(function), &form, false, to)
@@ -82,9 +83,9 @@ impl Machine {
         if self.inline(&global, &form, to) {
             return Ok(());
         }
-        let function = Make(form.span).symbol(&form.operator);
-        let function = FunctionName::of(&function).expect("a symbol names a function");
-        self.call(environment, Target::Global(function), &form.args.clone(), &form, to)
+        let named = form.datum.as_cons().map_or(&form.datum, |(head, _)| head);
+        let function = FunctionName::of(named).expect("a symbol names a function");
+        self.call(environment, Target::Global(function), &form.args, &form, to)
     }
 
     /// Opens up calls that have nodes of their own: accessors of structures, and what they are defined with.
@@ -173,9 +174,11 @@ impl Machine {
         form: &Form,
         to: To,
     ) -> Checked<Callee> {
+        check_names_function(function, form)?;
         let builtin = if function.name.is_setf { None } else { builtin(&function.cell) };
         let Some(builtin) = builtin else {
-            self.unit.note_call(function.name.clone(), count, to.span);
+            let named = form.at(function.datum.span());
+            self.unit.note_call(function.name.clone(), count, named, to.span);
             return Ok(Callee::Global(function.cell.clone()));
         };
         let arity = builtin.info().arity;
@@ -201,7 +204,7 @@ impl Machine {
             return Err(form.malformed("is called without being a function"));
         };
         let lambda = lambda.clone();
-        self.lambda_call(environment, &lambda, &form.args.clone(), &form, to)
+        self.lambda_call(environment, &lambda, &form.args, &form, to)
     }
 
     /// Expands a call of a `lambda` expression: a `let`, if the lambda list is plain.
@@ -265,6 +268,15 @@ impl Machine {
                 || self.is_macro(environment, &function.cell));
         if is_operator { other() } else { Ok(Target::Global(function)) }
     }
+}
+
+/// Refuses `t` as the name of a global function: it is no symbol to the module format.
+pub(super) fn check_names_function(function: &FunctionName, form: &Form) -> Checked {
+    if function.cell.is_cl("T") {
+        let message = "`t` is a constant and cannot be called";
+        return Err(Box::new(code::MALFORMED_FORM.at(form.at(function.datum.span()), message)));
+    }
+    Ok(())
 }
 
 /// The arguments of a call that passes most of them in a list, the last argument: `a … (list* b … (list z …))`.
@@ -342,7 +354,7 @@ pub(super) fn apply(machine: &mut Machine, environment: &mut dyn Environment, fo
 fn as_function(machine: &mut Machine, environment: &mut dyn Environment, form: &Form, to: To) -> Checked {
     let function =
         FunctionName::of(&Make(form.span).symbol(&form.operator)).expect("a symbol names a function");
-    machine.call(environment, Target::Global(function), &form.args.clone(), form, to)
+    machine.call(environment, Target::Global(function), &form.args, form, to)
 }
 
 /// The `lambda` expression that a form is or stands for.

@@ -10,7 +10,7 @@ use esl_bytecode::symbol::Symbol;
 use super::body::Body;
 use super::call::quoted_symbol;
 use super::form::{Checked, Form, Make, fresh, name, quoted};
-use super::lambda::FunctionName;
+use super::lambda::{FunctionName, Parts};
 use super::machine::{Job, Machine, Purpose, To};
 use crate::core::{Callee, NodeKind};
 use crate::diagnostic::code;
@@ -76,10 +76,13 @@ fn define_function(
 ) -> Checked {
     machine.check_definable(environment, &function.name.symbol, form.at(function.datum.span()))?;
     form.takes(2..=usize::MAX, "needs a name and a lambda list")?;
-    let name = Some(function.datum.clone());
-    let block = Some(function.block());
-    let text =
-        machine.lambda_text(environment, name, &form.args[1], &form.args[2..], block, form, to.origin)?;
+    let parts = Parts {
+        name: Some(&function.datum),
+        block: Some(&function.block()),
+        list: &form.args[1],
+        body: &form.args[2..],
+    };
+    let text = machine.lambda_text(environment, parts, form, to.origin)?;
     machine.unit.note_definition(function.name.clone(), text.arity());
 
     let mut call = to;

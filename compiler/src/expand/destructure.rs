@@ -14,24 +14,23 @@ use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::Symbol;
 
+use super::binding::check_distinct;
 use super::body::Body;
 use super::form::{Checked, Form, Make};
 use super::lambda::LambdaText;
 use super::lambda_list::{Kind, LambdaList, Optional};
 use super::machine::{Job, Machine, To};
-use crate::diagnostic::code;
 
-/// How deeply patterns may be nested.
-const MAX_PATTERN_DEPTH: usize = 100;
+/// A variable or pattern, and the form that it receives the value of.
+type Binding = (Datum, Datum);
 
-/// The bindings that a pattern is becoming.
+/// The bindings that a pattern is becoming. Patterns among them are still to be taken apart.
 struct Row<'e> {
     make: Make,
     environment: &'e mut dyn Environment,
     /// The quoted name of the macro, or pattern.
     context: Datum,
-    bindings: Vec<(Datum, Datum)>,
-    depth: usize,
+    bindings: Vec<Binding>,
 }
 
 impl Row<'_> {
@@ -42,28 +41,37 @@ impl Row<'_> {
     }
 
     /// Binds a variable, or the variables of a pattern, to the value of a form.
-    fn receive(&mut self, variable: &Datum, form: Datum) -> Checked {
-        if variable.as_symbol().is_some() {
-            self.bindings.push((variable.clone(), form));
-            return Ok(());
+    fn receive(&mut self, variable: &Datum, form: Datum) {
+        self.bindings.push((variable.clone(), form));
+    }
+
+    /// The bindings, all of them of variables. Patterns are taken apart from left to right, each in its place; nesting
+    /// takes no native stack.
+    fn finish(mut self, form: &Form) -> Checked<Vec<Binding>> {
+        let mut finished: Vec<Binding> = Vec::new();
+        let mut waiting: Vec<Binding> = std::mem::take(&mut self.bindings);
+        waiting.reverse();
+        while let Some((variable, form)) = waiting.pop() {
+            if variable.as_symbol().is_some() {
+                finished.push((variable, form));
+                continue;
+            }
+            let list = LambdaList::parse(&variable, Kind::Pattern, self.make.0)?;
+            let whole = self.bind("LIST", form);
+            self.pattern(&list, &whole, &whole);
+            waiting.extend(self.bindings.drain(..).rev());
         }
-        self.depth += 1;
-        if self.depth > MAX_PATTERN_DEPTH {
-            let message = format!("patterns are nested more than {MAX_PATTERN_DEPTH} deep");
-            return Err(Box::new(code::NESTED_TOO_DEEPLY.at(variable.span(), message)));
-        }
-        let list = LambdaList::parse(variable, Kind::Pattern, self.make.0)?;
-        let whole = self.bind("LIST", form);
-        self.pattern(&list, &whole, &whole)?;
-        self.depth -= 1;
-        Ok(())
+        let names =
+            finished.iter().filter_map(|(variable, _)| Some((variable.as_symbol()?, variable.span())));
+        check_distinct(names, form)?;
+        Ok(finished)
     }
 
     /// Binds the variables of `list`: `whole` is what `&whole` gets, `arguments` the form of the list to take apart.
-    fn pattern(&mut self, list: &LambdaList, whole: &Datum, arguments: &Datum) -> Checked {
+    fn pattern(&mut self, list: &LambdaList, whole: &Datum, arguments: &Datum) {
         let make = self.make;
         if let Some(variable) = &list.whole {
-            self.receive(variable, whole.clone())?;
+            self.receive(variable, whole.clone());
         }
         let arity = list.arity();
         let number = |count: u32| Datum::integer(count, make.0);
@@ -74,18 +82,22 @@ impl Row<'_> {
         let required = list.required.len();
         let is_over = list.optional.is_empty() && list.rest.is_none() && list.keys.is_none();
         for (index, pair) in list.required.chunks(2).enumerate() {
-            self.receive(&pair[0], make.call_cl("CAR", [rest.clone()]))?;
+            self.receive(&pair[0], make.call_cl("CAR", [rest.clone()]));
             if let Some(second) = pair.get(1) {
-                self.receive(second, make.call_cl("CADR", [rest.clone()]))?;
+                self.receive(second, make.call_cl("CADR", [rest.clone()]));
             }
             if !(is_over && 2 * (index + 1) >= required) {
                 let step = if pair.len() == 2 { "CDDR" } else { "CDR" };
                 rest = self.bind("ARGUMENTS", make.call_cl(step, [rest]));
             }
         }
-        for optional in &list.optional {
+        let has_more = list.rest.is_some() || list.keys.is_some();
+        for (index, optional) in list.optional.iter().enumerate() {
             let is_given = make.call_cl("CONSP", [rest.clone()]);
-            self.defaulted(optional, is_given, make.call_cl("CAR", [rest.clone()]))?;
+            self.defaulted(optional, is_given, make.call_cl("CAR", [rest.clone()]));
+            if index + 1 == list.optional.len() && !has_more {
+                break;
+            }
             let tail = make.call_cl("CDR", [rest.clone()]);
             // With a rest parameter, the list may be dotted.
             let tail = match list.rest {
@@ -95,7 +107,7 @@ impl Row<'_> {
             rest = self.bind("ARGUMENTS", tail);
         }
         if let Some(variable) = &list.rest {
-            self.receive(variable, rest.clone())?;
+            self.receive(variable, rest.clone());
         }
         if let Some(keys) = &list.keys {
             let names = make.items(keys.iter().map(|key| make.symbol(&key.key)));
@@ -105,25 +117,23 @@ impl Row<'_> {
             for key in keys {
                 let find = make.call_esl("%KEY-TAIL", [keyed.clone(), make.quote(make.symbol(&key.key))]);
                 let tail = self.bind("KEY", find);
-                self.defaulted(&key.optional, tail.clone(), make.call_cl("CAR", [tail]))?;
+                self.defaulted(&key.optional, tail.clone(), make.call_cl("CAR", [tail]));
             }
         }
         for (variable, value) in &list.aux {
-            self.receive(variable, value.clone())?;
+            self.receive(variable, value.clone());
         }
-        Ok(())
     }
 
     /// Binds an optional parameter: to `value` if `is_given`, otherwise to its default.
-    fn defaulted(&mut self, optional: &Optional, is_given: Datum, value: Datum) -> Checked {
+    fn defaulted(&mut self, optional: &Optional, is_given: Datum, value: Datum) {
         let make = self.make;
         let chosen = make.cl("IF", [is_given.clone(), value, optional.default.clone()]);
-        self.receive(&optional.variable, chosen)?;
+        self.receive(&optional.variable, chosen);
         if let Some(supplied) = &optional.supplied {
             let flag = make.cl("IF", [is_given, make.symbol(&Symbol::cl("T")), make.nil()]);
-            self.bindings.push((supplied.clone(), flag));
+            self.receive(supplied, flag);
         }
-        Ok(())
     }
 }
 
@@ -138,23 +148,12 @@ pub(super) fn destructuring_bind(
     // The bindings keep the place where they were written, so that unused variables are reported.
     let make = Make(form.datum.span());
     let context = make.quote(form.args[0].clone());
-    let mut row = Row { make, environment, context, bindings: Vec::new(), depth: 0 };
-    row.receive_list(&form.args[0], form.args[1].clone())?;
-    let whole = make.let_in_order(row.bindings, form.args[2..].to_vec());
+    // `(destructuring-bind x …)` is a dotted pattern of no elements.
+    let bindings = vec![(form.args[0].clone(), form.args[1].clone())];
+    let bindings = Row { make, environment, context, bindings }.finish(&form)?;
+    let whole = make.let_in_order(bindings, form.args[2..].to_vec());
     machine.schedule([Job::Expand(whole, to)]);
     Ok(())
-}
-
-impl Row<'_> {
-    /// As [`Row::receive`], for what must be a pattern.
-    fn receive_list(&mut self, pattern: &Datum, form: Datum) -> Checked {
-        if pattern.as_symbol().is_some() {
-            // `(destructuring-bind x …)` is a dotted pattern of no elements.
-            self.bindings.push((pattern.clone(), form));
-            return Ok(());
-        }
-        self.receive(pattern, form)
-    }
 }
 
 /// `(%macro-lambda shown name lambda-list . body)`: the function of the macro `name`, a function of a form and an
@@ -174,12 +173,12 @@ pub(super) fn macro_lambda(
     let call = make.fresh(environment, "FORM");
     let around = make.fresh(environment, "ENVIRONMENT");
     let context = make.quote(form.args[1].clone());
-    let mut row = Row { make, environment, context, bindings: Vec::new(), depth: 0 };
+    let mut row = Row { make, environment, context, bindings: Vec::new() };
     if let Some(variable) = &list.environment {
-        row.bindings.push((variable.clone(), around.clone()));
+        row.receive(variable, around.clone());
     }
-    row.pattern(&list, &call, &make.call_cl("CDR", [call.clone()]))?;
-    let bindings = row.bindings;
+    row.pattern(&list, &call, &make.call_cl("CDR", [call.clone()]));
+    let bindings = row.finish(&form)?;
 
     let block = std::iter::once(make.symbol(&symbol)).chain(std::mem::take(&mut body.forms));
     let block = make.cl("BLOCK", block);

@@ -96,18 +96,30 @@ impl FunctionName {
     }
 }
 
+/// The parts of a function as written.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Parts<'a> {
+    /// Its name, for people.
+    pub(super) name: Option<&'a Datum>,
+    /// The name of the block around its forms.
+    pub(super) block: Option<&'a Symbol>,
+    /// The lambda list.
+    pub(super) list: &'a Datum,
+    /// The body.
+    pub(super) body: &'a [Datum],
+}
+
 impl Machine {
     /// Checks the lambda list and takes the body of a function apart.
     pub(super) fn lambda_text(
         &mut self,
         environment: &dyn Environment,
-        name: Option<Datum>,
-        list: &Datum,
-        body: &[Datum],
-        block: Option<Symbol>,
+        parts: Parts<'_>,
         form: &Form,
         origin: Option<u32>,
     ) -> Checked<LambdaText> {
+        let Parts { name, block, list, body } = parts;
+        let (name, block) = (name.cloned(), block.cloned());
         let shown = list.clone();
         let list = LambdaList::parse(list, Kind::Ordinary, form.at(list.span()))?;
         let mut names = Vec::new();
@@ -227,6 +239,7 @@ impl Machine {
         form: &Form,
         to: To,
     ) -> Checked<NodeKind> {
+        super::call::check_names_function(function, form)?;
         if !function.name.is_setf {
             if let Some(builtin) = super::call::builtin(&function.cell) {
                 return Ok(NodeKind::BuiltinRef(builtin));
@@ -235,7 +248,7 @@ impl Machine {
                 return Err(is_macro(form, function));
             }
         }
-        self.unit.note_call(function.name.clone(), None, to.span);
+        self.unit.note_call(function.name.clone(), None, to.span, to.span);
         Ok(NodeKind::FunctionRef(function.cell.clone()))
     }
 }
@@ -376,8 +389,8 @@ pub(super) fn lambda(
     to: To,
 ) -> Checked {
     form.takes(1..=usize::MAX, "needs a lambda list")?;
-    let text =
-        machine.lambda_text(environment, None, &form.args[0], &form.args[1..], None, &form, to.origin)?;
+    let parts = Parts { name: None, block: None, list: &form.args[0], body: &form.args[1..] };
+    let text = machine.lambda_text(environment, parts, &form, to.origin)?;
     machine.closure(text, to);
     Ok(())
 }
@@ -391,9 +404,13 @@ pub(super) fn named_lambda(
 ) -> Checked {
     form.takes(2..=usize::MAX, "needs a name and a lambda list")?;
     let block = FunctionName::of(&form.args[0]).map(|name| name.block());
-    let name = Some(form.args[0].clone());
-    let text =
-        machine.lambda_text(environment, name, &form.args[1], &form.args[2..], block, &form, to.origin)?;
+    let parts = Parts {
+        name: Some(&form.args[0]),
+        block: block.as_ref(),
+        list: &form.args[1],
+        body: &form.args[2..],
+    };
+    let text = machine.lambda_text(environment, parts, &form, to.origin)?;
     machine.closure(text, to);
     Ok(())
 }

@@ -98,6 +98,10 @@ struct Parser {
 
 impl Parser {
     fn parse(mut self, list: &Datum) -> Checked<LambdaList> {
+        let is_list = matches!(list.kind(), DatumKind::Cons(..) | DatumKind::Nil);
+        if !is_list && (self.kind != Kind::Pattern || list.as_symbol().is_none()) {
+            return Err(self.wrong(list, &format!("a lambda list is a list, not {}", quoted(list))));
+        }
         let mut elements = list.elements();
         while let Some(item) = elements.next() {
             match item.as_symbol().filter(|symbol| symbol.name().starts_with('&') && symbol.name().len() > 1)

@@ -8,7 +8,7 @@ use esl_bytecode::symbol::Symbol;
 use super::binding::check_distinct;
 use super::body::Body;
 use super::form::{Checked, Form, Make};
-use super::lambda::{FunctionName, LambdaText};
+use super::lambda::{FunctionName, LambdaText, Parts};
 use super::machine::{Job, Machine, To};
 use super::scope::{Entry, Function};
 use crate::core::NodeKind;
@@ -75,9 +75,8 @@ fn local_functions(
     let mut texts: Vec<(FunctionName, LambdaText)> = Vec::new();
     for Definition { name, lambda_list, body } in definitions(machine, environment, form)? {
         let shown = make.items([make.symbol(&form.operator), name.datum.clone()]);
-        let block = Some(name.block());
-        let text =
-            machine.lambda_text(environment, Some(shown), &lambda_list, &body, block, form, to.origin)?;
+        let parts = Parts { name: Some(&shown), block: Some(&name.block()), list: &lambda_list, body: &body };
+        let text = machine.lambda_text(environment, parts, form, to.origin)?;
         texts.push((name, text));
     }
     let body = machine.take_body(&form.args[1..], false, form, to.origin)?;

@@ -11,6 +11,7 @@ use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
+use rustc_hash::FxHashSet;
 
 use super::form::{Checked, Form, is_known, name, quoted};
 use super::lambda::LambdaText;
@@ -153,6 +154,7 @@ pub(super) struct Machine {
     waiting: Waiting,
     stopped: Option<Event>,
     diagnostics: Vec<Diagnostic>,
+    reported: FxHashSet<(&'static str, Span, String)>,
     errors: usize,
     expansions: u32,
     /// Whether the limit on depth was reported for this top-level form.
@@ -172,6 +174,7 @@ impl Machine {
             waiting: Waiting::Nothing,
             stopped: None,
             diagnostics: Vec::new(),
+            reported: FxHashSet::default(),
             errors: 0,
             expansions: 0,
             is_too_deep: false,
@@ -441,6 +444,11 @@ impl Machine {
         To { node: body, lambda: LambdaId(0), depth: 0, origin, span }
     }
 
+    /// Whether something was wrong with the chunk that is being built.
+    pub(super) fn is_failing(&self) -> bool {
+        self.open.last().is_some_and(|open| self.errors > open.errors)
+    }
+
     /// What the chunk that is being built is for.
     pub(super) fn purpose(&self) -> Purpose {
         self.open.last().expect("forms are expanded within a chunk").purpose
@@ -553,7 +561,9 @@ impl Machine {
         let chain = parent.map_or(0, |parent| parent.chain + 1);
         self.expansions += 1;
         if self.expansions > MAX_EXPANSIONS || chain > MAX_CHAIN {
-            let message = format!("the expansion of {} does not end", name(operator));
+            let outermost =
+                parent.filter(|parent| parent.span == span).map_or(operator, |parent| &parent.name);
+            let message = format!("the expansion of {} does not end", name(outermost));
             return Err(Box::new(code::MACRO_FAILED.at(span, message)));
         }
         let origin = match parent {
@@ -566,11 +576,17 @@ impl Machine {
     }
 
     fn macro_failed(&mut self, failure: &str, origin: Option<u32>, span: Span) {
-        let message = match origin.map(|index| &self.origins[index as usize]) {
-            Some(origin) => format!("{} failed while it was expanded: {failure}", name(&origin.name)),
-            None => format!("a macro failed while it was expanded: {failure}"),
+        let failed = match origin.map(|index| &self.origins[index as usize]) {
+            Some(origin) => name(&origin.name),
+            None => "a macro".to_string(),
         };
-        self.report(code::MACRO_FAILED.at(span, message), None);
+        // So begins what a macro of the library says about parts that do not fit.
+        let diagnostic = if failure.starts_with("needs ") {
+            code::MALFORMED_FORM.at(span, format!("{failed} {failure}"))
+        } else {
+            code::MACRO_FAILED.at(span, format!("{failed} failed while it was expanded: {failure}"))
+        };
+        self.report(diagnostic, None);
     }
 
     // ---- diagnostics
@@ -588,7 +604,11 @@ impl Machine {
                 }
             }
         }
-        self.diagnostics.push(diagnostic);
+        // A macro may have used the same part twice.
+        let place = (diagnostic.code, diagnostic.primary.span, diagnostic.message.clone());
+        if self.reported.insert(place) {
+            self.diagnostics.push(diagnostic);
+        }
     }
 
     /// `span`, if a form of that place was written there; an empty one, if the macro call `origin` has made it: what a

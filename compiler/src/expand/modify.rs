@@ -89,10 +89,9 @@ impl Machine {
                 let old = make.fresh(environment, "OLD");
                 self.sound(count).map(|places| shift(&places, value, old, make))
             }
-            PlaceUse::Modify(change) => match self.sound(1) {
-                Some(places) => Some(self.modify(environment, &places[0], change, make)),
-                None => None,
-            },
+            PlaceUse::Modify(change) => {
+                self.sound(1).map(|places| self.modify(environment, &places[0], change, make))
+            }
         };
         match form {
             Some(form) => self.schedule([Job::Expand(form, to)]),

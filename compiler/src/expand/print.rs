@@ -45,6 +45,9 @@ impl Names {
         *count += 1;
         match *count {
             1 => MAKE.symbol(name),
+            count if name.package().is_none() => {
+                MAKE.symbol(&Symbol::uninterned(0, &format!("{text}.{count}")))
+            }
             count => MAKE.symbol(&Symbol::esl(&format!("{text}.{count}"))),
         }
     }

@@ -19,6 +19,9 @@ struct Call {
     function: Name,
     /// Number of arguments; `None` if it is not known, or the function is only referred to.
     arguments: Option<u32>,
+    /// Where the name was written.
+    name: Span,
+    /// Where the call was written.
     span: Span,
 }
 
@@ -63,9 +66,9 @@ pub(super) struct Unit {
 
 impl Unit {
     /// Notes a call or a reference.
-    pub(super) fn note_call(&mut self, function: Name, arguments: Option<usize>, span: Span) {
+    pub(super) fn note_call(&mut self, function: Name, arguments: Option<usize>, name: Span, span: Span) {
         let arguments = arguments.map(|count| u32::try_from(count).unwrap_or(u32::MAX));
-        self.calls.push(Call { function, arguments, span });
+        self.calls.push(Call { function, arguments, name, span });
     }
 
     /// Notes a use of a variable that nobody has defined so far.
@@ -115,16 +118,16 @@ impl Unit {
                         let message =
                             format!("{} is used as a function here, and a macro", call.function.shown());
                         findings.push(
-                            code::UNDEFINED_FUNCTION.at(call.span, message).help("define the macro first"),
+                            code::UNDEFINED_FUNCTION.at(call.name, message).help("define the macro first"),
                         );
                         continue;
                     }
                     GlobalFunction::Undefined => {
                         match known.get(&call.function) {
-                            Some(&index) => undefined[index].1.push(call.span),
+                            Some(&index) => undefined[index].1.push(call.name),
                             None => {
                                 known.insert(call.function.clone(), undefined.len());
-                                undefined.push((call.function, vec![call.span]));
+                                undefined.push((call.function, vec![call.name]));
                             }
                         }
                         continue;
@@ -223,6 +226,7 @@ pub(super) fn wrong_count(function: &str, arity: Arity, count: u32, span: Span) 
         (min, Some(max)) if min == max => arguments(min),
         (0, Some(max)) => format!("at most {}", arguments(max)),
         (min, None) => format!("at least {}", arguments(min)),
+        (min, Some(max)) if min + 1 == max => format!("{min} or {}", arguments(max)),
         (min, Some(max)) => format!("{min} to {}", arguments(max)),
     };
     let message = format!("{function} takes {takes}, but is given {count}");

@@ -13,24 +13,24 @@ use esl_bytecode::symbol::Symbol;
 use esl_compiler::reader::{BareEnvironment, read_datum};
 
 /// A macro: takes the form, gives the expansion or the text of a failure.
-pub type Macro = Box<dyn FnMut(&mut BareEnvironment, &[Datum]) -> Result<Datum, String> + Send>;
+pub(crate) type Macro = Box<dyn FnMut(&mut BareEnvironment, &[Datum]) -> Result<Datum, String> + Send>;
 
 /// The host.
-pub struct FakeHost {
-    pub bare: BareEnvironment,
-    pub globals: HashMap<Symbol, Global>,
-    pub setf_functions: Vec<Symbol>,
-    pub properties: HashMap<(Symbol, Symbol), Datum>,
-    pub macros: HashMap<Symbol, Macro>,
+pub(crate) struct FakeHost {
+    pub(crate) bare: BareEnvironment,
+    pub(crate) globals: HashMap<Symbol, Global>,
+    pub(crate) setf_functions: Vec<Symbol>,
+    pub(crate) properties: HashMap<(Symbol, Symbol), Datum>,
+    pub(crate) macros: HashMap<Symbol, Macro>,
     /// The functions of local macros, in the order in which they will be loaded.
-    pub local_macros: Vec<Macro>,
+    pub(crate) local_macros: Vec<Macro>,
     objects: usize,
     /// What was loaded: whether to keep, and the symbols among the constants.
-    pub loaded: Vec<(bool, String)>,
+    pub(crate) loaded: Vec<(bool, String)>,
 }
 
 impl FakeHost {
-    pub fn new() -> FakeHost {
+    pub(crate) fn new() -> FakeHost {
         let mut host = FakeHost {
             bare: BareEnvironment::new(),
             globals: HashMap::new(),
@@ -70,8 +70,6 @@ impl FakeHost {
         let pi = Datum::integer(3, Span::default());
         let limit = host.symbol("limit");
         host.globals.entry(limit).or_default().variable = GlobalVariable::Constant(pi);
-        let car = Symbol::cl("CAR");
-        host.globals.entry(car).or_default().locked = true;
         let accessor = Accessor { class: host.symbol("point"), slot: 1, read_only: false };
         let point_y = host.symbol("point-y");
         host.function("point-y", 1, Some(1));
@@ -79,47 +77,60 @@ impl FakeHost {
         let fixed = Accessor { class: host.symbol("point"), slot: 0, read_only: true };
         let point_x = host.symbol("point-x");
         host.globals.entry(point_x).or_default().accessor = Some(fixed);
+        host.record("short", "esl::%setf", "f");
+        host.record("short-macro", "esl::%setf", "twice");
+        host.record("long", "esl::%setf", "(write-long 1)");
+        host.define_macro("write-long", "(g #2 (car '#1))");
+        host.record("five", "esl::%setf", "(:expander expand-five)");
+        host.define_macro("expand-five", "((a) (#1) (new) (g new a) (f a))");
         let open = host.symbol("open-file");
         host.globals.entry(open).or_default().instead = Some("use `with-input-from-string`".into());
         host
     }
 
-    pub fn read(&mut self, text: &str) -> Datum {
+    /// A host in which `car` belongs to the language.
+    pub(crate) fn locked() -> FakeHost {
+        let mut host = FakeHost::new();
+        host.globals.entry(Symbol::cl("CAR")).or_default().locked = true;
+        host
+    }
+
+    pub(crate) fn read(&mut self, text: &str) -> Datum {
         let (datum, _) = read_datum(&mut self.bare, text, 0).expect("the text reads");
         without_spans(&datum.expect("there is a datum"))
     }
 
-    pub fn symbol(&mut self, name: &str) -> Symbol {
+    pub(crate) fn symbol(&mut self, name: &str) -> Symbol {
         self.read(name).as_symbol().expect("a symbol").clone()
     }
 
-    pub fn function(&mut self, name: &str, min: u32, max: Option<u32>) {
+    pub(crate) fn function(&mut self, name: &str, min: u32, max: Option<u32>) {
         let symbol = self.symbol(name);
         self.globals.entry(symbol).or_default().function = GlobalFunction::Function(Some(Arity { min, max }));
     }
 
-    pub fn property(&mut self, symbol: &str, indicator: &str, value: &str) {
+    pub(crate) fn record(&mut self, symbol: &str, indicator: &str, value: &str) {
         let key = (self.symbol(symbol), self.symbol(indicator));
         let value = self.read(value);
         self.properties.insert(key, value);
     }
 
     /// A macro by template: `#1` stands for the first argument, `(… . #2...)` for those from the second on.
-    pub fn define_macro(&mut self, name: &str, template: &str) {
+    pub(crate) fn define_macro(&mut self, name: &str, template: &str) {
         let symbol = self.symbol(name);
         self.globals.entry(symbol.clone()).or_default().function = GlobalFunction::Macro;
         let expander = self.template(template);
         self.macros.insert(symbol, expander);
     }
 
-    pub fn template(&mut self, template: &str) -> Macro {
+    pub(crate) fn template(&mut self, template: &str) -> Macro {
         let template = self.read(&template.replace('#', "argument-"));
         Box::new(move |_, args| Ok(fill(&template, args)))
     }
 }
 
 /// What a program's data look like: no place in the source.
-pub fn without_spans(datum: &Datum) -> Datum {
+pub(crate) fn without_spans(datum: &Datum) -> Datum {
     use esl_bytecode::datum::DatumKind;
     let none = Span::default();
     match datum.kind() {

@@ -1,0 +1,91 @@
+//! Compilations from text to module.
+
+use esl_bytecode::compile::{Compile, Step, drive};
+use esl_bytecode::diagnostic::Severity;
+use esl_bytecode::span::SourceId;
+use esl_bytecode::verify::verify;
+use esl_compiler::session::Compiler;
+
+use crate::host::FakeHost;
+
+#[test]
+fn a_text_becomes_one_module_with_a_function_for_each_form() {
+    let mut host = FakeHost::new();
+    let compiler = Compiler::default();
+    let text = "(defun h (x) (* x x))\n(print (h 2))\n(print (h 3))";
+    let (module, found) = drive(&mut *compiler.compile_text("test.esl", text), &mut host);
+    assert!(found.is_empty(), "{found:?}");
+    let module = module.expect("it compiles");
+    assert_eq!(module.toplevel.len(), 3);
+    assert_eq!(module.sources, ["test.esl"]);
+    verify(&module).expect("it verifies");
+    assert_eq!(host.loaded.len(), 1, "the definition of `h` is loaded at compile time");
+}
+
+#[test]
+fn errors_of_all_phases_are_reported_in_the_order_of_the_text() {
+    let compiler = Compiler::for_source(SourceId(3));
+    let text = "(let 5)\n(print ,x)\n(undefined)\n(car 1 2)\n(print 1))";
+    let (module, found) = drive(&mut *compiler.compile_text("test.esl", text), &mut FakeHost::new());
+    assert!(module.is_none());
+    let codes: Vec<&str> = found.iter().map(|finding| finding.code).collect();
+    let expected = [
+        "malformed-form",
+        "comma-outside-backquote",
+        "undefined-function",
+        "wrong-argument-count",
+        "unexpected-close",
+    ];
+    assert_eq!(codes, expected);
+    assert!(found.iter().all(|finding| finding.primary.span.source == SourceId(3)));
+    assert!(compiler.render(&found[0]).contains("test.esl:1:6"), "{}", compiler.render(&found[0]));
+}
+
+#[test]
+fn warnings_do_not_keep_a_program_from_compiling() {
+    let text = "(undefined 1)";
+    let (module, found) =
+        drive(&mut *Compiler::default().compile_text("test.esl", text), &mut FakeHost::new());
+    assert!(module.is_some());
+    assert!(found.iter().all(|finding| finding.severity == Severity::Warning));
+}
+
+#[test]
+fn a_form_becomes_a_module_whose_last_function_gives_its_value() {
+    let mut host = FakeHost::new();
+    let form = host.read("(progn (print 1) (load-time-value (print 2)))");
+    let mut compilation = Compiler::default().compile_form(form);
+    let (module, found) = drive(&mut *compilation, &mut host);
+    assert!(found.is_empty(), "{found:?}");
+    assert_eq!(module.expect("it compiles").toplevel.len(), 2);
+    assert_eq!(host.loaded.len(), 1, "the first form is evaluated before the second is looked at");
+}
+
+#[test]
+fn uninterned_symbols_are_the_same_in_all_forms_of_a_text() {
+    let mut host = FakeHost::new();
+    let text = "(twice (print '#1=#:g)) (print '#:g)";
+    let (module, _) = drive(&mut *Compiler::default().compile_text("test.esl", text), &mut host);
+    let module = module.expect("it compiles");
+    let is_g = |constant: &&esl_bytecode::module::Constant| matches!(constant, esl_bytecode::module::Constant::Symbol(symbol) if symbol.name() == "G");
+    assert_eq!(module.constants.iter().filter(is_g).count(), 2);
+}
+
+#[test]
+fn the_work_between_steps_is_charged() {
+    let mut host = FakeHost::new();
+    let mut compilation = Compiler::default().compile_text("test.esl", "(list (list 1) (list 2) (list 3))");
+    let mut charged = 0;
+    let step = compilation.step(&mut host, esl_bytecode::compile::Answer::Start, &mut |work| charged += work);
+    assert!(matches!(step, Step::Done(Some(_), _)));
+    assert!(charged >= 10, "{charged}");
+}
+
+#[test]
+fn a_program_can_be_shown_with_its_macros_expanded() {
+    let mut expansion = Compiler::default().expand_text("test.esl", "(when *x* (print 1))\n(defun h () 2)");
+    let (module, _) = drive(&mut expansion, &mut FakeHost::new());
+    assert!(module.is_some());
+    let expected = "(if *x* (print 1) ())\n\n(%set-function 'h (%named-lambda h () (block h 2)))\n\n";
+    assert_eq!(expansion.text(), expected);
+}
