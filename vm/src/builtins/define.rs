@@ -72,12 +72,6 @@ pub(crate) fn define_constant(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 impl Vm {
-    /// The symbol that holds `function`, a stub for a function that is not there.
-    pub(crate) fn name_of_undefined(&self, function: Value) -> Value {
-        let captures = self.heap.function_captures(function);
-        captures.and_then(|captures| captures.first().copied()).unwrap_or(Value::NIL)
-    }
-
     /// The object of a symbol.
     ///
     /// # Errors

@@ -15,11 +15,11 @@ impl Fixture {
         Fixture { heap, world, unit: Unit::default() }
     }
 
-    fn to_value(&mut self, datum: &Datum) -> Value {
+    fn value_of(&mut self, datum: &Datum) -> Value {
         self.unit.value_of(&mut self.heap, &mut self.world, datum).unwrap()
     }
 
-    fn to_datum(&mut self, value: Value) -> Result<Datum, DatumError> {
+    fn datum_of(&mut self, value: Value) -> Result<Datum, DatumError> {
         self.unit.datum_of(&self.heap, &self.world, value, at(99))
     }
 }
@@ -54,10 +54,10 @@ fn data_survive_both_ways() {
     ];
     let datum = Datum::list(kinds.map(|kind| Datum::new(kind, at(3))), at(4));
     let mut there = Fixture::new();
-    let value = there.to_value(&datum);
+    let value = there.value_of(&datum);
     // Another unit, so that nothing is remembered.
     there.unit = Unit::default();
-    let back = there.to_datum(value).unwrap();
+    let back = there.datum_of(value).unwrap();
     assert_eq!(back.to_string(), datum.to_string());
     assert_eq!(back.span(), at(99));
 }
@@ -67,25 +67,25 @@ fn parts_that_are_passed_through_keep_their_spans() {
     let mut fixture = Fixture::new();
     let inner = Datum::list([int(1, 10), int(2, 11)], at(12));
     let form = Datum::list([Datum::symbol(Symbol::esl("M"), at(1)), inner.clone()], at(2));
-    let value = fixture.to_value(&form);
+    let value = fixture.value_of(&form);
     let argument = fixture.heap.car(fixture.heap.cdr(value).unwrap()).unwrap();
     let expansion = fixture.heap.list(&[Value::T, argument]).unwrap();
-    let back = fixture.to_datum(expansion).unwrap();
+    let back = fixture.datum_of(expansion).unwrap();
     let items = back.as_list().unwrap();
     assert!(items[1].is_same(&inner));
     assert_eq!((back.span(), items[0].span()), (at(99), at(99)));
     // And the other way: the same datum is the same object.
-    assert_eq!(fixture.to_value(&inner), argument);
-    assert_eq!(fixture.to_value(&back), expansion);
+    assert_eq!(fixture.value_of(&inner), argument);
+    assert_eq!(fixture.value_of(&back), expansion);
 }
 
 #[test]
 fn a_changed_form_is_seen_as_it_is_now() {
     let mut fixture = Fixture::new();
     let form = Datum::list([int(1, 10), int(2, 11)], at(12));
-    let value = fixture.to_value(&form);
+    let value = fixture.value_of(&form);
     fixture.heap.set_car(value, Value::small(7)).unwrap();
-    let back = fixture.to_datum(value).unwrap();
+    let back = fixture.datum_of(value).unwrap();
     assert_eq!((back.to_string().as_str(), back.span()), ("(7 2)", at(12)));
     let rest = back.as_cons().unwrap().1;
     assert!(rest.is_same(form.as_cons().unwrap().1));
@@ -96,11 +96,11 @@ fn what_is_shared_stays_shared() {
     let mut fixture = Fixture::new();
     let shared = Datum::string("s", at(1));
     let pair = Datum::cons(shared.clone(), shared, at(2));
-    let value = fixture.to_value(&pair);
+    let value = fixture.value_of(&pair);
     assert_eq!(fixture.heap.car(value), fixture.heap.cdr(value));
     let cell = fixture.heap.cons(Value::NIL, Value::NIL).unwrap();
     let twice = fixture.heap.list(&[cell, cell]).unwrap();
-    let back = fixture.to_datum(twice).unwrap();
+    let back = fixture.datum_of(twice).unwrap();
     let items = back.as_list().unwrap();
     assert!(items[0].is_same(items[1]));
 }
@@ -110,20 +110,20 @@ fn uninterned_symbols_and_objects_keep_their_identity() {
     let mut fixture = Fixture::new();
     let g = Datum::symbol(Symbol::uninterned(7, "G"), at(0));
     let again = Datum::symbol(Symbol::uninterned(7, "G"), at(5));
-    let (first, second) = (fixture.to_value(&g), fixture.to_value(&again));
+    let (first, second) = (fixture.value_of(&g), fixture.value_of(&again));
     assert_eq!(first, second);
-    assert_eq!(fixture.to_datum(first).unwrap().as_symbol(), g.as_symbol());
+    assert_eq!(fixture.datum_of(first).unwrap().as_symbol(), g.as_symbol());
 
     let name = fixture.heap.alloc_str("H").unwrap();
     let made = fixture.world.make_symbol(&mut fixture.heap, name, Value::NIL, 0).unwrap();
-    let back = fixture.to_datum(made).unwrap();
-    assert_eq!(fixture.to_value(&back), made);
-    assert_ne!(back.as_symbol(), fixture.to_datum(first).unwrap().as_symbol());
+    let back = fixture.datum_of(made).unwrap();
+    assert_eq!(fixture.value_of(&back), made);
+    assert_ne!(back.as_symbol(), fixture.datum_of(first).unwrap().as_symbol());
 
     let table = fixture.heap.alloc_tag(Value::NIL).unwrap();
-    let back = fixture.to_datum(table).unwrap();
+    let back = fixture.datum_of(table).unwrap();
     assert!(matches!(back.kind(), DatumKind::Object(_)));
-    assert_eq!(fixture.to_value(&back), table);
+    assert_eq!(fixture.value_of(&back), table);
 }
 
 #[test]
@@ -131,7 +131,7 @@ fn circular_objects_are_refused() {
     let mut fixture = Fixture::new();
     let cell = fixture.heap.cons(Value::T, Value::NIL).unwrap();
     fixture.heap.set_cdr(cell, cell).unwrap();
-    assert_eq!(fixture.to_datum(cell).unwrap_err(), DatumError::Circular);
+    assert_eq!(fixture.datum_of(cell).unwrap_err(), DatumError::Circular);
 }
 
 #[test]
@@ -141,8 +141,8 @@ fn depth_takes_no_native_stack() {
     for _ in 0..200_000 {
         deep = Datum::list([deep], at(0));
     }
-    let value = fixture.to_value(&deep);
+    let value = fixture.value_of(&deep);
     fixture.unit = Unit::default();
-    let back = fixture.to_datum(value).unwrap();
+    let back = fixture.datum_of(value).unwrap();
     assert!(!back.is_nil());
 }
