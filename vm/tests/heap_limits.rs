@@ -209,6 +209,10 @@ fn slices_are_bounded_and_keep_up() {
     let stats = heap.stats();
     let live = (n * 24) as u64;
     assert!(stats.cycles >= 3, "{stats:?}");
+    if cfg!(miri) {
+        // The pace is that of blocks of full size.
+        return;
+    }
     // A block or a piece of a vector may come on top.
     assert!(stats.longest_slice <= u64::from(SLICE_VISITS) + 512, "{stats:?}");
     assert!(stats.peak <= 2 * (live + floor as u64) + 2 * scaled(1 << 20) as u64, "{stats:?}");
