@@ -7,6 +7,24 @@
 //! - It allocates before it has any effect, since [`Exit::Collect`] means that it is done again from the start.
 //! - No collection happens while it runs, so values need no rooting.
 //!
+//! The ESL twins are the functions in the `slowly` column of the table, `%SLOW-` and the builtin's name, with the same
+//! arguments. A twin does what the builtin does, failures included, in steps that can be interrupted; it may call the
+//! builtin on parts, and may not be given the whole again:
+//! - Lists: plain loops. `%slow-list-length` walks at two speeds and gives `NIL` for a circle; all others may go round for
+//!   ever.
+//! - Vectors and strings: parts of at most 65 536 elements, by the `start` and `end` of the builtin, or by `%replace`
+//!   into a fresh `%make-vector` or `%make-string`.
+//! - `%slow-+`, `%slow--`, `%slow-*`, `%slow-/` and their like of more than two numbers: pair by pair. Of two large integers,
+//!   the product by halves of the longer one (`ash`, `%ldb`); quotients by long division, a few limbs of the dividend at a
+//!   time, from the top; `gcd` by `%gcd-step` until the second value is 0, after a `rem` where lengths differ much. Ratios
+//!   by their numerators and denominators. `expt` by repeated squares, `isqrt` by Newton's steps, digits by halves
+//!   (`truncate` by a power of the radix).
+//! - Hash tables: `%table-hash` (or the hash function of a program: second and third value of `%hash-table-test`), then
+//!   `%table-first` and `%table-after` until the test is true of the key of `%table-entry`; at the end `%set-table-value`,
+//!   `%table-add` or `%table-delete`. A test that changes the table can make an entry of the walk free, which
+//!   `%table-after` refuses.
+//! - `%slow-table-next`: the builtin from `%table-skip` on.
+//!
 //! [`Exit::Call`]: crate::raise::Exit::Call
 //! [`Exit::Slowly`]: crate::raise::Exit::Slowly
 //! [`Exit::Collect`]: crate::raise::Exit::Collect
@@ -357,6 +375,10 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::SlotOf => structure::slot,
         Builtin::SetSlotOf => structure::set_slot,
         Builtin::IsInstance => structure::is_instance,
+        Builtin::CommandLineArguments => outside::command_line_arguments,
+        Builtin::Now => outside::now,
+        Builtin::InternalRealTime => outside::internal_real_time,
+        Builtin::UniversalTime => outside::universal_time,
         Builtin::ControlHeight => control::control_height,
         Builtin::NextHandler => control::next_handler,
         Builtin::TakeCase => control::take_case,
@@ -471,6 +493,7 @@ mod integer;
 mod list;
 mod lookup;
 mod number;
+mod outside;
 mod package;
 mod sequence;
 pub(crate) mod stream;
