@@ -781,18 +781,18 @@ define_builtins! {
     TableSkip = internal "%TABLE-SKIP" ("table position");
     /// The hash of a key.
     TableHash = internal "%TABLE-HASH" ("table key");
-    /// The first entry whose key has this hash, or `NIL`.
-    TableFirst = internal "%TABLE-FIRST" ("table hash");
-    /// The entry after this one whose key has the same hash, or `NIL`.
-    TableAfter = internal "%TABLE-AFTER" ("table entry");
-    /// Key and value of an entry.
-    TableEntry = internal "%TABLE-ENTRY" ("table entry");
-    /// Gives an entry another value, and returns it.
-    SetTableValue = internal "%SET-TABLE-VALUE" ("table entry value");
-    /// Adds a key that the table does not have, and returns the value.
-    TableAdd = internal "%TABLE-ADD" ("table hash key value");
-    /// Takes an entry out of the table.
-    TableDelete = internal "%TABLE-DELETE" ("table entry");
+    /// A fresh list of `(entry . key)` for the keys that have this hash.
+    TableCandidates = internal "%TABLE-CANDIDATES" ("table hash");
+    /// A number that changes whenever a key comes or goes.
+    TableSerial = internal "%TABLE-SERIAL" ("table");
+    /// The value of an entry, and whether it still has this very key.
+    TableValue = internal "%TABLE-VALUE" ("table entry key");
+    /// Gives an entry another value; whether that was done, as it still has this very key.
+    SetTableValue = internal "%SET-TABLE-VALUE" ("table entry key value");
+    /// Adds a key that the table does not have; whether that was done, as no key came or went since `serial`.
+    TableAdd = internal "%TABLE-ADD" ("table hash key value serial");
+    /// Takes an entry out of the table; whether that was done, as it still has this very key.
+    TableDelete = internal "%TABLE-DELETE" ("table entry key");
 
     // ---- structures
     /// Slot `index` of `instance`, which must be an instance of the class named `class` or a subclass.
@@ -810,8 +810,8 @@ define_builtins! {
     NextHandler = internal "%NEXT-HANDLER" ("height");
     /// Unwinds to the entry with this index, of the cases of a `handler-case`, and has one of them take the condition.
     TakeCase = internal "%TAKE-CASE" ("index case condition");
-    /// Ends the running task as failed, with this condition.
-    EndTask = internal "%END-TASK" ("condition");
+    /// Ends the running task as failed, with this condition: its text in a few words, and a report for people.
+    EndTask = internal "%END-TASK" ("condition text report");
     /// Ends the run with this status, from 0 to 255. The remaining tasks are aborted.
     Exit = internal "%EXIT" ("status");
     /// The innermost `limit` frames, each a list of the function's name, and source, line and column if known.
@@ -1015,4 +1015,14 @@ define_builtins! {
     FinishOutput = cl "FINISH-OUTPUT" ("&optional stream");
     /// Writes what a stream has gathered.
     ForceOutput = cl "FORCE-OUTPUT" ("&optional stream");
+
+    // ---- the host
+    /// The arguments of the program, a list of strings.
+    CommandLineArguments = esl "COMMAND-LINE-ARGUMENTS" ("");
+    /// Seconds on the machine's clock, which never goes back.
+    Now = esl "NOW" ("");
+    /// Microseconds on the machine's clock, which never goes back.
+    InternalRealTime = cl "GET-INTERNAL-REAL-TIME" ("");
+    /// Seconds since the beginning of 1900, UTC.
+    UniversalTime = cl "GET-UNIVERSAL-TIME" ("");
 }

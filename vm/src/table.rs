@@ -1,7 +1,7 @@
 //! Hash tables: entries in the order of insertion, found by linear hashing.
 //!
 //! ```text
-//! table   | count | used | free | pairs | words | test | hash |        header.aux: which test
+//! table   | count | used | free | pairs | words | test | hash | serial |     header.aux: which test
 //! pairs   directory of simple vectors:  | key | value | key | value | ...
 //! words   directory of Words32:         | head | hash | next | head | hash | next | ...
 //! ```
@@ -15,8 +15,8 @@
 //! proportion to the size of the table. What was removed leaves a free entry, and the last one freed is the first to be
 //! taken again, which is also where SBCL puts a new key: the order of iteration is the same.
 //!
-//! Not here: tests that are functions of the program. ESL calls them, over [`Table::first`], [`Table::after`],
-//! [`Table::add`] and [`Table::delete`].
+//! Not here: tests that are functions of the program. ESL calls them, over [`Table::candidates`], and [`Table::serial`] says
+//! whether keys came or went meanwhile.
 //! Source: Larson, "Dynamic hash tables", 1988, for growing by one bucket. We keep the entries apart from the
 //! buckets, for the order.
 
@@ -37,6 +37,7 @@ const PAIRS: usize = 3;
 const WORDS: usize = 4;
 const TEST: usize = 5;
 const HASH: usize = 6;
+const SERIAL: usize = 7;
 
 /// How a table compares keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,7 +87,7 @@ impl Table {
         let room = size.clamp(LEAST, SEGMENT).next_power_of_two();
         let [pairs, words] = fresh_directories(heap, room)?;
         let zero = Value::small(0);
-        let slots = [zero, zero, zero, pairs, words, functions[0], functions[1]];
+        let slots = [zero, zero, zero, pairs, words, functions[0], functions[1], zero];
         let number = match comparison {
             Comparison::Native(Test::Eq) => 0,
             Comparison::Native(Test::Eql) => 1,
@@ -145,7 +146,7 @@ impl Table {
 
     #[inline]
     fn view(self, heap: &Heap) -> View<'_> {
-        let slots = heap.record(self.0, Kind::HashTable).unwrap_or(&[Value::NIL; 7]);
+        let slots = heap.record(self.0, Kind::HashTable).unwrap_or(&[Value::NIL; 8]);
         View {
             heap,
             pairs: heap.vector(slots[PAIRS]).unwrap_or_default(),
@@ -154,16 +155,33 @@ impl Table {
         }
     }
 
-    /// The first entry whose key has this hash.
-    pub(crate) fn first(self, heap: &Heap, hash: u32) -> Option<usize> {
-        let view = self.view(heap);
-        view.matching(view.word(view.bucket(hash), 0), hash)
+    /// A number that changes whenever a key comes or goes.
+    pub(crate) fn serial(self, heap: &Heap) -> usize {
+        self.number(heap, SERIAL)
     }
 
-    /// The entry after this one whose key has the same hash.
-    pub(crate) fn after(self, heap: &Heap, entry: usize) -> Option<usize> {
+    fn advance(self, heap: &mut Heap) {
+        // Nobody waits for as many changes as there are fixnums.
+        let next = self.serial(heap).wrapping_add(1) & (Value::FIXNUM_MAX as usize);
+        self.set_number(heap, SERIAL, next);
+    }
+
+    /// The entries whose keys have this hash, with the keys.
+    pub(crate) fn candidates(self, heap: &Heap, hash: u32) -> Vec<(usize, Value)> {
         let view = self.view(heap);
-        view.matching(view.word(entry, 2), view.word(entry, 1))
+        let mut found = Vec::new();
+        let mut next = view.word(view.bucket(hash), 0);
+        while next != 0 {
+            let entry = next as usize - 1;
+            let [_, other, after] = view.words_of(entry);
+            if other == hash
+                && let Some((key, _)) = view.pair(entry)
+            {
+                found.push((entry, key));
+            }
+            next = after;
+        }
+        found
     }
 
     /// Key and value of an entry; `None` for one that is free or was never used.
@@ -239,6 +257,7 @@ impl Table {
         self.link(heap, entry, hash);
         let count = self.count(heap);
         self.set_number(heap, COUNT, count + 1);
+        self.advance(heap);
         Ok(())
     }
 
@@ -270,6 +289,7 @@ impl Table {
         self.set_number(heap, FREE, entry + 1);
         let count = self.count(heap);
         self.set_number(heap, COUNT, count - 1);
+        self.advance(heap);
     }
 
     /// Forgets all entries.
@@ -284,6 +304,7 @@ impl Table {
         for slot in [COUNT, USED, FREE] {
             self.set_number(heap, slot, 0);
         }
+        self.advance(heap);
         Ok(())
     }
 
@@ -414,18 +435,6 @@ impl View<'_> {
             &[key, value] => Some((key, value)),
             _ => None,
         }
-    }
-
-    /// The first entry of a chain with this hash.
-    fn matching(&self, mut next: u32, hash: u32) -> Option<usize> {
-        while next != 0 {
-            let [_, other, after] = self.words_of(next as usize - 1);
-            if other == hash {
-                return Some(next as usize - 1);
-            }
-            next = after;
-        }
-        None
     }
 
     fn room(&self) -> usize {
@@ -580,20 +589,22 @@ mod tests {
     }
 
     #[test]
-    fn chains_of_one_hash_can_be_walked() {
+    fn keys_of_one_hash_are_candidates() {
         let mut heap = Heap::for_tests();
         let table = new(&mut heap, Test::Eql);
         for key in 0..20 {
             table.add(&mut heap, 5 + 8 * (key as u32 % 2), Value::small(key), Value::NIL).unwrap();
         }
-        let mut found = Vec::new();
-        let mut next = table.first(&heap, 5);
-        while let Some(entry) = next {
-            found.push(table.entry(&heap, entry).unwrap().0.as_fixnum().unwrap());
-            next = table.after(&heap, entry);
-        }
-        found.sort_unstable();
-        assert_eq!(found, (0..20).step_by(2).collect::<Vec<i64>>());
-        assert_eq!(table.first(&heap, 6), None);
+        let candidates = table.candidates(&heap, 5);
+        let mut keys: Vec<i64> = candidates.iter().map(|(_, key)| key.as_fixnum().unwrap()).collect();
+        keys.sort_unstable();
+        assert_eq!(keys, (0..20).step_by(2).collect::<Vec<i64>>());
+        assert!(candidates.iter().all(|&(entry, key)| table.entry(&heap, entry) == Some((key, Value::NIL))));
+        assert_eq!(table.candidates(&heap, 6), []);
+        let before = table.serial(&heap);
+        table.set_value(&mut heap, 3, Value::T);
+        assert_eq!(table.serial(&heap), before);
+        table.delete(&mut heap, 3);
+        assert_ne!(table.serial(&heap), before);
     }
 }

@@ -19,10 +19,10 @@
 //!   time, from the top; `gcd` by `%gcd-step` until the second value is 0, after a `rem` where lengths differ much. Ratios
 //!   by their numerators and denominators. `expt` by repeated squares, `isqrt` by Newton's steps, digits by halves
 //!   (`truncate` by a power of the radix).
-//! - Hash tables: `%table-hash` (or the hash function of a program: second and third value of `%hash-table-test`), then
-//!   `%table-first` and `%table-after` until the test is true of the key of `%table-entry`; at the end `%set-table-value`,
-//!   `%table-add` or `%table-delete`. A test that changes the table can make an entry of the walk free, which
-//!   `%table-after` refuses.
+//! - Hash tables: the hash by `%table-hash` or the hash function of the program (second and third value of
+//!   `%hash-table-test`), then the test on the keys in `%table-candidates`. A key found is read, set or deleted with
+//!   `%table-value`, `%set-table-value`, `%table-delete`; one not found is added with `%table-add` and the `%table-serial`
+//!   from before. Where one of these says that the table has changed meanwhile, all over again.
 //! - `%slow-table-next`: the builtin from `%table-skip` on.
 //!
 //! [`Exit::Call`]: crate::raise::Exit::Call
@@ -366,9 +366,9 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::TableNext => table::table_next,
         Builtin::TableSkip => table::table_skip,
         Builtin::TableHash => table::table_hash,
-        Builtin::TableFirst => table::table_first,
-        Builtin::TableAfter => table::table_after,
-        Builtin::TableEntry => table::table_entry,
+        Builtin::TableCandidates => table::table_candidates,
+        Builtin::TableSerial => table::table_serial,
+        Builtin::TableValue => table::table_value,
         Builtin::SetTableValue => table::set_table_value,
         Builtin::TableAdd => table::table_add,
         Builtin::TableDelete => table::table_delete,

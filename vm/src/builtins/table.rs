@@ -1,7 +1,8 @@
 //! Hash tables.
 //!
 //! Tables that compare by a test of the machine are searched here, within a limit of work; above it, and for tests that
-//! are functions of the program, the ESL twin walks the entries whose keys have the same hash.
+//! are functions of the program, the ESL twin compares the keys that have the same hash. Since it can be interrupted, what it
+//! has found is checked again where it is used: an entry must still have the very key, a table the same keys.
 
 use crate::equality::{self, Test};
 use crate::raise::{Exit, Outcome};
@@ -175,61 +176,68 @@ fn hash_argument(vm: &mut Vm, v: Value) -> Result<u32, Exit> {
     }
 }
 
-fn entry_value(entry: Option<usize>) -> Value {
-    entry.map_or(Value::NIL, Value::index)
-}
-
-/// `(%table-first table hash)`: the first entry whose key has this hash, or `NIL`.
-pub(super) fn table_first(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+/// `(%table-candidates table hash)`: a list of `(entry . key)` for the keys with this hash.
+pub(super) fn table_candidates(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
     let hash = hash_argument(vm, arguments[1])?;
-    Ok(entry_value(table.first(&vm.heap, hash)))
+    let candidates = table.candidates(&vm.heap, hash);
+    vm.charge(candidates.len());
+    let mut list = Value::NIL;
+    for (entry, key) in candidates {
+        let pair = vm.heap.cons(Value::index(entry), key)?;
+        list = vm.heap.cons(pair, list)?;
+    }
+    Ok(list)
 }
 
-/// `(%table-after table entry)`: the entry after this one whose key has the same hash, or `NIL`.
-pub(super) fn table_after(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (table, entry) = live_entry(vm, arguments)?;
-    Ok(entry_value(table.after(&vm.heap, entry)))
-}
-
-/// The table and the number of an entry that is in use.
-fn live_entry(vm: &mut Vm, arguments: &[Value]) -> Result<(Table, usize), Exit> {
+/// `(%table-serial table)`: a number that changes whenever a key comes or goes.
+pub(super) fn table_serial(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
-    match arguments[1].as_index() {
-        Some(entry) if table.entry(&vm.heap, entry).is_some() => Ok((table, entry)),
-        _ => {
-            let used = table.used(&vm.heap);
-            vm.index_error(arguments[1], used)
-        }
+    Ok(Value::index(table.serial(&vm.heap)))
+}
+
+/// The table, and the entry with its value if it still has this very key.
+fn entry_of_key(vm: &mut Vm, arguments: &[Value]) -> Result<(Table, Option<(usize, Value)>), Exit> {
+    let table = table(vm, arguments[0])?;
+    let entry = vm.count(arguments[1])?;
+    let value = table.entry(&vm.heap, entry).filter(|&(key, _)| key == arguments[2]).map(|(_, value)| value);
+    Ok((table, value.map(|value| (entry, value))))
+}
+
+/// `(%table-value table entry key)`: the value, and whether the entry still has this very key.
+pub(super) fn table_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match entry_of_key(vm, arguments)? {
+        (_, Some((_, value))) => vm.give_values(&[value, Value::T]),
+        _ => vm.give_values(&[Value::NIL, Value::NIL]),
     }
 }
 
-/// `(%table-entry table entry)`: key and value; neither where the entry is free by now.
-pub(super) fn table_entry(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (table, entry) = live_entry(vm, arguments)?;
-    let (key, value) = table.entry(&vm.heap, entry).unwrap_or((Value::NIL, Value::NIL));
-    vm.give_values(&[key, value])
-}
-
-/// `(%set-table-value table entry value)`
+/// `(%set-table-value table entry key value)`: whether it was done, as the entry still has this very key.
 pub(super) fn set_table_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (table, entry) = live_entry(vm, arguments)?;
-    table.set_value(&mut vm.heap, entry, arguments[2]);
-    Ok(arguments[2])
+    let (table, found) = entry_of_key(vm, arguments)?;
+    if let Some((entry, _)) = found {
+        table.set_value(&mut vm.heap, entry, arguments[3]);
+    }
+    Ok(found.is_some().into())
 }
 
-/// `(%table-add table hash key value)`: adds a key that the table does not have.
+/// `(%table-add table hash key value serial)`: whether it was done, as no key came or went since `serial`.
 pub(super) fn table_add(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[table_value, hash, key, value] = arguments else { unreachable!("the table says four") };
+    let &[table_value, hash, key, value, serial] = arguments else { unreachable!("the table says five") };
     let table = table(vm, table_value)?;
     let hash = hash_argument(vm, hash)?;
+    if serial.as_index() != Some(table.serial(&vm.heap)) {
+        return Ok(Value::NIL);
+    }
     add(vm, table, hash, key, value)?;
-    Ok(value)
+    Ok(Value::T)
 }
 
-/// `(%table-delete table entry)`
+/// `(%table-delete table entry key)`: whether it was done, as the entry still has this very key.
 pub(super) fn table_delete(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (table, entry) = live_entry(vm, arguments)?;
-    table.delete(&mut vm.heap, entry);
-    Ok(Value::T)
+    let (table, found) = entry_of_key(vm, arguments)?;
+    if let Some((entry, _)) = found {
+        table.delete(&mut vm.heap, entry);
+    }
+    Ok(found.is_some().into())
 }
