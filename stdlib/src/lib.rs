@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 use esl_bytecode::file::{ImageBytes, ModuleImage};
+use esl_bytecode::symbol::{ESL_PACKAGE, USER_PACKAGE};
 use esl_vm::vm::Vm;
 
 /// The image: the bytes of an `.eslb` file.
@@ -16,8 +17,11 @@ pub static IMAGE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/image.eslb")
 /// A text, if the machine's limit of memory leaves no room for it.
 pub fn load(machine: &mut Vm) -> Result<(), String> {
     let image = ModuleImage::open_trusted(ImageBytes::Static(IMAGE)).map_err(|error| error.to_string())?;
+    let no_room = "there is no memory for the library";
+    machine.enter_package(ESL_PACKAGE).map_err(|_| no_room)?;
     let functions = machine.open_image(image).map_err(|error| error.to_string())?;
     machine.run_toplevel(functions, u64::MAX)?;
+    machine.enter_package(USER_PACKAGE).map_err(|_| no_room)?;
     machine.seal();
     Ok(())
 }
