@@ -116,6 +116,23 @@ impl Program {
     }
 }
 
+/// A source with its macros expanded, as text, and what was found on the way.
+pub fn expand(source: &Source) -> (String, Compiled) {
+    let mut sources = Sources::new();
+    let id = sources.add(source.name.clone(), Some(source.text.clone()));
+    match machine(COMPILE_TIME_CONFIG, Box::new(RealHost::new(Vec::new()))) {
+        Ok(mut machine) => {
+            let mut expansion = Compiler::for_source(id).expand_text(&source.name, &source.text);
+            let (_, diagnostics) = drive(&mut expansion, &mut machine);
+            (expansion.text().to_string(), Compiled { program: None, diagnostics, sources })
+        }
+        Err(text) => {
+            let diagnostic = Diagnostic::error("macro-failed", text, Default::default());
+            (String::new(), Compiled { program: None, diagnostics: vec![diagnostic], sources })
+        }
+    }
+}
+
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
@@ -189,6 +206,9 @@ pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Report, String> {
     machine.set_interruptible(Some(main));
     let outcome = machine.run(u64::MAX);
     machine.flush();
+    if let Some(report) = machine.report(main).map(String::from) {
+        machine.complain(&report);
+    }
     let ended = match (outcome, machine.result(main)) {
         (RunOutcome::BudgetSpent, _) => Ended::BudgetSpent,
         (RunOutcome::Waiting, _) => Ended::Deadlocked,

@@ -5,6 +5,7 @@ use esl_bytecode::span::Span;
 
 use crate::datum::Unit;
 use crate::heap::HeapStats;
+use crate::host::Output;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::task::TaskId;
 use crate::value::Value;
@@ -96,6 +97,23 @@ impl Vm {
     /// Writes what the program has printed and is still in a buffer.
     pub fn flush(&mut self) {
         self.flush_output();
+    }
+
+    /// Writes to the standard error output.
+    pub fn complain(&mut self, text: &str) {
+        self.flush_output();
+        // If that cannot be written there is nobody to tell.
+        _ = self.host.write(Output::Error, text.as_bytes());
+    }
+
+    /// Whether a condition that ended a task says that the memory is exhausted.
+    pub fn is_heap_exhausted(&self, condition: Value) -> bool {
+        if condition == self.world.known.heap_exhausted {
+            return true;
+        }
+        let class = self.heap.structure_class(condition);
+        let name = class.and_then(|class| self.heap.symbol(self.class_name(class)));
+        name.and_then(|symbol| self.heap.string_text(symbol.name)).is_some_and(|name| name == "HEAP-EXHAUSTED")
     }
 
     /// Figures of the heap.

@@ -87,6 +87,11 @@ impl Vm {
         }
     }
 
+    /// What is to be said of the failure that ended a task.
+    pub fn report(&self, id: TaskId) -> Option<&str> {
+        self.tasks.get(id)?.as_ref()?.report.as_deref()
+    }
+
     /// Ticks that a task has used.
     pub fn ticks_of(&self, id: TaskId) -> u64 {
         self.tasks.get(id).and_then(|task| task.as_ref()).map_or(0, |task| task.ticks)

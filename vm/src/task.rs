@@ -41,14 +41,14 @@ pub(crate) struct Task {
     pub pending_abort: bool,
     /// Ticks that it has used.
     pub ticks: u64,
-    /// Ticks that it may still use; `None` without a limit.
-    pub budget: Option<u64>,
     /// Whether the stack's reserve is open, because a failure for lack of stack is being handled.
     pub uses_reserve: bool,
     /// The collector's cycle in which the stack was last scanned.
     pub scanned: u64,
     /// What it returned.
     pub values: Vec<Value>,
+    /// What is to be said of the failure that ended it.
+    pub report: Option<String>,
 }
 
 // SAFETY: `pc` points into a Code in the heap of the machine that owns the task, or into a static table.
@@ -79,10 +79,10 @@ impl Task {
             state: TaskState::Runnable,
             pending_abort: false,
             ticks: 0,
-            budget: None,
             uses_reserve: false,
             scanned: 0,
             values: Vec::new(),
+            report: None,
         }
     }
 
