@@ -1,14 +1,15 @@
 //! Hash tables: entries in the order of insertion, found by linear hashing.
 //!
 //! ```text
-//! table   | count | used | free | pairs | words | test | hash | serial |     header.aux: which test
-//! pairs   directory of simple vectors:  | key | value | key | value | ...
-//! words   directory of Words32:         | head | hash | next | head | hash | next | ...
+//! table     | count | used | free | room | entries | heads | test | hash | serial |      header.aux: which test
+//! entries   directory of simple vectors:  | key | value | link | key | value | link | ...
+//! heads     directory of Words32:         | head | head | head | ...
 //! ```
 //!
-//! Entry `i` has its key and value in `pairs`, the hash of its key and the number of the next entry of its bucket in
-//! `words`; bucket `i` has its first entry in `head` of the same place. Numbers of entries are one too high, so that 0
-//! ends a chain. A segment of the directories holds [`SEGMENT`] entries; only the first one grows, by doubling.
+//! The link of an entry is a fixnum of the hash of its key (32 bits) and the number of the next entry of its bucket
+//! (29 bits). Numbers of entries are one too high in links and heads, so that 0 ends a chain. So a search touches one
+//! word of the heads, and what it needs of an entry is together. A segment of the directories holds [`SEGMENT`] entries
+//! and as many buckets; only the first one grows, by doubling.
 //!
 //! Invariant: a table has as many buckets as entries were ever in use (at least one). So each new entry adds one bucket,
 //! and that takes its share from one other bucket; nothing is ever rehashed at once, and no operation takes time in
@@ -30,14 +31,42 @@ const SHIFT: usize = 12;
 /// Entries for which a new table has room.
 const LEAST: usize = 8;
 
+/// Values of an entry in its segment.
+const ENTRY: usize = 3;
+
 const COUNT: usize = 0;
 const USED: usize = 1;
 const FREE: usize = 2;
-const PAIRS: usize = 3;
-const WORDS: usize = 4;
-const TEST: usize = 5;
-const HASH: usize = 6;
-const SERIAL: usize = 7;
+const ROOM: usize = 3;
+const ENTRIES: usize = 4;
+const HEADS: usize = 5;
+const TEST: usize = 6;
+const HASH: usize = 7;
+const SERIAL: usize = 8;
+const SLOTS: usize = 9;
+
+/// Bits of a link that are the number of the next entry.
+const NEXT_BITS: u32 = 29;
+/// Entries that a table may have: what those bits count.
+const MOST: usize = (1 << NEXT_BITS) - 1;
+
+/// Hash and next entry, as the link of an entry.
+fn link(hash: u32, next: usize) -> Value {
+    Value::index((hash as usize) << NEXT_BITS | next)
+}
+
+/// Hash and next entry in a link.
+#[inline]
+fn unlink(link: Value) -> (u32, usize) {
+    let word = link.as_index().unwrap_or(0);
+    ((word >> NEXT_BITS) as u32, word & MOST)
+}
+
+/// Where an entry has its values in its segment.
+#[inline]
+fn place(entry: usize) -> usize {
+    ENTRY * (entry & (SEGMENT - 1))
+}
 
 /// How a table compares keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,9 +114,13 @@ impl Table {
         functions: [Value; 2],
     ) -> Result<Value, AllocError> {
         let room = size.clamp(LEAST, SEGMENT).next_power_of_two();
-        let [pairs, words] = fresh_directories(heap, room)?;
-        let zero = Value::small(0);
-        let slots = [zero, zero, zero, pairs, words, functions[0], functions[1], zero];
+        let [entries, heads] = fresh_directories(heap, room)?;
+        let mut slots = [Value::small(0); SLOTS];
+        slots[ROOM] = Value::index(room);
+        slots[ENTRIES] = entries;
+        slots[HEADS] = heads;
+        slots[TEST] = functions[0];
+        slots[HASH] = functions[1];
         let number = match comparison {
             Comparison::Native(Test::Eq) => 0,
             Comparison::Native(Test::Eql) => 1,
@@ -136,7 +169,7 @@ impl Table {
 
     /// Entries for which there is room without more memory.
     pub(crate) fn room(self, heap: &Heap) -> usize {
-        self.view(heap).room()
+        self.number(heap, ROOM)
     }
 
     /// The functions of the program by which it compares and hashes, or `NIL`.
@@ -146,11 +179,11 @@ impl Table {
 
     #[inline]
     fn view(self, heap: &Heap) -> View<'_> {
-        let slots = heap.record(self.0, Kind::HashTable).unwrap_or(&[Value::NIL; 8]);
+        let slots = heap.record(self.0, Kind::HashTable).unwrap_or(&[Value::NIL; SLOTS]);
         View {
             heap,
-            pairs: heap.vector(slots[PAIRS]).unwrap_or_default(),
-            words: heap.vector(slots[WORDS]).unwrap_or_default(),
+            entries: heap.vector(slots[ENTRIES]).unwrap_or_default(),
+            heads: heap.vector(slots[HEADS]).unwrap_or_default(),
             buckets: slots[USED].as_index().unwrap_or(0).max(1),
         }
     }
@@ -170,14 +203,12 @@ impl Table {
     pub(crate) fn candidates(self, heap: &Heap, hash: u32) -> Vec<(usize, Value)> {
         let view = self.view(heap);
         let mut found = Vec::new();
-        let mut next = view.word(view.bucket(hash), 0);
+        let mut next = view.head(view.bucket(hash));
         while next != 0 {
-            let entry = next as usize - 1;
-            let [_, other, after] = view.words_of(entry);
-            if other == hash
-                && let Some((key, _)) = view.pair(entry)
-            {
-                found.push((entry, key));
+            let [key, _, link] = view.entry(next - 1);
+            let (other, after) = unlink(link);
+            if other == hash {
+                found.push((next - 1, key));
             }
             next = after;
         }
@@ -187,15 +218,14 @@ impl Table {
     /// Key and value of an entry; `None` for one that is free or was never used.
     #[inline]
     pub(crate) fn entry(self, heap: &Heap, entry: usize) -> Option<(Value, Value)> {
-        let (key, value) = self.view(heap).pair(entry)?;
+        let [key, value, _] = self.view(heap).entry(entry);
         if key == Value::UNBOUND { None } else { Some((key, value)) }
     }
 
     /// Gives an entry another value.
     pub(crate) fn set_value(self, heap: &mut Heap, entry: usize, value: Value) {
-        if let Some(pairs) = self.pairs_of(heap, entry) {
-            heap.vector_set(pairs, 2 * (entry & (SEGMENT - 1)) + 1, value);
-        }
+        let segment = self.segment(heap, entry);
+        heap.vector_set(segment, place(entry) + 1, value);
     }
 
     /// The entry of `key`, with a test of the machine; `hash` is the key's.
@@ -209,14 +239,17 @@ impl Table {
         work: &mut usize,
     ) -> Result<Option<usize>, Trouble> {
         let view = self.view(heap);
-        let mut next = view.word(view.bucket(hash), 0);
+        let mut next = view.head(view.bucket(hash));
         while next != 0 {
-            let entry = next as usize - 1;
-            let [_, other, after] = view.words_of(entry);
-            if other == hash {
-                let (candidate, _) = view.pair(entry).unwrap_or((Value::UNBOUND, Value::NIL));
+            let [candidate, _, link] = view.entry(next - 1);
+            let (other, after) = unlink(link);
+            // Where hashes differ, so do keys; that one key is another's very object is seen faster still.
+            if candidate == key {
+                return Ok(Some(next - 1));
+            }
+            if other == hash && test != Test::Eq {
                 match equality::same(heap, test, key, candidate, work) {
-                    Some(true) => return Ok(Some(entry)),
+                    Some(true) => return Ok(Some(next - 1)),
                     Some(false) => {}
                     None => return Err(Trouble::Slowly),
                 }
@@ -234,8 +267,8 @@ impl Table {
     pub(crate) fn add(self, heap: &mut Heap, hash: u32, key: Value, value: Value) -> Result<(), AllocError> {
         let free = self.number(heap, FREE);
         let entry = if free > 0 {
-            let next = self.view(heap).word(free - 1, 2);
-            self.set_number(heap, FREE, next as usize);
+            let (_, next) = unlink(self.view(heap).entry(free - 1)[2]);
+            self.set_number(heap, FREE, next);
             free - 1
         } else {
             let used = self.used(heap);
@@ -248,13 +281,13 @@ impl Table {
             }
             used
         };
-        if let Some(pairs) = self.pairs_of(heap, entry) {
-            let at = 2 * (entry & (SEGMENT - 1));
-            heap.vector_set(pairs, at, key);
-            heap.vector_set(pairs, at + 1, value);
+        let bucket = self.view(heap).bucket(hash);
+        let head = self.view(heap).head(bucket);
+        let segment = self.segment(heap, entry);
+        for (offset, v) in [key, value, link(hash, head)].into_iter().enumerate() {
+            heap.vector_set(segment, place(entry) + offset, v);
         }
-        self.set_word(heap, entry, 1, hash);
-        self.link(heap, entry, hash);
+        self.set_head(heap, bucket, entry + 1);
         let count = self.count(heap);
         self.set_number(heap, COUNT, count + 1);
         self.advance(heap);
@@ -264,28 +297,26 @@ impl Table {
     /// Frees an entry that is in use.
     pub(crate) fn delete(self, heap: &mut Heap, entry: usize) {
         let view = self.view(heap);
-        let number = entry as u32 + 1;
-        let bucket = view.bucket(view.word(entry, 1));
-        let after = view.word(entry, 2);
-        let mut before = view.word(bucket, 0);
-        if before == number {
-            self.set_word(heap, bucket, 0, after);
+        let (hash, after) = unlink(view.entry(entry)[2]);
+        let bucket = view.bucket(hash);
+        let mut before = view.head(bucket);
+        if before == entry + 1 {
+            self.set_head(heap, bucket, after);
         } else {
-            while before != 0 && view.word(before as usize - 1, 2) != number {
-                before = view.word(before as usize - 1, 2);
+            while before != 0 {
+                let (other, next) = unlink(view.entry(before - 1)[2]);
+                if next == entry + 1 {
+                    self.set_link(heap, before - 1, link(other, after));
+                    break;
+                }
+                before = next;
             }
-            if before == 0 {
-                return;
-            }
-            self.set_word(heap, before as usize - 1, 2, after);
-        }
-        if let Some(pairs) = self.pairs_of(heap, entry) {
-            let at = 2 * (entry & (SEGMENT - 1));
-            heap.vector_set(pairs, at, Value::UNBOUND);
-            heap.vector_set(pairs, at + 1, Value::NIL);
         }
         let free = self.number(heap, FREE);
-        self.set_word(heap, entry, 2, free as u32);
+        let segment = self.segment(heap, entry);
+        for (offset, v) in [Value::UNBOUND, Value::NIL, link(0, free)].into_iter().enumerate() {
+            heap.vector_set(segment, place(entry) + offset, v);
+        }
         self.set_number(heap, FREE, entry + 1);
         let count = self.count(heap);
         self.set_number(heap, COUNT, count - 1);
@@ -298,101 +329,93 @@ impl Table {
     /// As for every allocation; nothing has changed then.
     pub(crate) fn clear(self, heap: &mut Heap) -> Result<(), AllocError> {
         let room = self.room(heap).min(SEGMENT);
-        let [pairs, words] = fresh_directories(heap, room)?;
-        heap.record_set(self.0, Kind::HashTable, PAIRS, pairs);
-        heap.record_set(self.0, Kind::HashTable, WORDS, words);
+        let [entries, heads] = fresh_directories(heap, room)?;
+        heap.record_set(self.0, Kind::HashTable, ENTRIES, entries);
+        heap.record_set(self.0, Kind::HashTable, HEADS, heads);
         for slot in [COUNT, USED, FREE] {
             self.set_number(heap, slot, 0);
         }
+        self.set_number(heap, ROOM, room);
         self.advance(heap);
         Ok(())
     }
 
     /// Makes room for one entry at least: twice the first segment, or one segment more.
     fn grow(self, heap: &mut Heap, room: usize) -> Result<(), AllocError> {
-        let (old_pairs, old_words) = (self.slot(heap, PAIRS), self.slot(heap, WORDS));
+        let (old_entries, old_heads) = (self.slot(heap, ENTRIES), self.slot(heap, HEADS));
+        if room >= MOST - SEGMENT {
+            return Err(AllocError::TooLarge { requested: 8 * ENTRY * MOST });
+        }
         if room < SEGMENT {
-            let first = heap.vector(old_pairs).and_then(|segments| heap.vector(segments[0]));
-            let mut pairs = first.unwrap_or_default().to_vec();
-            pairs.resize(4 * room, Value::UNBOUND);
-            let first = heap.vector(old_words).and_then(|segments| heap.words(segments[0]));
-            let mut words = first.unwrap_or_default().to_vec();
-            words.resize(6 * room, 0);
-            let new_pairs = heap.alloc_vector(&pairs)?;
-            let new_words = heap.alloc_words(words.len(), 0)?;
-            if let Some(slots) = heap.words_mut(new_words) {
-                slots.copy_from_slice(&words);
+            let first = heap.vector(old_entries).and_then(|segments| heap.vector(segments[0]));
+            let mut entries = first.unwrap_or_default().to_vec();
+            entries.resize(2 * ENTRY * room, Value::UNBOUND);
+            let first = heap.vector(old_heads).and_then(|segments| heap.words(segments[0]));
+            let heads = first.unwrap_or_default().to_vec();
+            let new_entries = heap.alloc_vector(&entries)?;
+            let new_heads = heap.alloc_words(2 * room, 0)?;
+            if let Some(slots) = heap.words_mut(new_heads) {
+                slots[..heads.len()].copy_from_slice(&heads);
             }
-            heap.vector_set(old_pairs, 0, new_pairs);
-            heap.vector_set(old_words, 0, new_words);
+            heap.vector_set(old_entries, 0, new_entries);
+            heap.vector_set(old_heads, 0, new_heads);
+            self.set_number(heap, ROOM, 2 * room);
             return Ok(());
         }
         let segments = room >> SHIFT;
-        let pairs = heap.alloc_vector_filled(2 * SEGMENT, Value::UNBOUND)?;
-        let words = heap.alloc_words(3 * SEGMENT, 0)?;
-        let length = heap.vector(old_pairs).map_or(0, <[Value]>::len);
+        let entries = heap.alloc_vector_filled(ENTRY * SEGMENT, Value::UNBOUND)?;
+        let heads = heap.alloc_words(SEGMENT, 0)?;
+        let length = heap.vector(old_entries).map_or(0, <[Value]>::len);
         if segments < length {
-            heap.vector_set(old_pairs, segments, pairs);
-            heap.vector_set(old_words, segments, words);
-            return Ok(());
+            heap.vector_set(old_entries, segments, entries);
+            heap.vector_set(old_heads, segments, heads);
+        } else {
+            // The directories are a small part of a thousandth of the table, so copying them is a small matter.
+            let mut larger = [old_entries, old_heads];
+            for (directory, segment) in larger.iter_mut().zip([entries, heads]) {
+                let mut segments = heap.vector(*directory).unwrap_or_default().to_vec();
+                segments.push(segment);
+                segments.resize(2 * length.max(1), Value::NIL);
+                *directory = heap.alloc_vector(&segments)?;
+            }
+            heap.record_set(self.0, Kind::HashTable, ENTRIES, larger[0]);
+            heap.record_set(self.0, Kind::HashTable, HEADS, larger[1]);
         }
-        // The directories are a thousandth of the table, so copying them is a small matter.
-        let mut larger = [old_pairs, old_words];
-        for (directory, segment) in larger.iter_mut().zip([pairs, words]) {
-            let mut entries = heap.vector(*directory).unwrap_or_default().to_vec();
-            entries.push(segment);
-            entries.resize(2 * length.max(1), Value::NIL);
-            *directory = heap.alloc_vector(&entries)?;
-        }
-        heap.record_set(self.0, Kind::HashTable, PAIRS, larger[0]);
-        heap.record_set(self.0, Kind::HashTable, WORDS, larger[1]);
+        self.set_number(heap, ROOM, room + SEGMENT);
         Ok(())
     }
 
     /// Moves to the new bucket `new`, the last one, what belongs there from the bucket that has held it so far.
     fn split(self, heap: &mut Heap, new: usize) {
         let old = new - (1 << new.ilog2());
-        let mut next = self.view(heap).word(old, 0);
-        let mut keeps = old;
-        let mut word = 0;
-        // `keeps` and `word` say where the number of the next entry that stays belongs.
+        let mut next = self.view(heap).head(old);
+        let (mut stay, mut move_on) = (0, 0);
+        // Both chains come out in reverse, which no search can tell.
         while next != 0 {
-            let entry = next as usize - 1;
             let view = self.view(heap);
-            let [_, hash, after] = view.words_of(entry);
-            if view.bucket(hash) == new {
-                let head = view.word(new, 0);
-                self.set_word(heap, entry, 2, head);
-                self.set_word(heap, new, 0, next);
-            } else {
-                self.set_word(heap, keeps, word, next);
-                (keeps, word) = (entry, 2);
-            }
+            let (hash, after) = unlink(view.entry(next - 1)[2]);
+            let chain = if view.bucket(hash) == new { &mut move_on } else { &mut stay };
+            self.set_link(heap, next - 1, link(hash, *chain));
+            *chain = next;
             next = after;
         }
-        self.set_word(heap, keeps, word, 0);
+        self.set_head(heap, old, stay);
+        self.set_head(heap, new, move_on);
     }
 
-    /// Puts an entry at the head of its bucket.
-    fn link(self, heap: &mut Heap, entry: usize, hash: u32) {
-        let view = self.view(heap);
-        let bucket = view.bucket(hash);
-        let head = view.word(bucket, 0);
-        self.set_word(heap, entry, 2, head);
-        self.set_word(heap, bucket, 0, entry as u32 + 1);
+    fn segment(self, heap: &Heap, entry: usize) -> Value {
+        self.view(heap).entries.get(entry >> SHIFT).copied().unwrap_or(Value::NIL)
     }
 
-    fn pairs_of(self, heap: &Heap, entry: usize) -> Option<Value> {
-        self.view(heap).pairs.get(entry >> SHIFT).copied()
+    fn set_link(self, heap: &mut Heap, entry: usize, link: Value) {
+        let segment = self.segment(heap, entry);
+        heap.vector_set(segment, place(entry) + 2, link);
     }
 
-    #[inline]
-    fn set_word(self, heap: &mut Heap, entry: usize, word: usize, n: u32) {
-        let words = self.view(heap).words.get(entry >> SHIFT).copied().unwrap_or(Value::NIL);
-        if let Some(slot) =
-            heap.words_mut(words).and_then(|words| words.get_mut(3 * (entry & (SEGMENT - 1)) + word))
-        {
-            *slot = n;
+    fn set_head(self, heap: &mut Heap, bucket: usize, head: usize) {
+        let heads = self.view(heap).heads.get(bucket >> SHIFT).copied().unwrap_or(Value::NIL);
+        if let Some(slot) = heap.words_mut(heads).and_then(|heads| heads.get_mut(bucket & (SEGMENT - 1))) {
+            *slot = head as u32;
         }
     }
 }
@@ -400,8 +423,8 @@ impl Table {
 /// The parts of a table, to be read.
 struct View<'a> {
     heap: &'a Heap,
-    pairs: &'a [Value],
-    words: &'a [Value],
+    entries: &'a [Value],
+    heads: &'a [Value],
     buckets: usize,
 }
 
@@ -414,42 +437,31 @@ impl View<'_> {
         if bucket < self.buckets { bucket } else { bucket & mask >> 1 }
     }
 
-    /// Head, hash and next at the place of an entry; zeros where there is none.
+    /// The first entry of a bucket, one too high; 0 if there is none.
     #[inline]
-    fn words_of(&self, entry: usize) -> [u32; 3] {
-        let words = self.words.get(entry >> SHIFT).and_then(|&words| self.heap.words(words));
-        let at = 3 * (entry & (SEGMENT - 1));
-        words.and_then(|words| words.get(at..at + 3)?.try_into().ok()).unwrap_or([0; 3])
+    fn head(&self, bucket: usize) -> usize {
+        let heads = self.heads.get(bucket >> SHIFT).and_then(|&heads| self.heap.words(heads));
+        heads.and_then(|heads| heads.get(bucket & (SEGMENT - 1))).map_or(0, |&head| head as usize)
     }
 
+    /// Key, value and link of an entry; what a free one has where there is none.
     #[inline]
-    fn word(&self, entry: usize, word: usize) -> u32 {
-        self.words_of(entry)[word]
-    }
-
-    #[inline]
-    fn pair(&self, entry: usize) -> Option<(Value, Value)> {
-        let pairs = self.heap.vector(*self.pairs.get(entry >> SHIFT)?)?;
-        let at = 2 * (entry & (SEGMENT - 1));
-        match pairs.get(at..at + 2)? {
-            &[key, value] => Some((key, value)),
-            _ => None,
-        }
-    }
-
-    fn room(&self) -> usize {
-        let full = self.pairs.iter().filter(|segment| segment.is_true()).count();
-        let first =
-            self.pairs.first().and_then(|&pairs| self.heap.vector(pairs)).map_or(0, <[Value]>::len) / 2;
-        if full <= 1 { first } else { full << SHIFT }
+    fn entry(&self, entry: usize) -> [Value; ENTRY] {
+        let segment = self.entries.get(entry >> SHIFT).and_then(|&segment| self.heap.vector(segment));
+        let at = place(entry);
+        segment.and_then(|segment| segment.get(at..at + ENTRY)?.try_into().ok()).unwrap_or([
+            Value::UNBOUND,
+            Value::NIL,
+            Value::small(0),
+        ])
     }
 }
 
 /// Directories with one empty segment each.
 fn fresh_directories(heap: &mut Heap, room: usize) -> Result<[Value; 2], AllocError> {
-    let pairs = heap.alloc_vector_filled(2 * room, Value::UNBOUND)?;
-    let words = heap.alloc_words(3 * room, 0)?;
-    Ok([heap.alloc_vector(&[pairs])?, heap.alloc_vector(&[words])?])
+    let entries = heap.alloc_vector_filled(ENTRY * room, Value::UNBOUND)?;
+    let heads = heap.alloc_words(room, 0)?;
+    Ok([heap.alloc_vector(&[entries])?, heap.alloc_vector(&[heads])?])
 }
 
 #[cfg(test)]

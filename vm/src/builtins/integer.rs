@@ -126,12 +126,19 @@ pub(super) fn ash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `evenp`
 pub(super) fn evenp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok((!vm.integer(arguments[0])?.is_odd()).into())
+    Ok((!is_odd(vm, arguments[0])?).into())
 }
 
 /// `oddp`
 pub(super) fn oddp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(vm.integer(arguments[0])?.is_odd().into())
+    Ok(is_odd(vm, arguments[0])?.into())
+}
+
+fn is_odd(vm: &mut Vm, v: Value) -> Result<bool, Exit> {
+    match v.as_fixnum() {
+        Some(n) => Ok(n & 1 == 1),
+        None => vm.integer(v).map(|n| n.is_odd()),
+    }
 }
 
 /// Size and position of a field: two counts.

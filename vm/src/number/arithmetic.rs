@@ -1,5 +1,6 @@
 //! Sum, difference, product and quotient of any two numbers.
 
+use super::limbs::Operand;
 use super::{Int, Number, Ratio, limit};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
@@ -7,17 +8,21 @@ use crate::vm::Vm;
 
 /// `a + b`.
 pub(crate) fn add(vm: &mut Vm, a: Value, b: Value) -> Outcome {
-    if let (Some(x), Some(y)) = (a.as_fixnum(), b.as_fixnum()) {
-        return vm.integer_value("+", &Int::from(x + y));
+    if let (Some(x), Some(y)) = (a.as_fixnum(), b.as_fixnum())
+        && let Some(result) = Value::fixnum(x + y)
+    {
+        return Ok(result);
     }
     if let (Some(x), Some(y)) = (a.as_double(), b.as_double()) {
         return vm.float_value("+", x + y);
     }
+    if let (Some(x), Some(y)) = (Operand::of(&vm.heap, a, &mut [0]), Operand::of(&vm.heap, b, &mut [0])) {
+        let (negative, limbs) = x.plus(&y);
+        vm.charge(limbs.len());
+        return vm.limbs_value("+", negative, &limbs);
+    }
     match operands(vm, "+", a, b)? {
-        Pair::Ints(x, y) => {
-            vm.charge(x.len() + y.len());
-            vm.integer_value("+", &x.plus(&y))
-        }
+        Pair::Ints(x, y) => vm.integer_value("+", &x.plus(&y)),
         Pair::Ratios(x, y) => {
             check_sum(vm, &x, &y)?;
             vm.ratio_value("+", &x.plus(&y))
@@ -28,17 +33,21 @@ pub(crate) fn add(vm: &mut Vm, a: Value, b: Value) -> Outcome {
 
 /// `a - b`.
 pub(crate) fn subtract(vm: &mut Vm, a: Value, b: Value) -> Outcome {
-    if let (Some(x), Some(y)) = (a.as_fixnum(), b.as_fixnum()) {
-        return vm.integer_value("-", &Int::from(x - y));
+    if let (Some(x), Some(y)) = (a.as_fixnum(), b.as_fixnum())
+        && let Some(result) = Value::fixnum(x - y)
+    {
+        return Ok(result);
     }
     if let (Some(x), Some(y)) = (a.as_double(), b.as_double()) {
         return vm.float_value("-", x - y);
     }
+    if let (Some(x), Some(y)) = (Operand::of(&vm.heap, a, &mut [0]), Operand::of(&vm.heap, b, &mut [0])) {
+        let (negative, limbs) = x.plus(&y.negated());
+        vm.charge(limbs.len());
+        return vm.limbs_value("-", negative, &limbs);
+    }
     match operands(vm, "-", a, b)? {
-        Pair::Ints(x, y) => {
-            vm.charge(x.len() + y.len());
-            vm.integer_value("-", &x.minus(&y))
-        }
+        Pair::Ints(x, y) => vm.integer_value("-", &x.minus(&y)),
         Pair::Ratios(x, y) => {
             check_sum(vm, &x, &y)?;
             vm.ratio_value("-", &x.plus(&y.negated()))
@@ -67,12 +76,21 @@ pub(crate) fn multiply(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     if let (Some(x), Some(y)) = (a.as_double(), b.as_double()) {
         return vm.float_value("*", x * y);
     }
-    match operands(vm, "*", a, b)? {
-        Pair::Ints(x, y) => {
-            vm.check_bits("*", (x.bits() + y.bits()).saturating_sub(1))?;
-            vm.check_work(x.len(), y.len())?;
-            vm.integer_value("*", &x.times(&y))
+    let sizes = Operand::of(&vm.heap, a, &mut [0])
+        .zip(Operand::of(&vm.heap, b, &mut [0]))
+        .map(|(x, y)| (x.bits() + y.bits(), x.len(), y.len()));
+    if let Some((bits, left, right)) = sizes {
+        vm.check_bits("*", bits.saturating_sub(1))?;
+        vm.check_work(left, right)?;
+        let product = Operand::of(&vm.heap, a, &mut [0])
+            .zip(Operand::of(&vm.heap, b, &mut [0]))
+            .and_then(|(x, y)| x.times(&y));
+        if let Some((negative, limbs)) = product {
+            return vm.limbs_value("*", negative, &limbs);
         }
+    }
+    match operands(vm, "*", a, b)? {
+        Pair::Ints(x, y) => vm.integer_value("*", &x.times(&y)),
         Pair::Ratios(x, y) => {
             check_ratios(vm, &x, &y)?;
             vm.ratio_value("*", &x.times(&y))

@@ -21,6 +21,15 @@ pub(crate) enum BitOperation {
 
 /// The integers joined bit by bit.
 pub(crate) fn join(vm: &mut Vm, operation: BitOperation, a: Value, b: Value) -> Outcome {
+    if let (Some(a), Some(b)) = (a.as_fixnum(), b.as_fixnum()) {
+        // Two's complement of fixnums is closed under all of these.
+        let joined = match operation {
+            BitOperation::And => a & b,
+            BitOperation::Or => a | b,
+            BitOperation::Xor => a ^ b,
+        };
+        return Ok(Value::fixnum(joined).unwrap_or(Value::NIL));
+    }
     let (a, b) = (vm.integer(a)?, vm.integer(b)?);
     vm.charge(a.len() + b.len());
     vm.integer_value("LOGAND", &a.joined(operation, &b))

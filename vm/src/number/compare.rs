@@ -59,6 +59,9 @@ pub(crate) fn sign(vm: &mut Vm, a: Value, expected: &'static str) -> Result<i32,
 
 /// As [`sign`]; nothing for what is no number.
 pub(crate) fn sign_of(heap: &Heap, a: Value) -> Option<i32> {
+    if let Some(n) = a.as_fixnum() {
+        return Some(n.signum() as i32);
+    }
     Some(match Number::of(heap, a)? {
         Number::Int(n) => n.signum(),
         Number::Ratio(r) => r.numerator.signum(),

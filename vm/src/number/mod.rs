@@ -35,6 +35,7 @@ pub(crate) mod elementary;
 pub(crate) mod float;
 pub(crate) mod gcd;
 mod integer;
+mod limbs;
 pub(crate) mod limit;
 pub(crate) mod power;
 pub(crate) mod random;
@@ -118,6 +119,12 @@ impl Vm {
         v: Value,
         expected: &'static str,
     ) -> Result<f64, Exit> {
+        if let Some(x) = v.as_double() {
+            return Ok(x);
+        }
+        if let Some(n) = v.as_fixnum() {
+            return Ok(n as f64);
+        }
         let x = match self.number(v, expected)? {
             Number::Float(x) => return Ok(x),
             Number::Int(n) => n.to_f64(),
@@ -131,9 +138,8 @@ impl Vm {
         if let Some(n) = n.as_fixnum().and_then(Value::fixnum) {
             return Ok(n);
         }
-        self.check_bits(op, n.bits())?;
         let (negative, limbs) = n.limbs();
-        Ok(self.heap.alloc_bignum(negative, &limbs)?)
+        self.limbs_value(op, negative, &limbs)
     }
 
     /// The quotient of two integers in lowest terms, `denominator` above zero, as the value of operation `op`.

@@ -131,6 +131,11 @@ fn small(rounding: Rounding, a: Value, b: Value) -> Option<(Int, Int)> {
 }
 
 fn division(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Result<Division, Exit> {
+    if let Some(x) = a.as_double()
+        && let Some(y) = b.as_double().or_else(|| b.as_fixnum().map(|n| n as f64))
+    {
+        return float_division(vm, rounding, [a, b], x, y);
+    }
     match typed_operands(vm, "/", a, b, "REAL")? {
         Pair::Ints(_, y) if y.is_zero() => vm.raise(Raised::DivisionByZero("/", [a, b])),
         Pair::Ints(x, y) => {

@@ -1,0 +1,172 @@
+//! Sums, differences and products of magnitudes as the heap keeps them: limbs of 64 bits, least first.
+//!
+//! What programs do with big integers is mostly a sum or a product with something small; here that takes no detour over
+//! another representation and no allocation of the host. Products of two long numbers are left to `num-bigint`, which
+//! knows better ways than the one from school.
+
+use smallvec::SmallVec;
+
+use crate::heap::Heap;
+use crate::raise::Outcome;
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// Limbs of a result; up to this many stay on the native stack.
+pub(crate) type Limbs = SmallVec<[u64; 24]>;
+
+/// Products in which the shorter number has more limbs are for `num-bigint`.
+const SCHOOL_LIMBS: usize = 32;
+
+/// An integer in the heap, or a fixnum made to look like one.
+pub(crate) struct Operand<'a> {
+    negative: bool,
+    limbs: &'a [u64],
+}
+
+impl<'a> Operand<'a> {
+    /// The integer that `v` is, if it is one. `room` holds the limb of a fixnum.
+    #[inline]
+    pub(crate) fn of(heap: &'a Heap, v: Value, room: &'a mut [u64; 1]) -> Option<Operand<'a>> {
+        if let Some(n) = v.as_fixnum() {
+            room[0] = n.unsigned_abs();
+            return Some(Operand { negative: n < 0, limbs: if n == 0 { &[] } else { room } });
+        }
+        let big = heap.bignum(v)?;
+        Some(Operand { negative: big.negative, limbs: big.limbs })
+    }
+
+    /// Number of limbs, at least 1.
+    pub(crate) fn len(&self) -> usize {
+        self.limbs.len().max(1)
+    }
+
+    /// Bits of the magnitude.
+    pub(crate) fn bits(&self) -> u64 {
+        self.limbs.last().map_or(0, |last| 64 * self.limbs.len() as u64 - u64::from(last.leading_zeros()))
+    }
+
+    /// With the other sign.
+    pub(crate) fn negated(self) -> Operand<'a> {
+        Operand { negative: !self.negative, limbs: self.limbs }
+    }
+
+    /// The sum: whether it is negative, and its magnitude.
+    pub(crate) fn plus(&self, other: &Operand<'_>) -> (bool, Limbs) {
+        if self.negative == other.negative {
+            return (self.negative, sum(self.limbs, other.limbs));
+        }
+        if is_less(self.limbs, other.limbs) {
+            (other.negative, difference(other.limbs, self.limbs))
+        } else {
+            (self.negative, difference(self.limbs, other.limbs))
+        }
+    }
+
+    /// The product, unless both numbers are long: whether it is negative, and its magnitude.
+    pub(crate) fn times(&self, other: &Operand<'_>) -> Option<(bool, Limbs)> {
+        let (long, short) = if self.limbs.len() < other.limbs.len() { (other, self) } else { (self, other) };
+        if short.limbs.len() > SCHOOL_LIMBS {
+            return None;
+        }
+        Some((self.negative != other.negative, product(long.limbs, short.limbs)))
+    }
+}
+
+fn is_less(a: &[u64], b: &[u64]) -> bool {
+    a.len() < b.len() || a.len() == b.len() && a.iter().rev().lt(b.iter().rev())
+}
+
+fn sum(a: &[u64], b: &[u64]) -> Limbs {
+    let (long, short) = if a.len() < b.len() { (b, a) } else { (a, b) };
+    let mut result = Limbs::with_capacity(long.len() + 1);
+    let mut carry = false;
+    for (i, &limb) in long.iter().enumerate() {
+        let (partial, over) = limb.overflowing_add(short.get(i).copied().unwrap_or(0));
+        let (total, over_again) = partial.overflowing_add(u64::from(carry));
+        carry = over | over_again;
+        result.push(total);
+    }
+    if carry {
+        result.push(1);
+    }
+    result
+}
+
+/// `a - b`, where `a` is not less.
+fn difference(a: &[u64], b: &[u64]) -> Limbs {
+    let mut result = Limbs::with_capacity(a.len());
+    let mut borrow = false;
+    for (i, &limb) in a.iter().enumerate() {
+        let (partial, under) = limb.overflowing_sub(b.get(i).copied().unwrap_or(0));
+        let (total, under_again) = partial.overflowing_sub(u64::from(borrow));
+        borrow = under | under_again;
+        result.push(total);
+    }
+    debug_assert!(!borrow, "the first is not less");
+    result
+}
+
+fn product(long: &[u64], short: &[u64]) -> Limbs {
+    let mut result = Limbs::from_elem(0, long.len() + short.len());
+    for (offset, &factor) in short.iter().enumerate() {
+        let mut carry = 0;
+        for (slot, &limb) in result[offset..].iter_mut().zip(long) {
+            let total = u128::from(limb) * u128::from(factor) + u128::from(*slot) + u128::from(carry);
+            *slot = total as u64;
+            carry = (total >> 64) as u64;
+        }
+        result[offset + long.len()] = carry;
+    }
+    result
+}
+
+impl Vm {
+    /// The integer of this sign and magnitude as the value of operation `op`, which fails if it is too large.
+    pub(crate) fn limbs_value(&mut self, op: &'static str, negative: bool, limbs: &[u64]) -> Outcome {
+        let significant = limbs.iter().rposition(|&limb| limb != 0).map_or(0, |last| last + 1);
+        let limbs = &limbs[..significant];
+        match *limbs {
+            [] => return Ok(Value::small(0)),
+            [limb] if limb <= Value::FIXNUM_MIN.unsigned_abs() => {
+                let n = if negative { (limb as i64).wrapping_neg() } else { limb as i64 };
+                if let Some(n) = Value::fixnum(n) {
+                    return Ok(n);
+                }
+            }
+            [.., last] => self.check_bits(op, 64 * limbs.len() as u64 - u64::from(last.leading_zeros()))?,
+        }
+        Ok(self.heap.alloc_bignum(negative, limbs)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_bigint::BigUint;
+    use proptest::prelude::*;
+
+    fn magnitude() -> impl Strategy<Value = Vec<u64>> {
+        let limb = prop_oneof![Just(0), Just(1), Just(u64::MAX), any::<u64>()];
+        prop::collection::vec(limb, 0..40).prop_map(|mut limbs| {
+            while limbs.last() == Some(&0) {
+                limbs.pop();
+            }
+            limbs
+        })
+    }
+
+    fn big(limbs: &[u64]) -> BigUint {
+        BigUint::new(limbs.iter().flat_map(|&limb| [limb as u32, (limb >> 32) as u32]).collect())
+    }
+
+    proptest! {
+        #[test]
+        fn agrees_with_num_bigint(a in magnitude(), b in magnitude()) {
+            prop_assert_eq!(big(&sum(&a, &b)), big(&a) + big(&b));
+            let (high, low) = if is_less(&a, &b) { (&b, &a) } else { (&a, &b) };
+            prop_assert_eq!(is_less(&a, &b), big(&a) < big(&b));
+            prop_assert_eq!(big(&difference(high, low)), big(high) - big(low));
+            prop_assert_eq!(big(&product(&a, &b)), big(&a) * big(&b));
+        }
+    }
+}
