@@ -13,10 +13,10 @@ use esl_bytecode::compile::{Answer, Compilation, Compile, Environment, Step};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::link::join;
-use esl_bytecode::module::Module;
+use esl_bytecode::module::{Constant, Module};
 use esl_bytecode::span::SourceId;
 
-use crate::diagnostic::{Renderer, Sources};
+use crate::diagnostic::{Renderer, Sources, code};
 use crate::expand::print::print;
 use crate::expand::{Chunk, Event, Expander};
 use crate::lower::{SourceLines, lower};
@@ -192,6 +192,7 @@ impl Session {
     fn chunk(&mut self, chunk: Chunk, charge: &mut dyn FnMut(u64)) -> Option<Step> {
         let Chunk { core, purpose } = chunk;
         charge(core.nodes.len() as u64);
+        let span = core.nodes.first().map(|node| node.span).unwrap_or_default();
         if let (Some(listing), true) = (&mut self.listing, purpose.emit) {
             listing.push_str(&print(&core));
             listing.push_str("\n\n");
@@ -206,6 +207,15 @@ impl Session {
                 return None;
             }
         };
+        let is_file = matches!(self.input, Input::Text(_));
+        if is_file
+            && purpose.emit
+            && module.constants.iter().any(|constant| matches!(constant, Constant::Object(_)))
+        {
+            let message = "a macro has put an object that cannot be written to a file into this form";
+            let help = "have the macro return a form that makes the object when the program runs";
+            self.diagnostics.push(code::LITERAL_OBJECT.at(span, message).help(help));
+        }
         match (purpose.load, purpose.emit) {
             (true, true) => {
                 self.chunks.push(module.clone());

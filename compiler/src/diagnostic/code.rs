@@ -293,6 +293,11 @@ COMPILE_TIME_FAILURE = "compile-time-failure" Error
     fails: "(eval-when (:compile-toplevel :load-toplevel :execute)\n  (car 'table))\n"
     repaired: "(eval-when (:compile-toplevel :load-toplevel :execute)\n  (car '(table)))\n"
 
+LITERAL_OBJECT = "literal-object" Error
+    /// A form that a macro has made contains an object that cannot be written to a file, such as a function or a table.
+    fails: "(defmacro table ()\n  (make-hash-table))\n(print (hash-table-count (table)))\n"
+    repaired: "(defmacro table ()\n  '(make-hash-table))\n(print (hash-table-count (table)))\n"
+
 UNKNOWN_DECLARATION = "unknown-declaration" Warning
     /// A declaration that means nothing.
     fails: "(defun area (side)\n  (declare (ignorabel side))\n  0)\n"

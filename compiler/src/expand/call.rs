@@ -13,7 +13,7 @@ use super::lambda::{FunctionName, out_of_reach};
 use super::lambda_list::{Kind, LambdaList};
 use super::machine::{Job, Machine, To};
 use super::scope::{Function, Visible};
-use super::unit::{accepts, wrong_count};
+use super::unit::{Name, accepts, wrong_count};
 use crate::core::{Callee, NodeId, NodeKind};
 use crate::diagnostic::code;
 
@@ -81,6 +81,12 @@ impl Machine {
             return self.stop_for_form(function, &form, global.locked, to);
         }
         if self.inline(&global, &form, to) {
+            return Ok(());
+        }
+        if global.locked && global.instead.is_some() {
+            // What stands in it need not be forms: it is left out of the call, which fails in any case.
+            self.unit.note_call(Name::plain(&form.operator), None, form.span, form.span);
+            self.fill(to, NodeKind::Call(Callee::Global(form.operator.clone()), Vec::new()));
             return Ok(());
         }
         let named = form.datum.as_cons().map_or(&form.datum, |(head, _)| head);

@@ -4,6 +4,7 @@
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::{Environment, InternError};
 use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
@@ -16,7 +17,7 @@ use crate::core::{Callee, NodeKind};
 use crate::diagnostic::code;
 
 impl Machine {
-    /// Refuses to define `symbol` as a function or macro, globally or locally, if it belongs to the language.
+    /// Refuses to define `symbol` as a function or macro if it belongs to the language.
     pub(super) fn check_definable(
         &self,
         environment: &dyn Environment,
@@ -24,6 +25,21 @@ impl Machine {
         span: Span,
     ) -> Checked {
         if environment.global(symbol).locked { Err(locked(symbol, span)) } else { Ok(()) }
+    }
+
+    /// As [`Machine::check_definable`] for a local definition, which may also come from a macro of the library.
+    pub(super) fn check_locally_definable(
+        &self,
+        environment: &dyn Environment,
+        symbol: &Symbol,
+        span: Span,
+        origin: Option<u32>,
+    ) -> Checked {
+        if self.is_of_library(span, origin) {
+            Ok(())
+        } else {
+            self.check_definable(environment, symbol, span)
+        }
     }
 
     /// Refuses calls of the functions that define, if what they define belongs to the language.
@@ -47,7 +63,7 @@ impl Machine {
     }
 }
 
-fn locked(symbol: &Symbol, span: Span) -> Box<esl_bytecode::diagnostic::Diagnostic> {
+fn locked(symbol: &Symbol, span: Span) -> Box<Diagnostic> {
     let message = format!("{} belongs to the language and cannot be defined", name(symbol));
     Box::new(code::LOCKED_NAME.at(span, message).help("choose another name"))
 }
@@ -108,8 +124,8 @@ pub(super) fn defmacro(
     to: To,
 ) -> Checked {
     let symbol = form.symbol(0, "needs a name and a lambda list")?;
-    machine.note_macro(&symbol);
     machine.check_definable(environment, &symbol, form.at(form.args[0].span()))?;
+    machine.note_macro(&symbol);
     form.takes(2..=usize::MAX, "needs a name and a lambda list")?;
     // The definition keeps the place where it was written, so that its unused variables are reported.
     let make = Make(form.datum.span());
@@ -185,6 +201,30 @@ pub(super) fn package_change(environment: &mut dyn Environment, form: &Form) -> 
 fn always(make: Make) -> Datum {
     let situations = ["COMPILE-TOPLEVEL", "LOAD-TOPLEVEL", "EXECUTE"];
     make.items(situations.map(|situation| make.symbol(&Symbol::keyword(situation))))
+}
+
+/// `(%compiler-warning code message where . body)`: the body; reports a warning, of a code in the table of codes, at the
+/// place where the datum `where` was written.
+pub(super) fn compiler_warning(
+    machine: &mut Machine,
+    _: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
+    let [named, message, place, body @ ..] = form.args.as_slice() else {
+        return Err(form.malformed("takes a code, a message, a datum and forms"));
+    };
+    let (DatumKind::String(named), DatumKind::String(message)) = (named.kind(), message.kind()) else {
+        return Err(form.malformed("needs strings as code and message"));
+    };
+    let Some(code) = code::find(named) else {
+        return Err(form.malformed(&format!("knows no code {named}")));
+    };
+    let span = form.at(place.span());
+    machine.report(Diagnostic::warning(code.name, message.to_string(), span), None);
+    let jobs = machine.body(body.to_vec(), to);
+    machine.schedule(jobs);
+    Ok(())
 }
 
 /// `(load-time-value form [read-only])`: a chunk of its own, which runs before the one around it, sets a variable that

@@ -1,7 +1,7 @@
 //! `%handler-case`, on which the library builds `handler-case`.
 
 use esl_bytecode::compile::Environment;
-use esl_bytecode::datum::Datum;
+use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::symbol::Symbol;
 
 use super::form::{Checked, Form, Make, fresh};
@@ -27,6 +27,11 @@ pub(super) fn handler_case(
         let [condition_type, variables, body @ ..] = parts.as_slice() else {
             return Err(form.malformed_at(clause.span(), shape));
         };
+        if !matches!(condition_type.kind(), DatumKind::Symbol(_) | DatumKind::Cons(..) | DatumKind::Nil) {
+            return Err(
+                form.malformed_at(condition_type.span(), "needs a type at the beginning of each clause")
+            );
+        }
         let variables = variables.as_list();
         let bound: Option<Datum> = match variables.as_deref() {
             Some([]) => None,

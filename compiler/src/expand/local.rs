@@ -20,7 +20,12 @@ struct Definition {
     body: Vec<Datum>,
 }
 
-fn definitions(machine: &Machine, environment: &dyn Environment, form: &Form) -> Checked<Vec<Definition>> {
+fn definitions(
+    machine: &Machine,
+    environment: &dyn Environment,
+    form: &Form,
+    origin: Option<u32>,
+) -> Checked<Vec<Definition>> {
     let shape = "needs a list of definitions, such as `((f (x) (* x x)))`";
     let Some(items) = form.args.first().and_then(Datum::as_list) else {
         return Err(form.malformed(shape));
@@ -38,7 +43,8 @@ fn definitions(machine: &Machine, environment: &dyn Environment, form: &Form) ->
             return Err(form.malformed_at(item.span(), &what));
         };
         if !name.name.is_setf {
-            machine.check_definable(environment, &name.cell, form.at(head.span()))?;
+            let span = form.at(head.span());
+            machine.check_locally_definable(environment, &name.cell, span, origin)?;
         }
         let body = parts[1..].iter().map(|&part| part.clone()).collect();
         definitions.push(Definition { name, lambda_list: parts[0].clone(), body });
@@ -73,7 +79,7 @@ fn local_functions(
 ) -> Checked {
     let make = Make(to.span);
     let mut texts: Vec<(FunctionName, LambdaText)> = Vec::new();
-    for Definition { name, lambda_list, body } in definitions(machine, environment, form)? {
+    for Definition { name, lambda_list, body } in definitions(machine, environment, form, to.origin)? {
         let shown = make.items([make.symbol(&form.operator), name.datum.clone()]);
         let parts = Parts { name: Some(&shown), block: Some(&name.block()), list: &lambda_list, body: &body };
         let text = machine.lambda_text(environment, parts, form, to.origin)?;
@@ -122,7 +128,7 @@ pub(super) fn local_macros(
     let make = Make(to.span);
     let mut jobs = Vec::new();
     let mut names = Vec::new();
-    for Definition { name, lambda_list, body } in definitions(machine, environment, form)? {
+    for Definition { name, lambda_list, body } in definitions(machine, environment, form, to.origin)? {
         if name.name.is_setf {
             return Err(form.malformed_at(name.datum.span(), "needs a symbol as the name of a macro"));
         }

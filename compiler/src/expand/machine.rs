@@ -618,6 +618,12 @@ impl Machine {
         if is_made { Span::default() } else { span }
     }
 
+    /// Whether a form at `span` was made by a macro that belongs to the language.
+    pub(super) fn is_of_library(&self, span: Span, origin: Option<u32>) -> bool {
+        let is_made = !is_known(self.written(span, origin));
+        is_made && origin.is_some_and(|index| self.origins[index as usize].is_standard)
+    }
+
     /// The findings so far.
     pub(super) fn take_diagnostics(&mut self) -> Vec<Diagnostic> {
         std::mem::take(&mut self.diagnostics)

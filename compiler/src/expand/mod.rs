@@ -18,6 +18,7 @@
 //! | `(%handler-case form (type ([variable]) . body)*)` | unwinds to here and runs a body when a condition of the type is signalled |
 //! | `(%with-handlers list . body)` | runs the body with the list of `(type . function)` as handlers |
 //! | `(%with-mask height . body)` | runs the body with control entries from that height on masked |
+//! | `(%compiler-warning code message where . body)` | the body; warns, under a code of the table in `diagnostic/code.rs`, at the place of the datum `where` (not evaluated) |
 //! | `(%backquote template)`, `(%unquote form)`, `(%unquote-splicing form)` | what the reader makes of `` ` ``, `,` and `,@` |
 //!
 //! Calls of the functions `(%slot 'class index instance)`, `(%set-slot 'class index instance value)` and

@@ -82,7 +82,7 @@ impl Machine {
             }
             PlaceUse::Setf(value) => self.sound(1).map(|places| places[0].set(value)),
             PlaceUse::Psetf(values) => {
-                self.sound(values.len()).map(|places| store_all(&places, &values, None, make))
+                self.sound(values.len()).map(|places| store_all(&places, values, make))
             }
             PlaceUse::Rotatef(count) => self.sound(count).map(|places| rotate(&places, make)),
             PlaceUse::Shiftf(count, value) => {
@@ -179,65 +179,78 @@ fn is_inert(form: &Datum) -> bool {
     is_constant(form) || is_cl_form(form, "FUNCTION") || is_cl_form(form, "LAMBDA")
 }
 
-/// Binds all temporaries and values in order, then stores the values, then gives `result`.
-fn store_all(places: &[Place], values: &[Datum], result: Option<Datum>, make: Make) -> Datum {
-    let mut body: Vec<Datum> = places.iter().map(Place::write_stores).collect();
-    body.push(result.unwrap_or_else(|| make.nil()));
+/// Variables to be bound to the values of a form, after other bindings.
+struct Step<'a> {
+    before: Vec<(Datum, Datum)>,
+    stores: &'a [Datum],
+    value: Datum,
+}
+
+/// Binds all variables in order around a body.
+fn bind_in_order(steps: Vec<Step<'_>>, mut body: Vec<Datum>, make: Make) -> Datum {
     let mut bindings: Vec<(Datum, Datum)> = Vec::new();
-    // From the last place to the first, so that a place with several values can enclose those after it.
-    for (place, value) in places.iter().zip(values).rev() {
-        if let [store] = place.stores.as_slice() {
-            let own = place.temporaries.iter().cloned().chain([(store.clone(), value.clone())]);
-            bindings.splice(0..0, own);
+    // From the last step to the first, so that one with several values can enclose those after it.
+    for Step { before, stores, value } in steps.into_iter().rev() {
+        if let [store] = stores {
+            bindings.splice(0..0, before.into_iter().chain([(store.clone(), value)]));
         } else {
             let inside = make.let_in_order(std::mem::take(&mut bindings), std::mem::take(&mut body));
-            let stores = make.items(place.stores.iter().cloned());
-            body = vec![make.cl("MULTIPLE-VALUE-BIND", [stores, value.clone(), inside])];
-            bindings = place.temporaries.clone();
+            body = vec![make.cl("MULTIPLE-VALUE-BIND", [make.items(stores.iter().cloned()), value, inside])];
+            bindings = before;
         }
     }
     make.let_in_order(bindings, body)
 }
 
-/// All subforms, then the values read in order, then stored one place on.
+/// All subforms and values in order, then the values stored.
+fn store_all(places: &[Place], values: Vec<Datum>, make: Make) -> Datum {
+    let steps = places.iter().zip(values).map(|(place, value)| Step {
+        before: place.temporaries.clone(),
+        stores: &place.stores,
+        value,
+    });
+    let body = places.iter().map(Place::write_stores).chain([make.nil()]);
+    bind_in_order(steps.collect(), body.collect(), make)
+}
+
+/// All subforms, then the values read in order, each for the place before its own, then stored.
 fn rotate(places: &[Place], make: Make) -> Datum {
-    let temporaries: Vec<(Datum, Datum)> =
-        places.iter().flat_map(|place| place.temporaries.iter().cloned()).collect();
-    let mut body: Vec<Datum> = places.iter().map(Place::write_stores).collect();
-    body.push(make.nil());
-    // The place before each takes its value; the last takes the first one's, which is read first.
-    let mut inside = make.progn(body);
-    for (index, place) in places.iter().enumerate().rev() {
-        let taker = &places[(index + places.len() - 1) % places.len()];
-        inside = bind_stores(taker, place.reader.clone(), inside, make);
-    }
-    make.let_in_order(temporaries, vec![inside])
+    let takers = places.iter().cycle().skip(places.len() - 1);
+    let steps = places.iter().zip(takers).map(|(place, taker)| Step {
+        before: Vec::new(),
+        stores: &taker.stores,
+        value: place.reader.clone(),
+    });
+    let mut steps: Vec<Step<'_>> = steps.collect();
+    steps[0].before = temporaries(places);
+    let body = places.iter().map(Place::write_stores).chain([make.nil()]);
+    bind_in_order(steps, body.collect(), make)
 }
 
-/// As [`rotate`], the last place taking the value of a form, and the first one's old value the result.
+/// As [`rotate`], but the last place takes the value of a form, and the old value of the first one is the result.
 fn shift(places: &[Place], value: Datum, old: Datum, make: Make) -> Datum {
-    let temporaries: Vec<(Datum, Datum)> =
-        places.iter().flat_map(|place| place.temporaries.iter().cloned()).collect();
-    let Some((first, others)) = places.split_first() else { return value };
+    let [first, others @ ..] = places else { return value };
     let is_single = first.stores.len() == 1;
-    let mut body: Vec<Datum> = places.iter().map(Place::write_stores).collect();
-    body.push(if is_single { old.clone() } else { make.call_cl("VALUES-LIST", [old.clone()]) });
-    let mut inside = make.progn(body);
-    let readers: Vec<Datum> = others.iter().map(|place| place.reader.clone()).chain([value]).collect();
-    for (taker, value) in places.iter().zip(readers).rev() {
-        inside = bind_stores(taker, value, inside, make);
-    }
     let reader = first.reader.clone();
-    let kept = if is_single { reader } else { make.cl("MULTIPLE-VALUE-LIST", [reader]) };
-    let bindings = temporaries.into_iter().chain([(old, kept)]).collect();
-    make.let_in_order(bindings, vec![inside])
+    let (kept, result) = if is_single {
+        (reader, old.clone())
+    } else {
+        (make.cl("MULTIPLE-VALUE-LIST", [reader]), make.call_cl("VALUES-LIST", [old.clone()]))
+    };
+    let olds = [old];
+    let mut steps = vec![Step { before: temporaries(places), stores: &olds, value: kept }];
+    let values = others.iter().map(|place| place.reader.clone()).chain([value]);
+    steps.extend(places.iter().zip(values).map(|(taker, value)| Step {
+        before: Vec::new(),
+        stores: &taker.stores,
+        value,
+    }));
+    let body = places.iter().map(Place::write_stores).chain([result]);
+    bind_in_order(steps, body.collect(), make)
 }
 
-fn bind_stores(place: &Place, value: Datum, inside: Datum, make: Make) -> Datum {
-    match place.stores.as_slice() {
-        [store] => make.let_in_order(vec![(store.clone(), value)], vec![inside]),
-        stores => make.cl("MULTIPLE-VALUE-BIND", [make.items(stores.iter().cloned()), value, inside]),
-    }
+fn temporaries(places: &[Place]) -> Vec<(Datum, Datum)> {
+    places.iter().flat_map(|place| place.temporaries.iter().cloned()).collect()
 }
 
 /// `(setf {place form}*)`

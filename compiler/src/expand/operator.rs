@@ -80,6 +80,7 @@ const INTERNAL: &[(&str, Operator)] = &[
     ("%APPLY-GLOBAL", call::apply_global),
     ("%BACKQUOTE", backquote::backquote),
     ("%CALL-GLOBAL", call::call_global),
+    ("%COMPILER-WARNING", define::compiler_warning),
     ("%HANDLER-CASE", handler::handler_case),
     ("%MACRO-LAMBDA", destructure::macro_lambda),
     ("%MODIFY", modify::modify),

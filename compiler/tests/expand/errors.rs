@@ -248,6 +248,26 @@ fn calls_of_what_failed_to_be_defined_are_not_blamed() {
 }
 
 #[test]
+fn what_stands_in_a_call_of_something_left_out_is_not_looked_at() {
+    let mut host = FakeHost::new();
+    let open_file = host.symbol("open-file");
+    host.globals.entry(open_file).or_default().locked = true;
+    let (_, found) = crate::expand_file(&mut host, "(open-file ((stream 5) . x) (read-line stream))");
+    let codes: Vec<&str> = found.iter().map(|finding| finding.code).collect();
+    assert_eq!(codes, ["not-in-subset"]);
+}
+
+#[test]
+fn macros_can_have_the_compiler_warn() {
+    let mut host = FakeHost::new();
+    host.define_macro("doubtful", "(esl::%compiler-warning \"unreachable-code\" \"so it is\" #1 #1)");
+    let found = findings(&mut host, "(print (doubtful (f 1)))");
+    let expected = "warning[unreachable-code]: so it is\n --> test.esl:1:18\n";
+    assert!(found.starts_with(expected), "{found}");
+    assert_eq!(codes("(esl::%compiler-warning \"no-such-code\" \"text\" nil)"), ["malformed-form"]);
+}
+
+#[test]
 fn names_of_the_language_cannot_be_defined() {
     for form in [
         "(defun car (x) x)",
@@ -261,4 +281,14 @@ fn names_of_the_language_cannot_be_defined() {
         assert!(found.starts_with("error[locked-name]"), "{form}: {found}");
     }
     assert_eq!(codes("(let ((car 1)) car)"), [""; 0]);
+    // Macros of the language may, around what they are given.
+    let mut host = FakeHost::locked();
+    host.define_macro("with-car", "(flet ((car (x) x)) #1)");
+    let with_car = host.symbol("with-car");
+    host.globals.entry(with_car).or_default().locked = true;
+    assert_eq!(findings(&mut host, "(with-car (car 1))"), "");
+    let with_own = host.symbol("with-own");
+    host.define_macro("with-own", "(flet ((car (x) x)) #1)");
+    assert!(!host.globals[&with_own].locked);
+    assert!(findings(&mut host, "(with-own (car 1))").starts_with("error[locked-name]"));
 }
