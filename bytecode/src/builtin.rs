@@ -318,6 +318,8 @@ define_builtins! {
     Numerator = cl "NUMERATOR" ("rational");
     /// What is below the line in lowest terms; 1 for an integer.
     Denominator = cl "DENOMINATOR" ("rational");
+    /// The ratio of two integers that have no divisor in common; the second is above 1.
+    MakeRatio = internal "%MAKE-RATIO" ("numerator denominator");
     /// The rational of exactly this value.
     Rational = cl "RATIONAL" ("number");
     /// The simplest rational that reads as this float.

@@ -166,6 +166,7 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::Atanh => float::atanh,
         Builtin::Numerator => float::numerator,
         Builtin::Denominator => float::denominator,
+        Builtin::MakeRatio => library::make_ratio,
         Builtin::Rational => float::rational,
         Builtin::Rationalize => float::rationalize,
         Builtin::Float => float::to_float,
@@ -490,6 +491,7 @@ pub(crate) mod eval;
 mod expect;
 mod float;
 mod integer;
+mod library;
 mod list;
 mod lookup;
 mod number;
