@@ -10,9 +10,10 @@ use esl_bytecode::symbol::Symbol;
 
 use super::body::Body;
 use super::call::quoted_symbol;
+use super::chunk::Purpose;
 use super::form::{Checked, Form, Make, fresh, name, quoted};
 use super::lambda::{FunctionName, Parts};
-use super::machine::{Job, Machine, Purpose, To};
+use super::machine::{Job, Machine, To};
 use crate::core::{Callee, NodeKind};
 use crate::diagnostic::code;
 

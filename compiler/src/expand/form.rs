@@ -25,6 +25,31 @@ pub(super) struct Form {
 }
 
 impl Form {
+    /// Takes a compound form apart. `span` is where it, or the form around it, was written.
+    pub(super) fn of(datum: &Datum, span: Span) -> Checked<Form> {
+        let malformed = |what: String| Box::new(code::MALFORMED_FORM.at(span, what));
+        let Some((head, rest)) = datum.as_cons() else {
+            return Err(malformed(format!("{} is no compound form", quoted(datum))));
+        };
+        // A call of a `lambda` expression goes by the name of that.
+        let operator = match head.as_symbol() {
+            Some(symbol) => symbol.clone(),
+            None if super::form::is_cl_form(head, "LAMBDA") => Symbol::cl("LAMBDA"),
+            None => {
+                let message =
+                    format!("a form begins with the name of an operator, not with {}", quoted(head));
+                return Err(malformed(message));
+            }
+        };
+        match rest.as_list() {
+            Some(args) => {
+                let args = args.into_iter().cloned().collect();
+                Ok(Form { datum: datum.clone(), operator, args, span })
+            }
+            None => Err(malformed(format!("{} ends in a dot and something that is no list", quoted(datum)))),
+        }
+    }
+
     /// A diagnostic about this form: its operator, then what is wrong.
     pub(super) fn malformed(&self, what: &str) -> Box<Diagnostic> {
         self.malformed_at(self.span, what)

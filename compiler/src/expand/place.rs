@@ -5,9 +5,9 @@
 //! form that reads the old value. [`Job::Place`] finds the parts of one place, expanding macros as needed, and leaves
 //! them on the machine's list of places; [`super::modify`] makes forms of them.
 //!
-//! How a call `(f …)` is set is looked for in this order: local functions and macros; the forms known here; accessors
-//! of structures; the property `%setf` of `f`, which `defsetf` and its like record; a builtin `%set-f` that takes the
-//! new value last; a macro `f`; and at last the function `(setf f)`, which takes the new value first.
+//! How a call `(f …)` is set is looked for in this order: local functions and macros; the forms of [`super::standard_place`];
+//! accessors of structures; the property `%setf` of `f`, which `defsetf` and its like record; a builtin `%set-f` that
+//! takes the new value last; a macro `f`; and at last the function `(setf f)`, which takes the new value first.
 
 use esl_bytecode::compile::{Accessor, Environment, GlobalFunction, MacroRef};
 use esl_bytecode::datum::{Datum, DatumKind};
@@ -15,17 +15,16 @@ use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{CL_PACKAGE, Symbol};
 
-use super::form::{Checked, Form, Make, is_cl_form, is_constant, name, quoted};
+use super::form::{Checked, Form, Make, is_constant, name, quoted};
 use super::lambda::{FunctionName, out_of_reach};
 use super::machine::{Job, Machine, To};
-use super::modify::PlaceUse;
 use super::scope::{Function, Variable, Visible};
 use super::variable::Meaning;
 use crate::diagnostic::code;
 
 /// How the new value is stored.
 #[derive(Clone, Debug)]
-enum Writer {
+pub(super) enum Writer {
     /// By the form `(before… value after…)`.
     Call(Vec<Datum>, Vec<Datum>),
     /// By this form, within which the variables for the new values are bound.
@@ -39,14 +38,14 @@ pub(super) struct Place {
     pub(super) temporaries: Vec<(Datum, Datum)>,
     /// Variables for the new values.
     pub(super) stores: Vec<Datum>,
-    writer: Writer,
+    pub(super) writer: Writer,
     /// The form that reads the old value.
     pub(super) reader: Datum,
     /// Whether the writer takes the temporaries in order and the value after them.
-    is_direct: bool,
+    pub(super) is_direct: bool,
     /// Whether something was wrong with it, which has been reported.
     pub(super) is_broken: bool,
-    make: Make,
+    pub(super) make: Make,
 }
 
 impl Place {
@@ -64,7 +63,7 @@ impl Place {
         }
     }
 
-    fn new(make: Make, stores: Vec<Datum>, writer: Writer, reader: Datum) -> Place {
+    pub(super) fn new(make: Make, stores: Vec<Datum>, writer: Writer, reader: Datum) -> Place {
         Place { temporaries: Vec::new(), stores, writer, reader, is_direct: false, is_broken: false, make }
     }
 
@@ -252,7 +251,7 @@ impl Machine {
     }
 
     /// A place that is set by the form `(prefix… argument… value)`, which takes only the first `taken` arguments.
-    fn update_place(
+    pub(super) fn update_place(
         &mut self,
         environment: &mut dyn Environment,
         prefix: Vec<Datum>,
@@ -292,101 +291,6 @@ impl Machine {
         Ok(())
     }
 
-    /// The places of the standard that are more than an update function.
-    fn standard_place(&mut self, environment: &mut dyn Environment, form: &Form, to: To) -> Option<Checked> {
-        let make = Make(to.span);
-        if let Some(simpler) = simpler(form, make) {
-            self.schedule([Job::Place(simpler, to)]);
-            return Some(Ok(()));
-        }
-        let args = form.args.as_slice();
-        match (form.operator.name(), args) {
-            ("THE", [_, place]) => self.schedule([Job::Place(place.clone(), to)]),
-            ("VALUES", places) => {
-                let mut jobs: Vec<Job> = places.iter().map(|place| Job::Place(place.clone(), to)).collect();
-                jobs.push(Job::Use(Box::new(PlaceUse::Values(places.len())), to));
-                self.schedule(jobs);
-            }
-            ("GETF", [place, _] | [place, _, _]) => {
-                let usage = PlaceUse::Getf(form.clone());
-                self.schedule([Job::Place(place.clone(), to), Job::Use(Box::new(usage), to)]);
-            }
-            ("LDB" | "MASK-FIELD", [_, place]) => {
-                let usage = PlaceUse::Field(form.clone());
-                self.schedule([Job::Place(place.clone(), to), Job::Use(Box::new(usage), to)]);
-            }
-            ("GETHASH" | "GET", [_, _, _]) => match update_of(environment, &form.operator) {
-                Some(Update::Function(update)) => {
-                    let prefix = vec![make.symbol(&Symbol::esl("%CALL-GLOBAL")), make.symbol(&update)];
-                    self.update_place(environment, prefix, form.clone(), 2, to);
-                }
-                Some(Update::Operator(update)) => {
-                    self.update_place(environment, vec![make.symbol(&update)], form.clone(), 2, to);
-                }
-                _ => return None,
-            },
-            ("SUBSEQ", [_, _] | [_, _, _]) => {
-                let (temporaries, args) = arguments(environment, args, make);
-                let store = make.fresh(environment, "NEW");
-                let keyword = |name| make.symbol(&Symbol::keyword(name));
-                let mut replace = vec![args[0].clone(), store.clone(), keyword("START1"), args[1].clone()];
-                if let Some(end) = args.get(2) {
-                    replace.extend([keyword("END1"), end.clone()]);
-                }
-                let writer = Writer::Form(make.progn(vec![make.call_cl("REPLACE", replace), store.clone()]));
-                let place = Place::new(make, vec![store], writer, reader(form, args, make));
-                self.places.push(Place { temporaries, ..place });
-            }
-            ("APPLY", [function, rest @ ..]) if !rest.is_empty() => {
-                return Some(self.apply_place(environment, form, function, rest, to));
-            }
-            ("THE" | "GETF" | "LDB" | "MASK-FIELD" | "SUBSEQ" | "APPLY", _) => {
-                return Some(Err(no_place(&form.datum, to.span)));
-            }
-            _ => return None,
-        }
-        Some(Ok(()))
-    }
-
-    /// `(apply #'f argument… list)` as a place.
-    fn apply_place(
-        &mut self,
-        environment: &mut dyn Environment,
-        form: &Form,
-        function: &Datum,
-        rest: &[Datum],
-        to: To,
-    ) -> Checked {
-        let make = Make(to.span);
-        let named = super::form::arguments(function).unwrap_or_default();
-        let symbol = match named.as_slice() {
-            [named] if is_cl_form(function, "FUNCTION") => named.as_symbol(),
-            _ => None,
-        };
-        let Some(symbol) = symbol else {
-            return Err(form.malformed_at(function.span(), "can be set only if it applies `#'name`"));
-        };
-        let (temporaries, mut args) = arguments(environment, rest, make);
-        let store = make.fresh(environment, "NEW");
-        let reader = make.cl("APPLY", std::iter::once(function.clone()).chain(args.iter().cloned()));
-        let is_local = !matches!(self.scope.function(symbol, self.level()), Visible::No);
-        let writer = match update_of(environment, symbol) {
-            Some(Update::Function(update)) if !is_local => {
-                let last = args.pop().expect("apply has a list");
-                let list = make.call_cl("APPEND", [last, make.call_cl("LIST", [store.clone()])]);
-                let call = std::iter::once(make.symbol(&update)).chain(args).chain([list]);
-                Writer::Form(make.esl("%APPLY-GLOBAL", call))
-            }
-            _ => {
-                let setter = make.cl("FUNCTION", [make.cl("SETF", [make.symbol(symbol)])]);
-                Writer::Call(vec![make.symbol(&Symbol::cl("APPLY")), setter], args)
-            }
-        };
-        let place = Place::new(make, vec![store], writer, reader);
-        self.places.push(Place { temporaries, ..place });
-        Ok(())
-    }
-
     /// Takes the newest place.
     pub(super) fn take_place(&mut self) -> Place {
         self.places.pop().expect("a place was found for each use")
@@ -396,86 +300,10 @@ impl Machine {
     pub(super) fn take_places(&mut self, count: usize) -> Vec<Place> {
         self.places.split_off(self.places.len() - count)
     }
-
-    /// Makes one place of several: `(values place…)`.
-    pub(super) fn values_place(&mut self, environment: &mut dyn Environment, count: usize, to: To) {
-        let make = Make(to.span);
-        let mut temporaries = Vec::new();
-        let (mut stores, mut writers, mut readers) = (Vec::new(), Vec::new(), Vec::new());
-        let mut is_broken = false;
-        for place in self.take_places(count) {
-            is_broken |= place.is_broken;
-            let store = make.fresh(environment, "NEW");
-            // One value goes to each place; what takes several gets `NIL` for the others.
-            writers.push(place.write(match place.stores.len() {
-                1 => store.clone(),
-                _ => make.cl("VALUES", [store.clone()]),
-            }));
-            stores.push(store);
-            readers.push(place.reader);
-            temporaries.extend(place.temporaries);
-        }
-        let writer = Writer::Form(make.cl("VALUES", writers));
-        let place = Place::new(make, stores, writer, make.cl("VALUES", readers));
-        self.places.push(Place { temporaries, is_broken, ..place });
-    }
-
-    /// Makes the place `(getf inner indicator [default])` of the newest place.
-    pub(super) fn getf_place(&mut self, environment: &mut dyn Environment, form: &Form, to: To) {
-        let make = Make(to.span);
-        let inner = self.take_place();
-        let (temporaries, args) = arguments(environment, &form.args[1..], make);
-        let store = make.fresh(environment, "NEW");
-        let put = make.call_esl("%PUTF", [inner.reader.clone(), args[0].clone(), store.clone()]);
-        let get = make.call_cl("GETF", std::iter::once(inner.reader.clone()).chain(args));
-        self.inner_place(
-            inner,
-            store,
-            put,
-            get,
-            |inner| inner.into_iter().chain(temporaries).collect(),
-            make,
-        );
-    }
-
-    /// Makes the place `(ldb bytes inner)` or `(mask-field bytes inner)` of the newest place.
-    pub(super) fn field_place(&mut self, environment: &mut dyn Environment, form: &Form, to: To) {
-        let make = Make(to.span);
-        let inner = self.take_place();
-        let (temporaries, args) = arguments(environment, &form.args[..1], make);
-        let store = make.fresh(environment, "NEW");
-        let deposit = if form.operator.is_cl("LDB") { "DPB" } else { "DEPOSIT-FIELD" };
-        let put = make.call_cl(deposit, [store.clone(), args[0].clone(), inner.reader.clone()]);
-        let get = make.call(&form.operator, [args[0].clone(), inner.reader.clone()]);
-        self.inner_place(
-            inner,
-            store,
-            put,
-            get,
-            |inner| temporaries.into_iter().chain(inner).collect(),
-            make,
-        );
-    }
-
-    /// A place within a place: storing `store` in it stores `put` in the inner one.
-    fn inner_place(
-        &mut self,
-        inner: Place,
-        store: Datum,
-        put: Datum,
-        get: Datum,
-        order: impl FnOnce(Vec<(Datum, Datum)>) -> Vec<(Datum, Datum)>,
-        make: Make,
-    ) {
-        let writer = Writer::Form(make.progn(vec![inner.write(put), store.clone()]));
-        let place = Place::new(make, vec![store], writer, get);
-        let is_broken = inner.is_broken;
-        self.places.push(Place { temporaries: order(inner.temporaries), is_broken, ..place });
-    }
 }
 
 /// Variables for the subforms of a place that are not constant, and the subforms with these in their place.
-fn arguments(
+pub(super) fn arguments(
     environment: &mut dyn Environment,
     args: &[Datum],
     make: Make,
@@ -495,12 +323,12 @@ fn arguments(
 }
 
 /// The form that reads the place: its own operator with the temporaries for arguments.
-fn reader(form: &Form, args: Vec<Datum>, make: Make) -> Datum {
+pub(super) fn reader(form: &Form, args: Vec<Datum>, make: Make) -> Datum {
     make.items(std::iter::once(make.symbol(&form.operator)).chain(args))
 }
 
 /// How the library says that a place is set.
-enum Update {
+pub(super) enum Update {
     /// By a global function that takes the new value last.
     Function(Symbol),
     /// By a macro that takes the new value last.
@@ -511,7 +339,7 @@ enum Update {
     Expander(Symbol),
 }
 
-fn update_of(environment: &dyn Environment, symbol: &Symbol) -> Option<Update> {
+pub(super) fn update_of(environment: &dyn Environment, symbol: &Symbol) -> Option<Update> {
     if let Some(recorded) = environment.property(symbol, &Symbol::esl("%SETF")) {
         if let Some(update) = recorded.as_symbol() {
             let is_macro = environment.global(update).function == GlobalFunction::Macro;
@@ -537,39 +365,7 @@ fn update_of(environment: &dyn Environment, symbol: &Symbol) -> Option<Update> {
     (is_standard && super::call::builtin(&update).is_some()).then_some(Update::Function(update))
 }
 
-/// The place `(car …)` or `(cdr …)` that a place is another name for.
-fn simpler(form: &Form, make: Make) -> Option<Datum> {
-    const ORDINALS: [&str; 10] =
-        ["FIRST", "SECOND", "THIRD", "FOURTH", "FIFTH", "SIXTH", "SEVENTH", "EIGHTH", "NINTH", "TENTH"];
-    let args = form.args.as_slice();
-    let operator = form.operator.name();
-    if let ("NTH", [index, list]) = (operator, args) {
-        return Some(make.cl("CAR", [make.call_cl("NTHCDR", [index.clone(), list.clone()])]));
-    }
-    let [list] = args else { return None };
-    let list = list.clone();
-    if operator == "REST" {
-        return Some(make.cl("CDR", [list]));
-    }
-    if let Some(index) = ORDINALS.iter().position(|ordinal| *ordinal == operator) {
-        let tail = match index {
-            0 => list,
-            1 => make.call_cl("CDR", [list]),
-            2 => make.call_cl("CDDR", [list]),
-            _ => make.call_cl("NTHCDR", [Datum::integer(index, make.0), list]),
-        };
-        return Some(make.cl("CAR", [tail]));
-    }
-    let path = operator.strip_prefix('C')?.strip_suffix('R')?;
-    if !(2..=4).contains(&path.len()) || path.bytes().any(|step| !matches!(step, b'A' | b'D')) {
-        return None;
-    }
-    let (last, before) = path.split_at(1);
-    let inner = make.call_cl(&format!("C{before}R"), [list]);
-    Some(make.cl(&format!("C{last}R"), [inner]))
-}
-
-fn no_place(datum: &Datum, span: Span) -> Box<Diagnostic> {
+pub(super) fn no_place(datum: &Datum, span: Span) -> Box<Diagnostic> {
     let message = format!("{} is no place that can be set", quoted(datum));
     Box::new(
         code::MALFORMED_FORM

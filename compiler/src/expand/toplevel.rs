@@ -12,8 +12,9 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
+use super::chunk::Purpose;
 use super::form::{Checked, Form, is_constant, is_known};
-use super::machine::{Job, Machine, Purpose, To};
+use super::machine::{Job, Machine, To};
 use super::scope::{Function, Visible};
 use crate::core::{LambdaId, NodeId};
 
