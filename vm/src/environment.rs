@@ -28,12 +28,8 @@ impl Environment for Vm {
         let is_locked = symbol.package().is_some_and(|home| is_of_language(home)) && !self.world.is_open;
         let Some(object) = self.object_for(symbol) else {
             return Global {
-                function: undefined_so_far(&self.world, symbol),
-                variable: if symbol.is_keyword() {
-                    GlobalVariable::Constant(Datum::symbol(symbol.clone(), Span::default()))
-                } else {
-                    GlobalVariable::Undefined
-                },
+                function: function_so_far(&self.world, symbol),
+                variable: variable_so_far(&self.world, symbol),
                 accessor: None,
                 locked: is_locked,
                 instead: self.instead_of(symbol),
@@ -58,8 +54,14 @@ impl Environment for Vm {
     }
 
     fn property(&self, symbol: &Symbol, indicator: &Symbol) -> Option<Datum> {
-        let indicator = self.value_for(indicator)?;
-        let value = property(&self.heap, self.object_for(symbol)?, indicator)?;
+        let Some(object) = self.object_for(symbol) else {
+            let (image, definition) = self.world.images.definition(symbol)?;
+            let wanted = (&**indicator.package()?, indicator.name());
+            let has_name = |index| self.world.images.symbol(image, index) == Some(wanted);
+            let &(_, value) = definition.properties.iter().find(|&&(indicator, _)| has_name(indicator))?;
+            return self.world.images.datum(image, value);
+        };
+        let value = property(&self.heap, object, self.value_for(indicator)?)?;
         let unit = &mut self.world.unit.borrow_mut();
         Some(unit.datum_or_object(&self.heap, &self.world, value, Span::default()))
     }
@@ -81,8 +83,8 @@ fn is_of_language(home: &str) -> bool {
     matches!(home, CL_PACKAGE | ESL_PACKAGE | KEYWORD_PACKAGE)
 }
 
-/// What a symbol names of which no object was made yet: a builtin, or something of the library.
-fn undefined_so_far(world: &World, symbol: &Symbol) -> GlobalFunction {
+/// What a symbol of which no object was made yet names as a function: a builtin, or something of the library.
+fn function_so_far(world: &World, symbol: &Symbol) -> GlobalFunction {
     if let Some((image, definition)) = world.images.definition(symbol) {
         if definition.macro_function.is_some() {
             return GlobalFunction::Macro;
@@ -95,6 +97,23 @@ fn undefined_so_far(world: &World, symbol: &Symbol) -> GlobalFunction {
     match find_builtin(symbol) {
         Some(builtin) => GlobalFunction::Function(Some(builtin.info().arity)),
         None => GlobalFunction::Undefined,
+    }
+}
+
+/// What such a symbol names as a variable.
+fn variable_so_far(world: &World, symbol: &Symbol) -> GlobalVariable {
+    if symbol.is_keyword() {
+        return GlobalVariable::Constant(Datum::symbol(symbol.clone(), Span::default()));
+    }
+    match world.images.definition(symbol) {
+        Some((image, definition)) if definition.is_constant => {
+            match definition.value.and_then(|value| world.images.datum(image, value)) {
+                Some(value) => GlobalVariable::Constant(value),
+                None => GlobalVariable::Special,
+            }
+        }
+        Some((_, definition)) if definition.is_special => GlobalVariable::Special,
+        _ => GlobalVariable::Undefined,
     }
 }
 

@@ -29,13 +29,18 @@ use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::World;
 
+mod data;
 mod debug;
 mod definitions;
 mod image;
+mod prepare;
 
 pub use debug::SourcePlace;
-pub use definitions::prepare;
-pub(crate) use image::{Images, function as image_function, open as open_image, origin as image_origin};
+pub(crate) use image::{
+    Images, constant as image_constant, function as image_function, open as open_image,
+    origin as image_origin,
+};
+pub use prepare::prepare;
 
 /// Says that a module has passed the verifier, or is part of this program.
 pub(crate) struct Verified(());

@@ -116,8 +116,13 @@ impl<'a> PoolIndexes<'a> {
         self.0.is_empty()
     }
 
+    /// The one with this position.
+    pub fn get(self, position: usize) -> Option<PoolIdx> {
+        self.0.get(position).map(|word| PoolIdx(u32::from_le_bytes(*word)))
+    }
+
     /// One after the other.
-    pub fn iter(self) -> impl ExactSizeIterator<Item = PoolIdx> + 'a {
+    pub fn iter(self) -> impl DoubleEndedIterator<Item = PoolIdx> + ExactSizeIterator + 'a {
         self.0.iter().map(|word| PoolIdx(u32::from_le_bytes(*word)))
     }
 }

@@ -8,7 +8,9 @@ use std::sync::Arc;
 use esl_bytecode::compile::{CompileTimeHost, LocalDefinition, MacroCall, MacroRef};
 use esl_bytecode::datum::{Datum, ObjectId};
 use esl_bytecode::file::ModuleImage;
-use esl_bytecode::module::Module;
+use esl_bytecode::module::{Constant, Function, FunctionNumber, Module, Parameters, PoolIdx};
+use esl_bytecode::opcode::Instr;
+use esl_bytecode::operand::*;
 
 use crate::datum::Unit;
 use crate::heap::AllocError;
@@ -104,27 +106,68 @@ impl Vm {
         Ok(Some([function, form, environment]))
     }
 
-    /// Runs the functions of a loaded module one after the other: the value of the last.
+    /// Runs the functions of a loaded module one after the other, in one task: the value of the last.
     ///
     /// # Errors
-    /// The text of the failure that ended one.
+    /// The text of the failure that ended it, or that it took more than `ticks`.
     pub fn run_toplevel(&mut self, functions: Value, ticks: u64) -> Result<Value, String> {
         self.pin(functions);
-        let mut value = Value::NIL;
-        let mut rest = functions;
-        let mut result = Ok(());
-        while let Some(pair) = self.heap.as_cons(rest) {
-            match self.call(pair.car, &[], ticks) {
-                Ok(values) => value = values.first().copied().unwrap_or(Value::NIL),
-                Err(failure) => {
-                    result = Err(failure);
-                    break;
-                }
-            }
-            rest = pair.cdr;
-        }
+        let values = self.runner().and_then(|runner| self.call(runner, &[functions], ticks));
         self.unpin(functions);
-        result.map(|()| value)
+        Ok(values?.first().copied().unwrap_or(Value::NIL))
+    }
+
+    /// The function that calls the functions of a list.
+    fn runner(&mut self) -> Result<Value, String> {
+        if self.world.runner.is_nil() {
+            let toplevel = self.load_module(&runner_module()).map_err(|error| error.to_string())?;
+            let toplevel = self.heap.car(toplevel).unwrap_or(Value::NIL);
+            let runner = self.call(toplevel, &[], LOAD_TICKS)?;
+            self.world.runner = runner.first().copied().unwrap_or(Value::NIL);
+        }
+        Ok(self.world.runner)
+    }
+}
+
+/// A module that gives a function that calls the functions of a list, and returns what the last one returned.
+fn runner_module() -> Module {
+    let function = |registers, constants: &[u32], code: &[Instr]| Function {
+        registers,
+        constants: constants.iter().map(|&index| PoolIdx(index)).collect(),
+        code: code
+            .iter()
+            .flat_map(|instruction| {
+                let (word, aux) = instruction.encode();
+                [word].into_iter().chain(aux)
+            })
+            .collect(),
+        ..Function::default()
+    };
+    let give = function(
+        1,
+        &[0],
+        &[Instr::LoadConst { dst: Dst(0), constant: ConstIdx(0) }, Instr::Return { src: Reg(0) }],
+    );
+    let mut run = function(
+        4,
+        &[],
+        &[
+            Instr::LoadNil { first: Base(1), count: Count(1) },
+            Instr::JumpIfNotCons { test: Reg(0), to: Jump16(6) },
+            Instr::Car { dst: Dst(2), list: Reg(0) },
+            Instr::Cdr { dst: Dst(0), list: Reg(0) },
+            Instr::Call { window: Base(2), count: Count(0), want: Want::ONE, pad: Pad(0) },
+            Instr::Move { dst: Dst(1), src: Reg(2) },
+            Instr::LoopIfCons { test: Reg(0), to: Back16(-6) },
+            Instr::Return { src: Reg(1) },
+        ],
+    );
+    run.parameters = Parameters::exactly(1);
+    Module {
+        constants: vec![Constant::Function(FunctionNumber(1))],
+        functions: vec![give, run],
+        toplevel: vec![FunctionNumber(0)],
+        ..Module::default()
     }
 }
 

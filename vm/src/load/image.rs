@@ -10,12 +10,13 @@
 
 use std::sync::Arc;
 
+use esl_bytecode::datum::Datum;
 use esl_bytecode::file::{ConstantRecord, ModuleImage, SymbolHome};
 use esl_bytecode::module::{Function, FunctionNumber, PoolIdx};
 use esl_bytecode::symbol::Symbol;
 
-use super::definitions::{Definition, Definitions};
-use super::{LoadError, Parts, Verified, character, debug, integer, make_code, own_constants, ratio};
+use super::definitions::{Definition, Definitions, name_of};
+use super::{LoadError, Parts, Verified, character, data, debug, integer, make_code, own_constants, ratio};
 use crate::heap::{AllocError, Heap};
 use crate::raise::Exit;
 use crate::shape::{Shape, Sort};
@@ -58,6 +59,24 @@ impl Images {
             Some((number, image.definitions.find(&image.module, &image.packages, symbol)?))
         };
         self.0.iter().enumerate().find_map(find)
+    }
+
+    /// The names that the newest image exports from `ESL`.
+    pub(crate) fn exports(&self) -> Vec<String> {
+        let names = self.0.last().map(|image| image.definitions.exports(&image.module, &image.packages));
+        names.unwrap_or_default().into_iter().map(str::to_owned).collect()
+    }
+
+    /// The datum that a constant of an image describes, if there is one.
+    pub(crate) fn datum(&self, image: usize, index: PoolIdx) -> Option<Datum> {
+        let image = self.0.get(image)?;
+        data::datum(&image.module, &image.packages, index)
+    }
+
+    /// The package and name of a constant of an image that is a symbol.
+    pub(crate) fn symbol(&self, image: usize, index: PoolIdx) -> Option<(&str, &str)> {
+        let image = self.0.get(image)?;
+        name_of(&image.module, &image.packages, index)
     }
 
     /// Calls `visit` with every symbol that the images define.
@@ -116,6 +135,22 @@ pub(crate) fn function(
     number: u32,
 ) -> Result<Value, AllocError> {
     ImageLoader { heap, world, image }.function(FunctionNumber(number))
+}
+
+/// The value of a constant of an image, which is data or a function without captures.
+///
+/// # Errors
+/// As for every allocation. What is damaged is `NIL`: the image is part of this program.
+pub(crate) fn constant(
+    heap: &mut Heap,
+    world: &mut World,
+    image: usize,
+    index: PoolIdx,
+) -> Result<Value, AllocError> {
+    match (ImageLoader { heap, world, image }).constant(index) {
+        Err(LoadError::Alloc(error)) => Err(error),
+        value => Ok(value.unwrap_or(Value::NIL)),
+    }
 }
 
 /// Work on one image.

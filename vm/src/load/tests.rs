@@ -36,7 +36,7 @@ fn module() -> Module {
     inner.parameters = Parameters::exactly(1);
     inner.captures = vec![Capture::value(CaptureSource::Register(0))];
     inner.lines = vec![LineEntry { pc: 1, source: 0, line: 7, column: 3 }];
-    let data = function(1, &[2], "load-const r0 k0\nreturn r0");
+    let data = function(2, &[2], "load-const r0 k0\nnot r1 r0\nreturn r0");
     Module {
         sources: vec!["adder.esl".into()],
         constants: vec![

@@ -15,7 +15,6 @@ use std::hash::{BuildHasherDefault, Hasher};
 use std::sync::Arc;
 
 use esl_bytecode::builtin::{BUILTINS, Builtin, Visibility};
-use esl_bytecode::file::ModuleImage;
 use esl_bytecode::package::{PackageId, Packages};
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
@@ -24,12 +23,13 @@ use crate::builtins::stream::standard_streams;
 use crate::datum::Unit;
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{AllocError, Heap, Kind};
-use crate::load::{self, Images, LoadError};
+use crate::load::Images;
 use crate::shape::{Shape, Sort};
 use crate::stub;
 use crate::value::Value;
 
 pub(crate) mod class;
+mod defined;
 mod known;
 mod package;
 
@@ -77,6 +77,8 @@ pub(crate) struct World {
     package_objects: BTreeMap<PackageId, Value>,
     /// Packages in which symbols are at home, by name.
     homes: BTreeMap<Arc<str>, (PackageId, Value)>,
+    /// The function that runs the top-level functions of a module, once it was needed.
+    pub(crate) runner: Value,
     /// Standard input, output and error.
     pub(crate) streams: [Value; 3],
     /// The companions of `NIL` and `T`.
@@ -84,6 +86,9 @@ pub(crate) struct World {
     t: Value,
     /// The code of every symbol without a function.
     undefined: Value,
+    /// Symbols that have an object, but not yet what the images define them as.
+    undefined_yet: Vec<Symbol>,
+    is_defining: bool,
     /// Modules that are loaded piece by piece.
     pub(crate) images: Images,
     /// What the compilation that is under way remembers.
@@ -111,10 +116,13 @@ impl World {
             packages: Packages::standard(),
             package_objects: BTreeMap::new(),
             homes: BTreeMap::new(),
+            runner: Value::NIL,
             streams: [Value::NIL; 3],
             nil: Value::NIL,
             t: Value::NIL,
             undefined,
+            undefined_yet: Vec::new(),
+            is_defining: false,
             images: Images::default(),
             unit: RefCell::default(),
             compiler: Compiler::default(),
@@ -155,13 +163,19 @@ impl World {
     /// # Errors
     /// As for every allocation.
     pub(crate) fn intern(&mut self, heap: &mut Heap, symbol: &Symbol) -> Result<Value, AllocError> {
-        if let Some(&object) = self.symbols.get(symbol) {
-            return Ok(object);
-        }
-        let object = self.make_object(heap, symbol)?;
-        if symbol.package().is_some() {
-            self.symbols.insert(symbol.clone(), object);
-        }
+        let object = match self.symbols.get(symbol) {
+            Some(&object) if self.undefined_yet.is_empty() => return Ok(object),
+            Some(&object) => object,
+            None => {
+                let object = self.make_object(heap, symbol)?;
+                if symbol.package().is_some() {
+                    self.symbols.insert(symbol.clone(), object);
+                    self.undefined_yet.push(symbol.clone());
+                }
+                object
+            }
+        };
+        self.define_symbols(heap)?;
         Ok(object)
     }
 
@@ -220,47 +234,7 @@ impl World {
             let function = self.make_builtin(heap, builtin, object)?;
             heap.symbol_set_function(object, function);
         }
-        self.define_from_images(heap, symbol, object)?;
         Ok(object)
-    }
-
-    /// Gives a symbol object what the images define its symbol as.
-    fn define_from_images(
-        &mut self,
-        heap: &mut Heap,
-        symbol: &Symbol,
-        object: Value,
-    ) -> Result<(), AllocError> {
-        let Some((image, definition)) = self.images.definition(symbol) else { return Ok(()) };
-        if let Some(number) = definition.function {
-            let function = load::image_function(heap, self, image, number)?;
-            heap.symbol_set_function(object, function);
-        }
-        if let Some(number) = definition.macro_function {
-            let function = load::image_function(heap, self, image, number)?;
-            heap.symbol_set_macro_function(object, function);
-        }
-        Ok(())
-    }
-
-    /// Takes an image in: a list of the functions that run its top-level forms.
-    ///
-    /// # Errors
-    /// [`LoadError`].
-    pub(crate) fn open_image(
-        &mut self,
-        heap: &mut Heap,
-        image: Arc<ModuleImage>,
-    ) -> Result<Value, LoadError> {
-        let toplevel = load::open_image(heap, self, image)?;
-        // Symbols that are there already have missed the definitions.
-        let symbols: Vec<(Symbol, Value)> = self.symbols.iter().map(|(s, &v)| (s.clone(), v)).collect();
-        for (symbol, v) in symbols {
-            if let Some(object) = self.object_of(heap, v) {
-                self.define_from_images(heap, &symbol, object)?;
-            }
-        }
-        Ok(toplevel)
     }
 
     /// A new symbol object in no table, with this name (a String) and package.
@@ -365,7 +339,7 @@ impl World {
     /// Calls `visit` with every object that the world keeps alive.
     pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
         self.known.visit(visit);
-        [self.nil, self.t, self.undefined].into_iter().for_each(&mut *visit);
+        [self.nil, self.t, self.undefined, self.runner].into_iter().for_each(&mut *visit);
         self.streams.into_iter().for_each(&mut *visit);
         self.symbols.values().copied().for_each(&mut *visit);
         self.package_objects.values().copied().for_each(&mut *visit);

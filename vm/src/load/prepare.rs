@@ -1,0 +1,370 @@
+//! Makes the table of definitions of an image: top-level forms that do nothing but define are run here, as far as
+//! constants go, and noted instead of kept.
+//!
+//! A form is a short piece of code of a few kinds of instructions and builtins. Anything else, or a value that is no
+//! constant, and the form stays a form. The forms that stay run after all that are noted; a library must not depend on
+//! the order between the two.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use esl_bytecode::builtin::Builtin;
+use esl_bytecode::module::{Constant, FunctionNumber, Module, PoolIdx};
+use esl_bytecode::opcode::Instr;
+use esl_bytecode::symbol::{ESL_PACKAGE, Symbol};
+
+use super::definitions::{CONSTANT, HEAD, MARKER, ROW, SPECIAL, VALUE, hash};
+
+/// What a register holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Known {
+    Nil,
+    True,
+    Integer(i32),
+    Constant(PoolIdx),
+}
+
+/// What a symbol is.
+#[derive(Clone, Debug, Default)]
+struct Row {
+    symbol: Option<PoolIdx>,
+    function: Option<PoolIdx>,
+    macro_function: Option<PoolIdx>,
+    flags: i64,
+    value: Option<Known>,
+    /// The newest last.
+    properties: Vec<(PoolIdx, Known)>,
+}
+
+type Name = (Arc<str>, String);
+
+/// What was noted so far.
+#[derive(Clone, Debug, Default)]
+struct Noted {
+    rows: BTreeMap<Name, Row>,
+    /// Symbols that `ESL` exports.
+    exports: Vec<PoolIdx>,
+}
+
+/// Turns the top-level forms of `module` that do nothing but define into a table, for an image: functions, macros,
+/// special variables, constants, properties and exports. Those that do nothing at all go.
+///
+/// The module must stay the only one in its file: its last constant becomes the table.
+#[must_use]
+pub fn prepare(mut module: Module) -> Module {
+    let mut noted = Noted::default();
+    let mut toplevel = Vec::new();
+    for number in std::mem::take(&mut module.toplevel) {
+        let mut form = Form { module: &module, registers: [None; 256], changes: Vec::new(), noted: &noted };
+        match form.run(number) {
+            Some(()) => {
+                let changes = form.changes;
+                changes.into_iter().for_each(|change| noted.change(&module, change));
+            }
+            None => toplevel.push(number),
+        }
+    }
+    module.toplevel = toplevel;
+    noted.write(&mut module);
+    module
+}
+
+/// One thing that a form does. Symbols have a package.
+#[derive(Clone, Copy, Debug)]
+enum Change {
+    Function(PoolIdx, PoolIdx),
+    Macro(PoolIdx, PoolIdx),
+    Special(PoolIdx),
+    Constant(PoolIdx, Known),
+    Value(PoolIdx, Known),
+    Property(PoolIdx, PoolIdx, Known),
+    Export(PoolIdx),
+}
+
+/// A form that is being run.
+struct Form<'a> {
+    module: &'a Module,
+    registers: [Option<Known>; 256],
+    changes: Vec<Change>,
+    noted: &'a Noted,
+}
+
+impl Form<'_> {
+    /// Runs a top-level function to its end. `None` if that takes more than constants.
+    fn run(&mut self, FunctionNumber(number): FunctionNumber) -> Option<()> {
+        let function = &self.module.functions[number as usize];
+        let constant = |index: u16| Known::Constant(function.constants[usize::from(index)]);
+        let mut pc = 0;
+        loop {
+            // Jumps go forward, so this ends.
+            let instruction = Instr::decode(&function.code, pc)?;
+            pc += instruction.opcode().words();
+            let mut jump = |distance: i64| pc = (pc as i64 + distance) as usize;
+            match instruction {
+                Instr::LoadConst { dst, constant: index } => self.set(dst.0, constant(index.0)),
+                Instr::MakeClosure { dst, function: index } => self.set(dst.0, constant(index.0)),
+                Instr::LoadInt { dst, value } => self.set(dst.0, Known::Integer(i32::from(value.0))),
+                Instr::LoadTrue { dst } => self.set(dst.0, Known::True),
+                Instr::LoadNil { first, count } => {
+                    (0..count.0).for_each(|offset| self.set(first.0 + offset, Known::Nil));
+                }
+                Instr::Move { dst, src } => {
+                    self.registers[usize::from(dst.0)] = self.registers[usize::from(src.0)]
+                }
+                Instr::JumpAlways { to } => jump(i64::from(to.0)),
+                Instr::JumpIfNil { test, to } => {
+                    if self.get(test.0)? == Known::Nil {
+                        jump(i64::from(to.0));
+                    }
+                }
+                Instr::JumpIfNotNil { test, to } => {
+                    if self.get(test.0)? != Known::Nil {
+                        jump(i64::from(to.0));
+                    }
+                }
+                Instr::CallBuiltin { window, count, builtin, .. } => {
+                    let value = self.call(builtin.0, window.0, count.0)?;
+                    self.set(window.0, value);
+                }
+                Instr::TailCallBuiltin { window, count, builtin } => {
+                    return self.call(builtin.0, window.0, count.0).map(|_| ());
+                }
+                Instr::Return { .. } => return Some(()),
+                _ => return None,
+            }
+        }
+    }
+
+    fn get(&self, register: u8) -> Option<Known> {
+        self.registers[usize::from(register)]
+    }
+
+    fn set(&mut self, register: u8, value: Known) {
+        self.registers[usize::from(register)] = Some(value);
+    }
+
+    /// Notes what a builtin does, and gives its value.
+    fn call(&mut self, builtin: u32, window: u8, count: u8) -> Option<Known> {
+        let argument = |position: u8| {
+            if position < count {
+                self.registers[usize::from(window) + 2 + usize::from(position)]
+            } else {
+                None
+            }
+        };
+        let name = self.symbol(argument(0)?);
+        let value = argument(1);
+        let (change, result) = match Builtin::from_number(builtin)? {
+            Builtin::SetFunction => (Change::Function(name?, self.function(value?)?), name),
+            Builtin::SetMacro => (Change::Macro(name?, self.function(value?)?), name),
+            Builtin::ProclaimSpecial => (Change::Special(name?), name),
+            Builtin::DefineConstant => (Change::Constant(name?, self.data(value?)?), name),
+            Builtin::Set => {
+                self.changes.push(Change::Value(name?, self.data(value?)?));
+                return value;
+            }
+            Builtin::Put => {
+                self.changes.push(Change::Property(name?, self.symbol(value?)?, self.data(argument(2)?)?));
+                return argument(2);
+            }
+            Builtin::Boundp => {
+                let has_value = self.noted.has_value(self.module, name?);
+                let gets_value = self
+                    .changes
+                    .iter()
+                    .any(|change| matches!(change, Change::Value(symbol, _) if Some(*symbol) == name));
+                return Some(if has_value || gets_value { Known::True } else { Known::Nil });
+            }
+            Builtin::Export if count == 1 || self.is_esl(value?) => {
+                self.export(argument(0)?)?;
+                return Some(Known::True);
+            }
+            _ => return None,
+        };
+        self.changes.push(change);
+        result.map(Known::Constant)
+    }
+
+    fn constant(&self, PoolIdx(index): PoolIdx) -> &Constant {
+        &self.module.constants[index as usize]
+    }
+
+    /// The constant, if it is a symbol with a package.
+    fn symbol(&self, known: Known) -> Option<PoolIdx> {
+        let Known::Constant(index) = known else { return None };
+        match self.constant(index) {
+            Constant::Symbol(symbol) if symbol.package().is_some() => Some(index),
+            _ => None,
+        }
+    }
+
+    /// The constant, if it is a function without captures.
+    fn function(&self, known: Known) -> Option<PoolIdx> {
+        let Known::Constant(index) = known else { return None };
+        match self.constant(index) {
+            Constant::Function(number) if self.module.functions[number.0 as usize].captures.is_empty() => {
+                Some(index)
+            }
+            _ => None,
+        }
+    }
+
+    /// What is known, unless it is a function with captures or an object of the program.
+    fn data(&self, known: Known) -> Option<Known> {
+        match known {
+            Known::Constant(index) => match self.constant(index) {
+                Constant::Function(_) => self.function(known).map(Known::Constant),
+                Constant::Object(_) | Constant::Class(_) => None,
+                _ => Some(known),
+            },
+            _ => Some(known),
+        }
+    }
+
+    /// Whether this designates the package `ESL`.
+    fn is_esl(&self, known: Known) -> bool {
+        let Known::Constant(index) = known else { return false };
+        match self.constant(index) {
+            Constant::String(text) => **text == *ESL_PACKAGE,
+            Constant::Symbol(symbol) => symbol.name() == ESL_PACKAGE,
+            _ => false,
+        }
+    }
+
+    /// Notes the export of a symbol, or of a list of symbols, of `ESL`.
+    fn export(&mut self, known: Known) -> Option<()> {
+        let Known::Constant(mut list) = known else { return None };
+        let mut symbols = Vec::new();
+        if self.symbol(known).is_some() {
+            symbols.push(list);
+        } else {
+            while let &Constant::Cons(car, cdr) = self.constant(list) {
+                symbols.push(car);
+                list = cdr;
+            }
+            if *self.constant(list) != Constant::Nil {
+                return None;
+            }
+        }
+        for symbol in symbols {
+            match self.constant(symbol) {
+                Constant::Symbol(name) if name.is_in(ESL_PACKAGE) => {
+                    self.changes.push(Change::Export(symbol))
+                }
+                _ => return None,
+            }
+        }
+        Some(())
+    }
+}
+
+impl Noted {
+    fn name(module: &Module, PoolIdx(index): PoolIdx) -> Option<Name> {
+        match &module.constants[index as usize] {
+            Constant::Symbol(symbol) => Some((symbol.package()?.clone(), symbol.name().to_owned())),
+            _ => None,
+        }
+    }
+
+    fn has_value(&self, module: &Module, symbol: PoolIdx) -> bool {
+        let row = Noted::name(module, symbol).and_then(|name| self.rows.get(&name));
+        row.is_some_and(|row| row.value.is_some())
+    }
+
+    fn change(&mut self, module: &Module, change: Change) {
+        let (Change::Function(symbol, _)
+        | Change::Macro(symbol, _)
+        | Change::Special(symbol)
+        | Change::Constant(symbol, _)
+        | Change::Value(symbol, _)
+        | Change::Property(symbol, ..)
+        | Change::Export(symbol)) = change;
+        if let Change::Export(symbol) = change {
+            self.exports.push(symbol);
+            return;
+        }
+        let Some(name) = Noted::name(module, symbol) else { return };
+        let row = self.rows.entry(name).or_default();
+        row.symbol = Some(symbol);
+        match change {
+            Change::Function(_, function) => (row.function, row.macro_function) = (Some(function), None),
+            Change::Macro(_, function) => (row.function, row.macro_function) = (None, Some(function)),
+            Change::Special(_) => row.flags |= SPECIAL,
+            Change::Constant(_, value) => {
+                row.flags |= CONSTANT;
+                row.value = Some(value);
+            }
+            Change::Value(_, value) => row.value = Some(value),
+            Change::Property(_, indicator, value) => {
+                let found = row.properties.iter_mut().find(|(other, _)| {
+                    module.constants[other.0 as usize] == module.constants[indicator.0 as usize]
+                });
+                match found {
+                    Some((_, old)) => *old = value,
+                    None => row.properties.push((indicator, value)),
+                }
+            }
+            Change::Export(_) => {}
+        }
+    }
+
+    /// Makes the table the last constant.
+    fn write(self, module: &mut Module) {
+        let mut pool = Pool { constants: &mut module.constants };
+        let none = pool.add(Constant::Nil);
+        // At most two thirds full.
+        let count = (self.rows.len() + self.rows.len() / 2 + 1).next_power_of_two();
+        let mut table = vec![[none; ROW]; count];
+        for ((package, name), row) in self.rows {
+            let mut at = hash(&package, &name) as usize & (count - 1);
+            while table[at][0] != none {
+                at = (at + 1) & (count - 1);
+            }
+            let symbol = row.symbol.unwrap_or(none);
+            let functions = [row.function.unwrap_or(none), row.macro_function.unwrap_or(none)];
+            let data = pool.data(&row).unwrap_or(none);
+            table[at] = [symbol, functions[0], functions[1], data];
+        }
+        let marker = pool.add(Constant::Symbol(Symbol::esl(MARKER)));
+        let exports = pool.add(Constant::Vector(self.exports));
+        let head: [PoolIdx; HEAD] = [marker, exports];
+        pool.add(Constant::Vector(head.into_iter().chain(table.into_iter().flatten()).collect()));
+    }
+}
+
+/// The pool of the module, for additions.
+struct Pool<'a> {
+    constants: &'a mut Vec<Constant>,
+}
+
+impl Pool<'_> {
+    fn add(&mut self, constant: Constant) -> PoolIdx {
+        self.constants.push(constant);
+        PoolIdx(self.constants.len() as u32 - 1)
+    }
+
+    fn known(&mut self, known: Known) -> PoolIdx {
+        match known {
+            Known::Constant(index) => index,
+            Known::Nil => self.add(Constant::Nil),
+            Known::True => self.add(Constant::True),
+            Known::Integer(value) => self.add(Constant::Integer(value.into())),
+        }
+    }
+
+    /// The data of a row, if it has any.
+    fn data(&mut self, row: &Row) -> Option<PoolIdx> {
+        if row.flags == 0 && row.value.is_none() && row.properties.is_empty() {
+            return None;
+        }
+        let flags = row.flags | if row.value.is_some() { VALUE } else { 0 };
+        let mut items = vec![self.add(Constant::Integer(flags.into()))];
+        items.push(self.known(row.value.unwrap_or(Known::Nil)));
+        // The newest property comes first.
+        for &(indicator, value) in row.properties.iter().rev() {
+            items.push(indicator);
+            items.push(self.known(value));
+        }
+        Some(self.add(Constant::Vector(items)))
+    }
+}

@@ -1,0 +1,93 @@
+//! What the images define symbols as, given to their objects when these are made.
+//!
+//! To define one symbol may make the objects of others, which are defined in their turn: not by recursion, but from a
+//! list. A symbol stays on the list until it has all that is defined of it, so when there is no room in the middle, the
+//! next attempt to get at any symbol goes on from there.
+
+use std::sync::Arc;
+
+use esl_bytecode::file::ModuleImage;
+use esl_bytecode::package::PackageId;
+use esl_bytecode::symbol::Symbol;
+
+use crate::heap::layout::Symbol as SymbolObject;
+use crate::heap::{AllocError, Heap, Kind};
+use crate::load::{self, LoadError};
+use crate::value::Value;
+use crate::world::World;
+
+impl World {
+    /// Takes an image in: a list of the functions that run its top-level forms.
+    ///
+    /// # Errors
+    /// [`LoadError`].
+    pub(crate) fn open_image(
+        &mut self,
+        heap: &mut Heap,
+        image: Arc<ModuleImage>,
+    ) -> Result<Value, LoadError> {
+        let toplevel = load::open_image(heap, self, image)?;
+        for name in self.images.exports() {
+            self.packages.register(PackageId::ESL, name, true);
+        }
+        // Symbols that are there already have missed the definitions.
+        self.undefined_yet.extend(self.symbols.keys().cloned());
+        self.define_symbols(heap)?;
+        Ok(toplevel)
+    }
+
+    /// Gives the symbols on the list what the images define them as.
+    pub(super) fn define_symbols(&mut self, heap: &mut Heap) -> Result<(), AllocError> {
+        if self.is_defining {
+            // Whoever is at it will come to those that were added.
+            return Ok(());
+        }
+        self.is_defining = true;
+        let mut result = Ok(());
+        while result.is_ok()
+            && let Some(last) = self.undefined_yet.len().checked_sub(1)
+        {
+            let symbol = self.undefined_yet[last].clone();
+            result = self.define(heap, &symbol);
+            if result.is_ok() {
+                // Others may have been added behind it.
+                self.undefined_yet.remove(last);
+            }
+        }
+        self.is_defining = false;
+        result
+    }
+
+    fn define(&mut self, heap: &mut Heap, symbol: &Symbol) -> Result<(), AllocError> {
+        let Some((image, definition)) = self.images.definition(symbol) else { return Ok(()) };
+        let Some(object) = self.find(symbol).and_then(|v| self.object_of(heap, v)) else { return Ok(()) };
+        if let Some(number) = definition.function {
+            let function = load::image_function(heap, self, image, number)?;
+            heap.symbol_set_function(object, function);
+        }
+        if let Some(number) = definition.macro_function {
+            let function = load::image_function(heap, self, image, number)?;
+            heap.symbol_set_macro_function(object, function);
+        }
+        let cell = heap.symbol(object).copied();
+        let (mut flags, old) = cell.map_or((0, Value::UNBOUND), |cell| (cell.header.flags, cell.value));
+        if let Some(index) = definition.value.filter(|_| old == Value::UNBOUND) {
+            let value = load::image_constant(heap, self, image, index)?;
+            heap.symbol_set_value(object, value);
+        }
+        flags |= if definition.is_special { SymbolObject::SPECIAL } else { 0 };
+        flags |= if definition.is_constant { SymbolObject::CONSTANT } else { 0 };
+        heap.set_flags(object, Kind::Symbol, flags);
+        let mut items = Vec::new();
+        for (indicator, value) in definition.properties {
+            items.push(load::image_constant(heap, self, image, indicator)?);
+            items.push(load::image_constant(heap, self, image, value)?);
+        }
+        let plist = heap.symbol(object).map_or(Value::NIL, |cell| cell.plist);
+        if !items.is_empty() && plist.is_nil() {
+            let plist = heap.list(&items)?;
+            heap.symbol_set_plist(object, plist);
+        }
+        Ok(())
+    }
+}
