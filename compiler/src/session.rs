@@ -7,6 +7,7 @@
 //!
 //! Not here: running anything. Whoever drives the compilation does that, see [`esl_bytecode::compile`].
 
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use esl_bytecode::compile::{Answer, Compilation, Compile, Environment, Step};
@@ -25,7 +26,7 @@ use crate::reader::{Reader, read_datum};
 /// The compiler.
 #[derive(Debug, Default)]
 pub struct Compiler {
-    /// The number that diagnostics give to the source.
+    /// The number that diagnostics give to the first source.
     source: SourceId,
     /// The text that was compiled last, for drawing its diagnostics.
     sources: Arc<Mutex<Sources>>,
@@ -39,20 +40,30 @@ impl Compiler {
 
     /// Begins to compile a whole text for the sake of what its macros expand to.
     pub fn expand_text(&self, name: &str, text: &str) -> Expansion {
-        Expansion(Session { listing: Some(String::new()), ..self.text(name, text) })
+        Expansion(Session { listing: Some(String::new()), ..self.texts(&[(name, text)]) })
     }
 
-    fn text(&self, name: &str, text: &str) -> Session {
-        let text: Arc<str> = text.into();
+    /// Begins to compile texts, each with its name, to one module that runs them in order. To one another they are like
+    /// parts of one text. Diagnostics number them from the compiler's source number on.
+    pub fn compile_texts(&self, texts: &[(&str, &str)]) -> Box<dyn Compilation> {
+        Box::new(self.texts(texts))
+    }
+
+    fn texts(&self, texts: &[(&str, &str)]) -> Session {
         let mut sources = Sources::new();
         for _ in 0..self.source.0 {
             sources.add("", None);
         }
-        sources.add(name, Some(text.clone()));
-        *self.sources.lock().unwrap_or_else(PoisonError::into_inner) = sources;
         let mut lines = SourceLines::new();
-        let source = lines.add(name, text.clone());
-        self.session(Input::Text(Box::new(Reader::new(source, text))), lines)
+        let mut readers = VecDeque::new();
+        for &(name, text) in texts {
+            let text: Arc<str> = text.into();
+            sources.add(name, Some(text.clone()));
+            let source = lines.add(name, text.clone());
+            readers.push_back(Reader::new(source, text));
+        }
+        *self.sources.lock().unwrap_or_else(PoisonError::into_inner) = sources;
+        self.session(Input::Texts(readers), lines)
     }
 
     fn session(&self, input: Input, lines: SourceLines) -> Session {
@@ -74,7 +85,7 @@ impl Compile for Compiler {
     }
 
     fn compile_text(&self, name: &str, text: &str) -> Box<dyn Compilation> {
-        Box::new(self.text(name, text))
+        Box::new(self.texts(&[(name, text)]))
     }
 
     fn read(
@@ -95,8 +106,8 @@ impl Compile for Compiler {
 /// Where forms come from.
 #[derive(Debug)]
 enum Input {
-    /// A text, all forms of which are compiled.
-    Text(Box<Reader>),
+    /// Texts, all forms of which are compiled.
+    Texts(VecDeque<Reader>),
     /// A form to be evaluated.
     Form(Option<Datum>),
 }
@@ -173,14 +184,15 @@ impl Session {
                 }
                 None => false,
             },
-            Input::Text(reader) => {
-                while let Some(read) = reader.next(environment) {
-                    match read {
-                        Ok(form) => {
+            Input::Texts(readers) => {
+                while let Some(reader) = readers.front_mut() {
+                    match reader.next(environment) {
+                        Some(Ok(form)) => {
                             self.expander.begin_file_form(form);
                             return true;
                         }
-                        Err(diagnostic) => self.diagnostics.push(*diagnostic),
+                        Some(Err(diagnostic)) => self.diagnostics.push(*diagnostic),
+                        None => drop(readers.pop_front()),
                     }
                 }
                 false
@@ -207,7 +219,7 @@ impl Session {
                 return None;
             }
         };
-        let is_file = matches!(self.input, Input::Text(_));
+        let is_file = matches!(self.input, Input::Texts(_));
         if is_file
             && purpose.emit
             && module.constants.iter().any(|constant| matches!(constant, Constant::Object(_)))
@@ -233,7 +245,10 @@ impl Session {
     fn finish(&mut self, environment: &mut dyn Environment) -> Step {
         self.diagnostics.extend(self.expander.finish(environment));
         let mut diagnostics = std::mem::take(&mut self.diagnostics);
-        diagnostics.sort_by_key(|diagnostic| (diagnostic.primary.span.start, diagnostic.primary.span.end));
+        diagnostics.sort_by_key(|diagnostic| {
+            let span = diagnostic.primary.span;
+            (span.source, span.start, span.end)
+        });
         for diagnostic in &mut diagnostics {
             self.renumber(diagnostic);
         }
@@ -242,11 +257,11 @@ impl Session {
         Step::Done(module, diagnostics)
     }
 
-    /// Within the compilation, its source has the number 0.
+    /// Within the compilation, its first source has the number 0.
     fn renumber(&self, diagnostic: &mut Diagnostic) {
-        diagnostic.primary.span.source = self.source;
+        diagnostic.primary.span.source.0 += self.source.0;
         for label in &mut diagnostic.secondary {
-            label.span.source = self.source;
+            label.span.source.0 += self.source.0;
         }
     }
 }

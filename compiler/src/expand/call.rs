@@ -83,6 +83,11 @@ impl Machine {
         if self.inline(&global, &form, to) {
             return Ok(());
         }
+        if let Some(compiler_macro) = environment.property(&form.operator, &Symbol::esl("%COMPILER-MACRO"))
+            && let Some(compiler_macro) = compiler_macro.as_symbol()
+        {
+            return self.stop_for_call(compiler_macro.clone(), form, to);
+        }
         if global.locked && global.instead.is_some() {
             // What stands in it need not be forms: it is left out of the call, which fails in any case.
             self.unit.note_call(Name::plain(&form.operator), None, form.span, form.span);

@@ -50,6 +50,11 @@ impl Form {
         }
     }
 
+    /// The same as a call of the global function, whatever else the operator means.
+    pub(super) fn globally(&self) -> Datum {
+        Make(self.datum.span()).call(&self.operator, self.args.iter().cloned())
+    }
+
     /// A diagnostic about this form: its operator, then what is wrong.
     pub(super) fn malformed(&self, what: &str) -> Box<Diagnostic> {
         self.malformed_at(self.span, what)

@@ -87,6 +87,8 @@ pub(super) enum Waiting {
     Nothing,
     /// The expansion of a form.
     Form(To),
+    /// What a compiler macro makes of a call.
+    Call(Form, To),
     /// The expansion of a place.
     Place(To),
     /// The five values of a `define-setf-expander`.
@@ -247,6 +249,12 @@ impl Machine {
         let waiting = std::mem::replace(&mut self.waiting, Waiting::Nothing);
         match (waiting, answer) {
             (Waiting::Form(to), Answer::Expansion(form)) => self.jobs.push(Job::Expand(form, to)),
+            (Waiting::Call(call, to), Answer::Expansion(form)) => {
+                // A compiler macro that gives the form back leaves the call as it is.
+                let form = if form.is_same(&call.datum) { call.globally() } else { form };
+                self.jobs.push(Job::Expand(form, to));
+            }
+            (Waiting::Call(call, to), _) => self.jobs.push(Job::Expand(call.globally(), to)),
             (Waiting::Place(to), Answer::Expansion(form)) => self.jobs.push(Job::Place(form, to)),
             (Waiting::Five(place, to), Answer::Expansion(values)) => {
                 let outcome = Place::from_values(&place, &values, to.span);

@@ -34,6 +34,9 @@
 //! * a list `(:expander m)` (`define-setf-expander`): the macro `m`, called with the place as its form, returns the list
 //!   of five parts: variables, forms, stores, writer, reader.
 //!
+//! The property `%compiler-macro` of a function's name is the name of a macro that is given calls of the function, and
+//! returns a better form or the call itself.
+//!
 //! The property `%symbol-macro` of a symbol is the form that it stands for as a variable (`define-symbol-macro`).
 //!
 //! # What the expander calls

@@ -47,6 +47,15 @@ impl Machine {
         Ok(())
     }
 
+    /// Stops for what a compiler macro makes of a call.
+    pub(super) fn stop_for_call(&mut self, compiler_macro: Symbol, form: Form, to: To) -> Checked {
+        let origin = self.origin(&form.operator, form.span, true, to.origin)?;
+        let datum = form.datum.clone();
+        self.waiting = Waiting::Call(form, To { origin, ..to });
+        self.stop_for_macro(MacroRef::Global(compiler_macro), datum);
+        Ok(())
+    }
+
     /// Stops for the expansion of a macro call that stands for a place.
     pub(super) fn stop_for_place(
         &mut self,
@@ -115,12 +124,14 @@ impl Machine {
     }
 
     pub(super) fn macro_failed(&mut self, failure: &str, origin: Option<u32>, span: Span) {
-        let failed = match origin.map(|index| &self.origins[index as usize]) {
-            Some(origin) => name(&origin.name),
-            None => "a macro".to_string(),
-        };
-        // So begins what a macro of the library says about parts that do not fit.
-        let diagnostic = if failure.starts_with("needs ") {
+        let origin = origin.map(|index| &self.origins[index as usize]);
+        let failed = origin.map_or_else(|| "a macro".to_string(), |origin| name(&origin.name));
+        let is_standard = origin.is_some_and(|origin| origin.is_standard);
+        // The checks of arguments begin with the name of the macro, which is said already.
+        let shown = origin.map(|origin| origin.name.to_string() + " ").unwrap_or_default();
+        let failure = failure.strip_prefix(&shown).unwrap_or(failure);
+        // What fails in a macro of the language is a form that it cannot take.
+        let diagnostic = if is_standard {
             code::MALFORMED_FORM.at(span, format!("{failed} {failure}"))
         } else {
             code::MACRO_FAILED.at(span, format!("{failed} failed while it was expanded: {failure}"))

@@ -256,6 +256,10 @@ fn macros() {
         (macrolet ((local (x) (list 'car x))) (local *x*))
         (macrolet ((local (x) (list 'car x))) (flet ((local (x) x)) (local 1)))
         (flet ((when (x) x)) (when 1))
+        (improvable (improvable 1))
+        (good-enough (improvable 1))
+        (flet ((improvable (x) x)) (improvable 1))
+        (funcall #'improvable 1)
         ",
     );
 }

@@ -12,7 +12,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::reader::{BareEnvironment, read_datum};
 
-/// A macro: takes the form, gives the expansion or the text of a failure.
+/// A macro: takes the form and its arguments in a row, gives the expansion or the text of a failure.
 pub(crate) type Macro = Box<dyn FnMut(&mut BareEnvironment, &[Datum]) -> Result<Datum, String> + Send>;
 
 /// The host.
@@ -77,6 +77,11 @@ impl FakeHost {
         let fixed = Accessor { class: host.symbol("point"), slot: 0, read_only: true };
         let point_x = host.symbol("point-x");
         host.globals.entry(point_x).or_default().accessor = Some(fixed);
+        for (name, template) in [("improvable", "(f #1)"), ("good-enough", "#0")] {
+            host.function(name, 0, None);
+            host.record(name, "esl::%compiler-macro", &format!("better-{name}"));
+            host.define_macro(&format!("better-{name}"), template);
+        }
         host.record("short", "esl::%setf", "f");
         host.record("short-macro", "esl::%setf", "twice");
         host.record("long", "esl::%setf", "(write-long 1)");
@@ -115,7 +120,7 @@ impl FakeHost {
         self.properties.insert(key, value);
     }
 
-    /// A macro by template: `#1` stands for the first argument, `(… . #2...)` for those from the second on.
+    /// A macro by template: `#0` stands for the form, `#1` for the first argument, `(… . #2...)` for those from the second on.
     pub(crate) fn define_macro(&mut self, name: &str, template: &str) {
         let symbol = self.symbol(name);
         self.globals.entry(symbol.clone()).or_default().function = GlobalFunction::Macro;
@@ -145,11 +150,11 @@ fn fill(template: &Datum, args: &[Datum]) -> Datum {
     {
         return match number.strip_suffix("...") {
             Some(number) => {
-                let from = number.parse::<usize>().expect("a number") - 1;
+                let from = number.parse::<usize>().expect("a number");
                 Datum::list(args.get(from..).unwrap_or_default().to_vec(), Span::default())
             }
             None => {
-                let index = number.parse::<usize>().expect("a number") - 1;
+                let index = number.parse::<usize>().expect("a number");
                 args.get(index).cloned().unwrap_or_else(|| Datum::nil(Span::default()))
             }
         };
@@ -199,7 +204,8 @@ impl Environment for FakeHost {
 
 impl CompileTimeHost for FakeHost {
     fn expand(&mut self, call: &MacroCall) -> Result<Datum, String> {
-        let args: Vec<Datum> = call.form.as_list().ok_or("no list")?.into_iter().skip(1).cloned().collect();
+        let mut args: Vec<Datum> = call.form.as_list().ok_or("no list")?.into_iter().cloned().collect();
+        args[0] = call.form.clone();
         let expander = match &call.function {
             MacroRef::Global(symbol) => self.macros.get_mut(symbol),
             MacroRef::Local(ObjectId(number)) => self.local_macros.get_mut(*number as usize),

@@ -42,6 +42,20 @@ fn errors_of_all_phases_are_reported_in_the_order_of_the_text() {
 }
 
 #[test]
+fn texts_that_are_compiled_together_know_each_other() {
+    let texts =
+        [("a.esl", "(defun first-one () (second-one))"), ("b.esl", "(defun second-one () (third-one))")];
+    let mut host = FakeHost::new();
+    let compiler = Compiler::for_source(SourceId(5));
+    let (module, found) = drive(&mut *compiler.compile_texts(&texts), &mut host);
+    assert_eq!(module.expect("it compiles").sources, ["a.esl", "b.esl"]);
+    assert_eq!(found.len(), 1);
+    assert_eq!(found[0].message, "no function is called `third-one`");
+    assert_eq!(found[0].primary.span.source, SourceId(6));
+    assert!(compiler.render(&found[0]).contains("b.esl:1:23"), "{}", compiler.render(&found[0]));
+}
+
+#[test]
 fn warnings_do_not_keep_a_program_from_compiling() {
     let text = "(undefined 1)";
     let (module, found) =
