@@ -223,3 +223,6 @@ impl Vm {
         None
     }
 }
+
+#[cfg(test)]
+mod tests;

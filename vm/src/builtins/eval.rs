@@ -342,8 +342,9 @@ pub(super) fn read_from_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%read stream)`: as `%read-from-string`, without the end. What was read is taken from the stream.
 pub(super) fn read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let stream = optional(arguments, 0);
     loop {
-        let source = vm.source(arguments[0])?;
+        let source = vm.source(stream)?;
         let (text, may_grow) = match &source {
             Source::Text(text) => (text.clone(), false),
             Source::Console { text, is_at_end } => (text.clone(), !is_at_end),
@@ -362,7 +363,7 @@ pub(super) fn read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             Read::End => (Value::NIL, Value::NIL, text.len()),
             Read::Unfinished => (vm.world.known.unfinished, Value::NIL, text.len()),
         };
-        vm.skip_source(arguments[0], &source, text[..end].chars().count());
+        vm.skip_source(stream, &source, text[..end].chars().count());
         return vm.give_values(&[status, object]);
     }
 }
