@@ -407,6 +407,10 @@ fn v9_registers_survive_a_cleanup_entered_in_the_normal_way() {
     check(&format!("{} return r3", cleanup("call-global r4.. 0 want 1 k0")), Ok(()));
     check(&format!("{} return r3", cleanup("call-global r3.. 0 want 1 k0")), Err(window(3, 4)));
     check(&format!("{} return r0", cleanup("load-true r2 \n make-box r0 r2")), Err(Fault::Box(0)));
+    // What one of two paths through the cleanup destroys is gone.
+    let branch = cleanup("load-true r3 \n jump-if-nil r3 L2 \n call-global r4.. 0 want 1 k0 \n L2:");
+    check(&format!("{branch} return r5"), Err(Fault::Unassigned(5)));
+    check(&format!("{branch} return r2"), Ok(()));
 }
 
 fn window(window: u8, entry: u8) -> Fault {

@@ -63,6 +63,7 @@ pub(crate) const REGISTERS: u8 = 7;
 const SYMBOL: u32 = 0;
 const INTEGER: u32 = 1;
 const FUNCTIONS: std::ops::Range<u32> = 2..7;
+const WITH_LATER_CAPTURE: u32 = 5;
 const CLASS: u32 = 7;
 const TYPES: u32 = 8;
 
@@ -305,6 +306,7 @@ fn encode(opcodes: &[Opcode], palette: &Palette, random: &mut Random) -> Vec<u32
             "Count" if matches!(opcode, Opcode::PopControl | Opcode::Unbind) && !random.once_in(10) => 1,
             "Count" => random.below(3) as u32,
             "Want" => random.pick(&[0, 0, 2, 255]),
+            "FunctionIdx" if random.once_in(2) => WITH_LATER_CAPTURE,
             "FunctionIdx" => random.below(FUNCTIONS.len()) as u32 + FUNCTIONS.start,
             "SymbolIdx" | "WideSymbolIdx" => SYMBOL,
             "ConstIdx" => INTEGER,
