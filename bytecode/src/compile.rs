@@ -169,7 +169,12 @@ pub enum Answer {
 pub trait Compilation: Send {
     /// Takes the outcome of the last step and works up to the next one. Work between two steps is bounded by the size
     /// of one top-level form; `charge` is called with the number of nodes that were worked on.
-    fn step(&mut self, environment: &mut dyn Environment, answer: Answer, charge: &mut dyn FnMut(u64)) -> Step;
+    fn step(
+        &mut self,
+        environment: &mut dyn Environment,
+        answer: Answer,
+        charge: &mut dyn FnMut(u64),
+    ) -> Step;
 }
 
 /// A compiler, for a virtual machine that evaluates at run time.

@@ -262,7 +262,9 @@ fn display(datum: &Datum, f: &mut fmt::Formatter<'_>, depth: u32) -> fmt::Result
             f.write_str(")")
         }
         DatumKind::Vector(items) => display_items(items, "#(", f, depth),
-        DatumKind::Array(dimensions, items) => display_items(items, &format!("#{}A(", dimensions.len()), f, depth),
+        DatumKind::Array(dimensions, items) => {
+            display_items(items, &format!("#{}A(", dimensions.len()), f, depth)
+        }
     }
 }
 

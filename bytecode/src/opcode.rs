@@ -617,7 +617,8 @@ mod tests {
 
     #[test]
     fn an_instruction_without_its_aux_word_does_not_decode() {
-        let (word, _) = Instr::Call { window: Base(0), count: Count(0), want: Want::ONE, pad: Pad(0) }.encode();
+        let (word, _) =
+            Instr::Call { window: Base(0), count: Count(0), want: Want::ONE, pad: Pad(0) }.encode();
         assert_eq!(Instr::decode(&[word], 0), None);
         assert_eq!(Instr::decode(&[0], 0), None);
     }
