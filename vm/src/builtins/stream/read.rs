@@ -1,0 +1,103 @@
+//! Reading characters and lines.
+
+use super::{SKIP_LIMIT, Sort, slot};
+use crate::builtins::expect::optional;
+use crate::raise::{Exit, Outcome};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// `(read-char &optional stream (eof-error-p t) eof-value recursive-p)`
+pub(in crate::builtins) fn read_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (stream, sort) = vm.designated_stream(optional(arguments, 0), true)?;
+    match vm.next_character(stream, sort)? {
+        Some(code) => Ok(Value::character(code).unwrap_or(Value::NIL)),
+        None => vm.at_end(stream, arguments, 1),
+    }
+}
+
+/// `(read-char-no-hang &optional stream (eof-error-p t) eof-value recursive-p)`
+pub(in crate::builtins) fn read_char_no_hang(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match read_char(vm, arguments) {
+        Err(Exit::Park) => Ok(Value::NIL),
+        outcome => outcome,
+    }
+}
+
+/// `(listen &optional stream)`
+pub(in crate::builtins) fn listen(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (stream, sort) = vm.designated_stream(optional(arguments, 0), true)?;
+    match vm.next_character(stream, sort) {
+        Ok(Some(code)) => {
+            vm.give_back(stream, sort, code);
+            Ok(Value::T)
+        }
+        Ok(None) | Err(Exit::Park) => Ok(Value::NIL),
+        Err(exit) => Err(exit),
+    }
+}
+
+/// `(peek-char &optional peek-type stream (eof-error-p t) eof-value recursive-p)`
+pub(in crate::builtins) fn peek_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let wanted = optional(arguments, 0);
+    let (stream, sort) = vm.designated_stream(optional(arguments, 1), true)?;
+    for _ in 0..SKIP_LIMIT {
+        let Some(code) = vm.next_character(stream, sort)? else { return vm.at_end(stream, arguments, 2) };
+        let is_it = match wanted.as_character() {
+            Some(wanted) => code == wanted,
+            None => wanted.is_nil() || !char::from_u32(code).is_some_and(char::is_whitespace),
+        };
+        if is_it {
+            vm.give_back(stream, sort, code);
+            return Ok(Value::character(code).unwrap_or(Value::NIL));
+        }
+    }
+    // What was skipped stays so: whoever takes over goes on from there.
+    vm.charge(SKIP_LIMIT);
+    Err(Exit::Slowly)
+}
+
+/// `(unread-char character &optional stream)`
+pub(in crate::builtins) fn unread_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(code) = arguments[0].as_character() else { return vm.type_error(arguments[0], "CHARACTER") };
+    let (stream, sort) = vm.designated_stream(optional(arguments, 1), true)?;
+    vm.give_back(stream, sort, code);
+    Ok(Value::NIL)
+}
+
+/// `(read-line &optional stream (eof-error-p t) eof-value recursive-p)`
+pub(in crate::builtins) fn read_line(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (stream, sort) = vm.designated_stream(optional(arguments, 0), true)?;
+    let (line, is_cut) = if sort == Sort::StandardInput {
+        let taken = vm.console.read_line(&mut *vm.host);
+        let Some((line, is_cut)) = vm.taken(taken)? else { return end_of_line(vm, stream, arguments) };
+        vm.charge(line.len());
+        match vm.heap.alloc_string(&line) {
+            Ok(text) => (text, is_cut),
+            Err(error) => {
+                // The builtin will be done again.
+                vm.console.unread_line(&line, is_cut);
+                return Err(error.into());
+            }
+        }
+    } else {
+        let (start, end) = (vm.stream_index(stream, slot::POSITION), vm.stream_index(stream, slot::END));
+        if start >= end {
+            return end_of_line(vm, stream, arguments);
+        }
+        let buffer = vm.stream_slot(stream, slot::BUFFER);
+        let rest = vm.heap.string(buffer).map_or(&[][..], |all| &all[start..end]);
+        let length = rest.iter().position(|&c| c == u32::from('\n'));
+        let line = rest[..length.unwrap_or(rest.len())].to_vec();
+        vm.charge(line.len());
+        let text = vm.heap.alloc_string(&line)?;
+        let next = start + line.len() + usize::from(length.is_some());
+        vm.set_stream_slot(stream, slot::POSITION, Value::index(next));
+        (text, length.is_none())
+    };
+    vm.give_values(&[line, Value::boolean(is_cut)])
+}
+
+fn end_of_line(vm: &mut Vm, stream: Value, arguments: &[Value]) -> Outcome {
+    let value = vm.at_end(stream, arguments, 1)?;
+    vm.give_values(&[value, Value::T])
+}
