@@ -13,6 +13,9 @@ use crate::vm::Vm;
 
 use super::COPY_LIMIT;
 
+/// The greatest number of dimensions.
+const MAX_RANK: usize = 64;
+
 /// The elements of an array.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Elements<'a> {
@@ -457,7 +460,12 @@ fn shape(vm: &mut Vm, dimensions: Value, data: Value, fill: Value) -> Result<(Ve
     let Some(room) = Elements::of_data(&vm.heap, data).map(Elements::len) else {
         return vm.type_error(data, "VECTOR");
     };
-    let sizes = vm.list_items(dimensions, 64)?;
+    let sizes = match vm.list_items(dimensions, MAX_RANK) {
+        Err(Exit::Slowly) => {
+            return vm.raise(Raised::Simple(format!("an array has at most {MAX_RANK} dimensions")));
+        }
+        sizes => sizes?,
+    };
     let mut total = Some(1usize);
     for &size in &sizes {
         total = total.zip(Some(vm.count(size)?)).and_then(|(total, size)| total.checked_mul(size));

@@ -1,7 +1,7 @@
 //! Doubles: elementary functions, their parts, and the way between them and the rationals.
 
 use crate::number::elementary::{self, Elementary};
-use crate::number::{Int, Number, Ratio, float, power, random, text};
+use crate::number::{Int, Ratio, float, power, random, text};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -101,10 +101,11 @@ pub(super) fn rationalize(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 fn convert(vm: &mut Vm, op: &'static str, v: Value, from_float: fn(f64) -> Ratio) -> Outcome {
-    match vm.number(v, "REAL")? {
-        Number::Float(x) if x.is_finite() => vm.ratio_value(op, &from_float(x)),
-        Number::Float(_) => vm.raise(Raised::Arithmetic(op, "the float is not a finite number".into())),
-        _ => Ok(v),
+    match vm.heap.as_double(v) {
+        Some(x) if x.is_finite() => vm.ratio_value(op, &from_float(x)),
+        Some(_) => vm.raise(Raised::Arithmetic(op, "the float is not a finite number".into())),
+        None if crate::number::is_rational(&vm.heap, v) => Ok(v),
+        None => vm.type_error(v, "REAL"),
     }
 }
 

@@ -137,7 +137,10 @@ pub(super) fn oddp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 fn is_odd(vm: &mut Vm, v: Value) -> Result<bool, Exit> {
     match v.as_fixnum() {
         Some(n) => Ok(n & 1 == 1),
-        None => vm.integer(v).map(|n| n.is_odd()),
+        None => match vm.heap.bignum(v) {
+            Some(big) => Ok(big.limbs.first().is_some_and(|limb| limb & 1 == 1)),
+            None => vm.type_error(v, "INTEGER"),
+        },
     }
 }
 

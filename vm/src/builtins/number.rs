@@ -1,6 +1,6 @@
 //! Arithmetic, comparison and rounding for any number of arguments.
 
-use crate::number::{self, Number, Rounding, limit::WORK_LIMIT, rounding};
+use crate::number::{self, Rounding, limit::WORK_LIMIT, rounding};
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -160,20 +160,18 @@ pub(super) fn minusp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `abs`
 pub(super) fn abs(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    match vm.number(arguments[0], "NUMBER")? {
-        Number::Float(x) => Ok(vm.heap.float(x.abs())?),
-        Number::Int(n) if !n.is_negative() => Ok(arguments[0]),
-        Number::Ratio(r) if !r.numerator.is_negative() => Ok(arguments[0]),
-        _ => number::negate(vm, arguments[0]),
+    if let Some(x) = vm.heap.as_double(arguments[0]) {
+        return Ok(vm.heap.float(x.abs())?);
     }
+    let sign = number::sign(vm, arguments[0], "NUMBER")?;
+    if sign < 0 { number::negate(vm, arguments[0]) } else { Ok(arguments[0]) }
 }
 
 /// `signum`
 pub(super) fn signum(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    match vm.number(arguments[0], "NUMBER")? {
-        Number::Float(x) => Ok(vm.heap.float(if x == 0.0 { x } else { x.signum() })?),
-        Number::Int(n) => Ok(Value::small(n.signum())),
-        Number::Ratio(r) => Ok(Value::small(r.numerator.signum())),
+    match vm.heap.as_double(arguments[0]) {
+        Some(x) => Ok(vm.heap.float(if x == 0.0 { x } else { x.signum() })?),
+        None => Ok(Value::small(number::sign(vm, arguments[0], "NUMBER")?)),
     }
 }
 

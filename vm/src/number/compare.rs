@@ -2,6 +2,7 @@
 
 use std::cmp::Ordering;
 
+use super::limbs::Operand;
 use super::{Int, Number, Ratio, float};
 use crate::heap::{Heap, Kind};
 use crate::raise::Exit;
@@ -62,11 +63,14 @@ pub(crate) fn sign_of(heap: &Heap, a: Value) -> Option<i32> {
     if let Some(n) = a.as_fixnum() {
         return Some(n.signum() as i32);
     }
-    Some(match Number::of(heap, a)? {
-        Number::Int(n) => n.signum(),
-        Number::Ratio(r) => r.numerator.signum(),
-        Number::Float(x) => i32::from(x > 0.0) - i32::from(x < 0.0),
-    })
+    if let Some(big) = heap.bignum(a) {
+        return Some(if big.negative { -1 } else { 1 });
+    }
+    if let Some((numerator, _)) = heap.ratio(a) {
+        return sign_of(heap, numerator);
+    }
+    let x = heap.as_double(a)?;
+    Some(i32::from(x > 0.0) - i32::from(x < 0.0))
 }
 
 /// How `a` compares with `b`; nothing when one is not a number in the sense of floats.
@@ -82,6 +86,11 @@ fn compare(
     }
     if let (Some(x), Some(y)) = (a.as_double(), b.as_double()) {
         return Ok(x.partial_cmp(&y));
+    }
+    if let (Some(x), Some(y)) = (Operand::of(&vm.heap, a, &mut [0]), Operand::of(&vm.heap, b, &mut [0])) {
+        let (order, work) = (x.compare(&y), x.len().min(y.len()));
+        vm.charge(work);
+        return Ok(Some(order));
     }
     let (x, y) = (vm.number(a, expected)?, vm.number(b, expected)?);
     Ok(match (&x, &y) {

@@ -4,6 +4,8 @@
 //! another representation and no allocation of the host. Products of two long numbers are left to `num-bigint`, which
 //! knows better ways than the one from school.
 
+use std::cmp::Ordering;
+
 use smallvec::SmallVec;
 
 use crate::heap::Heap;
@@ -43,6 +45,18 @@ impl<'a> Operand<'a> {
     /// Bits of the magnitude.
     pub(crate) fn bits(&self) -> u64 {
         self.limbs.last().map_or(0, |last| 64 * self.limbs.len() as u64 - u64::from(last.leading_zeros()))
+    }
+
+    /// How it compares with `other`.
+    pub(crate) fn compare(&self, other: &Operand<'_>) -> Ordering {
+        let lengths = self.limbs.len().cmp(&other.limbs.len());
+        let magnitudes = lengths.then_with(|| self.limbs.iter().rev().cmp(other.limbs.iter().rev()));
+        match (self.negative, other.negative) {
+            (false, false) => magnitudes,
+            (true, true) => magnitudes.reverse(),
+            (false, true) => Ordering::Greater,
+            (true, false) => Ordering::Less,
+        }
     }
 
     /// With the other sign.
@@ -167,6 +181,11 @@ mod tests {
             prop_assert_eq!(is_less(&a, &b), big(&a) < big(&b));
             prop_assert_eq!(big(&difference(high, low)), big(high) - big(low));
             prop_assert_eq!(big(&product(&a, &b)), big(&a) * big(&b));
+            let order = big(&a).cmp(&big(&b));
+            for (negative, expected) in [(false, order), (true, order.reverse())] {
+                let (a, b) = (Operand { negative, limbs: &a }, Operand { negative, limbs: &b });
+                prop_assert_eq!(a.compare(&b), expected);
+            }
         }
     }
 }

@@ -98,7 +98,14 @@ impl Vm {
     /// The number that `v` is; a type error that names `expected` otherwise.
     pub(crate) fn number(&mut self, v: Value, expected: &'static str) -> Result<Number, Exit> {
         match Number::of(&self.heap, v) {
-            Some(number) => Ok(number),
+            Some(number) => {
+                self.charge(match &number {
+                    Number::Int(n) => 2 * n.len(),
+                    Number::Ratio(r) => 4 * r.len(),
+                    Number::Float(_) => 0,
+                });
+                Ok(number)
+            }
             None => self.type_error(v, expected),
         }
     }
@@ -106,7 +113,10 @@ impl Vm {
     /// The integer that `v` is; a type error otherwise.
     pub(crate) fn integer(&mut self, v: Value) -> Result<Int, Exit> {
         match Int::of(&self.heap, v) {
-            Some(n) => Ok(n),
+            Some(n) => {
+                self.charge(2 * n.len());
+                Ok(n)
+            }
             None => self.type_error(v, "INTEGER"),
         }
     }

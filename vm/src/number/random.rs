@@ -53,7 +53,7 @@ pub(crate) fn random(vm: &mut Vm, limit: Value, state: Value) -> Outcome {
     let object = words_of(vm, state)?;
     let mut generator = Generator::load(vm, object);
     let result = match Number::of(&vm.heap, limit) {
-        Some(Number::Float(x)) if x > 0.0 => loop {
+        Some(Number::Float(x)) if x > 0.0 && x.is_finite() => loop {
             let y = (generator.next() >> 11) as f64 / (1u64 << 53) as f64 * x;
             if y < x {
                 break vm.float_value("RANDOM", y)?;

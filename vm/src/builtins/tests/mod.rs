@@ -13,6 +13,7 @@ use crate::raise::{Exit, Expected, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
+mod anything;
 mod arrays;
 mod characters;
 mod lists;
@@ -180,13 +181,13 @@ fn tokens(text: &str) -> Vec<String> {
 
 /// An integer (also as `2^70`), a ratio or a float.
 fn parse_number(vm: &mut Vm, token: &str) -> Option<Value> {
-    if let Some(power) = token.strip_prefix("2^") {
-        let n = Int::ONE.shifted_left(power.parse().ok()?);
-        return vm.integer_value("", &n).ok();
-    }
     if let Some((numerator, denominator)) = token.split_once('/') {
         let (numerator, denominator) = (parse_number(vm, numerator)?, parse_number(vm, denominator)?);
         return number::divide(vm, numerator, denominator).ok();
+    }
+    if let Some(power) = token.strip_prefix("2^") {
+        let n = Int::ONE.shifted_left(power.parse().ok()?);
+        return vm.integer_value("", &n).ok();
     }
     if let Ok(n) = token.parse::<num_bigint::BigInt>() {
         return vm.integer_value("", &Int::from_big(n)).ok();
