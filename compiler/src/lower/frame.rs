@@ -52,6 +52,8 @@ pub(super) struct Frame<'b, 'a> {
     pub(super) loops: FxHashMap<LambdaId, LoopState>,
     /// Variables whose values are computed where they are read, once.
     pub(super) substitutes: FxHashMap<VarId, NodeId>,
+    /// Variables that share the register of another one.
+    pub(super) sharers: FxHashMap<u8, Vec<VarId>>,
     /// Registers of the literals of the loop around the form, if there is one.
     pub(super) literals: Option<FxHashMap<PoolIdx, u8>>,
     /// Where the form was written that is being lowered.
@@ -79,6 +81,7 @@ pub(super) fn function(builder: &mut Builder<'_>, lambda: LambdaId) -> Function 
         tagbodies: FxHashMap::default(),
         loops: FxHashMap::default(),
         substitutes: FxHashMap::default(),
+        sharers: FxHashMap::default(),
         literals: None,
         span: text.span,
         constants: Vec::new(),

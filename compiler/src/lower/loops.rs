@@ -115,7 +115,9 @@ impl<'a> Frame<'_, 'a> {
             if self.is_plain_read(value, target) && !is_set_later {
                 continue;
             }
-            if is_set_later || resolution.is_read_in(target, later) {
+            let sharers = self.sharers.get(&register).map_or(&[][..], Vec::as_slice);
+            let mut readers = std::iter::once(&target).chain(sharers);
+            if is_set_later || readers.any(|&reader| resolution.is_read_in(reader, later)) {
                 let temporary = self.registers.top();
                 self.form(value, Dest::Fresh(temporary));
                 waiting.push((register, self.registers.take(1)));
@@ -135,7 +137,8 @@ impl<'a> Frame<'_, 'a> {
             && !self.builder.resolution.is_boxed(variable)
     }
 
-    /// Lowers `(let ((t1 e1) …) (setq v1 t1) … rest…)` without temporaries, if that is what the form is.
+    /// Lowers `(let ((t1 e1) …) (setq v1 t1) … rest…)` without temporaries, if that is what the form is. The first
+    /// assignment may be one more, `(setq v e)`, whose value needed no temporary.
     pub(super) fn parallel_assignment(
         &mut self,
         bindings: &'a [(Target, NodeId)],
@@ -143,39 +146,50 @@ impl<'a> Frame<'_, 'a> {
         dest: Dest,
     ) -> bool {
         let NodeKind::Progn(forms) = &self.core.nodes[body.index()].kind else { return false };
-        // With one binding there is no temporary to save, and all forms but those that assign must be left over.
-        let count = bindings.len();
+        let Some(first) = bindings.first() else { return false };
+        let direct = forms.len() > bindings.len() && self.assigns_temporary(first, forms[0]).is_none();
+        let sets = if direct { &forms[1..] } else { &forms[..] };
+        let count = bindings.len() + usize::from(direct);
+        // With one assignment there is no temporary to save. If the last one gave the form's value, it would be wanted.
         if count < 2 || forms.len() < count || (forms.len() == count && !matches!(dest, Dest::Effect)) {
             return false;
         }
         let mut targets = Vec::with_capacity(count);
         let mut values = Vec::with_capacity(count);
-        for ((target, value), &form) in bindings.iter().zip(forms) {
-            let Target::Lexical(temporary) = *target else { return false };
-            let NodeKind::SetLocal(variable, read) = self.core.nodes[form.index()].kind else { return false };
-            let NodeKind::Local(source) = self.core.nodes[read.index()].kind else { return false };
-            // The temporary must serve for this alone.
-            let resolution = &self.builder.resolution;
-            let is_plain = source == temporary
-                && !resolution.is_assigned(temporary)
-                && resolution.reads_of(temporary) == 1
-                && matches!(self.place(variable), Place::Register(_));
-            if !is_plain {
-                return false;
-            }
+        for (binding, &form) in bindings.iter().zip(sets) {
+            // Values of a sequential `let` do not refer to the temporaries either, since each is read just once.
+            let Some(variable) = self.assigns_temporary(binding, form) else { return false };
             targets.push(variable);
-            values.push(*value);
+            values.push(binding.1);
         }
-        // Values of a sequential `let` do not refer to the temporaries either, since each is read just once.
-        let mut seen = targets.clone();
-        seen.sort_unstable();
-        seen.dedup();
-        if seen.len() != targets.len() {
+        if direct {
+            let NodeKind::SetLocal(variable, value) = self.core.nodes[forms[0].index()].kind else {
+                return false;
+            };
+            targets.push(variable);
+            values.push(value);
+        }
+        let in_registers = targets.iter().all(|&target| matches!(self.place(target), Place::Register(_)));
+        let mut distinct = targets.clone();
+        distinct.sort_unstable();
+        distinct.dedup();
+        if !in_registers || distinct.len() != targets.len() {
             return false;
         }
         self.assign(&targets, &values);
         self.progn_rest(&forms[count..], dest);
         true
+    }
+
+    /// The variable that `form` sets to the temporary of `binding`, which serves for this alone.
+    fn assigns_temporary(&self, binding: &(Target, NodeId), form: NodeId) -> Option<VarId> {
+        let Target::Lexical(temporary) = binding.0 else { return None };
+        let NodeKind::SetLocal(variable, read) = self.core.nodes[form.index()].kind else { return None };
+        let resolution = &self.builder.resolution;
+        let serves = matches!(self.core.nodes[read.index()].kind, NodeKind::Local(source) if source == temporary)
+            && !resolution.is_assigned(temporary)
+            && resolution.reads_of(temporary) == 1;
+        serves.then_some(variable)
     }
 
     fn progn_rest(&mut self, forms: &[NodeId], dest: Dest) {

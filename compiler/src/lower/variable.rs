@@ -252,18 +252,13 @@ impl<'a> Frame<'_, 'a> {
     fn alias(&mut self, variable: VarId, value: NodeId) -> Option<u8> {
         let NodeKind::Local(other) = self.core.nodes[value.index()].kind else { return None };
         let resolution = &self.builder.resolution;
-        let changes = resolution.is_assigned(variable)
-            || resolution.is_assigned(other)
-            // Jumps for self calls assign parameters.
-            || [variable, other]
-                .iter()
-                .any(|one| resolution.is_self_called(self.core.variables[one.index()].owner) && self.is_parameter(*one));
-        if changes { None } else { self.plain_variable(value, &[]) }
-    }
-
-    fn is_parameter(&self, variable: VarId) -> bool {
-        let owner = &self.core.lambdas[self.core.variables[variable.index()].owner.index()];
-        owner.required.iter().any(|parameter| parameter.variable == variable)
+        if resolution.is_assigned(variable) || resolution.is_assigned(other) {
+            return None;
+        }
+        let register = self.plain_variable(value, &[])?;
+        // Parameters are assigned by jumps for self calls, which must know who reads them.
+        self.sharers.entry(register).or_default().push(variable);
+        Some(register)
     }
 
     /// Moves a variable that has just got its value into a box, if it lives in one.

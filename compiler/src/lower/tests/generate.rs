@@ -239,6 +239,15 @@ impl Generator<'_> {
         };
         if let Some(sets) = psetq {
             self.scope.truncate(height);
+            if self.choose(2) == 0 {
+                let direct = self.pick(|name| match name {
+                    Name::Variable(name) => Some(name.clone()),
+                    _ => None,
+                });
+                let direct =
+                    direct.map_or(String::new(), |name| format!("(setq {name}{})", self.forms(1, depth + 3)));
+                return format!("(let* ({bindings}) (progn {direct} {sets} {}))", self.leaf());
+            }
             return format!("(let ({bindings}) (progn {sets} {}))", self.leaf());
         }
         self.scope.extend(bound);

@@ -105,7 +105,13 @@ fn a_self_call_in_tail_position_is_a_jump() {
 
 #[test]
 fn assignments_in_parallel_save_temporaries() {
-    check("parallel", &["(defun f (a b) (let ((x (+ a b)) (y a)) (setq a x) (setq b y) nil) (list a b))"]);
+    check(
+        "parallel",
+        &[
+            "(defun f (a b) (let ((x (+ a b)) (y a)) (setq a x) (setq b y) nil) (list a b))",
+            "(defun f (a b) (let* ((x (cdr a))) (setq b (+ b 1)) (setq a x) nil) (list a b))",
+        ],
+    );
 }
 
 #[test]
