@@ -1,20 +1,20 @@
 //! The expander: forms to the core language. It runs macros' calls, checks special forms, and resolves names.
 //!
 //! [`Expander`] is a machine of steps: it never runs a macro itself but stops with [`Event::Macro`], and goes on when
-//! it is told the expansion. It takes no native stack in proportion to the program, see [`machine`].
+//! it is told the expansion. It takes no native stack in proportion to the program, see `machine.rs`.
 //!
 //! # Operators for the library
 //!
-//! Besides the operators of the standard that [`operator`] lists, these, internal to the package `ESL`, are there for
+//! Besides the operators of the standard that `operator.rs` lists, these, internal to the package `ESL`, are there for
 //! the library's macros to expand into:
 //!
 //! | operator | what it does |
 //! |---|---|
 //! | `(%named-lambda name lambda-list . body)` | a function that is shown as `name`; if that is a function's name, it is also the block around the body |
-//! | `(%macro-lambda shown name lambda-list . body)` | the function of a macro: takes a form and an environment, takes the form apart; see [`destructure`] for the library functions that it calls |
+//! | `(%macro-lambda shown name lambda-list . body)` | the function of a macro: takes a form and an environment, takes the form apart; see `destructure.rs` for the library functions that it calls |
 //! | `(%call-global name argument*)` | calls the global function `name`, or `(setf name)`, whatever local function has its name |
 //! | `(%apply-global name argument* list)` | likewise, the last argument a list of arguments |
-//! | `(%modify (old (name form)*) place new [result])` | replaces the value of a place by that of `new`, where `old` is the value it had; see [`modify`] |
+//! | `(%modify (old (name form)*) place new [result])` | replaces the value of a place by that of `new`, where `old` is the value it had; the subforms of the place are evaluated first, then the forms in order |
 //! | `(%handler-case form (type ([variable]) . body)*)` | unwinds to here and runs a body when a condition of the type is signalled |
 //! | `(%with-handlers list . body)` | runs the body with the list of `(type . function)` as handlers |
 //! | `(%with-mask height . body)` | runs the body with control entries from that height on masked |
@@ -41,7 +41,7 @@
 //!
 //! # What the expander calls
 //!
-//! The library functions of [`destructure`], and for places `(%putf list indicator value)`, the property list with that
+//! The library functions that `destructure.rs` describes, and for places `(%putf list indicator value)`, the property list with that
 //! value; `(%remf list indicator)`, the property list without it and whether it was there; and the standard's `dpb`,
 //! `deposit-field`, `adjoin`, `replace`, `nthcdr` and `c…r`.
 

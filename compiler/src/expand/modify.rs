@@ -188,17 +188,20 @@ struct Step<'a> {
 
 /// Binds all variables in order around a body.
 fn bind_in_order(steps: Vec<Step<'_>>, mut body: Vec<Datum>, make: Make) -> Datum {
+    // From the last step to the first, so that one with several values can enclose those after it. The bindings that
+    // will enclose the body are gathered from the last to the first, too.
     let mut bindings: Vec<(Datum, Datum)> = Vec::new();
-    // From the last step to the first, so that one with several values can enclose those after it.
     for Step { before, stores, value } in steps.into_iter().rev() {
         if let [store] = stores {
-            bindings.splice(0..0, before.into_iter().chain([(store.clone(), value)]));
+            bindings.push((store.clone(), value));
         } else {
+            bindings.reverse();
             let inside = make.let_in_order(std::mem::take(&mut bindings), std::mem::take(&mut body));
             body = vec![make.cl("MULTIPLE-VALUE-BIND", [make.items(stores.iter().cloned()), value, inside])];
-            bindings = before;
         }
+        bindings.extend(before.into_iter().rev());
     }
+    bindings.reverse();
     make.let_in_order(bindings, body)
 }
 

@@ -12,6 +12,8 @@ use crate::diagnostic::code;
 
 /// How many uses of an undefined name are shown besides the first.
 const SHOWN: usize = 3;
+/// For how many undefined names a similar one is looked for, which takes a look at all names.
+const COMPARED: usize = 50;
 
 /// A call of a global function.
 #[derive(Debug)]
@@ -140,18 +142,19 @@ impl Unit {
                 findings.push(wrong_count(&call.function.shown(), arity, count, call.span));
             }
         }
+        let mut similar = Similar { environment, left: COMPARED };
         findings.extend(
-            undefined.into_iter().map(|(function, uses)| undefined_function(environment, &function, &uses)),
+            undefined.into_iter().map(|(function, uses)| similar.undefined_function(&function, &uses)),
         );
-        findings.extend(self.undefined_variables(environment));
+        findings.extend(self.undefined_variables(similar));
         findings
     }
 
-    fn undefined_variables(&mut self, environment: &dyn Environment) -> Vec<Diagnostic> {
+    fn undefined_variables(&mut self, mut similar: Similar<'_>) -> Vec<Diagnostic> {
         let mut uses: Vec<(Symbol, Vec<Span>)> = Vec::new();
         let mut known: FxHashMap<Symbol, usize> = FxHashMap::default();
         for (symbol, span) in std::mem::take(&mut self.variables) {
-            if !matches!(environment.global(&symbol).variable, GlobalVariable::Undefined) {
+            if !matches!(similar.environment.global(&symbol).variable, GlobalVariable::Undefined) {
                 continue;
             }
             let index = *known.entry(symbol.clone()).or_insert(uses.len());
@@ -164,7 +167,7 @@ impl Unit {
             .map(|(symbol, spans)| {
                 let message = format!("no variable is called {}", name(&symbol));
                 let diagnostic = with_uses(code::UNDEFINED_VARIABLE.at(spans[0], message), &spans[1..]);
-                with_similar(environment, diagnostic, &symbol, true)
+                similar.help(diagnostic, &symbol, true)
             })
             .collect()
     }
@@ -178,21 +181,42 @@ fn global(environment: &dyn Environment, function: &Name) -> GlobalFunction {
     }
 }
 
-fn undefined_function(environment: &dyn Environment, function: &Name, uses: &[Span]) -> Diagnostic {
-    if !function.is_setf
-        && let Some(instead) = environment.global(&function.symbol).instead
-    {
-        let message = format!("{} is not part of ESL", function.shown());
-        return Diagnostic::warning(code::NOT_IN_SUBSET.name, message, uses[0]).help(instead);
+/// Finds names like those that nobody has defined.
+struct Similar<'a> {
+    environment: &'a dyn Environment,
+    /// For how many more names.
+    left: usize,
+}
+
+impl Similar<'_> {
+    fn undefined_function(&mut self, function: &Name, uses: &[Span]) -> Diagnostic {
+        if !function.is_setf
+            && let Some(instead) = self.environment.global(&function.symbol).instead
+        {
+            let message = format!("{} is not part of ESL", function.shown());
+            return Diagnostic::warning(code::NOT_IN_SUBSET.name, message, uses[0]).help(instead);
+        }
+        let message = format!("no function is called {}", function.shown());
+        let diagnostic = with_uses(code::UNDEFINED_FUNCTION.at(uses[0], message), &uses[1..]);
+        if function.is_setf {
+            let place = super::form::plain(&function.symbol);
+            let help =
+                format!("define it with `(defun (setf {place}) (value …) …)` or `(defsetf {place} …)`");
+            return diagnostic.help(help);
+        }
+        self.help(diagnostic, &function.symbol, false)
     }
-    let message = format!("no function is called {}", function.shown());
-    let diagnostic = with_uses(code::UNDEFINED_FUNCTION.at(uses[0], message), &uses[1..]);
-    if function.is_setf {
-        let place = super::form::plain(&function.symbol);
-        return diagnostic
-            .help(format!("define it with `(defun (setf {place}) (value …) …)` or `(defsetf {place} …)`"));
+
+    fn help(&mut self, diagnostic: Diagnostic, symbol: &Symbol, variable: bool) -> Diagnostic {
+        if self.left == 0 {
+            return diagnostic;
+        }
+        self.left -= 1;
+        match self.environment.similar(symbol, variable).first() {
+            Some(similar) => diagnostic.help(format!("did you mean {}?", name(similar))),
+            None => diagnostic,
+        }
     }
-    with_similar(environment, diagnostic, &function.symbol, false)
 }
 
 fn with_uses(mut diagnostic: Diagnostic, further: &[Span]) -> Diagnostic {
@@ -200,18 +224,6 @@ fn with_uses(mut diagnostic: Diagnostic, further: &[Span]) -> Diagnostic {
         diagnostic.secondary.push(esl_bytecode::diagnostic::Label { span, text: "and here".into() });
     }
     diagnostic
-}
-
-fn with_similar(
-    environment: &dyn Environment,
-    diagnostic: Diagnostic,
-    symbol: &Symbol,
-    variable: bool,
-) -> Diagnostic {
-    match environment.similar(symbol, variable).first() {
-        Some(similar) => diagnostic.help(format!("did you mean {}?", name(similar))),
-        None => diagnostic,
-    }
 }
 
 /// Whether a function of this arity takes `count` arguments.

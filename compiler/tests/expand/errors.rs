@@ -1,5 +1,7 @@
 //! What is said of wrong and doubtful forms.
 
+use esl_compiler::diagnostic::code::{ALL, Code, Stage};
+
 use crate::host::FakeHost;
 use crate::{codes, findings, snapshot};
 
@@ -245,6 +247,21 @@ fn calls_of_what_failed_to_be_defined_are_not_blamed() {
     assert_eq!(codes("(defmacro broken (5) 1) (broken (let 5))"), ["malformed-lambda-list"]);
     assert_eq!(codes("(defmacro broken (x) (let 5) x) (broken (let 5))"), ["malformed-form"]);
     assert_eq!(codes("(macrolet ((broken (5) 1)) (broken (let 5)))"), ["malformed-lambda-list"]);
+}
+
+#[test]
+fn the_programs_in_the_table_of_codes_have_them() {
+    // These need a library, or a machine that runs what is loaded.
+    let needs_library = ["assignment-to-constant", "macro-failed", "compile-time-failure", "literal-object"];
+    let stage = |code: &&&Code| code.stage == Stage::Expander;
+    for code in ALL.iter().filter(stage).filter(|code| !needs_library.contains(&code.name)) {
+        let found = |program: &str| {
+            let (_, findings) = crate::expand_file(&mut FakeHost::locked(), program);
+            findings.iter().any(|finding| finding.code == code.name)
+        };
+        assert!(found(code.failing), "{}", code.name);
+        assert!(!found(code.repaired), "{}", code.name);
+    }
 }
 
 #[test]
