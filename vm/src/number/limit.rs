@@ -22,6 +22,9 @@ pub(crate) const ROOT_LIMBS: usize = 512;
 /// Limbs of an integer whose digits one operation may write in a radix that is no power of two.
 pub(crate) const DIGIT_LIMBS: usize = 1024;
 
+/// Digits that one operation may write in a radix that is a power of two, where that is linear.
+pub(crate) const WRITTEN_DIGITS: u64 = 1 << 17;
+
 /// Digits that one operation may read.
 pub(crate) const PARSED_DIGITS: usize = 16_384;
 

@@ -182,13 +182,12 @@ fn scaled(r: &Ratio) -> (f64, f64) {
     if x.is_normal() {
         return (0.0, x);
     }
-    let bits = r.numerator.bits() as i64 - r.denominator.bits() as i64;
-    let r = if bits > 0 {
-        Ratio { numerator: r.numerator.clone(), denominator: r.denominator.shifted_left(bits.unsigned_abs()) }
-    } else {
-        Ratio { numerator: r.numerator.shifted_left(bits.unsigned_abs()), denominator: r.denominator.clone() }
-    };
-    (bits as f64, r.to_f64())
+    // The leading bits of both parts are all that a double can tell of a quotient.
+    let cut = |n: &Int| n.bits().saturating_sub(120);
+    let (above, below) = (cut(&r.numerator), cut(&r.denominator));
+    let leading = |n: &Int, cut: u64| n.shifted_right(cut).to_f64();
+    let x = leading(&r.numerator, above) / leading(&r.denominator, below);
+    (above as f64 - below as f64, x)
 }
 
 /// The exponent, if `a` is a power of `base` and both are integers: a quotient of rounded logarithms may miss it.

@@ -88,6 +88,9 @@ impl Ratio {
 
     /// The nearest double, halves to even; infinite when it is too large for one.
     pub(crate) fn to_f64(&self) -> f64 {
+        if self.denominator.is_one() {
+            return self.numerator.to_f64();
+        }
         // A quotient of at least 66 bits, and whether there was a remainder: enough for one rounding.
         let shift = 66 + self.denominator.bits() as i64 - self.numerator.bits() as i64;
         let (mut numerator, mut denominator) = (self.numerator.abs(), self.denominator.clone());

@@ -14,12 +14,16 @@ use crate::vm::Vm;
 /// The digits of `n` in `radix`, from 2 to 36, with `-` in front of a negative number.
 ///
 /// # Errors
-/// [`Exit::Slowly`] for a number above [`limit::DIGIT_LIMBS`] in a radix that is no power of two.
+/// [`Exit::Slowly`] for a number above [`limit::DIGIT_LIMBS`] in a radix that is no power of two, or with more than about
+/// [`limit::WRITTEN_DIGITS`] digits.
 pub(crate) fn integer_text(vm: &mut Vm, n: &Int, radix: u32) -> Result<String, Exit> {
     match n {
         Int::Small(n) if radix == 10 => Ok(n.to_string()),
         _ => {
             let len = n.len();
+            if n.bits() / u64::from(radix.ilog2()) > limit::WRITTEN_DIGITS {
+                return Err(Exit::Slowly);
+            }
             if !radix.is_power_of_two() {
                 if len > limit::DIGIT_LIMBS {
                     return Err(Exit::Slowly);
