@@ -55,14 +55,8 @@ impl Compiled {
 }
 
 /// The ticks that a macro, or another part of the program that runs at compile time, may take.
-const COMPILE_TIME_CONFIG: Config = Config {
-    memory: 1 << 30,
-    stack: 1 << 16,
-    slice: 2000,
-    budget: None,
-    seed: 0,
-    collect_always: false,
-};
+const COMPILE_TIME_CONFIG: Config =
+    Config { memory: 1 << 30, stack: 1 << 16, slice: 2000, budget: None, seed: 0, collect_always: false };
 
 /// Compiles sources to one program that runs them in order.
 ///
@@ -181,9 +175,13 @@ pub struct Report {
 /// A text, if the limit of memory leaves no room for the library.
 pub fn machine(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, String> {
     let no_room = |_| "the memory limit leaves no room for the library".to_string();
-    let mut machine = Vm::new(config, host).map_err(no_room)?;
+    // The library is taken in at full speed; what is asked for counts from the program on.
+    let unhurried =
+        Config { slice: COMPILE_TIME_CONFIG.slice, budget: None, collect_always: false, ..config.clone() };
+    let mut machine = Vm::new(unhurried, host).map_err(no_room)?;
     machine.set_compiler(Box::new(Compiler::default()));
     esl_stdlib::load(&mut machine)?;
+    machine.begin_program(config);
     Ok(machine)
 }
 

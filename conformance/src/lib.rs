@@ -39,6 +39,8 @@ pub struct Expectations {
     pub warnings: Vec<(usize, String)>,
     /// The exit status, when it is not the one that follows from the rest.
     pub status: Option<u8>,
+    /// What is known not to work yet: the program fails, and has to, until that is mended.
+    pub known: Option<String>,
     /// Further options of `eslvm`.
     pub options: Vec<String>,
     /// The settings under which it runs.
@@ -57,7 +59,9 @@ impl Expectations {
             let number = index + 1;
             in_header &= line.starts_with(';');
             if in_header {
-                found.header(line.trim_start_matches(';').trim()).map_err(|error| format!("line {number}: {error}"))?;
+                found
+                    .header(line.trim_start_matches(';').trim())
+                    .map_err(|error| format!("line {number}: {error}"))?;
             }
             let Some((_, comment)) = line.split_once("; expect") else { continue };
             found.expectation(comment, number).map_err(|error| format!("line {number}: {error}"))?;
@@ -66,7 +70,9 @@ impl Expectations {
     }
 
     fn header(&mut self, line: &str) -> Result<(), String> {
-        if let Some(options) = line.strip_prefix("options:") {
+        if let Some(reason) = line.strip_prefix("known:") {
+            self.known = Some(reason.trim().to_string());
+        } else if let Some(options) = line.strip_prefix("options:") {
             self.options.extend(options.split_whitespace().map(String::from));
         } else if let Some(settings) = line.strip_prefix("settings:") {
             // Names come first, separated by commas; the reason follows.
@@ -89,7 +95,9 @@ impl Expectations {
             "failure" => return Err("a second failure".into()),
             "error" => self.errors.push((line, value.trim().to_string())),
             "warning" => self.warnings.push((line, value.trim().to_string())),
-            "status" => self.status = Some(value.trim().parse().map_err(|_| "expected a number from 0 to 255")?),
+            "status" => {
+                self.status = Some(value.trim().parse().map_err(|_| "expected a number from 0 to 255")?)
+            }
             other => return Err(format!("`expect {other}` is not known")),
         }
         Ok(())

@@ -9,7 +9,7 @@ use crate::host::Output;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::task::TaskId;
 use crate::value::Value;
-use crate::vm::Vm;
+use crate::vm::{Config, Vm};
 
 /// A function that the embedder gives to programs. It gets and gives data, and cannot call back.
 pub type HostFunction = Box<dyn FnMut(&[Datum]) -> Result<Datum, String> + Send>;
@@ -81,7 +81,8 @@ impl Vm {
     /// # Errors
     /// A text, if the library has none.
     pub fn library_function(&mut self, name: &str) -> Result<Value, String> {
-        let symbol = self.world.intern_esl(&mut self.heap, name).map_err(|_| "there is no memory left".to_string())?;
+        let symbol =
+            self.world.intern_esl(&mut self.heap, name).map_err(|_| "there is no memory left".to_string())?;
         if self.is_defined(symbol) { Ok(symbol) } else { Err(format!("the library has no function {name}")) }
     }
 
@@ -92,6 +93,12 @@ impl Vm {
     pub fn spawn_library(&mut self, name: &str, arguments: &[Value]) -> Result<TaskId, String> {
         let function = self.library_function(name)?;
         self.spawn(function, arguments).map_err(|_| "there is no memory left for a task".into())
+    }
+
+    /// Settings that count from here on; ticks are counted anew.
+    pub fn begin_program(&mut self, config: Config) {
+        self.config = Config { memory: self.config.memory, ..config };
+        self.spent = 0;
     }
 
     /// Writes what the program has printed and is still in a buffer.
@@ -113,7 +120,8 @@ impl Vm {
         }
         let class = self.heap.structure_class(condition);
         let name = class.and_then(|class| self.heap.symbol(self.class_name(class)));
-        name.and_then(|symbol| self.heap.string_text(symbol.name)).is_some_and(|name| name == "HEAP-EXHAUSTED")
+        name.and_then(|symbol| self.heap.string_text(symbol.name))
+            .is_some_and(|name| name == "HEAP-EXHAUSTED")
     }
 
     /// Figures of the heap.

@@ -18,7 +18,7 @@ use esl_bytecode::module::{Capture, CaptureSource, Parameters};
 /// The sort of a Code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Sort {
+pub(crate) enum Sort {
     /// Instructions, ready to run.
     Bytecode = 0,
     /// A builtin: its number is in the shape.
@@ -31,7 +31,7 @@ pub enum Sort {
 
 /// Sort and parameters of a Code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shape {
+pub(crate) struct Shape {
     /// The sort.
     pub sort: Sort,
     /// Number of required parameters.
@@ -50,7 +50,7 @@ pub struct Shape {
 
 impl Shape {
     /// The shape of bytecode that takes these parameters.
-    pub fn bytecode(parameters: &Parameters) -> Shape {
+    pub(crate) fn bytecode(parameters: &Parameters) -> Shape {
         Shape {
             sort: Sort::Bytecode,
             required: parameters.required,
@@ -63,7 +63,7 @@ impl Shape {
     }
 
     /// The shape of a Code of another sort; `number` is that of a builtin, else 0.
-    pub fn other(sort: Sort, number: u16) -> Shape {
+    pub(crate) fn other(sort: Sort, number: u16) -> Shape {
         Shape {
             sort,
             required: 0,
@@ -76,7 +76,7 @@ impl Shape {
     }
 
     /// As it stands in the Code.
-    pub fn pack(self) -> u64 {
+    pub(crate) fn pack(self) -> u64 {
         let flags =
             u64::from(self.rest) | u64::from(self.takes_keys) << 1 | u64::from(self.allow_other_keys) << 2;
         self.sort as u64
@@ -87,7 +87,7 @@ impl Shape {
     }
 
     /// Reads what [`Shape::pack`] made.
-    pub fn unpack(bits: u64) -> Shape {
+    pub(crate) fn unpack(bits: u64) -> Shape {
         let sort = match bits as u8 {
             1 => Sort::Native,
             2 => Sort::Undefined,
@@ -104,16 +104,10 @@ impl Shape {
             number: (bits >> 32) as u16,
         }
     }
-
-    /// Number of registers that hold parameters on entry.
-    pub fn registers(self) -> usize {
-        let keys = if self.takes_keys { usize::from(self.number) } else { 0 };
-        usize::from(self.required) + usize::from(self.optional) + usize::from(self.rest) + keys
-    }
 }
 
 /// A capture as a word behind the instructions.
-pub fn capture_word(capture: Capture) -> u32 {
+pub(crate) fn capture_word(capture: Capture) -> u32 {
     match capture.source {
         CaptureSource::Register(index) => u32::from(index),
         CaptureSource::Capture(index) => 1 << 8 | u32::from(index),
@@ -122,7 +116,7 @@ pub fn capture_word(capture: Capture) -> u32 {
 }
 
 /// Reads what [`capture_word`] made.
-pub fn capture_source(word: u32) -> CaptureSource {
+pub(crate) fn capture_source(word: u32) -> CaptureSource {
     match word >> 8 {
         0 => CaptureSource::Register(word as u8),
         1 => CaptureSource::Capture(word as u8),
@@ -141,7 +135,6 @@ mod tests {
         let parameters = Parameters { required: 200, optional: 3, rest: true, keys, allow_other_keys: true };
         let shape = Shape::bytecode(&parameters);
         assert_eq!(Shape::unpack(shape.pack()), shape);
-        assert_eq!(shape.registers(), parameters.registers());
         let native = Shape::other(Sort::Native, 700);
         assert_eq!(Shape::unpack(native.pack()), native);
     }

@@ -50,12 +50,6 @@ impl Stack {
         self.capacity
     }
 
-    /// Address after the last word.
-    pub(crate) fn end(&self) -> *mut Value {
-        // SAFETY: one past the end of the segment.
-        unsafe { self.start.as_ptr().add(self.capacity) }
-    }
-
     /// Makes room for at least `words` words, keeping the contents. Moves the stack.
     pub(crate) fn grow(&mut self, words: usize) {
         let capacity = words.next_power_of_two().max(self.capacity * 2);
@@ -99,7 +93,9 @@ fn layout(words: usize) -> Layout {
 fn allocate(words: usize) -> NonNull<Value> {
     let layout = layout(words);
     // SAFETY: the layout is not empty.
-    let Some(start) = NonNull::new(unsafe { alloc(layout) }.cast::<Value>()) else { handle_alloc_error(layout) };
+    let Some(start) = NonNull::new(unsafe { alloc(layout) }.cast::<Value>()) else {
+        handle_alloc_error(layout)
+    };
     for index in 0..words {
         // SAFETY: the index is below the size of the fresh segment.
         unsafe { start.as_ptr().add(index).write(Value::NIL) };

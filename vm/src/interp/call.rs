@@ -138,6 +138,7 @@ pub(super) unsafe fn call(vm: &mut Vm, callee: Value, arguments: Arguments, plac
         // SAFETY: as this function.
         return unsafe { call_native(vm, shape.number, &arguments, place) };
     }
+    // SAFETY: the code is that of the function, and bytecode.
     let arranged = match unsafe { arrange(vm, function, code, shape, arguments) } {
         Ok(arranged) => arranged,
         Err(exit) => return Signal::Exit(exit),
@@ -216,11 +217,13 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Plac
     match place {
         // SAFETY: as this function; V3 for the window.
         Place::Tail => unsafe { return_all(vm) },
+        // SAFETY: as this function; V3 for the window.
         Place::Window => unsafe {
             let word = *vm.cpu.pc;
             deliver(vm, vm.cpu.base.add((word >> 8 & 0xff) as usize), (word >> 24) as usize);
             Signal::Next
         },
+        // SAFETY: as this function.
         Place::Above => unsafe { super::raise::substitute(vm) },
     }
 }
@@ -244,8 +247,10 @@ unsafe fn arrange(
         let name = vm.name_of_function(function);
         let max = if takes_more { None } else { Some(positional as u32) };
         let given = count_of_arguments(count);
-        return vm
-            .program_error(format!("{name} was called with {given}; it takes {}", describe_arity(required, max)));
+        return vm.program_error(format!(
+            "{name} was called with {given}; it takes {}",
+            describe_arity(required, max)
+        ));
     }
     if count == required && positional == required && !takes_more {
         return Ok(arguments);
@@ -383,9 +388,7 @@ impl Vm {
         // SAFETY: a Function, by its kind or because the function of a symbol is one.
         let sort = unsafe { Shape::unpack((*code_of(function)).spare[0]).sort };
         match sort {
-            Sort::Undefined => {
-                self.raise(Raised::UndefinedFunction(callee))
-            }
+            Sort::Undefined => self.raise(Raised::UndefinedFunction(callee)),
             Sort::Lazy => {
                 self.make_ready(function)?;
                 Ok(function)
@@ -399,39 +402,50 @@ impl Vm {
         (base.addr() - self.task().stack.start().addr()) / size_of::<Value>()
     }
 
+    /// Words that the running task's stack may have now.
+    fn stack_limit(&self) -> usize {
+        self.config.stack + if self.task().uses_reserve { RESERVE } else { 0 }
+    }
+
+    /// Address up to which the running task's stack may be used: its end, or its limit if that comes first.
+    pub(super) fn stack_end(&self) -> *mut Value {
+        let stack = &self.task().stack;
+        // SAFETY: not behind the end of the segment.
+        unsafe { stack.start().add(stack.capacity().min(self.stack_limit())) }
+    }
+
     /// Makes room in the running task's stack for `words` words in all.
     ///
     /// # Errors
     /// `:stack-exhausted` at the limit. Handling that has a reserve; when it is used up too, the task ends.
     fn reserve_stack(&mut self, words: usize) -> Result<(), Exit> {
+        if words > self.stack_limit() {
+            if self.task().uses_reserve {
+                let condition = self.world.known.stack_exhausted;
+                self.begin_end(crate::control::End::Failed(condition));
+                return Err(Exit::Unwind);
+            }
+            self.task_mut().uses_reserve = true;
+            self.cpu.stack_end = self.stack_end();
+            return self.raise(Raised::StackExhausted);
+        }
         if words <= self.task().stack.capacity() {
             return Ok(());
         }
-        let soft = self.config.stack;
-        let uses_reserve = self.task().uses_reserve;
-        if words > soft && !uses_reserve {
-            self.task_mut().uses_reserve = true;
-            return self.raise(Raised::StackExhausted);
-        }
-        if words > soft + RESERVE {
-            let condition = self.world.known.stack_exhausted;
-            self.begin_end(crate::control::End::Failed(condition));
-            return Err(Exit::Unwind);
-        }
         let offset = self.offset_of(self.cpu.base);
-        let stack = &mut self.task_mut().stack;
-        stack.grow(words);
-        let (start, end) = (stack.start(), stack.end());
+        self.task_mut().stack.grow(words);
         // SAFETY: the offset was inside the old stack, and the new one is larger.
-        self.cpu.base = unsafe { start.add(offset) };
-        self.cpu.stack_end = end;
+        self.cpu.base = unsafe { self.task().stack.start().add(offset) };
+        self.cpu.stack_end = self.stack_end();
         Ok(())
     }
 
-    /// Closes the reserve of the stack once the handling of its exhaustion is over.
-    pub(super) fn close_reserve(&mut self) {
+    /// Closes the reserves of stack and heap once the handling of their exhaustion is over: an unwinding has landed.
+    pub(super) fn close_reserves(&mut self) {
+        self.heap.close_reserve();
         if self.task().uses_reserve && self.offset_of(self.cpu.base) < self.config.stack / 2 {
             self.task_mut().uses_reserve = false;
+            self.cpu.stack_end = self.stack_end();
         }
     }
 }

@@ -73,9 +73,8 @@ pub(super) unsafe fn pop(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Sign
 #[inline(never)]
 pub(super) unsafe fn bind_list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: V3: registers of the frame.
-    let (symbols, values) = unsafe {
-        (*base.add((*pc >> 8 & 0xff) as usize), *base.add((*pc >> 16 & 0xff) as usize))
-    };
+    let (symbols, values) =
+        unsafe { (*base.add((*pc >> 8 & 0xff) as usize), *base.add((*pc >> 16 & 0xff) as usize)) };
     let height = vm.task().control.bindings.len();
     match vm.bind_list(symbols, values) {
         Ok(()) => Signal::Next,
@@ -198,7 +197,7 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
         let window = vm.cpu.base.add(usize::from(entry.window));
         call::deliver(vm, window, usize::from(entry.want));
     }
-    vm.close_reserve();
+    vm.close_reserves();
     Signal::Reload
 }
 

@@ -37,6 +37,7 @@ macro_rules! define_operations {
         /// The operations of the loop: every opcode, and those that only the machine's own stubs contain.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
+        #[allow(dead_code, reason = "operations are made by reading code")]
         pub(crate) enum Operation {
             $( $name = $number, )*
             /// The function that took the place of an instruction has returned: see `raise`.
@@ -151,10 +152,11 @@ fn is_simple_vector(v: Value) -> bool {
 /// Makes the task in `vm.running` the one whose registers are in `vm.cpu`, with so many ticks.
 pub(crate) fn load(vm: &mut Vm, ticks: i32) {
     let task = vm.task();
-    let (pc, end) = (task.pc, task.stack.end());
+    let pc = task.pc;
     // SAFETY: the base of a task lies in its stack.
     let base = unsafe { task.stack.start().add(task.base) };
-    vm.cpu = Cpu { pc, base, stack_end: end, ticks, reserve: 0, granted: ticks };
+    let stack_end = vm.stack_end();
+    vm.cpu = Cpu { pc, base, stack_end, ticks, reserve: 0, granted: ticks };
     vm.arm();
 }
 
@@ -183,7 +185,7 @@ pub(crate) fn run(vm: &mut Vm) -> Leave {
 /// # Safety
 /// `vm.cpu` describes the running task, at the instruction that gave the signal.
 unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
-    // SAFETY, for all of these: each has the contract of this function and leaves `vm.cpu` in order.
+    // SAFETY: for all of these, each has the contract of this function and leaves `vm.cpu` in order.
     unsafe {
         loop {
             signal = match signal {
@@ -224,7 +226,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
     // SAFETY: `base[-2]` is the function of the frame (M2), which keeps its code alive.
     let mut k = unsafe { constants_of(code_of(*base.sub(2))) };
 
-    // SAFETY, for the whole loop: V1 makes every word reached an instruction with its aux word; V3 keeps registers inside
+    // SAFETY: for the whole loop, V1 makes every word reached an instruction with its aux word; V3 keeps registers inside
     // the frame, for which the call made room; V4 keeps constants inside the code; V6 makes every register read hold an
     // object of the program. What depends on data is tested before it is used (M6).
     let signal = unsafe {
@@ -356,8 +358,13 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             macro_rules! jump_compare {
                 ($operator:tt, $jump_when:literal) => {{
                     let offset = aux!() as i32 as isize;
-                    compare!($operator, get!(a!()), get!(b!()),
-                        jump_if!(2, $jump_when, offset), jump_if!(2, !$jump_when, offset));
+                    compare!(
+                        $operator,
+                        get!(a!()),
+                        get!(b!()),
+                        jump_if!(2, $jump_when, offset),
+                        jump_if!(2, !$jump_when, offset)
+                    );
                     cold_test!(2, $jump_when, offset)
                 }};
             }
@@ -915,7 +922,9 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     let function = *window;
                     if function.is_object() && (*function.object_ptr()).kind == Kind::Function {
                         let code = code_of(function);
-                        if (*code).arity == b!() as u32 && base.add((*code).nregs as usize) <= vm.cpu.stack_end {
+                        if (*code).arity == b!() as u32
+                            && base.add((*code).nregs as usize) <= vm.cpu.stack_end
+                        {
                             for i in 0..b!() {
                                 *base.add(i) = *window.add(2 + i);
                             }

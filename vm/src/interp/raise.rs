@@ -94,7 +94,8 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
 unsafe fn collect(vm: &mut Vm) -> Signal {
     // SAFETY: V1.
     let word = unsafe { *vm.cpu.pc };
-    let is_call = Opcode::from_number(word as u8).is_some_and(|opcode| opcode.substitute() == Substitute::Call);
+    let is_call =
+        Opcode::from_number(word as u8).is_some_and(|opcode| opcode.substitute() == Substitute::Call);
     if is_call {
         // Its tick will be taken again.
         vm.cpu.ticks += 1;
@@ -149,7 +150,9 @@ pub(super) unsafe fn substitute(vm: &mut Vm) -> Signal {
             // Nothing can stand for what the instruction was to do: it is tried again.
             Substitute::Never => return Signal::Reload,
             Substitute::Test => {
-                if vm.values.first().is_some_and(|v| v.is_true()) == jumps_when(std::mem::transmute(word as u8)) {
+                if vm.values.first().is_some_and(|v| v.is_true())
+                    == jumps_when(std::mem::transmute::<u8, Operation>(word as u8))
+                {
                     vm.cpu.pc = pc.add(2).offset(*pc.add(1) as i32 as isize);
                     return Signal::Reload;
                 }
@@ -224,4 +227,3 @@ impl Vm {
         frames
     }
 }
-
