@@ -177,6 +177,9 @@ struct Walk<'a> {
     tagbody_places: Vec<Place>,
     block_catches: Vec<bool>,
     tagbody_catches: Vec<bool>,
+    /// Whether all exits from a block so far give one value.
+    block_singles: Vec<bool>,
+    single: Vec<bool>,
     spans: Vec<(u32, u32)>,
     reads: Vec<Vec<u32>>,
     sets: Vec<Vec<u32>>,
@@ -214,6 +217,8 @@ impl<'a> Walk<'a> {
             tagbody_places: vec![root; core.tagbodies.len()],
             block_catches: vec![false; core.blocks.len()],
             tagbody_catches: vec![false; core.tagbodies.len()],
+            block_singles: vec![true; core.blocks.len()],
+            single: vec![false; core.nodes.len()],
             spans: vec![(0, 0); core.nodes.len()],
             reads: vec![Vec::new(); core.variables.len()],
             sets: vec![Vec::new(); core.variables.len()],
@@ -227,7 +232,10 @@ impl<'a> Walk<'a> {
         while let Some(event) = self.pending.pop() {
             self.clock += 1;
             match event {
-                Event::Leave(node) => self.spans[node.index()].1 = self.clock,
+                Event::Leave(node) => {
+                    self.spans[node.index()].1 = self.clock;
+                    self.single[node.index()] = self.gives_one(node);
+                }
                 Event::Enter(node, place) => {
                     self.spans[node.index()].0 = self.clock;
                     self.pending.push(Event::Leave(node));
@@ -346,34 +354,11 @@ impl<'a> Walk<'a> {
         self.captures.add(lexical, self.frames[owner.index()], place.frame, &mut |_| {});
     }
 
-    fn finish(mut self) -> Resolution {
-        let functions = std::mem::take(&mut self.functions);
-        let references = std::mem::take(&mut self.function_references);
-        self.captures.add_functions(self.core, &self.frames, &functions, &references);
-        Resolution {
-            single: single_valued(self.core),
-            frames: self.frames,
-            functions,
-            used: self.used,
-            captures: self.captures,
-            self_called: self.self_called,
-            block_catches: self.block_catches,
-            tagbody_catches: self.tagbody_catches,
-            spans: self.spans,
-            reads: self.reads,
-            sets: self.sets,
-        }
-    }
-}
-
-/// For each node whether it gives exactly one value. Children come after their parents, so that one pass from the end
-/// finds everything that it asks for.
-fn single_valued(core: &Core) -> Vec<bool> {
-    let mut single = vec![true; core.nodes.len()];
-    let mut blocks = vec![true; core.blocks.len()];
-    for (index, node) in core.nodes.iter().enumerate().rev() {
-        let of = |id: &NodeId| single[id.index()];
-        let answer = match &node.kind {
+    /// Whether a node gives exactly one value, now that this is known of everything inside it.
+    fn gives_one(&mut self, node: NodeId) -> bool {
+        let core = self.core;
+        let of = |id: &NodeId| self.single[id.index()];
+        match &core.nodes[node.index()].kind {
             NodeKind::If(_, consequent, alternative) => of(consequent) && of(alternative),
             NodeKind::Progn(forms) | NodeKind::And(forms) | NodeKind::Or(forms) => {
                 forms.last().is_none_or(of)
@@ -386,10 +371,11 @@ fn single_valued(core: &Core) -> Vec<bool> {
             | NodeKind::Mask(_, body) => of(body),
             NodeKind::FirstValues(first, _) | NodeKind::UnwindProtect(first, _) => of(first),
             NodeKind::ReturnFrom(block, value) => {
-                blocks[block.index()] &= of(value);
+                let value = of(value);
+                self.block_singles[block.index()] &= value;
                 true
             }
-            NodeKind::Block(block, body) => blocks[block.index()] && of(body),
+            NodeKind::Block(block, body) => self.block_singles[block.index()] && of(body),
             NodeKind::HandlerCase(body, clauses) => of(body) && clauses.iter().all(|clause| of(&clause.body)),
             NodeKind::Values(forms) => forms.len() == 1,
             NodeKind::Call(Callee::Builtin(builtin), _) => returns_one(*builtin),
@@ -397,10 +383,27 @@ fn single_valued(core: &Core) -> Vec<bool> {
                 false
             }
             _ => true,
-        };
-        single[index] = answer;
+        }
     }
-    single
+
+    fn finish(mut self) -> Resolution {
+        let functions = std::mem::take(&mut self.functions);
+        let references = std::mem::take(&mut self.function_references);
+        self.captures.add_functions(self.core, &self.frames, &functions, &references);
+        Resolution {
+            single: self.single,
+            frames: self.frames,
+            functions,
+            used: self.used,
+            captures: self.captures,
+            self_called: self.self_called,
+            block_catches: self.block_catches,
+            tagbody_catches: self.tagbody_catches,
+            spans: self.spans,
+            reads: self.reads,
+            sets: self.sets,
+        }
+    }
 }
 
 /// Whether the builtin is known to return exactly one value.

@@ -9,7 +9,6 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashMap;
 
-use super::Builder;
 use super::assemble::assemble;
 use super::dest::Dest;
 use super::exit::{BlockState, TagbodyState};
@@ -17,6 +16,7 @@ use super::fuse;
 use super::graph::{Cond, Exit, Graph, Label};
 use super::loops::LoopState;
 use super::regalloc::Registers;
+use super::{Builder, Excess};
 use crate::core::*;
 
 /// Native stack that one form may take before [`Frame::form`] is called again.
@@ -106,7 +106,7 @@ pub(super) fn function(builder: &mut Builder<'_>, lambda: LambdaId) -> Function 
         let diagnostic = Diagnostic::error("function-too-large", "this function is too large", text.span)
             .label(format!("has too many {what}"))
             .help("divide it into several functions");
-        builder.diagnostics.push(diagnostic);
+        builder.excesses.push(Excess { lambda, diagnostic });
     }
     let mut datum = |datum: &Option<Datum>| datum.as_ref().map(|datum| builder.pool.datum(datum));
     Function {

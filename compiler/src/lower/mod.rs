@@ -28,6 +28,7 @@ mod loops;
 pub(crate) mod operator;
 mod pool;
 mod regalloc;
+mod split;
 mod structure;
 mod test;
 mod values;
@@ -37,7 +38,7 @@ mod variable;
 mod tests;
 
 use esl_bytecode::diagnostic::Diagnostic;
-use esl_bytecode::module::{Capture, FunctionNumber, Module};
+use esl_bytecode::module::{Capture, Function, FunctionNumber, Module};
 
 use crate::core::{Core, LambdaId};
 use crate::resolve::{Resolution, resolve};
@@ -47,27 +48,35 @@ use pool::Pool;
 /// Lowers a top-level form to a module whose only top-level function it is.
 ///
 /// # Errors
-/// `function-too-large`, for each function that does not fit the format.
+/// `function-too-large`, for each function that does not fit the format, not even in parts.
 pub fn lower(core: &Core, lines: &SourceLines) -> Result<Module, Vec<Diagnostic>> {
-    let mut builder = Builder::new(core, lines);
-    let toplevel = builder.number(LambdaId(0));
-    let mut functions = Vec::new();
-    // Functions get their numbers when code that refers to them is lowered, and are lowered in that order.
-    while let Some(&lambda) = builder.numbered.get(functions.len()) {
-        functions.push(frame::function(&mut builder, lambda));
+    let mut divided: Option<Core> = None;
+    let mut limits = split::LIMITS.iter();
+    loop {
+        let mut builder = Builder::new(divided.as_ref().unwrap_or(core), lines);
+        let functions = builder.functions();
+        if builder.excesses.is_empty() {
+            return Ok(builder.module(functions));
+        }
+        let Some(&limits) = limits.next() else {
+            return Err(builder.excesses.into_iter().map(|excess| excess.diagnostic).collect());
+        };
+        let resolution = &builder.resolution;
+        let all = (0..builder.core.lambdas.len()).map(|index| LambdaId(index as u32));
+        let is_too_large = |lambda: &LambdaId| {
+            builder.excesses.iter().any(|excess| excess.lambda == resolution.frame(*lambda))
+        };
+        let too_large: Vec<LambdaId> = all.filter(is_too_large).collect();
+        let mut smaller = divided.take().unwrap_or_else(|| core.clone());
+        split::split(&mut smaller, &too_large, limits);
+        divided = Some(smaller);
     }
-    for (function, lambda) in functions.iter_mut().zip(&builder.numbered) {
-        function.captures = std::mem::take(&mut builder.captures[lambda.index()]);
-    }
-    if !builder.diagnostics.is_empty() {
-        return Err(builder.diagnostics);
-    }
-    Ok(Module {
-        sources: lines.names().map(str::to_string).collect(),
-        constants: builder.pool.finish(),
-        functions,
-        toplevel: vec![toplevel],
-    })
+}
+
+/// A function that does not fit the format.
+struct Excess {
+    lambda: LambdaId,
+    diagnostic: Diagnostic,
 }
 
 /// The module that is being made.
@@ -85,7 +94,7 @@ struct Builder<'a> {
     variables: Vec<u8>,
     blocks: Vec<u8>,
     tagbodies: Vec<u8>,
-    diagnostics: Vec<Diagnostic>,
+    excesses: Vec<Excess>,
 }
 
 impl<'a> Builder<'a> {
@@ -101,7 +110,30 @@ impl<'a> Builder<'a> {
             variables: vec![0; core.variables.len()],
             blocks: vec![0; core.blocks.len()],
             tagbodies: vec![0; core.tagbodies.len()],
-            diagnostics: Vec::new(),
+            excesses: Vec::new(),
+        }
+    }
+
+    /// Lowers all functions, beginning with the form itself.
+    fn functions(&mut self) -> Vec<Function> {
+        self.number(LambdaId(0));
+        let mut functions = Vec::new();
+        // Functions get their numbers when code that refers to them is lowered, and are lowered in that order.
+        while let Some(&lambda) = self.numbered.get(functions.len()) {
+            functions.push(frame::function(self, lambda));
+        }
+        for (function, lambda) in functions.iter_mut().zip(&self.numbered) {
+            function.captures = std::mem::take(&mut self.captures[lambda.index()]);
+        }
+        functions
+    }
+
+    fn module(self, functions: Vec<Function>) -> Module {
+        Module {
+            sources: self.lines.names().map(str::to_string).collect(),
+            constants: self.pool.finish(),
+            functions,
+            toplevel: vec![FunctionNumber(0)],
         }
     }
 

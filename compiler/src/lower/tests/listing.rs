@@ -241,6 +241,60 @@ fn long_argument_lists() {
     }
 }
 
+/// Checks that a form fits, and that all its code verifies.
+fn fits(source: &str) {
+    super::module(source);
+}
+
+#[test]
+fn large_functions_are_divided() {
+    let forms = |count: usize, form: &dyn Fn(usize) -> String| (0..count).map(form).collect::<String>();
+    // Many forms, many variables, and all of them used at the end.
+    fits(&format!("(defun f (x) {})", forms(10_000, &|i| format!("(g x {i})"))));
+    fits(&format!(
+        "(let* ({}) (list {}))",
+        forms(300, &|i| format!("(v{i} (f))")),
+        forms(300, &|i| format!("v{i} "))
+    ));
+    fits(&format!("(tagbody {} a (go a))", forms(10_000, &|i| format!("(if (g {i}) (go a))"))));
+    // Deep on the right, where everything on the left waits in a register.
+    fits(&format!("{} 1 {}", "(list (f) ".repeat(1000), ")".repeat(1000)));
+    fits(&format!("{} 1 {}", "(unwind-protect (f) ".repeat(1000), ")".repeat(1000)));
+    fits(&format!("{} 1 {}", "(catch 'a ".repeat(1000), ")".repeat(1000)));
+}
+
+#[test]
+fn a_function_with_too_many_captures_is_refused() {
+    let names = |text: &str| (0..600).map(|i| text.replace('#', &i.to_string())).collect::<String>();
+    let source = format!("(let* ({}) (lambda () (list {})))", names("(v# (f))"), names("v# "));
+    let faults = crate::lower::lower(&super::notation::core(&source), &crate::lower::SourceLines::new());
+    let faults = faults.expect_err("no such function fits");
+    assert!(faults.iter().all(|fault| fault.code == "function-too-large"), "{faults:?}");
+}
+
+#[test]
+fn deep_forms_need_little_native_stack() {
+    let deep = |open: &str, close: &str| format!("{} 1 {}", open.repeat(5000), close.repeat(5000));
+    let sources = [
+        deep("(+ 1 ", ")"),
+        deep("(car ", ")"),
+        deep("(if (f) 2 ", ")"),
+        deep("(progn (f) ", ")"),
+        deep("(block b ", ")"),
+        deep("(let ((x 1)) ", ")"),
+        deep("(list ", ")"),
+        deep("(lambda () ", ")"),
+    ];
+    let small = std::thread::Builder::new().stack_size(256 * 1024);
+    let run = move || {
+        for source in sources {
+            let core = super::notation::core_in_big_stack(&source);
+            let _ = crate::lower::lower(&core, &crate::lower::SourceLines::new());
+        }
+    };
+    small.spawn(run).expect("a thread").join().expect("no overflow");
+}
+
 #[test]
 fn literals_keep_their_sharing() {
     let constants = super::module("(list 'a 'a 1 1 \"s\" '(1 2) '(1 2))").constants;

@@ -13,11 +13,16 @@ use esl_bytecode::module::Module;
 use esl_bytecode::verify::verify;
 
 use super::{SourceLines, lower};
+use crate::core::Core;
 
 /// What a form is lowered to, verified.
 fn module(text: &str) -> Module {
-    let core = notation::core(text);
-    let module = lower(&core, &SourceLines::new()).unwrap_or_else(|faults| panic!("{faults:?}\n{text}"));
+    module_of(&notation::core_in_big_stack(text), text)
+}
+
+/// What a core tree is lowered to, verified.
+fn module_of(core: &Core, text: &str) -> Module {
+    let module = lower(core, &SourceLines::new()).unwrap_or_else(|faults| panic!("{faults:?}\n{text}"));
     if let Err(fault) = verify(&module) {
         panic!("{fault}\n{text}\n{}", disasm::module(&module));
     }

@@ -100,8 +100,13 @@ pub(super) fn core(text: &str) -> Core {
     core_of(&read(text))
 }
 
+/// The same, for deep forms: the notation itself recurses.
+pub(super) fn core_in_big_stack(text: &str) -> Core {
+    stacker::grow(256 << 20, || core(text))
+}
+
 /// The core tree of a datum in the notation.
-pub(super) fn core_of(datum: &Datum) -> Core {
+fn core_of(datum: &Datum) -> Core {
     let mut builder = Builder { core: Core::default(), scopes: Vec::new(), lambda: LambdaId(0) };
     let hole = builder.node(NodeKind::Hole, datum.span());
     builder.core.lambdas.push(Lambda {

@@ -2,17 +2,29 @@
 
 use proptest::prelude::*;
 
-use super::{generate, machine, model, module, notation};
+use super::{generate, machine, model, module_of, notation};
+use crate::core::LambdaId;
+use crate::lower::split;
 use esl_bytecode::disasm;
 
 /// Runs a program in both ways, if the model ends soon enough.
 fn check(text: &str) {
+    check_divided(text, false);
+}
+
+/// The same; if `divided`, after taking out all parts of some size.
+fn check_divided(text: &str, divided: bool) {
     // The handler is outside of the function, so that the program itself is in tail position.
     let text = format!(
         "(progn (setq *a* 1) (setq *b* 2) (handler-case (apply (lambda () {text}) nil) (error (c) (note c))))"
     );
-    let module = module(&text);
-    let Some(expected) = model::run(&notation::core(&text), 20_000) else { return };
+    let mut core = notation::core_in_big_stack(&text);
+    let Some(expected) = model::run(&core, 20_000) else { return };
+    if divided {
+        let all: Vec<LambdaId> = (0..core.lambdas.len()).map(|index| LambdaId(index as u32)).collect();
+        split::split(&mut core, &all, split::TINY);
+    }
+    let module = module_of(&core, &text);
     let found = std::panic::catch_unwind(|| machine::run(&module, 2_000_000));
     match found {
         Ok(found) if found.as_ref() == Some(&expected) => {}
@@ -22,10 +34,15 @@ fn check(text: &str) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(ProptestConfig::default().cases * 4))]
+    #![proptest_config(ProptestConfig::with_cases(ProptestConfig::default().cases * 2))]
     #[test]
     fn programs_do_what_the_tree_says(choices in proptest::collection::vec(any::<u8>(), 0..300)) {
         check(&generate::program(&choices));
+    }
+
+    #[test]
+    fn divided_programs_do_the_same(choices in proptest::collection::vec(any::<u8>(), 0..300)) {
+        check_divided(&generate::program(&choices), true);
     }
 }
 

@@ -1,0 +1,252 @@
+//! Divides functions that are too large for the format: parts of their text become functions of their own, which take
+//! what they need as captures and are called in place.
+//!
+//! The parts keep their meaning, since everything lexical may cross a function's border: assigned variables get boxes,
+//! exits become throws. They are slower, which is the price of a function with thousands of forms, hundreds of
+//! variables, or expressions a hundred levels deep.
+
+use esl_bytecode::span::Span;
+
+use crate::core::*;
+use crate::resolve::{children, lambda_nodes};
+
+/// How large a part may become.
+#[derive(Clone, Copy)]
+pub(super) struct Limits {
+    /// In nodes.
+    weight: usize,
+    /// In nodes on top of each other.
+    height: usize,
+    /// In variables of one `let`.
+    bindings: usize,
+}
+
+/// What is tried, one after the other, until all functions fit.
+pub(super) const LIMITS: [Limits; 4] = [
+    Limits { weight: 3000, height: 100, bindings: 60 },
+    Limits { weight: 1000, height: 50, bindings: 40 },
+    Limits { weight: 300, height: 25, bindings: 30 },
+    Limits { weight: 100, height: 12, bindings: 20 },
+];
+
+/// So small that tests can see every form taken out.
+#[cfg(test)]
+pub(super) const TINY: Limits = Limits { weight: 12, height: 5, bindings: 2 };
+
+/// Parts smaller than this are not worth a call.
+const MIN_WEIGHT: usize = 6;
+
+/// Divides the texts of `lambdas`. Returns the lambdas that were made of their parts.
+pub(super) fn split(core: &mut Core, lambdas: &[LambdaId], limits: Limits) -> Vec<LambdaId> {
+    let before = core.lambdas.len();
+    for &lambda in lambdas {
+        let mut roots = Vec::new();
+        lambda_nodes(&core.lambdas[lambda.index()], &mut |node| roots.push(node));
+        for root in roots {
+            Splitter { core, lambda, limits }.split(root);
+        }
+    }
+    let made: Vec<LambdaId> = (before..core.lambdas.len()).map(|index| LambdaId(index as u32)).collect();
+    made.iter().for_each(|&lambda| adopt(core, lambda));
+    made
+}
+
+struct Splitter<'a> {
+    core: &'a mut Core,
+    lambda: LambdaId,
+    limits: Limits,
+}
+
+/// How large a form is, parts that were taken out of it apart.
+#[derive(Clone, Copy, Default)]
+struct Size {
+    weight: usize,
+    height: usize,
+}
+
+impl Splitter<'_> {
+    fn split(&mut self, root: NodeId) {
+        let mut order = vec![root];
+        let mut next = 0;
+        while let Some(&node) = order.get(next) {
+            children(&self.core.nodes[node.index()].kind, &mut |child| order.push(child));
+            next += 1;
+        }
+        let mut sizes = vec![Size::default(); self.core.nodes.len()];
+        // Children come behind their parents.
+        for &node in order.iter().rev() {
+            let mut size = Size::default();
+            children(&self.core.nodes[node.index()].kind, &mut |child| {
+                size = size.with(sizes[child.index()])
+            });
+            if size.weight > self.limits.weight {
+                size = self.divide_forms(node, &sizes).unwrap_or(size);
+            }
+            if let Some(smaller) = self.divide_bindings(node, &sizes) {
+                size = smaller;
+            }
+            size.weight += 1;
+            size.height += 1;
+            let is_large = size.weight > self.limits.weight || size.height > self.limits.height;
+            if is_large && node != root && size.weight >= MIN_WEIGHT {
+                self.take_out(node);
+                size = Size { weight: 3, height: 1 };
+            }
+            sizes[node.index()] = size;
+        }
+    }
+
+    fn node(&mut self, kind: NodeKind, span: Span) -> NodeId {
+        self.core.nodes.push(Node { kind, span });
+        NodeId(self.core.nodes.len() as u32 - 1)
+    }
+
+    /// Makes a function of a form, and a call of it in its place.
+    fn take_out(&mut self, node: NodeId) {
+        let span = self.core.nodes[node.index()].span;
+        let kind = std::mem::replace(&mut self.core.nodes[node.index()].kind, NodeKind::Hole);
+        let body = self.node(kind, span);
+        let lambda = LambdaId(self.core.lambdas.len() as u32);
+        self.core.lambdas.push(Lambda {
+            name: None,
+            lambda_list: None,
+            documentation: None,
+            parent: Some(self.lambda),
+            span,
+            required: Vec::new(),
+            optional: Vec::new(),
+            rest: None,
+            keys: None,
+            allow_other_keys: false,
+            body,
+        });
+        let closure = self.node(NodeKind::Lambda(lambda), span);
+        // A call of a plain lambda would be part of the frame again.
+        let hidden = self.node(NodeKind::Progn(vec![closure]), span);
+        self.core.nodes[node.index()].kind = NodeKind::Call(Callee::Value(hidden), Vec::new());
+    }
+
+    /// Takes out runs of consecutive forms. `None` if the node has none.
+    fn divide_forms(&mut self, node: NodeId, sizes: &[Size]) -> Option<Size> {
+        let span = self.core.nodes[node.index()].span;
+        let mut size = Size::default();
+        let mut run: Vec<NodeId> = Vec::new();
+        let mut weight = 0;
+        match std::mem::replace(&mut self.core.nodes[node.index()].kind, NodeKind::Hole) {
+            NodeKind::Progn(forms) => {
+                let mut divided = Vec::new();
+                for form in forms {
+                    if weight + sizes[form.index()].weight > self.limits.weight {
+                        divided.extend(self.take_out_run(std::mem::take(&mut run), span));
+                        weight = 0;
+                    }
+                    weight += sizes[form.index()].weight;
+                    run.push(form);
+                }
+                divided.extend(self.take_out_run(run, span));
+                divided.iter().for_each(|_| size = size.with(Size { weight: 3, height: 1 }));
+                self.core.nodes[node.index()].kind = NodeKind::Progn(divided);
+            }
+            NodeKind::Tagbody(tagbody, items) => {
+                let mut divided = Vec::new();
+                for item in items {
+                    match item {
+                        TagbodyItem::Form(form)
+                            if weight + sizes[form.index()].weight <= self.limits.weight =>
+                        {
+                            weight += sizes[form.index()].weight;
+                            run.push(form);
+                        }
+                        other => {
+                            let taken = self.take_out_run(std::mem::take(&mut run), span);
+                            divided.extend(taken.map(TagbodyItem::Form));
+                            weight = 0;
+                            match other {
+                                TagbodyItem::Tag => divided.push(TagbodyItem::Tag),
+                                TagbodyItem::Form(form) => {
+                                    weight = sizes[form.index()].weight;
+                                    run.push(form);
+                                }
+                            }
+                        }
+                    }
+                }
+                divided.extend(self.take_out_run(run, span).map(TagbodyItem::Form));
+                divided.iter().for_each(|_| size = size.with(Size { weight: 3, height: 1 }));
+                self.core.nodes[node.index()].kind = NodeKind::Tagbody(tagbody, divided);
+            }
+            other => {
+                self.core.nodes[node.index()].kind = other;
+                return None;
+            }
+        }
+        Some(size)
+    }
+
+    fn take_out_run(&mut self, run: Vec<NodeId>, span: Span) -> Option<NodeId> {
+        if run.is_empty() {
+            return None;
+        }
+        let node = self.node(NodeKind::Progn(run), span);
+        self.take_out(node);
+        Some(node)
+    }
+
+    /// Binds the later variables of a long `let` in a function of their own.
+    fn divide_bindings(&mut self, node: NodeId, sizes: &[Size]) -> Option<Size> {
+        let Node { kind: NodeKind::Let { sequential, bindings, body }, span } =
+            &mut self.core.nodes[node.index()]
+        else {
+            return None;
+        };
+        // Names are resolved: one after another is as good as all at once, unless bindings are dynamic.
+        let in_order = *sequential || bindings.iter().all(|(target, _)| matches!(target, Target::Lexical(_)));
+        if bindings.len() <= self.limits.bindings || !in_order {
+            return None;
+        }
+        let (span, mut body) = (*span, *body);
+        let bindings = std::mem::take(bindings);
+        let size = bindings[..self.limits.bindings]
+            .iter()
+            .fold(Size { weight: 3, height: 1 }, |size, (_, value)| size.with(sizes[value.index()]));
+        for chunk in bindings.chunks(self.limits.bindings).skip(1).rev() {
+            body = self.node(NodeKind::Let { sequential: true, bindings: chunk.to_vec(), body }, span);
+            self.take_out(body);
+        }
+        let first = bindings[..self.limits.bindings].to_vec();
+        self.core.nodes[node.index()].kind = NodeKind::Let { sequential: true, bindings: first, body };
+        Some(size)
+    }
+}
+
+impl Size {
+    fn with(self, part: Size) -> Size {
+        Size { weight: self.weight + part.weight, height: self.height.max(part.height) }
+    }
+}
+
+/// Makes `lambda` the owner of what its text binds.
+fn adopt(core: &mut Core, lambda: LambdaId) {
+    let mut pending = vec![core.lambdas[lambda.index()].body];
+    while let Some(node) = pending.pop() {
+        let kind = &core.nodes[node.index()].kind;
+        let variables = &mut core.variables;
+        let mut own = |variable: VarId| variables[variable.index()].owner = lambda;
+        let mut own_target = |target: &Target| match target {
+            Target::Lexical(variable) => own(*variable),
+            Target::Special(_) => {}
+        };
+        match kind {
+            NodeKind::Let { bindings, .. } => bindings.iter().for_each(|(target, _)| own_target(target)),
+            NodeKind::BindValues(targets, ..) => targets.iter().for_each(own_target),
+            NodeKind::HandlerCase(_, clauses) => clauses.iter().for_each(|clause| own(clause.variable)),
+            NodeKind::Functions { definitions, .. } => {
+                definitions.iter().for_each(|(variable, _)| own(*variable))
+            }
+            NodeKind::Block(block, _) => core.blocks[block.index()].owner = lambda,
+            NodeKind::Tagbody(tagbody, _) => core.tagbodies[tagbody.index()].owner = lambda,
+            _ => {}
+        }
+        children(kind, &mut |child| pending.push(child));
+    }
+}
