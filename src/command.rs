@@ -119,7 +119,8 @@ pub fn print_diagnostics(compiled: &Compiled, renderer: &Renderer) {
         1 => Some(format!("1 {what}")),
         n => Some(format!("{n} {what}s")),
     };
-    let counts: Vec<String> = [count(errors, "error"), count(warnings, "warning")].into_iter().flatten().collect();
+    let counts: Vec<String> =
+        [count(errors, "error"), count(warnings, "warning")].into_iter().flatten().collect();
     complain(counts.join(", "));
 }
 

@@ -98,8 +98,9 @@ impl Engine {
         }));
         let parameters = parameters.join(" ");
         let documentation = documentation.replace('\\', "\\\\").replace('"', "\\\"");
-        let definition =
-            format!("(defun {name} ({parameters}) \"{documentation}\" (esl::%call-host {number} {parameters}))");
+        let definition = format!(
+            "(defun {name} ({parameters}) \"{documentation}\" (esl::%call-host {number} {parameters}))"
+        );
         self.eval(&definition).map(drop).map_err(|error| Error::Setup(error.to_string()))
     }
 

@@ -20,8 +20,10 @@ use esl_vm::vm::{Config, Vm};
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed=load-order");
-    let folder = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo names the folder of the package"));
-    let output = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo names the folder for what is built"));
+    let folder =
+        PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo names the folder of the package"));
+    let output =
+        PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo names the folder for what is built"));
     match build(&folder) {
         Ok(image) => std::fs::write(output.join("image.eslb"), image).expect("the image can be written"),
         Err(text) => {
@@ -34,7 +36,8 @@ fn main() {
 /// The bytes of the image.
 fn build(folder: &Path) -> Result<Vec<u8>, String> {
     let order = read(&folder.join("load-order"))?;
-    let machine = Vm::new(Config::default(), Box::new(VirtualHost::new())).map_err(|error| format!("{error:?}"))?;
+    let machine =
+        Vm::new(Config::default(), Box::new(VirtualHost::new())).map_err(|error| format!("{error:?}"))?;
     let mut library = Library { machine, sources: Sources::new(), modules: Vec::new(), doubts: Vec::new() };
     library.machine.set_compiler(Box::new(Compiler::default()));
     for name in order.lines().filter(|line| !line.is_empty() && !line.starts_with('#')) {
@@ -81,8 +84,11 @@ impl Library {
             }
         }
         let module = module.ok_or_else(|| format!("{name} gives no module"))?;
-        let functions = self.machine.load_module(&module).map_err(|error| format!("{name} cannot be loaded: {error}"))?;
-        self.machine.run_toplevel(functions, u64::MAX).map_err(|failure| format!("{name} fails: {failure}"))?;
+        let functions =
+            self.machine.load_module(&module).map_err(|error| format!("{name} cannot be loaded: {error}"))?;
+        self.machine
+            .run_toplevel(functions, u64::MAX)
+            .map_err(|failure| format!("{name} fails: {failure}"))?;
         self.modules.push(module);
         Ok(())
     }

@@ -61,7 +61,9 @@ impl Editor {
 
 impl Lines for Editor {
     fn next(&mut self, prompt: &str) -> Line {
-        let Some(editor) = &mut self.editor else { return Line::Failed("the terminal cannot be used".into()) };
+        let Some(editor) = &mut self.editor else {
+            return Line::Failed("the terminal cannot be used".into());
+        };
         match editor.readline(prompt) {
             Ok(line) => Line::Text(line),
             Err(ReadlineError::Interrupted) => Line::Dropped,

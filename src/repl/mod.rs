@@ -98,7 +98,9 @@ impl Session {
         loop {
             let prompt = if text.is_empty() { PROMPT } else { CONTINUATION };
             match lines.next(prompt) {
-                Line::Text(line) if text.is_empty() && line.trim_start().starts_with(':') && is_command(&line) => {
+                Line::Text(line)
+                    if text.is_empty() && line.trim_start().starts_with(':') && is_command(&line) =>
+                {
                     if let Next::Quit(status) = self.command(line.trim()) {
                         return Ok(status);
                     }

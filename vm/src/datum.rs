@@ -25,7 +25,7 @@ use crate::heap::{AllocError, Heap, Kind};
 use crate::load::{Shared, array, character, integer, ratio};
 use crate::number::Int;
 use crate::value::Value;
-use crate::world::{GivenMap, World};
+use crate::world::{GivenMap, GivenSet, World};
 
 /// The most nodes that an object may have to become a datum.
 const MAX_NODES: usize = 4_000_000;
@@ -66,6 +66,9 @@ pub(crate) struct Unit {
     data: GivenMap<u64, (Value, Datum)>,
     /// By the address of the datum: the datum, and its object.
     values: GivenMap<u64, (Datum, Value)>,
+    /// The addresses of objects whose data were made of them, not the other way round: their place is that of the
+    /// macro call that they came from last.
+    made: GivenSet<u64>,
     /// Nodes that were walked over since this was last asked.
     work: u64,
 }
@@ -145,6 +148,7 @@ impl Unit {
             // Of forms that old, no macro passes a part through.
             self.data.clear();
             self.values.clear();
+            self.made.clear();
         }
         let mut steps = vec![ToValue::Visit(datum)];
         let mut made: Vec<Value> = Vec::new();
@@ -280,12 +284,18 @@ impl Unit {
     /// The datum of an object with these parts: the one that it was made from, unless its parts are others now.
     fn compound(&mut self, heap: &Heap, object: Value, parts: Vec<Datum>, span: Span) -> Datum {
         let known = self.data.get(&object.bits()).map(|(_, datum)| datum.clone());
+        // A literal that a macro gives again and again is at another place each time.
+        let is_made = self.made.contains(&object.bits());
         if let Some(known) = &known
             && are_parts(known, &parts)
+            && (!is_made || known.span() == span)
         {
             return known.clone();
         }
-        let span = known.map_or(span, |known| known.span());
+        if known.is_none() {
+            self.made.insert(object.bits());
+        }
+        let span = known.filter(|_| !is_made).map_or(span, |known| known.span());
         let datum = match parts_of(heap, object) {
             Some(Parts::Items(None, _)) => Datum::new(DatumKind::Vector(parts.into()), span),
             Some(Parts::Items(Some(dimensions), _)) => {

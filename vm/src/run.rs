@@ -215,7 +215,8 @@ impl Vm {
             self.begin_end(End::Aborted);
         }
         let leave = interp::run(self);
-        let used = (i64::from(self.cpu.granted) - i64::from(self.cpu.reserve) - i64::from(self.cpu.ticks)).max(0);
+        let used =
+            (i64::from(self.cpu.granted) - i64::from(self.cpu.reserve) - i64::from(self.cpu.ticks)).max(0);
         self.cpu.reserve = 0;
         self.spent += used as u64;
         if leave != Leave::Ended {
@@ -251,7 +252,9 @@ impl Vm {
         self.forget(id);
         match result {
             TaskResult::Succeeded(values) => Ok(values),
-            TaskResult::Failed(condition) => Err(self.last_words.take().unwrap_or_else(|| self.describe(condition))),
+            TaskResult::Failed(condition) => {
+                Err(self.last_words.take().unwrap_or_else(|| self.describe(condition)))
+            }
             TaskResult::Aborted => Err("it was aborted".into()),
             TaskResult::Running if ended => Err("it was aborted".into()),
             TaskResult::Running if self.is_budget_spent() => Err("the budget of the run is spent".into()),

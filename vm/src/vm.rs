@@ -4,9 +4,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use esl_bytecode::builtin::BUILTINS;
+use esl_bytecode::datum::Datum;
 use slotmap::SlotMap;
 
 use crate::control::End;
+use crate::embed::HostFunction;
 use crate::heap::{AllocError, Heap, HeapConfig};
 use crate::host::{Console, Host};
 use crate::interp::Cpu;
@@ -36,14 +38,7 @@ pub struct Config {
 
 impl Default for Config {
     fn default() -> Config {
-        Config {
-            memory: 1 << 30,
-            stack: 1 << 16,
-            slice: 2000,
-            budget: None,
-            seed: 0,
-            collect_always: false,
-        }
+        Config { memory: 1 << 30, stack: 1 << 16, slice: 2000, budget: None, seed: 0, collect_always: false }
     }
 }
 
@@ -63,6 +58,10 @@ pub struct Vm {
     pub(crate) console: Console,
     /// Values that the embedder holds on to.
     pub(crate) pinned: Vec<Value>,
+    /// The embedder's functions.
+    pub(crate) host_functions: Vec<HostFunction>,
+    /// What one of them has given, while there is no room for it.
+    pub(crate) host_answer: Option<Result<Datum, String>>,
 
     // ---- tasks
     /// The tasks.
@@ -128,6 +127,8 @@ impl Vm {
             host,
             console: Console::default(),
             pinned: vec![starter],
+            host_functions: Vec::new(),
+            host_answer: None,
             tasks: SlotMap::with_key(),
             queue: RunQueue::new(),
             running: None,
@@ -210,8 +211,7 @@ impl Vm {
 
     /// Takes an interrupt, if it is meant for the task whose turn it is.
     pub(crate) fn take_interrupt(&mut self, id: TaskId) -> bool {
-        self.interruptible == Some(id)
-            && self.interrupt.swap(false, std::sync::atomic::Ordering::Relaxed)
+        self.interruptible == Some(id) && self.interrupt.swap(false, std::sync::atomic::Ordering::Relaxed)
     }
 
     /// Keeps a value from being collected, until [`Vm::unpin`].

@@ -484,9 +484,11 @@ pub const fn native(builtin: Builtin) -> Native {
 }
 
 pub(crate) mod array;
+mod character;
 mod class;
 mod control;
 mod define;
+mod equality;
 pub(crate) mod eval;
 mod expect;
 mod float;
@@ -497,17 +499,15 @@ mod lookup;
 mod number;
 mod outside;
 mod package;
-mod sequence;
-pub(crate) mod stream;
-mod structure;
-mod symbol;
-pub(crate) mod types;
-mod character;
-mod equality;
 mod print;
 mod search;
+mod sequence;
+pub(crate) mod stream;
 mod string;
+mod structure;
+mod symbol;
 mod table;
+pub(crate) mod types;
 
 #[cfg(test)]
 mod tests;

@@ -55,7 +55,8 @@ pub(super) fn is_string(vm: &Vm, value: Value) -> bool {
     match vm.heap.kind(value) {
         Some(Kind::String) => true,
         Some(Kind::Array) => {
-            is_vector(vm, value) && vm.heap.array(value).is_some_and(|array| vm.heap.is(array.data, Kind::String))
+            is_vector(vm, value)
+                && vm.heap.array(value).is_some_and(|array| vm.heap.is(array.data, Kind::String))
         }
         _ => false,
     }

@@ -37,13 +37,9 @@ fn function(required: u8, registers: u8, constants: &[u32], code: &[Instr]) -> F
 fn install(vm: &mut Vm, functions: Vec<Function>) -> Value {
     let mut constants = vec![Constant::Symbol(Symbol::esl("F"))];
     constants.extend((1..functions.len()).map(|number| Constant::Function(FunctionNumber(number as u32))));
-    let module = Module {
-        constants,
-        functions,
-        toplevel: vec![FunctionNumber(0)],
-        ..Module::default()
-    };
-    let list = load(&mut vm.heap, &mut vm.world, &module, &mut Alone::default()).expect("the module is in order");
+    let module = Module { constants, functions, toplevel: vec![FunctionNumber(0)], ..Module::default() };
+    let list =
+        load(&mut vm.heap, &mut vm.world, &module, &mut Alone::default()).expect("the module is in order");
     let toplevel = vm.heap.car(list).expect("one top-level function");
     vm.pin(toplevel);
     toplevel

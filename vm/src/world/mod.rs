@@ -59,6 +59,9 @@ impl Hasher for GivenHash {
 /// A map whose keys hash themselves well.
 pub(crate) type GivenMap<K, V> = HashMap<K, V, BuildHasherDefault<GivenHash>>;
 
+/// A set of what hashes itself well.
+pub(crate) type GivenSet<K> = std::collections::HashSet<K, BuildHasherDefault<GivenHash>>;
+
 /// Names and what they stand for.
 pub(crate) struct World {
     /// Symbols that the machine speaks of.
