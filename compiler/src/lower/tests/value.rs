@@ -7,13 +7,16 @@ use std::rc::Rc;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::symbol::Symbol;
 
+/// A car and a cdr.
+type Pair<F> = Rc<(RefCell<Value<F>>, RefCell<Value<F>>)>;
+
 /// A value; `F` is what functions are made of.
 pub(super) enum Value<F> {
     Nil,
     True,
     Int(i64),
     Symbol(Symbol),
-    Cons(Rc<(RefCell<Value<F>>, RefCell<Value<F>>)>),
+    Cons(Pair<F>),
     Function(Rc<F>),
     /// Something that is equal only to itself.
     Unique(u64),
