@@ -13,6 +13,7 @@ pub(super) enum Value<F> {
     True,
     Int(i64),
     Symbol(Symbol),
+    #[allow(clippy::type_complexity, reason = "a pair of cells is just that")]
     Cons(Rc<(RefCell<Value<F>>, RefCell<Value<F>>)>),
     Function(Rc<F>),
     /// Something that is equal only to itself.
