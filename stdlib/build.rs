@@ -3,6 +3,7 @@
 //! One machine runs the macros and takes in each file once that is compiled, so that each may use what the ones before it
 //! define. An error in the library is an error of the build; a warning is a warning, unless it is about a name that a
 //! later file defines.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a build step talks to cargo")]
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
