@@ -8,6 +8,7 @@
 //! Invariant: an entry of a frame is popped before the frame is left (the verifier's V9), so every entry's `base` is
 //! that of a live frame.
 
+use crate::binding::Bindings;
 use crate::value::Value;
 
 /// What an entry is.
@@ -86,15 +87,6 @@ pub(crate) struct Running {
     pub values: Vec<Value>,
 }
 
-/// A dynamic binding.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Binding {
-    /// The symbol.
-    pub symbol: Value,
-    /// Its value in this task.
-    pub value: Value,
-}
-
 /// The control stack of a task, with its bindings.
 #[derive(Default)]
 pub(crate) struct Control {
@@ -102,8 +94,8 @@ pub(crate) struct Control {
     pub entries: Vec<Entry>,
     /// What the running cleanups have interrupted, innermost last.
     pub running: Vec<Running>,
-    /// The dynamic bindings, newest last.
-    pub bindings: Vec<Binding>,
+    /// The dynamic bindings.
+    pub bindings: Bindings,
     /// The unwinding that is being worked on.
     pub unwinding: Option<Unwinding>,
 }
@@ -144,18 +136,12 @@ impl Control {
         None
     }
 
-    /// Index of this task's binding of `symbol`, the newest.
-    #[inline]
-    pub(crate) fn find_binding(&self, symbol: Value) -> Option<usize> {
-        self.bindings.iter().rposition(|binding| binding.symbol == symbol)
-    }
-
     /// Calls `visit` with every value that the control stack holds.
     pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
         for entry in &self.entries {
             visit(entry.data);
         }
-        for binding in &self.bindings {
+        for binding in self.bindings.iter() {
             visit(binding.symbol);
             visit(binding.value);
         }

@@ -13,6 +13,7 @@ pub mod task;
 pub mod value;
 pub mod vm;
 
+mod binding;
 mod character;
 mod control;
 mod datum;
@@ -21,6 +22,7 @@ mod environment;
 mod equality;
 mod interp;
 mod number;
+mod roster;
 mod shape;
 mod stack;
 mod stub;

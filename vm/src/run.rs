@@ -75,6 +75,7 @@ impl Vm {
         self.heap.log_if_marking(list);
         task.scanned = self.heap.cycle_id();
         let id = self.tasks.insert(Some(task));
+        self.roster.add(id, &self.tasks);
         self.queue.push_back(id);
         Ok(id)
     }

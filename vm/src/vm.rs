@@ -14,6 +14,7 @@ use crate::host::{Console, Host};
 use crate::interp::Cpu;
 use crate::interp::call::{Arguments, make_starter};
 use crate::raise::Raised;
+use crate::roster::Roster;
 use crate::run::{RunQueue, Tasks};
 use crate::task::{Task, TaskId};
 use crate::value::Value;
@@ -68,6 +69,8 @@ pub struct Vm {
     pub(crate) tasks: Tasks,
     /// Those that are runnable, in order.
     pub(crate) queue: RunQueue,
+    /// Which tasks the collector has yet to scan.
+    pub(crate) roster: Roster,
     /// The one that runs, out of its place in `tasks`.
     pub(crate) running: Option<Box<Task>>,
     /// Its registers.
@@ -131,6 +134,7 @@ impl Vm {
             host_answer: None,
             tasks: SlotMap::with_key(),
             queue: RunQueue::new(),
+            roster: Roster::default(),
             running: None,
             cpu: Cpu::new(),
             ending: None,

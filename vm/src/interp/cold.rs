@@ -9,8 +9,8 @@ use esl_bytecode::module::CaptureSource;
 use esl_bytecode::opcode::TypeCode;
 
 use super::{Operation, Signal, code_of, constants_of};
+use crate::binding::Binding;
 use crate::builtins::{NATIVES, Native, types};
-use crate::control::Binding;
 use crate::heap::layout::{Code, Function, Kind, Symbol};
 use crate::number;
 use crate::raise::{Exit, Expected, Outcome, Raised};
@@ -498,10 +498,9 @@ impl Vm {
         let value = if cell.header.flags & Symbol::EVER_BOUND == 0 {
             cell.value
         } else {
-            self.running.as_ref().map_or(cell.value, |task| {
-                let control = &task.control;
-                control.find_binding(symbol).map_or(cell.value, |index| control.bindings[index].value)
-            })
+            self.running
+                .as_ref()
+                .map_or(cell.value, |task| task.control.bindings.get(symbol).unwrap_or(cell.value))
         };
         (value != Value::UNBOUND).then_some(value)
     }
@@ -519,9 +518,9 @@ impl Vm {
         }
         if flags & Symbol::EVER_BOUND != 0
             && let Some(task) = self.running.as_mut()
-            && let Some(index) = task.control.find_binding(symbol)
+            && let Some(place) = task.control.bindings.get_mut(symbol)
         {
-            task.control.bindings[index].value = value;
+            *place = value;
             return Ok(());
         }
         self.heap.symbol_set_value(symbol, value);

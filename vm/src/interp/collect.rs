@@ -26,11 +26,14 @@ unsafe fn top_of(task: &Task, base: usize) -> usize {
     }
 }
 
-/// Marks everything that a task holds.
+/// Words of a stack that count as one visit of the collector.
+const WORDS_PER_VISIT: usize = 4;
+
+/// Marks everything that a task holds; gives how many words that are.
 ///
 /// # Safety
 /// `task.base` is the offset of its running frame.
-unsafe fn scan(heap: &mut Heap, task: &mut Task) {
+unsafe fn scan(heap: &mut Heap, task: &mut Task) -> usize {
     // SAFETY: by the contract.
     let top = unsafe { top_of(task, task.base) };
     task.stack.wipe(top);
@@ -41,6 +44,7 @@ unsafe fn scan(heap: &mut Heap, task: &mut Task) {
         heap.mark(condition);
     }
     task.scanned = heap.cycle_id();
+    top + task.control.entries.len() + 2 * task.control.bindings.len()
 }
 
 /// Marks everything that is reachable without a task.
@@ -126,7 +130,7 @@ impl Vm {
             heap.collect_fully(|heap| {
                 mark_roots(heap, world, [values, requested_call, pinned], raised.as_ref());
                 for task in running.iter_mut().chain(tasks.values_mut().flatten()) {
-                    scan(heap, task);
+                    _ = scan(heap, task);
                 }
             });
         }
@@ -137,26 +141,40 @@ impl Vm {
         if self.running.is_some() {
             self.save_cpu();
         }
-        let Vm { heap, world, values, requested_call, pinned, raised, running, tasks, .. } = self;
+        let Vm { heap, world, values, requested_call, pinned, raised, running, tasks, roster, .. } = self;
         match heap.phase() {
             Phase::Marking => {
-                let SliceOutcome::Drained { .. } = heap.slice(SLICE_VISITS) else { return };
+                let SliceOutcome::Drained { left } = heap.slice(SLICE_VISITS) else { return };
+                let (mut left, mut has_scanned) = (left as usize, false);
                 let cycle = heap.cycle_id();
-                match tasks.values_mut().flatten().find(|task| task.scanned != cycle) {
-                    // SAFETY: a task that does not run stands where it was noted at the switch.
-                    Some(task) => unsafe { scan(heap, task) },
+                while let Some(id) = roster.next(tasks) {
+                    let mut cost = 1;
+                    if let Some(Some(task)) = tasks.get_mut(id)
+                        && task.scanned != cycle
+                    {
+                        // SAFETY: a task that does not run stands where it was noted at the switch.
+                        cost += unsafe { scan(heap, task) } / WORDS_PER_VISIT;
+                        has_scanned = true;
+                    }
+                    left = left.saturating_sub(cost);
+                    if left == 0 {
+                        return;
+                    }
+                }
+                if !has_scanned {
                     // SAFETY: the roots and the running task were marked when the cycle began, and every other task
                     // since, before it ran.
-                    None => unsafe { heap.end_marking() },
+                    unsafe { heap.end_marking() };
                 }
             }
             Phase::Sweeping => _ = heap.slice(SLICE_VISITS),
             Phase::Idle => {
                 heap.begin_cycle();
+                roster.begin();
                 mark_roots(heap, world, [values, requested_call, pinned], raised.as_ref());
                 if let Some(task) = running {
                     // SAFETY: `save_cpu` has noted its running frame.
-                    unsafe { scan(heap, task) };
+                    _ = unsafe { scan(heap, task) };
                 }
             }
         }
@@ -172,7 +190,7 @@ impl Vm {
             && task.scanned != cycle
         {
             // SAFETY: the task has not run since its frame was noted.
-            unsafe { scan(&mut self.heap, task) };
+            _ = unsafe { scan(&mut self.heap, task) };
         }
     }
 }

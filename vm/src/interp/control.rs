@@ -148,7 +148,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
                 return unsafe { land(vm, unwinding.values) };
             }
             Target::Root(end) if height == 0 => {
-                task.control.bindings.clear();
+                task.control.bindings.truncate(0);
                 vm.values = unwinding.values;
                 vm.ending = Some(end);
                 return Signal::TaskExit;

@@ -1,0 +1,169 @@
+//! The dynamic bindings of a task.
+//!
+//! Deep binding: a variable's value is that of the newest binding of its symbol, and a switch of tasks costs nothing.
+//! The newest [`NEAR`] bindings are searched one by one. What lies below them is also found by a table, which follows
+//! with hysteresis, so that few and short-lived bindings never meet it: reading a variable costs the same below a million
+//! bindings of others as below a hundred.
+//!
+//! Invariant: `table.newest` has, for each symbol bound among the first `table.previous.len()` bindings, the index of
+//! the newest of these; `table.previous[i]` is what it had before binding `i`, plus one, or 0.
+
+use crate::value::Value;
+use crate::world::GivenMap;
+
+/// The bindings that are searched one by one; at most twice as many.
+const NEAR: usize = 32;
+
+/// A dynamic binding.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Binding {
+    /// The symbol.
+    pub symbol: Value,
+    /// Its value in this task.
+    pub value: Value,
+}
+
+/// The dynamic bindings of a task, newest last.
+#[derive(Default)]
+pub(crate) struct Bindings {
+    all: Vec<Binding>,
+    table: Option<Box<Table>>,
+}
+
+/// How the older bindings are found.
+#[derive(Default)]
+struct Table {
+    newest: GivenMap<u64, u32>,
+    previous: Vec<u32>,
+}
+
+impl Bindings {
+    /// How many there are.
+    #[inline]
+    pub(crate) fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// All of them, oldest first.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Binding> {
+        self.all.iter()
+    }
+
+    /// Adds one.
+    #[inline]
+    pub(crate) fn push(&mut self, binding: Binding) {
+        self.all.push(binding);
+        if self.all.len() - self.covered() > 2 * NEAR {
+            self.cover();
+        }
+    }
+
+    /// Undoes all but the oldest `length`.
+    #[inline]
+    pub(crate) fn truncate(&mut self, length: usize) {
+        if length < self.covered() {
+            self.uncover(length);
+        }
+        self.all.truncate(length);
+    }
+
+    /// The value of the newest binding of `symbol`.
+    #[inline]
+    pub(crate) fn get(&self, symbol: Value) -> Option<Value> {
+        self.find(symbol).map(|index| self.all[index].value)
+    }
+
+    /// The value of the newest binding of `symbol`, to be set.
+    #[inline]
+    pub(crate) fn get_mut(&mut self, symbol: Value) -> Option<&mut Value> {
+        self.find(symbol).map(|index| &mut self.all[index].value)
+    }
+
+    #[inline]
+    fn find(&self, symbol: Value) -> Option<usize> {
+        let covered = self.covered();
+        let near = self.all[covered..].iter().rposition(|binding| binding.symbol == symbol);
+        match (near, &self.table) {
+            (Some(index), _) => Some(covered + index),
+            (None, Some(table)) => table.newest.get(&symbol.bits()).map(|&index| index as usize),
+            (None, None) => None,
+        }
+    }
+
+    /// How many of the oldest are in the table.
+    #[inline]
+    fn covered(&self) -> usize {
+        self.table.as_ref().map_or(0, |table| table.previous.len())
+    }
+
+    #[cold]
+    fn cover(&mut self) {
+        let table = self.table.get_or_insert_default();
+        let from = table.previous.len();
+        for (index, binding) in self.all.iter().enumerate().take(from + NEAR).skip(from) {
+            let before = table.newest.insert(binding.symbol.bits(), index as u32);
+            table.previous.push(before.map_or(0, |before| before + 1));
+        }
+    }
+
+    #[cold]
+    fn uncover(&mut self, length: usize) {
+        let Some(table) = &mut self.table else { return };
+        if length == 0 {
+            self.table = None;
+            return;
+        }
+        while table.previous.len() > length {
+            let before = table.previous.pop().unwrap_or(0);
+            let symbol = self.all[table.previous.len()].symbol.bits();
+            match before {
+                0 => table.newest.remove(&symbol),
+                before => table.newest.insert(symbol, before - 1),
+            };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_newest_binding_is_found(steps in prop::collection::vec((0..6_u8, 0..12_i32), 1..600)) {
+            let mut bindings = Bindings::default();
+            let mut model: Vec<(Value, Value)> = Vec::new();
+            for (number, (kind, name)) in steps.into_iter().enumerate() {
+                let symbol = Value::small(name);
+                match kind {
+                    0 => {
+                        let length = model.len() * name as usize / 12;
+                        bindings.truncate(length);
+                        model.truncate(length);
+                    }
+                    1 => {
+                        let value = Value::small(-1 - number as i32);
+                        if let Some(place) = bindings.get_mut(symbol) {
+                            *place = value;
+                        }
+                        if let Some(pair) = model.iter_mut().rev().find(|pair| pair.0 == symbol) {
+                            pair.1 = value;
+                        }
+                    }
+                    _ => for repeat in 0..20 {
+                        let (symbol, value) = (Value::small(name + repeat / 7), Value::small(number as i32));
+                        bindings.push(Binding { symbol, value });
+                        model.push((symbol, value));
+                    }
+                }
+                prop_assert_eq!(bindings.len(), model.len());
+                for name in 0..16 {
+                    let symbol = Value::small(name);
+                    let expected = model.iter().rev().find(|pair| pair.0 == symbol).map(|pair| pair.1);
+                    prop_assert_eq!(bindings.get(symbol), expected);
+                }
+            }
+        }
+    }
+}
