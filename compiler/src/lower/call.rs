@@ -146,6 +146,10 @@ impl<'a> Frame<'_, 'a> {
 
     /// Applies what is in `window` to `count` arguments, the last of which is a list. Frees the window.
     pub(super) fn finish_apply(&mut self, window: u8, count: u8, dest: Dest) {
+        if self.keeps_its_frame(dest) {
+            self.finish_apply(window, count, Dest::All);
+            return self.finish(Dest::All, dest);
+        }
         let (base, count) = (Base(window), Count(count));
         if let Dest::Tail = dest {
             self.end(Instr::TailApply { window: base, count, pad: Pad(0) });
@@ -167,6 +171,10 @@ impl<'a> Frame<'_, 'a> {
 
     /// Lowers a call whose callee and arguments are not opened up.
     pub(super) fn emit_call(&mut self, target: Target<'a>, arguments: &'a [NodeId], dest: Dest) {
+        if self.keeps_its_frame(dest) {
+            self.emit_call(target, arguments, Dest::All);
+            return self.finish(Dest::All, dest);
+        }
         if arguments.len() > MAX_DIRECT && !matches!(target, Target::Itself) {
             return self.call_with_list(target, arguments, dest);
         }
@@ -215,6 +223,11 @@ impl<'a> Frame<'_, 'a> {
         };
         self.emit(instr);
         self.results(window, dest);
+    }
+
+    /// Whether a tail call is none after all: the frame of a top-level form is kept, so that backtraces show the form.
+    fn keeps_its_frame(&self, dest: Dest) -> bool {
+        matches!(dest, Dest::Tail) && self.lambda == LambdaId(0)
     }
 
     /// Puts what is called to `window`.

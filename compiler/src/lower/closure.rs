@@ -33,7 +33,9 @@ impl<'a> Frame<'_, 'a> {
         if self.builder.resolution.captures(lambda).is_empty() {
             return self.constant_function(lambda, dest);
         }
+        let top = self.registers.top();
         self.set_captures(lambda, &[]);
+        self.registers.release(top);
         let function = self.function_index(lambda);
         self.compute(dest, |dst| Instr::MakeClosure { dst, function });
     }
@@ -64,8 +66,8 @@ impl<'a> Frame<'_, 'a> {
         }
     }
 
-    /// Notes where the closure of a lambda, made here, takes its captures from. Closures of `unmade` come later.
-    /// Returns which captures those are.
+    /// Notes where the closure of a lambda, made here, takes its captures from. Closures of `unmade` come later: returns
+    /// which captures those are. Takes registers for variables that have none.
     fn set_captures(&mut self, lambda: LambdaId, unmade: &[VarId]) -> Vec<(Index, VarId)> {
         let core = self.core;
         let mut late = Vec::new();
@@ -81,7 +83,14 @@ impl<'a> Frame<'_, 'a> {
                     CaptureSource::Later
                 }
                 _ if !is_own => CaptureSource::Capture(self.capture_index(lexical).0),
-                Lexical::Variable(variable) => CaptureSource::Register(self.register(variable)),
+                Lexical::Variable(variable) => CaptureSource::Register(match self.spilled(variable) {
+                    Some(place) => {
+                        let register = self.registers.take(1);
+                        self.load_spilled(place, register);
+                        register
+                    }
+                    None => self.register(variable),
+                }),
                 Lexical::Block(block) => CaptureSource::Register(self.builder.blocks[block.index()]),
                 Lexical::Tagbody(tagbody) => CaptureSource::Register(self.builder.tagbodies[tagbody.index()]),
             };

@@ -16,6 +16,7 @@ use super::fuse;
 use super::graph::{Cond, Exit, Graph, Label};
 use super::loops::LoopState;
 use super::regalloc::Registers;
+use super::spill::Spill;
 use super::{Builder, Excess};
 use crate::core::*;
 
@@ -52,6 +53,8 @@ pub(super) struct Frame<'b, 'a> {
     pub(super) loops: FxHashMap<LambdaId, LoopState>,
     /// Variables whose values are computed where they are read, once.
     pub(super) substitutes: FxHashMap<VarId, NodeId>,
+    /// Where variables go that find no room in the registers.
+    pub(super) spill: Option<Spill>,
     /// Variables that share the register of another one.
     pub(super) sharers: FxHashMap<u8, Vec<VarId>>,
     /// Registers of the literals of the loop around the form, if there is one.
@@ -81,6 +84,7 @@ pub(super) fn function(builder: &mut Builder<'_>, lambda: LambdaId) -> Function 
         tagbodies: FxHashMap::default(),
         loops: FxHashMap::default(),
         substitutes: FxHashMap::default(),
+        spill: None,
         sharers: FxHashMap::default(),
         literals: None,
         span: text.span,
@@ -90,6 +94,7 @@ pub(super) fn function(builder: &mut Builder<'_>, lambda: LambdaId) -> Function 
     };
     let parameters = frame.parameters(text);
     frame.form_inside(text.body, Dest::Tail, 0);
+    frame.finish_spill();
     fuse::improve(&mut frame.graph);
     // Even a function without registers has one for instructions that name an empty range.
     frame.registers.reserve(0, 1);
@@ -293,6 +298,9 @@ impl<'a> Frame<'_, 'a> {
         let in_registers = (text.required.iter().copied()).chain(optional).chain(text.rest);
         for parameter in in_registers.chain(keys.iter().map(|key| key.optional.parameter)) {
             self.builder.variables[parameter.variable.index()] = self.registers.take(1);
+        }
+        if self.builder.spills_from.is_some() {
+            self.make_spill();
         }
         for &parameter in &text.required {
             self.settle(parameter);

@@ -64,7 +64,7 @@ impl<'a> Frame<'_, 'a> {
             return self.jump_to_function(lambda, state.head, arguments);
         }
         let text = &self.core.lambdas[lambda.index()];
-        let top = self.registers.top();
+        let (top, spilled) = (self.registers.top(), self.spill_height());
         let depth = self.extents.len();
         let is_loop = self.builder.resolution.is_self_called(lambda);
         for (parameter, &argument) in text.required.iter().zip(arguments) {
@@ -93,6 +93,7 @@ impl<'a> Frame<'_, 'a> {
             self.literals = None;
         }
         self.registers.release(top);
+        self.release_spilled(spilled);
     }
 
     /// Gives the parameters of a function new values and jumps to `head`, in front of the code that boxes them.

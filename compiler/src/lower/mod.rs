@@ -28,6 +28,7 @@ mod loops;
 pub(crate) mod operator;
 mod pool;
 mod regalloc;
+mod spill;
 mod split;
 mod structure;
 mod test;
@@ -50,26 +51,35 @@ use pool::Pool;
 /// # Errors
 /// `function-too-large`, for each function that does not fit the format, not even in parts.
 pub fn lower(core: &Core, lines: &SourceLines) -> Result<Module, Vec<Diagnostic>> {
-    let mut divided: Option<Core> = None;
+    let mut builder = Builder::new(core, lines);
+    let functions = builder.functions();
+    if builder.excesses.is_empty() {
+        return Ok(builder.module(functions));
+    }
+    let diagnostics = builder.excesses.iter().map(|excess| excess.diagnostic.clone()).collect();
+    lower_large(core, lines).ok_or(diagnostics)
+}
+
+/// Of forms that have not fit otherwise, variables go to the heap when so many registers are in use.
+const SPILLS_FROM: u8 = 80;
+
+/// Lowers a form with functions that do not fit as they are.
+fn lower_large(core: &Core, lines: &SourceLines) -> Option<Module> {
+    let mut divided = core.clone();
     let mut limits = split::LIMITS.iter();
     loop {
-        let mut builder = Builder::new(divided.as_ref().unwrap_or(core), lines);
+        let mut builder = Builder::new(&divided, lines);
+        builder.spills_from = Some(SPILLS_FROM);
         let functions = builder.functions();
         if builder.excesses.is_empty() {
-            return Ok(builder.module(functions));
+            return Some(builder.module(functions));
         }
-        let Some(&limits) = limits.next() else {
-            return Err(builder.excesses.into_iter().map(|excess| excess.diagnostic).collect());
-        };
         let resolution = &builder.resolution;
-        let all = (0..builder.core.lambdas.len()).map(|index| LambdaId(index as u32));
-        let is_too_large = |lambda: &LambdaId| {
-            builder.excesses.iter().any(|excess| excess.lambda == resolution.frame(*lambda))
-        };
-        let too_large: Vec<LambdaId> = all.filter(is_too_large).collect();
-        let mut smaller = divided.take().unwrap_or_else(|| core.clone());
-        split::split(&mut smaller, &too_large, limits);
-        divided = Some(smaller);
+        let too_large: Vec<LambdaId> = (0..divided.lambdas.len())
+            .map(|index| LambdaId(index as u32))
+            .filter(|&lambda| builder.excesses.iter().any(|excess| excess.lambda == resolution.frame(lambda)))
+            .collect();
+        split::split(&mut divided, &too_large, *limits.next()?);
     }
 }
 
@@ -95,6 +105,8 @@ struct Builder<'a> {
     blocks: Vec<u8>,
     tagbodies: Vec<u8>,
     excesses: Vec<Excess>,
+    /// Variables that are bound when so many registers are in use go to the heap; none if `None`.
+    spills_from: Option<u8>,
 }
 
 impl<'a> Builder<'a> {
@@ -111,6 +123,7 @@ impl<'a> Builder<'a> {
             blocks: vec![0; core.blocks.len()],
             tagbodies: vec![0; core.tagbodies.len()],
             excesses: Vec::new(),
+            spills_from: None,
         }
     }
 

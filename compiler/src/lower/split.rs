@@ -36,8 +36,8 @@ pub(super) const TINY: Limits = Limits { weight: 12, height: 5, bindings: 2 };
 /// Parts smaller than this are not worth a call.
 const MIN_WEIGHT: usize = 6;
 
-/// Divides the texts of `lambdas`. Returns the lambdas that were made of their parts.
-pub(super) fn split(core: &mut Core, lambdas: &[LambdaId], limits: Limits) -> Vec<LambdaId> {
+/// Divides the texts of `lambdas`.
+pub(super) fn split(core: &mut Core, lambdas: &[LambdaId], limits: Limits) {
     let before = core.lambdas.len();
     for &lambda in lambdas {
         let mut roots = Vec::new();
@@ -46,9 +46,7 @@ pub(super) fn split(core: &mut Core, lambdas: &[LambdaId], limits: Limits) -> Ve
             Splitter { core, lambda, limits }.split(root);
         }
     }
-    let made: Vec<LambdaId> = (before..core.lambdas.len()).map(|index| LambdaId(index as u32)).collect();
-    made.iter().for_each(|&lambda| adopt(core, lambda));
-    made
+    (before..core.lambdas.len()).for_each(|made| adopt(core, LambdaId(made as u32)));
 }
 
 struct Splitter<'a> {

@@ -1,7 +1,7 @@
 //! Variables: reading, setting and binding them.
 
 use esl_bytecode::opcode::Instr;
-use esl_bytecode::operand::{Dst, Index, Reg};
+use esl_bytecode::operand::{Dst, Index, Int16, Reg};
 use esl_bytecode::symbol::Symbol;
 
 use super::dest::Dest;
@@ -20,6 +20,8 @@ pub(super) enum Place {
     Capture(Index),
     /// In a box among the captures.
     CaptureBox(Index),
+    /// In the vector of variables that find no room in registers.
+    Spilled(Int16),
 }
 
 impl<'a> Frame<'_, 'a> {
@@ -43,6 +45,9 @@ impl<'a> Frame<'_, 'a> {
         let resolution = &self.builder.resolution;
         let is_boxed = resolution.is_boxed(variable);
         if resolution.frame(self.core.variables[variable.index()].owner) == self.lambda {
+            if let Some(place) = self.spilled(variable) {
+                return Place::Spilled(place);
+            }
             let register = self.register(variable);
             return if is_boxed { Place::Box(register) } else { Place::Register(register) };
         }
@@ -71,6 +76,11 @@ impl<'a> Frame<'_, 'a> {
             Place::Box(register) => self.compute(dest, |dst| Instr::BoxRef { dst, cell: Reg(register) }),
             Place::Capture(index) => self.compute(dest, |dst| Instr::CaptureRef { dst, index }),
             Place::CaptureBox(index) => self.compute(dest, |dst| Instr::CaptureBoxRef { dst, index }),
+            Place::Spilled(place) => {
+                let target = self.target(dest);
+                self.load_spilled(place, target);
+                self.deliver(target, dest);
+            }
         }
     }
 
@@ -83,11 +93,12 @@ impl<'a> Frame<'_, 'a> {
             place => {
                 let top = self.registers.top();
                 let src = self.operand(value, &[]);
-                self.emit(match place {
-                    Place::Box(register) => Instr::BoxSet { cell: Reg(register), src },
-                    Place::CaptureBox(index) => Instr::CaptureBoxSet { src, index },
+                match place {
+                    Place::Box(register) => self.emit(Instr::BoxSet { cell: Reg(register), src }),
+                    Place::CaptureBox(index) => self.emit(Instr::CaptureBoxSet { src, index }),
+                    Place::Spilled(place) => self.store_spilled(place, src),
                     _ => unreachable!("a variable that is captured and assigned lives in a box"),
-                });
+                }
                 self.deliver(src.0, dest);
                 self.registers.release(top);
             }
@@ -148,7 +159,7 @@ impl<'a> Frame<'_, 'a> {
         if self.parallel_assignment(bindings, body, dest) {
             return;
         }
-        let top = self.registers.top();
+        let (top, spilled) = (self.registers.top(), self.spill_height());
         let depth = self.extents.len();
         // Special bindings of a parallel `let` are made when all values are there.
         let mut waiting: Vec<(&Symbol, u8)> = Vec::new();
@@ -184,6 +195,7 @@ impl<'a> Frame<'_, 'a> {
         }
         self.form_inside(body, dest, depth);
         self.registers.release(top);
+        self.release_spilled(spilled);
     }
 
     /// Binds a lexical variable to the value of a form.
@@ -197,8 +209,10 @@ impl<'a> Frame<'_, 'a> {
         }
         let register = self.registers.top();
         self.form(value, Dest::Fresh(register));
-        self.builder.variables[variable.index()] = self.registers.take(1);
-        self.box_variable(variable);
+        if !self.spill_variable(variable) {
+            self.builder.variables[variable.index()] = self.registers.take(1);
+            self.box_variable(variable);
+        }
     }
 
     /// Whether the first thing that `next` does is to read `variable`, which nothing else refers to: then the value

@@ -129,7 +129,7 @@ impl Form<'_> {
                 Instr::TailCallBuiltin { window, count, builtin } => {
                     return self.call(builtin.0, window.0, count.0).map(|_| ());
                 }
-                Instr::Return { .. } => return Some(()),
+                Instr::Return { .. } | Instr::ReturnAll {} => return Some(()),
                 _ => return None,
             }
         }

@@ -256,6 +256,11 @@ fn large_functions_are_divided() {
         forms(300, &|i| format!("(v{i} (f))")),
         forms(300, &|i| format!("v{i} "))
     ));
+    let variables = forms(600, &|i| format!("(v{i} (f))"));
+    fits(&format!(
+        "(let* ({variables}) (setq v500 v400) (g (lambda () v300)) (+ {}))",
+        forms(600, &|i| format!("v{i} "))
+    ));
     fits(&format!("(tagbody {} a (go a))", forms(10_000, &|i| format!("(if (g {i}) (go a))"))));
     // Deep on the right, where everything on the left waits in a register.
     fits(&format!("{} 1 {}", "(list (f) ".repeat(1000), ")".repeat(1000)));
@@ -265,7 +270,7 @@ fn large_functions_are_divided() {
 
 #[test]
 fn a_function_with_too_many_captures_is_refused() {
-    let names = |text: &str| (0..600).map(|i| text.replace('#', &i.to_string())).collect::<String>();
+    let names = |text: &str| (0..300).map(|i| text.replace('#', &i.to_string())).collect::<String>();
     let source = format!("(let* ({}) (lambda () (list {})))", names("(v# (f))"), names("v# "));
     let faults = crate::lower::lower(&super::notation::core(&source), &crate::lower::SourceLines::new());
     let faults = faults.expect_err("no such function fits");

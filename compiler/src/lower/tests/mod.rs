@@ -12,7 +12,7 @@ use esl_bytecode::disasm;
 use esl_bytecode::module::Module;
 use esl_bytecode::verify::verify;
 
-use super::{SourceLines, lower};
+use super::{Builder, SourceLines, lower};
 use crate::core::Core;
 
 /// What a form is lowered to, verified.
@@ -23,10 +23,24 @@ fn module(text: &str) -> Module {
 /// What a core tree is lowered to, verified.
 fn module_of(core: &Core, text: &str) -> Module {
     let module = lower(core, &SourceLines::new()).unwrap_or_else(|faults| panic!("{faults:?}\n{text}"));
+    verified(module, text)
+}
+
+fn verified(module: Module, text: &str) -> Module {
     if let Err(fault) = verify(&module) {
         panic!("{fault}\n{text}\n{}", disasm::module(&module));
     }
     module
+}
+
+/// What a core tree is lowered to when nearly all variables go to the heap.
+fn spilled_module_of(core: &Core, text: &str) -> Module {
+    let lines = SourceLines::new();
+    let mut builder = Builder::new(core, &lines);
+    builder.spills_from = Some(2);
+    let functions = builder.functions();
+    assert!(builder.excesses.is_empty(), "{text}");
+    verified(builder.module(functions), text)
 }
 
 /// The listing of what a form is lowered to.

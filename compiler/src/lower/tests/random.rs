@@ -1,30 +1,27 @@
-//! Random programs are lowered, verified, and do what the tree says.
+//! Random programs are lowered, verified, and do what the tree says; so they do when everything is divided or spilled.
 
 use proptest::prelude::*;
 
-use super::{generate, machine, model, module_of, notation};
-use crate::core::LambdaId;
+use super::{generate, machine, model, module_of, notation, spilled_module_of};
+use crate::core::{Core, LambdaId};
 use crate::lower::split;
 use esl_bytecode::disasm;
+use esl_bytecode::module::Module;
 
 /// Runs a program in both ways, if the model ends soon enough.
 fn check(text: &str) {
-    check_divided(text, false);
+    check_made(text, &|core, text| module_of(core, text));
 }
 
-/// The same; if `divided`, after taking out all parts of some size.
-fn check_divided(text: &str, divided: bool) {
+/// The same, with the module that `make` makes of the program.
+fn check_made(text: &str, make: &dyn Fn(&mut Core, &str) -> Module) {
     // The handler is outside of the function, so that the program itself is in tail position.
     let text = format!(
         "(progn (setq *a* 1) (setq *b* 2) (handler-case (apply (lambda () {text}) nil) (error (c) (note c))))"
     );
     let mut core = notation::core_in_big_stack(&text);
     let Some(expected) = model::run(&core, 20_000) else { return };
-    if divided {
-        let all: Vec<LambdaId> = (0..core.lambdas.len()).map(|index| LambdaId(index as u32)).collect();
-        split::split(&mut core, &all, split::TINY);
-    }
-    let module = module_of(&core, &text);
+    let module = make(&mut core, &text);
     let found = std::panic::catch_unwind(|| machine::run(&module, 2_000_000));
     match found {
         Ok(found) if found.as_ref() == Some(&expected) => {}
@@ -42,7 +39,16 @@ proptest! {
 
     #[test]
     fn divided_programs_do_the_same(choices in proptest::collection::vec(any::<u8>(), 0..300)) {
-        check_divided(&generate::program(&choices), true);
+        check_made(&generate::program(&choices), &|core, text| {
+            let all: Vec<LambdaId> = (0..core.lambdas.len()).map(|index| LambdaId(index as u32)).collect();
+            split::split(core, &all, split::TINY);
+            module_of(core, text)
+        });
+    }
+
+    #[test]
+    fn variables_on_the_heap_do_the_same(choices in proptest::collection::vec(any::<u8>(), 0..300)) {
+        check_made(&generate::program(&choices), &|core, text| spilled_module_of(core, text));
     }
 }
 

@@ -8,7 +8,7 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::symbol::Symbol;
 
 /// A car and a cdr.
-type Pair<F> = Rc<(RefCell<Value<F>>, RefCell<Value<F>>)>;
+pub(super) type Pair<F> = Rc<(RefCell<Value<F>>, RefCell<Value<F>>)>;
 
 /// A value; `F` is what functions are made of.
 pub(super) enum Value<F> {
@@ -162,6 +162,7 @@ impl<F> Value<F> {
                 }
                 Ok(Value::list(items))
             }
+            (B::MakeVector, 2) => int(0).map(|size| Value::list(vec![arguments[1].clone(); size as usize])),
             (B::Identity, 1) => Ok(arguments[0].clone()),
             _ => return None,
         })

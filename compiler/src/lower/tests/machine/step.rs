@@ -8,6 +8,7 @@ use esl_bytecode::module::{Capture, CaptureSource, Constant};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 
+use super::super::value::Pair;
 use super::{Cell, Failed, Function, Kind, Machine, Unwinding, Value, divide, holds, simple};
 
 impl Machine<'_> {
@@ -157,6 +158,14 @@ impl Machine<'_> {
             Instr::List { dst, first, count } => {
                 let items = self.range(first.0, count.0);
                 self.set(dst.0, Value::list(items));
+            }
+            Instr::VectorRef { dst, vector, index } => {
+                let value = self.element(vector, index).0.borrow().clone();
+                self.set(dst.0, value);
+            }
+            Instr::VectorSet { vector, index, value } => {
+                let value = self.get(value.0);
+                *self.element(vector, index).0.borrow_mut() = value;
             }
             Instr::MakeBox { dst, src } => {
                 let value = self.get(src.0);
@@ -354,6 +363,20 @@ impl Machine<'_> {
             other => panic!("not in random programs: {other}"),
         }
         Ok(true)
+    }
+
+    /// The pair of a vector's element: vectors are lists here, since only the compiler makes them.
+    fn element(&mut self, vector: Reg, index: Reg) -> Pair<Function> {
+        let (mut rest, Value::Int(index)) = (self.get(vector.0), self.get(index.0)) else {
+            panic!("an index")
+        };
+        for _ in 0..index {
+            let Value::Cons(pair) = &rest else { panic!("an index inside") };
+            let next = pair.1.borrow().clone();
+            rest = next;
+        }
+        let Value::Cons(pair) = rest else { panic!("an index inside") };
+        pair
     }
 
     fn captured(&mut self, capture: &Capture) -> Cell {
