@@ -70,7 +70,7 @@ pub struct Variable {
     pub is_assigned: bool,
     /// Whether a lambda inside its owner refers to it.
     pub is_captured: bool,
-    /// Whether anything reads it.
+    /// Whether anything reads it, or uses the value of an assignment to it.
     pub is_read: bool,
 }
 

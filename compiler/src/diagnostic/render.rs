@@ -58,8 +58,9 @@ impl Renderer {
         let excerpts = excerpts(&diagnostic.primary, &diagnostic.secondary, sources);
         let mut group =
             Group::with_title(level.primary_title(visible(&diagnostic.message)).id(diagnostic.code));
-        if sources.text(diagnostic.primary.span.source).is_none() {
-            group = group.element(Origin::path(position(&diagnostic.primary, sources)));
+        let source = diagnostic.primary.span.source;
+        if let (Some(name), None) = (sources.name(source), sources.text(source)) {
+            group = group.element(Origin::path(position(&diagnostic.primary, name)));
         }
         for excerpt in &excerpts {
             group = group.element(snippet(excerpt, sources));
@@ -97,8 +98,7 @@ fn snippet<'a>(
 }
 
 /// What can be said of a place in a text that is not at hand.
-fn position(label: &Label, sources: &Sources) -> String {
-    let name = sources.name(label.span.source).unwrap_or("<unknown>");
+fn position(label: &Label, name: &str) -> String {
     format!("{name}, byte {}", label.span.start)
 }
 

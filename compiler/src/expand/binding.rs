@@ -151,7 +151,7 @@ fn expand_let(
     }
     let mut inside = to;
     if !targets.is_empty() {
-        inside = machine.child(to);
+        inside = machine.result(to);
         machine.fill(to, NodeKind::Let { sequential, bindings: targets, body: inside.node });
     }
     let free = body.free_specials(&bound);
@@ -190,7 +190,7 @@ pub(super) fn multiple_value_bind(
         targets.push(target);
         entries.push(entry);
     }
-    let inside = machine.child(to);
+    let inside = machine.result(to);
     machine.fill(to, NodeKind::BindValues(targets, values, inside.node));
     let bound: Vec<Symbol> = names.into_iter().map(|(symbol, _)| symbol).collect();
     entries.extend(body.free_specials(&bound));
@@ -222,12 +222,12 @@ pub(super) fn symbol_macros(
     form: &Form,
     origin: Option<u32>,
 ) -> Checked<(Vec<Entry>, Body)> {
-    let found = bindings(
-        machine,
-        environment,
-        form,
-        "needs a list of names and expansions, such as `((x (car y)))`",
-    )?;
+    let shape = "needs a list of names and expansions, such as `((x (car y)))`";
+    let found = bindings(machine, environment, form, shape)?;
+    let items = form.args[0].as_list().unwrap_or_default();
+    if let Some(item) = items.iter().find(|item| item.as_list().is_none_or(|parts| parts.len() != 2)) {
+        return Err(form.malformed_at(item.span(), "needs a name and an expansion in each definition"));
+    }
     check_distinct(found.iter().map(|binding| (&binding.symbol, binding.datum.span())), form)?;
     let body = machine.take_body(&form.args[1..], false, form, origin)?;
     let mut entries = Vec::new();

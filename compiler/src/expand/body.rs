@@ -129,8 +129,19 @@ impl Machine {
                 Vec::new()
             }
             1 => forms.into_iter().map(|form| Job::Expand(form, to)).collect(),
-            _ => {
-                let (nodes, jobs) = self.children(forms, to);
+            count => {
+                let mut nodes = Vec::with_capacity(count);
+                let mut jobs = Vec::with_capacity(count);
+                for (index, form) in forms.into_iter().enumerate() {
+                    let (node, job) = if index + 1 < count {
+                        self.statement(form, to)
+                    } else {
+                        let last = self.result(to);
+                        (last.node, Job::Expand(form, last))
+                    };
+                    nodes.push(node);
+                    jobs.push(job);
+                }
                 self.fill(to, NodeKind::Progn(nodes));
                 jobs
             }

@@ -36,6 +36,8 @@ enum Target {
     Local(crate::core::VarId, Arity),
     /// A global function, by name.
     Global(FunctionName),
+    /// The function that a symbol names when the call is made: nothing can be said of it before.
+    Named(FunctionName),
     /// What a form evaluates to.
     Form(Datum),
 }
@@ -161,6 +163,7 @@ impl Machine {
             Target::Global(function) => {
                 (self.global_callee(environment, &function, Some(count), form, to)?, Vec::new())
             }
+            Target::Named(function) => (named_callee(&function, Some(count)), Vec::new()),
             Target::Form(function) => {
                 let (node, job) = self.part(function, to);
                 (Callee::Value(node), vec![job])
@@ -270,14 +273,29 @@ impl Machine {
                 Visible::OutOfReach => return Err(out_of_reach(form, &function)),
                 Visible::No => {}
             }
-        } else if function.name.is_setf {
+        } else if function.name.is_setf || function.cell.is_cl("T") {
             return other();
         }
         let is_operator = !function.name.is_setf
             && builtin(&function.cell).is_none()
             && (super::operator::find(&function.cell).is_some()
                 || self.is_macro(environment, &function.cell));
-        if is_operator { other() } else { Ok(Target::Global(function)) }
+        Ok(match (is_operator, is_function) {
+            (true, _) => Target::Form(argument.clone()),
+            (false, true) => Target::Global(function),
+            (false, false) => Target::Named(function),
+        })
+    }
+}
+
+/// What a symbol names when the call is made. Builtins stay what they are.
+fn named_callee(function: &FunctionName, count: Option<usize>) -> Callee {
+    let fits = |builtin: &Builtin| {
+        count.is_none_or(|count| accepts(builtin.info().arity, u32::try_from(count).unwrap_or(u32::MAX)))
+    };
+    match builtin(&function.cell).filter(fits) {
+        Some(builtin) => Callee::Builtin(builtin),
+        None => Callee::Global(function.cell.clone()),
     }
 }
 
@@ -349,6 +367,7 @@ pub(super) fn apply(machine: &mut Machine, environment: &mut dyn Environment, fo
         Target::Global(function) => {
             (machine.global_callee(environment, &function, None, &form, to)?, Vec::new())
         }
+        Target::Named(function) => (named_callee(&function, None), Vec::new()),
         Target::Form(function) => {
             let (node, job) = machine.part(function, to);
             (Callee::Value(node), vec![job])

@@ -67,8 +67,13 @@ impl Machine {
             Node { kind: NodeKind::Constant(Datum::nil(to.span)), span: to.span };
     }
 
-    /// A fresh node within `to`.
+    /// A fresh node within `to`, for a value that is used.
     pub(super) fn child(&mut self, to: To) -> To {
+        To { is_dropped: false, ..self.result(to) }
+    }
+
+    /// A fresh node within `to`, for the value of `to`.
+    pub(super) fn result(&mut self, to: To) -> To {
         let nodes = &mut self.core().nodes;
         let node = NodeId(nodes.len() as u32);
         nodes.push(Node { kind: NodeKind::Hole, span: to.span });
@@ -89,6 +94,12 @@ impl Machine {
             jobs.push(Job::Expand(form, child));
         }
         (nodes, jobs)
+    }
+
+    /// A fresh node within `to` for `form`, the value of which is not used, and the job that fills it.
+    pub(super) fn statement(&mut self, form: Datum, to: To) -> (NodeId, Job) {
+        let child = To { is_dropped: true, ..self.child(to) };
+        (child.node, Job::Expand(form, child))
     }
 
     /// A fresh node within `to` for `form`, and the job that fills it.
@@ -129,10 +140,11 @@ impl Machine {
         self.fill(to, NodeKind::Local(variable));
     }
 
-    /// Notes that code in the lambda of `to` sets a variable.
+    /// Notes that `to` sets a variable. Whoever uses the value of that counts as a reader.
     pub(super) fn note_assigned(&mut self, variable: VarId, to: To) {
         let variable = &mut self.core().variables[variable.index()];
         variable.is_assigned = true;
+        variable.is_read |= !to.is_dropped;
         variable.is_captured |= variable.owner != to.lambda;
     }
 
@@ -159,7 +171,7 @@ impl Machine {
             ..Core::default()
         };
         self.open.push(Open { core, errors: self.errors, span, purpose, macros: Vec::new() });
-        To { node: body, lambda: LambdaId(0), depth: 0, origin, span }
+        To { node: body, lambda: LambdaId(0), depth: 0, origin, span, is_dropped: false }
     }
 
     /// Whether something was wrong with the chunk that is being built.

@@ -22,9 +22,11 @@ pub(super) fn if_(machine: &mut Machine, _: &mut dyn Environment, form: Form, to
     form.takes(2..=3, "takes a test, a form for true, and at most one for false")?;
     let nil = Datum::nil(to.span);
     let (test, first) = machine.part(form.args[0].clone(), to);
-    let (then, second) = machine.part(form.args[1].clone(), to);
-    let (otherwise, third) = machine.part(form.args.get(2).cloned().unwrap_or(nil), to);
-    machine.fill(to, NodeKind::If(test, then, otherwise));
+    let then = machine.result(to);
+    let otherwise = machine.result(to);
+    machine.fill(to, NodeKind::If(test, then.node, otherwise.node));
+    let second = Job::Expand(form.args[1].clone(), then);
+    let third = Job::Expand(form.args.get(2).cloned().unwrap_or(nil), otherwise);
     machine.schedule([first, second, third]);
     Ok(())
 }
@@ -121,9 +123,9 @@ pub(super) fn cond(machine: &mut Machine, _: &mut dyn Environment, form: Form, t
             machine.fill(at, NodeKind::Or(vec![node, rest.node]));
             at = rest;
         } else {
-            let then = machine.child(at);
+            let then = machine.result(at);
             jobs.extend(machine.body(clause, then));
-            let rest = machine.child(at);
+            let rest = machine.result(at);
             machine.fill(at, NodeKind::If(node, then.node, rest.node));
             at = rest;
         }
@@ -280,7 +282,7 @@ pub(super) fn tagbody(machine: &mut Machine, _: &mut dyn Environment, form: Form
                 entries.push(Entry::Tag(tag, tagbody, entries.len() as u32));
             }
             None if item.as_cons().is_some() => {
-                let (node, job) = machine.part(item.clone(), to);
+                let (node, job) = machine.statement(item.clone(), to);
                 items.push(TagbodyItem::Form(node));
                 jobs.push(job);
             }
@@ -434,7 +436,13 @@ pub(super) fn values(machine: &mut Machine, _: &mut dyn Environment, form: Form,
         machine.schedule([job]);
         return Ok(());
     }
-    let (nodes, jobs) = machine.children(form.args, to);
+    let mut nodes = Vec::with_capacity(form.args.len());
+    let mut jobs = Vec::with_capacity(form.args.len());
+    for arg in form.args {
+        let value = machine.result(to);
+        nodes.push(value.node);
+        jobs.push(Job::Expand(arg, value));
+    }
     machine.fill(to, NodeKind::Values(nodes));
     machine.schedule(jobs);
     Ok(())

@@ -43,9 +43,10 @@ impl Machine {
         }
     }
 
-    /// Refuses calls of the functions that define, if what they define belongs to the language.
+    /// Refuses calls of the functions that define, if what they define belongs to the language. What a definition inside
+    /// another form defines is known at the end of the unit.
     pub(super) fn check_defining(
-        &self,
+        &mut self,
         environment: &dyn Environment,
         builtin: Builtin,
         form: &Form,
@@ -57,10 +58,14 @@ impl Machine {
         if !defines {
             return Ok(());
         }
-        match form.args.iter().find_map(quoted_symbol) {
-            Some(symbol) if environment.global(&symbol).locked => Err(locked(&symbol, form.span)),
-            _ => Ok(()),
+        let Some(symbol) = form.args.iter().find_map(quoted_symbol) else { return Ok(()) };
+        if environment.global(&symbol).locked {
+            return Err(locked(&symbol, form.span));
         }
+        if matches!(builtin, Builtin::ProclaimSpecial | Builtin::DefineConstant) {
+            self.unit.note_variable_definition(&symbol);
+        }
+        Ok(())
     }
 }
 

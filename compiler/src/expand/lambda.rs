@@ -159,7 +159,7 @@ impl Machine {
     ) {
         let LambdaText { name, shown, list, body, block, form } = text;
         let node = self.core().lambdas[lambda.index()].body;
-        let inside = To { node, lambda, depth: to.depth + 1, ..to };
+        let inside = To { node, lambda, depth: to.depth + 1, is_dropped: false, ..to };
         let mut filling = Filling { body: &body, form, inside, jobs: Vec::new(), bound: Vec::new() };
 
         let required =

@@ -41,6 +41,8 @@ pub(super) struct To {
     pub(super) origin: Option<u32>,
     /// Where the form was written, or the one around it.
     pub(super) span: Span,
+    /// Whether nothing is done with the value.
+    pub(super) is_dropped: bool,
 }
 
 /// Something to be done.

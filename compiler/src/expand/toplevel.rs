@@ -69,7 +69,14 @@ impl Top {
 
     /// The circumstances, where forms outside of a chunk need some.
     fn to(self) -> To {
-        To { node: NodeId(0), lambda: LambdaId(0), depth: 0, origin: self.origin, span: self.span }
+        To {
+            node: NodeId(0),
+            lambda: LambdaId(0),
+            depth: 0,
+            origin: self.origin,
+            span: self.span,
+            is_dropped: false,
+        }
     }
 }
 
@@ -198,7 +205,8 @@ impl Machine {
         if !top.is_last && is_constant(&datum) && !matches!(datum.kind(), DatumKind::Cons(..)) {
             return;
         }
-        let to = self.begin_chunk(top.span, top.origin, top.purpose(is_definition));
+        let chunk = self.begin_chunk(top.span, top.origin, top.purpose(is_definition));
+        let to = To { is_dropped: !top.is_last, ..chunk };
         self.schedule([Job::Expand(datum, to), Job::FinishChunk]);
     }
 }

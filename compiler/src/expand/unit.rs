@@ -60,6 +60,8 @@ impl Name {
 pub(super) struct Unit {
     calls: Vec<Call>,
     variables: Vec<(Symbol, Span)>,
+    /// Variables that forms of the unit define when they run.
+    defined_variables: FxHashSet<Symbol>,
     /// Functions that the unit defines; without an arity if there are several that differ.
     functions: FxHashMap<Name, Option<Arity>>,
     /// Macros whose definitions are wrong: calls of them are not looked at.
@@ -78,7 +80,12 @@ impl Unit {
         self.variables.push((symbol.clone(), span));
     }
 
-    /// Notes a definition.
+    /// Notes that a form of the unit defines a variable.
+    pub(super) fn note_variable_definition(&mut self, symbol: &Symbol) {
+        self.defined_variables.insert(symbol.clone());
+    }
+
+    /// Notes the definition of a function.
     pub(super) fn note_definition(&mut self, function: Name, arity: Arity) {
         self.functions
             .entry(function)
@@ -154,7 +161,9 @@ impl Unit {
         let mut uses: Vec<(Symbol, Vec<Span>)> = Vec::new();
         let mut known: FxHashMap<Symbol, usize> = FxHashMap::default();
         for (symbol, span) in std::mem::take(&mut self.variables) {
-            if !matches!(similar.environment.global(&symbol).variable, GlobalVariable::Undefined) {
+            let is_defined = self.defined_variables.contains(&symbol)
+                || !matches!(similar.environment.global(&symbol).variable, GlobalVariable::Undefined);
+            if is_defined {
                 continue;
             }
             let index = *known.entry(symbol.clone()).or_insert(uses.len());

@@ -24,7 +24,7 @@ fn variables_are_assigned_captured_and_read() {
     assert_eq!(variable("(let ((x 1)) x)"), [false, false, true]);
     assert_eq!(variable("(let ((x 1)) (setq x 2))"), [true, false, false]);
     assert_eq!(variable("(let ((x 1)) (lambda () x))"), [false, true, true]);
-    assert_eq!(variable("(let ((x 1)) (lambda () (setq x 2)))"), [true, true, false]);
+    assert_eq!(variable("(let ((x 1)) (lambda () (setq x 2)))"), [true, true, true]);
     assert_eq!(variable("(lambda (x) (flet ((f () x)) (f)))"), [false, true, true]);
     assert_eq!(variable("(lambda (&optional (y 1) (x y)) (incf x))"), [true, false, true]);
     assert_eq!(variable("(let ((x 1)) (multiple-value-setq (x) (g)))"), [true, false, false]);
