@@ -1,7 +1,8 @@
 //! Trigonometric and hyperbolic functions, on doubles.
 //!
-//! The functions come from `libm`, so they give the same digits on every machine.
+//! What computes them is in `transcendental`.
 
+use super::transcendental;
 use crate::raise::{Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -32,18 +33,18 @@ macro_rules! elementary {
 }
 
 elementary! {
-    SIN = "SIN" libm::sin, everywhere;
-    COS = "COS" libm::cos, everywhere;
-    TAN = "TAN" libm::tan, everywhere;
-    ASIN = "ASIN" libm::asin, within_one;
-    ACOS = "ACOS" libm::acos, within_one;
-    ATAN = "ATAN" libm::atan, everywhere;
-    SINH = "SINH" libm::sinh, everywhere;
-    COSH = "COSH" libm::cosh, everywhere;
-    TANH = "TANH" libm::tanh, everywhere;
-    ASINH = "ASINH" libm::asinh, everywhere;
-    ACOSH = "ACOSH" libm::acosh, |x| x >= 1.0;
-    ATANH = "ATANH" libm::atanh, within_one;
+    SIN = "SIN" transcendental::sin, everywhere;
+    COS = "COS" transcendental::cos, everywhere;
+    TAN = "TAN" transcendental::tan, everywhere;
+    ASIN = "ASIN" transcendental::asin, within_one;
+    ACOS = "ACOS" transcendental::acos, within_one;
+    ATAN = "ATAN" transcendental::atan, everywhere;
+    SINH = "SINH" transcendental::sinh, everywhere;
+    COSH = "COSH" transcendental::cosh, everywhere;
+    TANH = "TANH" transcendental::tanh, everywhere;
+    ASINH = "ASINH" transcendental::asinh, everywhere;
+    ACOSH = "ACOSH" transcendental::acosh, |x| x >= 1.0;
+    ATANH = "ATANH" transcendental::atanh, within_one;
 }
 
 impl Elementary {
@@ -64,5 +65,5 @@ impl Elementary {
 /// `(atan y x)`: the angle of the point with these coordinates.
 pub(crate) fn angle(vm: &mut Vm, y: Value, x: Value) -> Outcome {
     let (y, x) = (vm.double_of("ATAN", y, "REAL")?, vm.double_of("ATAN", x, "REAL")?);
-    vm.float_value("ATAN", libm::atan2(y, x))
+    vm.float_value("ATAN", transcendental::atan2(y, x))
 }

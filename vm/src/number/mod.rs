@@ -42,6 +42,7 @@ pub(crate) mod random;
 mod ratio;
 pub(crate) mod rounding;
 pub(crate) mod text;
+mod transcendental;
 
 /// A number, taken out of its value.
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@
 use num_traits::Pow;
 
 use super::limit::{self, BIT_LIMIT};
-use super::{Int, Number, Ratio};
+use super::{Int, Number, Ratio, transcendental};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -90,7 +90,7 @@ fn real_power(vm: &mut Vm, operands: [Value; 2], is_float: bool, x: f64, y: f64)
     if x < 0.0 && y.fract() != 0.0 {
         return vm.raise(Raised::Arithmetic("EXPT", "the result would be a complex number".into()));
     }
-    vm.float_value("EXPT", libm::pow(x, y))
+    vm.float_value("EXPT", transcendental::pow(x, y))
 }
 
 /// `(sqrt a)`
@@ -124,7 +124,7 @@ pub(crate) fn isqrt(vm: &mut Vm, a: Value) -> Outcome {
 /// `(exp a)`
 pub(crate) fn exp(vm: &mut Vm, a: Value) -> Outcome {
     let x = vm.double_of("EXP", a, "NUMBER")?;
-    vm.float_value("EXP", libm::exp(x))
+    vm.float_value("EXP", transcendental::exp(x))
 }
 
 /// The natural logarithm of 2 in two parts, the first of which has so few bits that its products with counts are exact.
@@ -134,7 +134,7 @@ const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 /// `(log a)`
 pub(crate) fn log(vm: &mut Vm, a: Value) -> Outcome {
     let (bits, x) = log_parts(vm, a)?;
-    vm.float_value("LOG", (libm::log(x) + bits * LN_2_LOW) + bits * LN_2_HIGH)
+    vm.float_value("LOG", (transcendental::log(x) + bits * LN_2_LOW) + bits * LN_2_HIGH)
 }
 
 /// `(log a base)`
@@ -148,7 +148,7 @@ pub(crate) fn log_in_base(vm: &mut Vm, a: Value, base: Value) -> Outcome {
     if let Some(power) = exact_log(vm, a, base) {
         return vm.float_value("LOG", power);
     }
-    let (numerator, denominator) = (libm::log2(x) + a_bits, libm::log2(y) + base_bits);
+    let (numerator, denominator) = (transcendental::log2(x) + a_bits, transcendental::log2(y) + base_bits);
     if denominator == 0.0 {
         return vm.raise(Raised::DivisionByZero("LOG", [a, base]));
     }
@@ -196,7 +196,7 @@ fn exact_log(vm: &Vm, a: Value, base: Value) -> Option<f64> {
     if base.bits() < 2 || a.bits() > 4096 {
         return None;
     }
-    let guess = ((a.bits() as f64) / libm::log2(base.to_f64())).round();
+    let guess = ((a.bits() as f64) / transcendental::log2(base.to_f64())).round();
     [guess - 1.0, guess].into_iter().find(|&power| {
         power >= 0.0
             && power * (base.bits() - 1) as f64 <= 4096.0
