@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use esl_bytecode::compile::{Compile, drive};
+use esl_bytecode::compile::drive;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::module::Module;
 use esl_bytecode::verify::verify;
-use esl_bytecode::{disasm, file, link};
+use esl_bytecode::{disasm, file};
 use esl_compiler::diagnostic::Sources;
 use esl_compiler::session::Compiler;
 use esl_vm::host::{Host, RealHost};
@@ -58,13 +58,15 @@ impl Compiled {
 const COMPILE_TIME_CONFIG: Config =
     Config { memory: 1 << 30, stack: 1 << 16, slice: 2000, budget: None, seed: 0, collect_always: false };
 
-/// Compiles sources to one program that runs them in order.
+/// Compiles sources to one program that runs them in order. They are one unit: functions may be called before the source
+/// that defines them, and macros used after it. Each begins in the package `ESL-USER`.
 ///
 /// Macros run in a machine of their own, and what they define is gone when the compilation is over.
 pub fn compile(sources: &[Source]) -> Compiled {
     let mut table = Sources::new();
-    let mut diagnostics = Vec::new();
-    let mut modules = Vec::new();
+    for source in sources {
+        table.add(source.name.clone(), Some(source.text.clone()));
+    }
     let mut machine = match machine(COMPILE_TIME_CONFIG, Box::new(RealHost::new(Vec::new()))) {
         Ok(machine) => machine,
         Err(text) => {
@@ -72,17 +74,10 @@ pub fn compile(sources: &[Source]) -> Compiled {
             return Compiled { program: None, diagnostics: vec![diagnostic], sources: table };
         }
     };
-    for source in sources {
-        let id = table.add(source.name.clone(), Some(source.text.clone()));
-        let compiler = Compiler::for_source(id);
-        let mut compilation = compiler.compile_text(&source.name, &source.text);
-        let (module, mut found) = drive(&mut *compilation, &mut machine);
-        diagnostics.append(&mut found);
-        modules.extend(module);
-    }
-    let is_complete = modules.len() == sources.len();
-    let program = is_complete.then(|| Program { module: link::link(modules) });
-    Compiled { program, diagnostics, sources: table }
+    let texts: Vec<(&str, &str)> = sources.iter().map(|source| (&*source.name, &*source.text)).collect();
+    let mut compilation = Compiler::default().compile_texts(&texts);
+    let (module, diagnostics) = drive(&mut *compilation, &mut machine);
+    Compiled { program: module.map(|module| Program { module }), diagnostics, sources: table }
 }
 
 impl Program {
@@ -216,4 +211,52 @@ pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Report, String> {
         _ => Ended::Normally(machine.exit_status().unwrap_or(0)),
     };
     Ok(Report { ended, ticks: machine.ticks(), heap: machine.heap_stats() })
+}
+
+#[cfg(test)]
+mod tests {
+    use esl_vm::host::VirtualHost;
+
+    use super::*;
+
+    /// The messages about sources that are compiled together, and what the program prints.
+    fn run_together(texts: &[&str]) -> (Vec<String>, String) {
+        let sources: Vec<Source> = texts
+            .iter()
+            .enumerate()
+            .map(|(index, text)| Source::new(format!("{index}.esl"), *text))
+            .collect();
+        let compiled = compile(&sources);
+        let place = |diagnostic: &Diagnostic| {
+            let span = diagnostic.primary.span;
+            let name = compiled.sources.name(span.source).unwrap_or_default();
+            format!("{name}: {}", diagnostic.message)
+        };
+        let messages = compiled.diagnostics.iter().map(place).collect();
+        let Some(program) = compiled.program else { return (messages, String::new()) };
+        let program =
+            Program::from_bytes(&program.to_bytes().expect("it can be written")).expect("it is sound");
+        let host = VirtualHost::new();
+        let captured = host.captured();
+        run(&program, COMPILE_TIME_CONFIG, Box::new(host)).expect("it runs");
+        (messages, captured.output())
+    }
+
+    #[test]
+    fn sources_see_what_others_define() {
+        let first = "(defmacro twice (x) `(list ,x ,x)) (defun first-one () (second-one)) (defvar *v* 5)";
+        let second = "(defun second-one () (twice *v*)) (princ (first-one)) (third-one)";
+        let (messages, output) = run_together(&[first, second]);
+        assert_eq!(messages, ["1.esl: no function is called `third-one`"]);
+        assert_eq!(output, "(5 5)");
+    }
+
+    #[test]
+    fn each_source_begins_in_the_package_of_the_user() {
+        let first = "(defpackage :inner (:use :esl)) (in-package :inner) (princ (package-name *package*))";
+        let second = "(princ (list (package-name *package*) (symbol-package 'x)))";
+        let (messages, output) = run_together(&[first, second]);
+        assert!(messages.is_empty(), "{messages:?}");
+        assert_eq!(output, "INNER(ESL-USER #<PACKAGE \"ESL-USER\">)");
+    }
 }

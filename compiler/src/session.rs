@@ -15,7 +15,8 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::link::join;
 use esl_bytecode::module::{Constant, Module};
-use esl_bytecode::span::SourceId;
+use esl_bytecode::span::{SourceId, Span};
+use esl_bytecode::symbol::{Symbol, USER_PACKAGE};
 
 use crate::diagnostic::{Renderer, Sources, code};
 use crate::expand::print::print;
@@ -44,7 +45,8 @@ impl Compiler {
     }
 
     /// Begins to compile texts, each with its name, to one module that runs them in order. To one another they are like
-    /// parts of one text. Diagnostics number them from the compiler's source number on.
+    /// parts of one text, but each is read, and runs, in the package `ESL-USER` until it says otherwise. Diagnostics
+    /// number them from the compiler's source number on.
     pub fn compile_texts(&self, texts: &[(&str, &str)]) -> Box<dyn Compilation> {
         Box::new(self.texts(texts))
     }
@@ -101,6 +103,13 @@ impl Compile for Compiler {
         let sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
         Renderer::default().render(diagnostic, &sources)
     }
+}
+
+/// The form that comes between two texts.
+fn enter_user_package() -> Datum {
+    let nowhere = Span::default();
+    let operator = Datum::symbol(Symbol::cl("IN-PACKAGE"), nowhere);
+    Datum::list([operator, Datum::string(USER_PACKAGE, nowhere)], nowhere)
 }
 
 /// Where forms come from.
@@ -192,7 +201,13 @@ impl Session {
                             return true;
                         }
                         Some(Err(diagnostic)) => self.diagnostics.push(*diagnostic),
-                        None => drop(readers.pop_front()),
+                        None => {
+                            readers.pop_front();
+                            if !readers.is_empty() {
+                                self.expander.begin_file_form(enter_user_package());
+                                return true;
+                            }
+                        }
                     }
                 }
                 false
