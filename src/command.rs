@@ -1,6 +1,7 @@
 //! What the two commands have in common: exit statuses, reading their files, showing diagnostics.
 #![allow(clippy::print_stderr, reason = "commands print")]
 
+use std::fs::File;
 use std::io::{IsTerminal, Read};
 use std::path::Path;
 use std::sync::Arc;
@@ -10,6 +11,8 @@ use esl_bytecode::file::MAGIC;
 use esl_compiler::diagnostic::{Format, Renderer, Sources};
 use esl_compiler::reader::decode;
 
+use esl_vm::host::Waker;
+
 use crate::program::{Compiled, Program, Source};
 
 /// Exit status: all went well.
@@ -18,6 +21,8 @@ pub const SUCCESS: u8 = 0;
 pub const USAGE: u8 = 2;
 /// Exit status: the program does not compile, or its bytecode is refused.
 pub const NOT_COMPILED: u8 = 3;
+/// Exit status: ended from outside, as a shell reports a command that a signal has ended.
+pub const INTERRUPTED: u8 = 130;
 
 /// Reads the command line; a wrong one ends the process with status 2, `--help` and `--version` with status 0.
 pub fn parse<T: clap::Parser>() -> T {
@@ -43,17 +48,24 @@ pub fn complain(text: impl std::fmt::Display) {
     eprintln!("{}: {text}", command_name());
 }
 
+/// The most bytes that a file may have: a text beyond is not one that somebody wrote, or does not end at all.
+const MAX_BYTES: u64 = 64 << 20;
+
 fn read_bytes(path: &Path) -> Result<(String, Vec<u8>), u8> {
     let is_stdin = path.as_os_str() == "-";
     let name = if is_stdin { "<stdin>".into() } else { path.display().to_string() };
+    let mut bytes = Vec::new();
     let result = if is_stdin {
-        let mut bytes = Vec::new();
-        std::io::stdin().read_to_end(&mut bytes).map(|_| bytes)
+        std::io::stdin().take(MAX_BYTES + 1).read_to_end(&mut bytes)
     } else {
-        std::fs::read(path)
+        File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
     };
     match result {
-        Ok(bytes) => Ok((name, bytes)),
+        Ok(length) if length as u64 > MAX_BYTES => {
+            complain(format_args!("{name} is too long: at most {} MiB are read", MAX_BYTES >> 20));
+            Err(USAGE)
+        }
+        Ok(_) => Ok((name, bytes)),
         Err(error) => {
             let reason = match error.kind() {
                 std::io::ErrorKind::NotFound => "there is no such file".into(),
@@ -83,6 +95,10 @@ fn source(name: String, bytes: Vec<u8>) -> Result<Source, u8> {
 /// The exit status, after a message.
 pub fn read_source(path: &Path) -> Result<Source, u8> {
     let (name, bytes) = read_bytes(path)?;
+    if bytes.starts_with(&MAGIC) {
+        complain(format_args!("{name} is compiled already; name its source"));
+        return Err(USAGE);
+    }
     source(name, bytes)
 }
 
@@ -128,10 +144,25 @@ pub fn print_diagnostics(compiled: &Compiled, renderer: &Renderer) {
 pub fn interrupt_on_signal(flag: Arc<AtomicBool>) {
     let result = ctrlc::set_handler(move || {
         if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
+            std::process::exit(INTERRUPTED.into());
         }
     });
     // Without a handler Ctrl-C ends the process at once, which is what it would do anyway.
+    drop(result);
+}
+
+/// Has the first Ctrl-C set the flag and end the wait of the machine's host, and the second one end the process.
+pub fn end_on_signal(flag: Arc<AtomicBool>, waker: Waker) {
+    let was_asked = AtomicBool::new(false);
+    let result = ctrlc::set_handler(move || {
+        if was_asked.swap(true, Ordering::Relaxed) {
+            complain("interrupted");
+            std::process::exit(INTERRUPTED.into());
+        }
+        flag.store(true, Ordering::Relaxed);
+        waker.wake();
+    });
+    // As above.
     drop(result);
 }
 

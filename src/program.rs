@@ -147,8 +147,7 @@ impl Ended {
             Ended::Failed => 1,
             Ended::Deadlocked => 4,
             Ended::BudgetSpent | Ended::HeapExhausted => 5,
-            // As a shell reports a command that was ended by a signal.
-            Ended::Interrupted => 130,
+            Ended::Interrupted => crate::command::INTERRUPTED,
         }
     }
 }

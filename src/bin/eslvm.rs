@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand};
 use esl::Config;
 use esl::command::{self, Input, NOT_COMPILED, USAGE, complain};
-use esl::host::RealHost;
+use esl::host::{FileAccess, RealHost};
 use esl::program::{self, Ended, Program};
 use esl_compiler::diagnostic::{Format, Renderer};
 
@@ -100,9 +100,10 @@ fn run(file: &Path, arguments: Vec<String>, limits: &Limits, stats: bool) -> Res
         complain(text);
         USAGE
     };
-    let host = Box::new(RealHost::new(arguments));
-    let mut machine = program::machine(limits.config(), host).map_err(setup)?;
-    command::interrupt_on_signal(machine.interrupt_flag());
+    let host = RealHost::new(arguments).with_files(FileAccess::All);
+    let waker = host.waker();
+    let mut machine = program::machine(limits.config(), Box::new(host)).map_err(setup)?;
+    command::end_on_signal(machine.interrupt_flag(), waker);
     let started = std::time::Instant::now();
     let report = program::run_in(&mut machine, &program).map_err(setup)?;
     match report.ended {
@@ -120,5 +121,7 @@ fn run(file: &Path, arguments: Vec<String>, limits: &Limits, stats: bool) -> Res
         eprintln!("collections   {:>14}", heap.cycles);
         eprintln!("longest slice {:>14} objects", heap.longest_slice);
     }
+    // The process ends here; to give the memory back piece by piece would only take time.
+    std::mem::forget(machine);
     Ok(report.ended.status())
 }

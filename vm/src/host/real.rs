@@ -18,6 +18,20 @@ enum Incoming {
     Input(Input),
     /// A sender of messages is gone; perhaps it was the last.
     SenderGone,
+    /// The wait is to end, whatever it is for.
+    Wake,
+}
+
+/// Ends a wait of the host, from any thread: when the machine is to be interrupted while nothing runs.
+#[derive(Clone)]
+pub struct Waker(Sender<Incoming>);
+
+impl Waker {
+    /// Ends the wait that is under way, or the next one.
+    pub fn wake(&self) {
+        // Without a host there is nothing to wake.
+        let _ = self.0.send(Incoming::Wake);
+    }
 }
 
 /// Sends messages to a virtual machine, from any thread.
@@ -70,6 +84,7 @@ pub struct RealHost {
     alive: Arc<()>,
     messages: Vec<Message>,
     input: Option<Input>,
+    is_woken: bool,
     /// Asks the reading thread for a chunk; there is no thread until the first is wanted.
     reader: Option<Sender<()>>,
     is_reading: bool,
@@ -88,6 +103,7 @@ impl RealHost {
             alive: Arc::new(()),
             messages: Vec::new(),
             input: None,
+            is_woken: false,
             reader: None,
             is_reading: false,
         }
@@ -105,6 +121,11 @@ impl RealHost {
         MessageSender { channel: self.sender.clone(), alive: Some(self.alive.clone()) }
     }
 
+    /// What ends this host's waits.
+    pub fn waker(&self) -> Waker {
+        Waker(self.sender.clone())
+    }
+
     fn take_in(&mut self, incoming: Incoming) {
         match incoming {
             Incoming::Message(message) => self.messages.push(message),
@@ -113,6 +134,7 @@ impl RealHost {
                 self.input = Some(input);
             }
             Incoming::SenderGone => {}
+            Incoming::Wake => self.is_woken = true,
         }
     }
 
@@ -228,7 +250,8 @@ impl Host for RealHost {
             self.ask_for_input();
         }
         loop {
-            if !self.messages.is_empty() || for_input && self.input.is_some() {
+            let is_woken = std::mem::take(&mut self.is_woken);
+            if is_woken || !self.messages.is_empty() || for_input && self.input.is_some() {
                 return Wake::Arrival;
             }
             let received = match deadline {
@@ -349,6 +372,16 @@ mod tests {
         assert_eq!(channels, ["a", "b"]);
         assert!(!host.has_senders());
         assert!(thread.join().is_ok());
+    }
+
+    #[test]
+    fn a_waker_ends_a_wait_without_a_deadline() {
+        let mut host = RealHost::new(Vec::new());
+        let _sender = host.sender();
+        let waker = host.waker();
+        let thread = std::thread::spawn(move || waker.wake());
+        assert_eq!(host.wait(None, false), Wake::Arrival);
+        thread.join().unwrap();
     }
 
     #[test]

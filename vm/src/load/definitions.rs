@@ -28,6 +28,8 @@ pub(super) const SPECIAL: i64 = 1;
 pub(super) const CONSTANT: i64 = 2;
 /// Flag of data: has a value.
 pub(super) const VALUE: i64 = 4;
+/// Flag of data: the value is the standard stream of this number.
+pub(super) const STREAM: i64 = 8;
 
 /// What an image defines a symbol as: functions by number, data by index of the constant.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -42,6 +44,8 @@ pub(crate) struct Definition {
     pub is_constant: bool,
     /// Its value.
     pub value: Option<PoolIdx>,
+    /// The number of the standard stream that is its value.
+    pub stream: Option<usize>,
     /// Its properties: indicator and value.
     pub properties: Vec<(PoolIdx, PoolIdx)>,
 }
@@ -127,11 +131,16 @@ fn read_row(image: &ModuleImage, row: &[PoolIdx]) -> Definition {
         Some(Ok(ConstantRecord::Fixnum(flags))) => flags,
         _ => 0,
     };
+    let value = data.get(1).filter(|_| flags & VALUE != 0);
     let properties: Vec<PoolIdx> = data.iter().skip(2).collect();
     Definition {
         is_special: flags & SPECIAL != 0,
         is_constant: flags & CONSTANT != 0,
-        value: data.get(1).filter(|_| flags & VALUE != 0),
+        value: value.filter(|_| flags & STREAM == 0),
+        stream: value.filter(|_| flags & STREAM != 0).and_then(|number| match image.constant(number) {
+            Ok(ConstantRecord::Fixnum(number)) => usize::try_from(number).ok(),
+            _ => None,
+        }),
         properties: properties.chunks_exact(2).map(|pair| (pair[0], pair[1])).collect(),
         ..functions
     }

@@ -13,7 +13,10 @@ use esl_bytecode::module::{Constant, FunctionNumber, Module, PoolIdx};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::symbol::{ESL_PACKAGE, Symbol};
 
-use super::definitions::{CONSTANT, HEAD, MARKER, ROW, SPECIAL, VALUE, hash};
+use super::definitions::{CONSTANT, HEAD, MARKER, ROW, SPECIAL, STREAM, VALUE, hash};
+
+/// The function of the library that makes a constant, unless it is one with that value already.
+const DEFINE_CONSTANT: &str = "%DEFINE-CONSTANT-AGAIN";
 
 /// What a register holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,6 +25,8 @@ enum Known {
     True,
     Integer(i32),
     Constant(PoolIdx),
+    /// The standard stream of this number.
+    Stream(i32),
 }
 
 /// What a symbol is.
@@ -93,7 +98,8 @@ impl Form<'_> {
     /// Runs a top-level function to its end. `None` if that takes more than constants.
     fn run(&mut self, FunctionNumber(number): FunctionNumber) -> Option<()> {
         let function = &self.module.functions[number as usize];
-        let constant = |index: u16| Known::Constant(function.constants[usize::from(index)]);
+        let wide = |index: u32| Known::Constant(function.constants[index as usize]);
+        let constant = |index: u16| wide(index.into());
         let mut pc = 0;
         loop {
             // Jumps go forward, so this ends.
@@ -129,6 +135,13 @@ impl Form<'_> {
                 Instr::TailCallBuiltin { window, count, builtin } => {
                     return self.call(builtin.0, window.0, count.0).map(|_| ());
                 }
+                Instr::CallGlobal { window, count, symbol, .. } => {
+                    let value = self.call_library(wide(symbol.0), window.0, count.0)?;
+                    self.set(window.0, value);
+                }
+                Instr::TailCallGlobal { window, count, symbol } => {
+                    return self.call_library(wide(symbol.0), window.0, count.0).map(|_| ());
+                }
                 Instr::Return { .. } | Instr::ReturnAll {} => return Some(()),
                 _ => return None,
             }
@@ -141,6 +154,21 @@ impl Form<'_> {
 
     fn set(&mut self, register: u8, value: Known) {
         self.registers[usize::from(register)] = Some(value);
+    }
+
+    /// Notes what the one function of the library does that may be called here: it makes a constant.
+    fn call_library(&mut self, function: Known, window: u8, count: u8) -> Option<Known> {
+        let Constant::Symbol(function) = self.constant(self.symbol(function)?) else { return None };
+        let argument = |position: usize| self.registers[usize::from(window) + 2 + position];
+        if *function != Symbol::esl(DEFINE_CONSTANT) || count != 2 {
+            return None;
+        }
+        let (name, value) = (self.symbol(argument(0)?)?, self.data(argument(1)?)?);
+        if self.noted.has_value(self.module, name) {
+            return None;
+        }
+        self.changes.push(Change::Constant(name, value));
+        Some(Known::Constant(name))
     }
 
     /// Notes what a builtin does, and gives its value.
@@ -159,8 +187,16 @@ impl Form<'_> {
             Builtin::SetMacro => (Change::Macro(name?, self.function(value?)?), name),
             Builtin::ProclaimSpecial => (Change::Special(name?), name),
             Builtin::DefineConstant => (Change::Constant(name?, self.data(value?)?), name),
+            Builtin::StandardStream => {
+                let Known::Integer(number) = argument(0)? else { return None };
+                return Some(Known::Stream(number));
+            }
             Builtin::Set => {
-                self.changes.push(Change::Value(name?, self.data(value?)?));
+                let known = match value? {
+                    Known::Stream(number) => Known::Stream(number),
+                    known => self.data(known)?,
+                };
+                self.changes.push(Change::Value(name?, known));
                 return value;
             }
             Builtin::Put => {
@@ -217,6 +253,7 @@ impl Form<'_> {
                 Constant::Object(_) | Constant::Class(_) => None,
                 _ => Some(known),
             },
+            Known::Stream(_) => None,
             _ => Some(known),
         }
     }
@@ -348,7 +385,7 @@ impl Pool<'_> {
             Known::Constant(index) => index,
             Known::Nil => self.add(Constant::Nil),
             Known::True => self.add(Constant::True),
-            Known::Integer(value) => self.add(Constant::Integer(value.into())),
+            Known::Integer(value) | Known::Stream(value) => self.add(Constant::Integer(value.into())),
         }
     }
 
@@ -357,7 +394,12 @@ impl Pool<'_> {
         if row.flags == 0 && row.value.is_none() && row.properties.is_empty() {
             return None;
         }
-        let flags = row.flags | if row.value.is_some() { VALUE } else { 0 };
+        let value = match row.value {
+            None => 0,
+            Some(Known::Stream(_)) => VALUE | STREAM,
+            Some(_) => VALUE,
+        };
+        let flags = row.flags | value;
         let mut items = vec![self.add(Constant::Integer(flags.into()))];
         items.push(self.known(row.value.unwrap_or(Known::Nil)));
         // The newest property comes first.

@@ -75,6 +75,11 @@ impl World {
             let value = load::image_constant(heap, self, image, index)?;
             heap.symbol_set_value(object, value);
         }
+        if let Some(&stream) = definition.stream.and_then(|number| self.streams.get(number))
+            && old == Value::UNBOUND
+        {
+            heap.symbol_set_value(object, stream);
+        }
         flags |= if definition.is_special { SymbolObject::SPECIAL } else { 0 };
         flags |= if definition.is_constant { SymbolObject::CONSTANT } else { 0 };
         heap.set_flags(object, Kind::Symbol, flags);
