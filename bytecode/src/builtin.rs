@@ -807,11 +807,18 @@ define_builtins! {
     // ---- failures and the control stack
     /// How many entries the control stack has.
     ControlHeight = internal "%CONTROL-HEIGHT" ("");
-    /// The innermost handlers below `height` that no mask hides: index of the entry, whether it is one of cases, and its
-    /// types, or its list of `(type . function)`. `NIL` if there are none.
-    NextHandler = internal "%NEXT-HANDLER" ("height");
+    /// The innermost handlers below `height` that no mask hides: index of the entry, its kind, and what goes with it: 0 and a
+    /// list of `(type . function)`, 1 and the types of cases, 2 and the table or state of recovery procedures, 3 for a
+    /// cleanup, the last two only if `failure` is true. `NIL` if there are none.
+    NextHandler = internal "%NEXT-HANDLER" ("height failure");
     /// Unwinds to the entry with this index, of the cases of a `handler-case`, and has one of them take the condition.
     TakeCase = internal "%TAKE-CASE" ("index case condition");
+    /// Makes the state of the recovery procedures of the entry with this index: a copy of `table` with their function first.
+    BeginRecovery = internal "%BEGIN-RECOVERY" ("index table");
+    /// Unwinds to the cleanup for failures with this index, which has `failure` when it has run.
+    UnwindToCleanup = internal "%UNWIND-TO-CLEANUP" ("index failure");
+    /// What the innermost running cleanup was given by `%UNWIND-TO-CLEANUP`, or `NIL`.
+    CleaningUp = internal "%CLEANING-UP" ("");
     /// Ends the running task as failed, with this condition: its text in a few words, and a report for people.
     EndTask = internal "%END-TASK" ("condition text report");
     /// Ends the run with this status, from 0 to 255. The remaining tasks are aborted.

@@ -279,6 +279,13 @@ macro_rules! for_each_opcode {
             /// Throws the value list to the catch for the tag `R[tag]`. Fails with `control-error`, nothing unwound,
             /// when there is none; `kind` says which form it was: 0 `throw`, 1 `return-from`, 2 `go`.
             Throw = 0x82, "throw", effect { tag: Reg, kind: Count };
+            /// Pushes recovery procedures. `R[state]` is their table, a vector, or what the machine has made of it. A throw
+            /// to `R[state]` pops them, delivers two values to the window, and goes on at `to`, where the function that
+            /// runs the clauses is made: the machine makes it there when a failure needs it first.
+            PushRecovery = 0x84, "push-recovery", never { window: Base, state: Reg, to: Jump };
+            /// Pushes a cleanup for failures: when a failure, an abort or an expired limit leaves, the code at `to` runs until
+            /// `end-cleanup`. After a failure the value list is then that failure and what is known about it.
+            PushFailureCleanup = 0x85, "push-failure-cleanup", never { window: Base, to: Jump };
         }
     };
 }

@@ -11,7 +11,7 @@
 //! * **V3, registers.** `registers` is at most [`MAX_REGISTERS`]. Every register operand is below it. A range fits:
 //!   `first + count <= registers`. A call window fits with its arguments, `window + 2 + count <= registers`, and its
 //!   results, `window + want.registers() <= registers`; so do the results of `push-catch`, and the two registers of
-//!   `push-handler-case`. The window of another control entry is at most `registers`.
+//!   `push-handler-case` and `push-recovery`. The window of another control entry is at most `registers`.
 //! * **V4, constants.** A constant operand is below `constants.len()`, and `constants` names entries of the pool. A
 //!   symbol operand is a [`Constant::Symbol`] (not `Nil`, not `True`), a function operand a [`Constant::Function`] that
 //!   the module has, a class operand a [`Constant::Class`]; the items of the vector of `push-handler-case` are
@@ -31,18 +31,19 @@
 //!   `make-closure` only, from registers and captures that its maker has. The `closure` of `patch-capture` was made in
 //!   this frame by `make-closure`, from a function whose capture `index` is declared [`CaptureSource::Later`].
 //! * **V9, control stack.** For each instruction it is known which control entries of this frame stand, at most
-//!   [`MAX_CONTROL`], and how many bindings were made since the innermost: `pop-control` pops catches, handlers, masks
-//!   and scopes of this frame only; `enter-cleanup` finds a cleanup of this frame on top, `end-cleanup` a running one,
+//!   [`MAX_CONTROL`], and how many bindings were made since the innermost: `pop-control` pops catches, handlers, recovery
+//!   procedures, cleanups for failures, masks and scopes of this frame only; `enter-cleanup` finds a cleanup of this frame on top, `end-cleanup` a running one,
 //!   and no bindings made since; `bind-list` finds a scope of this frame; `unbind` undoes bindings of `bind` that this
 //!   frame made since the innermost entry and its last `bind-list`. Returns and tail calls find no entry and no
 //!   binding of this frame. A cleanup that was pushed is thus run, unless the task is killed.
 //! * **V10, landings.** While an entry stands, no call and no further entry has a window below the entry's. The code at `to` asks for no
 //!   more than: registers below the entry's window as they are, the results (`push-catch`) or the two registers
-//!   (`push-handler-case`), the entry popped or, for a cleanup, replaced by a running one, and the bindings undone
-//!   that were made since the push.
+//!   (`push-handler-case`, `push-recovery`), the entry popped or, for a cleanup, replaced by a running one, and the
+//!   bindings undone that were made since the push. As long as the entry stands, the machine may make the closure that
+//!   the first instruction at `to` of `push-recovery` makes.
 //! * **V11, the value list.** It is read only where the same frame set it on every path: by a call or a catch that wants
 //!   all, `set-values` or `list-to-values`, with nothing in between but silent instructions that do not loop, or a
-//!   cleanup from `enter-cleanup` to `end-cleanup`. So no one else has to preserve it.
+//!   cleanup from `enter-cleanup` to `end-cleanup`; and after the `end-cleanup` of a cleanup for failures. So no one else has to preserve it.
 //! * **V12, functions.** There are at most [`MAX_CAPTURES`] captures. Parameters have registers, `parameters.registers() <= registers`. Names of keys are symbols
 //!   (`NIL` and `T` too). Top-level functions take no arguments and have no captures.
 //! * **V13, the pool.** Entries refer to earlier entries only. A `Symbol` is not `COMMON-LISP:NIL` or `T`; a ratio is in
@@ -58,6 +59,7 @@
 //!   rest, a list; optional and key, an object or the marker.
 //! * **M3.** Frames for recoveries and interrupts lie at or above `registers` of the frame that they interrupt.
 //! * **M4.** An unwinding lands as V10 says. A running cleanup that another unwinding passes is dropped.
+//!   A cleanup for failures that a failure has reached goes on behind its `end-cleanup`, with a value list.
 //! * **M5.** The value list always consists of objects. `enter-cleanup` keeps it for `end-cleanup`. A `throw` that is tried
 //!   again throws the values that it had. A `list-to-values` that is recovered from leaves it empty.
 //! * **M6.** Everything that depends on data is checked when it happens: types of operands (`push-mask` and

@@ -38,6 +38,9 @@ enum Kind {
     Cleanup {
         to: usize,
     },
+    FailureCleanup {
+        to: usize,
+    },
     /// It came about by `enter-cleanup`, or by an unwinding to the entry with this index, or to somewhere below this
     /// frame.
     Running {
@@ -188,7 +191,10 @@ impl<'a> Model<'a> {
 
     fn unwind_somewhere(&mut self) -> Next {
         let targets: Vec<usize> = (0..self.entries.len())
-            .filter(|&at| matches!(self.entries[at].kind, Kind::Catch { .. } | Kind::HandlerCase { .. }))
+            .filter(|&at| {
+                let kind = self.entries[at].kind;
+                matches!(kind, Kind::Catch { .. } | Kind::HandlerCase { .. } | Kind::FailureCleanup { .. })
+            })
             .collect();
         let target = match targets.is_empty() || self.random.once_in(4) {
             true => Target::Caller,
@@ -211,10 +217,22 @@ impl<'a> Model<'a> {
                         self.write_all(Base(entry.window), 2);
                         return Next::Jump(to);
                     }
+                    Kind::FailureCleanup { to } => {
+                        let kind = Kind::Running { unwinding: None, value_list: true };
+                        self.entries.push(Entry { kind, ..entry });
+                        self.value_list = false;
+                        return Next::Jump(to);
+                    }
                     kind => panic!("landed at {kind:?}"),
                 }
             }
-            if let Kind::Cleanup { to } = entry.kind {
+            let runs = match entry.kind {
+                Kind::Cleanup { to } => Some(to),
+                // For an abort, not for a throw.
+                Kind::FailureCleanup { to } if target == Target::Caller && self.random.once_in(2) => Some(to),
+                _ => None,
+            };
+            if let Some(to) = runs {
                 self.others_ran(entry.window);
                 let kind = Kind::Running { unwinding: Some(target), value_list: false };
                 self.entries.push(Entry { kind, ..entry });
@@ -411,6 +429,13 @@ impl<'a> Model<'a> {
             Instr::PushCleanup { window, to } => self.push(Kind::Cleanup { to: landing(to.0) }, window),
             Instr::PushHandlerCase { window, to, .. } => {
                 self.push(Kind::HandlerCase { to: landing(to.0) }, window);
+            }
+            Instr::PushRecovery { window, state, to } => {
+                self.read(state.0);
+                self.push(Kind::HandlerCase { to: landing(to.0) }, window);
+            }
+            Instr::PushFailureCleanup { window, to } => {
+                self.push(Kind::FailureCleanup { to: landing(to.0) }, window);
             }
             Instr::PushHandlers { window, handlers: read } | Instr::PushMask { window, from: read } => {
                 self.read(read.0);

@@ -279,6 +279,20 @@ pub enum NodeKind {
     FirstValues(NodeId, NodeId),
     /// Runs a body; a condition of a clause's type that is signalled in it unwinds to here and runs the clause.
     HandlerCase(NodeId, Vec<HandlerClause>),
+    /// Runs a body with recovery procedures.
+    Recovery {
+        /// A vector: `NIL`, then for each clause its cause and how often it may run.
+        table: Datum,
+        /// The function that runs the clauses, always a lambda: of the form's state, the number of the clause, and the
+        /// list of the failure's arguments. Throws to the state: it with `NIL` to run the body again, `T` with a result
+        /// to leave the form.
+        procedures: NodeId,
+        /// The body.
+        body: NodeId,
+    },
+    /// Runs a body; if a failure, an abort or an expired limit leaves it, the second form is evaluated, and a failure then
+    /// goes on from there.
+    FailureCleanup(NodeId, NodeId),
     /// Runs a body (second) with the list of `(type . function)` that the first form gives as handlers.
     Handlers(NodeId, NodeId),
     /// Runs a body (second) in which entries of the control stack from the height that the first form gives are masked.

@@ -284,6 +284,11 @@ impl<'a> Walk<'a> {
                 self.tagbody_catches[tagbody.index()] = true;
                 self.capture(Lexical::Tagbody(*tagbody), place);
             }
+            NodeKind::FailureCleanup(body, cleanup) => {
+                let inside = Place { cleanups: place.cleanups + 1, ..place };
+                self.pending.push(Event::Enter(*body, place));
+                return self.pending.push(Event::Enter(*cleanup, inside));
+            }
             NodeKind::UnwindProtect(..) => {
                 let inside = Place { cleanups: place.cleanups + 1, ..place };
                 let pending = &mut self.pending;
@@ -368,7 +373,8 @@ impl<'a> Walk<'a> {
             | NodeKind::Progv(_, _, body)
             | NodeKind::BindValues(_, _, body)
             | NodeKind::Handlers(_, body)
-            | NodeKind::Mask(_, body) => of(body),
+            | NodeKind::Mask(_, body)
+            | NodeKind::Recovery { body, .. } => of(body),
             NodeKind::FirstValues(first, _) | NodeKind::UnwindProtect(first, _) => of(first),
             NodeKind::ReturnFrom(block, value) => {
                 let value = of(value);
@@ -379,9 +385,12 @@ impl<'a> Walk<'a> {
             NodeKind::HandlerCase(body, clauses) => of(body) && clauses.iter().all(|clause| of(&clause.body)),
             NodeKind::Values(forms) => forms.len() == 1,
             NodeKind::Call(Callee::Builtin(builtin), _) => returns_one(*builtin),
-            NodeKind::Call(..) | NodeKind::Apply(..) | NodeKind::CallValues(..) | NodeKind::Catch(..) => {
-                false
-            }
+            // What recovers from the failure gives the values of a form with a cleanup for failures.
+            NodeKind::Call(..)
+            | NodeKind::Apply(..)
+            | NodeKind::CallValues(..)
+            | NodeKind::Catch(..)
+            | NodeKind::FailureCleanup(..) => false,
             _ => true,
         }
     }

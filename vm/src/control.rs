@@ -18,12 +18,16 @@ pub(crate) enum EntryKind {
     Catch,
     /// A cleanup that waits for an unwinding to pass.
     Cleanup,
-    /// A cleanup that runs; the top of [`Control::running`] belongs to the innermost of these.
+    /// A cleanup that runs; `data` is its index in [`Control::running`], whose top belongs to the innermost of these.
     Running,
     /// Cases for conditions, which unwind to here; `data` is the vector of their types.
     HandlerCase,
     /// Functions for conditions, which run at the point of signalling; `data` is a list of `(type . function)`.
     Handlers,
+    /// Recovery procedures; `data` is their table, or after the first failure that they were for the state made of it.
+    Recovery,
+    /// A cleanup for failures: the search for handlers ends there, and goes on outside when it has run.
+    FailureCleanup,
     /// Entries from the fixnum `data` up to this one are not searched for handlers.
     Mask,
     /// A place down to which bindings are undone.
@@ -69,6 +73,13 @@ pub(crate) enum Target {
     Root(End),
 }
 
+impl Target {
+    /// Whether nothing that runs on the way can cancel the unwinding.
+    pub(crate) fn is_final(self) -> bool {
+        matches!(self, Target::Root(_))
+    }
+}
+
 /// An unwinding under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Unwinding {
@@ -105,20 +116,31 @@ pub(crate) struct Control {
 pub(crate) struct Found {
     /// Index of the entry.
     pub index: usize,
-    /// Whether it is of the kind [`EntryKind::HandlerCase`].
-    pub is_case: bool,
+    /// Its kind: cases, handlers, recovery procedures or a cleanup for failures.
+    pub kind: EntryKind,
     /// Its data.
     pub data: Value,
 }
 
 impl Control {
-    /// Index of the innermost catch for `tag`.
-    pub(crate) fn find_catch(&self, tag: Value) -> Option<usize> {
-        self.entries.iter().rposition(|entry| entry.kind == EntryKind::Catch && entry.data == tag)
+    /// Makes the cleanup `entry` a running one, on top of the stack, which has interrupted `running`.
+    pub(crate) fn run_cleanup(&mut self, entry: Entry, running: Running) {
+        let data = Value::index(self.running.len());
+        self.bindings.truncate(entry.bindings as usize);
+        self.entries.push(Entry { kind: EntryKind::Running, data, ..entry });
+        self.running.push(running);
     }
 
-    /// The innermost handlers below `height` that no mask hides. Counts the entries that it looked at in `steps`.
-    pub(crate) fn find_handlers(&self, height: usize, steps: &mut usize) -> Option<Found> {
+    /// Index of the innermost entry that catches `tag`.
+    pub(crate) fn find_catch(&self, tag: Value) -> Option<usize> {
+        let catches = |entry: &Entry| matches!(entry.kind, EntryKind::Catch | EntryKind::Recovery);
+        self.entries.iter().rposition(|entry| entry.data == tag && catches(entry))
+    }
+
+    /// The innermost handlers below `height` that no mask hides, for a failure also recovery procedures and cleanups. A
+    /// failure in a cleanup that runs because the task ends, or leaves an expired limit, finds nothing outside of it.
+    /// Counts the entries that it looked at in `steps`.
+    pub(crate) fn find_handlers(&self, height: usize, is_failure: bool, steps: &mut usize) -> Option<Found> {
         let mut end = height.min(self.entries.len());
         while end > 0 {
             let index = end - 1;
@@ -126,8 +148,18 @@ impl Control {
             *steps += 1;
             match entry.kind {
                 EntryKind::HandlerCase | EntryKind::Handlers => {
-                    let is_case = entry.kind == EntryKind::HandlerCase;
-                    return Some(Found { index, is_case, data: entry.data });
+                    return Some(Found { index, kind: entry.kind, data: entry.data });
+                }
+                EntryKind::Recovery | EntryKind::FailureCleanup if is_failure => {
+                    return Some(Found { index, kind: entry.kind, data: entry.data });
+                }
+                EntryKind::Running => {
+                    let running = entry.data.as_index().and_then(|index| self.running.get(index));
+                    let pending = running.and_then(|running| running.pending.as_ref());
+                    if is_failure && pending.is_some_and(|pending| pending.target.is_final()) {
+                        return None;
+                    }
+                    end = index;
                 }
                 EntryKind::Mask => end = index.min(entry.data.as_index().unwrap_or(index)),
                 _ => end = index,
@@ -181,7 +213,7 @@ mod tests {
         }
         let mut found = Vec::new();
         let (mut height, mut steps) = (5, 0);
-        while let Some(next) = control.find_handlers(height, &mut steps) {
+        while let Some(next) = control.find_handlers(height, false, &mut steps) {
             found.push(next.data);
             height = next.index;
         }

@@ -258,6 +258,8 @@ impl fmt::Display for EntryKind {
             EntryKind::Catch => "a catch",
             EntryKind::Cleanup => "a cleanup",
             EntryKind::RunningCleanup => "a running cleanup",
+            EntryKind::Recovery => "recovery procedures",
+            EntryKind::FailureCleanup => "a cleanup for failures",
             EntryKind::HandlerCase => "a handler-case",
             EntryKind::Handlers => "handlers",
             EntryKind::Mask => "a mask",

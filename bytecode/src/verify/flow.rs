@@ -281,6 +281,15 @@ impl Flow<'_> {
                 let landing = Landing { to: target(next, to.0) as u32, results: 0, value_list: false };
                 self.push(state, EntryKind::Cleanup, window, Some(landing))?;
             }
+            Instr::PushRecovery { window, state: table, to } => {
+                read(state, table.0)?;
+                let landing = Landing { to: target(next, to.0) as u32, results: 2, value_list: false };
+                self.push(state, EntryKind::Recovery, window, Some(landing))?;
+            }
+            Instr::PushFailureCleanup { window, to } => {
+                let landing = Landing { to: target(next, to.0) as u32, results: 0, value_list: false };
+                self.push(state, EntryKind::FailureCleanup, window, Some(landing))?;
+            }
             Instr::PushHandlerCase { window, to, .. } => {
                 let landing = Landing { to: target(next, to.0) as u32, results: 2, value_list: false };
                 self.push(state, EntryKind::HandlerCase, window, Some(landing))?;

@@ -248,8 +248,11 @@ impl Check<'_> {
                 self.want(want)?;
                 self.range(window.0.into(), want.registers().into())
             }
-            Instr::PushHandlerCase { window, .. } => self.range(window.0.into(), 2),
+            Instr::PushHandlerCase { window, .. } | Instr::PushRecovery { window, .. } => {
+                self.range(window.0.into(), 2)
+            }
             Instr::PushCleanup { window, .. }
+            | Instr::PushFailureCleanup { window, .. }
             | Instr::PushHandlers { window, .. }
             | Instr::PushMask { window, .. }
             | Instr::PushScope { window } => self.range(window.0.into(), 0),

@@ -12,6 +12,10 @@ pub enum EntryKind {
     Cleanup,
     /// Of `push-cleanup`, while it runs.
     RunningCleanup,
+    /// Of `push-recovery`.
+    Recovery,
+    /// Of `push-failure-cleanup`, before it runs.
+    FailureCleanup,
     /// Of `push-handler-case`.
     HandlerCase,
     /// Of `push-handlers`.
@@ -41,7 +45,8 @@ pub(super) struct Entry {
     /// Bindings made before it was pushed, since the entry below it.
     pub(super) bindings_below: u32,
     pub(super) landing: Option<Landing>,
-    /// For a running cleanup: what is known when it came about by `enter-cleanup`. `None` if it never does.
+    /// For a running cleanup: what is known when it came about by `enter-cleanup`, or by a failure that it is for. `None`
+    /// if it never does.
     pub(super) entered: Option<Box<Registers>>,
 }
 
@@ -110,12 +115,18 @@ impl State {
             state.set(register, Some(Class::Value));
         }
         state.registers.value_list = landing.value_list;
-        if entry.kind == EntryKind::Cleanup {
+        if matches!(entry.kind, EntryKind::Cleanup | EntryKind::FailureCleanup) {
+            // A cleanup for a failure goes on behind its end, with the failure in the value list.
+            let entered = (entry.kind == EntryKind::FailureCleanup).then(|| {
+                let mut registers = state.registers.clone();
+                registers.value_list = true;
+                Box::new(registers)
+            });
             state.bindings = 0;
             state.entries.push(Entry {
                 kind: EntryKind::RunningCleanup,
                 landing: None,
-                entered: None,
+                entered,
                 ..entry.clone()
             });
         }

@@ -121,6 +121,8 @@ const REGIONS: &[Region] = &[
     (Opcode::PushCatch, Opcode::PopControl, None),
     (Opcode::PushCatch, Opcode::PopControl, None),
     (Opcode::PushHandlerCase, Opcode::PopControl, None),
+    (Opcode::PushRecovery, Opcode::PopControl, None),
+    (Opcode::PushFailureCleanup, Opcode::PopControl, Some(Opcode::EndCleanup)),
     (Opcode::PushCleanup, Opcode::EnterCleanup, Some(Opcode::EndCleanup)),
     (Opcode::PushCleanup, Opcode::EnterCleanup, Some(Opcode::EndCleanup)),
 ];
@@ -271,9 +273,12 @@ fn region_end(opcodes: &[Opcode], at: usize) -> usize {
     let mut open = 0;
     for (index, opcode) in opcodes.iter().enumerate().skip(at) {
         match opcode {
-            Opcode::PushScope | Opcode::PushHandlers | Opcode::PushCatch | Opcode::PushHandlerCase => {
-                open += 1
-            }
+            Opcode::PushScope
+            | Opcode::PushHandlers
+            | Opcode::PushCatch
+            | Opcode::PushHandlerCase
+            | Opcode::PushRecovery
+            | Opcode::PushFailureCleanup => open += 1,
             Opcode::PushCleanup => open += 1,
             Opcode::PopControl | Opcode::EnterCleanup => {
                 open -= 1;
@@ -315,8 +320,14 @@ fn encode(opcodes: &[Opcode], palette: &Palette, random: &mut Random) -> Vec<u32
             "Pad" => 0,
             "Index" => random.below(2) as u32,
             "Jump" | "Jump16" | "Jump24" => {
-                let pushes =
-                    matches!(opcode, Opcode::PushCatch | Opcode::PushCleanup | Opcode::PushHandlerCase);
+                let pushes = matches!(
+                    opcode,
+                    Opcode::PushCatch
+                        | Opcode::PushCleanup
+                        | Opcode::PushHandlerCase
+                        | Opcode::PushRecovery
+                        | Opcode::PushFailureCleanup
+                );
                 let target = if pushes && !random.once_in(10) {
                     region_end(opcodes, index)
                 } else {

@@ -303,6 +303,26 @@ UNKNOWN_DECLARATION = "unknown-declaration" Warning
     fails: "(defun area (side)\n  (declare (ignorabel side))\n  0)\n"
     repaired: "(defun area (side)\n  (declare (ignorable side))\n  0)\n"
 
+CLAUSE_FALLS_OFF = "clause-falls-off" Warning
+    /// A recovery clause that can end without saying how the program goes on.
+    fails: "(with-recovery-procedures\n    ((:broken (print 'repairing)))\n  (fail :broken))\n"
+    repaired: "(with-recovery-procedures\n    ((:broken (print 'repairing) (retry)))\n  (fail :broken))\n"
+
+UNREACHABLE_CLAUSE = "unreachable-clause" Warning
+    /// A clause of a recovery form or a method of a goal that never has its turn.
+    fails: "(with-recovery-procedures\n    ((:general-failure :retries :infinite (retry))\n     (:broken (abort)))\n  (print 1))\n"
+    repaired: "(with-recovery-procedures\n    ((:broken (abort))\n     (:general-failure :retries :infinite (retry)))\n  (print 1))\n"
+
+UNDECLARED_CAUSE = "undeclared-cause" Warning
+    /// A cause that is not declared, in a program that declares causes.
+    fails: "(define-cause :broken ())\n(with-recovery-procedures\n    ((:brocken (abort)))\n  (fail :broken))\n"
+    repaired: "(define-cause :broken ())\n(with-recovery-procedures\n    ((:broken (abort)))\n  (fail :broken))\n"
+
+OUTSIDE_CLAUSE = "outside-clause" Error
+    /// `retry` or `abort` outside of a recovery clause.
+    fails: "(defun again ()\n  (retry))\n"
+    repaired: "(defun again (step)\n  (with-recovery-procedures\n      ((:broken (retry)))\n    (funcall step)))\n"
+
 LOCKED_NAME = "locked-name" Error
     /// A definition of a name that belongs to the language.
     fails: "(defun car (x)\n  x)\n"

@@ -60,6 +60,8 @@ pub(super) enum Job {
     Macro(Datum, To),
     /// Gives local macros their functions, the newest of the kept objects.
     EnterMacros(Vec<Symbol>),
+    /// Looks at the finished body of a recovery clause, which may be empty.
+    CheckClause(To, bool),
     /// Processes a top-level form.
     TopLevel(Datum, Top),
     /// Ends a chunk.
@@ -205,6 +207,7 @@ impl Machine {
                 let inside = self.begin_chunk(to.span, to.origin, purpose);
                 self.schedule([Job::Expand(form, inside), Job::FinishChunk]);
             }
+            Job::CheckClause(to, is_empty) => self.check_clause(to, is_empty),
             Job::EnterMacros(names) => self.enter_macros(names),
             Job::TopLevel(form, top) => {
                 let top = top.at(&form);

@@ -18,6 +18,10 @@
 //! | `(%handler-case form (type ([variable]) . body)*)` | unwinds to here and runs a body when a condition of the type is signalled |
 //! | `(%with-handlers list . body)` | runs the body with the list of `(type . function)` as handlers |
 //! | `(%with-mask height . body)` | runs the body with control entries from that height on masked |
+//! | `(%with-recovery table lambda . body)` | runs the body with recovery procedures: see `core.rs` for the table and the function |
+//! | `(%with-failure-cleanup form . body)` | runs the body; evaluates the form if a failure, an abort or an expired limit leaves it |
+//! | `(%clause where . body)` | the body, as that of a recovery clause: warns at the datum `where` if control can fall off its end |
+//! | `(%cause cause where . body)` | the body, which names a cause of failures at the datum `where`: warns if others are declared and this is not |
 //! | `(%compiler-warning code message where . body)` | the body; warns, under a code of the table in `diagnostic/code.rs`, at the place of the datum `where` (not evaluated) |
 //! | `(%backquote template)`, `(%unquote form)`, `(%unquote-splicing form)` | what the reader makes of `` ` ``, `,` and `,@` |
 //!
@@ -36,6 +40,9 @@
 //!
 //! The property `%compiler-macro` of a function's name is the name of a macro that is given calls of the function, and
 //! returns a better form or the call itself.
+//!
+//! The property `%cause` of a symbol says that it is a cause of failures: a list of its parents (`define-cause`), or the name of
+//! the type of conditions that it is the cause of. The property `%used` of `define-cause` says that causes are declared.
 //!
 //! The property `%symbol-macro` of a symbol is the form that it stands for as a variable (`define-symbol-macro`).
 //!
@@ -64,6 +71,7 @@ pub mod operator;
 mod origin;
 mod place;
 pub mod print;
+mod recovery;
 mod scope;
 mod standard_place;
 mod toplevel;

@@ -12,7 +12,8 @@ use rustc_hash::FxHashMap;
 use super::form::{Checked, Form};
 use super::machine::{Machine, To};
 use super::{
-    backquote, binding, call, control, define, destructure, handler, lambda, local, modify, variable,
+    backquote, binding, call, control, define, destructure, handler, lambda, local, modify, recovery,
+    variable,
 };
 
 /// Expands a form into a node.
@@ -75,11 +76,13 @@ const STANDARD: &[(&str, Operator)] = &[
     ("VALUES", control::values),
 ];
 
-/// The operators internal to the package `ESL`.
-const INTERNAL: &[(&str, Operator)] = &[
+/// The operators of the package `ESL`; those whose names begin with `%` are internal to it.
+const OWN: &[(&str, Operator)] = &[
     ("%APPLY-GLOBAL", call::apply_global),
     ("%BACKQUOTE", backquote::backquote),
     ("%CALL-GLOBAL", call::call_global),
+    ("%CAUSE", recovery::cause),
+    ("%CLAUSE", recovery::clause),
     ("%COMPILER-WARNING", define::compiler_warning),
     ("%HANDLER-CASE", handler::handler_case),
     ("%MACRO-LAMBDA", destructure::macro_lambda),
@@ -87,13 +90,17 @@ const INTERNAL: &[(&str, Operator)] = &[
     ("%NAMED-LAMBDA", lambda::named_lambda),
     ("%UNQUOTE", backquote::misplaced_unquote),
     ("%UNQUOTE-SPLICING", backquote::misplaced_unquote),
+    ("%WITH-FAILURE-CLEANUP", recovery::with_failure_cleanup),
     ("%WITH-HANDLERS", control::with_handlers),
     ("%WITH-MASK", control::with_mask),
+    ("%WITH-RECOVERY", recovery::with_recovery),
+    ("ABORT", recovery::abort),
+    ("RETRY", recovery::retry),
 ];
 
 static TABLE: LazyLock<FxHashMap<Symbol, Operator>> = LazyLock::new(|| {
     let standard = STANDARD.iter().map(|&(name, operator)| (Symbol::cl(name), operator));
-    let internal = INTERNAL.iter().map(|&(name, operator)| (Symbol::esl(name), operator));
+    let internal = OWN.iter().map(|&(name, operator)| (Symbol::esl(name), operator));
     standard.chain(internal).collect()
 });
 

@@ -158,6 +158,12 @@ impl Printer<'_> {
                 });
                 MAKE.esl("%HANDLER-CASE", std::iter::once(at(form)).chain(clauses))
             }
+            NodeKind::Recovery { table, procedures, body } => {
+                MAKE.esl("%WITH-RECOVERY", [table.clone(), at(procedures), at(body)])
+            }
+            NodeKind::FailureCleanup(body, cleanup) => {
+                MAKE.esl("%WITH-FAILURE-CLEANUP", [at(cleanup), at(body)])
+            }
             NodeKind::Handlers(list, body) => MAKE.esl("%WITH-HANDLERS", [at(list), at(body)]),
             NodeKind::Mask(height, body) => MAKE.esl("%WITH-MASK", [at(height), at(body)]),
             NodeKind::Slot(class, index, instance) => MAKE

@@ -62,6 +62,8 @@ pub(super) struct Unit {
     variables: Vec<(Symbol, Span)>,
     /// Variables that forms of the unit define when they run.
     defined_variables: FxHashSet<Symbol>,
+    /// Causes of failures that are named.
+    causes: Vec<(Symbol, Span)>,
     /// Functions that the unit defines; without an arity if there are several that differ.
     functions: FxHashMap<Name, Option<Arity>>,
     /// Macros whose definitions are wrong: calls of them are not looked at.
@@ -100,6 +102,11 @@ impl Unit {
     /// Notes that the definition of a function is wrong: calls of it are not looked at.
     pub(super) fn note_broken_function(&mut self, function: Name) {
         self.functions.insert(function, None);
+    }
+
+    /// Notes that a cause of failures is named.
+    pub(super) fn note_cause(&mut self, cause: &Symbol, span: Span) {
+        self.causes.push((cause.clone(), span));
     }
 
     /// Notes that the definition of a macro is wrong.
@@ -147,6 +154,14 @@ impl Unit {
                 && !accepts(arity, count)
             {
                 findings.push(wrong_count(&call.function.shown(), arity, count, call.span));
+            }
+        }
+        let mut reported = FxHashSet::default();
+        for (cause, span) in std::mem::take(&mut self.causes) {
+            if let Some(warning) = super::recovery::undeclared(environment, &cause, span)
+                && reported.insert(cause)
+            {
+                findings.push(warning);
             }
         }
         let mut similar = Similar { environment, left: COMPARED };

@@ -233,6 +233,8 @@ fn retarget(instr: Instr, distance: i32) -> Instr {
         | Instr::JumpIfNotInstance { to, .. }
         | Instr::PushCatch { to, .. }
         | Instr::PushCleanup { to, .. }
+        | Instr::PushRecovery { to, .. }
+        | Instr::PushFailureCleanup { to, .. }
         | Instr::PushHandlerCase { to, .. } => *to = far,
         Instr::Loop { to } => *to = Back24(distance),
         Instr::LoopIfNil { to, .. } | Instr::LoopIfNotNil { to, .. } | Instr::LoopIfCons { to, .. } => {

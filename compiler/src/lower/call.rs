@@ -230,6 +230,22 @@ impl<'a> Frame<'_, 'a> {
         matches!(dest, Dest::Tail) && self.lambda == LambdaId(0)
     }
 
+    /// Calls a global function with the arguments that are in a window at the top of the registers.
+    pub(super) fn call_in_window(&mut self, name: &Symbol, window: u8, count: u8, dest: Dest) {
+        if self.keeps_its_frame(dest) {
+            self.call_in_window(name, window, count, Dest::All);
+            return self.finish(Dest::All, dest);
+        }
+        self.registers.reserve(window, usize::from(dest.want().registers()));
+        let symbol = WideSymbolIdx(u32::from(self.symbol_index(name).0));
+        let (base, count, want) = (Base(window), Count(count), dest.want());
+        if let Dest::Tail = dest {
+            return self.end(Instr::TailCallGlobal { window: base, count, symbol });
+        }
+        self.emit(Instr::CallGlobal { window: base, count, want, symbol });
+        self.results(window, dest);
+    }
+
     /// Puts what is called to `window`.
     fn load_target(&mut self, target: Target<'a>, window: u8) {
         let dest = Dest::Fresh(window);

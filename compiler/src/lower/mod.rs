@@ -27,6 +27,7 @@ mod literals;
 mod loops;
 pub(crate) mod operator;
 mod pool;
+mod recovery;
 mod regalloc;
 mod spill;
 mod split;

@@ -25,6 +25,8 @@ pub(crate) fn children(kind: &NodeKind, visit: &mut dyn FnMut(NodeId)) {
         NodeKind::Catch(a, b)
         | NodeKind::Throw(a, b)
         | NodeKind::UnwindProtect(a, b)
+        | NodeKind::Recovery { procedures: a, body: b, .. }
+        | NodeKind::FailureCleanup(a, b)
         | NodeKind::BindValues(_, a, b)
         | NodeKind::FirstValues(a, b)
         | NodeKind::Handlers(a, b)

@@ -182,8 +182,17 @@ fn survey(core: &Core, escaping: &[bool]) -> Survey {
                 rest = Visit { cleanups: at.cleanups + 1, ..at.inside() };
                 last = rest;
             }
-            NodeKind::Catch(..) | NodeKind::Progv(..) | NodeKind::Handlers(..) | NodeKind::Mask(..) => {
+            NodeKind::Catch(..)
+            | NodeKind::Progv(..)
+            | NodeKind::Handlers(..)
+            | NodeKind::Mask(..)
+            | NodeKind::Recovery { .. } => {
                 last = at.inside();
+            }
+            NodeKind::FailureCleanup(body, cleanup) => {
+                pending.push((*body, at.inside()));
+                pending.push((*cleanup, Visit { cleanups: at.cleanups + 1, ..at.inside() }));
+                continue;
             }
             NodeKind::Tagbody(..) => {
                 // Its tags may need an entry that stands while the forms run.

@@ -1,7 +1,7 @@
 //! Calls, multiple values, and what the library needs to signal a failure: the handlers on the control stack, the end of
 //! a task, backtraces.
 
-use crate::control::End;
+use crate::control::{End, EntryKind, Target, Unwinding};
 use crate::interp::call::MAX_SPREAD;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
@@ -63,21 +63,65 @@ pub(super) fn control_height(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     Ok(Value::index(vm.task().control.entries.len()))
 }
 
-/// `(%next-handler height)`
+/// `(%next-handler height failure)`
 pub(super) fn next_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(height) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
     let mut steps = 0;
-    let found = vm.task().control.find_handlers(height, &mut steps);
+    let is_failure = arguments[1].is_true();
+    let found = vm.task().control.find_handlers(height, is_failure, &mut steps);
     vm.charge(steps);
     let Some(found) = found else { return Ok(Value::NIL) };
     vm.values.clear();
-    vm.values.extend([Value::index(found.index), Value::boolean(found.is_case), found.data]);
+    let kind = match found.kind {
+        EntryKind::HandlerCase => 1,
+        EntryKind::Recovery => 2,
+        EntryKind::FailureCleanup => 3,
+        _ => 0,
+    };
+    vm.values.extend([Value::index(found.index), Value::small(kind), found.data]);
     Err(Exit::Values)
+}
+
+/// `(%begin-recovery index table)`
+pub(super) fn begin_recovery(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let index = arguments[0].as_index().unwrap_or(usize::MAX);
+    let Some(function) = vm.recovery_function(index)? else {
+        return vm.raise(Raised::Control("the recovery procedures of a failure are no longer there".into()));
+    };
+    let mut items = vm.heap.vector(arguments[1]).map(<[Value]>::to_vec).unwrap_or_default();
+    if let Some(first) = items.first_mut() {
+        *first = function;
+    }
+    let state = vm.heap.alloc_vector(&items)?;
+    vm.charge(items.len());
+    if let Some(entry) = vm.task_mut().control.entries.get_mut(index) {
+        entry.data = state;
+    }
+    Ok(state)
+}
+
+/// `(%unwind-to-cleanup index failure)`
+pub(super) fn unwind_to_cleanup(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(index) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
+    let control = &mut vm.task_mut().control;
+    match control.entries.get(index) {
+        Some(entry) if entry.kind == EntryKind::FailureCleanup => {
+            let values = vec![arguments[1]];
+            control.unwinding = Some(Unwinding { target: Target::Entry(index), values });
+            Err(Exit::Unwind)
+        }
+        _ => vm.raise(Raised::Control("the cleanup for a failure is no longer there".into())),
+    }
+}
+
+/// `(%cleaning-up)`
+pub(super) fn cleaning_up(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    let running = vm.task().control.running.last().filter(|running| running.pending.is_none());
+    Ok(running.and_then(|running| running.values.first().copied()).unwrap_or(Value::NIL))
 }
 
 /// `(%take-case index case condition)`
 pub(super) fn take_case(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    use crate::control::{EntryKind, Target, Unwinding};
     let Some(index) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
     let control = &mut vm.task_mut().control;
     match control.entries.get(index) {

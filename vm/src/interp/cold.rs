@@ -330,14 +330,29 @@ pub(super) unsafe fn make_closure(vm: &mut Vm, pc: *const u32, base: *mut Value)
     unsafe {
         let word = *pc;
         let (dst, _, _) = operands(word);
+        let code = *constants_of(code_of(*base.sub(2))).add((word >> 16) as usize);
+        match closure(vm, code, base) {
+            Ok(closure) => {
+                *base.add(dst) = closure;
+                Signal::Next
+            }
+            Err(exit) => Signal::Exit(exit),
+        }
+    }
+}
+
+/// The closure of `code` made in the frame at `base`.
+///
+/// # Safety
+/// `make-closure` may stand where that frame is: V8.
+pub(super) unsafe fn closure(vm: &mut Vm, code: Value, base: *mut Value) -> Result<Value, Exit> {
+    // SAFETY: the constant is the code of a function with captures (`shape`), and V8 says that what they are taken from
+    // is there.
+    unsafe {
         let running = *base.sub(2);
-        let code = *constants_of(code_of(running)).add((word >> 16) as usize);
         let layout = code.object_ptr().cast::<Code>();
         let count = (*layout).spare[1] as usize;
-        let closure = match vm.heap.alloc_closure(code, count) {
-            Ok(closure) => closure,
-            Err(error) => return Signal::Exit(error.into()),
-        };
+        let closure = vm.heap.alloc_closure(code, count)?;
         let sources = layout.byte_add((*layout).words_offset()).cast::<u32>();
         let sources = sources.add((*layout).nwords as usize - count);
         let captures = (&raw mut (*closure).captures).cast::<Value>();
@@ -351,8 +366,7 @@ pub(super) unsafe fn make_closure(vm: &mut Vm, pc: *const u32, base: *mut Value)
             // An initialising store needs no barrier.
             *captures.add(i) = value;
         }
-        *base.add(dst) = Value::from_object(closure.cast());
-        Signal::Next
+        Ok(Value::from_object(closure.cast()))
     }
 }
 

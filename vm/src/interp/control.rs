@@ -2,8 +2,9 @@
 
 use esl_bytecode::opcode::Opcode;
 
-use super::{Signal, call, code_of, constants_of};
+use super::{Signal, call, code_of, cold, constants_of};
 use crate::control::{End, Entry, EntryKind, Running, Target, Unwinding};
+use crate::heap::layout::Kind;
 use crate::raise::{Exit, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -38,6 +39,8 @@ pub(super) unsafe fn push(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
                 let types = *constants_of(code_of(*base.sub(2))).add((word >> 16) as usize);
                 (EntryKind::HandlerCase, types, 2, to())
             }
+            Some(Opcode::PushRecovery) => (EntryKind::Recovery, register(word >> 16), 2, to()),
+            Some(Opcode::PushFailureCleanup) => (EntryKind::FailureCleanup, Value::NIL, 0, to()),
             Some(Opcode::PushHandlers) => (EntryKind::Handlers, register(word >> 16), 0, std::ptr::null()),
             Some(Opcode::PushMask) => (EntryKind::Mask, register(word >> 16), 0, std::ptr::null()),
             _ => (EntryKind::Scope, Value::NIL, 0, std::ptr::null()),
@@ -90,11 +93,8 @@ pub(super) unsafe fn bind_list(vm: &mut Vm, pc: *const u32, base: *mut Value) ->
 pub(super) unsafe fn enter_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value) -> Signal {
     let values = std::mem::take(&mut vm.values);
     let control = &mut vm.task_mut().control;
-    if let Some(entry) = control.entries.last_mut() {
-        entry.kind = EntryKind::Running;
-        let bindings = entry.bindings as usize;
-        control.bindings.truncate(bindings);
-        control.running.push(Running { pending: None, values });
+    if let Some(entry) = control.entries.pop() {
+        control.run_cleanup(entry, Running { pending: None, values });
     }
     Signal::Next
 }
@@ -157,10 +157,12 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
         }
         let Some(entry) = task.control.entries.pop() else { return Signal::Reload };
         match entry.kind {
-            EntryKind::Cleanup => {
-                task.control.bindings.truncate(entry.bindings as usize);
-                task.control.entries.push(Entry { kind: EntryKind::Running, ..entry });
-                task.control.running.push(Running { pending: Some(unwinding), values: Vec::new() });
+            EntryKind::FailureCleanup if !unwinding.target.is_final() => {
+                // What passes is no failure.
+                task.control.unwinding = Some(unwinding);
+            }
+            EntryKind::Cleanup | EntryKind::FailureCleanup => {
+                task.control.run_cleanup(entry, Running { pending: Some(unwinding), values: Vec::new() });
                 // SAFETY: as above; the entry's pc is the cleanup's first instruction.
                 unsafe { vm.resume_at(&entry) };
                 return Signal::Reload;
@@ -169,7 +171,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
                 // A cleanup is left. What it interrupted is dropped, unless that was to end the task.
                 let interrupted = task.control.running.pop().and_then(|running| running.pending);
                 task.control.unwinding = Some(match interrupted {
-                    Some(pending) if matches!(pending.target, Target::Root(_)) => pending,
+                    Some(pending) if pending.target.is_final() => pending,
                     _ => unwinding,
                 });
             }
@@ -190,6 +192,15 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
     let control = &mut vm.task_mut().control;
     let Some(entry) = control.entries.pop() else { return Signal::Reload };
     control.bindings.truncate(entry.bindings as usize);
+    if entry.kind == EntryKind::FailureCleanup {
+        // The failure waits for the end of the cleanup as the values of a protected form do.
+        control.run_cleanup(entry, Running { pending: None, values });
+        vm.values.clear();
+        // SAFETY: as below; the entry's pc is the cleanup's first instruction.
+        unsafe { vm.resume_at(&entry) };
+        vm.close_reserves();
+        return Signal::Reload;
+    }
     vm.values = values;
     // SAFETY: the entry's frame is live, and V10: its landing asks for no more than the registers below the window.
     unsafe {
@@ -202,6 +213,31 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
 }
 
 impl Vm {
+    /// The function that runs the clauses of the recovery procedures of an entry, made as the first instruction at its
+    /// landing says; `None` if there is no such entry or instruction.
+    pub(crate) fn recovery_function(&mut self, index: usize) -> Result<Option<Value>, Exit> {
+        let Some(entry) = self.task().control.entries.get(index).copied() else { return Ok(None) };
+        if entry.kind != EntryKind::Recovery {
+            return Ok(None);
+        }
+        // SAFETY: the entry's frame is live and its pc that of an instruction of the frame's function (V1, V2); V10 says
+        // that this may do what that instruction does as long as the entry stands.
+        unsafe {
+            let base = self.task().stack.start().add(entry.base as usize);
+            let word = *entry.pc;
+            match Opcode::from_number(word as u8) {
+                Some(Opcode::MakeClosure | Opcode::LoadConst) => {
+                    let constant = *constants_of(code_of(*base.sub(2))).add((word >> 16) as usize);
+                    if constant.is_object() && (*constant.object_ptr()).kind == Kind::Code {
+                        return cold::closure(self, constant, base).map(Some);
+                    }
+                    Ok(Some(constant))
+                }
+                _ => Ok(None),
+            }
+        }
+    }
+
     /// Makes the frame and place of an entry the running ones.
     ///
     /// # Safety

@@ -997,6 +997,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 Operation::PushCatch => cold!(2, control::push),
                 Operation::PushCleanup => cold!(2, control::push),
                 Operation::PushHandlerCase => cold!(2, control::push),
+                Operation::PushRecovery => cold!(2, control::push),
+                Operation::PushFailureCleanup => cold!(2, control::push),
                 Operation::PushHandlers => cold!(1, control::push),
                 Operation::PushMask => cold!(1, control::push),
                 Operation::PushScope => cold!(1, control::push),
@@ -1009,10 +1011,13 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 },
 
                 // ---- stubs
-                Operation::ErrorReturn => match raise::error_return(vm, pc, base) {
-                    Signal::Next => next!(1),
-                    signal => break signal,
-                },
+                Operation::ErrorReturn => {
+                    let signal = raise::error_return(vm, pc, base);
+                    // It has found the place to go on at.
+                    pc = vm.cpu.pc;
+                    base = vm.cpu.base;
+                    break signal;
+                }
                 Operation::TaskExit => break Signal::TaskExit,
             }
         }

@@ -1,0 +1,203 @@
+//! `%with-recovery` and its relatives, on which the library builds `with-recovery-procedures` and
+//! `with-cleanup-procedure`, and what is to be said about the clauses.
+
+use esl_bytecode::compile::Environment;
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+use rustc_hash::FxHashSet;
+
+use super::form::{Checked, Form, Make};
+use super::machine::{Job, Machine, To};
+use super::scope::Visible;
+use crate::core::*;
+use crate::diagnostic::code;
+
+/// Functions and operators that do not return.
+const LEAVING: &[&str] = &["FAIL", "NEXT-BINDINGS", "EXIT"];
+const LEAVING_STANDARD: &[&str] = &["ERROR", "INVOKE-RESTART", "ABORT"];
+
+/// `(%with-recovery table lambda . body)`: see [`NodeKind::Recovery`].
+pub(super) fn with_recovery(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    form.takes(2..=usize::MAX, "needs a table and a function")?;
+    let table = form.args[0].clone();
+    if !matches!(table.kind(), DatumKind::Vector(_)) || !super::form::is_cl_form(&form.args[1], "LAMBDA") {
+        return Err(form.malformed("needs a vector and a lambda expression"));
+    }
+    let (procedures, job) = machine.part(form.args[1].clone(), to);
+    let body = machine.child(to);
+    machine.fill(to, NodeKind::Recovery { table, procedures, body: body.node });
+    let mut jobs = vec![job];
+    jobs.extend(machine.body(form.args[2..].to_vec(), body));
+    machine.schedule(jobs);
+    Ok(())
+}
+
+/// `(%with-failure-cleanup form . body)`: see [`NodeKind::FailureCleanup`].
+pub(super) fn with_failure_cleanup(
+    machine: &mut Machine,
+    _: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
+    form.takes(1..=usize::MAX, "needs a form for the cleanup")?;
+    let body = machine.child(to);
+    let mut jobs = machine.body(form.args[1..].to_vec(), body);
+    let (cleanup, job) = machine.part(form.args[0].clone(), to);
+    machine.fill(to, NodeKind::FailureCleanup(body.node, cleanup));
+    // The cleanup is expanded first, as it is written first.
+    jobs.insert(0, job);
+    machine.schedule(jobs);
+    Ok(())
+}
+
+/// `(%clause where . body)`: the body of a recovery clause.
+pub(super) fn clause(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    form.takes(1..=usize::MAX, "needs a datum that says where the clause is")?;
+    let span = form.at(form.args[0].span());
+    let body = machine.child(to);
+    machine.fill(to, NodeKind::Progn(vec![body.node]));
+    let mut jobs = machine.body(form.args[1..].to_vec(), body);
+    jobs.push(Job::CheckClause(To { span, ..body }, form.args.len() == 1));
+    machine.schedule(jobs);
+    Ok(())
+}
+
+/// `(%cause cause where . body)`: the body; notes that the cause is named there.
+pub(super) fn cause(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    form.takes(2..=usize::MAX, "needs a cause and a datum that says where it is")?;
+    if let Some(cause) = form.args[0].as_symbol() {
+        machine.unit.note_cause(cause, form.at(form.args[1].span()));
+    }
+    let jobs = machine.body(form.args[2..].to_vec(), to);
+    machine.schedule(jobs);
+    Ok(())
+}
+
+/// `(retry)`: runs the body of the form again that the clause around this belongs to.
+pub(super) fn retry(machine: &mut Machine, environment: &mut dyn Environment, form: Form, to: To) -> Checked {
+    form.takes(0..=0, "takes no arguments")?;
+    leave(machine, environment, form, to)
+}
+
+/// `(abort [result])`: leaves the form that the clause around this belongs to.
+pub(super) fn abort(machine: &mut Machine, environment: &mut dyn Environment, form: Form, to: To) -> Checked {
+    form.takes(0..=1, "takes at most a result")?;
+    leave(machine, environment, form, to)
+}
+
+/// Throws to the form's state, which is a parameter of the function around the clause.
+fn leave(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    let state = Symbol::esl("%RECOVERY");
+    if !matches!(machine.scope.variable(&state, machine.level()), Visible::Is(_)) {
+        let message = format!("{} stands outside of a recovery clause", super::form::name(&form.operator));
+        let help = "only clauses of `with-recovery-procedures` can contain it";
+        return Err(Box::new(code::OUTSIDE_CLAUSE.at(form.span, message).help(help)));
+    }
+    let make = Make(to.span);
+    let is_retry = form.operator.name() == "RETRY";
+    let result = form.args.into_iter().next().unwrap_or(make.nil());
+    let first = if is_retry { make.symbol(&state) } else { make.nil() };
+    let throw = make.cl("THROW", [make.symbol(&state), make.cl("VALUES", [first, result])]);
+    machine.schedule([Job::Expand(throw, to)]);
+    Ok(())
+}
+
+impl Machine {
+    /// Warns if control can fall off the end of a recovery clause without its saying so.
+    pub(super) fn check_clause(&mut self, to: To, is_empty: bool) {
+        if is_empty || !leaves_or_resumes(self.core(), to.node) {
+            let message = "this clause can end without saying how to go on, and its value then stands for that of \
+                           the operation that failed";
+            let help = "end it with `(retry)`, `(abort …)` or `(fail …)`, or with `(values …)` to go on behind the failure";
+            self.report(code::CLAUSE_FALLS_OFF.at(to.span, message.to_string()).help(help), to.origin);
+        }
+    }
+}
+
+/// Whether the end of a form is never reached, or is one that says that its value is meant.
+fn leaves_or_resumes(core: &Core, node: NodeId) -> bool {
+    let mut inside: FxHashSet<BlockId> = FxHashSet::default();
+    let mut pending = vec![node];
+    while let Some(node) = pending.pop() {
+        match &core.nodes[node.index()].kind {
+            NodeKind::Constant(_) | NodeKind::Values(_) | NodeKind::Throw(..) | NodeKind::Go(..) => {}
+            NodeKind::ReturnFrom(block, value) => {
+                if inside.contains(block) {
+                    pending.push(*value);
+                }
+            }
+            NodeKind::Block(block, body) => {
+                inside.insert(*block);
+                pending.push(*body);
+            }
+            NodeKind::If(_, consequent, alternative) => {
+                // What `when` and `cond` leave out is not said.
+                let is_left_out = |node: &NodeId| matches!(&core.nodes[node.index()].kind, NodeKind::Constant(c) if c.is_nil());
+                if is_left_out(consequent) || is_left_out(alternative) {
+                    return false;
+                }
+                pending.extend([*consequent, *alternative]);
+            }
+            NodeKind::Progn(forms) => match forms.last() {
+                Some(last) => pending.push(*last),
+                None => return false,
+            },
+            NodeKind::Let { body, .. }
+            | NodeKind::Functions { body, .. }
+            | NodeKind::BindValues(_, _, body)
+            | NodeKind::Progv(_, _, body)
+            | NodeKind::Handlers(_, body)
+            | NodeKind::Mask(_, body)
+            | NodeKind::FirstValues(body, _)
+            | NodeKind::UnwindProtect(body, _)
+            | NodeKind::FailureCleanup(body, _)
+            | NodeKind::Recovery { body, .. } => pending.push(*body),
+            NodeKind::HandlerCase(body, clauses) => {
+                pending.push(*body);
+                pending.extend(clauses.iter().map(|clause| clause.body));
+            }
+            NodeKind::Tagbody(_, items) => match items.last() {
+                Some(TagbodyItem::Form(last)) => {
+                    if !matches!(core.nodes[last.index()].kind, NodeKind::Go(..)) {
+                        return false;
+                    }
+                }
+                _ => return false,
+            },
+            NodeKind::Call(Callee::Global(function), _) => {
+                let leaves = LEAVING.iter().any(|name| super::form::is_esl(function, name))
+                    || LEAVING_STANDARD.iter().any(|name| function.is_cl(name));
+                if !leaves {
+                    return false;
+                }
+            }
+            NodeKind::Call(Callee::Value(function), _) | NodeKind::Apply(Callee::Value(function), _) => {
+                match core.nodes[function.index()].kind {
+                    NodeKind::Lambda(lambda) => pending.push(core.lambdas[lambda.index()].body),
+                    _ => return false,
+                }
+            }
+            _ => return false,
+        }
+    }
+    true
+}
+
+/// The warning about a cause that nobody has declared.
+pub(super) fn undeclared(
+    environment: &dyn Environment,
+    cause: &Symbol,
+    span: Span,
+) -> Option<esl_bytecode::diagnostic::Diagnostic> {
+    let property = |of: &Symbol, indicator: &str| -> Option<Datum> {
+        environment.property(of, &Symbol::esl(indicator)).filter(|value| !value.is_nil())
+    };
+    property(&Symbol::esl("DEFINE-CAUSE"), "%USED")?;
+    if cause.name() == "GENERAL-FAILURE" || property(cause, "%CAUSE").is_some() {
+        return None;
+    }
+    let message = format!("no cause is called {}", super::form::name(cause));
+    let help = format!("declare it with `(define-cause {} ())`", super::form::plain(cause));
+    Some(code::UNDECLARED_CAUSE.at(span, message).help(help))
+}
