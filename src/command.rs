@@ -140,12 +140,14 @@ pub fn print_diagnostics(compiled: &Compiled, renderer: &Renderer) {
     complain(counts.join(", "));
 }
 
-/// Sets the flag when the process is asked to stop with Ctrl-C. A second one, before the first is seen to, ends it.
-pub fn interrupt_on_signal(flag: Arc<AtomicBool>) {
+/// Sets the flag, and wakes the host, when the process is asked to stop with Ctrl-C. A second one, before the first is seen
+/// to, ends it.
+pub fn interrupt_on_signal(flag: Arc<AtomicBool>, waker: Waker) {
     let result = ctrlc::set_handler(move || {
         if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(INTERRUPTED.into());
         }
+        waker.wake();
     });
     // Without a handler Ctrl-C ends the process at once, which is what it would do anyway.
     drop(result);

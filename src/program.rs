@@ -55,8 +55,7 @@ impl Compiled {
 }
 
 /// The ticks that a macro, or another part of the program that runs at compile time, may take.
-const COMPILE_TIME_CONFIG: Config =
-    Config { memory: 1 << 30, stack: 1 << 16, slice: 2000, budget: None, seed: 0, collect_always: false };
+const COMPILE_TIME_CONFIG: Config = Config::DEFAULT;
 
 /// Compiles sources to one program that runs them in order. They are one unit: functions may be called before the source
 /// that defines them, and macros used after it. Each begins in the package `ESL-USER`.
@@ -196,6 +195,7 @@ pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Report, String> {
     let functions = machine.load_module(&program.module).map_err(|error| error.to_string())?;
     let main = machine.spawn_library("%RUN-TOPLEVEL", &[functions])?;
     machine.set_interruptible(Some(main));
+    machine.set_main(main);
     let outcome = machine.run(u64::MAX);
     machine.flush();
     if let Some(report) = machine.report(main).map(String::from) {
@@ -203,10 +203,20 @@ pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Report, String> {
     }
     let ended = match (outcome, machine.result(main)) {
         (RunOutcome::BudgetSpent, _) => Ended::BudgetSpent,
-        (RunOutcome::Waiting, _) => Ended::Deadlocked,
+        (RunOutcome::Waiting, _) => {
+            let report = machine.deadlock_report();
+            machine.complain(&report);
+            Ended::Deadlocked
+        }
         (_, TaskResult::Failed(condition)) if machine.is_heap_exhausted(condition) => Ended::HeapExhausted,
         (_, TaskResult::Failed(_)) => Ended::Failed,
-        (_, TaskResult::Aborted) if machine.exit_status().is_none() => Ended::Interrupted,
+        (_, TaskResult::Aborted) if machine.exit_status().is_none() => {
+            if machine.was_interrupted() {
+                Ended::Interrupted
+            } else {
+                Ended::Failed
+            }
+        }
         _ => Ended::Normally(machine.exit_status().unwrap_or(0)),
     };
     Ok(Report { ended, ticks: machine.ticks(), heap: machine.heap_stats() })

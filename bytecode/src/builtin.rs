@@ -1034,4 +1034,80 @@ define_builtins! {
     InternalRealTime = cl "GET-INTERNAL-REAL-TIME" ("");
     /// Seconds since the beginning of 1900, UTC.
     UniversalTime = cl "GET-UNIVERSAL-TIME" ("");
+
+    // ---- events
+    /// A new event. The name is for reports.
+    MakeEvent = esl "MAKE-EVENT" ("&optional name");
+    /// Signals an event: all tasks that wait for it go on, in the order in which they began to, and get the arguments.
+    Signal = esl "SIGNAL" ("event &rest arguments");
+    /// The same as `signal`.
+    SignalEvent = esl "SIGNAL-EVENT" ("event &rest arguments");
+    /// How often an event was signalled.
+    EventCount = esl "EVENT-COUNT" ("event");
+    /// The sum of the counts of an event, or of a list of events.
+    CountEvents = internal "%COUNT-EVENTS" ("events");
+    /// The name of an event or task, or `NIL`.
+    EventName = internal "%EVENT-NAME" ("event");
+    /// Whether `object` is an event; tasks are.
+    Eventp = internal "%EVENTP" ("object");
+    /// The event that every signal of any event signals too, without arguments.
+    AnyEvent = internal "%ANY-EVENT" ("");
+    /// Waits for the next signal of one of `events` and returns its arguments; returns at once if `count` is not `NIL`
+    /// and no longer the sum of their counts. `what` is for reports.
+    Wait = internal "%WAIT" ("events count what");
+    /// A wait that keeps all signals of `events` until it is closed, and lasts for `seconds` if they are not `NIL`; `NIL`
+    /// if `count` is not `NIL` and no longer the sum of their counts.
+    OpenWait = internal "%OPEN-WAIT" ("events seconds count what");
+    /// Waits for a signal that a wait has kept: the list of its arguments, or `:timeout`.
+    TakeSignal = internal "%TAKE-SIGNAL" ("wait");
+    /// Ends a wait.
+    CloseWait = internal "%CLOSE-WAIT" ("wait");
+    /// The time in so many seconds, in nanoseconds.
+    Deadline = internal "%DEADLINE" ("seconds");
+    /// Waits until a time in nanoseconds.
+    SleepUntil = internal "%SLEEP-UNTIL" ("deadline");
+    /// Lets other tasks have their turns.
+    PassTurn = internal "%PASS-TURN" ("");
+
+    // ---- tasks
+    /// A new task that calls a function. `daemon` may be `:internal` for one that is not listed. `notify` is told of its
+    /// end: an event and arguments as a list, or a guard.
+    Spawn = internal "%SPAWN" ("function &optional name priority budget daemon notify");
+    /// New tasks, one for each function, that begin together; `event` is signalled with each at its end. They have the
+    /// priority of this task.
+    SpawnNet = internal "%SPAWN-NET" ("event &rest functions");
+    /// The task that runs.
+    CurrentTask = esl "CURRENT-TASK" ("");
+    /// Whether `object` is a task.
+    Taskp = internal "%TASKP" ("object");
+    /// `:running`, `:waiting`, `:succeeded`, `:failed` or `:aborted`.
+    TaskStatus = esl "TASK-STATUS" ("task");
+    /// The number of a task, and that of the task that made it; `NIL` when it has ended.
+    TaskNumber = internal "%TASK-NUMBER" ("task");
+    /// The ticks that a task has used; `NIL` when it has ended.
+    TaskTicks = internal "%TASK-TICKS" ("task");
+    /// The status of a task that has ended, then its values, or the condition; `NIL` before.
+    TaskEnd = internal "%TASK-END" ("task");
+    /// The tasks that have not ended, oldest first; with those that are not listed if `hidden`.
+    AllTasks = internal "%ALL-TASKS" ("hidden");
+    /// Waits for the end of a task, then as `%task-end`. With `child`, the time of a cleanup does not count.
+    Join = internal "%JOIN" ("task child");
+    /// Asks for the end of a task.
+    RequestAbort = internal "%REQUEST-ABORT" ("task");
+    /// Ends a task wherever it is, and returns when its cleanups are over.
+    AbortTask = esl "ABORT-TASK" ("task");
+    /// Notes a checkpoint of the running task, and signals it.
+    AddCheckpoint = internal "%ADD-CHECKPOINT" ("id");
+    /// The checkpoints that a task has passed, newest first.
+    Checkpoints = internal "%CHECKPOINTS" ("task");
+    /// What lets the end of another task interrupt this one with a call of `function`.
+    MakeGuard = internal "%MAKE-GUARD" ("function");
+    /// Lets a guard interrupt no more.
+    CloseGuard = internal "%CLOSE-GUARD" ("guard");
+    /// Makes the innermost catch, for `tag`, a limit: when it expires, its form is ended and gives the cause.
+    OpenLimit = internal "%OPEN-LIMIT" ("tag seconds ticks");
+    /// Begins a critical section: no other task runs.
+    BeginCritical = internal "%BEGIN-CRITICAL" ("");
+    /// Ends a critical section.
+    EndCritical = internal "%END-CRITICAL" ("");
 }

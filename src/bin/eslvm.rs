@@ -26,7 +26,7 @@ enum Action {
     /// Run a program
     ///
     /// Exit status: 0 success, or what the program asks for; 1 a failure left the main task; 2 wrong usage or an
-    /// unreadable file; 3 the program does not compile or is refused; 5 the budget or the memory is spent.
+    /// unreadable file; 3 the program does not compile or is refused; 4 no task can ever run again; 5 the budget or the memory is spent.
     Run {
         #[command(flatten)]
         limits: Limits,
@@ -46,8 +46,20 @@ enum Action {
     },
 }
 
+/// How time passes.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Clock {
+    /// As it does.
+    Real,
+    /// By jumps to the next time for which a task waits.
+    Virtual,
+}
+
 #[derive(Args)]
 struct Limits {
+    /// Let time pass as it does, or only when all tasks wait
+    #[arg(long, value_enum, default_value = "real")]
+    clock: Clock,
     /// Choose another legal order of what the language leaves open
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -100,7 +112,10 @@ fn run(file: &Path, arguments: Vec<String>, limits: &Limits, stats: bool) -> Res
         complain(text);
         USAGE
     };
-    let host = RealHost::new(arguments).with_files(FileAccess::All);
+    let mut host = RealHost::new(arguments).with_files(FileAccess::All);
+    if limits.clock == Clock::Virtual {
+        host = host.with_virtual_time();
+    }
     let waker = host.waker();
     let mut machine = program::machine(limits.config(), Box::new(host)).map_err(setup)?;
     command::end_on_signal(machine.interrupt_flag(), waker);
@@ -108,7 +123,6 @@ fn run(file: &Path, arguments: Vec<String>, limits: &Limits, stats: bool) -> Res
     let report = program::run_in(&mut machine, &program).map_err(setup)?;
     match report.ended {
         Ended::BudgetSpent => complain(format_args!("the budget of {} ticks is spent", report.ticks)),
-        Ended::Deadlocked => complain("deadlock: every task waits for something that cannot come"),
         Ended::Interrupted => complain("interrupted"),
         _ => {}
     }

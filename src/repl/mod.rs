@@ -63,13 +63,14 @@ impl Lines for Pipe {
 /// # Errors
 /// The exit status, if the machine could not be made.
 pub fn run(config: Config) -> Result<u8, u8> {
-    let host = Box::new(RealHost::new(Vec::new()));
-    let machine = program::machine(config, host).map_err(|text| {
+    let host = RealHost::new(Vec::new());
+    let waker = host.waker();
+    let machine = program::machine(config, Box::new(host)).map_err(|text| {
         complain(text);
         USAGE
     })?;
     let mut session = Session { machine };
-    interrupt_on_signal(session.machine.interrupt_flag());
+    interrupt_on_signal(session.machine.interrupt_flag(), waker);
     if std::io::stdin().is_terminal() {
         let mut editor = editor::Editor::new();
         session.talk(&mut editor)

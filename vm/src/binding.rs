@@ -49,6 +49,18 @@ impl Bindings {
         self.all.iter()
     }
 
+    /// The newest binding of each symbol but those of `without`, for another task.
+    pub(crate) fn copy(&self, without: &[Value]) -> Bindings {
+        let mut seen = GivenMap::default();
+        seen.extend(without.iter().map(|symbol| (symbol.bits(), ())));
+        let is_new = |binding: &&Binding| seen.insert(binding.symbol.bits(), ()).is_none();
+        let mut all: Vec<Binding> = self.all.iter().rev().filter(is_new).copied().collect();
+        all.reverse();
+        let mut copy = Bindings { all: Vec::with_capacity(all.len()), table: None };
+        all.into_iter().for_each(|binding| copy.push(binding));
+        copy
+    }
+
     /// Adds one.
     #[inline]
     pub(crate) fn push(&mut self, binding: Binding) {

@@ -8,7 +8,11 @@
 //! Invariant: an entry of a frame is popped before the frame is left (the verifier's V9), so every entry's `base` is
 //! that of a live frame.
 
+use std::cell::OnceCell;
+use std::ops::{Deref, DerefMut};
+
 use crate::binding::Bindings;
+use crate::limit::Allowance;
 use crate::value::Value;
 
 /// What an entry is.
@@ -32,6 +36,10 @@ pub(crate) enum EntryKind {
     Mask,
     /// A place down to which bindings are undone.
     Scope,
+    /// A limit of time or ticks; `data` is the tag of the catch that it was. It belongs to the innermost of the task's limits.
+    Limit,
+    /// A function that runs where the task was interrupted; `data` is the wait at which it was parked, or `NIL`.
+    Interrupt,
 }
 
 /// An entry.
@@ -62,6 +70,8 @@ pub(crate) enum End {
     Failed(Value),
     /// It was aborted.
     Aborted,
+    /// Its budget was spent.
+    Spent,
 }
 
 /// Where an unwinding ends.
@@ -71,12 +81,29 @@ pub(crate) enum Target {
     Entry(usize),
     /// At the task's root, which ends it.
     Root(End),
+    /// At the entry with this index, an expired limit.
+    Limit(usize),
+    /// At the entry with this index, a running cleanup that is cut off.
+    Cleanup(usize),
 }
 
 impl Target {
-    /// Whether nothing that runs on the way can cancel the unwinding.
+    /// Whether nothing that the program does may cancel an unwinding to it.
+    pub(crate) fn is_forced(self) -> bool {
+        matches!(self, Target::Root(End::Aborted | End::Spent) | Target::Limit(_) | Target::Cleanup(_))
+    }
+
+    /// Whether nothing that runs on the way can cancel the unwinding: the task ends, or is made to leave a form.
     pub(crate) fn is_final(self) -> bool {
-        matches!(self, Target::Root(_))
+        self.is_forced() || matches!(self, Target::Root(_))
+    }
+
+    /// How far inside it is: the greater, the further.
+    fn depth(self) -> usize {
+        match self {
+            Target::Root(_) => 0,
+            Target::Entry(index) | Target::Limit(index) | Target::Cleanup(index) => index + 1,
+        }
     }
 }
 
@@ -89,6 +116,20 @@ pub(crate) struct Unwinding {
     pub values: Vec<Value>,
 }
 
+impl Unwinding {
+    /// Which of two goes on when a cleanup is left: this one, with which it is left, or the one that it interrupted. An
+    /// exit of the program replaces another, but not the end of the task, nor an expired limit.
+    pub(crate) fn or_interrupted(self, interrupted: Option<Unwinding>) -> Unwinding {
+        let Some(interrupted) = interrupted else { return self };
+        let is_further = interrupted.target.depth() < self.target.depth();
+        if interrupted.target.is_final() && (!self.target.is_forced() || is_further) {
+            interrupted
+        } else {
+            self
+        }
+    }
+}
+
 /// What a running cleanup has interrupted.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Running {
@@ -96,6 +137,8 @@ pub(crate) struct Running {
     pub pending: Option<Unwinding>,
     /// The value list of the protected form.
     pub values: Vec<Value>,
+    /// What it may still use, once something waits for its end.
+    pub allowance: Option<Allowance>,
 }
 
 /// The control stack of a task, with its bindings.
@@ -109,6 +152,43 @@ pub(crate) struct Control {
     pub bindings: Bindings,
     /// The unwinding that is being worked on.
     pub unwinding: Option<Unwinding>,
+}
+
+/// A control stack that is made when it is first wanted: many tasks never want one.
+#[derive(Default)]
+pub(crate) struct LazyControl(OnceCell<Box<Control>>);
+
+impl LazyControl {
+    /// The control stack, if there is one.
+    #[inline(always)]
+    pub(crate) fn get(&self) -> Option<&Control> {
+        self.0.get().map(|control| &**control)
+    }
+
+    /// Whether an unwinding is being worked on.
+    #[inline(always)]
+    pub(crate) fn is_unwinding(&self) -> bool {
+        self.get().is_some_and(|control| control.unwinding.is_some())
+    }
+}
+
+impl Deref for LazyControl {
+    type Target = Control;
+
+    #[inline]
+    fn deref(&self) -> &Control {
+        self.0.get_or_init(Box::default)
+    }
+}
+
+impl DerefMut for LazyControl {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut Control {
+        if self.0.get().is_none() {
+            self.0 = OnceCell::from(Box::<Control>::default());
+        }
+        self.0.get_mut().expect("it was just made")
+    }
 }
 
 /// The next handlers that a search has found.
@@ -129,6 +209,17 @@ impl Control {
         self.bindings.truncate(entry.bindings as usize);
         self.entries.push(Entry { kind: EntryKind::Running, data, ..entry });
         self.running.push(running);
+    }
+
+    /// Index of the entry of the innermost cleanup that runs.
+    pub(crate) fn innermost_cleanup(&self) -> Option<usize> {
+        self.cleanup_entry(self.running.len().checked_sub(1)?)
+    }
+
+    /// Index of the entry of the cleanup whose place in `running` this is.
+    pub(crate) fn cleanup_entry(&self, position: usize) -> Option<usize> {
+        let data = Value::index(position);
+        self.entries.iter().rposition(|entry| entry.kind == EntryKind::Running && entry.data == data)
     }
 
     /// Index of the innermost entry that catches `tag`.

@@ -7,6 +7,7 @@ use crate::datum::Unit;
 use crate::heap::HeapStats;
 use crate::host::Output;
 use crate::raise::{Exit, Outcome, Raised};
+use crate::schedule::Choices;
 use crate::task::TaskId;
 use crate::value::Value;
 use crate::vm::{Config, Vm};
@@ -98,7 +99,9 @@ impl Vm {
     /// Settings that count from here on; ticks are counted anew.
     pub fn begin_program(&mut self, config: Config) {
         self.config = Config { memory: self.config.memory, ..config };
+        self.choices = Choices::seeded(self.config.seed);
         self.spent = 0;
+        (self.looked_at, self.moved_at, self.made) = (0, 0, 0);
     }
 
     /// Writes what the program has printed and is still in a buffer.

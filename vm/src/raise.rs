@@ -52,6 +52,8 @@ pub enum Raised {
     Simple(String),
     /// A failure of the given cause (a keyword's name) and one argument.
     Cause(&'static str, Value),
+    /// A failure of the given cause without arguments.
+    Failure(&'static str),
     /// The task's stack has reached its limit.
     StackExhausted,
     /// The heap has reached its limit, or an object would be larger than it.
@@ -170,6 +172,7 @@ impl Vm {
                 let cause = self.keyword(cause)?;
                 smallvec![self.keyword("CAUSE")?, cause, argument]
             }
+            Raised::Failure(cause) => smallvec![self.keyword(cause)?],
             Raised::StackExhausted => smallvec![self.keyword("STACK-EXHAUSTED")?],
             Raised::HeapExhausted => smallvec![self.keyword("HEAP-EXHAUSTED")?],
         };

@@ -23,20 +23,28 @@ use crate::value::Value;
 /// A stack.
 pub(crate) struct Stack {
     start: NonNull<Value>,
-    capacity: usize,
+    capacity: u32,
 }
 
 // SAFETY: a stack owns its segment; the values in it belong to the heap of the machine that owns the stack.
 unsafe impl Send for Stack {}
 
-/// Words of a new stack: one frame of a small function.
-const INITIAL: usize = 24;
+/// Words of the smallest stack. With the word that an allocator takes for itself it fills a block of 128 bytes, and so do
+/// the others.
+const SMALLEST: usize = 15;
+
+/// The words of the segment that holds at least `words` words: 15, 23, 31, 47, 63, 95, ...
+fn segment(words: usize) -> usize {
+    let power = (words + 1).max(SMALLEST + 1).next_power_of_two();
+    let between = power / 4 * 3 - 1;
+    if between >= words.max(SMALLEST) { between } else { power - 1 }
+}
 
 impl Stack {
-    /// A stack of nils.
-    pub(crate) fn new() -> Stack {
-        let start = allocate(INITIAL);
-        Stack { start, capacity: INITIAL }
+    /// A stack of nils with at least `words` words.
+    pub(crate) fn new(words: usize) -> Stack {
+        let capacity = segment(words);
+        Stack { start: allocate(capacity), capacity: capacity as u32 }
     }
 
     /// Address of the first word.
@@ -46,26 +54,38 @@ impl Stack {
     }
 
     /// Number of words.
+    #[inline(always)]
     pub(crate) fn capacity(&self) -> usize {
-        self.capacity
+        self.capacity as usize
     }
 
     /// Makes room for at least `words` words, keeping the contents. Moves the stack.
     pub(crate) fn grow(&mut self, words: usize) {
-        let capacity = words.next_power_of_two().max(self.capacity * 2);
+        self.move_to(segment(words.max(self.capacity() + self.capacity() / 4)));
+    }
+
+    /// Gives back what is not needed for the words below `top`. Moves the stack.
+    pub(crate) fn shrink(&mut self, top: usize) {
+        self.move_to(segment(top));
+    }
+
+    fn move_to(&mut self, capacity: usize) {
         let start = allocate(capacity);
-        // SAFETY: both segments are ours and hold at least `self.capacity` words.
-        unsafe { std::ptr::copy_nonoverlapping(self.start.as_ptr(), start.as_ptr(), self.capacity) };
+        // SAFETY: both segments are ours and hold at least so many words.
+        unsafe {
+            let words = self.capacity().min(capacity);
+            std::ptr::copy_nonoverlapping(self.start.as_ptr(), start.as_ptr(), words);
+        };
         let old = std::mem::replace(&mut self.start, start);
         // SAFETY: `old` was allocated with this layout and is no longer used.
-        unsafe { dealloc(old.as_ptr().cast(), layout(self.capacity)) };
-        self.capacity = capacity;
+        unsafe { dealloc(old.as_ptr().cast(), layout(self.capacity())) };
+        self.capacity = capacity as u32;
     }
 
     /// Clears everything from `top` on, so that what is below is all that a scan sees.
     pub(crate) fn wipe(&mut self, top: usize) {
         // The interpreter does not note how high it has written: that would cost each call a store.
-        for index in top..self.capacity {
+        for index in top..self.capacity() {
             // SAFETY: the index is below the capacity.
             unsafe { self.start.as_ptr().add(index).write(Value::NIL) };
         }
@@ -73,16 +93,16 @@ impl Stack {
 
     /// The words below `top`.
     pub(crate) fn words(&self, top: usize) -> &[Value] {
-        debug_assert!(top <= self.capacity);
+        debug_assert!(top <= self.capacity());
         // SAFETY: invariant 1.
-        unsafe { std::slice::from_raw_parts(self.start.as_ptr(), top.min(self.capacity)) }
+        unsafe { std::slice::from_raw_parts(self.start.as_ptr(), top.min(self.capacity())) }
     }
 }
 
 impl Drop for Stack {
     fn drop(&mut self) {
         // SAFETY: the segment was allocated with this layout.
-        unsafe { dealloc(self.start.as_ptr().cast(), layout(self.capacity)) };
+        unsafe { dealloc(self.start.as_ptr().cast(), layout(self.capacity())) };
     }
 }
 
@@ -101,4 +121,18 @@ fn allocate(words: usize) -> NonNull<Value> {
         unsafe { start.as_ptr().add(index).write(Value::NIL) };
     }
     start
+}
+
+#[cfg(test)]
+mod tests {
+    use super::segment;
+
+    #[test]
+    fn segments_are_as_large_as_asked_for_and_not_much_larger() {
+        assert_eq!([1, 15, 16, 23, 24, 31, 32, 47, 48].map(segment), [15, 15, 23, 23, 31, 31, 47, 47, 63]);
+        for words in 1..5000 {
+            let segment = segment(words);
+            assert!(segment >= words && (segment <= 15 || segment * 2 <= words * 3), "{words} {segment}");
+        }
+    }
 }

@@ -16,6 +16,8 @@ pub(crate) const LAZY: u8 = 0xC2;
 pub(crate) const ERROR_RETURN: u8 = 0xC3;
 /// Where the first function of a task returns to.
 pub(crate) const TASK_EXIT: u8 = 0xC4;
+/// Where a function returns to that ran where its task was interrupted: the task goes on as it was.
+pub(crate) const INTERRUPT_RETURN: u8 = 0xC5;
 /// The word of an instruction whose operand takes 24 bits.
 pub(crate) const fn word(opcode: u8, operand: u32) -> u32 {
     debug_assert!(operand < 1 << 24);

@@ -5,19 +5,20 @@ use std::sync::atomic::AtomicBool;
 
 use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::datum::Datum;
-use slotmap::SlotMap;
 
 use crate::control::End;
 use crate::embed::HostFunction;
-use crate::heap::{AllocError, Heap, HeapConfig};
+use crate::heap::{AllocError, Heap, HeapConfig, Kind};
 use crate::host::{Console, Host};
 use crate::interp::Cpu;
 use crate::interp::call::{Arguments, make_starter};
+use crate::limit::{Accounts, CLEANUP_TICKS, CLEANUP_TIME};
 use crate::raise::Raised;
-use crate::roster::Roster;
-use crate::run::{RunQueue, Tasks};
-use crate::task::{Task, TaskId};
+use crate::schedule::{Choices, RunQueues};
+use crate::task::{Task, TaskId, Tasks};
+use crate::timer::Timers;
 use crate::value::Value;
+use crate::wait::Parking;
 use crate::world::World;
 
 /// Limits and settings of a virtual machine.
@@ -35,11 +36,32 @@ pub struct Config {
     pub seed: u64,
     /// Collect at every safepoint. For tests: what is not rooted is found soon.
     pub collect_always: bool,
+    /// Ticks that a critical section may take.
+    pub critical_ticks: u32,
+    /// Ticks that a cleanup may take once an abort or an expired limit is pending.
+    pub cleanup_ticks: u64,
+    /// Nanoseconds that it may take then.
+    pub cleanup_time: u64,
+}
+
+impl Config {
+    /// What holds where nothing else is said.
+    pub const DEFAULT: Config = Config {
+        memory: 1 << 30,
+        stack: 1 << 16,
+        slice: 2000,
+        budget: None,
+        seed: 0,
+        collect_always: false,
+        critical_ticks: 20_000,
+        cleanup_ticks: CLEANUP_TICKS,
+        cleanup_time: CLEANUP_TIME,
+    };
 }
 
 impl Default for Config {
     fn default() -> Config {
-        Config { memory: 1 << 30, stack: 1 << 16, slice: 2000, budget: None, seed: 0, collect_always: false }
+        Config::DEFAULT
     }
 }
 
@@ -67,12 +89,49 @@ pub struct Vm {
     // ---- tasks
     /// The tasks.
     pub(crate) tasks: Tasks,
-    /// Those that are runnable, in order.
-    pub(crate) queue: RunQueue,
-    /// Which tasks the collector has yet to scan.
-    pub(crate) roster: Roster,
+    /// Those that are runnable.
+    pub(crate) queues: RunQueues,
+    /// The choices among them.
+    pub(crate) choices: Choices,
+    /// What is to happen at a time.
+    pub(crate) timers: Timers,
+    /// Budgets of forms and tasks.
+    pub(crate) accounts: Accounts,
+    /// Tasks that wait for input.
+    pub(crate) readers: Vec<TaskId>,
+    /// The event that every signal signals too.
+    pub(crate) any_event: Value,
+    /// The task with whose failure the run ends; without one, tasks come and go as they like.
+    pub(crate) main: Option<TaskId>,
+    /// How many tasks have not ended.
+    pub(crate) alive: usize,
+    /// How many of them are no daemons.
+    pub(crate) foreground: usize,
+    /// How many tasks were made.
+    pub(crate) made: u64,
+    /// The newest serial number of a task's state.
+    pub(crate) serial: u64,
+    /// The clock when it was read last, in nanoseconds.
+    pub(crate) now: u64,
+    /// Ticks spent when the scheduler read the clock last, and when virtual time moved last.
+    pub(crate) looked_at: u64,
+    pub(crate) moved_at: u64,
     /// The one that runs, out of its place in `tasks`.
     pub(crate) running: Option<Box<Task>>,
+    /// Its place.
+    pub(crate) running_index: u32,
+    /// Ticks that are left of its critical section.
+    pub(crate) critical_left: i64,
+    /// Whether its slice was cut short and goes on with another one.
+    pub(crate) slice_is_cut: bool,
+    /// Whether it wants others to have their turns.
+    pub(crate) passes_turn: bool,
+    /// Whether its critical section has begun in this slice, whose ticks so far do not count.
+    pub(crate) critical_is_new: bool,
+    /// Whether something was noted of it when its slice began.
+    pub(crate) had_attention: bool,
+    /// For what it is to be parked.
+    pub(crate) parking: Parking,
     /// Its registers.
     pub(crate) cpu: Cpu,
     /// How it ends, once its unwinding has reached the root.
@@ -85,6 +144,8 @@ pub struct Vm {
     pub(crate) interrupt: Arc<AtomicBool>,
     /// The task that an interrupt aborts.
     pub(crate) interruptible: Option<TaskId>,
+    /// Whether an interrupt has aborted one.
+    pub(crate) was_interrupted: bool,
 
     // ---- between the interpreter and builtins
     /// The value list: all values of the form that was evaluated last, where they are wanted.
@@ -124,24 +185,46 @@ impl Vm {
         let mut heap = unsafe { Heap::new(heap_config) };
         let world = World::new(&mut heap)?;
         let starter = make_starter(&mut heap)?;
+        let any_event =
+            heap.alloc_record(Kind::Event, 0, 0, &[Value::NIL, Value::small(0), Value::NIL, Value::NIL])?;
         Ok(Vm {
             heap,
             world,
             host,
             console: Console::default(),
-            pinned: vec![starter],
+            pinned: vec![starter, any_event],
             host_functions: Vec::new(),
             host_answer: None,
-            tasks: SlotMap::with_key(),
-            queue: RunQueue::new(),
-            roster: Roster::default(),
+            tasks: Tasks::default(),
+            queues: RunQueues::default(),
+            choices: Choices::seeded(config.seed),
+            timers: Timers::default(),
+            accounts: Accounts::default(),
+            readers: Vec::new(),
+            any_event,
+            main: None,
+            alive: 0,
+            foreground: 0,
+            made: 0,
+            serial: 0,
+            now: 0,
+            looked_at: 0,
+            moved_at: 0,
             running: None,
+            running_index: u32::MAX,
+            critical_left: 0,
+            slice_is_cut: false,
+            passes_turn: false,
+            critical_is_new: false,
+            had_attention: false,
+            parking: Parking::default(),
             cpu: Cpu::new(),
             ending: None,
             spent: 0,
             starter,
             interrupt: Arc::default(),
             interruptible: None,
+            was_interrupted: false,
             values: Vec::new(),
             raised: None,
             requested_call: Vec::new(),
@@ -213,9 +296,26 @@ impl Vm {
         self.interruptible = id;
     }
 
-    /// Takes an interrupt, if it is meant for the task whose turn it is.
-    pub(crate) fn take_interrupt(&mut self, id: TaskId) -> bool {
-        self.interruptible == Some(id) && self.interrupt.swap(false, std::sync::atomic::Ordering::Relaxed)
+    /// Takes an interrupt: the task that it aborts.
+    pub(crate) fn take_interrupt(&mut self) -> Option<TaskId> {
+        use std::sync::atomic::Ordering::Relaxed;
+        let id = self.interruptible?;
+        (self.interrupt.load(Relaxed) && self.interrupt.swap(false, Relaxed)).then_some(id)
+    }
+
+    /// Whether the embedder has interrupted the program.
+    pub fn was_interrupted(&self) -> bool {
+        self.was_interrupted
+    }
+
+    /// Decides how choices are made where the language leaves the order of tasks open.
+    pub fn set_choices(&mut self, choices: Choices) {
+        self.choices = choices;
+    }
+
+    /// How choices are made, and those made so far.
+    pub fn choices(&self) -> &Choices {
+        &self.choices
     }
 
     /// Keeps a value from being collected, until [`Vm::unpin`].

@@ -137,7 +137,7 @@ pub(super) fn take_case(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(%end-task condition text report)`
 pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.last_words = vm.heap.string_text(arguments[1]);
-    vm.task_mut().report = vm.heap.string_text(arguments[2]);
+    vm.task_mut().extra_mut().report = vm.heap.string_text(arguments[2]);
     vm.begin_end(End::Failed(arguments[0]));
     Err(Exit::Unwind)
 }

@@ -483,6 +483,42 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::FreshLine => stream::fresh_line,
         Builtin::FinishOutput => stream::finish_output,
         Builtin::ForceOutput => stream::finish_output,
+
+        Builtin::MakeEvent => event::make_event,
+        Builtin::Signal => event::signal,
+        Builtin::SignalEvent => event::signal,
+        Builtin::EventCount => event::event_count,
+        Builtin::CountEvents => event::count_events,
+        Builtin::EventName => event::event_name,
+        Builtin::Eventp => event::eventp,
+        Builtin::AnyEvent => event::any_event,
+        Builtin::Wait => event::wait,
+        Builtin::OpenWait => event::open_wait,
+        Builtin::TakeSignal => event::take_signal,
+        Builtin::CloseWait => event::close_wait,
+        Builtin::Deadline => event::deadline,
+        Builtin::SleepUntil => event::sleep_until,
+        Builtin::PassTurn => event::pass_turn,
+
+        Builtin::Spawn => task::spawn,
+        Builtin::SpawnNet => task::spawn_net,
+        Builtin::CurrentTask => task::current_task,
+        Builtin::Taskp => task::taskp,
+        Builtin::TaskStatus => task::task_status,
+        Builtin::TaskNumber => task::task_number,
+        Builtin::TaskTicks => task::task_ticks,
+        Builtin::TaskEnd => task::task_end,
+        Builtin::AllTasks => task::all_tasks,
+        Builtin::Join => task::join,
+        Builtin::RequestAbort => task::request_abort,
+        Builtin::AbortTask => task::abort_task,
+        Builtin::AddCheckpoint => task::add_checkpoint,
+        Builtin::Checkpoints => task::checkpoints,
+        Builtin::MakeGuard => task::make_guard,
+        Builtin::CloseGuard => task::close_guard,
+        Builtin::OpenLimit => task::open_limit,
+        Builtin::BeginCritical => task::begin_critical,
+        Builtin::EndCritical => task::end_critical,
     }
 }
 
@@ -493,6 +529,7 @@ mod control;
 mod define;
 mod equality;
 pub(crate) mod eval;
+pub(crate) mod event;
 mod expect;
 mod float;
 mod integer;
@@ -510,6 +547,7 @@ mod string;
 mod structure;
 mod symbol;
 mod table;
+mod task;
 pub(crate) mod types;
 
 #[cfg(test)]

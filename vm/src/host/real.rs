@@ -84,10 +84,12 @@ pub struct RealHost {
     alive: Arc<()>,
     messages: Vec<Message>,
     input: Option<Input>,
-    is_woken: bool,
     /// Asks the reading thread for a chunk; there is no thread until the first is wanted.
     reader: Option<Sender<()>>,
     is_reading: bool,
+    is_woken: bool,
+    /// The time, if it is virtual.
+    virtual_time: Option<u64>,
 }
 
 impl RealHost {
@@ -103,9 +105,10 @@ impl RealHost {
             alive: Arc::new(()),
             messages: Vec::new(),
             input: None,
-            is_woken: false,
             reader: None,
             is_reading: false,
+            is_woken: false,
+            virtual_time: None,
         }
     }
 
@@ -113,6 +116,13 @@ impl RealHost {
     #[must_use]
     pub fn with_files(mut self, files: FileAccess) -> RealHost {
         self.files = files;
+        self
+    }
+
+    /// Makes time virtual: it begins at zero, and passes only when the program waits or the host is told so.
+    #[must_use]
+    pub fn with_virtual_time(mut self) -> RealHost {
+        self.virtual_time = Some(0);
         self
     }
 
@@ -233,7 +243,15 @@ fn nanoseconds(duration: Duration) -> u64 {
 
 impl Host for RealHost {
     fn monotonic(&mut self) -> u64 {
-        nanoseconds(self.start.elapsed())
+        self.virtual_time.unwrap_or_else(|| nanoseconds(self.start.elapsed()))
+    }
+
+    fn is_virtual(&self) -> bool {
+        self.virtual_time.is_some()
+    }
+
+    fn advance(&mut self, nanoseconds: u64) {
+        self.virtual_time = self.virtual_time.map(|time| time.saturating_add(nanoseconds));
     }
 
     fn wall_clock(&mut self) -> i64 {
@@ -254,6 +272,12 @@ impl Host for RealHost {
             if is_woken || !self.messages.is_empty() || for_input && self.input.is_some() {
                 return Wake::Arrival;
             }
+            if let (Some(now), Some(deadline), false) = (self.virtual_time, deadline, for_input) {
+                // Input takes no virtual time, so that it comes at the same time in each run; all else waits for nobody.
+                self.virtual_time = Some(now.max(deadline));
+                return Wake::Time;
+            }
+            let deadline = if self.virtual_time.is_some() { None } else { deadline };
             let received = match deadline {
                 None if !for_input && !self.has_senders() => return Wake::Never,
                 None => self.incoming.recv().map_err(|_| RecvTimeoutError::Disconnected),

@@ -21,9 +21,6 @@ use crate::vm::Vm;
 /// The largest number of arguments that `apply` spreads.
 pub(crate) const MAX_SPREAD: usize = 4096;
 
-/// Words of stack kept free above every frame: a link, a window and arguments of the function that a failure calls.
-pub(crate) const HEADROOM: usize = 16;
-
 /// Words beyond the limit of the stack for the handling of its exhaustion.
 const RESERVE: usize = 8192;
 
@@ -118,6 +115,8 @@ pub(super) enum Place {
     Tail,
     /// Above the running frame; its values take the place of those of the instruction at `vm.cpu.pc`.
     Above,
+    /// Above the running frame; the instruction at `vm.cpu.pc` comes after it.
+    Interrupt,
 }
 
 /// Calls `callee` with `arguments`.
@@ -149,11 +148,11 @@ pub(super) unsafe fn call(vm: &mut Vm, callee: Value, arguments: Arguments, plac
         let frame = match place {
             Place::Tail => 0,
             Place::Window => (*vm.cpu.pc >> 8 & 0xff) as usize + 2,
-            Place::Above => (*code_of(*vm.cpu.base.sub(2))).nregs as usize + 3,
+            Place::Above | Place::Interrupt => (*code_of(*vm.cpu.base.sub(2))).nregs as usize + 3,
         };
         // The link and the saved pc of `Place::Above` are counted in `frame`, the arguments in `nregs`.
         let offset = vm.offset_of(vm.cpu.base) + frame;
-        if let Err(exit) = vm.reserve_stack(offset + nregs + HEADROOM) {
+        if let Err(exit) = vm.reserve_stack(offset + nregs) {
             return Signal::Exit(exit);
         }
         let base = vm.cpu.base;
@@ -164,9 +163,14 @@ pub(super) unsafe fn call(vm: &mut Vm, callee: Value, arguments: Arguments, plac
                 let words = super::stubs::length(*vm.cpu.pc);
                 *registers.sub(1) = Value::from_bits(vm.cpu.pc.add(words).expose_provenance() as u64);
             }
-            Place::Above => {
+            Place::Above | Place::Interrupt => {
                 *registers.sub(3) = Value::from_bits(vm.cpu.pc.expose_provenance() as u64);
-                let stub = super::stubs::error_return((frame - 2) as u8);
+                let window = (frame - 2) as u8;
+                let stub = if place == Place::Above {
+                    super::stubs::error_return(window)
+                } else {
+                    super::stubs::interrupt_return(window)
+                };
                 *registers.sub(1) = Value::from_bits(stub.expose_provenance() as u64);
             }
         }
@@ -225,6 +229,13 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Plac
         },
         // SAFETY: as this function.
         Place::Above => unsafe { super::raise::substitute(vm) },
+        // What is called in an interrupted task is written in ESL; were it not, the task would just go on.
+        Place::Interrupt => {
+            if let Some(entry) = vm.task_mut().control.entries.pop() {
+                vm.task_mut().wait = entry.data;
+            }
+            Signal::Reload
+        }
     }
 }
 
@@ -328,9 +339,33 @@ fn describe_arity(min: usize, max: Option<u32>) -> String {
     }
 }
 
-/// Gives a new task its first frame: a starter that calls `function` with the list of arguments in its place.
-pub(crate) fn first_frame(task: &mut Task, starter: Value, function: Value, arguments: Value) {
+/// Words of the stack of a task that begins with `function` and the list of `arguments`.
+pub(crate) fn first_words(heap: &Heap, function: Value, arguments: Value) -> usize {
+    4 + direct_code(heap, function, arguments).map_or(3, |code| code.nregs as usize)
+}
+
+/// The code of `function`, if it can be entered without arguments just as it is.
+fn direct_code(heap: &Heap, function: Value, arguments: Value) -> Option<&Code> {
+    let code = heap.code(heap.function_code(function)?)?;
+    (arguments.is_nil() && code.arity == 0 && Shape::unpack(code.spare[0]).sort == Sort::Bytecode)
+        .then_some(code)
+}
+
+/// Gives a new task its first frame: that of `function`, or a starter that calls it with the list of arguments in its place.
+pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function: Value, arguments: Value) {
     let stub = super::stubs::task_exit();
+    if let Some(code) = direct_code(heap, function, arguments) {
+        // SAFETY: `first_words` has made room for two links and the registers of this code, which takes no arguments.
+        unsafe {
+            let start = task.stack.start();
+            *start = starter;
+            *start.add(2) = function;
+            *start.add(3) = Value::from_bits(stub.expose_provenance() as u64);
+        }
+        task.pc = code.entry;
+        task.base = 4;
+        return;
+    }
     // SAFETY: a new stack has room for two links and the three registers of the starter, which is bytecode.
     unsafe {
         let start = task.stack.start();
@@ -347,7 +382,7 @@ pub(crate) fn first_frame(task: &mut Task, starter: Value, function: Value, argu
 
 /// Lets go of everything that a task that has ended holds on its stacks.
 pub(crate) fn drop_frames(task: &mut Task) {
-    task.control = crate::control::Control::default();
+    task.control = crate::control::LazyControl::default();
     task.base = 2;
     task.stack.wipe(2);
 }
@@ -404,7 +439,7 @@ impl Vm {
 
     /// Words that the running task's stack may have now.
     fn stack_limit(&self) -> usize {
-        self.config.stack + if self.task().uses_reserve { RESERVE } else { 0 }
+        self.config.stack + if self.task().flags.uses_reserve() { RESERVE } else { 0 }
     }
 
     /// Address up to which the running task's stack may be used: its end, or its limit if that comes first.
@@ -420,12 +455,12 @@ impl Vm {
     /// `:stack-exhausted` at the limit. Handling that has a reserve; when it is used up too, the task ends.
     fn reserve_stack(&mut self, words: usize) -> Result<(), Exit> {
         if words > self.stack_limit() {
-            if self.task().uses_reserve {
+            if self.task().flags.uses_reserve() {
                 let condition = self.world.known.stack_exhausted;
                 self.begin_end(crate::control::End::Failed(condition));
                 return Err(Exit::Unwind);
             }
-            self.task_mut().uses_reserve = true;
+            self.task_mut().flags.set_uses_reserve(true);
             self.cpu.stack_end = self.stack_end();
             return self.raise(Raised::StackExhausted);
         }
@@ -443,8 +478,8 @@ impl Vm {
     /// Closes the reserves of stack and heap once the handling of their exhaustion is over: an unwinding has landed.
     pub(super) fn close_reserves(&mut self) {
         self.heap.close_reserve();
-        if self.task().uses_reserve && self.offset_of(self.cpu.base) < self.config.stack / 2 {
-            self.task_mut().uses_reserve = false;
+        if self.task().flags.uses_reserve() && self.offset_of(self.cpu.base) < self.config.stack / 2 {
+            self.task_mut().flags.set_uses_reserve(false);
             self.cpu.stack_end = self.stack_end();
         }
     }

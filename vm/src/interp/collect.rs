@@ -7,8 +7,9 @@
 use super::{Leave, code_of};
 use crate::control::End;
 use crate::heap::{Heap, Phase, SLICE_VISITS, SliceOutcome};
+use crate::limit;
 use crate::raise::{Expected, Raised};
-use crate::task::{Task, TaskState};
+use crate::task::Task;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::World;
@@ -26,8 +27,17 @@ unsafe fn top_of(task: &Task, base: usize) -> usize {
     }
 }
 
+/// Charged by whoever wants the slice to end at the next tick; the task goes on with the next slice.
+const END_OF_SLICE: u64 = 1 << 40;
+
 /// Words of a stack that count as one visit of the collector.
 const WORDS_PER_VISIT: usize = 4;
+
+/// Words of the stack of a task that does not run.
+pub(crate) fn top_of_task(task: &Task) -> usize {
+    // SAFETY: the task stands where it was noted at the switch.
+    unsafe { top_of(task, task.base as usize) }
+}
 
 /// Marks everything that a task holds; gives how many words that are.
 ///
@@ -35,16 +45,23 @@ const WORDS_PER_VISIT: usize = 4;
 /// `task.base` is the offset of its running frame.
 unsafe fn scan(heap: &mut Heap, task: &mut Task) -> usize {
     // SAFETY: by the contract.
-    let top = unsafe { top_of(task, task.base) };
+    let top = unsafe { top_of(task, task.base as usize) };
     task.stack.wipe(top);
     heap.mark_slice(task.stack.words(top));
-    task.control.visit(&mut |value| heap.mark(value));
-    heap.mark_slice(&task.values);
-    if let TaskState::Ended(End::Failed(condition)) = task.state {
-        heap.mark(condition);
+    for value in [task.object, task.wait, task.notify] {
+        heap.mark(value);
+    }
+    limit::visit(task, &mut |value| heap.mark(value));
+    if let Some(extra) = &task.extra {
+        heap.mark_slice(&extra.values);
+        if let Some(End::Failed(condition)) = extra.end {
+            heap.mark(condition);
+        }
     }
     task.scanned = heap.cycle_id();
-    top + task.control.entries.len() + 2 * task.control.bindings.len()
+    let Some(control) = task.control.get() else { return top };
+    control.visit(&mut |value| heap.mark(value));
+    top + control.entries.len() + 2 * control.bindings.len()
 }
 
 /// Marks everything that is reachable without a task.
@@ -100,8 +117,15 @@ impl Vm {
     #[inline(never)]
     pub(super) fn attend(&mut self, ticks: i32) -> i32 {
         // A task that owes more than this has had its slice many times over.
-        let charged = std::mem::take(&mut self.charged).min(1 << 29) as i32;
-        let ticks = ticks.saturating_sub(charged);
+        let charged = std::mem::take(&mut self.charged);
+        let mut ticks = ticks.saturating_sub((charged % END_OF_SLICE).min(1 << 29) as i32);
+        if charged >= END_OF_SLICE {
+            let left = ticks + self.cpu.reserve;
+            self.cpu.granted -= left.max(0);
+            self.cpu.reserve = 0;
+            ticks = left.min(0);
+            self.slice_is_cut = true;
+        }
         if self.heap.gc_due() && self.cpu.reserve == 0 && ticks > 0 {
             self.cpu.reserve = ticks;
             return 0;
@@ -109,12 +133,22 @@ impl Vm {
         ticks
     }
 
+    /// Has the slice of the running task end at the next tick, to go on with another one: what the slice may take has changed.
+    pub(crate) fn end_slice_here(&mut self) {
+        self.charged |= END_OF_SLICE;
+    }
+
+    /// Ticks that were charged since the last instruction that saw to it.
+    pub(crate) fn take_charged(&mut self) -> u64 {
+        std::mem::take(&mut self.charged) % END_OF_SLICE
+    }
+
     /// Notes where the running task stands, for a scan or a switch.
     pub(crate) fn save_cpu(&mut self) {
         let offset = self.offset_of(self.cpu.base);
         let pc = self.cpu.pc;
         let task = self.task_mut();
-        task.base = offset;
+        task.base = offset as u32;
         task.pc = pc;
     }
 
@@ -129,7 +163,7 @@ impl Vm {
         unsafe {
             heap.collect_fully(|heap| {
                 mark_roots(heap, world, [values, requested_call, pinned], raised.as_ref());
-                for task in running.iter_mut().chain(tasks.values_mut().flatten()) {
+                for task in running.as_deref_mut().into_iter().chain(tasks.iter_mut()) {
                     _ = scan(heap, task);
                 }
             });
@@ -141,15 +175,15 @@ impl Vm {
         if self.running.is_some() {
             self.save_cpu();
         }
-        let Vm { heap, world, values, requested_call, pinned, raised, running, tasks, roster, .. } = self;
+        let Vm { heap, world, values, requested_call, pinned, raised, running, tasks, .. } = self;
         match heap.phase() {
             Phase::Marking => {
                 let SliceOutcome::Drained { left } = heap.slice(SLICE_VISITS) else { return };
                 let (mut left, mut has_scanned) = (left as usize, false);
                 let cycle = heap.cycle_id();
-                while let Some(id) = roster.next(tasks) {
+                while let Some(task) = tasks.next_unmet() {
                     let mut cost = 1;
-                    if let Some(Some(task)) = tasks.get_mut(id)
+                    if let Some(task) = task
                         && task.scanned != cycle
                     {
                         // SAFETY: a task that does not run stands where it was noted at the switch.
@@ -170,7 +204,7 @@ impl Vm {
             Phase::Sweeping => _ = heap.slice(SLICE_VISITS),
             Phase::Idle => {
                 heap.begin_cycle();
-                roster.begin();
+                tasks.begin_cycle();
                 mark_roots(heap, world, [values, requested_call, pinned], raised.as_ref());
                 if let Some(task) = running {
                     // SAFETY: `save_cpu` has noted its running frame.

@@ -64,10 +64,15 @@ pub(super) unsafe fn pop(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Sign
     // SAFETY: V1.
     let count = unsafe { *pc >> 8 & 0xff };
     let control = &mut vm.task_mut().control;
+    let mut limits = 0;
     for _ in 0..count {
         if let Some(entry) = control.entries.pop() {
             control.bindings.truncate(entry.bindings as usize);
+            limits += usize::from(entry.kind == EntryKind::Limit);
         }
+    }
+    for _ in 0..limits {
+        vm.close_limit();
     }
     Signal::Next
 }
@@ -94,7 +99,7 @@ pub(super) unsafe fn enter_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Val
     let values = std::mem::take(&mut vm.values);
     let control = &mut vm.task_mut().control;
     if let Some(entry) = control.entries.pop() {
-        control.run_cleanup(entry, Running { pending: None, values });
+        control.run_cleanup(entry, Running { values, ..Running::default() });
     }
     Signal::Next
 }
@@ -104,10 +109,14 @@ pub(super) unsafe fn enter_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Val
 pub(super) unsafe fn end_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value) -> Signal {
     let control = &mut vm.task_mut().control;
     control.entries.pop();
-    let Running { pending, values } = control.running.pop().unwrap_or_default();
+    let Running { pending, values, .. } = control.running.pop().unwrap_or_default();
     control.unwinding = pending;
     let unwinds = control.unwinding.is_some();
     vm.values = values;
+    if vm.task().flags.attention() {
+        // What waited for the end of the cleanup waits no longer.
+        vm.end_slice_here();
+    }
     if unwinds { Signal::Unwind } else { Signal::Next }
 }
 
@@ -143,7 +152,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
         let Some(unwinding) = task.control.unwinding.take() else { return Signal::Reload };
         let height = task.control.entries.len();
         match unwinding.target {
-            Target::Entry(index) if index + 1 >= height => {
+            Target::Entry(index) | Target::Limit(index) if index + 1 >= height => {
                 // SAFETY: the entry's frame is live: entries of a frame are popped before it is left.
                 return unsafe { land(vm, unwinding.values) };
             }
@@ -162,18 +171,33 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
                 task.control.unwinding = Some(unwinding);
             }
             EntryKind::Cleanup | EntryKind::FailureCleanup => {
-                task.control.run_cleanup(entry, Running { pending: Some(unwinding), values: Vec::new() });
+                let is_forced = unwinding.target.is_forced();
+                let allowance = if is_forced { Some(vm.new_allowance()) } else { None };
+                let running = Running { pending: Some(unwinding), allowance, ..Running::default() };
+                vm.task_mut().control.run_cleanup(entry, running);
                 // SAFETY: as above; the entry's pc is the cleanup's first instruction.
                 unsafe { vm.resume_at(&entry) };
                 return Signal::Reload;
             }
             EntryKind::Running => {
-                // A cleanup is left. What it interrupted is dropped, unless that was to end the task.
                 let interrupted = task.control.running.pop().and_then(|running| running.pending);
-                task.control.unwinding = Some(match interrupted {
-                    Some(pending) if pending.target.is_final() => pending,
-                    _ => unwinding,
-                });
+                let next = if unwinding.target == Target::Cleanup(task.control.entries.len()) {
+                    vm.after_cut_off(interrupted)
+                } else {
+                    Some(unwinding.or_interrupted(interrupted))
+                };
+                vm.task_mut().control.unwinding = next;
+            }
+            EntryKind::Limit => {
+                task.control.unwinding = Some(unwinding);
+                vm.close_limit();
+            }
+            EntryKind::Interrupt => {
+                task.control.unwinding = Some(unwinding);
+                if entry.data.is_true() {
+                    vm.heap.log_if_marking(entry.data);
+                    vm.close_wait(entry.data);
+                }
             }
             _ => task.control.unwinding = Some(unwinding),
         }
@@ -194,12 +218,15 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
     control.bindings.truncate(entry.bindings as usize);
     if entry.kind == EntryKind::FailureCleanup {
         // The failure waits for the end of the cleanup as the values of a protected form do.
-        control.run_cleanup(entry, Running { pending: None, values });
+        control.run_cleanup(entry, Running { values, ..Running::default() });
         vm.values.clear();
         // SAFETY: as below; the entry's pc is the cleanup's first instruction.
         unsafe { vm.resume_at(&entry) };
         vm.close_reserves();
         return Signal::Reload;
+    }
+    if entry.kind == EntryKind::Limit {
+        vm.close_limit();
     }
     vm.values = values;
     // SAFETY: the entry's frame is live, and V10: its landing asks for no more than the registers below the window.

@@ -17,6 +17,8 @@
 pub(crate) mod call;
 mod cold;
 mod collect;
+pub(crate) use collect::top_of_task;
+pub(crate) use raise::frames_of_task;
 mod control;
 mod raise;
 pub(crate) mod stubs;
@@ -27,7 +29,7 @@ use esl_bytecode::for_each_opcode;
 
 use crate::builtins::NATIVES;
 use crate::heap::layout::{Boxed, Code, Function, Kind, Structure, Symbol, Vector};
-use crate::raise::Exit;
+use crate::raise::{Exit, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -44,6 +46,8 @@ macro_rules! define_operations {
             ErrorReturn = crate::stub::ERROR_RETURN,
             /// The task's function has returned: its values are in the value list.
             TaskExit = crate::stub::TASK_EXIT,
+            /// The function that ran where the task was interrupted has returned: see `raise`.
+            InterruptReturn = crate::stub::INTERRUPT_RETURN,
         }
     };
 }
@@ -68,6 +72,8 @@ pub(crate) enum Signal {
     Unwind,
     /// The task has come to its end.
     TaskExit,
+    /// The task waits; the instruction is done again when it goes on.
+    Park,
 }
 
 /// Why a task stopped running.
@@ -154,15 +160,33 @@ pub(crate) fn load(vm: &mut Vm, ticks: i32) {
     let task = vm.task();
     let pc = task.pc;
     // SAFETY: the base of a task lies in its stack.
-    let base = unsafe { task.stack.start().add(task.base) };
+    let base = unsafe { task.stack.start().add(task.base as usize) };
     let stack_end = vm.stack_end();
     vm.cpu = Cpu { pc, base, stack_end, ticks, reserve: 0, granted: ticks };
     vm.arm();
 }
 
+/// Sees to what was noted of the task in `vm.running`, which is loaded: it may begin to unwind, or find itself in another
+/// function.
+pub(crate) fn see_to_attention(vm: &mut Vm) -> Result<(), Leave> {
+    if let Some(function) = vm.see_to_running_task() {
+        interrupt(vm, function, call::Arguments::new())?;
+    }
+    Ok(())
+}
+
+/// Calls `function` where the task in `vm.running`, which is loaded, stands.
+pub(crate) fn interrupt(vm: &mut Vm, function: Value, arguments: call::Arguments) -> Result<(), Leave> {
+    // SAFETY: as for `run`; a task that does not run stands before an instruction that has had no effect yet.
+    unsafe {
+        let signal = raise::interrupt(vm, function, arguments);
+        settle(vm, signal)
+    }
+}
+
 /// Runs the task in `vm.running` from `vm.cpu` until it leaves the processor.
 pub(crate) fn run(vm: &mut Vm) -> Leave {
-    if vm.task().control.unwinding.is_some() {
+    if vm.task().control.is_unwinding() {
         // SAFETY: as below.
         if let Err(leave) = unsafe { settle(vm, Signal::Unwind) } {
             return leave;
@@ -197,10 +221,14 @@ unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
                 }
                 Signal::Tick => match vm.safepoint() {
                     Some(leave) => return Err(leave),
-                    None if vm.task().control.unwinding.is_some() => Signal::Unwind,
+                    None if vm.task().control.is_unwinding() => Signal::Unwind,
                     None => return Ok(()),
                 },
-                Signal::Exit(Exit::Park) => return Err(Leave::Parked),
+                Signal::Park if vm.task().critical > 0 => {
+                    vm.cancel_wait();
+                    Signal::Exit(vm.raise::<()>(Raised::Failure("WOULD-BLOCK")).unwrap_err())
+                }
+                Signal::Park => return Err(Leave::Parked),
                 Signal::Exit(exit) => raise::exit(vm, exit),
                 Signal::Call => call::slow_call(vm),
                 Signal::ReturnAll => call::return_all(vm),
@@ -1019,6 +1047,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     break signal;
                 }
                 Operation::TaskExit => break Signal::TaskExit,
+                Operation::InterruptReturn => break raise::interrupt_return(vm, pc, base),
             }
         }
     };

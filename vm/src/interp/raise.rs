@@ -12,7 +12,9 @@ use esl_bytecode::opcode::{Opcode, Substitute};
 
 use super::call::{Arguments, Place};
 use super::{Operation, Signal, call, code_of, stubs};
+use crate::control::{Entry, EntryKind};
 use crate::raise::Exit;
+use crate::task::Task;
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -34,7 +36,7 @@ pub(super) unsafe fn exit(vm: &mut Vm, exit: Exit) -> Signal {
                 let place = place_of(vm);
                 call::call(vm, function, arguments, place)
             }
-            Exit::Park => Signal::Exit(Exit::Park),
+            Exit::Park => Signal::Park,
         }
     }
 }
@@ -132,6 +134,42 @@ pub(super) unsafe fn error_return(vm: &mut Vm, _pc: *const u32, base: *mut Value
     }
 }
 
+/// `interrupt-return`: the function that ran where the task was interrupted has returned. The instruction there, which has
+/// had no effect yet, comes next, and a wait at which the task was parked goes on.
+///
+/// # Safety
+/// As [`super::settle`], at the stub.
+pub(super) unsafe fn interrupt_return(vm: &mut Vm, _pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: as for `error_return`.
+    unsafe {
+        let nregs = (*code_of(*base.sub(2))).nregs as usize;
+        vm.cpu.base = base;
+        vm.cpu.pc = std::ptr::with_exposed_provenance((*base.add(nregs)).bits() as usize);
+    }
+    let task = vm.task_mut();
+    if let Some(entry) = task.control.entries.pop() {
+        debug_assert_eq!(entry.kind, crate::control::EntryKind::Interrupt);
+        task.wait = entry.data;
+    }
+    Signal::Reload
+}
+
+/// Calls a function where the running task stands, before the instruction there.
+///
+/// # Safety
+/// As [`super::settle`], at an instruction that has had no effect yet.
+pub(super) unsafe fn interrupt(vm: &mut Vm, function: Value, arguments: Arguments) -> Signal {
+    let base = vm.offset_of(vm.cpu.base) as u32;
+    let task = vm.task_mut();
+    let wait = std::mem::replace(&mut task.wait, Value::NIL);
+    let bindings = task.control.bindings.len() as u32;
+    let kind = EntryKind::Interrupt;
+    let entry = Entry { data: wait, pc: std::ptr::null(), base, bindings, window: 0, want: 0, kind };
+    task.control.entries.push(entry);
+    // SAFETY: as this function.
+    unsafe { call::call(vm, function, arguments, Place::Interrupt) }
+}
+
 /// Puts the value list in the place of the result of the instruction at `vm.cpu.pc`, and goes on behind it.
 ///
 /// # Safety
@@ -198,32 +236,52 @@ impl Vm {
     /// The frames of the running task, innermost first, at most `limit` of them. `vm.cpu` is in order when a builtin that
     /// the interpreter called asks for it only up to its innermost frame's pc, so that one is given as it was saved.
     pub(crate) fn frames(&self, limit: usize) -> Vec<FrameAt> {
-        let mut frames = Vec::new();
-        let Some(task) = self.running.as_ref() else { return frames };
-        let (mut pc, mut base) = (self.cpu.pc, self.cpu.base);
-        let mut is_exact = true;
-        // SAFETY: frames are linked as `call` and the loop link them, down to the root, whose link is a stub's.
-        unsafe {
-            while frames.len() < limit && base.addr() >= task.stack.start().addr() + 2 * size_of::<Value>() {
-                let function = *base.sub(2);
-                let code = code_of(function);
-                let start = code.byte_add((*code).words_offset()).cast::<u32>().cast_const();
-                let word = pc.addr().wrapping_sub(start.addr()) / size_of::<u32>();
-                frames.push(FrameAt { function, word, is_exact });
-                let return_to: *const u32 = std::ptr::with_exposed_provenance((*base.sub(1)).bits() as usize);
-                if return_to == stubs::task_exit() {
-                    break;
-                }
-                let window = (*return_to.sub(2) >> 8 & 0xff) as usize;
-                base = base.sub(2 + window);
-                is_exact = stubs::is_error_return(return_to);
-                pc = return_to;
-                if is_exact {
-                    let nregs = (*code_of(*base.sub(2))).nregs as usize;
-                    pc = std::ptr::with_exposed_provenance((*base.add(nregs)).bits() as usize);
-                }
+        let Some(task) = self.running.as_ref() else { return Vec::new() };
+        // SAFETY: `vm.cpu` describes the running task.
+        unsafe { frames_of(task.stack.start(), self.cpu.pc, self.cpu.base, limit) }
+    }
+}
+
+/// The frames of a task that does not run, innermost first, at most `limit` of them.
+pub(crate) fn frames_of_task(task: &Task, limit: usize) -> Vec<FrameAt> {
+    let start = task.stack.start();
+    // SAFETY: the task stands where it was noted at the switch.
+    unsafe { frames_of(start, task.pc, start.add(task.base as usize), limit) }
+}
+
+/// The frames of the stack that begins at `bottom`, from that with the registers at `base` on.
+///
+/// # Safety
+/// The task to which the stack belongs stands at `pc` in that frame.
+unsafe fn frames_of(
+    bottom: *mut Value,
+    mut pc: *const u32,
+    mut base: *mut Value,
+    limit: usize,
+) -> Vec<FrameAt> {
+    let mut frames = Vec::new();
+    let mut is_exact = true;
+    // SAFETY: frames are linked as `call` and the loop link them, down to the root, whose link is a stub's.
+    unsafe {
+        while frames.len() < limit && base.addr() >= bottom.addr() + 2 * size_of::<Value>() {
+            let function = *base.sub(2);
+            let code = code_of(function);
+            let start = code.byte_add((*code).words_offset()).cast::<u32>().cast_const();
+            let word = pc.addr().wrapping_sub(start.addr()) / size_of::<u32>();
+            frames.push(FrameAt { function, word, is_exact });
+            let return_to: *const u32 = std::ptr::with_exposed_provenance((*base.sub(1)).bits() as usize);
+            if return_to == stubs::task_exit() {
+                break;
+            }
+            let window = (*return_to.sub(2) >> 8 & 0xff) as usize;
+            base = base.sub(2 + window);
+            is_exact = stubs::is_return_above(return_to);
+            pc = return_to;
+            if is_exact {
+                let nregs = (*code_of(*base.sub(2))).nregs as usize;
+                pc = std::ptr::with_exposed_provenance((*base.add(nregs)).bits() as usize);
             }
         }
-        frames
     }
+    frames
 }

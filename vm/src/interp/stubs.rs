@@ -1,5 +1,5 @@
-//! Code that no module contains: where a task's first function returns to, and where the function returns to that took
-//! the place of a failed instruction.
+//! Code that no module contains: where a task's first function returns to, where the function returns to that took
+//! the place of a failed instruction, and the one that ran where its task was interrupted.
 //!
 //! A return reads the call word two words before the return address, so each stub is a call word, its aux word, and
 //! then the operation that goes on.
@@ -17,16 +17,22 @@ const fn call_word(window: u8) -> u32 {
 /// Return to the end of the task.
 static TASK_EXIT: [u32; 3] = [call_word(0), 0, stub::word(stub::TASK_EXIT, 0)];
 
-/// For each window, return to a failed instruction.
-static ERROR_RETURN: [[u32; 3]; 256] = {
+/// For each window, return to this operation.
+const fn returns_to(operation: u8) -> [[u32; 3]; 256] {
     let mut table = [[0; 3]; 256];
     let mut window = 0;
     while window < 256 {
-        table[window] = [call_word(window as u8), 0, stub::word(stub::ERROR_RETURN, 0)];
+        table[window] = [call_word(window as u8), 0, stub::word(operation, 0)];
         window += 1;
     }
     table
-};
+}
+
+/// For each window, return to a failed instruction.
+static ERROR_RETURN: [[u32; 3]; 256] = returns_to(stub::ERROR_RETURN);
+
+/// For each window, return to an instruction before which the task was interrupted.
+static INTERRUPT_RETURN: [[u32; 3]; 256] = returns_to(stub::INTERRUPT_RETURN);
 
 /// Return address of a task's first function.
 pub(crate) fn task_exit() -> *const u32 {
@@ -38,11 +44,19 @@ pub(crate) fn error_return(window: u8) -> *const u32 {
     &raw const ERROR_RETURN[usize::from(window)][2]
 }
 
-/// Whether a return address is one of [`error_return`].
-pub(crate) fn is_error_return(pc: *const u32) -> bool {
-    let table = &raw const ERROR_RETURN;
+/// Return address of a function that runs in an interrupted frame, whose window is this register of the frame.
+pub(crate) fn interrupt_return(window: u8) -> *const u32 {
+    &raw const INTERRUPT_RETURN[usize::from(window)][2]
+}
+
+/// Whether a return address is one of [`error_return`] or [`interrupt_return`]: the frame has its pc behind its registers.
+pub(crate) fn is_return_above(pc: *const u32) -> bool {
     let address = pc.addr();
-    address >= table.addr() && address < table.addr() + size_of_val(&ERROR_RETURN)
+    let is_in = |table: &'static [[u32; 3]; 256]| {
+        let start = table.as_ptr().addr();
+        address >= start && address < start + size_of_val(table)
+    };
+    is_in(&ERROR_RETURN) || is_in(&INTERRUPT_RETURN)
 }
 
 /// Length in words of the instruction that begins with `word`.

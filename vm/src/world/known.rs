@@ -56,6 +56,18 @@ define_known! {
     allow_other_keys = keyword "ALLOW-OTHER-KEYS";
     stack_exhausted = keyword "STACK-EXHAUSTED";
     heap_exhausted = keyword "HEAP-EXHAUSTED";
+    budget_exhausted = keyword "BUDGET-EXHAUSTED";
+    timeout = keyword "TIMEOUT";
+    event = esl "EVENT";
+    task = esl "TASK";
+    restarts = esl "*RESTARTS*";
+    recoveries = esl "*RECOVERIES*";
+    task_end = keyword "TASK-END";
+    succeeded = keyword "SUCCEEDED";
+    failed = keyword "FAILED";
+    aborted = keyword "ABORTED";
+    running = keyword "RUNNING";
+    waiting = keyword "WAITING";
     // Properties under which the machine keeps data on a symbol.
     accessor = esl "%ACCESSOR";
     // Variables of the library that the machine looks at.

@@ -1,0 +1,201 @@
+//! Events, waits and time: the primitives from which the library makes the forms that wait.
+//!
+//! A builtin that waits parks its task and is done again, from the start, when the task goes on: then the task's `wait` is
+//! what it was parked at.
+
+use crate::builtins::LIMIT;
+use crate::heap::Kind;
+use crate::raise::{Exit, Outcome};
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::wait::{WaitOptions, event};
+
+/// The latest time, in nanoseconds: far beyond the life of a machine, and a fixnum.
+const LATEST: u64 = 1 << 60;
+
+impl Vm {
+    /// Seconds as nanoseconds; what is negative counts as zero.
+    ///
+    /// # Errors
+    /// A failure if `seconds` is no real number.
+    pub(crate) fn nanoseconds(&mut self, seconds: Value) -> Result<u64, Exit> {
+        if let Some(n) = seconds.as_fixnum() {
+            return Ok((n.max(0) as u64).saturating_mul(1_000_000_000).min(LATEST));
+        }
+        let seconds = self.double_of("SLEEP", seconds, "REAL")?;
+        // A conversion of floats saturates, and makes 0 of what is not a number.
+        Ok(((seconds * 1e9).round() as u64).min(LATEST))
+    }
+
+    /// The sum of the counts of an event or of a list of events.
+    fn count_of_events(&mut self, events: Value) -> Result<i64, Exit> {
+        if !events.is_list() {
+            return if self.is_event(events) {
+                Ok(self.event_count(events))
+            } else {
+                self.event_error(events)
+            };
+        }
+        let mut sum = 0_i64;
+        for event in self.list_items(events, LIMIT)? {
+            if !self.is_event(event) {
+                return self.event_error(event);
+            }
+            sum = sum.wrapping_add(self.event_count(event));
+        }
+        Ok(sum)
+    }
+
+    /// Whether a wait need not begin because the events were signalled since they were counted.
+    fn was_signalled_since(&mut self, events: Value, count: Value) -> Result<bool, Exit> {
+        match count.as_fixnum() {
+            Some(count) => Ok(self.count_of_events(events)? != count),
+            None if count.is_nil() => Ok(false),
+            None => self.type_error(count, "INTEGER"),
+        }
+    }
+
+    fn give_list(&mut self, list: Value) -> Outcome {
+        self.values.clear();
+        let mut rest = list;
+        while let Some(pair) = self.heap.as_cons(rest) {
+            self.values.push(pair.car);
+            rest = pair.cdr;
+        }
+        Err(Exit::Values)
+    }
+}
+
+/// `(make-event &optional name)`
+pub(super) fn make_event(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.make_event(arguments.first().copied().unwrap_or(Value::NIL))
+}
+
+/// `(signal event &rest arguments)`, `(signal-event event &rest arguments)`
+pub(super) fn signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    if !vm.is_event(arguments[0]) {
+        return vm.event_error(arguments[0]);
+    }
+    vm.signal_event(arguments[0], &arguments[1..])?;
+    Ok(Value::NIL)
+}
+
+/// `(event-count event)`
+pub(super) fn event_count(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    if !vm.is_event(arguments[0]) {
+        return vm.event_error(arguments[0]);
+    }
+    Ok(vm.slot(arguments[0], event::COUNT))
+}
+
+/// `(%count-events events)`
+pub(super) fn count_events(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let sum = vm.count_of_events(arguments[0])?;
+    Ok(Value::fixnum(sum).unwrap_or(Value::small(0)))
+}
+
+/// `(%event-name event)`
+pub(super) fn event_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    if !vm.is_event(arguments[0]) {
+        return vm.event_error(arguments[0]);
+    }
+    Ok(vm.slot(arguments[0], event::NAME))
+}
+
+/// `(%eventp object)`
+pub(super) fn eventp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(Value::boolean(vm.is_event(arguments[0])))
+}
+
+/// `(%any-event)`
+pub(super) fn any_event(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    Ok(vm.any_event)
+}
+
+/// Parks the running task until `events` are signalled: at the wait where it was parked, or at a new one.
+pub(super) fn take_or_park(vm: &mut Vm, events: Value, options: WaitOptions) -> Outcome {
+    let wait = vm.task().wait;
+    if wait.is_true() && vm.take_signalled(wait).is_none() {
+        return vm.park(wait, None);
+    }
+    let wait = vm.open_wait(events, options)?;
+    vm.park(wait, None)
+}
+
+/// `(%wait events count what)`
+pub(super) fn wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[events, count, what] = arguments else { unreachable!("the table says three") };
+    let wait = vm.task().wait;
+    if wait.is_true() {
+        return match vm.take_signalled(wait) {
+            Some(arguments) => {
+                vm.cancel_wait();
+                vm.give_list(arguments)
+            }
+            None => vm.park(wait, None),
+        };
+    }
+    if vm.was_signalled_since(events, count)? {
+        return Ok(Value::NIL);
+    }
+    let wait = vm.open_wait(events, WaitOptions { what, ..WaitOptions::default() })?;
+    vm.park(wait, None)
+}
+
+/// `(%open-wait events seconds count what)`
+pub(super) fn open_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[events, seconds, count, what] = arguments else { unreachable!("the table says four") };
+    let deadline = if seconds.is_nil() {
+        None
+    } else {
+        let nanoseconds = vm.nanoseconds(seconds)?;
+        Some(vm.time().saturating_add(nanoseconds).min(LATEST))
+    };
+    if vm.was_signalled_since(events, count)? {
+        return Ok(Value::NIL);
+    }
+    vm.open_wait(events, WaitOptions { keeps: true, deadline, what, ..WaitOptions::default() })
+}
+
+/// `(%take-signal wait)`
+pub(super) fn take_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let wait = arguments[0];
+    if !vm.heap.is(wait, Kind::Wait) {
+        return vm.type_error(wait, "ATOM");
+    }
+    vm.task_mut().wait = Value::NIL;
+    if let Some(arguments) = vm.take_kept(wait) {
+        return Ok(arguments);
+    }
+    match vm.wait_deadline(wait) {
+        Some(deadline) if vm.time() >= deadline => Ok(vm.world.known.timeout),
+        deadline => vm.park(wait, deadline),
+    }
+}
+
+/// `(%close-wait wait)`
+pub(super) fn close_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.close_wait(arguments[0]);
+    Ok(Value::NIL)
+}
+
+/// `(%deadline seconds)`
+pub(super) fn deadline(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let nanoseconds = vm.nanoseconds(arguments[0])?;
+    let time = vm.time().saturating_add(nanoseconds).min(LATEST);
+    Ok(Value::fixnum(time as i64).unwrap_or(Value::NIL))
+}
+
+/// `(%sleep-until deadline)`
+pub(super) fn sleep_until(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(deadline) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
+    let now = vm.time();
+    if now >= deadline as u64 { Ok(Value::NIL) } else { vm.park(Value::NIL, Some(deadline as u64)) }
+}
+
+/// `(%pass-turn)`: done again when the others have had theirs.
+pub(super) fn pass_turn(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    vm.passes_turn = true;
+    vm.end_slice_here();
+    Ok(Value::NIL)
+}

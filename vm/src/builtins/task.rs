@@ -1,0 +1,298 @@
+//! Tasks: making them, what is known of them, ending them, limits, guards and critical sections.
+
+use crate::builtins::event::take_or_park;
+use crate::control::End;
+use crate::heap::Kind;
+use crate::limit::guard;
+use crate::raise::{Exit, Outcome};
+use crate::run::SpawnOptions;
+use crate::task::{DEFAULT_PRIORITY, PRIORITIES, TaskId, TaskState};
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::wait::{WaitOptions, event};
+
+impl Vm {
+    /// The task that `v` is.
+    ///
+    /// # Errors
+    /// A failure if it is none.
+    fn expect_task(&mut self, v: Value) -> Result<Value, Exit> {
+        if self.heap.is(v, Kind::Task) { Ok(v) } else { self.task_error(v) }
+    }
+
+    /// Whether a task has ended.
+    fn has_ended(&self, task: Value) -> bool {
+        !self.slot(task, event::STATE).is_fixnum()
+    }
+
+    /// A number of ticks.
+    fn ticks_argument(&mut self, v: Value) -> Result<u64, Exit> {
+        match v.as_index() {
+            Some(ticks) => Ok(ticks as u64),
+            None if self.heap.is(v, Kind::Bignum) => Ok(i64::MAX as u64),
+            None => self.type_error(v, "UNSIGNED-BYTE"),
+        }
+    }
+
+    /// Waits for the end of a task. `None` once it has ended.
+    fn wait_for_end(&mut self, task: Value, urgent: bool, child: bool) -> Option<Outcome> {
+        if self.has_ended(task) {
+            self.cancel_wait();
+            return None;
+        }
+        let options = WaitOptions { urgent, child, ..WaitOptions::default() };
+        Some(take_or_park(self, task, options))
+    }
+}
+
+impl Vm {
+    fn make_net_task(&mut self, event: Value, function: Value, priority: u8) -> Result<TaskId, Exit> {
+        let function = self.callable(function)?;
+        let notice = self.heap.list(&[Value::NIL])?;
+        let notify = self.heap.cons(event, notice)?;
+        let options = SpawnOptions { priority, notify, ..SpawnOptions::default() };
+        let id = self.make_task(function, Value::NIL, options)?;
+        let object = self.tasks.get(id).map_or(Value::NIL, |task| task.object);
+        self.heap.set_car(notice, object);
+        Ok(id)
+    }
+}
+
+/// `(%spawn function &optional name priority budget daemon notify)`
+pub(super) fn spawn(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let argument = |index: usize| arguments.get(index).copied().unwrap_or(Value::NIL);
+    let function = vm.callable(arguments[0])?;
+    let priority = match argument(2) {
+        v if v.is_nil() => DEFAULT_PRIORITY,
+        v => match v.as_index().filter(|&priority| priority < PRIORITIES) {
+            Some(priority) => priority as u8,
+            None => return vm.specifier_error(v, "(INTEGER 0 7)"),
+        },
+    };
+    let budget = match argument(3) {
+        v if v.is_nil() => None,
+        v => Some(vm.ticks_argument(v)?),
+    };
+    let daemon = argument(4);
+    let options = SpawnOptions {
+        name: argument(1),
+        priority,
+        budget,
+        daemon: daemon.is_true(),
+        hidden: daemon == vm.world.known.internal,
+        notify: argument(5),
+    };
+    let id = vm.make_task(function, Value::NIL, options)?;
+    Ok(vm.tasks.get(id).map_or(Value::NIL, |task| task.object))
+}
+
+/// `(%spawn-net event &rest functions)`
+pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (event, functions) = (arguments[0], &arguments[1..]);
+    let mut made = Vec::with_capacity(functions.len());
+    let priority = vm.task().priority;
+    for &function in functions {
+        match vm.make_net_task(event, function, priority) {
+            Ok(id) => made.push(id),
+            Err(exit) => {
+                // None of them has run yet, so nothing has happened.
+                made.into_iter().for_each(|id| vm.forget(id));
+                return Err(exit);
+            }
+        }
+    }
+    let tasks: Vec<Value> =
+        made.into_iter().map(|id| vm.tasks.get(id).map_or(Value::NIL, |task| task.object)).collect();
+    vm.charge(64 * tasks.len());
+    vm.give_values(&tasks)
+}
+
+/// `(current-task)`
+pub(super) fn current_task(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    Ok(vm.task().object)
+}
+
+/// `(%taskp object)`
+pub(super) fn taskp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(Value::boolean(vm.heap.is(arguments[0], Kind::Task)))
+}
+
+/// `(task-status task)`
+pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let task = vm.expect_task(arguments[0])?;
+    let state = vm.slot(task, event::STATE);
+    let Some(index) = state.as_index() else { return Ok(state) };
+    let known = &vm.world.known;
+    Ok(match vm.tasks.at(index as u32).map(|task| task.state) {
+        Some(TaskState::Waiting | TaskState::Reading) => known.waiting,
+        _ => known.running,
+    })
+}
+
+/// `(%task-number task)`: its number and that of the task that made it, while it lives; `NIL` afterwards.
+pub(super) fn task_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let task = vm.expect_task(arguments[0])?;
+    let Some(index) = vm.slot(task, event::STATE).as_index() else { return Ok(Value::NIL) };
+    let number = match vm.tasks.at(index as u32) {
+        Some(task) => task.number,
+        None => vm.task().number,
+    };
+    let parent = vm.slot(task, event::RESULT);
+    vm.give_values(&[Value::index(number as usize), parent])
+}
+
+/// `(%task-ticks task)`
+pub(super) fn task_ticks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let task = vm.expect_task(arguments[0])?;
+    let Some(index) = vm.slot(task, event::STATE).as_index() else { return Ok(Value::NIL) };
+    let ticks = vm.tasks.at(index as u32).map_or(vm.task().ticks, |task| task.ticks);
+    Ok(Value::index(ticks as usize))
+}
+
+/// `(%task-end task)`: the status of a task that has ended, then its values, or the condition; `NIL` before.
+pub(super) fn task_end(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let task = vm.expect_task(arguments[0])?;
+    if !vm.has_ended(task) {
+        return Ok(Value::NIL);
+    }
+    let (status, result) = (vm.slot(task, event::STATE), vm.slot(task, event::RESULT));
+    let has_one_value = vm.heap.header(task).is_some_and(|header| header.aux == 1);
+    vm.values.clear();
+    vm.values.push(status);
+    if status == vm.world.known.failed || has_one_value {
+        vm.values.push(result);
+    } else {
+        let mut rest = result;
+        while let Some(pair) = vm.heap.as_cons(rest) {
+            vm.values.push(pair.car);
+            rest = pair.cdr;
+        }
+    }
+    Err(Exit::Values)
+}
+
+/// `(%all-tasks hidden)`
+pub(super) fn all_tasks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let shows_hidden = arguments[0].is_true();
+    let mut tasks: Vec<(u64, Value)> = vm
+        .tasks
+        .iter()
+        .chain(vm.running.as_deref())
+        .filter(|task| task.state != TaskState::Ended && (shows_hidden || !task.flags.hidden()))
+        .map(|task| (task.number, task.object))
+        .collect();
+    tasks.sort_unstable_by_key(|&(number, _)| number);
+    vm.charge(64 * tasks.len());
+    let objects: Vec<Value> = tasks.into_iter().map(|(_, object)| object).collect();
+    Ok(vm.heap.list(&objects)?)
+}
+
+/// `(%join task child)`
+pub(super) fn join(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let task = vm.expect_task(arguments[0])?;
+    match vm.wait_for_end(task, false, arguments[1].is_true()) {
+        Some(outcome) => outcome,
+        None => task_end(vm, arguments),
+    }
+}
+
+/// `(%request-abort task)`
+pub(super) fn request_abort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let task = vm.expect_task(arguments[0])?;
+    if let Some(index) = vm.slot(task, event::STATE).as_index()
+        && let Some(id) = vm.tasks.id_at(index as u32)
+    {
+        vm.abort(id);
+    }
+    Ok(Value::NIL)
+}
+
+/// `(abort-task task)`
+pub(super) fn abort_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let task = vm.expect_task(arguments[0])?;
+    if vm.task().wait.is_nil() {
+        if task == vm.task().object {
+            let in_cleanup = vm.task().control.get().is_some_and(|control| !control.running.is_empty());
+            if in_cleanup || vm.task().critical > 0 {
+                return request_abort(vm, arguments);
+            }
+            vm.task_mut().flags.set_urgent(true);
+            vm.begin_end(End::Aborted);
+            return Err(Exit::Unwind);
+        }
+        request_abort(vm, arguments)?;
+        if vm.task().critical > 0 {
+            return Ok(Value::NIL);
+        }
+    }
+    vm.wait_for_end(task, true, false).unwrap_or(Ok(Value::NIL))
+}
+
+/// `(%add-checkpoint id)`
+pub(super) fn add_checkpoint(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let task = vm.task().object;
+    let list = vm.heap.cons(arguments[0], vm.slot(task, event::CHECKPOINTS))?;
+    vm.signal_event(task, arguments)?;
+    vm.set_slot(task, event::CHECKPOINTS, list);
+    Ok(Value::NIL)
+}
+
+/// `(%checkpoints task)`
+pub(super) fn checkpoints(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let task = vm.expect_task(arguments[0])?;
+    Ok(vm.slot(task, event::CHECKPOINTS))
+}
+
+/// `(%make-guard function)`
+pub(super) fn make_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let function = vm.callable(arguments[0])?;
+    let height = vm.task().control.get().map_or(0, |control| control.entries.len());
+    let mut slots = [Value::NIL; 4];
+    slots[guard::TASK] = vm.task().object;
+    slots[guard::FUNCTION] = function;
+    slots[guard::IS_OPEN] = Value::T;
+    slots[guard::HEIGHT] = Value::index(height);
+    Ok(vm.heap.alloc_record(Kind::Record, 0, guard::AUX, &slots)?)
+}
+
+/// `(%close-guard guard)`
+pub(super) fn close_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    if vm.is_guard(arguments[0]) {
+        vm.set_slot(arguments[0], guard::IS_OPEN, Value::NIL);
+    }
+    Ok(Value::NIL)
+}
+
+/// `(%open-limit tag seconds ticks)`
+pub(super) fn open_limit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[tag, seconds, ticks] = arguments else { unreachable!("the table says three") };
+    let time = if seconds.is_nil() { None } else { Some(vm.nanoseconds(seconds)?) };
+    let ticks = if ticks.is_nil() { None } else { Some(vm.ticks_argument(ticks)?) };
+    Ok(Value::boolean(vm.open_limit(tag, time, ticks)))
+}
+
+/// `(%begin-critical)`
+pub(super) fn begin_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    let ticks = i64::from(vm.config.critical_ticks);
+    let task = vm.task_mut();
+    if task.critical == 0 {
+        // The ticks of the slice so far are taken off at its end.
+        task.critical = 1;
+        vm.critical_left = ticks;
+        vm.critical_is_new = true;
+        vm.end_slice_here();
+    } else {
+        task.critical = task.critical.saturating_add(1);
+    }
+    Ok(Value::NIL)
+}
+
+/// `(%end-critical)`
+pub(super) fn end_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    let task = vm.task_mut();
+    task.critical = task.critical.saturating_sub(1);
+    if task.critical == 0 && task.flags.attention() {
+        vm.end_slice_here();
+    }
+    Ok(Value::NIL)
+}

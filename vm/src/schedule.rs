@@ -1,0 +1,243 @@
+//! Whose turn it is, and for how long.
+//!
+//! Eight priorities, the highest first, round-robin within one; of 64 turns each priority that has a runnable task gets at
+//! least one. Beside them a queue for what must not wait: tasks that are being ended, and those that wait for that. It
+//! is served in turn with the others, so that an abort is delivered within two slices however many tasks there are.
+//!
+//! A schedule is legal if it keeps to this; where the order is open, between runnable tasks of the same priority, and in the
+//! length of a slice, choices are made in one place, [`Choices`]: always the first, from a seed, or from a given list. A
+//! run can note its choices, and the list of them reproduces it.
+//!
+//! A place in a queue is good as long as the task's serial number is the one that it had when it was put there, so a task
+//! changes queues without being looked for.
+
+use std::collections::VecDeque;
+
+use crate::task::{PRIORITIES, TaskState, Tasks};
+
+/// Runnable tasks among which a choice is made, at most.
+const CHOICE: usize = 8;
+
+/// A place in a queue.
+#[derive(Clone, Copy, Debug)]
+struct Queued {
+    index: u32,
+    serial: u64,
+}
+
+/// The runnable tasks.
+#[derive(Default)]
+pub(crate) struct RunQueues {
+    queues: [VecDeque<Queued>; PRIORITIES],
+    urgent: VecDeque<Queued>,
+    /// Turns so far.
+    turns: u64,
+}
+
+impl RunQueues {
+    /// Adds a task.
+    #[inline]
+    pub(crate) fn push(&mut self, index: u32, serial: u64, priority: u8, urgent: bool) {
+        let queue = if urgent { &mut self.urgent } else { &mut self.queues[usize::from(priority)] };
+        queue.push_back(Queued { index, serial });
+    }
+
+    /// Takes out the task whose turn it is.
+    pub(crate) fn next(&mut self, tasks: &Tasks, choices: &mut Choices) -> Option<u32> {
+        self.turns += 1;
+        if self.turns & 1 == 0
+            && let Some(index) = pop(&mut self.urgent, tasks, &mut Choices::first())
+        {
+            return Some(index);
+        }
+        // Each priority has one turn in 64 of its own.
+        if self.turns & 7 == 0 {
+            let priority = (self.turns >> 3) as usize % PRIORITIES;
+            if let Some(index) = pop(&mut self.queues[priority], tasks, choices) {
+                return Some(index);
+            }
+        }
+        for queue in self.queues.iter_mut().rev() {
+            if let Some(index) = pop(queue, tasks, choices) {
+                return Some(index);
+            }
+        }
+        pop(&mut self.urgent, tasks, &mut Choices::first())
+    }
+}
+
+fn is_valid(queued: Queued, tasks: &Tasks) -> bool {
+    tasks
+        .at(queued.index)
+        .is_some_and(|task| task.serial == queued.serial && task.state == TaskState::Runnable)
+}
+
+/// Takes a task out of a queue, and drops places that are no longer good.
+#[inline]
+fn pop(queue: &mut VecDeque<Queued>, tasks: &Tasks, choices: &mut Choices) -> Option<u32> {
+    while let Some(&first) = queue.front() {
+        if !is_valid(first, tasks) {
+            queue.pop_front();
+            continue;
+        }
+        if choices.is_first() {
+            queue.pop_front();
+            return Some(first.index);
+        }
+        let chosen = choices.choose(queue.len().min(CHOICE));
+        let queued = queue.remove(chosen)?;
+        if is_valid(queued, tasks) {
+            return Some(queued.index);
+        }
+    }
+    None
+}
+
+/// How choices are made.
+#[derive(Clone, Debug, Default)]
+enum Source {
+    /// Always the first.
+    #[default]
+    First,
+    /// At random, from this state.
+    Seeded(u64),
+    /// As given; the first when the list is used up.
+    Given(VecDeque<u32>),
+}
+
+/// The choices of a run where the language leaves an order open.
+#[derive(Clone, Debug, Default)]
+pub struct Choices {
+    source: Source,
+    record: Option<Vec<u32>>,
+}
+
+impl Choices {
+    /// Always the first: plain round-robin with whole slices.
+    pub fn first() -> Choices {
+        Choices::default()
+    }
+
+    /// Choices that follow from a seed; those of the seed 0 are always the first.
+    pub fn seeded(seed: u64) -> Choices {
+        let source = if seed == 0 { Source::First } else { Source::Seeded(seed) };
+        Choices { source, record: None }
+    }
+
+    /// The given choices, then always the first.
+    pub fn given(list: &[u32]) -> Choices {
+        Choices { source: Source::Given(list.iter().copied().collect()), record: None }
+    }
+
+    /// Notes the choices that are made.
+    #[must_use]
+    pub fn recorded(mut self) -> Choices {
+        self.record = Some(Vec::new());
+        self
+    }
+
+    /// The choices made so far, if they were noted.
+    pub fn made(&self) -> &[u32] {
+        self.record.as_deref().unwrap_or(&[])
+    }
+
+    #[inline]
+    fn is_first(&self) -> bool {
+        matches!(self.source, Source::First)
+    }
+
+    /// A number below `count`.
+    pub(crate) fn choose(&mut self, count: usize) -> usize {
+        if count <= 1 {
+            return 0;
+        }
+        let choice = match &mut self.source {
+            Source::First => return 0,
+            Source::Seeded(state) => (next_random(state) % count as u64) as usize,
+            Source::Given(list) => list.pop_front().map_or(0, |choice| choice as usize % count),
+        };
+        if let Some(record) = &mut self.record {
+            record.push(choice as u32);
+        }
+        choice
+    }
+
+    /// The length of a slice of at most `slice` ticks.
+    #[inline]
+    pub(crate) fn slice(&mut self, slice: u32) -> u32 {
+        if self.is_first() { slice } else { slice - self.choose(slice as usize) as u32 }
+    }
+}
+
+/// Steele, Lea and Flood's SplitMix: a full period from any state.
+fn next_random(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::task::Task;
+    use crate::value::Value;
+
+    fn tasks(count: u32) -> Tasks {
+        let mut tasks = Tasks::default();
+        for serial in 0..count {
+            let mut task = Box::new(Task::new(Value::NIL, 1));
+            task.serial = u64::from(serial);
+            tasks.insert(task);
+        }
+        tasks
+    }
+
+    #[test]
+    fn every_priority_has_its_turn_in_sixty_four() {
+        let tasks = tasks(8);
+        let mut queues = RunQueues::default();
+        for index in 0..8 {
+            queues.push(index, u64::from(index), index as u8, false);
+        }
+        let mut turns = [0; 8];
+        for _ in 0..64 {
+            let index = queues.next(&tasks, &mut Choices::first()).unwrap();
+            turns[index as usize] += 1;
+            queues.push(index, u64::from(index), index as u8, false);
+        }
+        assert!(turns.iter().all(|&turns| turns >= 1) && turns[7] > 50, "{turns:?}");
+    }
+
+    #[test]
+    fn an_urgent_task_has_its_turn_within_two() {
+        let tasks = tasks(10);
+        let mut queues = RunQueues::default();
+        for index in 0..9 {
+            queues.push(index, u64::from(index), 7, false);
+        }
+        queues.push(9, 9, 0, true);
+        let turns: Vec<u32> = (0..2).filter_map(|_| queues.next(&tasks, &mut Choices::first())).collect();
+        assert!(turns.contains(&9), "{turns:?}");
+    }
+
+    #[test]
+    fn an_old_place_is_not_good() {
+        let tasks = tasks(2);
+        let mut queues = RunQueues::default();
+        queues.push(0, 77, 4, false);
+        queues.push(1, 1, 4, false);
+        assert_eq!(queues.next(&tasks, &mut Choices::first()), Some(1));
+        assert_eq!(queues.next(&tasks, &mut Choices::first()), None);
+    }
+
+    #[test]
+    fn noted_choices_reproduce_a_run() {
+        let mut seeded = Choices::seeded(7).recorded();
+        let made: Vec<usize> = (2..40).map(|count| seeded.choose(count)).collect();
+        let mut given = Choices::given(seeded.made());
+        assert_eq!(made, (2..40).map(|count| given.choose(count)).collect::<Vec<_>>());
+        assert_ne!(made, vec![0; made.len()]);
+    }
+}
