@@ -1,6 +1,8 @@
 //! What a conformance program says of itself: expectations beside its lines, and headers. See `README.md` for the format.
 #![forbid(unsafe_code)]
 
+pub mod anything;
+
 /// Under which conditions a program runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting {

@@ -325,9 +325,11 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             }
             macro_rules! tick {
                 () => {
-                    ticks -= 1;
-                    if ticks < 0 {
-                        break Signal::Tick;
+                    if !cfg!(feature = "no-ticks") {
+                        ticks -= 1;
+                        if ticks < 0 {
+                            break Signal::Tick;
+                        }
                     }
                 };
             }

@@ -1,0 +1,138 @@
+//! The machine: the interpreter, the collector, and what a start takes.
+#![allow(missing_docs, reason = "criterion's macros make functions without")]
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use criterion::{Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
+use esl::host::VirtualHost;
+use esl::program::{self, Program, Source};
+use esl::{Config, Engine};
+use esl_bytecode::datum::Datum;
+use esl_vm::run::RunOutcome;
+use esl_vm::task::TaskResult;
+
+fn engine(definitions: &str) -> Engine {
+    let config = Config { memory: 1 << 30, ..Config::default() };
+    let mut engine =
+        Engine::with(config, Box::new(VirtualHost::new())).expect("there is room for the library");
+    engine.eval(definitions).expect("the definitions are sound");
+    engine
+}
+
+/// A few of the things that programs spend their time on; a call takes about a millisecond.
+fn interpreter(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("interpreter");
+    for (name, definitions, call) in [
+        ("calls", "(defun f (n) (if (< n 2) n (+ (f (- n 1)) (f (- n 2)))))", "(f 20)"),
+        (
+            "floats",
+            "(defun f (n) (let ((x 0.5)) (dotimes (i n x) (setq x (* 3.7 x (- 1.0 x))))))",
+            "(f 20000)",
+        ),
+        (
+            "lists",
+            "(defun f (n) (let ((sum 0)) (dolist (x (mapcar (lambda (x) (* x 2)) (loop for i below n collect i)) sum)
+               (incf sum x))))",
+            "(f 5000)",
+        ),
+        (
+            "tables",
+            "(defun f (n) (let ((table (make-hash-table)))
+               (dotimes (i n) (incf (gethash (mod i 100) table 0)))
+               (gethash 7 table)))",
+            "(f 5000)",
+        ),
+    ] {
+        let mut engine = engine(definitions);
+        group.bench_function(name, |bencher| bencher.iter(|| engine.eval(call).expect("it runs")));
+    }
+    group.finish();
+}
+
+/// Builds and drops trees beside what lives on. The unit of throughput is a byte allocated.
+fn collector(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("collector");
+    group
+        .sample_size(10)
+        .sampling_mode(SamplingMode::Flat)
+        .measurement_time(Duration::from_secs(2))
+        .warm_up_time(Duration::from_secs(1));
+    for (name, live) in [("allocate_with_1_MB_live", 1_000_000), ("allocate_with_100_MB_live", 100_000_000)] {
+        let mut engine = engine(DEFINITIONS);
+        engine.eval(&format!("(defvar *live* (tree {}))", live / CONS)).expect("there is room");
+        group.throughput(Throughput::Bytes(TURN * CONS));
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| engine.eval(&format!("(churn {TURN})")).expect("it runs"));
+        });
+    }
+    let mut engine = engine(DEFINITIONS);
+    engine.eval(&format!("(defvar *live* (tree {}))", 100_000_000 / CONS)).expect("there is room");
+    group.throughput(Throughput::Elements(1));
+    // The time of a whole cycle would be of no interest: this reports the longest wait of a cycle as the time of an
+    // iteration.
+    group.bench_function("longest_step_with_100_MB_live", |bencher| {
+        bencher.iter_custom(|iterations| (0..iterations).map(|_| longest_step(&mut engine)).sum());
+    });
+    group.finish();
+}
+
+const CONS: u64 = 16;
+/// Conses that a turn allocates.
+const TURN: u64 = 500_000;
+
+const DEFINITIONS: &str = "
+(defun tree (n)
+  (if (< n 2)
+      (list n)
+      (let ((half (floor (- n 1) 2)))
+        (cons (tree half) (tree (- n 1 half))))))
+(defun churn (n)
+  (let ((kept nil))
+    (dotimes (i n)
+      (setq kept (if (= (mod i 1000) 0) nil (cons i kept))))))";
+
+/// Runs a program that allocates as much as it takes for a whole cycle, in steps of a slice's length, and gives the
+/// longest of these: a slice of the program with a turn of the collector in it.
+fn longest_step(engine: &mut Engine) -> Duration {
+    let machine = engine.machine();
+    let cycles = machine.heap_stats().cycles;
+    let text = Datum::string("(churn 100000000)", Default::default());
+    let text = machine.import(&text).expect("there is room");
+    let id = machine.spawn_library("%EVAL-TEXT", &[text]).expect("the library has it");
+    let mut longest = Duration::ZERO;
+    while machine.heap_stats().cycles < cycles + 2 {
+        let start = Instant::now();
+        let outcome = machine.run(2000);
+        longest = longest.max(start.elapsed());
+        assert_eq!(outcome, RunOutcome::TicksUsed, "the program goes on for ever");
+    }
+    machine.abort(id);
+    while machine.result(id) == TaskResult::Running {
+        machine.run(2000);
+    }
+    machine.forget(id);
+    longest
+}
+
+/// What it takes to make a machine with the library, and to run the shortest of programs in it.
+fn startup(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("startup");
+    let host = || Box::new(VirtualHost::new());
+    group.bench_function("machine", |bencher| {
+        bencher.iter(|| program::machine(Config::default(), host()).expect("there is room for the library"));
+    });
+    let hello = include_str!("../programs/hello.esl");
+    let compiled = program::compile(&[Source::new("hello.esl", hello)]);
+    let bytes = compiled.program.expect("it compiles").to_bytes().expect("it can be written");
+    group.bench_function("hello", |bencher| {
+        bencher.iter(|| {
+            let program = Program::from_bytes(black_box(&bytes)).expect("it is sound");
+            program::run(&program, Config::default(), host()).expect("it runs")
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, interpreter, collector, startup);
+criterion_main!(benches);

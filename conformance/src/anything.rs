@@ -1,0 +1,108 @@
+//! Input of any kind, for tests and fuzzing that look for panics, hangs, and what the verifier lets through.
+//!
+//! What is run has small limits of ticks and memory and a host without files, so whatever it is, it comes to an end soon.
+
+use std::time::{Duration, Instant};
+
+use esl::Config;
+use esl::host::VirtualHost;
+use esl::program;
+use esl_bytecode::compile::{Compile, drive};
+use esl_bytecode::module::Module;
+use esl_bytecode::span::SourceId;
+use esl_bytecode::{file, verify};
+use esl_compiler::diagnostic::{Renderer, Sources};
+use esl_compiler::session::Compiler;
+use esl_vm::vm::Vm;
+
+/// Ticks that a run may take.
+const TICKS: u64 = 100_000;
+/// The longest that one input may take. The limit of ticks ends it long before that, or does not do what it is for.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+fn machine() -> Vm {
+    let config = Config { memory: 24 << 20, stack: 1 << 13, budget: Some(3 * TICKS), ..Config::default() };
+    let host = VirtualHost::new().with_output_limit(1 << 20).without_files();
+    program::machine(config, Box::new(host)).expect("there is room for the library")
+}
+
+/// Does something that may not take long.
+fn hasten<T>(what: &str, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let result = work();
+    assert!(start.elapsed() < PATIENCE, "{what} took {:?}", start.elapsed());
+    result
+}
+
+/// Reads bytes as data. Gives the numbers of data and of diagnostics.
+pub fn read(bytes: &[u8]) -> (usize, usize) {
+    hasten("reading", || esl_compiler::reader::read_anything(bytes))
+}
+
+/// Compiles a text, draws its diagnostics, and verifies the module if there is one.
+///
+/// # Panics
+/// If the verifier refuses what the compiler has made.
+pub fn compile(text: &str) -> Option<Module> {
+    let mut machine = machine();
+    let source = SourceId::default();
+    let mut compilation = Compiler::for_source(source).compile_text("anything.esl", text);
+    let (module, diagnostics) = hasten("compiling", || drive(&mut *compilation, &mut machine));
+    let mut sources = Sources::new();
+    sources.add("anything.esl", Some(text.into()));
+    for diagnostic in diagnostics.iter().take(100) {
+        Renderer::default().render(diagnostic, &sources);
+    }
+    if let Some(module) = &module {
+        verify::verify(module).expect("the verifier accepts what the compiler makes");
+    }
+    module
+}
+
+/// Verifies a module, and runs it if it is accepted; whether it was.
+pub fn run(module: &Module) -> bool {
+    if verify::verify(module).is_err() {
+        return false;
+    }
+    let mut machine = machine();
+    let Ok(functions) = machine.load_module(module) else { return false };
+    // How it ends is its own business.
+    drop(hasten("running", || machine.run_toplevel(functions, TICKS)));
+    true
+}
+
+/// Reads bytes as a file of bytecode, with checksums that fit, and runs what the verifier accepts; whether it did.
+pub fn run_file(bytes: &[u8]) -> bool {
+    match file::read(bytes) {
+        Ok(module) => run(&module),
+        Err(error) => {
+            drop(error.to_string());
+            false
+        }
+    }
+}
+
+/// The bytes as a file whose checksums are right, as far as it has sections: damage that only checksums would find is not
+/// what fuzzing looks for.
+pub fn with_checksums(bytes: &[u8]) -> Vec<u8> {
+    const TABLE: usize = 32;
+    const ENTRY: usize = 16;
+    const HEADER: usize = TABLE + 6 * ENTRY + 4;
+    let mut file = bytes.to_vec();
+    if file.len() < HEADER {
+        return file;
+    }
+    let word = |file: &[u8], at: usize| {
+        file[at..at + 4].iter().rev().fold(0_usize, |word, &byte| word << 8 | usize::from(byte))
+    };
+    for entry in (TABLE..HEADER - 4).step_by(ENTRY) {
+        let (start, length) = (word(&file, entry + 4), word(&file, entry + 8));
+        if let Some(section) = start.checked_add(length).and_then(|end| file.get(start..end)) {
+            let checksum = crc32fast::hash(section);
+            file[entry + 12..entry + 16].copy_from_slice(&checksum.to_le_bytes());
+        }
+    }
+    let checksum = crc32fast::hash(&file[..HEADER - 4]);
+    file[HEADER - 4..HEADER].copy_from_slice(&checksum.to_le_bytes());
+    file
+}

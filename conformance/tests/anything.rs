@@ -1,0 +1,228 @@
+//! Programs that nobody would write: the conformance programs with their tokens mixed up, and their bytecode with
+//! instructions changed. Nothing may panic, hang, or get past the verifier and do harm.
+//!
+//! `PROPTEST_CASES=10000 cargo test -p esl-conformance --test anything --features paranoid` looks longer.
+
+use std::path::Path;
+use std::sync::LazyLock;
+
+use esl_bytecode::module::Module;
+use esl_conformance::anything;
+use proptest::prelude::*;
+use proptest::sample::Index;
+
+/// The texts of all conformance programs but those that are large on purpose.
+static TEXTS: LazyLock<Vec<String>> = LazyLock::new(|| {
+    let mut texts = Vec::new();
+    let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("programs")];
+    while let Some(folder) = folders.pop() {
+        let mut paths: Vec<_> = folder
+            .read_dir()
+            .expect("the folder is there")
+            .map(|entry| entry.expect("it can be read").path())
+            .collect();
+        paths.sort();
+        for path in paths {
+            match path.is_dir() {
+                true if !path.ends_with("limits") => folders.push(path),
+                true => {}
+                false => texts.extend(std::fs::read_to_string(&path).ok()),
+            }
+        }
+    }
+    texts
+});
+
+fn text_at(index: &Index) -> &'static str {
+    &TEXTS[index.index(TEXTS.len())]
+}
+
+/// The tokens of a text, comments left out: parentheses, quotes, strings, everything else between blanks.
+fn tokens(text: &str) -> Vec<&str> {
+    let mut tokens = Vec::new();
+    let mut rest = text.trim_start();
+    while let Some(first) = rest.chars().next() {
+        let length = match first {
+            ';' => rest.find('\n').unwrap_or(rest.len()),
+            '"' => rest[1..].find('"').map_or(rest.len(), |end| end + 2),
+            '(' | ')' | '\'' | '`' | ',' => 1,
+            _ => rest.find(|c: char| c.is_whitespace() || "()'`,;\"".contains(c)).unwrap_or(rest.len()),
+        };
+        if first != ';' {
+            tokens.push(&rest[..length]);
+        }
+        rest = rest[length..].trim_start();
+    }
+    tokens
+}
+
+#[derive(Clone, Debug)]
+enum Change {
+    Delete(Index),
+    Repeat(Index),
+    Swap(Index, Index),
+    /// Puts a token of another program in the place of one.
+    Replace(Index, Index, Index),
+    /// Puts a form of another program in the place of a token.
+    Graft(Index, Index, Index),
+    Wrap(Index),
+}
+
+fn change() -> impl Strategy<Value = Change> {
+    let index = any::<Index>;
+    prop_oneof![
+        index().prop_map(Change::Delete),
+        index().prop_map(Change::Repeat),
+        (index(), index()).prop_map(|(a, b)| Change::Swap(a, b)),
+        (index(), index(), index()).prop_map(|(at, text, token)| Change::Replace(at, text, token)),
+        (index(), index(), index()).prop_map(|(at, text, token)| Change::Graft(at, text, token)),
+        index().prop_map(Change::Wrap),
+    ]
+}
+
+/// Position after the form that begins at `start`.
+fn end_of_form(tokens: &[&str], start: usize) -> usize {
+    let mut depth = 0_usize;
+    for (position, &token) in tokens.iter().enumerate().skip(start) {
+        match token {
+            "(" => depth += 1,
+            ")" => depth = depth.saturating_sub(1),
+            "'" | "`" | "," => continue,
+            _ => {}
+        }
+        if depth == 0 {
+            return position + 1;
+        }
+    }
+    tokens.len()
+}
+
+fn mix(text: &Index, changes: &[Change]) -> String {
+    let mut mixed = tokens(text_at(text));
+    for change in changes {
+        if mixed.is_empty() {
+            break;
+        }
+        let size = mixed.len();
+        match change {
+            Change::Delete(at) => _ = mixed.remove(at.index(size)),
+            Change::Repeat(at) => {
+                let start = at.index(size);
+                let form = mixed[start..end_of_form(&mixed, start)].to_vec();
+                mixed.splice(start..start, form);
+            }
+            Change::Swap(a, b) => mixed.swap(a.index(size), b.index(size)),
+            Change::Replace(at, text, token) => {
+                let other = tokens(text_at(text));
+                mixed[at.index(size)] = other[token.index(other.len())];
+            }
+            Change::Graft(at, text, token) => {
+                let other = tokens(text_at(text));
+                let start = token.index(other.len());
+                let form = other[start..end_of_form(&other, start)].to_vec();
+                let at = at.index(size);
+                mixed.splice(at..=at, form);
+            }
+            Change::Wrap(at) => {
+                let start = at.index(size);
+                let end = end_of_form(&mixed, start);
+                mixed.insert(end, ")");
+                mixed.insert(start, "(");
+            }
+        }
+    }
+    mixed.join(" ")
+}
+
+/// A change of one thing of a module: which function, what of it, where, and to what.
+type Patch = (Index, u8, Index, u32);
+
+fn patch(module: &mut Module, (function, what, at, to): &Patch) {
+    if module.functions.is_empty() {
+        return;
+    }
+    let pool = module.constants.len().max(1) as u32;
+    let count = module.functions.len();
+    let function = &mut module.functions[function.index(count)];
+    if function.code.is_empty() {
+        return;
+    }
+    let words = function.code.len();
+    let at_word = at.index(words);
+    match what {
+        // A byte of an instruction, a little more or less of one, a bit.
+        0..=3 => {
+            let shift = 8 * u32::from(what % 4);
+            function.code[at_word] = function.code[at_word] & !(0xff << shift) | (to & 0xff) << shift;
+        }
+        4 => function.code[at_word] = function.code[at_word].wrapping_add(1 << (8 * (to % 4))),
+        5 => function.code[at_word] = function.code[at_word].wrapping_sub(1 << (8 * (to % 4))),
+        6 => function.code[at_word] ^= 1 << (to % 32),
+        7 => function.code.swap(at_word, *to as usize % words),
+        8 => _ = function.code.remove(at_word),
+        9 => function.code.insert(at_word, function.code[*to as usize % words]),
+        10 => function.registers = (to % 256) as u8,
+        11 => function.parameters.required = (to % 4) as u8,
+        12 => _ = function.captures.pop(),
+        13 if !function.constants.is_empty() => {
+            let place = at.index(function.constants.len());
+            function.constants[place].0 = to % pool;
+        }
+        14 => module.constants.swap(at.index(pool as usize), (to % pool) as usize),
+        _ => {
+            if let Some(number) = module.toplevel.first_mut() {
+                number.0 = to % (count as u32 + 1);
+            }
+        }
+    }
+}
+
+fn cases() -> u32 {
+    std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(100)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(), max_shrink_iters: 200, ..ProptestConfig::default() })]
+
+    #[test]
+    fn mixed_up_programs_compile_and_run_without_harm(
+        text in any::<Index>(),
+        changes in prop::collection::vec(change(), 1..8),
+    ) {
+        if let Some(module) = anything::compile(&mix(&text, &changes)) {
+            prop_assert!(anything::run(&module));
+        }
+    }
+
+    #[test]
+    fn the_verifier_lets_nothing_harmful_through(
+        text in any::<Index>(),
+        patches in prop::collection::vec((any::<Index>(), 0..16_u8, any::<Index>(), any::<u32>()), 1..4),
+    ) {
+        if let Some(mut module) = anything::compile(text_at(&text)) {
+            patches.iter().for_each(|change| patch(&mut module, change));
+            anything::run(&module);
+        }
+    }
+
+    #[test]
+    fn files_with_right_checksums_run_or_are_refused(
+        text in any::<Index>(),
+        bytes in prop::collection::vec((any::<Index>(), any::<u8>()), 0..4),
+    ) {
+        if let Some(module) = anything::compile(text_at(&text)) {
+            let mut file = esl_bytecode::file::write(&module).expect("it can be written");
+            for (at, byte) in bytes {
+                let at = at.index(file.len());
+                file[at] = byte;
+            }
+            anything::run_file(&anything::with_checksums(&file));
+        }
+    }
+
+    #[test]
+    fn bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        anything::read(&bytes);
+        anything::run_file(&bytes);
+    }
+}

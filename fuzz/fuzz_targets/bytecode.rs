@@ -1,0 +1,6 @@
+//! Bytes as a compiled file, their checksums put right first: what the verifier accepts runs without harm.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    esl_conformance::anything::run_file(&esl_conformance::anything::with_checksums(bytes));
+});
