@@ -134,7 +134,12 @@ const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 /// `(log a)`
 pub(crate) fn log(vm: &mut Vm, a: Value) -> Outcome {
     let (bits, x) = log_parts(vm, a)?;
-    vm.float_value("LOG", (transcendental::log(x) + bits * LN_2_LOW) + bits * LN_2_HIGH)
+    vm.float_value("LOG", natural_log(bits, x))
+}
+
+/// The logarithm of `x · 2^bits`.
+fn natural_log(bits: f64, x: f64) -> f64 {
+    (transcendental::log(x) + bits * LN_2_LOW) + bits * LN_2_HIGH
 }
 
 /// `(log a base)`
@@ -148,7 +153,7 @@ pub(crate) fn log_in_base(vm: &mut Vm, a: Value, base: Value) -> Outcome {
     if let Some(power) = exact_log(vm, a, base) {
         return vm.float_value("LOG", power);
     }
-    let (numerator, denominator) = (transcendental::log2(x) + a_bits, transcendental::log2(y) + base_bits);
+    let (numerator, denominator) = (natural_log(a_bits, x), natural_log(base_bits, y));
     if denominator == 0.0 {
         return vm.raise(Raised::DivisionByZero("LOG", [a, base]));
     }
