@@ -60,7 +60,8 @@ impl Vm {
         }
         let labels: Vec<String> = events.iter().map(|&event| self.event_label(event)).collect();
         match &labels[..] {
-            [label] if self.heap.is(first, Kind::Task) => format!("the end of {label}"),
+            [label] if what == self.world.known.task_end => format!("the end of {label}"),
+            [label] if self.heap.is(first, Kind::Task) => format!("a signal of {label}"),
             labels => labels.join(" or "),
         }
     }

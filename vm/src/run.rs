@@ -361,14 +361,18 @@ impl Vm {
         if let Some(budget) = self.config.budget {
             slice = slice.min(budget.saturating_sub(self.spent));
         }
-        let task = self.task();
-        if task.account != AccountId::NONE {
-            slice = slice.min(self.accounts.left(task.account));
+        let account = self.task().account;
+        if account != AccountId::NONE {
+            slice = slice.min(self.accounts.left(account));
         }
-        if task.control.get().is_some_and(|control| !control.running.is_empty()) {
-            slice = slice.min(self.cleanup_ticks_left());
+        if self.task().control.get().is_some_and(|control| !control.running.is_empty()) {
+            let left = self.cleanup_ticks_left();
+            slice = slice.min(left);
+            if left == 0 {
+                self.task_mut().flags.set_attention(true);
+            }
         }
-        if task.critical > 0 {
+        if self.task().critical > 0 {
             slice = slice.min(self.critical_left.max(1) as u64);
         }
         slice.max(1)

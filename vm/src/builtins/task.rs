@@ -40,7 +40,8 @@ impl Vm {
             self.cancel_wait();
             return None;
         }
-        let options = WaitOptions { urgent, child, ..WaitOptions::default() };
+        let what = self.world.known.task_end;
+        let options = WaitOptions { urgent, child, what, ..WaitOptions::default() };
         Some(take_or_park(self, task, options))
     }
 }

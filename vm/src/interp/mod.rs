@@ -1041,15 +1041,18 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 },
 
                 // ---- stubs
-                Operation::ErrorReturn => {
-                    let signal = raise::error_return(vm, pc, base);
+                Operation::ErrorReturn | Operation::InterruptReturn => {
+                    let signal = if word as u8 == crate::stub::ERROR_RETURN {
+                        raise::error_return(vm, pc, base)
+                    } else {
+                        raise::interrupt_return(vm, pc, base)
+                    };
                     // It has found the place to go on at.
                     pc = vm.cpu.pc;
                     base = vm.cpu.base;
                     break signal;
                 }
                 Operation::TaskExit => break Signal::TaskExit,
-                Operation::InterruptReturn => break raise::interrupt_return(vm, pc, base),
             }
         }
     };

@@ -1,0 +1,116 @@
+//! Runs the programs about tasks under many schedules: what the language promises holds under each of them.
+//!
+//! A failure names the seed and the slice, and the choices that were made: `Choices::given` reproduces the run from them.
+
+use std::path::Path;
+
+use esl::Config;
+use esl::host::VirtualHost;
+use esl::program::{self, Program, Source};
+use esl_conformance::Expectations;
+use esl_vm::schedule::Choices;
+
+/// Seeds for each slice; 0 is plain round-robin.
+const SEEDS: u64 = 100;
+const SLICES: [u32; 4] = [1, 7, 100, 2000];
+
+/// What a run did: the lines that it wrote, its status, and the choices that led there.
+struct Run {
+    lines: Vec<String>,
+    status: u8,
+    choices: Vec<u32>,
+    errors: String,
+    ticks: u64,
+}
+
+fn run(program: &Program, choices: Choices, slice: u32) -> Run {
+    let host = VirtualHost::new();
+    let captured = host.captured();
+    let config = Config { slice, ..Config::default() };
+    let mut machine = program::machine(config, Box::new(host)).expect("there is room for the library");
+    machine.set_choices(choices.recorded());
+    let report = program::run_in(&mut machine, program).expect("the program can be begun");
+    let output = captured.output();
+    let lines = output.lines().map(str::trim_end).filter(|line| !line.is_empty()).map(String::from);
+    Run {
+        lines: lines.collect(),
+        status: report.ended.status(),
+        choices: machine.choices().made().to_vec(),
+        errors: captured.error(),
+        ticks: report.ticks,
+    }
+}
+
+fn compile(name: &str, text: &str) -> Program {
+    program::compile(&[Source::new(name, text)]).program.expect("the program compiles")
+}
+
+#[test]
+fn programs_do_what_they_say_under_every_schedule() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("programs/tasks");
+    let mut names: Vec<String> = std::fs::read_dir(&folder)
+        .expect("the folder is there")
+        .map(|entry| entry.expect("it can be read").file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    let mut failures = Vec::new();
+    for name in names {
+        let text = std::fs::read_to_string(folder.join(&name)).expect("the program can be read");
+        if text.lines().any(|line| line.starts_with("; schedules: skip")) {
+            continue;
+        }
+        let expected = Expectations::parse(&text).expect("its comments are well-formed");
+        let program = compile(&name, &text);
+        'schedules: for slice in SLICES {
+            for seed in 0..SEEDS {
+                let run = run(&program, Choices::seeded(seed), slice);
+                if run.lines != expected.output || run.status != expected.expected_status() {
+                    failures.push(format!(
+                        "{name}, seed {seed}, slice {slice}: status {}\nexpected {:?}\nfound    {:?}\n{}choices {:?}",
+                        run.status, expected.output, run.lines, run.errors, run.choices
+                    ));
+                    break 'schedules;
+                }
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n\n"));
+}
+
+/// Four tasks that each write their name a few times.
+const RACE: &str = "(dolist (name '(a b c d))
+                      (let ((name name))
+                        (spawn (dotimes (i 5) (princ name) (sleep 0)))))";
+
+#[test]
+fn seeds_vary_the_schedule() {
+    let program = compile("race", RACE);
+    let mut outputs: Vec<Vec<String>> =
+        (0..100).map(|seed| run(&program, Choices::seeded(seed), 100).lines).collect();
+    outputs.sort();
+    outputs.dedup();
+    assert!(outputs.len() > 90, "only {} different runs", outputs.len());
+}
+
+#[test]
+fn the_same_seed_gives_the_same_run_to_the_tick() {
+    let program = compile("race", RACE);
+    for seed in [0, 1, 77] {
+        let runs = [(); 2].map(|()| run(&program, Choices::seeded(seed), 7));
+        assert_eq!((&runs[0].lines, runs[0].ticks), (&runs[1].lines, runs[1].ticks));
+    }
+}
+
+#[test]
+fn a_schedule_can_be_given_as_a_list_of_choices() {
+    let program = compile("race", RACE);
+    let first = run(&program, Choices::seeded(3), 50);
+    assert!(!first.choices.is_empty());
+    let again = run(&program, Choices::given(&first.choices), 50);
+    assert_eq!((again.lines, again.ticks, again.choices), (first.lines, first.ticks, first.choices));
+    // Any list is legal: what it leaves open is the first choice.
+    let other = run(&program, Choices::given(&[3, 1, 4, 1, 5, 9, 2, 6]), 50);
+    let mut letters: Vec<char> = other.lines.concat().chars().collect();
+    letters.sort_unstable();
+    assert_eq!(String::from_iter(letters), "aaaaabbbbbcccccddddd".to_uppercase());
+}
