@@ -3,8 +3,11 @@
 use std::sync::Arc;
 
 use esl_bytecode::compile::drive;
+use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::module::Module;
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
 use esl_bytecode::verify::verify;
 use esl_bytecode::{disasm, file};
 use esl_compiler::diagnostic::Sources;
@@ -176,6 +179,22 @@ pub fn machine(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, String>
     esl_stdlib::load(&mut machine)?;
     machine.begin_program(config);
     Ok(machine)
+}
+
+/// Has a machine write what happens to `failures` or `goals` to its error output. Nothing changes if `traces` is empty.
+///
+/// # Errors
+/// A text, if there is no room for that.
+pub fn set_traces(machine: &mut Vm, traces: &[String]) -> Result<(), String> {
+    if traces.is_empty() {
+        return Ok(());
+    }
+    let keywords =
+        traces.iter().map(|name| Datum::symbol(Symbol::keyword(&name.to_uppercase()), Span::default()));
+    let list = Datum::list(keywords.collect::<Vec<_>>(), Span::default());
+    let list = machine.import(&list).map_err(|_| "there is no room for the names of traces".to_string())?;
+    let function = machine.library_function("%SET-TRACES")?;
+    machine.call(function, &[list], u64::MAX).map(|_| ())
 }
 
 /// Runs a program to its end.

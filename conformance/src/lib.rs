@@ -115,6 +115,9 @@ impl Expectations {
     }
 }
 
+pub mod chapter;
+pub mod session;
+
 #[cfg(test)]
 mod tests {
     use super::*;

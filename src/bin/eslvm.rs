@@ -33,6 +33,9 @@ enum Action {
         /// Print figures of the run to standard error when it is over
         #[arg(long)]
         stats: bool,
+        /// Write to standard error what happens to failures or goals: a list such as failures,goals
+        #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = ["failures", "goals"])]
+        trace: Vec<String>,
         /// A source or bytecode file; `-` is a source from standard input
         file: PathBuf,
         /// Arguments of the program
@@ -88,7 +91,9 @@ impl Limits {
 
 fn main() -> ExitCode {
     let status = match command::parse::<Command>().action {
-        Action::Run { limits, stats, file, arguments } => run(&file, arguments, &limits, stats),
+        Action::Run { limits, stats, trace, file, arguments } => {
+            run(&file, arguments, &limits, stats, &trace)
+        }
         Action::Repl { limits } => esl::repl::run(limits.config()),
     };
     ExitCode::from(status.unwrap_or_else(|status| status))
@@ -106,7 +111,13 @@ fn program(file: &Path) -> Result<Program, u8> {
     compiled.program.ok_or(NOT_COMPILED)
 }
 
-fn run(file: &Path, arguments: Vec<String>, limits: &Limits, stats: bool) -> Result<u8, u8> {
+fn run(
+    file: &Path,
+    arguments: Vec<String>,
+    limits: &Limits,
+    stats: bool,
+    trace: &[String],
+) -> Result<u8, u8> {
     let program = program(file)?;
     let setup = |text| {
         complain(text);
@@ -119,6 +130,7 @@ fn run(file: &Path, arguments: Vec<String>, limits: &Limits, stats: bool) -> Res
     let waker = host.waker();
     let mut machine = program::machine(limits.config(), Box::new(host)).map_err(setup)?;
     command::end_on_signal(machine.interrupt_flag(), waker);
+    program::set_traces(&mut machine, trace).map_err(setup)?;
     let started = std::time::Instant::now();
     let report = program::run_in(&mut machine, &program).map_err(setup)?;
     match report.ended {

@@ -10,7 +10,7 @@ mod editor;
 use std::io::{BufRead, IsTerminal, Write};
 
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_vm::host::RealHost;
+use esl_vm::host::{FileAccess, RealHost};
 use esl_vm::task::TaskResult;
 use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
@@ -63,13 +63,14 @@ impl Lines for Pipe {
 /// # Errors
 /// The exit status, if the machine could not be made.
 pub fn run(config: Config) -> Result<u8, u8> {
-    let host = RealHost::new(Vec::new());
+    let host = RealHost::new(Vec::new()).with_files(FileAccess::All);
     let waker = host.waker();
     let machine = program::machine(config, Box::new(host)).map_err(|text| {
         complain(text);
         USAGE
     })?;
-    let mut session = Session { machine };
+    let mut session = Session { machine, failure: None };
+    session.call("%REPL-BEGIN", "");
     interrupt_on_signal(session.machine.interrupt_flag(), waker);
     if std::io::stdin().is_terminal() {
         let mut editor = editor::Editor::new();
@@ -81,6 +82,8 @@ pub fn run(config: Config) -> Result<u8, u8> {
 
 struct Session {
     machine: Vm,
+    /// The report of the last failure, for `:bt`.
+    failure: Option<String>,
 }
 
 /// What is to be done after a form.
@@ -158,7 +161,10 @@ impl Session {
                 return Next::Quit(SUCCESS);
             }
             ":load" => drop(self.call("%REPL-LOAD", argument.trim())),
-            ":bt" => drop(self.call("%REPL-BACKTRACE", "")),
+            ":bt" => match &self.failure {
+                Some(report) => print!("{report}"),
+                None => println!("Nothing has failed."),
+            },
             _ => print!("{HELP}"),
         }
         self.next()
@@ -178,20 +184,37 @@ impl Session {
         self.machine.run(u64::MAX);
         self.machine.set_interruptible(None);
         let result = self.machine.result(task);
+        let report = self.machine.report(task).map(String::from);
         self.machine.forget(task);
         self.machine.flush();
         match result {
-            TaskResult::Succeeded(values) => values.first().copied(),
-            _ => {
-                if self.machine.exit_status().is_none() {
-                    println!("Aborted");
+            TaskResult::Succeeded(values) => return values.first().copied(),
+            TaskResult::Failed(_) => match report {
+                Some(report) => {
+                    print!("{}", in_short(&report));
+                    self.failure = Some(report);
                 }
-                // What could not be written will be missed when the next value is.
-                _ = std::io::stdout().flush();
-                None
-            }
+                None => println!("Aborted"),
+            },
+            _ if self.machine.exit_status().is_none() => println!("Aborted"),
+            _ => {}
         }
+        // What could not be written will be missed when the next value is.
+        _ = std::io::stdout().flush();
+        None
     }
+}
+
+/// What is shown of a failure's report at once: what went wrong, unless the last lines say that already, and those. What is
+/// left out are the frames, which `:bt` shows.
+fn in_short(report: &str) -> String {
+    let lines: Vec<&str> = report.lines().collect();
+    let ending = lines.len().saturating_sub(2);
+    let (text, ending) = lines.split_at(ending);
+    let text = text.iter().take_while(|line| !line.starts_with("  in ") && !line.starts_with("  while "));
+    let is_plain = lines.first().is_some_and(|line| line.starts_with("A failure of cause "));
+    let shown = text.filter(|_| !is_plain).chain(ending);
+    shown.flat_map(|line| [line, "\n"]).collect()
 }
 
 /// Whether a line that begins with a colon is a command of the REPL, not a keyword to be evaluated.

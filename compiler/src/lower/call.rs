@@ -171,7 +171,8 @@ impl<'a> Frame<'_, 'a> {
 
     /// Lowers a call whose callee and arguments are not opened up.
     pub(super) fn emit_call(&mut self, target: Target<'a>, arguments: &'a [NodeId], dest: Dest) {
-        if self.keeps_its_frame(dest) {
+        let fails = matches!(target, Target::Global(name) if fails(name));
+        if self.keeps_its_frame(dest) || matches!(dest, Dest::Tail) && fails {
             self.emit_call(target, arguments, Dest::All);
             return self.finish(Dest::All, dest);
         }
@@ -325,6 +326,11 @@ impl<'a> Frame<'_, 'a> {
         self.registers.reserve(window, 1);
         self.deliver(window, dest);
     }
+}
+
+/// Whether a function fails: backtraces are to show who has called it.
+fn fails(function: &Symbol) -> bool {
+    function.is_cl("ERROR") || *function == Symbol::esl("FAIL")
 }
 
 /// Whether a builtin takes so many arguments.

@@ -1,0 +1,67 @@
+//! The examples of a chapter of the manual.
+//!
+//! A fenced block of `lisp` is a piece of program; the pieces of a chapter are one program, in order. A block without a
+//! language right behind it is what that piece prints. A block of `repl` is a session (see [`crate::session`]) in which the
+//! pieces before it are loaded. Blocks of other languages are not looked at.
+
+/// An example.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Example {
+    /// A piece of program, and what it prints; `None` if the manual does not say.
+    Program {
+        /// The text.
+        text: String,
+        /// What it prints.
+        output: Option<String>,
+    },
+    /// A session.
+    Session(String),
+}
+
+/// The examples of a chapter, each with the line on which it begins.
+///
+/// # Errors
+/// A text, if a block is not closed, or output stands behind no program.
+pub fn examples(markdown: &str) -> Result<Vec<(usize, Example)>, String> {
+    let mut found: Vec<(usize, Example)> = Vec::new();
+    let mut lines = markdown.lines().enumerate();
+    while let Some((index, line)) = lines.next() {
+        let Some(language) = line.strip_prefix("```") else { continue };
+        let mut text = String::new();
+        loop {
+            match lines.next() {
+                Some((_, "```")) => break,
+                Some((_, line)) => {
+                    text.push_str(line);
+                    text.push('\n');
+                }
+                None => return Err(format!("line {}: a block that is not closed", index + 1)),
+            }
+        }
+        match language.trim() {
+            "lisp" => found.push((index + 1, Example::Program { text, output: None })),
+            "repl" => found.push((index + 1, Example::Session(text))),
+            "" => match found.last_mut() {
+                Some((_, Example::Program { output: output @ None, .. })) => *output = Some(text),
+                _ => return Err(format!("line {}: output of no program", index + 1)),
+            },
+            _ => {}
+        }
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_programs_outputs_and_sessions() {
+        let text = "A\n```lisp\n(print 1)\n```\nprints\n```\n1\n```\n```repl\n? 5\n5\n```\n```sh\nls\n```\n";
+        let found = examples(text).unwrap();
+        let program = Example::Program { text: "(print 1)\n".into(), output: Some("1\n".into()) };
+        assert_eq!(found, [(2, program), (9, Example::Session("? 5\n5\n".into()))]);
+        assert!(examples("```lisp\n(print 1)").is_err());
+        assert!(examples("```\n1\n```\n").is_err());
+    }
+}

@@ -1,0 +1,86 @@
+//! The examples of the manual, `docs/manual/*.md`, run by the commands. `conformance/src/chapter.rs` says how they are
+//! written.
+
+use std::io::Write;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use esl_conformance::chapter::{Example, examples};
+use esl_conformance::session::{Session, compare};
+use libtest_mimic::{Arguments, Failed, Trial};
+
+/// Printed before each piece of a program, with its number.
+const MARK: &str = "@@ piece ";
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/manual");
+    let mut trials = Vec::new();
+    for entry in std::fs::read_dir(folder).expect("the manual is there") {
+        let path = entry.expect("the folder of the manual can be read").path();
+        if path.extension().is_some_and(|extension| extension == "md") {
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            trials.push(Trial::test(name, move || check(&std::fs::read_to_string(&path)?)));
+        }
+    }
+    libtest_mimic::run(&arguments, trials).exit();
+}
+
+fn check(markdown: &str) -> Result<(), Failed> {
+    let mut program = String::new();
+    let mut outputs: Vec<(usize, Option<String>)> = Vec::new();
+    for (line, example) in examples(markdown)? {
+        match example {
+            Example::Program { text, output } => {
+                let number = outputs.len();
+                program.push_str(&format!("(format t \"~&{MARK}{number}~%\")\n{text}"));
+                outputs.push((line, output));
+            }
+            Example::Session(text) => {
+                let session = Session::parse(&text);
+                // The pieces so far, then a mark behind which the session's own output begins.
+                let number = outputs.len();
+                let begin = format!("(progn (format t \"~&{MARK}{number}~%\") (values))\n");
+                let found = eslvm(&["repl"], &format!("{program}{begin}{}", session.input))?;
+                let found = found.split(&format!("{MARK}{number}\n")).last().unwrap_or_default();
+                session.compare(found).map_err(|text| format!("the session on line {line}: {text}"))?;
+            }
+        }
+    }
+    if outputs.is_empty() {
+        return Ok(());
+    }
+    let found = eslvm(&["run", "--clock", "virtual", "-"], &program)?;
+    for (number, (line, expected)) in outputs.iter().enumerate() {
+        let Some(expected) = expected else { continue };
+        let begin = format!("{MARK}{number}\n");
+        let found = found.split_once(&begin).map_or("", |(_, rest)| rest);
+        let found = found.split(MARK).next().unwrap_or_default();
+        // `print` begins with an empty line, which the manual does not show.
+        let plain: String =
+            found.lines().filter(|line| !line.is_empty()).flat_map(|line| [line, "\n"]).collect();
+        compare(expected, &plain).map_err(|text| format!("the program on line {line}: {text}"))?;
+    }
+    Ok(())
+}
+
+/// What a command writes, errors included, with `input` typed.
+fn eslvm(arguments: &[&str], input: &str) -> Result<String, Failed> {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_eslvm"))
+        .args(arguments)
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()?;
+    let mut stdin = child.stdin.take().ok_or("no standard input")?;
+    let input = input.to_string();
+    let writer = std::thread::spawn(move || stdin.write_all(input.as_bytes()));
+    let output = child.wait_with_output()?;
+    _ = writer.join();
+    let errors = String::from_utf8(output.stderr)?;
+    if !errors.is_empty() {
+        return Err(format!("{arguments:?} wrote to standard error:\n{errors}").into());
+    }
+    Ok(String::from_utf8(output.stdout)?)
+}
