@@ -22,6 +22,8 @@ pub(super) enum PlaceUse {
     Getf(Form),
     /// Makes an `ldb` or `mask-field` place of the newest place.
     Field(Form),
+    /// Gives the five parts of the newest place, as a list.
+    Parts,
     /// Stores the values of a form.
     Setf(Datum),
     /// Stores the values of forms, after all of them are computed.
@@ -72,6 +74,7 @@ impl Machine {
                 self.values_place(environment, count, to);
                 return Ok(());
             }
+            PlaceUse::Parts => self.sound(1).map(|places| make.quote(places[0].parts())),
             PlaceUse::Getf(form) => {
                 self.getf_place(environment, &form, to);
                 return Ok(());
@@ -272,6 +275,13 @@ pub(super) fn setf(machine: &mut Machine, _: &mut dyn Environment, form: Form, t
             machine.schedule(jobs);
         }
     }
+    Ok(())
+}
+
+/// `(%place-parts place)`: what `get-setf-expansion` returns for a place, as a list.
+pub(super) fn place_parts(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    form.takes(1..=1, "takes one place")?;
+    machine.schedule([Job::Place(form.args[0].clone(), to), Job::Use(Box::new(PlaceUse::Parts), to)]);
     Ok(())
 }
 

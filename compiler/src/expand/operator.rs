@@ -88,6 +88,7 @@ const OWN: &[(&str, Operator)] = &[
     ("%MACRO-LAMBDA", destructure::macro_lambda),
     ("%MODIFY", modify::modify),
     ("%NAMED-LAMBDA", lambda::named_lambda),
+    ("%PLACE-PARTS", modify::place_parts),
     ("%UNQUOTE", backquote::misplaced_unquote),
     ("%UNQUOTE-SPLICING", backquote::misplaced_unquote),
     ("%WITH-FAILURE-CLEANUP", recovery::with_failure_cleanup),

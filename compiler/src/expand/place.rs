@@ -88,6 +88,18 @@ impl Place {
         Ok(found)
     }
 
+    /// The five parts, as a list: variables, forms, stores, writer, reader.
+    pub(super) fn parts(&self) -> Datum {
+        let make = self.make;
+        make.list([
+            make.items(self.temporaries.iter().map(|(variable, _)| variable.clone())),
+            make.items(self.temporaries.iter().map(|(_, form)| form.clone())),
+            make.items(self.stores.iter().cloned()),
+            self.write_stores(),
+            self.reader.clone(),
+        ])
+    }
+
     /// Whether this is a variable: reading it has no effect, and nothing has to be bound for it.
     pub(super) fn is_variable(&self) -> bool {
         self.temporaries.is_empty() && self.reader.as_symbol().is_some()
