@@ -7,7 +7,7 @@
 //! of 32 bits. `R[n]` is a register of the current frame, `K[n]` a constant of the function. Jumps are relative to the
 //! word after the instruction. Only the rows under "loops" jump back, and each of them is a tick; so is every call.
 //!
-//! Numbers are never given twice. Those from `0xC0` on belong to the virtual machine and are refused in files.
+//! Numbers are never given twice. 0 and those from `0xC0` on belong to the virtual machine and are refused in files.
 //!
 //! The word after the mnemonic says what becomes of the value that a recovery puts in place of a failed instruction:
 //! `value` goes to the first operand, `test` decides the jump, `call` is delivered as the results of a call,

@@ -1,6 +1,7 @@
 //! Instructions that only the virtual machine makes.
 //!
-//! Opcodes from `0xC0` on are refused in files, so whoever meets one of these knows that the machine has put it there.
+//! Opcode 0 and those from `0xC0` on are refused in files, so whoever meets one of these knows that the machine has put it
+//! there. (Because there is a 0, the loop's table of jumps begins there, and the opcode is its index as it is.)
 //! Each is one word: the opcode in the low byte, the operand, if any, in the 24 bits above or, where the text says
 //! *D16*, in the high half.
 
@@ -15,9 +16,9 @@ pub(crate) const LAZY: u8 = 0xC2;
 /// Where a recovery procedure returns to: its values take the place of the failed operation's.
 pub(crate) const ERROR_RETURN: u8 = 0xC3;
 /// Where the first function of a task returns to.
-pub(crate) const TASK_EXIT: u8 = 0xC4;
+pub(crate) const TASK_EXIT: u8 = 0;
 /// Where a function returns to that ran where its task was interrupted: the task goes on as it was.
-pub(crate) const INTERRUPT_RETURN: u8 = 0xC5;
+pub(crate) const INTERRUPT_RETURN: u8 = 0xC4;
 /// The word of an instruction whose operand takes 24 bits.
 pub(crate) const fn word(opcode: u8, operand: u32) -> u32 {
     debug_assert!(operand < 1 << 24);

@@ -8,12 +8,12 @@
 //!
 //! The link of an entry is a fixnum of the hash of its key (32 bits) and the number of the next entry of its bucket
 //! (29 bits). Numbers of entries are one too high in links and heads, so that 0 ends a chain. So a search touches one
-//! word of the heads, and what it needs of an entry is together. A segment of the directories holds [`SEGMENT`] entries
-//! and as many buckets; only the first one grows, by doubling.
+//! word of the heads, and what it needs of an entry is together. A segment of the directories holds [`SEGMENT`] entries,
+//! or the [`PER_ENTRY`] buckets of each; only the first one grows, by doubling.
 //!
-//! Invariant: a table has as many buckets as entries were ever in use (at least one). So each new entry adds one bucket,
-//! and that takes its share from one other bucket; nothing is ever rehashed at once, and no operation takes time in
-//! proportion to the size of the table. What was removed leaves a free entry, and the last one freed is the first to be
+//! Invariant: a table has [`PER_ENTRY`] buckets for each entry that was ever in use (and for one at least). So each new
+//! entry adds as many, and each of these takes its share from one other bucket; nothing is ever rehashed at once, and no
+//! operation takes time in proportion to the size of the table. What was removed leaves a free entry, and the last one freed is the first to be
 //! taken again, which is also where SBCL puts a new key: the order of iteration is the same.
 //!
 //! Not here: tests that are functions of the program. ESL calls them, over [`Table::candidates`], and [`Table::serial`] says
@@ -28,6 +28,9 @@ use crate::value::Value;
 /// Entries of a segment.
 pub(crate) const SEGMENT: usize = 1 << SHIFT;
 const SHIFT: usize = 12;
+/// Buckets for each entry. With one, a search for a key that is not there looks at one entry on the average, which may be
+/// anywhere in memory; with two at half of one.
+const PER_ENTRY: usize = 2;
 /// Entries for which a new table has room.
 const LEAST: usize = 8;
 
@@ -66,6 +69,12 @@ fn unlink(link: Value) -> (u32, usize) {
 #[inline]
 fn place(entry: usize) -> usize {
     ENTRY * (entry & (SEGMENT - 1))
+}
+
+/// The segment of the heads that a bucket has its head in, and where.
+#[inline]
+fn place_of_head(bucket: usize) -> (usize, usize) {
+    (bucket / (PER_ENTRY * SEGMENT), bucket % (PER_ENTRY * SEGMENT))
 }
 
 /// How a table compares keys.
@@ -179,12 +188,13 @@ impl Table {
 
     #[inline]
     fn view(self, heap: &Heap) -> View<'_> {
-        let slots = heap.record(self.0, Kind::HashTable).unwrap_or(&[Value::NIL; SLOTS]);
+        let slots = heap.record(self.0, Kind::HashTable).and_then(<[Value]>::first_chunk::<SLOTS>);
+        let slots = slots.unwrap_or(&[Value::NIL; SLOTS]);
         View {
             heap,
             entries: heap.vector(slots[ENTRIES]).unwrap_or_default(),
             heads: heap.vector(slots[HEADS]).unwrap_or_default(),
-            buckets: slots[USED].as_index().unwrap_or(0).max(1),
+            buckets: PER_ENTRY * slots[USED].as_index().unwrap_or(0).max(1),
         }
     }
 
@@ -222,13 +232,20 @@ impl Table {
         if key == Value::UNBOUND { None } else { Some((key, value)) }
     }
 
+    /// The value of an entry, if it has this very key.
+    #[inline]
+    pub(crate) fn value_of(self, heap: &Heap, entry: usize, key: Value) -> Option<Value> {
+        let [candidate, value, _] = self.view(heap).entry(entry);
+        if candidate == key && key != Value::UNBOUND { Some(value) } else { None }
+    }
+
     /// Gives an entry another value.
     pub(crate) fn set_value(self, heap: &mut Heap, entry: usize, value: Value) {
         let segment = self.segment(heap, entry);
         heap.vector_set(segment, place(entry) + 1, value);
     }
 
-    /// The entry of `key`, with a test of the machine; `hash` is the key's.
+    /// The entry of `key` and its value, with a test of the machine; `hash` is the key's.
     #[inline]
     pub(crate) fn find(
         self,
@@ -237,19 +254,19 @@ impl Table {
         key: Value,
         hash: u32,
         work: &mut usize,
-    ) -> Result<Option<usize>, Trouble> {
+    ) -> Result<Option<(usize, Value)>, Trouble> {
         let view = self.view(heap);
         let mut next = view.head(view.bucket(hash));
         while next != 0 {
-            let [candidate, _, link] = view.entry(next - 1);
+            let [candidate, value, link] = view.entry(next - 1);
             let (other, after) = unlink(link);
             // Where hashes differ, so do keys; that one key is another's very object is seen faster still.
             if candidate == key {
-                return Ok(Some(next - 1));
+                return Ok(Some((next - 1, value)));
             }
             if other == hash && test != Test::Eq {
                 match equality::same(heap, test, key, candidate, work) {
-                    Some(true) => return Ok(Some(next - 1)),
+                    Some(true) => return Ok(Some((next - 1, value))),
                     Some(false) => {}
                     None => return Err(Trouble::Slowly),
                 }
@@ -277,7 +294,7 @@ impl Table {
             }
             self.set_number(heap, USED, used + 1);
             if used > 0 {
-                self.split(heap, used);
+                (PER_ENTRY * used..PER_ENTRY * (used + 1)).for_each(|bucket| self.split(heap, bucket));
             }
             used
         };
@@ -353,7 +370,7 @@ impl Table {
             let first = heap.vector(old_heads).and_then(|segments| heap.words(segments[0]));
             let heads = first.unwrap_or_default().to_vec();
             let new_entries = heap.alloc_vector(&entries)?;
-            let new_heads = heap.alloc_words(2 * room, 0)?;
+            let new_heads = heap.alloc_words(2 * PER_ENTRY * room, 0)?;
             if let Some(slots) = heap.words_mut(new_heads) {
                 slots[..heads.len()].copy_from_slice(&heads);
             }
@@ -364,7 +381,7 @@ impl Table {
         }
         let segments = room >> SHIFT;
         let entries = heap.alloc_vector_filled(ENTRY * SEGMENT, Value::UNBOUND)?;
-        let heads = heap.alloc_words(SEGMENT, 0)?;
+        let heads = heap.alloc_words(PER_ENTRY * SEGMENT, 0)?;
         let length = heap.vector(old_entries).map_or(0, <[Value]>::len);
         if segments < length {
             heap.vector_set(old_entries, segments, entries);
@@ -385,7 +402,7 @@ impl Table {
         Ok(())
     }
 
-    /// Moves to the new bucket `new`, the last one, what belongs there from the bucket that has held it so far.
+    /// Moves to the new bucket `new`, which comes from no other new one, what belongs there from the bucket that has held it so far.
     fn split(self, heap: &mut Heap, new: usize) {
         let old = new - (1 << new.ilog2());
         let mut next = self.view(heap).head(old);
@@ -413,8 +430,9 @@ impl Table {
     }
 
     fn set_head(self, heap: &mut Heap, bucket: usize, head: usize) {
-        let heads = self.view(heap).heads.get(bucket >> SHIFT).copied().unwrap_or(Value::NIL);
-        if let Some(slot) = heap.words_mut(heads).and_then(|heads| heads.get_mut(bucket & (SEGMENT - 1))) {
+        let (segment, at) = place_of_head(bucket);
+        let heads = self.view(heap).heads.get(segment).copied().unwrap_or(Value::NIL);
+        if let Some(slot) = heap.words_mut(heads).and_then(|heads| heads.get_mut(at)) {
             *slot = head as u32;
         }
     }
@@ -440,8 +458,9 @@ impl View<'_> {
     /// The first entry of a bucket, one too high; 0 if there is none.
     #[inline]
     fn head(&self, bucket: usize) -> usize {
-        let heads = self.heads.get(bucket >> SHIFT).and_then(|&heads| self.heap.words(heads));
-        heads.and_then(|heads| heads.get(bucket & (SEGMENT - 1))).map_or(0, |&head| head as usize)
+        let (segment, at) = place_of_head(bucket);
+        let heads = self.heads.get(segment).and_then(|&heads| self.heap.words(heads));
+        heads.and_then(|heads| heads.get(at)).map_or(0, |&head| head as usize)
     }
 
     /// Key, value and link of an entry; what a free one has where there is none.
@@ -460,7 +479,7 @@ impl View<'_> {
 /// Directories with one empty segment each.
 fn fresh_directories(heap: &mut Heap, room: usize) -> Result<[Value; 2], AllocError> {
     let entries = heap.alloc_vector_filled(ENTRY * room, Value::UNBOUND)?;
-    let heads = heap.alloc_words(room, 0)?;
+    let heads = heap.alloc_words(PER_ENTRY * room, 0)?;
     Ok([heap.alloc_vector(&[entries])?, heap.alloc_vector(&[heads])?])
 }
 
@@ -513,7 +532,7 @@ mod tests {
     fn find(heap: &Heap, table: Table, key: i32) -> Option<usize> {
         let key = Value::small(key);
         let hash = equality::hash(heap, Test::Eql, key);
-        table.find(heap, Test::Eql, key, hash, &mut 4096).unwrap()
+        table.find(heap, Test::Eql, key, hash, &mut 4096).unwrap().map(|(entry, _)| entry)
     }
 
     fn put(heap: &mut Heap, table: Table, key: i32, value: i32) {

@@ -72,10 +72,10 @@ const fn immediate(sub: u64, payload: u64) -> Value {
     Value(payload << 8 | sub << 3 | TAG_IMMEDIATE)
 }
 
-/// What moves the exponents of the window to the two patterns that the rotation turns into the tag.
-const DOUBLE_BIAS: u64 = 3 << 60;
-
 impl Value {
+    /// What moves the exponents of the window to the two patterns that the rotation turns into the tag.
+    pub(crate) const DOUBLE_BIAS: u64 = 3 << 60;
+
     /// The empty list and falsehood.
     pub const NIL: Value = immediate(SUB_NIL, 0);
     /// Truth.
@@ -180,7 +180,7 @@ impl Value {
     /// `Heap::float` takes every double.
     #[inline(always)]
     pub const fn double(x: f64) -> Option<Value> {
-        let word = x.to_bits().wrapping_add(DOUBLE_BIAS).rotate_left(3);
+        let word = x.to_bits().wrapping_add(Self::DOUBLE_BIAS).rotate_left(3);
         if word & 3 == 3 { Some(Value(word)) } else { Self::special_double(x) }
     }
 
@@ -212,7 +212,7 @@ impl Value {
     /// The double of a value of which [`Value::is_windowed_double`] is true; any other gives some number.
     #[inline(always)]
     pub const fn windowed_double(self) -> f64 {
-        f64::from_bits(self.0.rotate_right(3).wrapping_sub(DOUBLE_BIAS))
+        f64::from_bits(self.0.rotate_right(3).wrapping_sub(Self::DOUBLE_BIAS))
     }
 
     /// The double, if this is one without a box. `Heap::as_double` knows the boxed ones too.

@@ -154,6 +154,8 @@ pub struct Vm {
     pub(crate) raised: Option<Raised>,
     /// The call that a builtin has asked for: the function, then its arguments.
     pub(crate) requested_call: Vec<Value>,
+    /// The key that was found last in a hash table, and the number of its entry there.
+    pub(crate) last_lookup: (Value, usize),
     /// Ticks that builtins have charged, beside those of their calls, until the interpreter takes them.
     pub(crate) charged: u64,
     /// Place and time of the last collection for want of room; a second one there would not help.
@@ -228,6 +230,7 @@ impl Vm {
             values: Vec::new(),
             raised: None,
             requested_call: Vec::new(),
+            last_lookup: (Value::UNBOUND, 0),
             charged: 0,
             collected_at: None,
             last_words: None,

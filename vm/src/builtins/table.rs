@@ -30,15 +30,37 @@ fn table(vm: &mut Vm, v: Value) -> Result<Table, Exit> {
     }
 }
 
-/// The test and hash of a key, and its entry if it has one.
+/// The entry of a key, if it has one; and its hash, if that was needed to know.
+///
+/// The key is often the one that was looked up last, as in `(incf (gethash key table))`: that entry is tried first.
 #[inline]
-fn find(vm: &mut Vm, table: Table, key: Value) -> Result<(u32, Option<usize>), Exit> {
+fn find(vm: &mut Vm, table: Table, key: Value) -> Result<Place, Exit> {
     let Comparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
+    let (last_key, last_entry) = vm.last_lookup;
+    if last_key == key
+        && let Some(value) = table.value_of(&vm.heap, last_entry, key)
+    {
+        return Ok(Place::Entry(last_entry, value));
+    }
     let hash = equality::hash(&vm.heap, test, key);
     let mut work = LIMIT;
     let found = table.find(&vm.heap, test, key, hash, &mut work)?;
     vm.charge(LIMIT - work);
-    Ok((hash, found))
+    Ok(match found {
+        Some((entry, value)) => {
+            vm.last_lookup = (key, entry);
+            Place::Entry(entry, value)
+        }
+        None => Place::None(hash),
+    })
+}
+
+/// What a search comes to.
+enum Place {
+    /// The entry with the key, and its value.
+    Entry(usize, Value),
+    /// There is none; the hash of the key.
+    None(u32),
 }
 
 /// `(%make-hash-table test size test-function hash-function)`
@@ -61,10 +83,9 @@ pub(super) fn make_hash_table(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(gethash key table &optional default)`
 pub(super) fn gethash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[1])?;
-    let (_, entry) = find(vm, table, arguments[0])?;
-    match entry.and_then(|entry| table.entry(&vm.heap, entry)) {
-        Some((_, value)) => vm.give_values(&[value, Value::T]),
-        None => vm.give_values(&[optional(arguments, 2), Value::NIL]),
+    match find(vm, table, arguments[0])? {
+        Place::Entry(_, value) => vm.give_values(&[value, Value::T]),
+        Place::None(_) => vm.give_values(&[optional(arguments, 2), Value::NIL]),
     }
 }
 
@@ -72,10 +93,9 @@ pub(super) fn gethash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn puthash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[key, table_value, value] = arguments else { unreachable!("the table says three") };
     let table = table(vm, table_value)?;
-    let (hash, entry) = find(vm, table, key)?;
-    match entry {
-        Some(entry) => table.set_value(&mut vm.heap, entry, value),
-        None => add(vm, table, hash, key, value)?,
+    match find(vm, table, key)? {
+        Place::Entry(entry, _) => table.set_value(&mut vm.heap, entry, value),
+        Place::None(hash) => add(vm, table, hash, key, value)?,
     }
     Ok(value)
 }
@@ -91,11 +111,11 @@ fn add(vm: &mut Vm, table: Table, hash: u32, key: Value, value: Value) -> Result
 /// `(remhash key table)`
 pub(super) fn remhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[1])?;
-    let (_, entry) = find(vm, table, arguments[0])?;
-    if let Some(entry) = entry {
+    let place = find(vm, table, arguments[0])?;
+    if let Place::Entry(entry, _) = place {
         table.delete(&mut vm.heap, entry);
     }
-    Ok(entry.is_some().into())
+    Ok(matches!(place, Place::Entry(..)).into())
 }
 
 /// `(clrhash table)`

@@ -189,6 +189,7 @@ pub(super) unsafe fn call(vm: &mut Vm, callee: Value, arguments: Arguments, plac
 /// # Safety
 /// As [`call`].
 unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Place) -> Signal {
+    vm.cpu.wants_one = false;
     let info = &esl_bytecode::builtin::BUILTINS[usize::from(number)];
     let count = arguments.len() as u32;
     if count < info.arity.min || info.arity.max.is_some_and(|max| count > max) {

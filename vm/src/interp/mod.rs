@@ -20,6 +20,7 @@ mod collect;
 pub(crate) use collect::top_of_task;
 pub(crate) use raise::frames_of_task;
 mod control;
+mod double;
 mod raise;
 pub(crate) mod stubs;
 #[cfg(test)]
@@ -95,6 +96,8 @@ pub(crate) struct Cpu {
     pub base: *mut Value,
     /// End of the running task's stack.
     pub stack_end: *mut Value,
+    /// Whether the call of the builtin that runs wants its first value only.
+    pub wants_one: bool,
     /// Ticks left until the next safepoint.
     pub ticks: i32,
     /// Ticks kept back so that the collector has its turn at the next tick.
@@ -109,6 +112,7 @@ impl Cpu {
             pc: std::ptr::null(),
             base: std::ptr::null_mut(),
             stack_end: std::ptr::null_mut(),
+            wants_one: false,
             ticks: 0,
             reserve: 0,
             granted: 0,
@@ -162,7 +166,7 @@ pub(crate) fn load(vm: &mut Vm, ticks: i32) {
     // SAFETY: the base of a task lies in its stack.
     let base = unsafe { task.stack.start().add(task.base as usize) };
     let stack_end = vm.stack_end();
-    vm.cpu = Cpu { pc, base, stack_end, ticks, reserve: 0, granted: ticks };
+    vm.cpu = Cpu { pc, base, stack_end, wants_one: false, ticks, reserve: 0, granted: ticks };
     vm.arm();
 }
 
@@ -301,10 +305,28 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     *base.add($register) = value;
                 }};
             }
+            // Keeps the ends of arms apart. The code generator would make one end of those that are alike, which costs a
+            // jump per instruction; it cannot with a line of assembly that differs, though nothing is in it.
+            macro_rules! apart {
+                () => {
+                    apart!(0)
+                };
+                ($which:literal) => {
+                    #[cfg(not(miri))]
+                    std::arch::asm!(
+                        "/* {} {} */", const line!(), const $which, options(nomem, nostack, preserves_flags)
+                    );
+                };
+            }
             // Goes on after an instruction of this many words.
             macro_rules! next {
-                ($words:literal) => {{
+                ($words:literal) => {
+                    next!($words, 0)
+                };
+                // One of several ends of an arm.
+                ($words:literal, $which:literal) => {{
                     pc = pc.add($words);
+                    apart!($which);
                     continue;
                 }};
             }
@@ -312,6 +334,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             macro_rules! jump {
                 ($words:literal, $offset:expr) => {{
                     pc = pc.add($words).offset($offset);
+                    apart!();
                     continue;
                 }};
             }
@@ -356,8 +379,19 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                 }};
             }
+            // A double and a fixnum, or a zero.
+            macro_rules! mixed {
+                ($mixed:path, $x:expr, $y:expr) => {{
+                    let v = $mixed($x, $y);
+                    if v != Value::UNBOUND {
+                        set!(a!(), v);
+                        next!(1, 2);
+                    }
+                    cold!(1, cold::arithmetic)
+                }};
+            }
             macro_rules! arithmetic {
-                ($fixnum:ident, $float:tt) => {{
+                ($fixnum:ident, $float:tt, $mixed:path) => {{
                     let (x, y) = (get!(b!()), get!(c!()));
                     if Value::both_fixnums(x, y) {
                         let (sum, overflow) = (x.bits() as i64).$fixnum(y.bits() as i64);
@@ -366,13 +400,12 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(1);
                         }
                     } else if Value::both_windowed_doubles(x, y) {
-                        let result = x.windowed_double() $float y.windowed_double();
-                        if let Some(v) = windowed(result) {
-                            set!(a!(), v);
-                            next!(1);
+                        let result = double::load(base.add(b!())) $float double::load(base.add(c!()));
+                        if double::store(base.add(a!()), result) {
+                            next!(1, 1);
                         }
                     }
-                    cold!(1, cold::arithmetic)
+                    mixed!($mixed, x, y)
                 }};
             }
             macro_rules! compare {
@@ -481,8 +514,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 }
 
                 // ---- arithmetic
-                Operation::Add => arithmetic!(overflowing_add, +),
-                Operation::Sub => arithmetic!(overflowing_sub, -),
+                Operation::Add => arithmetic!(overflowing_add, +, double::mixed_add),
+                Operation::Sub => arithmetic!(overflowing_sub, -, double::mixed_subtract),
                 Operation::Mul => {
                     let (x, y) = (get!(b!()), get!(c!()));
                     if Value::both_fixnums(x, y) {
@@ -492,22 +525,26 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(1);
                         }
                     } else if Value::both_windowed_doubles(x, y)
-                        && let Some(v) = windowed(x.windowed_double() * y.windowed_double())
+                        && double::store(
+                            base.add(a!()),
+                            double::load(base.add(b!())) * double::load(base.add(c!())),
+                        )
                     {
-                        set!(a!(), v);
-                        next!(1);
+                        next!(1, 1);
                     }
-                    cold!(1, cold::arithmetic)
+                    mixed!(double::mixed_multiply, x, y)
                 }
                 Operation::Div => {
                     let (x, y) = (get!(b!()), get!(c!()));
                     if Value::both_windowed_doubles(x, y)
-                        && let Some(v) = windowed(x.windowed_double() / y.windowed_double())
+                        && double::store(
+                            base.add(a!()),
+                            double::load(base.add(b!())) / double::load(base.add(c!())),
+                        )
                     {
-                        set!(a!(), v);
                         next!(1);
                     }
-                    cold!(1, cold::arithmetic)
+                    mixed!(double::mixed_divide, x, y)
                 }
                 Operation::AddInt => {
                     let x = get!(b!());
@@ -519,10 +556,12 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(1);
                         }
                     } else if x.is_windowed_double()
-                        && let Some(v) = windowed(x.windowed_double() + f64::from(word as i32 >> 24))
+                        && double::store(
+                            base.add(a!()),
+                            double::load(base.add(b!())) + f64::from(word as i32 >> 24),
+                        )
                     {
-                        set!(a!(), v);
-                        next!(1);
+                        next!(1, 1);
                     }
                     cold!(1, cold::arithmetic)
                 }
@@ -873,7 +912,15 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     cold!(1, cold::symbol_value)
                 }
-                Operation::SetSymbolValue => cold!(1, cold::set_symbol_value),
+                Operation::SetSymbolValue => {
+                    // SAFETY: V4: the constant is a symbol.
+                    let symbol = (*k.add(d!())).object_ptr().cast::<Symbol>();
+                    if (*symbol).header.flags & (Symbol::EVER_BOUND | Symbol::CONSTANT) == 0 {
+                        vm.heap.store(&raw mut (*symbol).value, get!(a!()));
+                        next!(1);
+                    }
+                    cold!(1, cold::set_symbol_value)
+                }
                 Operation::Bind => cold!(1, cold::bind),
                 Operation::Unbind => cold!(1, cold::unbind),
                 Operation::BindList => cold!(1, control::bind_list),
@@ -915,7 +962,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     let arguments = std::slice::from_raw_parts(window.add(2), b!());
                     // SAFETY: V5: the number is in the table, the number of arguments right.
                     let native = *NATIVES.get_unchecked(aux!() as usize);
-                    (vm.cpu.pc, vm.cpu.base) = (pc, base);
+                    (vm.cpu.pc, vm.cpu.base, vm.cpu.wants_one) = (pc, base, c!() == 0);
                     match native(vm, arguments) {
                         Ok(value) if c!() == 0 => {
                             *window = value;
@@ -987,7 +1034,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     tick!();
                     let arguments = std::slice::from_raw_parts(base.add(a!() + 2), b!());
                     let native = *NATIVES.get_unchecked(aux!() as usize);
-                    (vm.cpu.pc, vm.cpu.base) = (pc, base);
+                    (vm.cpu.pc, vm.cpu.base, vm.cpu.wants_one) = (pc, base, false);
                     match native(vm, arguments) {
                         Ok(value) => {
                             if vm.wants_attention() {
@@ -1060,14 +1107,6 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
     vm.cpu.base = base;
     vm.cpu.ticks = ticks;
     signal
-}
-
-/// The double as a value, if it is one of those that need no box and are not special: see `Value::double`.
-#[inline(always)]
-fn windowed(x: f64) -> Option<Value> {
-    let word = x.to_bits().wrapping_add(3 << 60).rotate_left(3);
-    // SAFETY: a word with these low bits is a double, whatever the rest.
-    if word & 3 == 3 { Some(unsafe { Value::from_bits(word) }) } else { None }
 }
 
 /// Whether `value` is an instance of just this class, not of a subclass.

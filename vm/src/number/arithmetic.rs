@@ -13,7 +13,7 @@ pub(crate) fn add(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     {
         return Ok(result);
     }
-    if let (Some(x), Some(y)) = (a.as_double(), b.as_double()) {
+    if let Some((x, y)) = unboxed_doubles(a, b) {
         return vm.float_value("+", x + y);
     }
     if let (Some(x), Some(y)) = (Operand::of(&vm.heap, a, &mut [0]), Operand::of(&vm.heap, b, &mut [0])) {
@@ -38,7 +38,7 @@ pub(crate) fn subtract(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     {
         return Ok(result);
     }
-    if let (Some(x), Some(y)) = (a.as_double(), b.as_double()) {
+    if let Some((x, y)) = unboxed_doubles(a, b) {
         return vm.float_value("-", x - y);
     }
     if let (Some(x), Some(y)) = (Operand::of(&vm.heap, a, &mut [0]), Operand::of(&vm.heap, b, &mut [0])) {
@@ -73,7 +73,7 @@ pub(crate) fn negate(vm: &mut Vm, a: Value) -> Outcome {
 
 /// `a · b`.
 pub(crate) fn multiply(vm: &mut Vm, a: Value, b: Value) -> Outcome {
-    if let (Some(x), Some(y)) = (a.as_double(), b.as_double()) {
+    if let Some((x, y)) = unboxed_doubles(a, b) {
         return vm.float_value("*", x * y);
     }
     let sizes = Operand::of(&vm.heap, a, &mut [0])
@@ -101,6 +101,9 @@ pub(crate) fn multiply(vm: &mut Vm, a: Value, b: Value) -> Outcome {
 
 /// `a / b`: a ratio where integers do not divide.
 pub(crate) fn divide(vm: &mut Vm, a: Value, b: Value) -> Outcome {
+    if let Some((x, y)) = unboxed_doubles(a, b) {
+        return float_quotient(vm, "/", [a, b], x, y);
+    }
     match operands(vm, "/", a, b)? {
         Pair::Ints(_, y) if y.is_zero() => vm.raise(Raised::DivisionByZero("/", [a, b])),
         Pair::Ints(Int::Small(x), Int::Small(y)) if x.checked_rem(y) == Some(0) => {
@@ -125,6 +128,17 @@ pub(crate) fn float_quotient(vm: &mut Vm, op: &'static str, operands: [Value; 2]
         return vm.raise(Raised::DivisionByZero(op, operands));
     }
     vm.float_value(op, x / y)
+}
+
+/// A double and a double or fixnum, as doubles, if neither needs a look at the heap.
+#[inline]
+pub(crate) fn unboxed_doubles(a: Value, b: Value) -> Option<(f64, f64)> {
+    match (a.as_fixnum(), b.as_fixnum()) {
+        (Some(_), Some(_)) => None,
+        (Some(x), None) => Some((x as f64, b.as_double()?)),
+        (None, Some(y)) => Some((a.as_double()?, y as f64)),
+        (None, None) => Some((a.as_double()?, b.as_double()?)),
+    }
 }
 
 /// Two numbers of one type.

@@ -9,8 +9,22 @@ use crate::raise::Exit;
 use crate::value::Value;
 use crate::vm::Vm;
 
+/// Both as doubles of just the same value, if neither needs a look at the heap.
+#[inline]
+fn exact_doubles(a: Value, b: Value) -> Option<(f64, f64)> {
+    let exact = |v: Value| match v.as_fixnum() {
+        Some(n) if n.unsigned_abs() <= 1 << 53 => Some(n as f64),
+        Some(_) => None,
+        None => v.as_double(),
+    };
+    Some((exact(a)?, exact(b)?))
+}
+
 /// `(= a b)`.
 pub(crate) fn num_equal(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
+    if let Some((x, y)) = exact_doubles(a, b) {
+        return Ok(x == y);
+    }
     for v in [a, b] {
         if !super::is_number(&vm.heap, v) {
             return vm.type_error(v, "NUMBER");
@@ -84,7 +98,7 @@ fn compare(
     if let (Some(x), Some(y)) = (a.as_fixnum(), b.as_fixnum()) {
         return Ok(Some(x.cmp(&y)));
     }
-    if let (Some(x), Some(y)) = (a.as_double(), b.as_double()) {
+    if let Some((x, y)) = exact_doubles(a, b) {
         return Ok(x.partial_cmp(&y));
     }
     if let (Some(x), Some(y)) = (Operand::of(&vm.heap, a, &mut [0]), Operand::of(&vm.heap, b, &mut [0])) {

@@ -22,7 +22,7 @@ use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
-pub(crate) use arithmetic::{add, check_gcd, divide, multiply, negate, subtract};
+pub(crate) use arithmetic::{add, check_gcd, divide, multiply, negate, subtract, unboxed_doubles};
 pub(crate) use compare::{eql, less, less_or_equal, num_equal, same_value, sign, sign_of};
 pub(crate) use integer::Int;
 pub(crate) use ratio::Ratio;
@@ -179,7 +179,11 @@ impl Vm {
     }
 
     /// Gives several values.
+    #[inline]
     pub(crate) fn give_values(&mut self, values: &[Value]) -> Outcome {
+        if self.cpu.wants_one {
+            return Ok(values.first().copied().unwrap_or(Value::NIL));
+        }
         self.values.clear();
         self.values.extend_from_slice(values);
         Err(Exit::Values)

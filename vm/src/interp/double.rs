@@ -1,0 +1,180 @@
+//! Arithmetic on doubles, for the loop.
+//!
+//! A double in a register of the frame is decoded, used and encoded without leaving the vector unit where there is one:
+//! the way through general registers and back takes as long as a multiplication, and programs wait for it, since the
+//! result of one operation is what the next one needs.
+//!
+//! Not here: comparisons, which nobody waits for, and doubles in boxes, which are the numeric tower's.
+#![allow(unsafe_code)]
+
+use crate::number::unboxed_doubles;
+use crate::value::Value;
+
+#[cfg(all(target_arch = "x86_64", not(miri)))]
+mod register {
+    use std::arch::asm;
+
+    use crate::value::Value;
+
+    /// What an operand in memory has to be for instructions of the vector unit.
+    #[repr(align(16))]
+    struct Operand(#[expect(dead_code, reason = "read by instructions only")] [u64; 2]);
+
+    static BIAS: Operand = Operand([Value::DOUBLE_BIAS, 0]);
+
+    /// The double in a register, of which [`Value::is_windowed_double`] is true.
+    ///
+    /// # Safety
+    /// `register` points to a value.
+    #[inline(always)]
+    pub(in super::super) unsafe fn load(register: *const Value) -> f64 {
+        let x: f64;
+        // SAFETY: 8 bytes are read, by the contract, and what is at `BIAS`: a rotation to the right, less the bias.
+        // As intrinsics, this would be compiled to the way through general registers again.
+        unsafe {
+            asm!(
+                "movq {x}, qword ptr [{register}]",
+                "movdqa {low}, {x}",
+                "psrlq {x}, 3",
+                "psllq {low}, 61",
+                "por {x}, {low}",
+                "psubq {x}, xmmword ptr [rip + {bias}]",
+                register = in(reg) register,
+                x = out(xmm_reg) x,
+                low = out(xmm_reg) _,
+                bias = sym BIAS,
+                options(pure, readonly, nostack, preserves_flags),
+            );
+        }
+        x
+    }
+
+    /// Puts a double into a register, if it is one that needs no box and has no constant of its own.
+    ///
+    /// # Safety
+    /// `register` points to a place for a value.
+    #[inline(always)]
+    pub(in super::super) unsafe fn store(register: *mut Value, x: f64) -> bool {
+        let (word, bits): (f64, u64);
+        // SAFETY: what is at `BIAS` is read: the bias is added, and a rotation to the left follows.
+        unsafe {
+            asm!(
+                "paddq {x}, xmmword ptr [rip + {bias}]",
+                "movdqa {high}, {x}",
+                "psllq {x}, 3",
+                "psrlq {high}, 61",
+                "por {x}, {high}",
+                "movq {bits}, {x}",
+                x = inout(xmm_reg) x => word,
+                high = out(xmm_reg) _,
+                bits = out(reg) bits,
+                bias = sym BIAS,
+                options(pure, readonly, nostack, preserves_flags),
+            );
+        }
+        if bits & 3 != 3 {
+            return false;
+        }
+        // SAFETY: by the contract; the word is the value of a double.
+        unsafe { *register.cast::<f64>() = word };
+        true
+    }
+}
+
+#[cfg(not(all(target_arch = "x86_64", not(miri))))]
+mod register {
+    use crate::value::Value;
+
+    /// The double in a register, of which [`Value::is_windowed_double`] is true.
+    ///
+    /// # Safety
+    /// `register` points to a value.
+    #[inline(always)]
+    pub(in super::super) unsafe fn load(register: *const Value) -> f64 {
+        // SAFETY: by the contract.
+        unsafe { (*register).windowed_double() }
+    }
+
+    /// Puts a double into a register, if it is one that needs no box and has no constant of its own.
+    ///
+    /// # Safety
+    /// `register` points to a place for a value.
+    #[inline(always)]
+    pub(in super::super) unsafe fn store(register: *mut Value, x: f64) -> bool {
+        match Value::double(x).filter(|v| v.is_windowed_double()) {
+            // SAFETY: by the contract.
+            Some(v) => unsafe { *register = v },
+            None => return false,
+        }
+        true
+    }
+}
+
+pub(super) use register::{load, store};
+
+/// The operations between a double and a fixnum, and on the doubles that have a constant of their own (zeros, above all):
+/// too long for the loop, too common for the way that all numbers take. They are leaves, so that the loop's registers stay where
+/// they are. Each gives `UNBOUND` for what it leaves to the numeric tower: other operands, results that need a box, and those that
+/// fail.
+macro_rules! define_mixed {
+    ($($name:ident $operator:tt;)*) => { $(
+        #[inline(never)]
+        pub(super) fn $name(a: Value, b: Value) -> Value {
+            match unboxed_doubles(a, b) {
+                Some((x, y)) => finite(x $operator y),
+                None => Value::UNBOUND,
+            }
+        }
+    )* };
+}
+
+define_mixed! {
+    mixed_add +;
+    mixed_subtract -;
+    mixed_multiply *;
+    mixed_divide /;
+}
+
+#[inline]
+fn finite(x: f64) -> Value {
+    if x.is_finite() { Value::double(x).unwrap_or(Value::UNBOUND) } else { Value::UNBOUND }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn registers_hold_what_values_of_doubles_hold() {
+        for exponent in 0..2048u64 {
+            for low in [0, 1, 0x000F_FFFF_FFFF_FFFF, 1 << 63] {
+                let x = f64::from_bits(exponent << 52 | low);
+                let mut register = Value::NIL;
+                // SAFETY: a value of our own.
+                let (is_stored, back) = unsafe { (store(&raw mut register, x), load(&raw const register)) };
+                let expected = Value::double(x).filter(|v| v.is_windowed_double());
+                assert_eq!(is_stored.then_some(register), expected, "{x:e}");
+                if is_stored {
+                    assert_eq!(back.to_bits(), x.to_bits());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn mixed_operations_leave_what_fails_to_the_tower() {
+        let double = |x| Value::double(x).unwrap();
+        assert_eq!(mixed_add(Value::small(1), double(0.5)), double(1.5));
+        assert_eq!(mixed_subtract(double(0.0), Value::small(2)), double(-2.0));
+        assert_eq!(mixed_multiply(double(0.0), double(3.0)), Value::POSITIVE_ZERO);
+        assert_eq!(mixed_divide(Value::small(1), double(4.0)), double(0.25));
+        for (a, b) in [
+            (Value::small(1), Value::small(2)),
+            (double(1.0), Value::small(0)),
+            (Value::NIL, double(1.0)),
+            (Value::INFINITY, double(1.0)),
+        ] {
+            assert_eq!(mixed_divide(a, b), Value::UNBOUND);
+        }
+    }
+}
