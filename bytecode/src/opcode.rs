@@ -76,6 +76,8 @@ macro_rules! for_each_opcode {
             Less = 0x1C, "less", value { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := (<= R[left] R[right])`
             LessEq = 0x1D, "less-eq", value { dst: Dst, left: Reg, right: Reg };
+            /// `R[dst] := (char= R[left] R[right])`
+            CharEq = 0x1F, "char-eq", value { dst: Dst, left: Reg, right: Reg };
             /// `R[dst]` := whether `R[src]` is of the type
             IsType = 0x1E, "is-type", silent { dst: Dst, src: Reg, code: TypeIdx };
 
@@ -177,6 +179,8 @@ macro_rules! for_each_opcode {
             ArrayRef = 0x52, "array-ref", value { dst: Dst, array: Reg, index: Reg };
             /// Element `R[index]` of the array `R[array]` of rank 1 becomes `R[value]`.
             ArraySet = 0x53, "array-set", effect { array: Reg, index: Reg, value: Reg };
+            /// `R[dst] := (char R[string] R[index])`
+            CharRef = 0x57, "char-ref", value { dst: Dst, string: Reg, index: Reg };
             /// `R[dst]` := slot `slot` of `R[instance]`, which must be an instance of the class or a subclass.
             Slot = 0x54, "slot", value { dst: Dst, instance: Reg, slot: Index, class: WideClassIdx };
             /// Slot `slot` of `R[instance]` becomes `R[value]`.

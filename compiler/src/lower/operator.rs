@@ -120,6 +120,8 @@ fn shape(builtin: Builtin, count: usize) -> Option<Shape> {
         (B::Cddr, 1) => Unary(|dst, list| Instr::Cddr { dst, list }),
         (B::Cons, 2) => Binary(|dst, car, cdr| Instr::Cons { dst, car, cdr }),
         (B::Svref, 2) => Binary(|dst, vector, index| Instr::VectorRef { dst, vector, index }),
+        (B::Char | B::Schar, 2) => Binary(|dst, string, index| Instr::CharRef { dst, string, index }),
+        (B::CharEqualExactly, 2) => Binary(|dst, left, right| Instr::CharEq { dst, left, right }),
         (B::Aref, 2) => Binary(|dst, array, index| Instr::ArrayRef { dst, array, index }),
         (B::Rplaca, 2) => Store(|pair, value| Instr::SetCar { pair, value }, 0),
         (B::Rplacd, 2) => Store(|pair, value| Instr::SetCdr { pair, value }, 0),

@@ -2,6 +2,8 @@
 //!
 //! Lists are walked up to [`LIMIT`] pairs. Vectors are copied up to [`COPY_LIMIT`] elements, which takes about as long.
 
+use smallvec::SmallVec;
+
 use crate::heap::Kind;
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
@@ -171,6 +173,10 @@ pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             return Err(Exit::Slowly);
         }
         vm.charge(end - start);
+        if let Some(characters) = vm.heap.string(sequence) {
+            let part: SmallVec<[u32; 64]> = SmallVec::from_slice(&characters[start..end]);
+            return Ok(vm.heap.alloc_string(&part)?);
+        }
         let part = vector_elements(&vm.heap, sequence).map(|elements| Owned::of(elements.part(start, end)));
         return part.map_or(Ok(Value::NIL), |part| new_vector(vm, &part));
     }

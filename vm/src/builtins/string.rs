@@ -5,6 +5,8 @@
 
 use std::cmp::Ordering;
 
+use smallvec::SmallVec;
+
 use crate::builtins::array::{all_elements, data_of};
 use crate::character;
 use crate::equality::characters_of;
@@ -65,6 +67,11 @@ fn string_and_index(vm: &mut Vm, string: Value, index: Value) -> Result<usize, E
 
 /// `(char string index)`
 pub(super) fn char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    if let (Some(characters), Some(index)) = (vm.heap.string(arguments[0]), arguments[1].as_index())
+        && let Some(v) = characters.get(index).and_then(|&code| Value::character(code))
+    {
+        return Ok(v);
+    }
     let index = string_and_index(vm, arguments[0], arguments[1])?;
     Ok(all_elements(&vm.heap, arguments[0]).and_then(|elements| elements.get(index)).unwrap_or(Value::NIL))
 }
@@ -246,7 +253,7 @@ pub(super) fn right_trim(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%string-concat &rest strings)`
 pub(super) fn concat(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let mut characters = Vec::new();
+    let mut characters: SmallVec<[u32; 64]> = SmallVec::new();
     for &string in arguments {
         let Some(more) = characters_of(&vm.heap, string) else { return vm.type_error(string, "STRING") };
         if characters.len() + more.len() > COPY_LIMIT {
@@ -271,14 +278,30 @@ pub(super) fn search(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if length.saturating_mul(end - start) > 8 * COPY_LIMIT {
         return Err(Exit::Slowly);
     }
-    vm.charge(length * (end - start) / 4);
     let (pattern, part) = (text(vm, pattern), &text(vm, string)[start..end]);
-    let found = if length == 0 {
-        Some(if from_end.is_true() { part.len() } else { 0 })
-    } else if from_end.is_true() {
-        part.windows(length).rposition(|window| window == pattern)
-    } else {
-        part.windows(length).position(|window| window == pattern)
+    let Some((&first, rest)) = pattern.split_first() else {
+        return Ok(Value::index(if from_end.is_true() { end } else { start }));
     };
+    // Where the pattern may begin; what follows is looked at where its first character is.
+    let starts = &part[..(part.len() + 1).saturating_sub(length)];
+    let mut compared = 0;
+    let mut is_there = |(at, &code): (usize, &u32)| {
+        code == first && {
+            compared += length;
+            part[at + 1..].starts_with(rest)
+        }
+    };
+    let found = if from_end.is_true() {
+        starts.iter().enumerate().rev().find(|&place| is_there(place))
+    } else {
+        starts.iter().enumerate().find(|&place| is_there(place))
+    };
+    let found = found.map(|(at, _)| at);
+    let passed = match found {
+        Some(at) if from_end.is_true() => starts.len() - at,
+        Some(at) => at,
+        None => starts.len(),
+    };
+    vm.charge((passed + compared) / 4);
     Ok(found.map_or(Value::NIL, |at| Value::index(start + at)))
 }

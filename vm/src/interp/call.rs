@@ -72,7 +72,6 @@ pub(super) unsafe fn slow_call(vm: &mut Vm) -> Signal {
         let window = base.add((word >> 8 & 0xff) as usize);
         let count = (word >> 16 & 0xff) as usize;
         let given = std::slice::from_raw_parts(window.add(2), count);
-        let mut arguments = Arguments::from_slice(given);
         let callee = match operation {
             Operation::CallGlobal | Operation::TailCallGlobal => {
                 *constants_of(code_of(*base.sub(2))).add(*pc.add(1) as usize)
@@ -80,14 +79,17 @@ pub(super) unsafe fn slow_call(vm: &mut Vm) -> Signal {
             Operation::CallSelf => *base.sub(2),
             _ => *window,
         };
-        if matches!(operation, Operation::Apply | Operation::TailApply)
-            && let Err(exit) = spread(vm, &mut arguments)
-        {
-            return Signal::Exit(exit);
-        }
         let is_tail =
             matches!(operation, Operation::TailCall | Operation::TailCallGlobal | Operation::TailApply);
-        call(vm, callee, arguments, if is_tail { Place::Tail } else { Place::Window })
+        let place = if is_tail { Place::Tail } else { Place::Window };
+        if matches!(operation, Operation::Apply | Operation::TailApply) {
+            let mut arguments = Arguments::from_slice(given);
+            if let Err(exit) = spread(vm, &mut arguments) {
+                return Signal::Exit(exit);
+            }
+            return call(vm, callee, &arguments, place);
+        }
+        call(vm, callee, given, place)
     }
 }
 
@@ -119,11 +121,11 @@ pub(super) enum Place {
     Interrupt,
 }
 
-/// Calls `callee` with `arguments`.
+/// Calls `callee` with `arguments`, which may lie in the running frame: they are copied before the stack moves.
 ///
 /// # Safety
 /// As [`super::settle`]; for [`Place::Window`] at an instruction that has a window.
-pub(super) unsafe fn call(vm: &mut Vm, callee: Value, arguments: Arguments, place: Place) -> Signal {
+pub(super) unsafe fn call(vm: &mut Vm, callee: Value, arguments: &[Value], place: Place) -> Signal {
     let function = match vm.callable(callee) {
         Ok(function) => function,
         Err(exit) => return Signal::Exit(exit),
@@ -135,13 +137,13 @@ pub(super) unsafe fn call(vm: &mut Vm, callee: Value, arguments: Arguments, plac
     };
     if shape.sort == Sort::Native {
         // SAFETY: as this function.
-        return unsafe { call_native(vm, shape.number, &arguments, place) };
+        return unsafe { call_native(vm, shape.number, arguments, place) };
     }
+    let mut arranged = Arguments::new();
     // SAFETY: the code is that of the function, and bytecode.
-    let arranged = match unsafe { arrange(vm, function, code, shape, arguments) } {
-        Ok(arranged) => arranged,
-        Err(exit) => return Signal::Exit(exit),
-    };
+    if let Err(exit) = unsafe { arrange(vm, function, code, shape, arguments, &mut arranged) } {
+        return Signal::Exit(exit);
+    }
     // SAFETY: the frame's place is computed from the running frame, after room was made for it.
     unsafe {
         let nregs = (*code).nregs as usize;
@@ -209,12 +211,12 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Plac
                 return Signal::Exit(vm.program_error::<()>(text).unwrap_err());
             };
             // SAFETY: as this function; a twin is no builtin, so this goes one level deep.
-            return unsafe { call(vm, function, Arguments::from_slice(arguments), place) };
+            return unsafe { call(vm, function, arguments, place) };
         }
         Err(Exit::Call) => {
             let (function, arguments) = vm.take_requested_call();
             // SAFETY: as this function. A builtin that asks for itself would go on for ever, and none does.
-            return unsafe { call(vm, function, arguments, place) };
+            return unsafe { call(vm, function, &arguments, place) };
         }
         Err(exit) => return Signal::Exit(exit),
     }
@@ -240,7 +242,7 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Plac
     }
 }
 
-/// Puts arguments in the order of the parameter registers: missing ones unsupplied, the rest as a list, keys by name.
+/// Puts arguments in the order of the parameter registers into `arranged`, which is empty: missing ones unsupplied, the rest as a list, keys by name.
 ///
 /// # Safety
 /// `code` is the Code of `function`, of the given shape, with bytecode.
@@ -249,8 +251,9 @@ unsafe fn arrange(
     function: Value,
     code: *mut Code,
     shape: Shape,
-    arguments: Arguments,
-) -> Result<Arguments, Exit> {
+    arguments: &[Value],
+    arranged: &mut Arguments,
+) -> Result<(), Exit> {
     let required = usize::from(shape.required);
     let positional = required + usize::from(shape.optional);
     let count = arguments.len();
@@ -264,10 +267,7 @@ unsafe fn arrange(
             describe_arity(required, max)
         ));
     }
-    if count == required && positional == required && !takes_more {
-        return Ok(arguments);
-    }
-    let mut arranged = Arguments::from_slice(&arguments[..count.min(positional)]);
+    arranged.extend_from_slice(&arguments[..count.min(positional)]);
     arranged.resize(positional, Value::UNSUPPLIED);
     let rest = &arguments[count.min(positional)..];
     if shape.rest {
@@ -279,13 +279,14 @@ unsafe fn arrange(
         let first = arranged.len();
         arranged.resize(first + keys, Value::UNSUPPLIED);
         // SAFETY: by the contract, the names of the keys are the last constants (`shape`).
-        let names: SmallVec<[Value; 8]> = unsafe {
+        // Code does not move, and the frame or its caller's holds on to it.
+        let names = unsafe {
             let names = constants_of(code).add((*code).nconsts as usize - keys);
-            SmallVec::from_slice(std::slice::from_raw_parts(names, keys))
+            std::slice::from_raw_parts(names, keys)
         };
-        take_keys(vm, function, shape, &names, rest, &mut arranged[first..])?;
+        take_keys(vm, function, shape, names, rest, &mut arranged[first..])?;
     }
-    Ok(arranged)
+    Ok(())
 }
 
 /// Sorts key arguments into the registers of their parameters; of a repeated key the first counts.

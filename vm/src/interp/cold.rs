@@ -56,6 +56,8 @@ fn builtin(operation: Operation) -> Builtin {
         Operation::LogIor => Builtin::LogIor,
         Operation::LogXor => Builtin::LogXor,
         Operation::Ash => Builtin::Ash,
+        Operation::CharEq => Builtin::CharEqualExactly,
+        Operation::CharRef => Builtin::Char,
         Operation::VectorRef => Builtin::Svref,
         Operation::VectorSet => Builtin::SetSvref,
         Operation::ArrayRef => Builtin::Aref,
@@ -81,7 +83,7 @@ fn ask_twin(vm: &mut Vm, builtin: Builtin, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// Arithmetic and comparisons that give a value.
+/// Arithmetic, comparisons that give a value, and characters.
 #[cold]
 #[inline(never)]
 pub(super) unsafe fn arithmetic(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {

@@ -650,6 +650,14 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         { set!(a!(), Value::T); next!(1) }, { set!(a!(), Value::NIL); next!(1) });
                     cold!(1, cold::arithmetic)
                 }
+                Operation::CharEq => {
+                    let (x, y) = (get!(b!()), get!(c!()));
+                    if x.is_character() && y.is_character() {
+                        set!(a!(), Value::boolean(x == y));
+                        next!(1);
+                    }
+                    cold!(1, cold::arithmetic)
+                }
                 Operation::IsType => {
                     set!(a!(), Value::boolean(cold::is_type(vm, get!(b!()), c!() as u8)));
                     next!(1)
@@ -829,6 +837,21 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         next!(1);
                     }
                     cold!(1, cold::array)
+                }
+                Operation::CharRef => {
+                    let (string, index) = (get!(b!()), get!(c!()));
+                    if string.is_object() && index.is_fixnum() {
+                        let header = string.object_ptr();
+                        let at = index.bits() >> 2;
+                        if (*header).kind == Kind::String && at < u64::from((*header).len) {
+                            let code = *header.add(1).cast::<u32>().add(at as usize);
+                            if let Some(v) = Value::character(code) {
+                                set!(a!(), v);
+                                next!(1);
+                            }
+                        }
+                    }
+                    cold!(1, cold::arithmetic)
                 }
                 Operation::Slot => {
                     let instance = get!(b!());

@@ -10,7 +10,7 @@
 
 use esl_bytecode::opcode::{Opcode, Substitute};
 
-use super::call::{Arguments, Place};
+use super::call::Place;
 use super::{Operation, Signal, call, code_of, stubs};
 use crate::control::{Entry, EntryKind};
 use crate::raise::Exit;
@@ -34,7 +34,7 @@ pub(super) unsafe fn exit(vm: &mut Vm, exit: Exit) -> Signal {
             Exit::Call => {
                 let (function, arguments) = vm.take_requested_call();
                 let place = place_of(vm);
-                call::call(vm, function, arguments, place)
+                call::call(vm, function, &arguments, place)
             }
             Exit::Park => Signal::Park,
         }
@@ -69,7 +69,7 @@ unsafe fn take_over(vm: &mut Vm) -> Signal {
         let first = vm.cpu.base.add((word >> 8 & 0xff) as usize + 2);
         let given = std::slice::from_raw_parts(first, (word >> 16 & 0xff) as usize);
         let place = place_of(vm);
-        call::call(vm, function, Arguments::from_slice(given), place)
+        call::call(vm, function, given, place)
     }
 }
 
@@ -88,7 +88,7 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
         return Signal::Unwind;
     }
     // SAFETY: as `settle`.
-    unsafe { call::call(vm, function, arguments, Place::Above) }
+    unsafe { call::call(vm, function, &arguments, Place::Above) }
 }
 
 /// Collects, so that the instruction at `vm.cpu.pc` is done again with more room; if that did not help the last time, the

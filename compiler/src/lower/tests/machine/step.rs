@@ -163,6 +163,14 @@ impl Machine<'_> {
                 let value = self.element(vector, index).0.borrow().clone();
                 self.set(dst.0, value);
             }
+            Instr::CharRef { dst, string, index } => {
+                let value = simple(B::Char, vec![self.get(string.0), self.get(index.0)])?;
+                self.set(dst.0, value);
+            }
+            Instr::CharEq { dst, left, right } => {
+                let value = simple(B::CharEqualExactly, vec![self.get(left.0), self.get(right.0)])?;
+                self.set(dst.0, value);
+            }
             Instr::VectorSet { vector, index, value } => {
                 let value = self.get(value.0);
                 *self.element(vector, index).0.borrow_mut() = value;
