@@ -383,7 +383,7 @@ impl Vm {
         self.task_mut().critical = 0;
         let function = self.world.known.raise;
         let cause = self.world.known.budget_exhausted;
-        interp::interrupt(self, function, smallvec::smallvec![cause])
+        interp::interrupt(self, function, &[cause])
     }
 
     /// Notes that the task at a place has come to wait.

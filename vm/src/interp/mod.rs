@@ -174,13 +174,13 @@ pub(crate) fn load(vm: &mut Vm, ticks: i32) {
 /// function.
 pub(crate) fn see_to_attention(vm: &mut Vm) -> Result<(), Leave> {
     if let Some(function) = vm.see_to_running_task() {
-        interrupt(vm, function, call::Arguments::new())?;
+        interrupt(vm, function, &[])?;
     }
     Ok(())
 }
 
 /// Calls `function` where the task in `vm.running`, which is loaded, stands.
-pub(crate) fn interrupt(vm: &mut Vm, function: Value, arguments: call::Arguments) -> Result<(), Leave> {
+pub(crate) fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]) -> Result<(), Leave> {
     // SAFETY: as for `run`; a task that does not run stands before an instruction that has had no effect yet.
     unsafe {
         let signal = raise::interrupt(vm, function, arguments);

@@ -158,7 +158,7 @@ pub(super) unsafe fn interrupt_return(vm: &mut Vm, _pc: *const u32, base: *mut V
 ///
 /// # Safety
 /// As [`super::settle`], at an instruction that has had no effect yet.
-pub(super) unsafe fn interrupt(vm: &mut Vm, function: Value, arguments: Arguments) -> Signal {
+pub(super) unsafe fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]) -> Signal {
     let base = vm.offset_of(vm.cpu.base) as u32;
     let task = vm.task_mut();
     let wait = std::mem::replace(&mut task.wait, Value::NIL);
