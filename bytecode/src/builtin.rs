@@ -1025,6 +1025,33 @@ define_builtins! {
     /// Writes what a stream has gathered.
     ForceOutput = cl "FORCE-OUTPUT" ("&optional stream");
 
+    // ---- the logical database
+    /// Adds a fact to the database: `T` if it was new, or the fact that it replaces as the value of a property.
+    AssertFact = internal "%ASSERT" ("fact");
+    /// Removes a fact from the database; whether it was there, or 0 for a pattern with variables.
+    RetractFact = internal "%RETRACT" ("fact");
+    /// From now on the last of `width` arguments of facts of this name is unique for given others; `NIL` if there are rules
+    /// for such facts.
+    MakeProperty = internal "%MAKE-PROPERTY" ("name width");
+    /// The last argument of the fact that begins with the terms of a list, and whether there is one. For properties.
+    PropertyValue = internal "%PROPERTY-VALUE" ("property");
+    /// Adds a rule, unless one with an equal source is there, which it replaces.
+    DefineRule = internal "%DEFINE-RULE" ("head body source");
+    /// Begins a query in which variables have the values of an association list; the number that names it. With `facts`,
+    /// its answers are the facts that match a pattern.
+    OpenQuery = internal "%OPEN-QUERY" ("query bindings facts");
+    /// Works on a query: `T` when all answers are found, `NIL` when there is more to do; or `:test`, a function whose value
+    /// is to be told, and the bindings under which to call it.
+    QueryStep = internal "%QUERY-STEP" ("query");
+    /// Tells a query the outcome of the test that it has asked for.
+    QueryTell = internal "%QUERY-TELL" ("query holds");
+    /// The next answers of a query, a list of binding lists; empty when all were given.
+    QueryAnswers = internal "%QUERY-ANSWERS" ("query");
+    /// Removes the next fact that a query has found and that is still there, and gives it; `NIL` when all were seen to, `T` to be asked again.
+    RetractNext = internal "%RETRACT-NEXT" ("query");
+    /// Ends a query.
+    CloseQuery = internal "%CLOSE-QUERY" ("query");
+
     // ---- the host
     /// The arguments of the program, a list of strings.
     CommandLineArguments = esl "COMMAND-LINE-ARGUMENTS" ("");
@@ -1102,6 +1129,8 @@ define_builtins! {
     Checkpoints = internal "%CHECKPOINTS" ("task");
     /// What lets the end of another task interrupt this one with a call of `function`.
     MakeGuard = internal "%MAKE-GUARD" ("function");
+    /// Has a guard interrupt its task, again if it has done so before.
+    InterruptBy = internal "%INTERRUPT-BY" ("guard");
     /// Lets a guard interrupt no more.
     CloseGuard = internal "%CLOSE-GUARD" ("guard");
     /// Makes the innermost catch, for `tag`, a limit: when it expires, its form is ended and gives the cause.

@@ -17,6 +17,7 @@ pub mod vm;
 mod binding;
 mod character;
 mod control;
+mod database;
 mod datum;
 mod deadlock;
 mod describe;

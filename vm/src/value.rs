@@ -66,6 +66,8 @@ const SUB_NEGATIVE_ZERO: u64 = 7;
 const SUB_INFINITY: u64 = 8;
 const SUB_NEGATIVE_INFINITY: u64 = 9;
 const SUB_NAN: u64 = 10;
+const SUB_TERM: u64 = 29;
+const SUB_VARIABLE: u64 = 30;
 const SUB_POISON: u64 = 31;
 
 const fn immediate(sub: u64, payload: u64) -> Value {
@@ -270,6 +272,32 @@ impl Value {
     #[inline(always)]
     pub const fn as_character(self) -> Option<u32> {
         if self.is_character() { Some((self.0 >> 8) as u32) } else { None }
+    }
+
+    // What only the logical database sees.
+
+    /// The entry with this index among the terms of the database. Never seen by a program.
+    #[inline(always)]
+    pub(crate) const fn term(index: u32) -> Value {
+        immediate(SUB_TERM, index as u64)
+    }
+
+    /// The index, if this is an entry among the terms of the database.
+    #[inline(always)]
+    pub(crate) const fn as_term(self) -> Option<u32> {
+        if self.0 & 0xFF == SUB_TERM << 3 | TAG_IMMEDIATE { Some((self.0 >> 8) as u32) } else { None }
+    }
+
+    /// The logical variable with this number. Never seen by a program.
+    #[inline(always)]
+    pub(crate) const fn variable(number: u32) -> Value {
+        immediate(SUB_VARIABLE, number as u64)
+    }
+
+    /// The number, if this is a logical variable.
+    #[inline(always)]
+    pub(crate) const fn as_variable(self) -> Option<u32> {
+        if self.0 & 0xFF == SUB_VARIABLE << 3 | TAG_IMMEDIATE { Some((self.0 >> 8) as u32) } else { None }
     }
 
     // Handles.

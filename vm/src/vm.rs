@@ -7,6 +7,7 @@ use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::datum::Datum;
 
 use crate::control::End;
+use crate::database::Database;
 use crate::embed::HostFunction;
 use crate::heap::{AllocError, Heap, HeapConfig, Kind};
 use crate::host::{Console, Host};
@@ -85,6 +86,9 @@ pub struct Vm {
     pub(crate) host_functions: Vec<HostFunction>,
     /// What one of them has given, while there is no room for it.
     pub(crate) host_answer: Option<Result<Datum, String>>,
+
+    /// Facts and rules.
+    pub(crate) database: Database,
 
     // ---- tasks
     /// The tasks.
@@ -212,6 +216,7 @@ impl Vm {
             now: 0,
             looked_at: 0,
             moved_at: 0,
+            database: Database::default(),
             running: None,
             running_index: u32::MAX,
             critical_left: 0,

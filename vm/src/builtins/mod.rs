@@ -376,6 +376,17 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::SlotOf => structure::slot,
         Builtin::SetSlotOf => structure::set_slot,
         Builtin::IsInstance => structure::is_instance,
+        Builtin::AssertFact => database::assert_fact,
+        Builtin::RetractFact => database::retract_fact,
+        Builtin::MakeProperty => database::make_property,
+        Builtin::PropertyValue => database::property_value,
+        Builtin::DefineRule => database::define_rule,
+        Builtin::OpenQuery => database::open_query,
+        Builtin::QueryStep => database::query_step,
+        Builtin::QueryTell => database::query_tell,
+        Builtin::QueryAnswers => database::query_answers,
+        Builtin::RetractNext => database::retract_next,
+        Builtin::CloseQuery => database::close_query,
         Builtin::CommandLineArguments => outside::command_line_arguments,
         Builtin::Now => outside::now,
         Builtin::InternalRealTime => outside::internal_real_time,
@@ -515,6 +526,7 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::AddCheckpoint => task::add_checkpoint,
         Builtin::Checkpoints => task::checkpoints,
         Builtin::MakeGuard => task::make_guard,
+        Builtin::InterruptBy => task::interrupt_by,
         Builtin::CloseGuard => task::close_guard,
         Builtin::OpenLimit => task::open_limit,
         Builtin::BeginCritical => task::begin_critical,
@@ -526,6 +538,7 @@ pub(crate) mod array;
 mod character;
 mod class;
 mod control;
+mod database;
 mod define;
 mod equality;
 pub(crate) mod eval;

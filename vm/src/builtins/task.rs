@@ -256,6 +256,15 @@ pub(super) fn make_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.alloc_record(Kind::Record, 0, guard::AUX, &slots)?)
 }
 
+/// `(%interrupt-by guard)`
+pub(super) fn interrupt_by(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    if vm.is_guard(arguments[0]) {
+        vm.set_slot(arguments[0], guard::IS_OPEN, Value::T);
+        vm.interrupt_by(arguments[0]);
+    }
+    Ok(Value::NIL)
+}
+
 /// `(%close-guard guard)`
 pub(super) fn close_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if vm.is_guard(arguments[0]) {

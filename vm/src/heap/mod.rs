@@ -166,6 +166,8 @@ pub struct Heap {
     large: Vec<LargeObject>,
     large_number: u64,
     committed: usize,
+    /// Bytes outside of the heap that count against its limit.
+    external: usize,
     limit: usize,
 
     stats: HeapStats,
@@ -198,6 +200,7 @@ impl Heap {
             large: Vec::new(),
             large_number: 0,
             committed: 0,
+            external: 0,
             limit: config.limit.max(ARENA),
             stats: HeapStats::default(),
         }
@@ -240,6 +243,15 @@ impl Heap {
     /// Number of the cycle that runs or ran last; a task stack notes it when it was scanned.
     pub fn cycle_id(&self) -> u64 {
         self.cycle_id
+    }
+
+    /// Notes how many bytes outside of the heap count against its limit. What there is stays, whatever the answer.
+    ///
+    /// # Errors
+    /// [`AllocError::NeedCollection`] if the limit is passed.
+    pub(crate) fn set_external(&mut self, bytes: usize) -> Result<(), AllocError> {
+        self.external = bytes;
+        if self.committed + bytes > self.limit_now() { Err(AllocError::NeedCollection) } else { Ok(()) }
     }
 
     /// Opens the reserve above the limit for the clause that handles `:heap-exhausted`; false if it is open already.

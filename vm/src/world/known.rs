@@ -76,5 +76,6 @@ define_known! {
     internal = keyword "INTERNAL";
     external = keyword "EXTERNAL";
     inherited = keyword "INHERITED";
+    test = keyword "TEST";
     unfinished = keyword "UNFINISHED";
 }

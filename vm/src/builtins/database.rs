@@ -1,0 +1,183 @@
+//! The logical database: changes of facts, and queries in steps. Whatever calls functions of the program is ESL, in
+//! `stdlib/database.esl`.
+
+use crate::database::{Fault, Problem, Progress};
+use crate::heap::AllocError;
+use crate::raise::{Exit, Outcome, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// Work of one step of a query: a fact looked at, a goal, an answer.
+const STEP: usize = 1024;
+
+/// Makes what the database needs of the heap, when it is used first.
+fn prepare(vm: &mut Vm) -> Result<(), Exit> {
+    if let Some(objects) = vm.database.prepare(&mut vm.heap)? {
+        vm.pin(objects);
+    }
+    Ok(())
+}
+
+/// What goes on with a fault.
+fn checked<T>(vm: &mut Vm, outcome: Result<T, Fault>) -> Result<T, Exit> {
+    match outcome {
+        Ok(value) => Ok(value),
+        Err(Fault::Room(error)) => Err(error.into()),
+        Err(Fault::Variable(fact)) => {
+            checked(vm, Err(Fault::Malformed(fact, "a fact, which has no variables")))
+        }
+        Err(Fault::Malformed(v, expected)) => {
+            let found = vm.describe(v);
+            vm.program_error(format!("expected {expected}, found {found}"))
+        }
+    }
+}
+
+/// `(%assert fact)`
+pub(super) fn assert_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    prepare(vm)?;
+    let mut work = 0;
+    let outcome = vm.database.assert(&mut vm.heap, arguments[0], &mut work);
+    vm.charge(4 * work);
+    checked(vm, outcome)
+}
+
+/// `(%make-property name width)`
+pub(super) fn make_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    prepare(vm)?;
+    if !vm.world.is_symbol(&vm.heap, arguments[0]) {
+        return vm.type_error(arguments[0], "SYMBOL");
+    }
+    let width = vm.count(arguments[1])?;
+    let mut work = 0;
+    let made = vm.database.define_property(&mut vm.heap, arguments[0], width, &mut work)?;
+    vm.charge(4 * work);
+    Ok(made.into())
+}
+
+/// `(%property-value property)`
+pub(super) fn property_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    prepare(vm)?;
+    let mut work = 0;
+    let outcome = vm.database.property_value(&mut vm.heap, arguments[0], &mut work);
+    vm.charge(4 * work);
+    let value = checked(vm, outcome)?;
+    if value == Value::UNBOUND {
+        vm.give_values(&[Value::NIL, Value::NIL])
+    } else {
+        vm.give_values(&[value, Value::T])
+    }
+}
+
+/// `(%retract fact)`
+pub(super) fn retract_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    prepare(vm)?;
+    let mut work = 0;
+    let outcome = vm.database.retract(&mut vm.heap, arguments[0], &mut work);
+    vm.charge(4 * work);
+    match outcome {
+        Err(Fault::Variable(_)) => Ok(Value::small(0)),
+        outcome => Ok(checked(vm, outcome)?.into()),
+    }
+}
+
+/// `(%define-rule head body source)`
+pub(super) fn define_rule(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    prepare(vm)?;
+    let &[head, body, source] = arguments else { unreachable!("the table says three") };
+    let mut work = 0;
+    let outcome = vm.database.define_rule(&mut vm.heap, [head, body, source], &mut work);
+    vm.charge(4 * work);
+    checked(vm, outcome)?;
+    Ok(Value::T)
+}
+
+/// `(%open-query query bindings facts)`
+pub(super) fn open_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    prepare(vm)?;
+    let &[query, bindings, facts] = arguments else { unreachable!("the table says three") };
+    let mut work = 0;
+    let outcome = vm.database.open(&mut vm.heap, query, bindings, facts.is_true(), &mut work);
+    vm.charge(4 * work);
+    Ok(Value::index(checked(vm, outcome)? as usize))
+}
+
+/// The query that a number names.
+fn query(vm: &mut Vm, v: Value) -> Result<u64, Exit> {
+    Ok(vm.count(v)? as u64)
+}
+
+/// What goes on where there may be no query of that number.
+fn open<T>(vm: &mut Vm, found: Option<T>) -> Result<T, Exit> {
+    match found {
+        Some(value) => Ok(value),
+        None => vm.raise(Raised::Control("the query is no longer open".into())),
+    }
+}
+
+/// `(%query-step query)`
+pub(super) fn query_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let key = query(vm, arguments[0])?;
+    let mut work = STEP;
+    let progress = vm.database.step(key, &mut work);
+    vm.charge(8 * (STEP - work));
+    // If there is no room, the step is done again and goes on from here.
+    vm.database.check_room(&mut vm.heap)?;
+    match open(vm, progress)? {
+        Ok(Progress::More) => Ok(Value::NIL),
+        Ok(Progress::Done) => Ok(Value::T),
+        Ok(Progress::Test(function, bindings)) => {
+            let function = vm.database.value(&mut vm.heap, function)?;
+            let bindings = bindings.into_iter().rev().try_fold(Value::NIL, |list, (name, value)| {
+                let name = vm.database.value(&mut vm.heap, name)?;
+                let value = vm.database.value(&mut vm.heap, value)?;
+                let binding = vm.heap.cons(name, value)?;
+                vm.heap.cons(binding, list)
+            });
+            let test = vm.world.known.test;
+            let bindings: Result<Value, AllocError> = bindings;
+            vm.give_values(&[test, function, bindings?])
+        }
+        Err(Problem::Circular(functor)) => {
+            let functor = vm.database.value(&mut vm.heap, functor)?;
+            vm.raise(Raised::Cause("UNSTRATIFIED-RULES", functor))
+        }
+        Err(Problem::Unbound(functor)) => {
+            let functor = vm.database.value(&mut vm.heap, functor)?;
+            vm.raise(Raised::Cause("UNBOUND-LOGICAL-VARIABLE", functor))
+        }
+        Err(Problem::TooLarge) => vm.program_error("a rule builds too large a term"),
+    }
+}
+
+/// `(%query-tell query holds)`
+pub(super) fn query_tell(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let key = query(vm, arguments[0])?;
+    vm.database.tell(key, arguments[1].is_true());
+    Ok(Value::NIL)
+}
+
+/// `(%query-answers query)`
+pub(super) fn query_answers(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let key = query(vm, arguments[0])?;
+    let mut work = 0;
+    let answers = vm.database.answers(&mut vm.heap, key, &mut work);
+    vm.charge(4 * work);
+    Ok(open(vm, answers)??)
+}
+
+/// `(%retract-next query)`
+pub(super) fn retract_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let key = query(vm, arguments[0])?;
+    let mut work = 0;
+    let fact = vm.database.retract_next(&mut vm.heap, key, &mut work);
+    vm.charge(4 * work);
+    Ok(open(vm, fact)??)
+}
+
+/// `(%close-query query)`
+pub(super) fn close_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let key = query(vm, arguments[0])?;
+    vm.database.close(&mut vm.heap, key);
+    Ok(Value::NIL)
+}

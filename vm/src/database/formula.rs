@@ -1,0 +1,404 @@
+//! Queries as they are written, and facts, as terms.
+//!
+//! ```text
+//! formula   (and formula*)  (or formula*)  (not formula)  (test function variable*)  pattern
+//! pattern   (term term* [. variable])
+//! ```
+//!
+//! The library has put a function in place of the form of a test. The words are known by their names, whatever their
+//! package, since `test` is a name that programs use themselves. A variable is a symbol whose name begins with `?`; `?`
+//! alone is another variable each time.
+
+use std::collections::BTreeMap;
+
+use super::term::{MAX_SIZE, Term, TermError, Terms};
+use crate::heap::{AllocError, Heap};
+use crate::value::Value;
+
+/// Formulas within formulas.
+const MOST_NESTED: usize = 100;
+/// Atoms and pairs in a query.
+const MOST_PARTS: usize = 1 << 13;
+
+/// What is wrong with a query or a fact.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Fault {
+    /// No room.
+    Room(AllocError),
+    /// A fact has variables.
+    Variable(Value),
+    /// This is not what it should be: a text that begins with what was expected.
+    Malformed(Value, &'static str),
+}
+
+impl From<AllocError> for Fault {
+    fn from(error: AllocError) -> Fault {
+        Fault::Room(error)
+    }
+}
+
+/// Facts of a certain form.
+#[derive(Clone, Debug)]
+pub(super) struct Pattern {
+    /// Its place among the generators of its query, in the order of the text.
+    pub(super) rank: usize,
+    pub(super) functor: Term,
+    pub(super) arguments: Vec<Term>,
+    /// What is matched with the list of all further arguments; `NIL` for none.
+    pub(super) tail: Term,
+}
+
+/// A condition that the program computes.
+#[derive(Clone, Debug)]
+pub(super) struct Test {
+    pub(super) function: Term,
+    /// The variables that it looks at.
+    pub(super) variables: Vec<u32>,
+}
+
+/// What a query asks, or the body of a rule.
+#[derive(Clone, Debug)]
+pub(super) enum Formula {
+    Pattern(Pattern),
+    And(Vec<Formula>),
+    /// Alternatives, its rank, and the rank after those in it.
+    Or(Vec<Formula>, usize, usize),
+    Not(Box<Formula>),
+    Test(Test),
+}
+
+/// Whether `v` is a logical variable, and whether it is one without a name.
+#[inline]
+fn variable_name(heap: &Heap, v: Value) -> Option<bool> {
+    let name = heap.string(heap.symbol(v)?.name)?;
+    if name.first() == Some(&u32::from(b'?')) { Some(name.len() == 1) } else { None }
+}
+
+/// Gives the term of a symbol, held, if it is a variable.
+type OfSymbol<'a> = dyn FnMut(&mut Terms, &mut Heap, Value) -> Result<Option<Term>, Fault> + 'a;
+
+/// The term of an object; `symbol` gives the terms of symbols that are variables.
+fn convert(
+    terms: &mut Terms,
+    heap: &mut Heap,
+    v: Value,
+    parts: &mut usize,
+    symbol: &mut OfSymbol<'_>,
+) -> Result<Term, Fault> {
+    enum Open {
+        Make(Value),
+        Join,
+    }
+    let mut atom = |terms: &mut Terms, heap: &mut Heap, v: Value| match symbol(terms, heap, v)? {
+        Some(term) => Ok(term),
+        None => terms.atom(heap, v).map_err(Fault::Room),
+    };
+    if !v.is_cons() {
+        return atom(terms, heap, v);
+    }
+    let mut made: Vec<Term> = Vec::new();
+    let mut open = vec![Open::Make(v)];
+    let mut walk = || -> Result<(), Fault> {
+        while let Some(next) = open.pop() {
+            match next {
+                Open::Make(part) => match heap.as_cons(part) {
+                    Some(pair) => {
+                        *parts = parts.checked_sub(1).ok_or(Fault::Malformed(v, TOO_LARGE))?;
+                        open.push(Open::Join);
+                        open.push(Open::Make(pair.cdr));
+                        open.push(Open::Make(pair.car));
+                    }
+                    None => made.push(atom(terms, heap, part)?),
+                },
+                Open::Join => {
+                    let (cdr, car) = (made.pop().unwrap_or(Term::NIL), made.pop().unwrap_or(Term::NIL));
+                    made.push(terms.pair(car, cdr).map_err(|error| fault_of(error, v))?);
+                }
+            }
+        }
+        Ok(())
+    };
+    match walk() {
+        Ok(()) => Ok(made.pop().unwrap_or(Term::NIL)),
+        Err(fault) => {
+            for term in made {
+                terms.release(term);
+            }
+            Err(fault)
+        }
+    }
+}
+
+const TOO_LARGE: &str = "a smaller term";
+
+fn fault_of(error: TermError, v: Value) -> Fault {
+    match error {
+        TermError::Room(error) => Fault::Room(error),
+        TermError::TooLarge => Fault::Malformed(v, TOO_LARGE),
+    }
+}
+
+/// The terms of a fact, each held: its functor and its arguments. `work` is what that took.
+pub(super) fn fact(
+    terms: &mut Terms,
+    heap: &mut Heap,
+    v: Value,
+    cells: &mut Vec<Term>,
+    work: &mut usize,
+) -> Result<(), Fault> {
+    let mut parts = MAX_SIZE as usize;
+    let mut rest = v;
+    let mut walk = || -> Result<(), Fault> {
+        if !v.is_cons() {
+            return Err(Fault::Malformed(v, "a fact, which is a list"));
+        }
+        while let Some(pair) = heap.as_cons(rest) {
+            parts = parts.checked_sub(1).ok_or(Fault::Malformed(v, "a smaller fact"))?;
+            let term =
+                convert(terms, heap, pair.car, &mut parts, &mut |_, heap, part| match part.is_address()
+                    && variable_name(heap, part).is_some()
+                {
+                    true => Err(Fault::Variable(v)),
+                    false => Ok(None),
+                })?;
+            cells.push(term);
+            rest = pair.cdr;
+        }
+        if rest.is_true() { Err(Fault::Malformed(v, "a fact, which is a proper list")) } else { Ok(()) }
+    };
+    let outcome = walk();
+    *work += MAX_SIZE as usize - parts;
+    if outcome.is_err() {
+        for term in cells.drain(..) {
+            terms.release(term);
+        }
+    }
+    outcome
+}
+
+/// Makes formulas of what a program has written.
+pub(super) struct Parser<'a> {
+    pub(super) terms: &'a mut Terms,
+    pub(super) heap: &'a mut Heap,
+    /// Terms that the formulas hold.
+    pub(super) held: Vec<Term>,
+    /// The names of the variables, by their numbers; unbound for those without a name.
+    pub(super) names: Vec<Term>,
+    /// Number of patterns and alternatives.
+    pub(super) ranks: usize,
+    /// Terms of variables that have a value from outside.
+    inherited: BTreeMap<u64, Term>,
+    numbers: BTreeMap<u64, u32>,
+    parts: usize,
+    query: Value,
+}
+
+impl<'a> Parser<'a> {
+    pub(super) fn new(terms: &'a mut Terms, heap: &'a mut Heap, query: Value) -> Parser<'a> {
+        Parser {
+            terms,
+            heap,
+            held: Vec::new(),
+            names: Vec::new(),
+            ranks: 0,
+            inherited: BTreeMap::new(),
+            numbers: BTreeMap::new(),
+            parts: MOST_PARTS,
+            query,
+        }
+    }
+
+    /// Gives variables the values of an association list; the first one counts.
+    pub(super) fn inherit(&mut self, bindings: Value) -> Result<(), Fault> {
+        let mut rest = bindings;
+        let mut parts = MAX_SIZE as usize;
+        while let Some(pair) = self.heap.as_cons(rest) {
+            parts = parts.checked_sub(1).ok_or(Fault::Malformed(bindings, "fewer bindings"))?;
+            rest = pair.cdr;
+            let Some(binding) = self.heap.as_cons(pair.car) else { continue };
+            if self.inherited.contains_key(&binding.car.bits()) {
+                continue;
+            }
+            let term = convert(self.terms, self.heap, binding.cdr, &mut parts, &mut |_, _, _| Ok(None))?;
+            self.held.push(term);
+            self.inherited.insert(binding.car.bits(), term);
+        }
+        Ok(())
+    }
+
+    /// How much of what a query may have was used.
+    pub(super) fn work(&self) -> usize {
+        MOST_PARTS - self.parts
+    }
+
+    fn malformed<T>(&self, v: Value, expected: &'static str) -> Result<T, Fault> {
+        Err(Fault::Malformed(v, expected))
+    }
+
+    fn spend(&mut self) -> Result<(), Fault> {
+        self.parts = self.parts.checked_sub(1).ok_or(Fault::Malformed(self.query, "a smaller query"))?;
+        Ok(())
+    }
+
+    fn variable(&mut self, v: Value, is_anonymous: bool) -> Result<Term, Fault> {
+        if is_anonymous {
+            self.names.push(Term::UNBOUND);
+            return Ok(Term::variable(self.names.len() as u32 - 1));
+        }
+        if let Some(&term) = self.inherited.get(&v.bits()) {
+            self.terms.retain(term);
+            return Ok(term);
+        }
+        if let Some(&number) = self.numbers.get(&v.bits()) {
+            return Ok(Term::variable(number));
+        }
+        let name = self.terms.atom(self.heap, v)?;
+        self.held.push(name);
+        let number = self.names.len() as u32;
+        self.names.push(name);
+        self.numbers.insert(v.bits(), number);
+        Ok(Term::variable(number))
+    }
+
+    /// The term of a part of a pattern; held by what is parsed.
+    fn term(&mut self, v: Value) -> Result<Term, Fault> {
+        self.spend()?;
+        let term = match v.is_cons() {
+            false => match variable_name(self.heap, v) {
+                Some(is_anonymous) => self.variable(v, is_anonymous)?,
+                None => self.terms.atom(self.heap, v)?,
+            },
+            true => self.compound(v)?,
+        };
+        self.held.push(term);
+        Ok(term)
+    }
+
+    fn compound(&mut self, v: Value) -> Result<Term, Fault> {
+        // The variables are found first, since the conversion has the terms to itself.
+        let mut open = vec![v];
+        let mut known: BTreeMap<u64, Term> = BTreeMap::new();
+        while let Some(part) = open.pop() {
+            self.spend()?;
+            if let Some(pair) = self.heap.as_cons(part) {
+                open.push(pair.cdr);
+                open.push(pair.car);
+            } else if let Some(false) = variable_name(self.heap, part)
+                && !known.contains_key(&part.bits())
+            {
+                let term = self.variable(part, false)?;
+                known.insert(part.bits(), term);
+            }
+        }
+        let Parser { terms, heap, names, .. } = self;
+        let mut parts = MOST_PARTS;
+        let outcome =
+            convert(terms, heap, v, &mut parts, &mut |terms, heap, part| match variable_name(heap, part) {
+                Some(true) => {
+                    names.push(Term::UNBOUND);
+                    Ok(Some(Term::variable(names.len() as u32 - 1)))
+                }
+                Some(false) => Ok(known.get(&part.bits()).map(|&term| {
+                    terms.retain(term);
+                    term
+                })),
+                None => Ok(None),
+            });
+        for term in known.into_values() {
+            terms.release(term);
+        }
+        outcome
+    }
+
+    /// A pattern.
+    pub(super) fn pattern(&mut self, v: Value) -> Result<Pattern, Fault> {
+        let Some(pair) = self.heap.as_cons(v) else { return self.malformed(v, "a pattern, which is a list") };
+        let rank = self.ranks;
+        self.ranks += 1;
+        let functor = self.term(pair.car)?;
+        let mut arguments = Vec::new();
+        let mut rest = pair.cdr;
+        while let Some(pair) = self.heap.as_cons(rest) {
+            arguments.push(self.term(pair.car)?);
+            rest = pair.cdr;
+        }
+        let tail = self.term(rest)?;
+        if tail != Term::NIL && tail.as_variable().is_none() {
+            return self.malformed(v, "a pattern, which is a list with at most a variable after its dot");
+        }
+        Ok(Pattern { rank, functor, arguments, tail })
+    }
+
+    /// The term of a text as it is, variables and all.
+    pub(super) fn text(&mut self, v: Value) -> Result<Term, Fault> {
+        let term = convert(self.terms, self.heap, v, &mut self.parts, &mut |_, _, _| Ok(None))?;
+        self.held.push(term);
+        Ok(term)
+    }
+
+    fn items(&mut self, v: Value) -> Result<Vec<Value>, Fault> {
+        let mut items = Vec::new();
+        let mut rest = v;
+        while let Some(pair) = self.heap.as_cons(rest) {
+            self.spend()?;
+            items.push(pair.car);
+            rest = pair.cdr;
+        }
+        if rest.is_true() { self.malformed(v, "a proper list") } else { Ok(items) }
+    }
+
+    fn word(&self, v: Value) -> Option<&'static str> {
+        let name = self.heap.string(self.heap.symbol(v)?.name)?;
+        let is = |word: &str| name.iter().copied().eq(word.bytes().map(u32::from));
+        ["AND", "OR", "NOT", "TEST"].into_iter().find(|word| is(word))
+    }
+
+    /// A formula.
+    pub(super) fn formula(&mut self, v: Value, depth: usize) -> Result<Formula, Fault> {
+        if depth > MOST_NESTED {
+            return self.malformed(v, "fewer formulas within formulas");
+        }
+        let Some(pair) = self.heap.as_cons(v) else { return self.malformed(v, "a query, which is a list") };
+        match self.word(pair.car) {
+            Some("AND") => Ok(Formula::And(self.formulas(pair.cdr, depth)?)),
+            Some("OR") => {
+                let rank = self.ranks;
+                self.ranks += 1;
+                let alternatives = self.formulas(pair.cdr, depth)?;
+                Ok(Formula::Or(alternatives, rank, self.ranks))
+            }
+            Some("NOT") => match self.formulas(pair.cdr, depth)?.pop() {
+                Some(inside) if self.heap.cdr(pair.cdr) == Some(Value::NIL) => {
+                    Ok(Formula::Not(Box::new(inside)))
+                }
+                _ => self.malformed(v, "(not query)"),
+            },
+            Some(_) => self.test(v, pair.cdr),
+            None => Ok(Formula::Pattern(self.pattern(v)?)),
+        }
+    }
+
+    fn formulas(&mut self, list: Value, depth: usize) -> Result<Vec<Formula>, Fault> {
+        let items = self.items(list)?;
+        items.into_iter().map(|item| self.formula(item, depth + 1)).collect()
+    }
+
+    fn test(&mut self, v: Value, parts: Value) -> Result<Formula, Fault> {
+        let items = self.items(parts)?;
+        let Some((&function, looks_at)) = items.split_first() else {
+            return self.malformed(v, "(test form)");
+        };
+        let function = self.terms.atom(self.heap, function)?;
+        self.held.push(function);
+        let mut variables = Vec::new();
+        for &item in looks_at {
+            if variable_name(self.heap, item) != Some(false) {
+                return self.malformed(v, "(test form)");
+            }
+            if let Some(number) = self.term(item)?.as_variable() {
+                variables.push(number as u32);
+            }
+        }
+        Ok(Formula::Test(Test { function, variables }))
+    }
+}

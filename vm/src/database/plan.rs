@@ -1,0 +1,327 @@
+//! In which order the parts of a conjunction are looked up, and the goals that a query is run by.
+//!
+//! Of the patterns of a conjunction that one comes next for which there are fewest facts to be expected, given what is
+//! bound by then, unless the order of the text is about as good. A test comes as soon as its variables are bound and the
+//! patterns before it in the text have been seen to, a negation as soon as the variables are bound that it shares with
+//! patterns. The answers do not depend on the order, and neither does their order, for which see `query`.
+//!
+//! A goal names the goal that comes after it, so formulas in formulas become one graph.
+
+use std::rc::Rc;
+
+use super::formula::{Formula, Pattern, Test};
+use super::relation::INDEXED_POSITIONS;
+use super::term::{Term, Terms};
+use super::{Database, rule::Rules};
+
+/// The number of a goal.
+pub(super) type GoalId = u32;
+
+/// A step of a query.
+#[derive(Clone, Debug)]
+pub(super) enum Goal {
+    /// Finds facts.
+    Match { pattern: Rc<Pattern>, relation: Option<u32>, next: GoalId },
+    /// Finds facts of a predicate that has rules.
+    Call { pattern: Rc<Pattern>, predicate: usize, next: GoalId },
+    /// Tries one after the other. The ranks are those of the alternatives.
+    Branch { alternatives: Vec<GoalId>, rank: usize, ranks_end: usize },
+    /// Goes on if there is no answer inside.
+    Not { inside: GoalId, next: GoalId },
+    /// There is an answer inside.
+    Proved,
+    /// Goes on if the program says so.
+    Test { test: Test, next: GoalId },
+    /// An answer.
+    Solved,
+}
+
+/// Patterns of a conjunction that are put into order by what they cost; more than that stay as they are.
+const MOST_ORDERED: usize = 64;
+/// By how much another order must be better than that of the text.
+const WORTHWHILE: f64 = 4.0;
+/// How many facts a predicate with rules is taken to have, when no argument is known, and when some are.
+const MANY: f64 = 1e6;
+const SOME: f64 = 1e3;
+
+/// Which variables are bound.
+type Bound = Vec<bool>;
+
+/// A formula, put into order.
+enum Arranged<'f> {
+    Pattern(&'f Pattern),
+    And(Vec<Arranged<'f>>),
+    Or(Vec<Arranged<'f>>, usize, usize),
+    Not(Box<Arranged<'f>>),
+    Test(&'f Test),
+}
+
+/// Makes goals of formulas.
+pub(super) struct Planner<'a> {
+    pub(super) database: &'a Database,
+    pub(super) rules: &'a Rules,
+    pub(super) goals: &'a mut Vec<Goal>,
+    /// Whether generators are in another order than in the text.
+    pub(super) is_reordered: bool,
+    /// Steps taken.
+    pub(super) work: usize,
+}
+
+fn variables_of(terms: &Terms, pattern: &Pattern, visit: &mut dyn FnMut(usize)) {
+    for &part in [&pattern.functor, &pattern.tail].into_iter().chain(&pattern.arguments) {
+        terms.variables(part, visit);
+    }
+}
+
+impl Planner<'_> {
+    /// Makes the goals of a formula after which `next` comes. `bound` says what is bound before.
+    pub(super) fn plan(&mut self, formula: &Formula, bound: &mut Bound, next: GoalId) -> GoalId {
+        let arranged = self.arrange(formula, bound);
+        self.emit(&arranged, next)
+    }
+
+    fn add(&mut self, goal: Goal) -> GoalId {
+        self.goals.push(goal);
+        self.goals.len() as GoalId - 1
+    }
+
+    fn emit(&mut self, arranged: &Arranged<'_>, next: GoalId) -> GoalId {
+        match arranged {
+            Arranged::Pattern(pattern) => self.emit_pattern(pattern, next),
+            Arranged::And(parts) => parts.iter().rev().fold(next, |next, part| self.emit(part, next)),
+            Arranged::Or(parts, rank, ranks_end) => {
+                let alternatives = parts.iter().map(|part| self.emit(part, next)).collect();
+                self.add(Goal::Branch { alternatives, rank: *rank, ranks_end: *ranks_end })
+            }
+            Arranged::Not(inside) => {
+                let proved = self.add(Goal::Proved);
+                let inside = self.emit(inside, proved);
+                self.add(Goal::Not { inside, next })
+            }
+            Arranged::Test(test) => self.add(Goal::Test { test: (*test).clone(), next }),
+        }
+    }
+
+    /// A pattern, and for each predicate with rules that it may be about an alternative.
+    fn emit_pattern(&mut self, pattern: &Pattern, next: GoalId) -> GoalId {
+        let is_plain = pattern.functor.as_variable().is_none() && pattern.tail == Term::NIL;
+        let relation = match is_plain {
+            true => self.database.find_relation(pattern.functor, pattern.arguments.len()),
+            false => None,
+        };
+        let shared = Rc::new(pattern.clone());
+        let predicates: Vec<usize> = self.rules.matching(pattern).collect();
+        if let (true, [predicate]) = (is_plain, predicates.as_slice()) {
+            return self.add(Goal::Call { pattern: shared.clone(), predicate: *predicate, next });
+        }
+        let facts = self.add(Goal::Match { pattern: shared.clone(), relation, next });
+        if predicates.is_empty() {
+            return facts;
+        }
+        let mut alternatives = vec![facts];
+        for predicate in predicates {
+            alternatives.push(self.add(Goal::Call { pattern: shared.clone(), predicate, next }));
+        }
+        self.add(Goal::Branch { alternatives, rank: pattern.rank, ranks_end: pattern.rank + 1 })
+    }
+
+    fn arrange<'f>(&mut self, formula: &'f Formula, bound: &mut Bound) -> Arranged<'f> {
+        self.work += 1;
+        match formula {
+            Formula::Pattern(pattern) => {
+                self.bind(formula, bound);
+                Arranged::Pattern(pattern)
+            }
+            Formula::And(parts) => self.arrange_and(parts, bound),
+            Formula::Or(parts, rank, ranks_end) => {
+                let arranged = parts.iter().map(|part| self.arrange(part, &mut bound.clone())).collect();
+                self.bind(formula, bound);
+                Arranged::Or(arranged, *rank, *ranks_end)
+            }
+            Formula::Not(inside) => Arranged::Not(Box::new(self.arrange(inside, &mut bound.clone()))),
+            Formula::Test(test) => Arranged::Test(test),
+        }
+    }
+
+    fn arrange_and<'f>(&mut self, parts: &'f [Formula], bound: &mut Bound) -> Arranged<'f> {
+        let order = self.order(parts, bound);
+        Arranged::And(order.into_iter().map(|at| self.arrange(&parts[at], bound)).collect())
+    }
+
+    /// The order in which the parts of a conjunction are looked up.
+    fn order(&mut self, parts: &[Formula], bound: &Bound) -> Vec<usize> {
+        let is_generator = |at: &usize| !matches!(parts[*at], Formula::Not(_) | Formula::Test(_));
+        let generators: Vec<usize> = (0..parts.len()).filter(is_generator).collect();
+        let mut chosen = generators.clone();
+        if (2..=MOST_ORDERED).contains(&generators.len()) {
+            let (best, cost) = self.cheapest(parts, &generators, bound);
+            if cost * WORTHWHILE < self.cost(parts, &generators, bound) {
+                chosen = best;
+                self.is_reordered = true;
+            }
+        }
+        // Tests and negations, each as soon as it may come.
+        let mut waiting: Vec<usize> = (0..parts.len()).filter(|at| !is_generator(at)).collect();
+        let mut order = Vec::with_capacity(parts.len());
+        let mut now = bound.clone();
+        let mut left = chosen.iter().copied();
+        loop {
+            waiting.retain(|&at| {
+                let comes = self.may_come(parts, at, &now, &generators, &order);
+                if comes {
+                    order.push(at);
+                }
+                !comes
+            });
+            let Some(at) = left.next() else { break };
+            self.bind_surely(&parts[at], &mut now);
+            order.push(at);
+        }
+        order.extend(waiting);
+        order
+    }
+
+    /// Whether a test or negation may come behind those parts that are in order.
+    fn may_come(
+        &self,
+        parts: &[Formula],
+        at: usize,
+        now: &Bound,
+        generators: &[usize],
+        order: &[usize],
+    ) -> bool {
+        // Variables that are bound for sure by now, or on which the patterns to come have no bearing.
+        let mut open = vec![false; now.len()];
+        for &other in generators.iter().filter(|other| !order.contains(other)) {
+            self.bind(&parts[other], &mut open);
+        }
+        let mut is_ready = true;
+        self.each_variable(&parts[at], &mut |variable| is_ready &= now[variable] || !open[variable]);
+        let guards = matches!(parts[at], Formula::Test(_));
+        is_ready && (!guards || generators.iter().all(|&other| other > at || order.contains(&other)))
+    }
+
+    fn each_variable(&self, formula: &Formula, visit: &mut dyn FnMut(usize)) {
+        match formula {
+            Formula::Pattern(pattern) => variables_of(&self.database.terms, pattern, visit),
+            Formula::And(parts) | Formula::Or(parts, ..) => {
+                parts.iter().for_each(|part| self.each_variable(part, visit));
+            }
+            Formula::Not(inside) => self.each_variable(inside, visit),
+            Formula::Test(test) => test.variables.iter().for_each(|&variable| visit(variable as usize)),
+        }
+    }
+
+    /// Notes the variables that every answer to a formula binds.
+    fn bind_surely(&self, formula: &Formula, bound: &mut Bound) {
+        match formula {
+            Formula::Pattern(_) => self.bind(formula, bound),
+            Formula::And(parts) => parts.iter().for_each(|part| self.bind_surely(part, bound)),
+            Formula::Or(parts, ..) => {
+                let after = parts.iter().map(|part| {
+                    let mut after = bound.clone();
+                    self.bind_surely(part, &mut after);
+                    after
+                });
+                let both = |a: Bound, b: Bound| a.iter().zip(b).map(|(&a, b)| a && b).collect();
+                if let Some(after) = after.reduce(both) {
+                    *bound = after;
+                }
+            }
+            Formula::Not(_) | Formula::Test(_) => {}
+        }
+    }
+
+    /// Notes the variables that an answer to a formula may bind.
+    fn bind(&self, formula: &Formula, bound: &mut Bound) {
+        match formula {
+            Formula::Pattern(pattern) => {
+                variables_of(&self.database.terms, pattern, &mut |variable| bound[variable] = true);
+            }
+            Formula::And(parts) | Formula::Or(parts, ..) => {
+                parts.iter().for_each(|part| self.bind(part, bound))
+            }
+            Formula::Not(_) | Formula::Test(_) => {}
+        }
+    }
+
+    fn cost(&mut self, parts: &[Formula], order: &[usize], bound: &Bound) -> f64 {
+        let mut now = bound.clone();
+        let (mut rows, mut cost) = (1.0, 0.0);
+        for &at in order {
+            rows *= self.estimate(&parts[at], &now);
+            cost += rows;
+            self.bind(&parts[at], &mut now);
+        }
+        cost
+    }
+
+    fn cheapest(&mut self, parts: &[Formula], generators: &[usize], bound: &Bound) -> (Vec<usize>, f64) {
+        let mut now = bound.clone();
+        let mut left = generators.to_vec();
+        let mut order = Vec::with_capacity(left.len());
+        let (mut rows, mut cost) = (1.0, 0.0);
+        while !left.is_empty() {
+            let mut best = (0, f64::INFINITY);
+            for (place, &at) in left.iter().enumerate() {
+                let estimate = self.estimate(&parts[at], &now);
+                if estimate < best.1 {
+                    best = (place, estimate);
+                }
+            }
+            let at = left.remove(best.0);
+            rows *= best.1;
+            cost += rows;
+            self.bind(&parts[at], &mut now);
+            order.push(at);
+        }
+        (order, cost)
+    }
+
+    /// About how many answers a formula has for each choice of what is bound.
+    fn estimate(&mut self, formula: &Formula, bound: &Bound) -> f64 {
+        self.work += 1;
+        match formula {
+            Formula::Pattern(pattern) => self.estimate_pattern(pattern, bound),
+            Formula::And(parts) => {
+                let mut now = bound.clone();
+                parts.iter().fold(1.0, |rows, part| {
+                    let rows = rows * self.estimate(part, &now);
+                    self.bind(part, &mut now);
+                    rows
+                })
+            }
+            Formula::Or(parts, ..) => parts.iter().map(|part| self.estimate(part, bound)).sum(),
+            Formula::Not(_) | Formula::Test(_) => 1.0,
+        }
+    }
+
+    fn estimate_pattern(&self, pattern: &Pattern, bound: &Bound) -> f64 {
+        let terms = &self.database.terms;
+        let mut mask = 0_u64;
+        let (mut known, mut constant) = (0, 0);
+        for (position, &argument) in pattern.arguments.iter().enumerate() {
+            let mut is_known = true;
+            terms.variables(argument, &mut |variable| is_known &= bound[variable]);
+            if is_known {
+                known += 1;
+                if position < INDEXED_POSITIONS {
+                    mask |= 1 << position;
+                }
+            }
+            constant += usize::from(terms.is_ground(argument));
+        }
+        if self.rules.matching(pattern).next().is_some() {
+            return if known > 0 { SOME / known as f64 } else { MANY };
+        }
+        if pattern.functor.as_variable().is_some() || pattern.tail != Term::NIL {
+            return (self.database.facts() as f64).powf(1.0 / (1.0 + known as f64));
+        }
+        let Some(relation) = self.database.find_relation(pattern.functor, pattern.arguments.len()) else {
+            return 0.0;
+        };
+        let is_all = known == pattern.arguments.len();
+        let key = if known == constant { Some(pattern.arguments.as_slice()) } else { None };
+        self.database.relations[relation as usize].estimate(mask, is_all, key)
+    }
+}

@@ -1,0 +1,479 @@
+//! Relations: the facts that begin with the same term and have the same length, and their indexes.
+//!
+//! A fact is a row of cells, with the number of the change that made it and of the one that ended it; a query that began in
+//! between sees it. Rows are chained in the order in which they were asserted, and so are, in each index, those with the
+//! same cells at the index's positions.
+//!
+//! A row that has ended stays where it is until every query has closed that may see it, then it leaves its chains, and its
+//! place is used again when every query has closed that may stand on it ([`super::Database`] keeps the times).
+//! An index is made when a query wants one, in steps; until it is complete it holds the rows before its position.
+//! Which index to make: the one for the positions that a query has bound, once the rows that such queries have looked at
+//! in vain outnumber the facts. So whatever is asked, the work is at most a few times that with the best choice.
+
+use super::bucket::{Buckets, NONE, finish, mix};
+use super::term::Term;
+
+/// In place of the row before it: the row is in no chain.
+const UNLINKED: u32 = u32::MAX - 1;
+/// With fewer rows than this, looking at all of them is best.
+const FEW: usize = 8;
+/// Indexes that a relation may have.
+const MOST_INDEXES: usize = 8;
+/// Arguments that an index can be for.
+pub(super) const INDEXED_POSITIONS: usize = 64;
+
+#[derive(Clone, Copy, Debug)]
+struct Link {
+    before: u32,
+    after: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Ends {
+    first: u32,
+    last: u32,
+}
+
+const EMPTY: Ends = Ends { first: NONE, last: NONE };
+
+/// When a row began and ended to be a fact.
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    born: u64,
+    died: u64,
+}
+
+#[derive(Debug)]
+struct Group {
+    ends: Ends,
+    count: u32,
+}
+
+/// The rows by the cells at some positions.
+#[derive(Debug)]
+pub(super) struct Index {
+    mask: u64,
+    keys: Buckets,
+    groups: Vec<Group>,
+    free_groups: Vec<u32>,
+    links: Vec<Link>,
+    /// Number of different keys.
+    distinct: usize,
+    /// The next row to be taken in; [`NONE`] when the index is complete.
+    position: u32,
+}
+
+#[derive(Debug)]
+struct Wanted {
+    mask: u64,
+    vain: usize,
+}
+
+/// See the module documentation.
+#[derive(Debug)]
+pub(super) struct Relation {
+    pub(super) functor: Term,
+    /// Number of arguments.
+    pub(super) width: usize,
+    /// Whether its last argument is unique for given others.
+    is_property: bool,
+    cells: Vec<Term>,
+    spans: Vec<Span>,
+    links: Vec<Link>,
+    ends: Ends,
+    set: Buckets,
+    indexes: Vec<Index>,
+    wanted: Vec<Wanted>,
+    free: Vec<u32>,
+    live: usize,
+}
+
+/// How the rows for a query are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Access {
+    /// Along a chain from this row on: that of all rows, or of an index.
+    Chain(Option<usize>, u32),
+    /// There is at most this one row.
+    One(u32),
+    /// There is none.
+    Nothing,
+    /// This index has to be completed first.
+    Build(usize),
+}
+
+fn push(links: &mut Vec<Link>, ends: &mut Ends, row: u32) {
+    if links.len() <= row as usize {
+        links.resize(row as usize + 1, Link { before: UNLINKED, after: NONE });
+    }
+    links[row as usize] = Link { before: ends.last, after: NONE };
+    match ends.last {
+        NONE => ends.first = row,
+        last => links[last as usize].after = row,
+    }
+    ends.last = row;
+}
+
+/// Takes a row out of its chain. It keeps its successor, for those who stand on it.
+fn unlink(links: &mut [Link], ends: &mut Ends, row: u32) {
+    let Link { before, after } = links[row as usize];
+    match before {
+        NONE => ends.first = after,
+        before => links[before as usize].after = after,
+    }
+    match after {
+        NONE => ends.last = before,
+        after => links[after as usize].before = before,
+    }
+    links[row as usize].before = UNLINKED;
+}
+
+fn positions(mask: u64) -> impl Iterator<Item = usize> {
+    let mut rest = mask;
+    std::iter::from_fn(move || {
+        let position = rest.trailing_zeros() as usize;
+        rest &= rest.wrapping_sub(1);
+        (position < 64).then_some(position)
+    })
+}
+
+fn hash_cells(cells: &[Term]) -> u32 {
+    finish(cells.iter().fold(1, |hash, cell| mix(hash, cell.bits())))
+}
+
+fn hash_key(mask: u64, cells: &[Term]) -> u32 {
+    finish(positions(mask).fold(1, |hash, position| mix(hash, cells[position].bits())))
+}
+
+impl Relation {
+    pub(super) fn new(functor: Term, width: usize) -> Relation {
+        Relation {
+            functor,
+            width,
+            is_property: false,
+            cells: Vec::new(),
+            spans: Vec::new(),
+            links: Vec::new(),
+            ends: EMPTY,
+            set: Buckets::default(),
+            indexes: Vec::new(),
+            wanted: Vec::new(),
+            free: Vec::new(),
+            live: 0,
+        }
+    }
+
+    /// The arguments of a fact.
+    #[inline]
+    pub(super) fn row(&self, row: u32) -> &[Term] {
+        let start = row as usize * self.width;
+        &self.cells[start..start + self.width]
+    }
+
+    /// The change that made a row.
+    #[inline]
+    pub(super) fn born(&self, row: u32) -> u64 {
+        self.spans[row as usize].born
+    }
+
+    /// Whether a query that began after change `time` sees a row.
+    #[inline]
+    pub(super) fn is_visible(&self, row: u32, time: u64) -> bool {
+        let span = self.spans[row as usize];
+        span.born <= time && time < span.died
+    }
+
+    /// Whether a row is a fact now.
+    pub(super) fn is_live(&self, row: u32) -> bool {
+        self.spans[row as usize].died == u64::MAX
+    }
+
+    /// The row of a fact that is there now.
+    pub(super) fn find(&self, cells: &[Term]) -> Option<u32> {
+        let is_it = |row| self.is_live(row) && self.row(row) == cells;
+        self.set.find(hash_cells(cells), is_it)
+    }
+
+    /// Whether its last argument is unique for given others.
+    pub(super) fn is_property(&self) -> bool {
+        self.is_property
+    }
+
+    /// From now on the last argument is to be unique for given others; `work` is what that took.
+    pub(super) fn make_property(&mut self, work: &mut usize) {
+        self.is_property = true;
+        let mask = Relation::arguments_mask(self.width);
+        if mask == 0 || self.indexes.iter().any(|index| index.mask == mask && index.position == NONE) {
+            return;
+        }
+        self.indexes.retain(|index| index.mask != mask);
+        self.indexes.insert(0, Index::new(mask, self.ends.first));
+        let mut left = usize::MAX;
+        self.build(0, &mut left);
+        *work += usize::MAX - left;
+    }
+
+    /// The positions of all arguments but the last.
+    fn arguments_mask(width: usize) -> u64 {
+        if (2..=INDEXED_POSITIONS).contains(&width) { (1 << (width - 1)) - 1 } else { 0 }
+    }
+
+    /// The row of a property that a new fact replaces.
+    pub(super) fn replaced(&self, cells: &[Term]) -> Option<u32> {
+        if !self.is_property {
+            return None;
+        }
+        let shared = &cells[..self.width.saturating_sub(1)];
+        let mask = Relation::arguments_mask(self.width);
+        let index = self.indexes.iter().position(|index| index.mask == mask && mask != 0);
+        let mut row = match index {
+            Some(index) => match self.indexes[index].find(cells, &self.cells, self.width) {
+                Some(group) => self.indexes[index].groups[group as usize].ends.first,
+                None => return None,
+            },
+            None => self.ends.first,
+        };
+        while row != NONE {
+            if self.is_live(row) && self.row(row).starts_with(shared) {
+                return Some(row);
+            }
+            row = self.after(index, row);
+        }
+        None
+    }
+
+    /// The row of a fact that was there after change `time`.
+    fn find_at(&self, cells: &[Term], time: u64) -> Option<u32> {
+        let is_it = |row| self.is_visible(row, time) && self.row(row) == cells;
+        self.set.find(hash_cells(cells), is_it)
+    }
+
+    /// Bytes that a fact takes, about.
+    pub(super) fn row_bytes(&self) -> usize {
+        8 * self.width + 40 + 8 * self.indexes.len()
+    }
+
+    /// Adds a fact that is not there. It holds its cells.
+    pub(super) fn add(&mut self, cells: &[Term], time: u64) -> u32 {
+        let span = Span { born: time, died: u64::MAX };
+        let row = match self.free.pop() {
+            Some(row) => {
+                let start = row as usize * self.width;
+                self.cells[start..start + self.width].copy_from_slice(cells);
+                self.spans[row as usize] = span;
+                row
+            }
+            None => {
+                self.cells.extend_from_slice(cells);
+                self.spans.push(span);
+                (self.spans.len() - 1) as u32
+            }
+        };
+        push(&mut self.links, &mut self.ends, row);
+        self.set.add(row, hash_cells(cells));
+        self.live += 1;
+        let Relation { indexes, cells, width, .. } = self;
+        for index in indexes.iter_mut().filter(|index| index.position == NONE) {
+            index.take_in(row, cells, *width);
+        }
+        row
+    }
+
+    /// Ends a fact.
+    pub(super) fn end(&mut self, row: u32, time: u64) {
+        self.spans[row as usize].died = time;
+        self.live -= 1;
+    }
+
+    /// Takes a row that has ended out of all chains.
+    pub(super) fn unlink(&mut self, row: u32) {
+        let after = self.links[row as usize].after;
+        unlink(&mut self.links, &mut self.ends, row);
+        self.set.remove(row);
+        let Relation { indexes, cells, width, .. } = self;
+        for index in indexes.iter_mut() {
+            if index.position == row {
+                index.position = after;
+            }
+            index.leave(row, cells, *width);
+        }
+    }
+
+    /// Lets the place of an unlinked row be used again.
+    pub(super) fn free(&mut self, row: u32) {
+        self.free.push(row);
+    }
+
+    // Finding rows.
+
+    /// The next row of a chain.
+    #[inline]
+    pub(super) fn after(&self, index: Option<usize>, row: u32) -> u32 {
+        match index {
+            None => self.links[row as usize].after,
+            Some(index) => self.indexes[index].links[row as usize].after,
+        }
+    }
+
+    /// How to find the rows with the cells of `key` at the positions of `bound`, as of change `time`. `is_all` says that
+    /// all positions are bound.
+    pub(super) fn access(&mut self, bound: u64, is_all: bool, key: &[Term], time: u64) -> Access {
+        if is_all {
+            return self.find_at(key, time).map_or(Access::Nothing, Access::One);
+        }
+        let rows = self.spans.len() - self.free.len();
+        if bound == 0 || rows < FEW {
+            return self.chain(None, self.ends.first);
+        }
+        let mut best: Option<(usize, Ends, usize)> = None;
+        for (number, index) in self.indexes.iter().enumerate() {
+            if index.mask & !bound != 0 {
+                continue;
+            }
+            if index.position != NONE {
+                if index.mask == bound {
+                    return Access::Build(number);
+                }
+                continue;
+            }
+            let Some(group) = index.find(key, &self.cells, self.width) else { return Access::Nothing };
+            let group = &index.groups[group as usize];
+            if index.mask == bound {
+                return self.chain(Some(number), group.ends.first);
+            }
+            if best.is_none_or(|(.., count)| (group.count as usize) < count) {
+                best = Some((number, group.ends, group.count as usize));
+            }
+        }
+        let cost = best.map_or(rows, |(.., count)| count);
+        if cost > FEW && self.wants(bound, cost) {
+            self.indexes.push(Index::new(bound, self.ends.first));
+            return Access::Build(self.indexes.len() - 1);
+        }
+        match best {
+            Some((number, ends, _)) => self.chain(Some(number), ends.first),
+            None => self.chain(None, self.ends.first),
+        }
+    }
+
+    fn chain(&self, index: Option<usize>, first: u32) -> Access {
+        if first == NONE { Access::Nothing } else { Access::Chain(index, first) }
+    }
+
+    /// Notes that rows are looked at for want of an index; whether they are so many that it should be made.
+    fn wants(&mut self, mask: u64, rows: usize) -> bool {
+        if self.indexes.len() >= MOST_INDEXES {
+            return false;
+        }
+        let at = match self.wanted.iter().position(|wanted| wanted.mask == mask) {
+            Some(at) => at,
+            None if self.wanted.len() < 4 * MOST_INDEXES => {
+                self.wanted.push(Wanted { mask, vain: 0 });
+                self.wanted.len() - 1
+            }
+            None => return false,
+        };
+        self.wanted[at].vain += rows;
+        if self.wanted[at].vain < self.live {
+            return false;
+        }
+        self.wanted.swap_remove(at);
+        true
+    }
+
+    /// Works on an index until it is complete or the work is used up; whether it is complete.
+    pub(super) fn build(&mut self, number: usize, work: &mut usize) -> bool {
+        let index = &mut self.indexes[number];
+        while index.position != NONE {
+            let Some(left) = work.checked_sub(1) else { return false };
+            *work = left;
+            let row = index.position;
+            index.position = self.links[row as usize].after;
+            index.take_in(row, &self.cells, self.width);
+        }
+        true
+    }
+
+    /// About how many rows have given cells at the positions of `bound`; the cells themselves where they are known.
+    pub(super) fn estimate(&self, bound: u64, is_all: bool, key: Option<&[Term]>) -> f64 {
+        let live = self.live as f64;
+        if is_all {
+            return live.min(1.0);
+        }
+        let complete = self.indexes.iter().filter(|index| index.position == NONE && index.mask & !bound == 0);
+        let by_index = complete.map(|index| match key {
+            Some(key) => index
+                .find(key, &self.cells, self.width)
+                .map_or(0.0, |group| f64::from(index.groups[group as usize].count)),
+            None => live / index.distinct.max(1) as f64,
+        });
+        // Without an index, each bound position is taken to leave fewer, but not how many fewer.
+        let guess = live.powf(1.0 / (1.0 + f64::from(bound.count_ones())));
+        by_index.reduce(f64::min).unwrap_or(guess)
+    }
+}
+
+impl Index {
+    fn new(mask: u64, position: u32) -> Index {
+        Index {
+            mask,
+            keys: Buckets::default(),
+            groups: Vec::new(),
+            free_groups: Vec::new(),
+            links: Vec::new(),
+            distinct: 0,
+            position,
+        }
+    }
+
+    fn find(&self, key: &[Term], cells: &[Term], width: usize) -> Option<u32> {
+        let is_it = |group: u32| {
+            let start = self.groups[group as usize].ends.first as usize * width;
+            positions(self.mask).all(|position| cells[start + position] == key[position])
+        };
+        self.keys.find(hash_key(self.mask, key), is_it)
+    }
+
+    fn take_in(&mut self, row: u32, cells: &[Term], width: usize) {
+        let start = row as usize * width;
+        let key = &cells[start..start + width];
+        let group = match self.find(key, cells, width) {
+            Some(group) => group,
+            None => {
+                let fresh = Group { ends: EMPTY, count: 0 };
+                let group = match self.free_groups.pop() {
+                    Some(group) => {
+                        self.groups[group as usize] = fresh;
+                        group
+                    }
+                    None => {
+                        self.groups.push(fresh);
+                        (self.groups.len() - 1) as u32
+                    }
+                };
+                self.keys.add(group, hash_key(self.mask, key));
+                self.distinct += 1;
+                group
+            }
+        };
+        let entry = &mut self.groups[group as usize];
+        push(&mut self.links, &mut entry.ends, row);
+        entry.count += 1;
+    }
+
+    fn leave(&mut self, row: u32, cells: &[Term], width: usize) {
+        if self.links.get(row as usize).is_none_or(|link| link.before == UNLINKED) {
+            return;
+        }
+        let start = row as usize * width;
+        let Some(group) = self.find(&cells[start..start + width], cells, width) else { return };
+        let entry = &mut self.groups[group as usize];
+        entry.count -= 1;
+        if entry.count == 0 {
+            // The key of a group is that of its first row, so it goes while that is still there.
+            self.keys.remove(group);
+            self.free_groups.push(group);
+            self.distinct -= 1;
+        }
+        unlink(&mut self.links, &mut self.groups[group as usize].ends, row);
+    }
+}

@@ -1,0 +1,507 @@
+//! Terms: what facts consist of, one word each, equal exactly when the objects are `equal`.
+//!
+//! Numbers, characters and symbols are the words that they are as values. Pairs, strings and numbers too large for a word
+//! are kept once, outside of the heap, with a count of those who hold on to them; they are copies, so that nobody changes
+//! a fact from outside. Any other object stands for itself. So the collector has nothing to do for a database of numbers,
+//! strings and named symbols, however large it is; all other objects that facts hold are in one hash table of the heap, which it marks as any other.
+//!
+//! Whoever gets a term from a function that makes one holds it, until [`Terms::release`].
+
+use super::bucket::{Buckets, finish, mix};
+use crate::equality::{self, Test};
+use crate::heap::{AllocError, Heap};
+use crate::table::{Comparison, Table};
+use crate::value::Value;
+
+/// Most pairs in a term.
+pub(crate) const MAX_SIZE: u32 = 1 << 16;
+
+/// A term, or in patterns a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Term(pub(super) Value);
+
+impl Term {
+    /// What stands in place of a term where there is none.
+    pub(super) const UNBOUND: Term = Term(Value::UNBOUND);
+    /// The empty list.
+    pub(super) const NIL: Term = Term(Value::NIL);
+
+    /// The variable with this number.
+    #[inline]
+    pub(super) const fn variable(number: u32) -> Term {
+        Term(Value::variable(number))
+    }
+
+    /// The number, if this is a variable.
+    #[inline]
+    pub(super) fn as_variable(self) -> Option<usize> {
+        self.0.as_variable().map(|number| number as usize)
+    }
+
+    #[inline]
+    pub(super) fn is_unbound(self) -> bool {
+        self == Term::UNBOUND
+    }
+
+    /// A word that tells it from all others.
+    #[inline]
+    pub(super) fn bits(self) -> u64 {
+        self.0.bits()
+    }
+}
+
+/// What is kept of a term that is more than a word.
+#[derive(Debug, PartialEq)]
+enum Data {
+    Free,
+    /// A pair: its halves, the pairs in it, and whether there is no variable in it.
+    Pair {
+        car: Term,
+        cdr: Term,
+        size: u32,
+        is_ground: bool,
+    },
+    Text(Box<[u32]>),
+    Big(bool, Box<[u64]>),
+    Ratio(Term, Term),
+    Float(u64),
+    /// Any other object.
+    Object(Value),
+}
+
+#[derive(Debug)]
+struct Node {
+    data: Data,
+    holders: u32,
+}
+
+/// All terms that are more than a word.
+#[derive(Debug)]
+pub(crate) struct Terms {
+    nodes: Vec<Node>,
+    buckets: Buckets,
+    free: Vec<u32>,
+    /// Those that had no holder at some time; [`Terms::sweep`] frees them if they have none still.
+    unheld: Vec<u32>,
+    /// A hash table of the heap with the objects, `NIL` as long as there are none.
+    objects: Value,
+    /// Bytes in use, about.
+    pub(super) bytes: usize,
+}
+
+/// Bytes of a node besides its contents.
+const NODE_BYTES: usize = size_of::<Node>() + 16;
+
+/// Why there is no term.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum TermError {
+    /// No room for the table of objects.
+    Room(AllocError),
+    /// More than [`MAX_SIZE`] pairs.
+    TooLarge,
+}
+
+impl From<AllocError> for TermError {
+    fn from(error: AllocError) -> TermError {
+        TermError::Room(error)
+    }
+}
+
+impl Default for Terms {
+    fn default() -> Terms {
+        Terms {
+            nodes: Vec::new(),
+            buckets: Buckets::default(),
+            free: Vec::new(),
+            unheld: Vec::new(),
+            objects: Value::NIL,
+            bytes: 0,
+        }
+    }
+}
+
+impl Terms {
+    fn intern(&mut self, hash: u32, data: Data) -> Term {
+        if let Some(found) = self.buckets.find(hash, |other| self.nodes[other as usize].data == data) {
+            self.nodes[found as usize].holders += 1;
+            // What is kept holds its parts once, however often it is made.
+            if let Data::Pair { car, cdr, .. } | Data::Ratio(car, cdr) = data {
+                self.release(car);
+                self.release(cdr);
+            }
+            return Term(Value::term(found));
+        }
+        self.bytes += NODE_BYTES + data.bytes();
+        let node = Node { data, holders: 1 };
+        let index = match self.free.pop() {
+            Some(index) => {
+                self.nodes[index as usize] = node;
+                index
+            }
+            None => {
+                self.nodes.push(node);
+                (self.nodes.len() - 1) as u32
+            }
+        };
+        self.buckets.add(index, hash);
+        Term(Value::term(index))
+    }
+
+    /// Another holder for a term.
+    pub(super) fn retain(&mut self, term: Term) {
+        if let Some(index) = term.0.as_term() {
+            self.nodes[index as usize].holders += 1;
+        }
+    }
+
+    /// Gives up a term.
+    pub(super) fn release(&mut self, term: Term) {
+        if let Some(index) = term.0.as_term() {
+            let node = &mut self.nodes[index as usize];
+            node.holders -= 1;
+            if node.holders == 0 {
+                self.unheld.push(index);
+            }
+        }
+    }
+
+    /// The pair of two terms, which the caller gives up. Objects in them are counted where they were taken in.
+    ///
+    /// # Errors
+    /// [`TermError::TooLarge`]; the halves are given up all the same.
+    pub(super) fn pair(&mut self, car: Term, cdr: Term) -> Result<Term, TermError> {
+        let size = 1 + self.size(car) + self.size(cdr);
+        if size > MAX_SIZE {
+            self.release(car);
+            self.release(cdr);
+            return Err(TermError::TooLarge);
+        }
+        let is_ground = self.is_ground(car) && self.is_ground(cdr);
+        let hash = finish(mix(mix(2, car.bits()), cdr.bits()));
+        Ok(self.intern(hash, Data::Pair { car, cdr, size, is_ground }))
+    }
+
+    fn size(&self, term: Term) -> u32 {
+        match term.0.as_term().map(|index| &self.nodes[index as usize].data) {
+            Some(Data::Pair { size, .. }) => *size,
+            _ => 0,
+        }
+    }
+
+    /// The halves of a pair.
+    #[inline]
+    pub(super) fn as_pair(&self, term: Term) -> Option<(Term, Term)> {
+        match self.nodes[term.0.as_term()? as usize].data {
+            Data::Pair { car, cdr, .. } => Some((car, cdr)),
+            _ => None,
+        }
+    }
+
+    /// Whether there is no variable in a term.
+    #[inline]
+    pub(super) fn is_ground(&self, term: Term) -> bool {
+        match term.0.as_term() {
+            None => term.as_variable().is_none(),
+            Some(index) => !matches!(self.nodes[index as usize].data, Data::Pair { is_ground: false, .. }),
+        }
+    }
+
+    /// The list of some terms, each of which gets another holder.
+    pub(super) fn list(&mut self, items: &[Term], tail: Term) -> Result<Term, TermError> {
+        let mut list = tail;
+        self.retain(tail);
+        for &item in items.iter().rev() {
+            self.retain(item);
+            list = self.pair(item, list)?;
+        }
+        Ok(list)
+    }
+
+    /// Frees up to `most` terms that nobody holds.
+    pub(super) fn sweep(&mut self, heap: &mut Heap, most: usize) {
+        for _ in 0..most {
+            let Some(index) = self.unheld.pop() else { return };
+            let node = &mut self.nodes[index as usize];
+            if node.holders > 0 || node.data == Data::Free {
+                continue;
+            }
+            let data = std::mem::replace(&mut node.data, Data::Free);
+            self.bytes -= NODE_BYTES + data.bytes();
+            self.buckets.remove(index);
+            self.free.push(index);
+            match data {
+                Data::Pair { car, cdr, .. } | Data::Ratio(car, cdr) => {
+                    self.release(car);
+                    self.release(cdr);
+                }
+                Data::Object(v) => {
+                    if let Some((table, _, Some(entry))) = self.find_object(heap, v) {
+                        table.delete(heap, entry);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
+    // Objects of the heap.
+
+    /// Whether an object lives as long as its package anyway.
+    fn is_named(heap: &Heap, v: Value) -> bool {
+        heap.symbol(v).is_some_and(|symbol| symbol.package.is_true())
+    }
+
+    fn find_object(&self, heap: &Heap, v: Value) -> Option<(Table, u32, Option<usize>)> {
+        let table = Table::of(heap, self.objects)?;
+        let hash = equality::hash(heap, Test::Eq, v);
+        // Comparing by identity has no need of a limit.
+        let mut work = usize::MAX;
+        let entry = table.find(heap, Test::Eq, v, hash, &mut work).unwrap_or_default();
+        Some((table, hash, entry))
+    }
+
+    fn object(&mut self, heap: &mut Heap, v: Value) -> Result<Term, AllocError> {
+        let Some((table, hash, entry)) = self.find_object(heap, v) else { return Ok(Term::NIL) };
+        if entry.is_none() {
+            table.add(heap, hash, v, Value::T)?;
+        }
+        Ok(self.intern(hash, Data::Object(v)))
+    }
+
+    /// Makes the table of objects, if there is none yet: the caller keeps it from being collected.
+    /// Before there is one, no object may be made a term.
+    pub(super) fn make_object_table(&mut self, heap: &mut Heap) -> Result<Option<Value>, AllocError> {
+        if self.objects.is_true() {
+            return Ok(None);
+        }
+        self.objects = Table::make(heap, Comparison::Native(Test::Eq), 8, [Value::NIL; 2])?;
+        Ok(Some(self.objects))
+    }
+
+    // From values and to values.
+
+    /// The term of an object that is no pair.
+    pub(super) fn atom(&mut self, heap: &mut Heap, v: Value) -> Result<Term, AllocError> {
+        if !v.is_address() {
+            return Ok(Term(v));
+        }
+        if let Some(characters) = equality::characters_of(heap, v) {
+            let hash =
+                finish(characters.iter().fold(mix(3, characters.len() as u64), |h, &c| mix(h, c.into())));
+            let data = Data::Text(characters.into());
+            return Ok(self.intern(hash, data));
+        }
+        if let Some(n) = heap.bignum(v) {
+            let hash = finish(n.limbs.iter().fold(mix(4, n.negative.into()), |hash, &limb| mix(hash, limb)));
+            let data = Data::Big(n.negative, n.limbs.into());
+            return Ok(self.intern(hash, data));
+        }
+        if let Some((numerator, denominator)) = heap.ratio(v) {
+            let numerator = self.atom(heap, numerator)?;
+            let denominator = self.atom(heap, denominator)?;
+            let hash = finish(mix(mix(5, numerator.bits()), denominator.bits()));
+            return Ok(self.intern(hash, Data::Ratio(numerator, denominator)));
+        }
+        if let Some(x) = heap.as_double(v) {
+            return Ok(self.intern(finish(mix(6, x.to_bits())), Data::Float(x.to_bits())));
+        }
+        if Terms::is_named(heap, v) { Ok(Term(v)) } else { self.object(heap, v) }
+    }
+
+    /// The object of a term. `work` is what that took.
+    ///
+    /// # Errors
+    /// As for every allocation.
+    pub(super) fn value(&self, heap: &mut Heap, term: Term, work: &mut usize) -> Result<Value, AllocError> {
+        match term.0.as_term() {
+            None => Ok(term.0),
+            Some(_) => self.compound_value(heap, term, work),
+        }
+    }
+
+    fn compound_value(&self, heap: &mut Heap, term: Term, work: &mut usize) -> Result<Value, AllocError> {
+        enum Open {
+            Make(Term),
+            Join,
+        }
+        let mut open = vec![Open::Make(term)];
+        let mut made: Vec<Value> = Vec::new();
+        while let Some(next) = open.pop() {
+            *work += 1;
+            match next {
+                Open::Make(term) => match self.as_pair(term) {
+                    Some((car, cdr)) => {
+                        open.push(Open::Join);
+                        open.push(Open::Make(cdr));
+                        open.push(Open::Make(car));
+                    }
+                    None => made.push(self.atom_value(heap, term)?),
+                },
+                Open::Join => {
+                    let (cdr, car) = (made.pop().unwrap_or(Value::NIL), made.pop().unwrap_or(Value::NIL));
+                    made.push(heap.cons(car, cdr)?);
+                }
+            }
+        }
+        Ok(made.pop().unwrap_or(Value::NIL))
+    }
+
+    fn atom_value(&self, heap: &mut Heap, term: Term) -> Result<Value, AllocError> {
+        let Some(index) = term.0.as_term() else { return Ok(term.0) };
+        match &self.nodes[index as usize].data {
+            Data::Text(characters) => heap.alloc_string(characters),
+            Data::Big(negative, limbs) => heap.alloc_bignum(*negative, limbs),
+            Data::Ratio(numerator, denominator) => {
+                let numerator = self.atom_value(heap, *numerator)?;
+                let denominator = self.atom_value(heap, *denominator)?;
+                heap.alloc_ratio(numerator, denominator)
+            }
+            Data::Float(bits) => heap.float(f64::from_bits(*bits)),
+            Data::Object(v) => Ok(*v),
+            Data::Free | Data::Pair { .. } => Ok(Value::NIL),
+        }
+    }
+
+    // Patterns.
+
+    /// A pattern with its variables replaced: a term if all of them have one. The caller does not hold it; new pairs are
+    /// noted in `made`, held.
+    ///
+    /// # Errors
+    /// [`TermError::TooLarge`].
+    pub(super) fn instantiate(
+        &mut self,
+        pattern: Term,
+        bindings: &[Term],
+        made: &mut Vec<Term>,
+    ) -> Result<Option<Term>, TermError> {
+        if let Some(variable) = pattern.as_variable() {
+            let term = bindings[variable];
+            return Ok(if term.is_unbound() { None } else { Some(term) });
+        }
+        if self.is_ground(pattern) {
+            return Ok(Some(pattern));
+        }
+        self.rebuild(pattern, made, &mut |variable| {
+            let term = bindings[variable];
+            if term.is_unbound() { None } else { Some(term) }
+        })
+    }
+
+    /// A pattern with what `replace` gives in place of its variables; `None` where that gives none.
+    pub(super) fn rebuild(
+        &mut self,
+        pattern: Term,
+        made: &mut Vec<Term>,
+        replace: &mut dyn FnMut(usize) -> Option<Term>,
+    ) -> Result<Option<Term>, TermError> {
+        enum Open {
+            Make(Term),
+            Join,
+        }
+        let mut open = vec![Open::Make(pattern)];
+        let mut terms: Vec<Term> = Vec::new();
+        while let Some(next) = open.pop() {
+            match next {
+                Open::Make(term) if self.is_ground(term) => terms.push(term),
+                Open::Make(term) => match (term.as_variable(), self.as_pair(term)) {
+                    (Some(variable), _) => match replace(variable) {
+                        Some(term) => terms.push(term),
+                        None => return Ok(None),
+                    },
+                    (None, Some((car, cdr))) => {
+                        open.push(Open::Join);
+                        open.push(Open::Make(cdr));
+                        open.push(Open::Make(car));
+                    }
+                    (None, None) => terms.push(term),
+                },
+                Open::Join => {
+                    let (cdr, car) = (terms.pop().unwrap_or(Term::NIL), terms.pop().unwrap_or(Term::NIL));
+                    self.retain(car);
+                    self.retain(cdr);
+                    let pair = self.pair(car, cdr)?;
+                    made.push(pair);
+                    terms.push(pair);
+                }
+            }
+        }
+        Ok(terms.pop())
+    }
+
+    /// Matches a pattern with a ground term: binds variables in `bindings`, and notes them in `trail`.
+    pub(super) fn matches(
+        &self,
+        pattern: Term,
+        term: Term,
+        bindings: &mut [Term],
+        trail: &mut Vec<u32>,
+    ) -> bool {
+        if let Some(variable) = pattern.as_variable() {
+            let bound = bindings[variable];
+            if bound.is_unbound() {
+                bindings[variable] = term;
+                trail.push(variable as u32);
+                return true;
+            }
+            return bound == term;
+        }
+        if self.is_ground(pattern) {
+            return pattern == term;
+        }
+        let mut open = vec![(pattern, term)];
+        while let Some((pattern, term)) = open.pop() {
+            if let Some(variable) = pattern.as_variable() {
+                let bound = bindings[variable];
+                if bound.is_unbound() {
+                    bindings[variable] = term;
+                    trail.push(variable as u32);
+                } else if bound != term {
+                    return false;
+                }
+            } else if self.is_ground(pattern) {
+                if pattern != term {
+                    return false;
+                }
+            } else {
+                let (Some(left), Some(right)) = (self.as_pair(pattern), self.as_pair(term)) else {
+                    return false;
+                };
+                open.push((left.1, right.1));
+                open.push((left.0, right.0));
+            }
+        }
+        true
+    }
+
+    /// Calls `visit` with the number of each variable in a pattern, in textual order.
+    pub(super) fn variables(&self, pattern: Term, visit: &mut dyn FnMut(usize)) {
+        let mut open = vec![pattern];
+        while let Some(term) = open.pop() {
+            if let Some(variable) = term.as_variable() {
+                visit(variable);
+            } else if !self.is_ground(term)
+                && let Some((car, cdr)) = self.as_pair(term)
+            {
+                open.push(cdr);
+                open.push(car);
+            }
+        }
+    }
+
+    /// Terms that are kept. For tests.
+    #[cfg(test)]
+    pub(super) fn kept(&self) -> usize {
+        self.nodes.len() - self.free.len()
+    }
+}
+
+impl Data {
+    fn bytes(&self) -> usize {
+        match self {
+            Data::Text(characters) => 4 * characters.len(),
+            Data::Big(_, limbs) => 8 * limbs.len(),
+            _ => 0,
+        }
+    }
+}
