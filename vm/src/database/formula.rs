@@ -164,7 +164,11 @@ pub(super) fn fact(
             cells.push(term);
             rest = pair.cdr;
         }
-        if rest.is_true() { Err(Fault::Malformed(v, "a fact, which is a proper list")) } else { Ok(()) }
+        match rest {
+            Value::NIL => Ok(()),
+            rest if variable_name(heap, rest).is_some() => Err(Fault::Variable(v)),
+            _ => Err(Fault::Malformed(v, "a fact, which is a proper list")),
+        }
     };
     let outcome = walk();
     *work += MAX_SIZE as usize - parts;
