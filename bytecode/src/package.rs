@@ -196,6 +196,23 @@ impl Packages {
         Ok(id)
     }
 
+    /// Gives a package further nicknames; those that it has already are none.
+    ///
+    /// # Errors
+    /// [`PackageError::NameTaken`] for a name of another package; then none is given.
+    pub fn add_nicknames(&mut self, package: PackageId, nicknames: &[&str]) -> Result<(), PackageError> {
+        let is_taken = |name: &&&str| self.by_name.get(**name).is_some_and(|&other| other != package);
+        if let Some(name) = nicknames.iter().find(is_taken) {
+            return Err(PackageError::NameTaken((*name).to_owned()));
+        }
+        for &name in nicknames {
+            if self.by_name.insert(name.into(), package).is_none() {
+                self.table[package].nicknames.push(name.into());
+            }
+        }
+        Ok(())
+    }
+
     /// Makes known that the symbol `name` is at home in `package`. For the tables of an image: nothing is checked.
     pub fn register(&mut self, package: PackageId, name: impl Into<Cow<'static, str>>, external: bool) {
         let entry = Entry { home: package, external, shadowing: false, symbol: None };

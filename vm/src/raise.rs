@@ -48,6 +48,10 @@ pub enum Raised {
     EndOfFile(Value),
     /// `stream-error` on a stream, with a text.
     Stream(Value, String),
+    /// `file-error`: the name of the file, a text.
+    File(String, String),
+    /// `package-error`: the name of the package, a text.
+    Package(String, String),
     /// `simple-error` with a text.
     Simple(String),
     /// A failure of the given cause (a keyword's name) and one argument.
@@ -168,6 +172,8 @@ impl Vm {
                 let text = self.heap.alloc_str(&text)?;
                 smallvec![self.keyword("STREAM-ERROR")?, stream, text]
             }
+            Raised::File(name, text) => self.raised_about("FILE-ERROR", &name, &text)?,
+            Raised::Package(name, text) => self.raised_about("PACKAGE-ERROR", &name, &text)?,
             Raised::Cause(cause, argument) => {
                 let cause = self.keyword(cause)?;
                 smallvec![self.keyword("CAUSE")?, cause, argument]
@@ -183,6 +189,12 @@ impl Vm {
     fn raised_text(&mut self, kind: &str, text: &str) -> Result<SmallVec<[Value; 16]>, Exit> {
         let text = self.heap.alloc_str(text)?;
         Ok(smallvec![self.keyword(kind)?, text])
+    }
+
+    fn raised_about(&mut self, kind: &str, name: &str, text: &str) -> Result<SmallVec<[Value; 16]>, Exit> {
+        let name = self.heap.alloc_str(name)?;
+        let text = self.heap.alloc_str(text)?;
+        Ok(smallvec![self.keyword(kind)?, name, text])
     }
 
     /// The keyword of this name.

@@ -6,7 +6,7 @@ use esl_bytecode::symbol::Symbol;
 use crate::builtins::LIMIT;
 use crate::builtins::expect::optional;
 use crate::heap::Kind;
-use crate::raise::{Exit, Outcome};
+use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -22,7 +22,10 @@ impl Vm {
         let name = self.designated_text(v)?;
         match self.world.packages().named(&name) {
             Some(package) => Ok(package),
-            None => self.program_error(format!("there is no package {name}")),
+            None => {
+                let text = format!("there is no package {name}");
+                self.raise(Raised::Package(name, text))
+            }
         }
     }
 
@@ -154,10 +157,15 @@ pub(super) fn make_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let name = vm.designated_text(name)?;
     let nicknames = vm.designated_names(nicknames)?;
     let uses = vm.packages(uses)?;
+    let nicknames: Vec<&str> = nicknames.iter().map(String::as_str).collect();
     let package = match vm.world.packages().named(&name) {
-        Some(package) => package,
+        // Reading a compiled program makes the packages of its symbols, without more.
+        Some(package) => {
+            let changed = vm.world.packages_mut().add_nicknames(package, &nicknames);
+            vm.changed(changed)?;
+            package
+        }
         None => {
-            let nicknames: Vec<&str> = nicknames.iter().map(String::as_str).collect();
             let made = vm.world.packages_mut().make_package(&name, &nicknames, &[]);
             vm.changed(made)?
         }

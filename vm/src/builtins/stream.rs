@@ -337,7 +337,7 @@ impl Vm {
     }
 
     fn file_error<T>(&mut self, what: &str, path: &str, error: &HostError) -> Result<T, Exit> {
-        self.raise(Raised::Simple(format!("cannot {what} {path}: {error}")))
+        self.raise(Raised::File(path.into(), format!("it cannot be {what}: {error}")))
     }
 }
 
@@ -453,7 +453,7 @@ pub(super) fn delete_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
     match vm.host.delete_file(&path) {
         Ok(()) => Ok(Value::T),
-        Err(error) => vm.file_error("delete", &path, &error),
+        Err(error) => vm.file_error("deleted", &path, &error),
     }
 }
 

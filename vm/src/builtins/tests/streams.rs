@@ -74,7 +74,7 @@ fn files_are_read_whole_and_written_in_blocks() {
     let mut vm = machine(host);
     assert_eq!(evaluate(&mut vm, "(read-line (%open-input \"in\"))"), "\"äb\" ; NIL");
     assert_eq!(evaluate(&mut vm, "(%file-text \"in\")"), "\"äb\\n\"");
-    let missing = "error: cannot read none: there is no such file";
+    let missing = "file-error none: it cannot be read: there is no such file";
     assert_eq!(evaluate(&mut vm, "(%open-input \"none\")"), missing);
     let exists = "stream-error: it cannot be written: the file exists already";
     assert_eq!(evaluate(&mut vm, "(%open-output \"log\" 2)"), exists);
@@ -92,6 +92,6 @@ fn files_are_read_whole_and_written_in_blocks() {
 #[test]
 fn refused_files_are_failures() {
     let mut vm = machine(VirtualHost::new().without_files());
-    let refused = format!("error: cannot read in: {}", HostError::Refused);
+    let refused = format!("file-error in: it cannot be read: {}", HostError::Refused);
     assert_eq!(evaluate(&mut vm, "(%file-text \"in\")"), refused);
 }

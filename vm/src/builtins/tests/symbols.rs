@@ -83,7 +83,7 @@ fn packages() {
         ("(find-package \"CL\")", "<Some(Package)>"),
         ("(package-name $0)", "\"COMMON-LISP\""),
         ("(find-package \"NONE\")", "NIL"),
-        ("(package-name \"NONE\")", "program-error: there is no package NONE"),
+        ("(package-name \"NONE\")", "package-error: there is no package NONE"),
         ("(%make-package \"P\" '(\"PP\") '(\"CL\"))", "<Some(Package)>"),
         ("(package-nicknames 'p)", "(\"PP\")"),
         ("(package-use-list \"PP\")", "(<Some(Package)>)"),

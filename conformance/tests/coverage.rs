@@ -1,0 +1,53 @@
+//! Every function, macro and special form that programs can name is used by a conformance program.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use esl::{Config, Engine, host::VirtualHost};
+
+/// What no program uses, and why.
+const EXCEPTIONS: &[(&str, &str)] = &[("UNBOUND-SLOT-INSTANCE", "no operation leaves a slot unbound")];
+
+/// Names that are defined, as the language itself lists them.
+const NAMES: &str = "
+(let ((names nil))
+  (dolist (symbol (apropos-list \"\" \"ESL\") (format nil \"~{~a~^ ~}\" names))
+    (when (and (eq (nth-value 1 (find-symbol (symbol-name symbol) (symbol-package symbol))) :external)
+               (or (special-operator-p symbol) (macro-function symbol) (fboundp symbol)))
+      (push (symbol-name symbol) names))))";
+
+fn words(folder: &Path, words: &mut BTreeSet<String>) {
+    for entry in folder.read_dir().expect("the folder of programs is there") {
+        let path = entry.expect("the folder of programs can be read").path();
+        if path.is_dir() {
+            self::words(&path, words);
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).expect("a program is text").to_uppercase();
+        for line in text.lines() {
+            let code = line.split(" ;").next().unwrap_or(line);
+            if !code.starts_with(';') {
+                let parts = code.split(|c: char| c.is_whitespace() || "()'`,@#\"".contains(c));
+                words.extend(parts.map(|word| word.trim_start_matches("CL:").to_string()));
+            }
+        }
+    }
+}
+
+#[test]
+fn every_name_is_used_by_a_program() {
+    let mut used = BTreeSet::new();
+    words(&Path::new(env!("CARGO_MANIFEST_DIR")).join("programs"), &mut used);
+    let mut engine =
+        Engine::with(Config::default(), Box::new(VirtualHost::new())).expect("there is room for the library");
+    let names = engine.eval(NAMES).expect("the names can be listed").to_string();
+    let names: Vec<&str> = names.trim_matches('"').split(' ').collect();
+    assert!(names.len() > 500, "only {} names are listed", names.len());
+    let excepted = |name: &str| EXCEPTIONS.iter().any(|&(exception, _)| exception == name);
+    let unused: Vec<&str> =
+        names.into_iter().filter(|name| !used.contains(*name) && !excepted(name)).collect();
+    assert!(unused.is_empty(), "no conformance program uses {} names: {}", unused.len(), unused.join(" "));
+    for (name, reason) in EXCEPTIONS {
+        assert!(!used.contains(*name), "a program uses {name}; it is no exception any more ({reason})");
+    }
+}
