@@ -257,7 +257,7 @@ impl Terms {
         // Comparing by identity has no need of a limit.
         let mut work = usize::MAX;
         let entry = table.find(heap, Test::Eq, v, hash, &mut work).unwrap_or_default();
-        Some((table, hash, entry))
+        Some((table, hash, entry.map(|(entry, _)| entry)))
     }
 
     fn object(&mut self, heap: &mut Heap, v: Value) -> Result<Term, AllocError> {
