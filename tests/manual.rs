@@ -1,4 +1,4 @@
-//! The examples of the manual, `docs/manual/*.md`, run by the commands. `conformance/src/chapter.rs` says how they are
+//! The examples of the manual, `docs/manual/*.md`, and of `README.md`, run by the commands. `conformance/src/chapter.rs` says how they are
 //! written.
 
 use std::io::Write;
@@ -14,10 +14,13 @@ const MARK: &str = "@@ piece ";
 
 fn main() {
     let arguments = Arguments::from_args();
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/manual");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut paths = vec![root.join("README.md")];
+    for entry in std::fs::read_dir(root.join("docs/manual")).expect("the manual is there") {
+        paths.push(entry.expect("the folder of the manual can be read").path());
+    }
     let mut trials = Vec::new();
-    for entry in std::fs::read_dir(folder).expect("the manual is there") {
-        let path = entry.expect("the folder of the manual can be read").path();
+    for path in paths {
         if path.extension().is_some_and(|extension| extension == "md") {
             let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             trials.push(Trial::test(name, move || check(&std::fs::read_to_string(&path)?)));
