@@ -237,13 +237,13 @@ impl Machine {
                 self.places.push(Place { temporaries, ..place });
             }
             Some(Update::Expander(expander)) => return self.stop_for_five(expander, &form, to),
+            None if super::operator::find(&form.operator).is_some() => {
+                return Err(no_place(&form.datum, to.span));
+            }
             None if self.unit.is_broken_macro(&form.operator) => self.places.push(Place::broken(to.span)),
             None if self.is_macro(environment, &form.operator) => {
                 let function = MacroRef::Global(form.operator.clone());
                 return self.stop_for_place(function, &form, global.locked, to);
-            }
-            None if super::operator::find(&form.operator).is_some() => {
-                return Err(no_place(&form.datum, to.span));
             }
             None => self.function_place(environment, form, to),
         }

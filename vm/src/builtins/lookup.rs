@@ -130,17 +130,24 @@ pub(super) fn putf(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(%remf plist indicator)`: the property list without that property, and whether it was there.
 pub(super) fn remf(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[plist, indicator] = arguments else { unreachable!("the table says two") };
-    match find_property(vm, plist, indicator)? {
+    let (rest, was_there) = without_property(vm, plist, indicator)?;
+    vm.give_values(&[rest, Value::boolean(was_there)])
+}
+
+/// A property list without a property, and whether it had it.
+pub(super) fn without_property(vm: &mut Vm, plist: Value, indicator: Value) -> Result<(Value, bool), Exit> {
+    Ok(match find_property(vm, plist, indicator)? {
         Some([before, _, pair]) => {
             let rest = vm.heap.cdr(pair).unwrap_or(Value::NIL);
             if before.is_nil() {
-                return vm.give_values(&[rest, Value::T]);
+                (rest, true)
+            } else {
+                vm.heap.set_cdr(before, rest);
+                (plist, true)
             }
-            vm.heap.set_cdr(before, rest);
-            vm.give_values(&[plist, Value::T])
         }
-        None => vm.give_values(&[plist, Value::NIL]),
-    }
+        None => (plist, false),
+    })
 }
 
 /// `(get-properties plist indicators)`

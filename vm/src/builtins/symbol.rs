@@ -112,14 +112,9 @@ pub(super) fn remprop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[symbol, indicator] = arguments else { unreachable!("the table says two") };
     let object = vm.symbol_object(symbol)?;
     let plist = vm.cell(symbol)?.plist;
-    match lookup::remf(vm, &[plist, indicator]) {
-        Err(Exit::Values) => {
-            let &[plist, was_there] = &vm.values[..] else { unreachable!("remf gives two values") };
-            vm.heap.symbol_set_plist(object, plist);
-            Ok(was_there)
-        }
-        other => other,
-    }
+    let (plist, was_there) = lookup::without_property(vm, plist, indicator)?;
+    vm.heap.symbol_set_plist(object, plist);
+    Ok(Value::boolean(was_there))
 }
 
 /// `(symbol-value symbol)`
