@@ -25,3 +25,18 @@ pub fn load(machine: &mut Vm) -> Result<(), String> {
     machine.seal();
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_forms_run_when_a_machine_is_made() {
+        let image = ModuleImage::open_trusted(ImageBytes::Static(IMAGE)).expect("the image is sound");
+        let count = image.toplevel().expect("the image is sound").len();
+        assert!(
+            count <= 16,
+            "{count} forms of the library run at each start; `esl_vm::load::prepare` notes plain definitions"
+        );
+    }
+}

@@ -15,8 +15,8 @@ use esl_bytecode::symbol::{ESL_PACKAGE, Symbol};
 
 use super::definitions::{CONSTANT, HEAD, MARKER, ROW, SPECIAL, STREAM, VALUE, hash};
 
-/// The function of the library that makes a constant, unless it is one with that value already.
-const DEFINE_CONSTANT: &str = "%DEFINE-CONSTANT-AGAIN";
+/// The function of the library that tells whether a symbol is a constant with a value already.
+const IS_CONSTANT: &str = "%IS-CONSTANT-WITH";
 
 /// What a register holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,19 +156,15 @@ impl Form<'_> {
         self.registers[usize::from(register)] = Some(value);
     }
 
-    /// Notes what the one function of the library does that may be called here: it makes a constant.
+    /// What the one function of the library gives that may be called here.
     fn call_library(&mut self, function: Known, window: u8, count: u8) -> Option<Known> {
         let Constant::Symbol(function) = self.constant(self.symbol(function)?) else { return None };
         let argument = |position: usize| self.registers[usize::from(window) + 2 + position];
-        if *function != Symbol::esl(DEFINE_CONSTANT) || count != 2 {
+        if *function != Symbol::esl(IS_CONSTANT) || count != 2 {
             return None;
         }
-        let (name, value) = (self.symbol(argument(0)?)?, self.data(argument(1)?)?);
-        if self.noted.has_value(self.module, name) {
-            return None;
-        }
-        self.changes.push(Change::Constant(name, value));
-        Some(Known::Constant(name))
+        let is_new = !self.noted.has_value(self.module, self.symbol(argument(0)?)?);
+        is_new.then_some(Known::Nil)
     }
 
     /// Notes what a builtin does, and gives its value.
