@@ -161,6 +161,10 @@ pub struct Report {
     pub ended: Ended,
     /// Ticks that it took.
     pub ticks: u64,
+    /// Tasks that it made, the main one included.
+    pub tasks: u64,
+    /// Turns that they had.
+    pub turns: u64,
     /// Figures of its heap.
     pub heap: esl_vm::heap::HeapStats,
 }
@@ -181,7 +185,7 @@ pub fn machine(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, String>
     Ok(machine)
 }
 
-/// Has a machine write what happens to `failures` or `goals` to its error output. Nothing changes if `traces` is empty.
+/// Has a machine write what happens to `failures`, `goals` or `tasks` to its error output. Nothing changes if `traces` is empty.
 ///
 /// # Errors
 /// A text, if there is no room for that.
@@ -194,7 +198,9 @@ pub fn set_traces(machine: &mut Vm, traces: &[String]) -> Result<(), String> {
     let list = Datum::list(keywords.collect::<Vec<_>>(), Span::default());
     let list = machine.import(&list).map_err(|_| "there is no room for the names of traces".to_string())?;
     let function = machine.library_function("%SET-TRACES")?;
-    machine.call(function, &[list], u64::MAX).map(|_| ())
+    machine.call(function, &[list], u64::MAX)?;
+    machine.trace_tasks(traces.iter().any(|name| name == "tasks"));
+    Ok(())
 }
 
 /// Runs a program to its end.
@@ -238,7 +244,8 @@ pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Report, String> {
         }
         _ => Ended::Normally(machine.exit_status().unwrap_or(0)),
     };
-    Ok(Report { ended, ticks: machine.ticks(), heap: machine.heap_stats() })
+    let (tasks, turns) = machine.tasks_and_turns();
+    Ok(Report { ended, ticks: machine.ticks(), tasks, turns, heap: machine.heap_stats() })
 }
 
 #[cfg(test)]

@@ -33,8 +33,8 @@ enum Action {
         /// Print figures of the run to standard error when it is over
         #[arg(long)]
         stats: bool,
-        /// Write to standard error what happens to failures or goals: a list such as failures,goals
-        #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = ["failures", "goals"])]
+        /// Write to standard error what happens to failures, goals or tasks: a list such as failures,tasks
+        #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = ["failures", "goals", "tasks"])]
         trace: Vec<String>,
         /// A source or bytecode file; `-` is a source from standard input
         file: PathBuf,
@@ -141,6 +141,8 @@ fn run(
     if stats {
         let heap = report.heap;
         eprintln!("ticks         {:>14}", report.ticks);
+        eprintln!("tasks         {:>14}", report.tasks);
+        eprintln!("turns         {:>14}", report.turns);
         eprintln!("seconds       {:>14.3}", started.elapsed().as_secs_f64());
         eprintln!("allocated     {:>14} bytes", heap.allocated);
         eprintln!("peak heap     {:>14} bytes", heap.peak);

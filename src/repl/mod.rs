@@ -181,7 +181,7 @@ impl Session {
             }
         };
         self.machine.set_interruptible(Some(task));
-        self.machine.run(u64::MAX);
+        self.machine.run_until(Some(task), u64::MAX);
         self.machine.set_interruptible(None);
         let result = self.machine.result(task);
         let report = self.machine.report(task).map(String::from);

@@ -31,5 +31,6 @@ mod stack;
 mod stub;
 mod table;
 mod timer;
+mod trace;
 mod wait;
 mod world;

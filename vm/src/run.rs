@@ -11,6 +11,7 @@ use crate::limit::AccountId;
 use crate::raise::Exit;
 use crate::task::{DEFAULT_PRIORITY, Task, TaskId, TaskResult, TaskState};
 use crate::timer::Due;
+use crate::trace::Happening;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{Parking, event};
@@ -171,6 +172,7 @@ impl Vm {
         let id = self.tasks.insert(task);
         self.set_slot(object, event::STATE, Value::index(id.index as usize));
         self.queues.push(id.index, serial, priority, false);
+        self.trace(id.index, Happening::Begins);
         Ok(id)
     }
 
@@ -192,6 +194,11 @@ impl Vm {
     /// Ticks that all tasks together have used.
     pub fn ticks(&self) -> u64 {
         self.spent
+    }
+
+    /// Tasks that were made, and turns that they had, since the program began.
+    pub fn tasks_and_turns(&self) -> (u64, u64) {
+        (self.made, self.turns)
     }
 
     /// Forgets a task that has ended; one that has not is dropped as it stands, without its cleanups.
@@ -220,6 +227,7 @@ impl Vm {
             && task.state != TaskState::Ended
         {
             task.flags.set_abort_pending(true);
+            self.trace(id.index, Happening::IsToEnd);
             self.call_attention(id.index);
         }
     }
@@ -237,10 +245,13 @@ impl Vm {
     pub(crate) fn make_runnable(&mut self, index: u32, urgent: bool) {
         let serial = self.next_serial();
         let Some(task) = self.tasks.at_mut(index) else { return };
-        task.state = TaskState::Runnable;
+        let was_parked = std::mem::replace(&mut task.state, TaskState::Runnable) != TaskState::Runnable;
         task.serial = serial;
         let (priority, urgent) = (task.priority, urgent || task.flags.urgent());
         self.queues.push(index, serial, priority, urgent);
+        if was_parked {
+            self.trace(index, Happening::GoesOn);
+        }
     }
 
     /// Runs tasks in turn until all have ended or wait for what cannot come, the budget of the run is spent, or `ticks`
@@ -310,6 +321,7 @@ impl Vm {
         let account = task.account;
         self.running = Some(task);
         self.running_index = index;
+        self.turns += 1;
         self.slice_is_cut = false;
         self.had_attention = self.task().flags.attention();
         self.scan_before_running();
@@ -406,6 +418,7 @@ impl Vm {
                 }
             }
         }
+        self.trace(index, Happening::Waits);
         if !self.had_attention && self.tasks.at(index).is_some_and(|task| task.flags.attention()) {
             // Something was noted while it was about to wait.
             self.make_runnable(index, true);
@@ -529,6 +542,7 @@ impl Vm {
         interp::call::drop_frames(self.task_mut());
         let account = std::mem::replace(&mut self.task_mut().account, AccountId::NONE);
         self.accounts.leave(account);
+        self.trace_end(self.slot(object, event::NAME), status);
         self.report_end(end, is_awaited || notify.is_true());
         let task = self.task_mut();
         task.state = TaskState::Ended;
@@ -607,13 +621,20 @@ impl Vm {
         self.label_of(self.slot(object, event::NAME), number)
     }
 
-    fn label_of(&self, name: Value, number: u64) -> String {
-        if name.is_true() { format!("task {}", self.describe(name)) } else { format!("task {number}") }
+    pub(crate) fn label_of(&self, name: Value, number: u64) -> String {
+        if name.is_true() {
+            format!("task {}", self.describe(name))
+        } else if self.main_number == Some(number) {
+            "the main task".into()
+        } else {
+            format!("task {number}")
+        }
     }
 
     /// Makes a program's main task the one with whose failure the run ends.
     pub fn set_main(&mut self, id: TaskId) {
         self.main = Some(id);
+        self.main_number = self.tasks.get(id).map(|task| task.number);
     }
 
     /// Calls a function in a task of its own and runs tasks until it has ended, at most for `ticks`.

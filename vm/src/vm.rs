@@ -107,12 +107,18 @@ pub struct Vm {
     pub(crate) any_event: Value,
     /// The task with whose failure the run ends; without one, tasks come and go as they like.
     pub(crate) main: Option<TaskId>,
+    /// Its number.
+    pub(crate) main_number: Option<u64>,
     /// How many tasks have not ended.
     pub(crate) alive: usize,
     /// How many of them are no daemons.
     pub(crate) foreground: usize,
     /// How many tasks were made.
     pub(crate) made: u64,
+    /// How many turns they had.
+    pub(crate) turns: u64,
+    /// Whether what happens to tasks is written.
+    pub(crate) traces_tasks: bool,
     /// The newest serial number of a task's state.
     pub(crate) serial: u64,
     /// The clock when it was read last, in nanoseconds.
@@ -209,9 +215,12 @@ impl Vm {
             readers: Vec::new(),
             any_event,
             main: None,
+            main_number: None,
             alive: 0,
             foreground: 0,
             made: 0,
+            turns: 0,
+            traces_tasks: false,
             serial: 0,
             now: 0,
             looked_at: 0,

@@ -1,0 +1,60 @@
+//! What is written when tasks are traced: a line for each beginning, wait, going on, request of an abort, and end.
+
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// What happens to a task.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Happening {
+    /// It was made.
+    Begins,
+    /// It is parked.
+    Waits,
+    /// It can run again.
+    GoesOn,
+    /// Its end is asked for.
+    IsToEnd,
+}
+
+impl Vm {
+    /// Has what happens to tasks written to standard error.
+    pub fn trace_tasks(&mut self, on: bool) {
+        self.traces_tasks = on;
+    }
+
+    /// Writes what happens to the task at a place, if tasks are traced.
+    #[inline]
+    pub(crate) fn trace(&mut self, index: u32, happening: Happening) {
+        if self.traces_tasks {
+            self.write_trace(index, happening);
+        }
+    }
+
+    #[cold]
+    fn write_trace(&mut self, index: u32, happening: Happening) {
+        let Some(task) = self.tasks.at(index).filter(|task| !task.flags.hidden()) else { return };
+        let label = self.task_label(task.object);
+        let what = match happening {
+            Happening::Begins => "begins".into(),
+            Happening::Waits => format!("waits for {}", self.reason_of(task)),
+            Happening::GoesOn => "goes on".into(),
+            Happening::IsToEnd => "is to be aborted".into(),
+        };
+        self.write_trace_line(&label, &what);
+    }
+
+    /// Writes how a task has ended, if tasks are traced.
+    pub(crate) fn trace_end(&mut self, name: Value, status: Value) {
+        if self.traces_tasks && !self.task().flags.hidden() {
+            let label = self.label_of(name, self.task().number);
+            let status = self.describe(status).trim_start_matches(':').to_lowercase();
+            let what = if status == "aborted" { "was aborted".into() } else { format!("has {status}") };
+            self.write_trace_line(&label, &what);
+        }
+    }
+
+    fn write_trace_line(&mut self, label: &str, what: &str) {
+        let seconds = self.time() as f64 / 1e9;
+        self.complain(&format!("; {seconds:.6} {label} {what}\n"));
+    }
+}
