@@ -453,6 +453,16 @@ impl Packages {
         names
     }
 
+    /// Names of all symbols that can be written in a package without a prefix, sorted.
+    pub fn accessible_names(&self, package: PackageId) -> BTreeSet<&str> {
+        let mut names = self.external_names(package);
+        names.extend(self.table[package].symbols.keys().map(|name| &**name));
+        for &used in &self.table[package].uses {
+            names.extend(self.external_names(used));
+        }
+        names
+    }
+
     fn is_at(&self, symbol: &Symbol, home: PackageId) -> bool {
         symbol.is_in(&self.table[home].name)
     }

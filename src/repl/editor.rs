@@ -8,16 +8,32 @@ use rustyline::{Completer, Helper, Highlighter, Hinter, Validator};
 
 use super::{Line, Lines};
 
-/// The helper of the line editor. Completion asks the table of builtins and special operators.
+/// The helper of the line editor.
 #[derive(Default, Helper, Hinter, Highlighter, Validator, Completer)]
 struct Names {
     #[rustyline(Completer)]
     completer: NameCompleter,
 }
 
-/// Completes names of the language.
+/// Completes names: of the language, and those that the person has used. They are in order.
 #[derive(Default)]
-struct NameCompleter;
+struct NameCompleter {
+    names: Vec<String>,
+}
+
+impl NameCompleter {
+    /// Where the name that ends at `position` begins, and all names that begin like it.
+    fn candidates(&self, line: &str, position: usize) -> (usize, Vec<String>) {
+        let start = line[..position].rfind(|c: char| "()'`,\"# ".contains(c)).map_or(0, |index| index + 1);
+        let prefix = line[start..position].to_uppercase();
+        if prefix.is_empty() {
+            return (start, Vec::new());
+        }
+        let first = self.names.partition_point(|name| *name < prefix);
+        let names = self.names[first..].iter().take_while(|name| name.starts_with(&prefix));
+        (start, names.map(|name| name.to_lowercase()).collect())
+    }
+}
 
 impl rustyline::completion::Completer for NameCompleter {
     type Candidate = String;
@@ -28,14 +44,7 @@ impl rustyline::completion::Completer for NameCompleter {
         position: usize,
         _context: &rustyline::Context<'_>,
     ) -> rustyline::Result<(usize, Vec<String>)> {
-        let start = line[..position].rfind(|c: char| "()'`,\"# ".contains(c)).map_or(0, |index| index + 1);
-        let prefix = line[start..position].to_uppercase();
-        let names = esl_bytecode::builtin::BUILTINS
-            .iter()
-            .filter(|info| info.visibility != esl_bytecode::builtin::Visibility::Internal)
-            .map(|info| info.name)
-            .filter(|name| !prefix.is_empty() && name.starts_with(&prefix));
-        Ok((start, names.map(str::to_lowercase).collect()))
+        Ok(self.candidates(line, position))
     }
 }
 
@@ -72,6 +81,16 @@ impl Lines for Editor {
         }
     }
 
+    fn completes(&self) -> bool {
+        true
+    }
+
+    fn learn(&mut self, names: Vec<String>) {
+        if let Some(helper) = self.editor.as_mut().and_then(|editor| editor.helper_mut()) {
+            helper.completer.names = names;
+        }
+    }
+
     fn remember(&mut self, form: &str) {
         let Some(editor) = &mut self.editor else { return };
         // A history that cannot be kept is no reason to stop.
@@ -79,5 +98,20 @@ impl Lines for Editor {
         if let Some(history) = &self.history {
             _ = editor.save_history(history);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_completed_from_their_beginning() {
+        let names = ["FAIL", "FAILURE-CAUSE", "FALSE", "WIDGET-OK?"].map(String::from).to_vec();
+        let completer = NameCompleter { names };
+        assert_eq!(completer.candidates("(print (fai", 11), (8, vec!["fail".into(), "failure-cause".into()]));
+        assert_eq!(completer.candidates("(wid)", 4), (1, vec!["widget-ok?".into()]));
+        assert_eq!(completer.candidates("(", 1), (1, vec![]));
+        assert_eq!(completer.candidates("(x", 2), (1, vec![]));
     }
 }

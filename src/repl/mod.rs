@@ -28,6 +28,12 @@ trait Lines {
     fn next(&mut self, prompt: &str) -> Line;
     /// Notes a whole form for the history.
     fn remember(&mut self, form: &str);
+    /// Whether names are completed.
+    fn completes(&self) -> bool {
+        false
+    }
+    /// Takes the names that are there now.
+    fn learn(&mut self, _names: Vec<String>) {}
 }
 
 /// What reading a line gave.
@@ -101,6 +107,9 @@ impl Session {
         let mut text = String::new();
         loop {
             let prompt = if text.is_empty() { PROMPT } else { CONTINUATION };
+            if text.is_empty() && lines.completes() {
+                lines.learn(self.machine.accessible_names());
+            }
             match lines.next(prompt) {
                 Line::Text(line)
                     if text.is_empty() && line.trim_start().starts_with(':') && is_command(&line) =>
@@ -196,7 +205,8 @@ impl Session {
                 }
                 None => println!("Aborted"),
             },
-            _ if self.machine.exit_status().is_none() => println!("Aborted"),
+            // What the task has written may end within a line.
+            _ if self.machine.exit_status().is_none() => _ = self.call("%REPL-ABORTED", ""),
             _ => {}
         }
         // What could not be written will be missed when the next value is.

@@ -18,7 +18,7 @@
 //! | `(%handler-case form (type ([variable]) . body)*)` | unwinds to here and runs a body when a condition of the type is signalled |
 //! | `(%with-handlers list . body)` | runs the body with the list of `(type . function)` as handlers |
 //! | `(%with-mask height . body)` | runs the body with control entries from that height on masked |
-//! | `(%with-recovery table lambda . body)` | runs the body with recovery procedures: see `core.rs` for the table and the function |
+//! | `(%with-recovery table (%named-lambda …) . body)` | runs the body with recovery procedures: see `core.rs` for the table and the function |
 //! | `(%with-failure-cleanup form . body)` | runs the body; evaluates the form if a failure, an abort or an expired limit leaves it |
 //! | `(%clause where . body)` | the body, as that of a recovery clause: warns at the datum `where` if control can fall off its end |
 //! | `(%cause cause where . body)` | the body, which names a cause of failures at the datum `where`: warns if others are declared and this is not |

@@ -17,12 +17,14 @@ use crate::diagnostic::code;
 const LEAVING: &[&str] = &["FAIL", "NEXT-BINDINGS", "EXIT"];
 const LEAVING_STANDARD: &[&str] = &["ERROR", "INVOKE-RESTART", "ABORT"];
 
-/// `(%with-recovery table lambda . body)`: see [`NodeKind::Recovery`].
+/// `(%with-recovery table (%named-lambda …) . body)`: see [`NodeKind::Recovery`].
 pub(super) fn with_recovery(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(2..=usize::MAX, "needs a table and a function")?;
     let table = form.args[0].clone();
-    if !matches!(table.kind(), DatumKind::Vector(_)) || !super::form::is_cl_form(&form.args[1], "LAMBDA") {
-        return Err(form.malformed("needs a vector and a lambda expression"));
+    let is_function = super::form::operator(&form.args[1])
+        .is_some_and(|operator| super::form::is_esl(operator, "%NAMED-LAMBDA"));
+    if !matches!(table.kind(), DatumKind::Vector(_)) || !is_function {
+        return Err(form.malformed("needs a vector and a function's text"));
     }
     let (procedures, job) = machine.part(form.args[1].clone(), to);
     let body = machine.child(to);

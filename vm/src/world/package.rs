@@ -81,6 +81,12 @@ impl Vm {
         value.and_then(|value| self.world.package_of(&self.heap, value)).unwrap_or(PackageId::USER)
     }
 
+    /// Names of all symbols that a person can write in the current package without a prefix, sorted.
+    pub fn accessible_names(&self) -> Vec<String> {
+        let names = self.world.packages().accessible_names(self.current_package());
+        names.into_iter().filter(|name| !name.starts_with('%')).map(String::from).collect()
+    }
+
     /// Makes the package of this name the value of `*package*` outside of all bindings; false if there is none.
     ///
     /// # Errors
