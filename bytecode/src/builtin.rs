@@ -1037,6 +1037,9 @@ define_builtins! {
     PropertyValue = internal "%PROPERTY-VALUE" ("property");
     /// Adds a rule, unless one with an equal source is there, which it replaces.
     DefineRule = internal "%DEFINE-RULE" ("head body source");
+    /// Begins a query in which variables have the values of an association list, and does its first step: the first answers;
+    /// the number of the query, or `NIL` if these were all; and whether all answers are found.
+    BeginQuery = internal "%BEGIN-QUERY" ("query bindings");
     /// Begins a query in which variables have the values of an association list; the number that names it. With `facts`,
     /// its answers are the facts that match a pattern.
     OpenQuery = internal "%OPEN-QUERY" ("query bindings facts");

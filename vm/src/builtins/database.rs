@@ -138,15 +138,61 @@ pub(super) fn query_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             let bindings: Result<Value, AllocError> = bindings;
             vm.give_values(&[test, function, bindings?])
         }
-        Err(Problem::Circular(functor)) => {
+        Err(problem) => raise_problem(vm, problem),
+    }
+}
+
+/// Notes why a query cannot be answered.
+fn raise_problem(vm: &mut Vm, problem: Problem) -> Outcome {
+    match problem {
+        Problem::Circular(functor) => {
             let functor = vm.database.value(&mut vm.heap, functor)?;
             vm.raise(Raised::Cause("UNSTRATIFIED-RULES", functor))
         }
-        Err(Problem::Unbound(functor)) => {
+        Problem::Unbound(functor) => {
             let functor = vm.database.value(&mut vm.heap, functor)?;
             vm.raise(Raised::Cause("UNBOUND-LOGICAL-VARIABLE", functor))
         }
-        Err(Problem::TooLarge) => vm.program_error("a rule builds too large a term"),
+        Problem::TooLarge => vm.program_error("a rule builds too large a term"),
+    }
+}
+
+/// `(%begin-query query bindings)`
+pub(super) fn begin_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    prepare(vm)?;
+    let &[query, bindings] = arguments else { unreachable!("the table says two") };
+    let mut work = 0;
+    let opened = vm.database.open(&mut vm.heap, query, bindings, false, &mut work);
+    let key = checked(vm, opened)?;
+    let mut left = STEP;
+    let progress = vm.database.step(key, &mut left);
+    vm.charge(4 * work + 8 * (STEP - left.min(STEP)));
+    match progress {
+        Some(Ok(Progress::Done)) => {
+            let mut work = 0;
+            let answers = vm.database.answers(&mut vm.heap, key, &mut work);
+            vm.charge(4 * work);
+            if let Some(Ok(list)) = answers
+                && !vm.database.has_all_given(key)
+            {
+                // The rest is asked for with these answers to begin with.
+                return vm.give_values(&[list, Value::index(key as usize), Value::T]);
+            }
+            vm.database.close(&mut vm.heap, key);
+            match answers {
+                Some(answers) => {
+                    let answers = answers?;
+                    vm.give_values(&[answers, Value::NIL, Value::T])
+                }
+                None => Ok(Value::NIL),
+            }
+        }
+        Some(Err(problem)) => {
+            let raised = raise_problem(vm, problem);
+            vm.database.close(&mut vm.heap, key);
+            raised
+        }
+        _ => vm.give_values(&[Value::NIL, Value::index(key as usize), Value::NIL]),
     }
 }
 

@@ -381,6 +381,7 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::MakeProperty => database::make_property,
         Builtin::PropertyValue => database::property_value,
         Builtin::DefineRule => database::define_rule,
+        Builtin::BeginQuery => database::begin_query,
         Builtin::OpenQuery => database::open_query,
         Builtin::QueryStep => database::query_step,
         Builtin::QueryTell => database::query_tell,

@@ -423,6 +423,12 @@ impl Database {
         }
     }
 
+    /// Whether all answers that a query has found were taken.
+    pub(crate) fn has_all_given(&self, key: u64) -> bool {
+        let query = self.queries.get(&key).and_then(Option::as_ref);
+        query.is_none_or(|query| query.taken == query.tuples.len())
+    }
+
     /// Closes a query.
     pub(crate) fn close(&mut self, heap: &mut Heap, key: u64) {
         let Some(Some(mut query)) = self.queries.remove(&key) else { return };
