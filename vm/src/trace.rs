@@ -2,6 +2,7 @@
 
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::wait::event;
 
 /// What happens to a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,5 +57,24 @@ impl Vm {
     fn write_trace_line(&mut self, label: &str, what: &str) {
         let seconds = self.time() as f64 / 1e9;
         self.complain(&format!("; {seconds:.6} {label} {what}\n"));
+    }
+
+    /// How reports call a task.
+    pub(crate) fn task_label(&self, object: Value) -> String {
+        let index = self.slot(object, event::STATE).as_index();
+        let is_running = index == Some(self.running_index as usize);
+        let task = if is_running { self.running.as_deref() } else { None };
+        let number = task.or_else(|| self.tasks.at(index? as u32)).map_or(0, |task| task.number);
+        self.label_of(self.slot(object, event::NAME), number)
+    }
+
+    pub(crate) fn label_of(&self, name: Value, number: u64) -> String {
+        if name.is_true() {
+            format!("task {}", self.describe(name))
+        } else if self.main_number == Some(number) {
+            "the main task".into()
+        } else {
+            format!("task {number}")
+        }
     }
 }

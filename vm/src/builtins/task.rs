@@ -5,7 +5,7 @@ use crate::control::End;
 use crate::heap::Kind;
 use crate::limit::guard;
 use crate::raise::{Exit, Outcome};
-use crate::run::SpawnOptions;
+use crate::spawn::SpawnOptions;
 use crate::task::{DEFAULT_PRIORITY, PRIORITIES, TaskId, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;

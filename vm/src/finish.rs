@@ -1,0 +1,139 @@
+//! The end of a task: asking for it, noting how it came, telling who waits for it, and ending the run with the last.
+
+use crate::control::End;
+use crate::heap::Kind;
+use crate::interp;
+use crate::limit::AccountId;
+use crate::raise::Exit;
+use crate::task::{TaskId, TaskState};
+use crate::trace::Happening;
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::wait::event;
+
+impl Vm {
+    /// Asks for the end of a task, wherever it is. It unwinds, and runs its cleanups, within two slices; inside a cleanup
+    /// or a critical section the request waits for its end.
+    pub fn abort(&mut self, id: TaskId) {
+        if !self.tasks.contains(id) {
+            return;
+        }
+        let is_running = id.index == self.running_index && self.running.is_some();
+        let task = if is_running { self.running.as_deref_mut() } else { self.tasks.get_mut(id) };
+        if let Some(task) = task
+            && task.state != TaskState::Ended
+        {
+            task.flags.set_abort_pending(true);
+            self.trace(id.index, Happening::IsToEnd);
+            self.call_attention(id.index);
+        }
+    }
+
+    /// Asks for the end of every task but the running one.
+    pub(crate) fn abort_others(&mut self) {
+        for id in self.tasks.ids() {
+            if self.running.is_none() || id.index != self.running_index {
+                self.abort(id);
+            }
+        }
+    }
+
+    /// Notes how the running task has ended, and tells those who want to know.
+    pub(crate) fn finish_task(&mut self) {
+        let end = match self.ending.take().unwrap_or(End::Succeeded) {
+            End::Spent => End::Failed(self.world.known.budget_exhausted),
+            end => end,
+        };
+        let mut values = std::mem::take(&mut self.values);
+        let object = self.task().object;
+        // What others are told of has to be made before; here there is nothing to go back to.
+        let result = match (end, &values[..]) {
+            (End::Succeeded, &[value]) => value,
+            (End::Succeeded, values) => self.make_for_end(|vm| Ok(vm.heap.list(values)?)),
+            (End::Failed(condition), _) => condition,
+            _ => Value::NIL,
+        };
+        let aux = u16::from(end == End::Succeeded && values.len() == 1);
+        self.heap.set_aux(object, Kind::Task, aux);
+        self.set_slot(object, event::RESULT, result);
+        let status = match end {
+            End::Succeeded => self.world.known.succeeded,
+            End::Failed(_) | End::Spent => self.world.known.failed,
+            End::Aborted => self.world.known.aborted,
+        };
+        self.set_slot(object, event::STATE, status);
+        let is_awaited = self.slot(object, event::FIRST).is_true();
+        let notify = std::mem::replace(&mut self.task_mut().notify, Value::NIL);
+        interp::call::drop_frames(self.task_mut());
+        let account = std::mem::replace(&mut self.task_mut().account, AccountId::NONE);
+        self.accounts.leave(account);
+        self.trace_end(self.slot(object, event::NAME), status);
+        self.report_end(end, is_awaited || notify.is_true());
+        let task = self.task_mut();
+        task.state = TaskState::Ended;
+        if task.flags.kept() {
+            let extra = task.extra_mut();
+            extra.end = Some(end);
+            extra.values = std::mem::take(&mut values);
+        }
+        values.clear();
+        self.values = values;
+        // The list of arguments is made only if somebody will see it.
+        let has_waiters = self.slot(object, event::FIRST).is_true();
+        let arguments: &[Value] = if has_waiters { &[self.world.known.task_end] } else { &[] };
+        self.make_for_end(|vm| vm.signal_event(object, arguments).map(|()| Value::NIL));
+        if let Some(pair) = self.heap.as_cons(notify) {
+            self.make_for_end(|vm| vm.signal(pair.car, pair.cdr).map(|()| Value::NIL));
+        } else if notify.is_true() {
+            self.interrupt_by(notify);
+        }
+        self.end_run_if_over(end);
+    }
+
+    /// Does what needs room at the end of a task, where an instruction cannot be done again: with a collection if need be,
+    /// and with the reserve of the heap.
+    fn make_for_end(&mut self, mut make: impl FnMut(&mut Vm) -> Result<Value, Exit>) -> Value {
+        for attempt in 0..3 {
+            if let Ok(value) = make(self) {
+                return value;
+            }
+            match attempt {
+                0 => self.collect_fully(),
+                _ => _ = self.heap.open_reserve(),
+            }
+        }
+        Value::NIL
+    }
+
+    /// Reports the failure that has ended the running task, unless somebody waits for it or the embedder wants to.
+    fn report_end(&mut self, end: End, is_awaited: bool) {
+        let task = self.task_mut();
+        if task.flags.kept() || is_awaited {
+            return;
+        }
+        let report = task.extra.as_mut().and_then(|extra| extra.report.take());
+        let name = self.slot(self.task().object, event::NAME);
+        let label = self.label_of(name, self.task().number);
+        match (end, report) {
+            (End::Failed(_), Some(report)) => self.complain(&format!("In {label}:\n{report}")),
+            (End::Failed(condition), None) => {
+                let cause = self.describe(condition);
+                self.complain(&format!("In {label}:\nFailure {cause}, no recovery available.\nAborted\n"));
+            }
+            _ => {}
+        }
+    }
+
+    /// Ends the run with the running task, if it is the last that matters.
+    fn end_run_if_over(&mut self, end: End) {
+        self.alive -= 1;
+        if !self.task().flags.daemon() {
+            self.foreground -= 1;
+        }
+        let Some(main) = self.main else { return };
+        let main_has_failed = main.index == self.running_index && (end != End::Succeeded);
+        if main_has_failed || self.foreground == 0 {
+            self.abort_others();
+        }
+    }
+}
