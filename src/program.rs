@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use esl_bytecode::compile::drive;
+use esl_bytecode::compile::drive_with;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::module::Module;
@@ -12,10 +12,12 @@ use esl_bytecode::verify::verify;
 use esl_bytecode::{disasm, file};
 use esl_compiler::diagnostic::Sources;
 use esl_compiler::session::Compiler;
-use esl_vm::host::{Host, RealHost};
+use esl_vm::host::{FileAccess, Host, RealHost};
 use esl_vm::run::RunOutcome;
 use esl_vm::task::TaskResult;
 use esl_vm::vm::{Config, Vm};
+
+use crate::library::Library;
 
 /// A source text and what it is called in diagnostics and backtraces.
 #[derive(Clone, Debug)]
@@ -63,23 +65,47 @@ const COMPILE_TIME_CONFIG: Config = Config::DEFAULT;
 /// Compiles sources to one program that runs them in order. They are one unit: functions may be called before the source
 /// that defines them, and macros used after it. Each begins in the package `ESL-USER`.
 ///
-/// Macros run in a machine of their own, and what they define is gone when the compilation is over.
+/// Macros run in a machine of their own, and what they define is gone when the compilation is over. The sources cannot require
+/// modules.
 pub fn compile(sources: &[Source]) -> Compiled {
-    let mut table = Sources::new();
-    for source in sources {
-        table.add(source.name.clone(), Some(source.text.clone()));
+    compile_with(sources, &Library::none(), Modules::Inside)
+}
+
+/// What becomes of the modules that a program requires.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Modules {
+    /// They are part of it.
+    Inside,
+    /// It finds them when it runs.
+    Apart,
+}
+
+/// As [`compile`], with the modules of a library.
+pub fn compile_with(sources: &[Source], library: &Library, modules: Modules) -> Compiled {
+    let mut compiler = Compiler::default();
+    if modules == Modules::Apart {
+        compiler = compiler.apart();
     }
-    let mut machine = match machine(COMPILE_TIME_CONFIG, Box::new(RealHost::new(Vec::new()))) {
+    let texts: Vec<(&str, &str)> = sources.iter().map(|source| (&*source.name, &*source.text)).collect();
+    let mut compilation = compiler.compile_texts(&texts);
+    let mut machine = match compile_time_machine(library) {
         Ok(machine) => machine,
         Err(text) => {
             let diagnostic = Diagnostic::error("macro-failed", text, Default::default());
-            return Compiled { program: None, diagnostics: vec![diagnostic], sources: table };
+            return Compiled { program: None, diagnostics: vec![diagnostic], sources: compiler.sources() };
         }
     };
-    let texts: Vec<(&str, &str)> = sources.iter().map(|source| (&*source.name, &*source.text)).collect();
-    let mut compilation = Compiler::default().compile_texts(&texts);
-    let (module, diagnostics) = drive(&mut *compilation, &mut machine);
-    Compiled { program: module.map(|module| Program { module }), diagnostics, sources: table }
+    let (module, diagnostics) = drive_with(&mut *compilation, &mut machine, &mut |name| library.find(name));
+    let program = module.map(|module| Program { module });
+    Compiled { program, diagnostics, sources: compiler.sources() }
+}
+
+/// The machine in which macros run: it may read the modules of the library.
+fn compile_time_machine(library: &Library) -> Result<Vm, String> {
+    let files = FileAccess::Under(library.folders().to_vec());
+    let mut machine = machine(COMPILE_TIME_CONFIG, Box::new(RealHost::new(Vec::new()).with_files(files)))?;
+    set_library(&mut machine, library)?;
+    Ok(machine)
 }
 
 impl Program {
@@ -107,18 +133,19 @@ impl Program {
     }
 }
 
-/// A source with its macros expanded, as text, and what was found on the way.
-pub fn expand(source: &Source) -> (String, Compiled) {
-    let mut sources = Sources::new();
-    let id = sources.add(source.name.clone(), Some(source.text.clone()));
-    match machine(COMPILE_TIME_CONFIG, Box::new(RealHost::new(Vec::new()))) {
+/// A source with its macros expanded, as text, and what was found on the way. Modules that it requires are left out.
+pub fn expand(source: &Source, library: &Library) -> (String, Compiled) {
+    let compiler = Compiler::default().apart();
+    let mut expansion = compiler.expand_text(&source.name, &source.text);
+    match compile_time_machine(library) {
         Ok(mut machine) => {
-            let mut expansion = Compiler::for_source(id).expand_text(&source.name, &source.text);
-            let (_, diagnostics) = drive(&mut expansion, &mut machine);
+            let (_, diagnostics) = drive_with(&mut expansion, &mut machine, &mut |name| library.find(name));
+            let sources = compiler.sources();
             (expansion.text().to_string(), Compiled { program: None, diagnostics, sources })
         }
         Err(text) => {
             let diagnostic = Diagnostic::error("macro-failed", text, Default::default());
+            let sources = compiler.sources();
             (String::new(), Compiled { program: None, diagnostics: vec![diagnostic], sources })
         }
     }
@@ -200,6 +227,21 @@ pub fn set_traces(machine: &mut Vm, traces: &[String]) -> Result<(), String> {
     let function = machine.library_function("%SET-TRACES")?;
     machine.call(function, &[list], u64::MAX)?;
     machine.trace_tasks(traces.iter().any(|name| name == "tasks"));
+    Ok(())
+}
+
+/// Has `require` look into the folders of a library.
+///
+/// # Errors
+/// A text, if there is no room for their names.
+pub fn set_library(machine: &mut Vm, library: &Library) -> Result<(), String> {
+    let nowhere = Span::default();
+    let folders = library.folders().iter().map(|folder| folder.to_string_lossy());
+    let list =
+        Datum::list(folders.map(|folder| Datum::string(&folder, nowhere)).collect::<Vec<_>>(), nowhere);
+    let list = machine.import(&list).map_err(|_| "there is no room for the names of folders".to_string())?;
+    let function = machine.library_function("%SET-MODULE-PATH")?;
+    machine.call(function, &[list], u64::MAX)?;
     Ok(())
 }
 

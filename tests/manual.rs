@@ -72,6 +72,7 @@ fn eslvm(arguments: &[&str], input: &str) -> Result<String, Failed> {
     let mut child = Command::new(env!("CARGO_BIN_EXE_eslvm"))
         .args(arguments)
         .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .env("ESL_LIBRARY", "examples/library")
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

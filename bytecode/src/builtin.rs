@@ -951,6 +951,10 @@ define_builtins! {
     // ---- reading and compiling at run time
     /// A handle of the compilation of `form`.
     BeginCompilation = internal "%BEGIN-COMPILATION" ("form");
+    /// A handle of the compilation of a whole text, called `name` in what is said about it.
+    BeginFile = internal "%BEGIN-FILE" ("name text");
+    /// The functions that run the top-level forms of a compiled file, in order.
+    CompiledFile = internal "%COMPILED-FILE" ("path");
     /// A handle of a text that is compiled form by form.
     OpenText = internal "%OPEN-TEXT" ("text");
     /// A handle of the compilation of the next form of a text, `NIL` at its end.

@@ -146,8 +146,26 @@ pub enum Step {
         /// Whether the value is wanted.
         keep: bool,
     },
+    /// Find the module that the text being compiled requires by this name. Answer with [`Answer::Module`]; with
+    /// [`Answer::Loaded`] if it is defined already where macros run, and the program is to find it when it runs; or with
+    /// [`Answer::Failed`].
+    Require(String),
     /// The compilation is over. There is no module when one of the diagnostics is an error.
     Done(Option<Module>, Vec<Diagnostic>),
+}
+
+/// A module that a text requires.
+#[derive(Clone, Debug)]
+pub enum Required {
+    /// Its text, and what that is called in diagnostics: it becomes part of what is compiled.
+    Source {
+        /// The name of the text.
+        name: String,
+        /// The text.
+        text: Arc<str>,
+    },
+    /// Compiled already, and verified.
+    Compiled(Box<Module>),
 }
 
 /// What became of a step.
@@ -161,6 +179,8 @@ pub enum Answer {
     Loaded,
     /// The value that was to be kept.
     Object(ObjectId),
+    /// The module that was asked for.
+    Module(Required),
     /// The macro or module failed; the text says with what.
     Failed(String),
 }
@@ -211,10 +231,25 @@ pub trait CompileTimeHost: Environment {
     fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, String>;
 }
 
-/// Works a compilation through to its end with the help of `host`.
+/// Finds the module of a name.
+///
+/// # Errors
+/// A text that says why there is none, and what to do.
+pub type Library<'a> = &'a mut dyn FnMut(&str) -> Result<Required, String>;
+
+/// Works a compilation through to its end with the help of `host`. A text that requires modules cannot be compiled so.
 pub fn drive(
     compilation: &mut dyn Compilation,
     host: &mut dyn CompileTimeHost,
+) -> (Option<Module>, Vec<Diagnostic>) {
+    drive_with(compilation, host, &mut |_| Err("there are no modules here".to_string()))
+}
+
+/// As [`drive`]; `library` finds the modules that the text requires.
+pub fn drive_with(
+    compilation: &mut dyn Compilation,
+    host: &mut dyn CompileTimeHost,
+    library: Library<'_>,
 ) -> (Option<Module>, Vec<Diagnostic>) {
     let mut answer = Answer::Start;
     loop {
@@ -230,6 +265,10 @@ pub fn drive(
                 Ok(Some(object)) => Answer::Object(object),
                 Ok(None) => Answer::Loaded,
                 Err(failure) => Answer::Failed(failure),
+            },
+            Step::Require(name) => match library(&name) {
+                Ok(module) => Answer::Module(module),
+                Err(reason) => Answer::Failed(reason),
             },
         };
     }

@@ -14,7 +14,7 @@
 //! Numbers are little-endian. Inside the sections:
 //!
 //! ```text
-//! sources     count, then for each: length, UTF-8
+//! sources     count, then for each: length, UTF-8; then likewise the modules that it requires
 //! symbols     count of packages, for each: length, UTF-8
 //!             count of symbols, for each 16 bytes: package (or NONE), number of an uninterned symbol (else 0), offset and
 //!             length of the name in the names; then the names, to the end of the section
@@ -50,7 +50,7 @@ use crate::module::Module;
 /// The first bytes of a file. They betray transfers that change line ends.
 pub const MAGIC: [u8; 8] = *b"ESLB\r\n\x1a\n";
 /// The version of the format that this crate reads and writes.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 
 /// In place of an index: there is none.
 const NONE: u32 = u32::MAX;

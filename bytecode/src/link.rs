@@ -25,7 +25,7 @@ pub fn link(modules: impl IntoIterator<Item = Module>) -> Module {
 }
 
 /// As [`link`], for modules of one compilation unit: an uninterned symbol of one is that of the same number in another,
-/// and keeps its number. All of them have the same sources, or none.
+/// and keeps its number. Each has the sources of the one before it, and maybe more.
 pub fn join(modules: impl IntoIterator<Item = Module>) -> Module {
     let mut linker = Linker { is_one_unit: true, ..Linker::default() };
     for module in modules {
@@ -104,7 +104,7 @@ impl Places {
 impl Linker {
     fn add(&mut self, module: Module) {
         self.uninterned.clear();
-        let is_same_text = self.is_one_unit && self.linked.sources == module.sources;
+        let is_same_text = self.is_one_unit && module.sources.starts_with(&self.linked.sources);
         let mut places = Places {
             constants: Vec::with_capacity(module.constants.len()),
             first_function: self.linked.functions.len() as u32,
@@ -115,9 +115,12 @@ impl Linker {
             let index = self.place(constant);
             places.constants.push(index);
         }
-        if !is_same_text {
+        if is_same_text {
+            self.linked.sources = module.sources;
+        } else {
             self.linked.sources.extend(module.sources);
         }
+        self.linked.requires.extend(module.requires);
         self.linked.functions.extend(module.functions.into_iter().map(|mut function| {
             relocate(&mut function, &places);
             function
@@ -201,6 +204,7 @@ mod tests {
         };
         Module {
             sources: vec!["a.esl".to_owned()],
+            requires: Vec::new(),
             constants,
             functions: vec![function],
             toplevel: vec![FunctionNumber(0)],

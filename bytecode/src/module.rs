@@ -172,6 +172,8 @@ pub struct Module {
     pub constants: Vec<Constant>,
     /// The functions.
     pub functions: Vec<Function>,
+    /// Names of the modules that it requires and that are not part of it.
+    pub requires: Vec<String>,
     /// The functions of no parameters that run the top-level forms, in this order.
     pub toplevel: Vec<FunctionNumber>,
 }

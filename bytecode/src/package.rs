@@ -169,7 +169,8 @@ impl Packages {
         &self.table[package].uses
     }
 
-    /// A new package without symbols.
+    /// A new package without symbols. `COMMON-LISP` beside `ESL`, which exports all of it again but for what it takes over,
+    /// adds nothing.
     ///
     /// # Errors
     /// [`PackageError::NameTaken`] for a name that is in use; [`PackageError::Conflict`] as for [`Packages::use_package`].
@@ -184,13 +185,15 @@ impl Packages {
                 return Err(PackageError::NameTaken((*name).to_owned()));
             }
         }
+        let uses: Vec<PackageId> =
+            uses.iter().copied().filter(|&used| !self.is_offered_again(used, uses)).collect();
         for (i, &used) in uses.iter().enumerate() {
             self.check_inherited(name, used, &uses[..i])?;
         }
         let id = self.add(name.into(), nicknames.iter().map(|&name| name.into()).collect());
         for used in uses {
-            if !self.table[id].uses.contains(used) {
-                self.table[id].uses.push(*used);
+            if !self.table[id].uses.contains(&used) {
+                self.table[id].uses.push(used);
             }
         }
         Ok(id)
@@ -409,17 +412,27 @@ impl Packages {
             return Ok(());
         }
         self.check_open(package)?;
+        if self.is_offered_again(used, &self.table[package].uses) {
+            return Ok(());
+        }
         let this = &self.table[package];
         for (name, entry) in this.symbols.iter().filter(|(_, entry)| !entry.shadowing) {
             if self.external(used, name).is_some_and(|found| found.home != entry.home) {
                 return Err(self.conflict(package, name));
             }
         }
-        let uses = this.uses.clone();
+        let mut uses = this.uses.clone();
+        uses.retain(|&other| self.table[used].exports_again != Some(other));
         let name = this.name.clone();
         self.check_inherited(&name, used, &uses)?;
-        self.table[package].uses.push(used);
+        uses.push(used);
+        self.table[package].uses = uses;
         Ok(())
+    }
+
+    /// Whether one of `others` exports again what `used` does: then that one stands for both, and `used` need not be used.
+    fn is_offered_again(&self, used: PackageId, others: &[PackageId]) -> bool {
+        others.iter().any(|&other| self.table[other].exports_again == Some(used))
     }
 
     /// Checks that no two of the packages that `user` uses or is about to use export different symbols by one name,

@@ -5,24 +5,29 @@
 //! belong to the program are joined at the end. Everything that is found on the way is reported together, in the order
 //! of the text; an error in one form does not keep the others from being looked at.
 //!
-//! Not here: running anything. Whoever drives the compilation does that, see [`esl_bytecode::compile`].
+//! A form `(require "name")` of a text stops the compilation ([`Step::Require`]), and the forms of the module come in its
+//! place, or at least what they define at compile time; see [`parts`].
+//!
+//! Not here: running anything, finding modules. Whoever drives the compilation does that, see [`esl_bytecode::compile`].
 
-use std::collections::VecDeque;
+mod parts;
+
 use std::sync::{Arc, Mutex, PoisonError};
 
-use esl_bytecode::compile::{Answer, Compilation, Compile, Environment, Step};
+use esl_bytecode::compile::{Answer, Compilation, Compile, Environment, Required, Step};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::link::join;
 use esl_bytecode::module::{Constant, Module};
 use esl_bytecode::span::{SourceId, Span};
-use esl_bytecode::symbol::{Symbol, USER_PACKAGE};
 
 use crate::diagnostic::{Renderer, Sources, code};
 use crate::expand::print::print;
 use crate::expand::{Chunk, Event, Expander};
 use crate::lower::{SourceLines, lower};
-use crate::reader::{Reader, read_datum};
+use crate::reader::read_datum;
+
+use parts::{Next, Parts, renumber_uninterned};
 
 /// The compiler.
 #[derive(Debug, Default)]
@@ -31,12 +36,26 @@ pub struct Compiler {
     source: SourceId,
     /// The text that was compiled last, for drawing its diagnostics.
     sources: Arc<Mutex<Sources>>,
+    /// Whether modules stay outside of the program, to be found when it runs.
+    apart: bool,
 }
 
 impl Compiler {
     /// A compiler whose diagnostics call the text that it is given source number `source`.
     pub fn for_source(source: SourceId) -> Compiler {
         Compiler { source, ..Compiler::default() }
+    }
+
+    /// A compiler that leaves required modules out of the program, which finds them when it runs.
+    #[must_use]
+    pub fn apart(mut self) -> Compiler {
+        self.apart = true;
+        self
+    }
+
+    /// The texts that were compiled last, those of required modules included.
+    pub fn sources(&self) -> Sources {
+        self.sources.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Begins to compile a whole text for the sake of what its macros expand to.
@@ -57,21 +76,24 @@ impl Compiler {
             sources.add("", None);
         }
         let mut lines = SourceLines::new();
-        let mut readers = VecDeque::new();
+        let mut parts = Parts::default();
         for &(name, text) in texts {
             let text: Arc<str> = text.into();
             sources.add(name, Some(text.clone()));
-            let source = lines.add(name, text.clone());
-            readers.push_back(Reader::new(source, text));
+            parts.add(lines.add(name, text.clone()), text);
         }
         *self.sources.lock().unwrap_or_else(PoisonError::into_inner) = sources;
-        self.session(Input::Texts(readers), lines)
+        self.session(Input::Texts(parts), lines)
     }
 
     fn session(&self, input: Input, lines: SourceLines) -> Session {
         Session {
             input,
             source: self.source,
+            sources: self.sources.clone(),
+            apart: self.apart,
+            asked: None,
+            loading: None,
             lines,
             expander: Expander::new(),
             chunks: Vec::new(),
@@ -105,18 +127,11 @@ impl Compile for Compiler {
     }
 }
 
-/// The form that comes between two texts.
-fn enter_user_package() -> Datum {
-    let nowhere = Span::default();
-    let operator = Datum::symbol(Symbol::cl("IN-PACKAGE"), nowhere);
-    Datum::list([operator, Datum::string(USER_PACKAGE, nowhere)], nowhere)
-}
-
 /// Where forms come from.
 #[derive(Debug)]
 enum Input {
     /// Texts, all forms of which are compiled.
-    Texts(VecDeque<Reader>),
+    Texts(Parts),
     /// A form to be evaluated.
     Form(Option<Datum>),
 }
@@ -125,6 +140,12 @@ enum Input {
 struct Session {
     input: Input,
     source: SourceId,
+    sources: Arc<Mutex<Sources>>,
+    apart: bool,
+    /// The module that was asked for, and the form that requires it.
+    asked: Option<(String, Span)>,
+    /// The form that requires the compiled module that is being loaded.
+    loading: Option<Span>,
     lines: SourceLines,
     expander: Expander,
     /// What belongs to the program.
@@ -162,7 +183,16 @@ impl Compilation for Session {
         answer: Answer,
         charge: &mut dyn FnMut(u64),
     ) -> Step {
-        self.expander.answer(answer);
+        if let Some((name, span)) = self.asked.take() {
+            self.take_module(&name, span, answer);
+        } else if let Some(span) = self.loading.take() {
+            if let Answer::Failed(failure) = answer {
+                let message = format!("the module failed at compile time: {failure}");
+                self.diagnostics.push(code::COMPILE_TIME_FAILURE.at(span, message));
+            }
+        } else {
+            self.expander.answer(answer);
+        }
         loop {
             match self.expander.run(environment, charge) {
                 Event::Macro(call) => return Step::Expand(call),
@@ -173,8 +203,22 @@ impl Compilation for Session {
                 }
                 Event::Done => {
                     self.diagnostics.extend(self.expander.take_diagnostics());
-                    if !self.next_form(environment) {
-                        return self.finish(environment);
+                    match self.next_form(environment) {
+                        Next::Form => {}
+                        Next::Require(name, span) => {
+                            self.asked = Some((name.clone(), span));
+                            return Step::Require(name);
+                        }
+                        Next::Module(mut module, span) => {
+                            renumber_uninterned(&mut module, environment);
+                            self.take_sources(&mut module);
+                            if !self.apart {
+                                self.chunks.push(module.clone());
+                            }
+                            self.loading = Some(span);
+                            return Step::Load { module, keep: false };
+                        }
+                        Next::End => return self.finish(environment),
                     }
                 }
             }
@@ -184,40 +228,63 @@ impl Compilation for Session {
 
 impl Session {
     /// Begins the next form, if there is one.
-    fn next_form(&mut self, environment: &mut dyn Environment) -> bool {
+    fn next_form(&mut self, environment: &mut dyn Environment) -> Next {
         match &mut self.input {
             Input::Form(form) => match form.take() {
                 Some(form) => {
                     self.expander.begin_evaluation(form);
-                    true
+                    Next::Form
                 }
-                None => false,
+                None => Next::End,
             },
-            Input::Texts(readers) => {
-                while let Some(reader) = readers.front_mut() {
-                    match reader.next(environment) {
-                        Some(Ok(form)) => {
-                            self.expander.begin_file_form(form);
-                            return true;
-                        }
-                        Some(Err(diagnostic)) => self.diagnostics.push(*diagnostic),
-                        None => {
-                            readers.pop_front();
-                            if !readers.is_empty() {
-                                self.expander.begin_file_form(enter_user_package());
-                                return true;
-                            }
-                        }
-                    }
-                }
-                false
-            }
+            Input::Texts(parts) => parts.next(environment, &mut self.expander, &mut self.diagnostics),
         }
+    }
+
+    /// Puts the module that was asked for in the place of the form that requires it.
+    fn take_module(&mut self, name: &str, span: Span, answer: Answer) {
+        let Input::Texts(parts) = &mut self.input else { return };
+        match answer {
+            Answer::Module(Required::Source { name: path, text }) => {
+                self.sources
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .add(path.clone(), Some(text.clone()));
+                let source = self.lines.add(&path, text.clone());
+                parts.enter(name, span, source, text);
+            }
+            Answer::Module(Required::Compiled(module)) => parts.enter_compiled(name, span, *module),
+            Answer::Failed(reason) => {
+                let message = format!("the module `{name}` is not to be had: {reason}");
+                self.diagnostics.push(code::UNKNOWN_MODULE.at(span, message));
+            }
+            _ => parts.add_call(name, span),
+        }
+    }
+
+    /// Makes the sources of a compiled module sources of this compilation, though their texts are not at hand.
+    fn take_sources(&mut self, module: &mut Module) {
+        let mut sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
+        let first = self.lines.names().count() as u32;
+        for name in &module.sources {
+            sources.add(name.clone(), None);
+            self.lines.add(name, "".into());
+        }
+        for entry in module.functions.iter_mut().flat_map(|function| &mut function.lines) {
+            entry.source = entry.source.saturating_add(first);
+        }
+        module.sources = self.lines.names().map(String::from).collect();
+    }
+
+    /// Whether what is being compiled stays outside of the program.
+    fn is_outside(&self) -> bool {
+        self.apart && matches!(&self.input, Input::Texts(parts) if parts.is_inside_module())
     }
 
     /// Lowers a chunk, and keeps it or has it loaded, or both.
     fn chunk(&mut self, chunk: Chunk, charge: &mut dyn FnMut(u64)) -> Option<Step> {
-        let Chunk { core, purpose } = chunk;
+        let Chunk { core, mut purpose } = chunk;
+        purpose.emit &= !self.is_outside();
         charge(core.nodes.len() as u64);
         let span = core.nodes.first().map(|node| node.span).unwrap_or_default();
         if let (Some(listing), true) = (&mut self.listing, purpose.emit) {
@@ -249,10 +316,11 @@ impl Session {
                 Some(Step::Load { module, keep: purpose.keep })
             }
             (true, false) => Some(Step::Load { module, keep: purpose.keep }),
-            (false, _) => {
+            (false, true) => {
                 self.chunks.push(module);
                 None
             }
+            (false, false) => None,
         }
     }
 
@@ -268,7 +336,10 @@ impl Session {
             self.renumber(diagnostic);
         }
         let has_failed = diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error);
-        let module = (!has_failed).then(|| join(std::mem::take(&mut self.chunks)));
+        let mut module = (!has_failed).then(|| join(std::mem::take(&mut self.chunks)));
+        if let (Some(module), Input::Texts(parts)) = (&mut module, &mut self.input) {
+            module.requires = if self.apart { parts.take_apart() } else { Vec::new() };
+        }
         Step::Done(module, diagnostics)
     }
 

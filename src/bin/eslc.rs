@@ -8,7 +8,8 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use esl::command::{self, NOT_COMPILED, SUCCESS, USAGE};
-use esl::program::{self, Compiled, Program, Source};
+use esl::library::Library;
+use esl::program::{self, Compiled, Modules, Program, Source};
 use esl_compiler::diagnostic::{Format, Renderer};
 
 /// The compiler of ESL, the Execution Support Language.
@@ -19,6 +20,9 @@ struct Command {
     action: Action,
     #[command(flatten)]
     style: Style,
+    /// A folder in which required modules are found, after that of the file itself and before those of ESL_LIBRARY
+    #[arg(long, value_name = "FOLDER", global = true)]
+    library: Vec<PathBuf>,
 }
 
 #[derive(Args)]
@@ -53,7 +57,8 @@ enum Color {
 enum Action {
     /// Compile files to bytecode
     ///
-    /// Without -o each FILE.esl becomes FILE.eslb. With -o all files together become one program that runs them in order.
+    /// Without -o each FILE.esl becomes FILE.eslb, which finds the modules that it requires when it runs. With -o all files
+    /// together, and the modules that they require, become one program that runs them in order.
     Compile {
         /// The source files; `-` is standard input
         #[arg(required = true, value_name = "FILE")]
@@ -83,12 +88,16 @@ enum Action {
 fn main() -> ExitCode {
     let command = command::parse::<Command>();
     let style = &command.style;
+    let folders = &command.library;
+    let library = |files: &[PathBuf]| Library::new(files.iter().map(PathBuf::as_path), folders);
     let status = match &command.action {
-        Action::Compile { files, output: Some(output) } => compile(files, output, style),
-        Action::Compile { files, output: None } => compile_each(files, style),
-        Action::Check { files } => check(files, style),
-        Action::Disasm { file } => disassemble(file, style),
-        Action::Expand { file } => expand(file, style),
+        Action::Compile { files, output: Some(output) } => {
+            compile(files, output, &library(files), Modules::Inside, style)
+        }
+        Action::Compile { files, output: None } => compile_each(files, folders, style),
+        Action::Check { files } => check(files, &library(files), style),
+        Action::Disasm { file } => disassemble(file, &library(std::slice::from_ref(file)), style),
+        Action::Expand { file } => expand(file, &library(std::slice::from_ref(file)), style),
     };
     ExitCode::from(status.unwrap_or_else(|status| status))
 }
@@ -99,8 +108,8 @@ fn read(files: &[PathBuf]) -> Result<Vec<Source>, u8> {
 }
 
 /// Compiles sources and prints what was found. The program, unless there was an error.
-fn compiled(sources: &[Source], style: &Style) -> Result<Program, u8> {
-    let compiled = program::compile(sources);
+fn compiled(sources: &[Source], library: &Library, modules: Modules, style: &Style) -> Result<Program, u8> {
+    let compiled = program::compile_with(sources, library, modules);
     print_diagnostics(&compiled, style);
     compiled.program.ok_or(NOT_COMPILED)
 }
@@ -118,19 +127,27 @@ fn print_diagnostics(compiled: &Compiled, style: &Style) {
     command::print_diagnostics(compiled, &Renderer { color, format });
 }
 
-fn compile(files: &[PathBuf], output: &Path, style: &Style) -> Result<u8, u8> {
-    let program = compiled(&read(files)?, style)?;
+fn compile(
+    files: &[PathBuf],
+    output: &Path,
+    library: &Library,
+    modules: Modules,
+    style: &Style,
+) -> Result<u8, u8> {
+    let program = compiled(&read(files)?, library, modules, style)?;
     write(&program, output)
 }
 
-fn compile_each(files: &[PathBuf], style: &Style) -> Result<u8, u8> {
+fn compile_each(files: &[PathBuf], folders: &[PathBuf], style: &Style) -> Result<u8, u8> {
     let mut status = SUCCESS;
     for file in files {
         if file.as_os_str() == "-" {
             eprintln!("eslc: say with -o where the program from standard input goes");
             return Err(USAGE);
         }
-        let result = compile(std::slice::from_ref(file), &file.with_extension("eslb"), style);
+        let library = Library::new([file.as_path()], folders);
+        let files = std::slice::from_ref(file);
+        let result = compile(files, &file.with_extension("eslb"), &library, Modules::Apart, style);
         status = status.max(result.unwrap_or_else(|status| status));
     }
     Ok(status)
@@ -154,21 +171,21 @@ fn write(program: &Program, output: &Path) -> Result<u8, u8> {
     })
 }
 
-fn check(files: &[PathBuf], style: &Style) -> Result<u8, u8> {
-    compiled(&read(files)?, style).map(|_| SUCCESS)
+fn check(files: &[PathBuf], library: &Library, style: &Style) -> Result<u8, u8> {
+    compiled(&read(files)?, library, Modules::Inside, style).map(|_| SUCCESS)
 }
 
-fn disassemble(file: &Path, style: &Style) -> Result<u8, u8> {
+fn disassemble(file: &Path, library: &Library, style: &Style) -> Result<u8, u8> {
     let program = match command::read_program(file)? {
         command::Input::Program(program) => program,
-        command::Input::Source(source) => compiled(&[source], style)?,
+        command::Input::Source(source) => compiled(&[source], library, Modules::Apart, style)?,
     };
     print(&program.disassemble())
 }
 
-fn expand(file: &Path, style: &Style) -> Result<u8, u8> {
+fn expand(file: &Path, library: &Library, style: &Style) -> Result<u8, u8> {
     let source = command::read_source(file)?;
-    let (text, compiled) = program::expand(&source);
+    let (text, compiled) = program::expand(&source, library);
     print_diagnostics(&compiled, style);
     print(&text)?;
     if compiled.has_errors() { Err(NOT_COMPILED) } else { Ok(SUCCESS) }

@@ -10,7 +10,8 @@ use clap::{Args, Parser, Subcommand};
 use esl::Config;
 use esl::command::{self, Input, NOT_COMPILED, USAGE, complain};
 use esl::host::{FileAccess, RealHost};
-use esl::program::{self, Ended, Program};
+use esl::library::Library;
+use esl::program::{self, Ended, Modules, Program};
 use esl_compiler::diagnostic::{Format, Renderer};
 
 /// The virtual machine of ESL, the Execution Support Language.
@@ -19,6 +20,9 @@ use esl_compiler::diagnostic::{Format, Renderer};
 struct Command {
     #[command(subcommand)]
     action: Action,
+    /// A folder in which required modules are found, after that of the program and before those of ESL_LIBRARY
+    #[arg(long, value_name = "FOLDER", global = true)]
+    library: Vec<PathBuf>,
 }
 
 #[derive(Subcommand)]
@@ -90,22 +94,24 @@ impl Limits {
 }
 
 fn main() -> ExitCode {
-    let status = match command::parse::<Command>().action {
+    let Command { action, library } = command::parse::<Command>();
+    let status = match action {
         Action::Run { limits, stats, trace, file, arguments } => {
-            run(&file, arguments, &limits, stats, &trace)
+            let library = Library::new([file.as_path()], &library);
+            run(&file, arguments, &limits, stats, &trace, &library)
         }
-        Action::Repl { limits } => esl::repl::run(limits.config()),
+        Action::Repl { limits } => esl::repl::run(limits.config(), &Library::new([Path::new("-")], &library)),
     };
     ExitCode::from(status.unwrap_or_else(|status| status))
 }
 
 /// The program in a file, compiled if it is a source.
-fn program(file: &Path) -> Result<Program, u8> {
+fn program(file: &Path, library: &Library) -> Result<Program, u8> {
     let source = match command::read_program(file)? {
         Input::Program(program) => return Ok(program),
         Input::Source(source) => source,
     };
-    let compiled = program::compile(&[source]);
+    let compiled = program::compile_with(&[source], library, Modules::Inside);
     let color = std::io::stderr().is_terminal();
     command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
     compiled.program.ok_or(NOT_COMPILED)
@@ -117,8 +123,9 @@ fn run(
     limits: &Limits,
     stats: bool,
     trace: &[String],
+    library: &Library,
 ) -> Result<u8, u8> {
-    let program = program(file)?;
+    let program = program(file, library)?;
     let setup = |text| {
         complain(text);
         USAGE
@@ -130,6 +137,7 @@ fn run(
     let waker = host.waker();
     let mut machine = program::machine(limits.config(), Box::new(host)).map_err(setup)?;
     command::end_on_signal(machine.interrupt_flag(), waker);
+    program::set_library(&mut machine, library).map_err(setup)?;
     program::set_traces(&mut machine, trace).map_err(setup)?;
     let started = std::time::Instant::now();
     let report = program::run_in(&mut machine, &program).map_err(setup)?;

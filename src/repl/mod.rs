@@ -16,6 +16,7 @@ use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
 
 use crate::command::{SUCCESS, USAGE, complain, interrupt_on_signal};
+use crate::library::Library;
 use crate::program;
 
 /// The prompt, and the one for further lines of a form.
@@ -64,17 +65,19 @@ impl Lines for Pipe {
     fn remember(&mut self, _form: &str) {}
 }
 
-/// Runs the REPL until the end of the input or `:quit`. Gives the exit status.
+/// Runs the REPL until the end of the input or `:quit`, with the modules of `library`. Gives the exit status.
 ///
 /// # Errors
 /// The exit status, if the machine could not be made.
-pub fn run(config: Config) -> Result<u8, u8> {
+pub fn run(config: Config, library: &Library) -> Result<u8, u8> {
     let host = RealHost::new(Vec::new()).with_files(FileAccess::All);
     let waker = host.waker();
-    let machine = program::machine(config, Box::new(host)).map_err(|text| {
+    let setup = |text| {
         complain(text);
         USAGE
-    })?;
+    };
+    let mut machine = program::machine(config, Box::new(host)).map_err(setup)?;
+    program::set_library(&mut machine, library).map_err(setup)?;
     let mut session = Session { machine, failure: None };
     session.call("%REPL-BEGIN", "");
     interrupt_on_signal(session.machine.interrupt_flag(), waker);

@@ -28,6 +28,7 @@ fn sample() -> Module {
     };
     Module {
         sources: vec!["count.esl".to_owned()],
+        requires: Vec::new(),
         constants: vec![
             Constant::Symbol(Symbol::esl("COUNT-DOWN")),
             Constant::String("odd \"text\"\n".into()),

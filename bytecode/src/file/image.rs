@@ -202,14 +202,30 @@ impl ModuleImage {
     /// # Errors
     /// [`ReadError::Damaged`].
     pub fn sources(&self) -> Result<Vec<String>, ReadError> {
+        Ok(self.sources_and_required()?.0)
+    }
+
+    /// Names of the modules that it requires.
+    ///
+    /// # Errors
+    /// [`ReadError::Damaged`].
+    pub fn requires(&self) -> Result<Vec<String>, ReadError> {
+        Ok(self.sources_and_required()?.1)
+    }
+
+    fn sources_and_required(&self) -> Result<(Vec<String>, Vec<String>), ReadError> {
         let mut from = self.section(Section::Sources);
-        let count = from.count(4)?;
-        let mut sources = Vec::with_capacity(count);
-        for _ in 0..count {
-            sources.push(from.text()?.to_owned());
-        }
+        let mut names = || {
+            let count = from.count(4)?;
+            let mut names = Vec::with_capacity(count);
+            for _ in 0..count {
+                names.push(from.text()?.to_owned());
+            }
+            Ok(names)
+        };
+        let lists = (names()?, names()?);
         from.end()?;
-        Ok(sources)
+        Ok(lists)
     }
 
     /// Names of the packages at which the symbols are at home, by number.

@@ -60,6 +60,7 @@ fn sample() -> Module {
     };
     Module {
         sources: vec!["a.esl".to_owned(), "b.esl".to_owned()],
+        requires: vec!["c".to_owned()],
         constants,
         functions: vec![full, Function::default()],
         toplevel: vec![FunctionNumber(1), FunctionNumber(1)],
@@ -106,6 +107,7 @@ fn an_image_is_read_in_parts() {
     let file = write(&module).unwrap();
     let image = ModuleImage::open_trusted(ImageBytes::Shared(file.into())).unwrap();
     assert_eq!(image.sources(), Ok(module.sources.clone()));
+    assert_eq!(image.requires(), Ok(module.requires.clone()));
     assert_eq!(image.packages().unwrap(), ["COMMON-LISP", "ESL", "KEYWORD"]);
     let symbols: Vec<_> = image.symbols().map(Result::unwrap).collect();
     assert_eq!(symbols.len(), image.symbol_count());
@@ -138,7 +140,7 @@ fn files_of_others_are_told_apart_from_damaged_ones() {
     check_refused(|file| file[4] = b'\n', "not a compiled ESL file: its first bytes are others");
     check_refused(
         |file| file[8] = 9,
-        "compiled in format version 9, but this is a machine for version 1: compile it again",
+        "compiled in format version 9, but this is a machine for version 2: compile it again",
     );
     check_refused(
         |file| file[16] ^= 1,
@@ -154,7 +156,7 @@ fn files_of_others_are_told_apart_from_damaged_ones() {
 fn damage_is_found_and_placed() {
     check_refused(
         |file| *file.last_mut().unwrap() ^= 1,
-        "damaged file: wrong checksum at byte 735 (top level): compile it again",
+        "damaged file: wrong checksum at byte 744 (top level): compile it again",
     );
     check_refused(
         |file| file.truncate(700),
@@ -173,7 +175,7 @@ fn damage_is_found_and_placed() {
     };
     check_refused(
         change(Section::Sources, 3, 0xFF),
-        "damaged file: expected 17112760328 more bytes, found 18 at byte 136 (sources): compile it again",
+        "damaged file: expected 17112760328 more bytes, found 27 at byte 136 (sources): compile it again",
     );
 }
 

@@ -34,6 +34,7 @@ impl ModuleImage {
         }
         Ok(Module {
             sources: self.sources()?,
+            requires: self.requires()?,
             constants: self.all_constants(&symbols)?,
             functions,
             toplevel: self.toplevel()?,

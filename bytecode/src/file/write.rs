@@ -22,7 +22,7 @@ pub fn write(module: &Module) -> Result<Vec<u8>, WriteError> {
     let constants = write_constants(&module.constants, &mut symbols)?;
     let (functions, index) = write_functions(module);
     let sections = [
-        write_sources(&module.sources),
+        write_names(&[&module.sources, &module.requires]),
         symbols.finish(),
         constants,
         functions,
@@ -53,11 +53,13 @@ pub fn write(module: &Module) -> Result<Vec<u8>, WriteError> {
     Ok(file.0)
 }
 
-fn write_sources(sources: &[String]) -> Output {
+fn write_names(lists: &[&[String]]) -> Output {
     let mut out = Output::default();
-    out.u32(sources.len() as u32);
-    for source in sources {
-        write_text(source, &mut out);
+    for names in lists {
+        out.u32(names.len() as u32);
+        for name in *names {
+            write_text(name, &mut out);
+        }
     }
     out
 }

@@ -48,6 +48,7 @@ fn with_captures(captures: impl IntoIterator<Item = Capture>) -> Function {
 fn module(first: Function) -> Module {
     Module {
         sources: vec!["a.esl".to_owned()],
+        requires: Vec::new(),
         constants: constants(),
         functions: vec![
             first,

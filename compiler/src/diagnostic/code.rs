@@ -323,6 +323,16 @@ OUTSIDE_CLAUSE = "outside-clause" Error
     fails: "(defun again ()\n  (retry))\n"
     repaired: "(defun again (step)\n  (with-recovery-procedures\n      ((:broken (retry)))\n    (funcall step)))\n"
 
+UNKNOWN_MODULE = "unknown-module" Error
+    /// A `require` of a module of which no file is found in the folders of the library.
+    fails: "(require \"colours\")\n(print (paint 3))\n"
+    repaired: "(defun paint (n)\n  (nth n '(red green blue)))\n(print (paint 3))\n"
+
+CIRCULAR_MODULE = "circular-module" Error
+    /// A module that requires itself, maybe by way of others.
+    fails: ""
+    repaired: ""
+
 LOCKED_NAME = "locked-name" Error
     /// A definition of a name that belongs to the language.
     fails: "(defun car (x)\n  x)\n"

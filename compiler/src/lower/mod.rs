@@ -145,6 +145,7 @@ impl<'a> Builder<'a> {
     fn module(self, functions: Vec<Function>) -> Module {
         Module {
             sources: self.lines.names().map(str::to_string).collect(),
+            requires: Vec::new(),
             constants: self.pool.finish(),
             functions,
             toplevel: vec![FunctionNumber(0)],

@@ -261,6 +261,8 @@ fn the_programs_in_the_table_of_codes_have_them() {
         "unreachable-clause",
         "undeclared-cause",
         "outside-clause",
+        "unknown-module",
+        "circular-module",
     ];
     let stage = |code: &&&Code| code.stage == Stage::Expander;
     for code in ALL.iter().filter(stage).filter(|code| !needs_library.contains(&code.name)) {

@@ -10,6 +10,7 @@
 //! (%compilation-step handle kind outcome)
 //!   => :expand function form environment    call it, then answer :expansion value, or :failed text
 //!   => :load functions keep                 call them in order, then answer :loaded value, or :failed text
+//!   => :require name                        have the module, then answer :loaded nil, or :failed text
 //!   => :done functions diagnostics          over; NIL for functions if one of the diagnostics is an error
 //! ```
 //!
@@ -18,12 +19,15 @@
 use esl_bytecode::compile::{Answer, Compilation, Compile, Step};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::file;
 use esl_bytecode::span::Span;
+use esl_bytecode::verify::verify;
 use slotmap::{Key, KeyData, SlotMap, new_key_type};
 
 use crate::builtins::expect::optional;
 use crate::builtins::stream::Source;
 use crate::datum::Unit;
+use crate::load::{Alone, load};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -171,6 +175,10 @@ impl Vm {
                 results[2] = Value::boolean(*keep);
                 "LOAD"
             }
+            Step::Require(name) => {
+                results[1] = self.heap.alloc_str(name)?;
+                "REQUIRE"
+            }
             Step::Done(module, diagnostics) => {
                 if let Some(module) = module {
                     let functions = self.load_in_unit(module);
@@ -242,6 +250,34 @@ pub(super) fn begin_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let form = vm.as_form(&mut unit, arguments[0], Span::default())?;
     let compilation = vm.with_compiler(|_, compiler| compiler.compile_form(form))?;
     Ok(vm.begin(compilation, unit))
+}
+
+/// `(%begin-file name text)`: the compilation of a whole text.
+pub(super) fn begin_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let name = vm.designated_text(arguments[0])?;
+    let Some(text) = vm.text_of(arguments[1]) else { return vm.type_error(arguments[1], "STRING") };
+    vm.charge(text.len());
+    let compilation = vm.with_compiler(|_, compiler| compiler.compile_text(&name, &text))?;
+    Ok(vm.begin(compilation, Unit::default()))
+}
+
+/// `(%compiled-file path)`: the functions that run the top-level forms of a compiled file, in order, as a list.
+pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
+    let bytes = match vm.host.read_file(&path) {
+        Ok(bytes) => bytes,
+        Err(error) => return vm.file_error("read", &path, &error),
+    };
+    vm.charge(bytes.len() * 4);
+    let sound = file::read(&bytes).map_err(|error| error.to_string());
+    let sound = sound.and_then(|module| verify(&module).map(|()| module).map_err(|error| error.to_string()));
+    match sound {
+        Ok(module) => {
+            let functions = load(&mut vm.heap, &mut vm.world, &module, &mut Alone::default());
+            vm.loaded(functions)
+        }
+        Err(reason) => vm.raise(Raised::File(path, format!("it is no sound program: {reason}"))),
+    }
 }
 
 /// `(%open-text text)`

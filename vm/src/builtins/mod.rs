@@ -460,6 +460,8 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::SetStructureRef => class::set_structure_ref,
         Builtin::DefineAccessor => class::define_accessor,
         Builtin::BeginCompilation => eval::begin_compilation,
+        Builtin::BeginFile => eval::begin_file,
+        Builtin::CompiledFile => eval::compiled_file,
         Builtin::OpenText => eval::open_text,
         Builtin::NextForm => eval::next_form,
         Builtin::CompilationStep => eval::compilation_step,

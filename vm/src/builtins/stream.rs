@@ -336,7 +336,7 @@ impl Vm {
         self.taken(taken).map(|_| ())
     }
 
-    fn file_error<T>(&mut self, what: &str, path: &str, error: &HostError) -> Result<T, Exit> {
+    pub(super) fn file_error<T>(&mut self, what: &str, path: &str, error: &HostError) -> Result<T, Exit> {
         self.raise(Raised::File(path.into(), format!("it cannot be {what}: {error}")))
     }
 }

@@ -39,6 +39,7 @@ fn module() -> Module {
     let data = function(2, &[2], "load-const r0 k0\nnot r1 r0\nreturn r0");
     Module {
         sources: vec!["adder.esl".into()],
+        requires: Vec::new(),
         constants: vec![
             Constant::Symbol(Symbol::esl("ADDER")),
             Constant::String("Makes an adder.".into()),

@@ -1,0 +1,215 @@
+//! Programs of several files: modules found in folders, compiled together and apart, by the commands.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const ESLC: &str = env!("CARGO_BIN_EXE_eslc");
+const ESLVM: &str = env!("CARGO_BIN_EXE_eslvm");
+
+/// A folder of files for one test, the working directory of its commands.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(test: &str, files: &[(&str, &str)]) -> Folder {
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("modules").join(test);
+        if path.exists() {
+            std::fs::remove_dir_all(&path).expect("what an earlier run has left can be removed");
+        }
+        for (name, text) in files {
+            let file = path.join(name);
+            std::fs::create_dir_all(file.parent().expect("it lies in the folder"))
+                .expect("a folder can be made");
+            std::fs::write(file, text).expect("a file can be written");
+        }
+        Folder(path)
+    }
+
+    fn remove(&self, name: &str) {
+        std::fs::remove_file(self.0.join(name)).expect("the file is there");
+    }
+
+    /// The status of a command, and what it writes: the lines of output that are not empty, and errors.
+    fn run(&self, command: &str, arguments: &[&str], library: &str) -> (i32, String, String) {
+        let output = Command::new(command)
+            .args(arguments)
+            .current_dir(&self.0)
+            .env("ESL_LIBRARY", library)
+            .output()
+            .expect("the command is there");
+        let lines = String::from_utf8(output.stdout).expect("the commands write UTF-8");
+        let lines: Vec<&str> = lines.lines().map(str::trim_end).filter(|line| !line.is_empty()).collect();
+        let errors = String::from_utf8(output.stderr).expect("the commands write UTF-8");
+        (output.status.code().unwrap_or(-1), lines.join("\n"), errors)
+    }
+
+    /// Checks what a program prints when all goes well.
+    #[track_caller]
+    fn check_run(&self, arguments: &[&str], expected: &str) {
+        let (status, output, errors) = self.run(ESLVM, &[&["run"], arguments].concat(), "");
+        assert_eq!((status, &*output, &*errors), (0, expected, ""), "{arguments:?}");
+    }
+
+    #[track_caller]
+    fn compile(&self, arguments: &[&str]) {
+        let (status, output, errors) = self.run(ESLC, &[&["compile"], arguments].concat(), "");
+        assert_eq!((status, &*output, &*errors), (0, "", ""), "{arguments:?}");
+    }
+}
+
+const SHAPES: &str = "
+(defpackage :shapes (:use :cl :esl) (:export :area :twice :side :make-side :side-length :*made*))
+(in-package :shapes)
+(require :names)
+(defvar *made* (list (names:name) (intern \"LOCAL\")))
+(defstruct side (length 1))
+(defun helper (a b) (* a b))
+(defun area (side) (helper (side-length side) (side-length side)))
+(defmacro twice (form) (let ((g (gensym))) `(let ((,g ,form)) (list ,g ,g))))
+(print 'shapes-run)
+";
+const NAMES: &str = "
+(defpackage :names (:use :cl) (:export :name))
+(in-package :names)
+(defun name () 'the-name)
+(defun helper () 'of-names)
+(print 'names-run)
+";
+const MAIN: &str = "
+(print 'before)
+(require \"shapes\")
+(require \"names\")
+(defun helper () 'of-main)
+(print (list (helper) (shapes::helper 2 3) (names::helper)))
+(print (shapes:twice (shapes:area (shapes:make-side :length 3))))
+(print shapes:*made*)
+(setf (shapes:side-length (shapes:make-side)) 3)
+(print (list *package* *modules* (intern \"LOCAL\")))
+";
+const OUTPUT: &str = "BEFORE
+SHAPES-RUN
+NAMES-RUN
+(OF-MAIN 6 NAMES::OF-NAMES)
+(9 9)
+(NAMES::THE-NAME SHAPES::LOCAL)
+(#<PACKAGE \"ESL-USER\"> (\"shapes\" \"names\") LOCAL)";
+/// A module runs where it is required: the other one before anything of its own.
+fn output() -> String {
+    OUTPUT.replace("SHAPES-RUN\nNAMES-RUN", "NAMES-RUN\nSHAPES-RUN")
+}
+
+fn program(test: &str) -> Folder {
+    Folder::new(test, &[("main.esl", MAIN), ("lib/shapes.esl", SHAPES), ("lib/names.esl", NAMES)])
+}
+
+#[test]
+fn a_source_is_run_with_its_modules() {
+    let folder = program("source");
+    folder.check_run(&["--library", "lib", "main.esl"], &output());
+    let (status, output, _) = folder.run(ESLVM, &["run", "main.esl"], "nowhere:lib");
+    assert_eq!((status, output), (0, self::output()));
+    std::fs::copy(folder.0.join("lib/names.esl"), folder.0.join("names.esl")).expect("a file can be copied");
+    std::fs::copy(folder.0.join("lib/shapes.esl"), folder.0.join("shapes.esl"))
+        .expect("a file can be copied");
+    folder.check_run(&["main.esl"], &self::output());
+}
+
+#[test]
+fn a_whole_program_is_one_file() {
+    let folder = program("whole");
+    folder.compile(&["main.esl", "--library", "lib", "-o", "out.eslb"]);
+    for file in ["main.esl", "lib/shapes.esl", "lib/names.esl"] {
+        folder.remove(file);
+    }
+    folder.check_run(&["out.eslb"], &output());
+}
+
+#[test]
+fn files_are_compiled_apart() {
+    let folder = program("apart");
+    folder.compile(&["main.esl", "--library", "lib"]);
+    // The modules are found as sources,
+    folder.check_run(&["--library", "lib", "main.eslb"], &output());
+    // or compiled,
+    folder.compile(&["lib/shapes.esl", "lib/names.esl"]);
+    folder.remove("lib/shapes.esl");
+    folder.remove("lib/names.esl");
+    folder.check_run(&["--library", "lib", "main.eslb"], &output());
+    // and the program is compiled against compiled modules, together or apart.
+    folder.compile(&["main.esl", "--library", "lib"]);
+    folder.check_run(&["--library", "lib", "main.eslb"], &output());
+    folder.compile(&["main.esl", "--library", "lib", "-o", "out.eslb"]);
+    folder.check_run(&["--library", "lib", "out.eslb"], &output());
+}
+
+#[test]
+fn a_module_that_is_not_found_is_reported() {
+    let folder = program("missing");
+    let (status, _, errors) = folder.run(ESLC, &["check", "main.esl"], "");
+    assert_eq!(status, 3);
+    assert!(errors.contains("error[unknown-module]"), "{errors}");
+    assert!(errors.contains("main.esl:3:1"), "{errors}");
+    folder.compile(&["main.esl", "--library", "lib"]);
+    let (status, output, errors) = folder.run(ESLVM, &["run", "main.eslb"], "");
+    assert_eq!((status, &*output), (1, "BEFORE"));
+    assert!(
+        errors.starts_with("there is no module shapes: no file shapes.esl or shapes.eslb in ."),
+        "{errors}"
+    );
+    assert!(errors.contains("main.esl:3:1"), "{errors}");
+}
+
+#[test]
+fn modules_in_a_circle_are_reported() {
+    let files = [
+        ("main.esl", "(require \"a\")"),
+        ("a.esl", "(require \"b\")"),
+        ("b.esl", "(print 1)\n(require :a)"),
+        ("late.esl", "(defun late (x) (require x))\n(late \"a\")"),
+    ];
+    let folder = Folder::new("circle", &files);
+    let (status, _, errors) = folder.run(ESLC, &["check", "main.esl"], "");
+    assert_eq!(status, 3);
+    assert!(errors.contains("the module `a` requires itself, by way of `b`"), "{errors}");
+    assert!(errors.contains("b.esl:2:1"), "{errors}");
+    let (status, _, errors) = folder.run(ESLVM, &["run", "late.esl"], "");
+    assert_eq!(status, 1);
+    assert!(errors.contains("requires itself"), "{errors}");
+}
+
+#[test]
+fn what_is_wrong_in_a_module_is_reported_there() {
+    let files = [("main.esl", "(require \"a\")\n(undefined-one)"), ("a.esl", "(print 1)\n(let 5)")];
+    let folder = Folder::new("wrong", &files);
+    let (status, _, errors) = folder.run(ESLC, &["check", "main.esl"], "");
+    assert_eq!(status, 3);
+    assert!(errors.contains("a.esl:2:6"), "{errors}");
+    assert!(errors.contains("main.esl:2:2"), "{errors}");
+}
+
+#[test]
+fn a_damaged_module_is_refused() {
+    let folder = Folder::new("damaged", &[("main.esl", "(defun late (x) (require x))\n(late \"a\")")]);
+    std::fs::write(folder.0.join("a.eslb"), b"no bytecode").expect("a file can be written");
+    let (status, _, errors) = folder.run(ESLVM, &["run", "main.esl"], "");
+    assert_eq!(status, 1);
+    assert!(errors.contains("it is no sound program"), "{errors}");
+    std::fs::write(folder.0.join("main.esl"), "(require \"a\")").expect("a file can be written");
+    let (status, _, errors) = folder.run(ESLVM, &["run", "main.esl"], "");
+    assert_eq!(status, 3);
+    assert!(errors.contains("`./a.eslb` is no sound program"), "{errors}");
+}
+
+#[test]
+fn files_that_are_compiled_together_share_their_modules() {
+    let files = [
+        ("one.esl", "(require \"a\")\n(print (a:next))"),
+        ("two.esl", "(require \"a\")\n(print (a:next))"),
+        (
+            "a.esl",
+            "(defpackage :a (:use :cl) (:export :next))(in-package :a)\n(let ((n 0)) (defun next () (incf n)))",
+        ),
+    ];
+    let folder = Folder::new("together", &files);
+    folder.compile(&["one.esl", "two.esl", "-o", "out.eslb"]);
+    folder.check_run(&["out.eslb"], "1\n2");
+}
