@@ -1123,7 +1123,9 @@ define_builtins! {
     /// The status of a task that has ended, then its values, or the condition; `NIL` before.
     TaskEnd = internal "%TASK-END" ("task");
     /// The tasks that have not ended, oldest first; with those that are not listed if `hidden`.
-    AllTasks = internal "%ALL-TASKS" ("hidden");
+    AllTasks = internal "%ALL-TASKS" ("hidden") slowly "%SLOW-ALL-TASKS";
+    /// Some of these tasks, in no order, from a number on; and the number for the next ones, `NIL` if there are no more.
+    TasksFrom = internal "%TASKS-FROM" ("place hidden");
     /// Waits for the end of a task, then as `%task-end`. With `child`, the time of a cleanup does not count.
     Join = internal "%JOIN" ("task child");
     /// Asks for the end of a task.

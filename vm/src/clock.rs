@@ -11,12 +11,17 @@ use crate::vm::Vm;
 const CLOCK_TICKS: u64 = 2000;
 /// Ticks after which virtual time moves although tasks are running.
 const VIRTUAL_TICKS: u64 = 10_000_000;
+/// Timers that are seen to in one step; between two steps tasks have their turns.
+const AT_ONCE: usize = 1000;
 
 impl Vm {
     /// Reads the clock if it is time to, and does what is due.
     pub(crate) fn look_at_clock(&mut self) {
         if self.timers.first().is_none() {
             return;
+        }
+        if self.more_is_due {
+            return self.fire_timers();
         }
         if self.host.is_virtual() {
             if self.spent.saturating_sub(self.moved_at) < VIRTUAL_TICKS {
@@ -32,10 +37,14 @@ impl Vm {
         self.fire_timers();
     }
 
-    /// Does what is due.
+    /// Does what is due, or as much of it as may be done at once.
     fn fire_timers(&mut self) {
         let now = self.time();
-        while let Some((index, due)) = self.timers.take_due(now) {
+        let mut left = AT_ONCE;
+        while left > 0
+            && let Some((index, due)) = self.timers.take_due(now)
+        {
+            left -= 1;
             match due {
                 Due::Wait(serial) => {
                     if self.tasks.at(index).is_some_and(|task| is_waiting(task, serial)) {
@@ -54,6 +63,7 @@ impl Vm {
                 }
             }
         }
+        self.more_is_due = left == 0;
         self.moved_at = self.spent;
         if self.timers.wants_sweep() {
             self.sweep_timers();

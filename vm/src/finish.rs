@@ -92,7 +92,7 @@ impl Vm {
 
     /// Does what needs room at the end of a task, where an instruction cannot be done again: with a collection if need be,
     /// and with the reserve of the heap.
-    fn make_for_end(&mut self, mut make: impl FnMut(&mut Vm) -> Result<Value, Exit>) -> Value {
+    pub(crate) fn make_for_end(&mut self, mut make: impl FnMut(&mut Vm) -> Result<Value, Exit>) -> Value {
         for attempt in 0..3 {
             if let Ok(value) = make(self) {
                 return value;

@@ -81,6 +81,8 @@ pub enum Exit {
     Collect,
     /// The task waits; what wakes it delivers the value.
     Park,
+    /// It cannot be done yet: it is done again in the task's next turn. It has had no effect.
+    Again,
     /// An unwinding of the task has begun.
     Unwind,
 }

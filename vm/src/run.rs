@@ -92,6 +92,7 @@ impl Vm {
                 self.abort(interrupted);
             }
             self.look_at_clock();
+            self.deliver_some();
             match self.queues.next(&self.tasks, &mut self.choices) {
                 Some(index) => self.give_turn(index, end),
                 None => {
@@ -129,6 +130,7 @@ impl Vm {
 
     /// Gives a runnable task one slice.
     fn run_slice(&mut self, index: u32, limit: u64) -> Leave {
+        self.deliver_some();
         let Some(task) = self.tasks.take(index) else { return Leave::Ended };
         let account = task.account;
         self.running = Some(task);

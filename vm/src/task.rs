@@ -293,6 +293,11 @@ impl Tasks {
         place.task.take()
     }
 
+    /// How many places there are; each task that has not ended has one.
+    pub(crate) fn places(&self) -> usize {
+        self.places.len()
+    }
+
     /// The names of all tasks, in the order of their places.
     pub(crate) fn ids(&self) -> Vec<TaskId> {
         (0..self.places.len() as u32).filter_map(|index| self.id_at(index)).collect()

@@ -1,5 +1,6 @@
 //! The virtual machine: a heap, a world of names, and tasks that run in them.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -19,7 +20,7 @@ use crate::schedule::{Choices, RunQueues};
 use crate::task::{Task, TaskId, Tasks};
 use crate::timer::Timers;
 use crate::value::Value;
-use crate::wait::Parking;
+use crate::wait::{Delivery, Parking};
 use crate::world::World;
 
 /// Limits and settings of a virtual machine.
@@ -101,6 +102,10 @@ pub struct Vm {
     pub(crate) timers: Timers,
     /// Budgets of forms and tasks.
     pub(crate) accounts: Accounts,
+    /// Signals that are being handed out, in the order in which they were given.
+    pub(crate) deliveries: VecDeque<Delivery>,
+    /// Whether more timers are due than were seen to.
+    pub(crate) more_is_due: bool,
     /// Tasks that wait for input.
     pub(crate) readers: Vec<TaskId>,
     /// The event that every signal signals too.
@@ -212,6 +217,8 @@ impl Vm {
             choices: Choices::seeded(config.seed),
             timers: Timers::default(),
             accounts: Accounts::default(),
+            deliveries: VecDeque::new(),
+            more_is_due: false,
             readers: Vec::new(),
             any_event,
             main: None,

@@ -9,7 +9,7 @@
 //! wait  | owner | event | previous | next | more | queue | deadline |
 //! ```
 //!
-//! Guarantees: a signal reaches everybody who waits when it is given, in the order in which they began; to look at a count and
+//! Guarantees (signals are in `wait/signal.rs`): a signal reaches everybody who waits when it is given, in the order in which they began; to look at a count and
 //! to begin to wait is one step; a wait that has ended is in no list. A wait is either for one signal, and is over with it,
 //! or keeps them: then signals are queued until it is closed, and none is lost.
 //! Not here: whose turn it is (`schedule`), and what ends a wait from outside (`limit`).
@@ -17,9 +17,12 @@
 use crate::heap::Kind;
 use crate::heap::layout::Header;
 use crate::raise::{Exit, Expected, Outcome, Raised};
-use crate::task::TaskState;
 use crate::value::Value;
 use crate::vm::Vm;
+
+mod signal;
+
+pub(crate) use signal::Delivery;
 
 /// Slots of an event.
 pub(crate) mod event {
@@ -150,74 +153,6 @@ impl Vm {
         self.slot(event, event::COUNT).as_fixnum().unwrap_or(0)
     }
 
-    /// Signals an event: everybody who waits for it becomes runnable, in the order in which they began to wait. It is as
-    /// if the running task had called `signal`.
-    ///
-    /// # Errors
-    /// [`Exit::Collect`] without room; then nothing has happened.
-    pub fn signal_event(&mut self, event: Value, arguments: &[Value]) -> Result<(), Exit> {
-        let arguments = self.heap.list(arguments)?;
-        self.signal(event, arguments)
-    }
-
-    /// Signals an event with a list of arguments.
-    pub(crate) fn signal(&mut self, event: Value, arguments: Value) -> Result<(), Exit> {
-        let mut keepers = 0;
-        let mut link = self.slot(event, event::FIRST);
-        while link.is_true() {
-            keepers += usize::from(self.wait_flags(self.wait_of(link)) & link::KEEPS != 0);
-            link = self.slot(link, link::NEXT);
-        }
-        // Everything is allocated before anything happens.
-        let mut cells = Value::NIL;
-        for _ in 0..keepers {
-            cells = self.heap.cons(arguments, cells)?;
-        }
-        let mut woken = self.deliver(event, arguments, cells);
-        woken += self.deliver(self.any_event, Value::NIL, Value::NIL);
-        self.charge(64 * woken);
-        Ok(())
-    }
-
-    /// Hands a signal to everybody who waits for `event`; gives how many. `cells` is a list of as many conses as there are
-    /// waits that keep signals.
-    fn deliver(&mut self, event: Value, arguments: Value, mut cells: Value) -> usize {
-        let count = Value::fixnum(self.event_count(event) + 1).unwrap_or(Value::small(0));
-        self.set_slot(event, event::COUNT, count);
-        let mut link = self.slot(event, event::FIRST);
-        let mut woken = 0;
-        while link.is_true() {
-            // A wait is in the list once, so ending it does not touch the next link.
-            let next = self.slot(link, link::NEXT);
-            let wait = self.wait_of(link);
-            let flags = self.wait_flags(wait);
-            if flags & link::KEEPS == 0 {
-                self.set_slot(wait, link::QUEUE, arguments);
-                self.heap.set_flags(wait, Kind::Wait, flags | link::SIGNALLED);
-                self.close_wait(wait);
-            } else {
-                let cell = cells;
-                cells = self.heap.cdr(cell).unwrap_or(Value::NIL);
-                self.heap.set_cdr(cell, Value::NIL);
-                self.enqueue(wait, cell);
-            }
-            self.wake_waiter(wait);
-            woken += 1;
-            link = next;
-        }
-        woken
-    }
-
-    /// Adds a cons to the queue of a wait.
-    fn enqueue(&mut self, wait: Value, cell: Value) {
-        let queue = self.slot(wait, link::QUEUE);
-        match self.heap.cdr(queue) {
-            Some(last) if last.is_cons() => _ = self.heap.set_cdr(last, cell),
-            _ => _ = self.heap.set_car(queue, cell),
-        }
-        self.heap.set_cdr(queue, cell);
-    }
-
     /// The wait that a link belongs to.
     #[inline]
     fn wait_of(&self, link: Value) -> Value {
@@ -225,24 +160,12 @@ impl Vm {
         if self.heap.is(owner, Kind::Wait) { owner } else { link }
     }
 
-    /// Makes the task runnable that is parked at this wait, if one is.
-    fn wake_waiter(&mut self, wait: Value) {
-        let task = self.slot(wait, link::OWNER);
-        let Some(index) = self.slot(task, event::STATE).as_index() else { return };
-        let urgent = self.wait_flags(wait) & link::URGENT != 0;
-        if let Some(task) = self.tasks.at(index as u32)
-            && task.state == TaskState::Waiting
-            && task.wait == wait
-        {
-            self.make_runnable(index as u32, urgent);
-        }
-    }
-
     /// Begins a wait of the running task for `events`, an event or a list of them.
     ///
     /// # Errors
-    /// A failure if something else is among them; [`Exit::Collect`].
+    /// A failure if something else is among them; [`Exit::Collect`]; [`Exit::Again`] while a signal is being delivered.
     pub(crate) fn open_wait(&mut self, events: Value, options: WaitOptions) -> Outcome {
+        self.wait_for_deliveries()?;
         let mut list = Vec::new();
         if events.is_list() {
             for event in self.list_items(events, MAX_EVENTS)? {
@@ -310,6 +233,7 @@ impl Vm {
             return;
         }
         let (previous, next) = (self.slot(link, link::PREVIOUS), self.slot(link, link::NEXT));
+        self.pass_over(link, next);
         if previous.is_true() {
             self.set_slot(previous, link::NEXT, next);
         } else {

@@ -76,6 +76,7 @@ pub(super) fn signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !vm.is_event(arguments[0]) {
         return vm.event_error(arguments[0]);
     }
+    vm.wait_for_deliveries()?;
     vm.signal_event(arguments[0], &arguments[1..])?;
     Ok(Value::NIL)
 }
@@ -167,6 +168,8 @@ pub(super) fn take_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if let Some(arguments) = vm.take_kept(wait) {
         return Ok(arguments);
     }
+    // A signal that is on its way comes before a timeout.
+    vm.wait_for_deliveries()?;
     match vm.wait_deadline(wait) {
         Some(deadline) if vm.time() >= deadline => Ok(vm.world.known.timeout),
         deadline => vm.park(wait, deadline),

@@ -523,6 +523,7 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::TaskTicks => task::task_ticks,
         Builtin::TaskEnd => task::task_end,
         Builtin::AllTasks => task::all_tasks,
+        Builtin::TasksFrom => task::tasks_from,
         Builtin::Join => task::join,
         Builtin::RequestAbort => task::request_abort,
         Builtin::AbortTask => task::abort_task,

@@ -1,5 +1,6 @@
 //! Tasks: making them, what is known of them, ending them, limits, guards and critical sections.
 
+use crate::builtins::LIMIT;
 use crate::builtins::event::take_or_park;
 use crate::control::End;
 use crate::heap::Kind;
@@ -47,6 +48,15 @@ impl Vm {
 }
 
 impl Vm {
+    /// Number and object of the task at a place, if it is one that is listed.
+    fn listed_task(&self, place: usize, shows_hidden: bool) -> Option<(u64, Value)> {
+        let is_running = self.running_index as usize == place;
+        let task = if is_running { self.running.as_deref() } else { None };
+        let task = task.or_else(|| self.tasks.at(place as u32))?;
+        let is_listed = task.state != TaskState::Ended && (shows_hidden || !task.flags.hidden());
+        is_listed.then_some((task.number, task.object))
+    }
+
     fn make_net_task(&mut self, event: Value, function: Value, priority: u8) -> Result<TaskId, Exit> {
         let function = self.callable(function)?;
         let notice = self.heap.list(&[Value::NIL])?;
@@ -174,18 +184,31 @@ pub(super) fn task_end(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%all-tasks hidden)`
 pub(super) fn all_tasks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let shows_hidden = arguments[0].is_true();
-    let mut tasks: Vec<(u64, Value)> = vm
-        .tasks
-        .iter()
-        .chain(vm.running.as_deref())
-        .filter(|task| task.state != TaskState::Ended && (shows_hidden || !task.flags.hidden()))
-        .map(|task| (task.number, task.object))
-        .collect();
+    if vm.tasks.places() > LIMIT {
+        return Err(Exit::Slowly);
+    }
+    let mut tasks: Vec<(u64, Value)> = Vec::new();
+    for index in 0..vm.tasks.places() {
+        tasks.extend(vm.listed_task(index, arguments[0].is_true()));
+    }
     tasks.sort_unstable_by_key(|&(number, _)| number);
     vm.charge(64 * tasks.len());
     let objects: Vec<Value> = tasks.into_iter().map(|(_, object)| object).collect();
     Ok(vm.heap.list(&objects)?)
+}
+
+/// `(%tasks-from place hidden)`
+pub(super) fn tasks_from(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(place) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
+    let end = vm.tasks.places().min(place.saturating_add(LIMIT));
+    let mut objects = Vec::new();
+    for index in place..end {
+        objects.extend(vm.listed_task(index, arguments[1].is_true()).map(|(_, object)| object));
+    }
+    let list = vm.heap.list(&objects)?;
+    vm.charge(LIMIT + 8 * objects.len());
+    let next = if end < vm.tasks.places() { Value::index(end) } else { Value::NIL };
+    vm.give_values(&[list, next])
 }
 
 /// `(%join task child)`
@@ -231,6 +254,7 @@ pub(super) fn abort_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%add-checkpoint id)`
 pub(super) fn add_checkpoint(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.wait_for_deliveries()?;
     let task = vm.task().object;
     let list = vm.heap.cons(arguments[0], vm.slot(task, event::CHECKPOINTS))?;
     vm.signal_event(task, arguments)?;

@@ -157,12 +157,13 @@ impl Vm {
         if self.running.is_some() {
             self.save_cpu();
         }
-        let Vm { heap, world, values, requested_call, pinned, raised, running, tasks, .. } = self;
+        let Vm { heap, world, values, requested_call, pinned, raised, running, tasks, deliveries, .. } = self;
         // SAFETY: all roots and all tasks are marked; `save_cpu` has noted the running frame of the running task, those
         // of the others were noted at the switch.
         unsafe {
             heap.collect_fully(|heap| {
                 mark_roots(heap, world, [values, requested_call, pinned], raised.as_ref());
+                deliveries.iter().for_each(|delivery| delivery.visit(&mut |value| heap.mark(value)));
                 for task in running.as_deref_mut().into_iter().chain(tasks.iter_mut()) {
                     _ = scan(heap, task);
                 }
@@ -175,7 +176,7 @@ impl Vm {
         if self.running.is_some() {
             self.save_cpu();
         }
-        let Vm { heap, world, values, requested_call, pinned, raised, running, tasks, .. } = self;
+        let Vm { heap, world, values, requested_call, pinned, raised, running, tasks, deliveries, .. } = self;
         match heap.phase() {
             Phase::Marking => {
                 let SliceOutcome::Drained { left } = heap.slice(SLICE_VISITS) else { return };
@@ -206,6 +207,7 @@ impl Vm {
                 heap.begin_cycle();
                 tasks.begin_cycle();
                 mark_roots(heap, world, [values, requested_call, pinned], raised.as_ref());
+                deliveries.iter().for_each(|delivery| delivery.visit(&mut |value| heap.mark(value)));
                 if let Some(task) = running {
                     // SAFETY: `save_cpu` has noted its running frame.
                     _ = unsafe { scan(heap, task) };

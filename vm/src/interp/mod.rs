@@ -75,6 +75,8 @@ pub(crate) enum Signal {
     TaskExit,
     /// The task waits; the instruction is done again when it goes on.
     Park,
+    /// The turn is over; the instruction is done again in the next one.
+    Again,
 }
 
 /// Why a task stopped running.
@@ -233,6 +235,7 @@ unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
                     Signal::Exit(vm.raise::<()>(Raised::Failure("WOULD-BLOCK")).unwrap_err())
                 }
                 Signal::Park => return Err(Leave::Parked),
+                Signal::Again => return Err(Leave::Slice),
                 Signal::Exit(exit) => raise::exit(vm, exit),
                 Signal::Call => call::slow_call(vm),
                 Signal::ReturnAll => call::return_all(vm),

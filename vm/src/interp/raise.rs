@@ -37,6 +37,7 @@ pub(super) unsafe fn exit(vm: &mut Vm, exit: Exit) -> Signal {
                 call::call(vm, function, &arguments, place)
             }
             Exit::Park => Signal::Park,
+            Exit::Again => Signal::Again,
         }
     }
 }
