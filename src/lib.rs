@@ -24,6 +24,7 @@ pub mod engine;
 pub mod library;
 pub mod program;
 pub mod repl;
+pub mod timeline;
 
 pub use data::Data;
 pub use engine::{Engine, Error};

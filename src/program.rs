@@ -192,6 +192,8 @@ pub struct Report {
     pub tasks: u64,
     /// Turns that they had.
     pub turns: u64,
+    /// How many of these came after one of another task.
+    pub switches: u64,
     /// Figures of its heap.
     pub heap: esl_vm::heap::HeapStats,
 }
@@ -286,8 +288,8 @@ pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Report, String> {
         }
         _ => Ended::Normally(machine.exit_status().unwrap_or(0)),
     };
-    let (tasks, turns) = machine.tasks_and_turns();
-    Ok(Report { ended, ticks: machine.ticks(), tasks, turns, heap: machine.heap_stats() })
+    let (tasks, turns, switches) = machine.tasks_turns_and_switches();
+    Ok(Report { ended, ticks: machine.ticks(), tasks, turns, switches, heap: machine.heap_stats() })
 }
 
 #[cfg(test)]

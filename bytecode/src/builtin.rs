@@ -819,6 +819,8 @@ define_builtins! {
     UnwindToCleanup = internal "%UNWIND-TO-CLEANUP" ("index failure");
     /// What the innermost running cleanup was given by `%UNWIND-TO-CLEANUP`, or `NIL`.
     CleaningUp = internal "%CLEANING-UP" ("");
+    /// Tells those who watch the run that this task fails with a condition, or that a recovery procedure deals with one.
+    NoteFailure = internal "%NOTE-FAILURE" ("condition recovers");
     /// Ends the running task as failed, with this condition: its text in a few words, and a report for people.
     EndTask = internal "%END-TASK" ("condition text report");
     /// Ends the run with this status, from 0 to 255. The remaining tasks are aborted.
@@ -1107,9 +1109,9 @@ define_builtins! {
     /// A new task that calls a function. `daemon` may be `:internal` for one that is not listed. `notify` is told of its
     /// end: an event and arguments as a list, or a guard.
     Spawn = internal "%SPAWN" ("function &optional name priority budget daemon notify");
-    /// New tasks, one for each function, that begin together; `event` is signalled with each at its end. They have the
-    /// priority of this task.
-    SpawnNet = internal "%SPAWN-NET" ("event &rest functions");
+    /// New tasks, one for each function and name, that begin together; `event` is signalled with each at its end. They have
+    /// the priority of this task.
+    SpawnNet = internal "%SPAWN-NET" ("event names &rest functions");
     /// The task that runs.
     CurrentTask = esl "CURRENT-TASK" ("");
     /// Whether `object` is a task.

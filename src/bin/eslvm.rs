@@ -11,8 +11,10 @@ use esl::Config;
 use esl::command::{self, Input, NOT_COMPILED, USAGE, complain};
 use esl::host::{FileAccess, RealHost};
 use esl::library::Library;
-use esl::program::{self, Ended, Modules, Program};
+use esl::program::{self, Ended, Modules, Program, Report};
+use esl::timeline::Timeline;
 use esl_compiler::diagnostic::{Format, Renderer};
+use esl_vm::vm::Vm;
 
 /// The virtual machine of ESL, the Execution Support Language.
 #[derive(Parser)]
@@ -34,9 +36,12 @@ enum Action {
     Run {
         #[command(flatten)]
         limits: Limits,
-        /// Print figures of the run to standard error when it is over
-        #[arg(long)]
-        stats: bool,
+        /// Print figures of the run to standard error when it is over; with `=tasks`, those of the tasks that have used most, too
+        #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "run")]
+        stats: Option<Stats>,
+        /// Write what the tasks do in time to a file: a trace for the Perfetto UI, or one drawing if it ends in `.svg`
+        #[arg(long, value_name = "FILE")]
+        timeline: Option<PathBuf>,
         /// Write to standard error what happens to failures, goals or tasks: a list such as failures,tasks
         #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = ["failures", "goals", "tasks"])]
         trace: Vec<String>,
@@ -51,6 +56,15 @@ enum Action {
         #[command(flatten)]
         limits: Limits,
     },
+}
+
+/// What figures are printed of.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Stats {
+    /// The run.
+    Run,
+    /// Also of tasks.
+    Tasks,
 }
 
 /// How time passes.
@@ -96,9 +110,9 @@ impl Limits {
 fn main() -> ExitCode {
     let Command { action, library } = command::parse::<Command>();
     let status = match action {
-        Action::Run { limits, stats, trace, file, arguments } => {
+        Action::Run { limits, stats, timeline, trace, file, arguments } => {
             let library = Library::new([file.as_path()], &library);
-            run(&file, arguments, &limits, stats, &trace, &library)
+            run(&file, arguments, &limits, stats, timeline.as_deref(), &trace, &library)
         }
         Action::Repl { limits } => esl::repl::run(limits.config(), &Library::new([Path::new("-")], &library)),
     };
@@ -121,7 +135,8 @@ fn run(
     file: &Path,
     arguments: Vec<String>,
     limits: &Limits,
-    stats: bool,
+    stats: Option<Stats>,
+    timeline: Option<&Path>,
     trace: &[String],
     library: &Library,
 ) -> Result<u8, u8> {
@@ -139,25 +154,69 @@ fn run(
     command::end_on_signal(machine.interrupt_flag(), waker);
     program::set_library(&mut machine, library).map_err(setup)?;
     program::set_traces(&mut machine, trace).map_err(setup)?;
+    if let Some(stats) = stats {
+        machine.gather_figures(stats == Stats::Tasks);
+    }
+    let timeline = match timeline {
+        Some(path) => {
+            Some((Timeline::begin(path, &mut machine).map_err(|error| not_written(path, &error))?, path))
+        }
+        None => None,
+    };
     let started = std::time::Instant::now();
     let report = program::run_in(&mut machine, &program).map_err(setup)?;
+    let seconds = started.elapsed().as_secs_f64();
+    let mut status = report.ended.status();
+    if let Some((timeline, path)) = timeline
+        && let Err(error) = timeline.end(&mut machine)
+    {
+        status = not_written(path, &error);
+    }
     match report.ended {
         Ended::BudgetSpent => complain(format_args!("the budget of {} ticks is spent", report.ticks)),
         Ended::Interrupted => complain("interrupted"),
         _ => {}
     }
-    if stats {
-        let heap = report.heap;
-        eprintln!("ticks         {:>14}", report.ticks);
-        eprintln!("tasks         {:>14}", report.tasks);
-        eprintln!("turns         {:>14}", report.turns);
-        eprintln!("seconds       {:>14.3}", started.elapsed().as_secs_f64());
-        eprintln!("allocated     {:>14} bytes", heap.allocated);
-        eprintln!("peak heap     {:>14} bytes", heap.peak);
-        eprintln!("collections   {:>14}", heap.cycles);
-        eprintln!("longest slice {:>14} objects", heap.longest_slice);
+    if let Some(stats) = stats {
+        print_stats(&machine, &report, seconds);
+        if stats == Stats::Tasks {
+            print_tasks(&machine);
+        }
     }
     // The process ends here; to give the memory back piece by piece would only take time.
     std::mem::forget(machine);
-    Ok(report.ended.status())
+    Ok(status)
+}
+
+/// Says that a file could not be written; gives the exit status.
+fn not_written(path: &Path, error: &std::io::Error) -> u8 {
+    complain(format_args!("{} cannot be written: {error}", path.display()));
+    USAGE
+}
+
+fn print_stats(machine: &Vm, report: &Report, seconds: f64) {
+    let (heap, pauses) = (report.heap, machine.pauses());
+    let milliseconds = |nanoseconds: u64| nanoseconds as f64 / 1e6;
+    eprintln!("ticks         {:>14}", report.ticks);
+    eprintln!("tasks         {:>14}", report.tasks);
+    eprintln!("turns         {:>14}", report.turns);
+    eprintln!("switches      {:>14}", report.switches);
+    eprintln!("seconds       {seconds:>14.3}");
+    eprintln!("allocated     {:>14} bytes", heap.allocated);
+    eprintln!("peak heap     {:>14} bytes", heap.peak);
+    eprintln!("collections   {:>14}", heap.cycles);
+    eprintln!("pauses        {:>14}", pauses.count);
+    eprintln!("  all         {:>14.3} ms", milliseconds(pauses.total));
+    eprintln!("  longest     {:>14.3} ms", milliseconds(pauses.longest));
+    eprintln!("longest slice {:>14} objects", heap.longest_slice);
+}
+
+fn print_tasks(machine: &Vm) {
+    eprintln!("\n{:>14} {:>10} {:>8}  {:<9}  task", "ticks", "turns", "stack", "status");
+    for task in machine.task_figures() {
+        eprintln!(
+            "{:>14} {:>10} {:>8}  {:<9}  {}",
+            task.ticks, task.turns, task.stack, task.status, task.name
+        );
+    }
 }

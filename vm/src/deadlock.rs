@@ -66,7 +66,7 @@ impl Vm {
         }
     }
 
-    fn event_label(&self, event: Value) -> String {
+    pub(crate) fn event_label(&self, event: Value) -> String {
         if self.heap.is(event, Kind::Task) {
             return self.task_label(event);
         }
@@ -74,6 +74,7 @@ impl Vm {
             return "nothing".into();
         }
         match self.slot(event, crate::wait::event::NAME) {
+            _ if event == self.any_event => "any event".into(),
             name if name.is_true() => format!("event {}", self.describe(name)),
             _ => "an event".into(),
         }

@@ -101,7 +101,7 @@ impl Vm {
         self.config = Config { memory: self.config.memory, ..config };
         self.choices = Choices::seeded(self.config.seed);
         self.spent = 0;
-        (self.looked_at, self.moved_at, self.made, self.turns) = (0, 0, 0, 0);
+        (self.looked_at, self.moved_at, self.made, self.turns, self.switches) = (0, 0, 0, 0, 0);
     }
 
     /// Writes what the program has printed and is still in a buffer.

@@ -24,7 +24,7 @@ impl Vm {
             && task.state != TaskState::Ended
         {
             task.flags.set_abort_pending(true);
-            self.trace(id.index, Happening::IsToEnd);
+            self.note(id.index, Happening::IsToEnd);
             self.call_attention(id.index);
         }
     }

@@ -116,6 +116,12 @@ pub trait Host {
     /// standard input has something to say. May wake too early.
     fn wait(&mut self, deadline: Option<u64>, for_input: bool) -> Wake;
 
+    /// Nanoseconds of real time, for figures and pictures of a run: nothing that the run does depends on it. 0 where there is no
+    /// real time.
+    fn stopwatch(&mut self) -> u64 {
+        0
+    }
+
     /// Whether time stands still unless somebody waits, so that a long computation must be told to pass some.
     fn is_virtual(&self) -> bool {
         false

@@ -4,9 +4,11 @@
 
 pub mod builtins;
 pub mod embed;
+pub mod figures;
 pub mod heap;
 pub mod host;
 pub mod load;
+pub mod observe;
 pub mod raise;
 pub mod run;
 pub mod schedule;

@@ -7,6 +7,7 @@
 
 use crate::interp::{self, Leave};
 use crate::limit::AccountId;
+use crate::observe::Seen;
 use crate::task::{Task, TaskId, TaskResult, TaskState};
 use crate::timer::Due;
 use crate::trace::Happening;
@@ -62,7 +63,7 @@ impl Vm {
         let (priority, urgent) = (task.priority, urgent || task.flags.urgent());
         self.queues.push(index, serial, priority, urgent);
         if was_parked {
-            self.trace(index, Happening::GoesOn);
+            self.note(index, Happening::GoesOn);
         }
     }
 
@@ -134,8 +135,15 @@ impl Vm {
         let Some(task) = self.tasks.take(index) else { return Leave::Ended };
         let account = task.account;
         self.running = Some(task);
+        self.switches += u64::from(index != self.running_index);
         self.running_index = index;
         self.turns += 1;
+        let task = self.task_mut();
+        task.turns = task.turns.wrapping_add(1);
+        let number = task.number;
+        if self.is_watched {
+            self.show(number, Seen::Runs);
+        }
         self.slice_is_cut = false;
         self.had_attention = self.task().flags.attention();
         self.scan_before_running();
@@ -169,6 +177,9 @@ impl Vm {
         if account != AccountId::NONE {
             self.charge_account(account, used);
         }
+        if self.is_watched {
+            self.tell_how_turn_ended(leave);
+        }
         let Some(task) = self.running.take() else { return Leave::Ended };
         if leave == Leave::Ended && !task.flags.kept() {
             self.running_index = u32::MAX;
@@ -179,6 +190,21 @@ impl Vm {
             self.tasks.put_back(index, task);
         }
         leave
+    }
+
+    /// Tells observers that the turn of the running task is over. Waits are told of when the task is parked.
+    #[cold]
+    fn tell_how_turn_ended(&mut self, leave: Leave) {
+        let number = self.task().number;
+        match leave {
+            Leave::Slice => self.tell_end_of_turn(number),
+            Leave::Parked => {}
+            Leave::Ended => {
+                self.note_end_in_figures();
+                let how = self.end_label(self.task());
+                self.show(number, Seen::Ends(how));
+            }
+        }
     }
 
     /// The length of the next slice of the running task.
@@ -232,7 +258,7 @@ impl Vm {
                 }
             }
         }
-        self.trace(index, Happening::Waits);
+        self.note(index, Happening::Waits);
         if !self.had_attention && self.tasks.at(index).is_some_and(|task| task.flags.attention()) {
             // Something was noted while it was about to wait.
             self.make_runnable(index, true);
@@ -269,6 +295,9 @@ impl Vm {
     pub fn set_main(&mut self, id: TaskId) {
         self.main = Some(id);
         self.main_number = self.tasks.get(id).map(|task| task.number);
+        if let Some(number) = self.main_number {
+            self.show(number, Seen::IsNamed("the main task"));
+        }
     }
 
     /// What became of a task. One that was forgotten counts as running.
@@ -291,9 +320,10 @@ impl Vm {
         self.spent
     }
 
-    /// Tasks that were made, and turns that they had, since the program began.
-    pub fn tasks_and_turns(&self) -> (u64, u64) {
-        (self.made, self.turns)
+    /// Tasks that were made, turns that they had, and how many of these came after one of another task, since the program
+    /// began.
+    pub fn tasks_turns_and_switches(&self) -> (u64, u64, u64) {
+        (self.made, self.turns, self.switches)
     }
 }
 

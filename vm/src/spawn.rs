@@ -125,7 +125,7 @@ impl Vm {
         let id = self.tasks.insert(task);
         self.set_slot(object, event::STATE, Value::index(id.index as usize));
         self.queues.push(id.index, serial, priority, false);
-        self.trace(id.index, Happening::Begins);
+        self.note(id.index, Happening::Begins);
         Ok(id)
     }
 

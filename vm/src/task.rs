@@ -59,6 +59,8 @@ pub(crate) struct Task {
     pub scanned: u64,
     /// Offset of the running frame's base, while it does not run.
     pub base: u32,
+    /// How many turns it has had.
+    pub turns: u32,
     /// The account that its ticks are charged to.
     pub account: AccountId,
     /// Whether it can run.
@@ -162,6 +164,7 @@ impl Task {
             number: 0,
             scanned: 0,
             base: 0,
+            turns: 0,
             account: AccountId::NONE,
             state: TaskState::Runnable,
             priority: DEFAULT_PRIORITY,

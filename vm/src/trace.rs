@@ -1,5 +1,7 @@
-//! What is written when tasks are traced: a line for each beginning, wait, going on, request of an abort, and end.
+//! What happens to tasks, for those who watch; and what is written when tasks are traced: a line for each beginning, wait, going
+//! on, request of an abort, and end.
 
+use crate::observe::Seen;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
@@ -21,17 +23,39 @@ impl Vm {
     /// Has what happens to tasks written to standard error.
     pub fn trace_tasks(&mut self, on: bool) {
         self.traces_tasks = on;
+        self.note_who_watches();
     }
 
-    /// Writes what happens to the task at a place, if tasks are traced.
+    /// Notes what happens to the task at a place, for whoever watches.
     #[inline]
-    pub(crate) fn trace(&mut self, index: u32, happening: Happening) {
-        if self.traces_tasks {
-            self.write_trace(index, happening);
+    pub(crate) fn note(&mut self, index: u32, happening: Happening) {
+        if self.is_watched {
+            self.note_for_watchers(index, happening);
         }
     }
 
     #[cold]
+    fn note_for_watchers(&mut self, index: u32, happening: Happening) {
+        if self.traces_tasks {
+            self.write_trace(index, happening);
+        }
+        let Some(task) = self.tasks.at(index) else { return };
+        let number = task.number;
+        match happening {
+            Happening::Begins => {
+                let (name, is_hidden) = (self.task_label(task.object), task.flags.hidden());
+                self.show(number, Seen::Begins { name: &name, is_hidden });
+                self.show(number, Seen::IsReady);
+            }
+            Happening::Waits => {
+                let reason = self.reason_of(task);
+                self.show(number, Seen::Waits(&reason));
+            }
+            Happening::GoesOn => self.show(number, Seen::IsReady),
+            Happening::IsToEnd => self.show(number, Seen::IsToEnd),
+        }
+    }
+
     fn write_trace(&mut self, index: u32, happening: Happening) {
         let Some(task) = self.tasks.at(index).filter(|task| !task.flags.hidden()) else { return };
         let label = self.task_label(task.object);

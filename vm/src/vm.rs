@@ -10,11 +10,13 @@ use esl_bytecode::datum::Datum;
 use crate::control::End;
 use crate::database::Database;
 use crate::embed::HostFunction;
+use crate::figures::Figures;
 use crate::heap::{AllocError, Heap, HeapConfig, Kind};
 use crate::host::{Console, Host};
 use crate::interp::Cpu;
 use crate::interp::call::{Arguments, make_starter};
 use crate::limit::{Accounts, CLEANUP_TICKS, CLEANUP_TIME};
+use crate::observe::Observers;
 use crate::raise::Raised;
 use crate::schedule::{Choices, RunQueues};
 use crate::task::{Task, TaskId, Tasks};
@@ -122,6 +124,14 @@ pub struct Vm {
     pub(crate) made: u64,
     /// How many turns they had.
     pub(crate) turns: u64,
+    /// How many of them came after one of another task.
+    pub(crate) switches: u64,
+    /// Whether anybody has to be told what happens.
+    pub(crate) is_watched: bool,
+    /// Who watches the run.
+    pub(crate) observers: Observers,
+    /// What is gathered of it.
+    pub(crate) figures: Figures,
     /// Whether what happens to tasks is written.
     pub(crate) traces_tasks: bool,
     /// The newest serial number of a task's state.
@@ -227,6 +237,10 @@ impl Vm {
             foreground: 0,
             made: 0,
             turns: 0,
+            switches: 0,
+            is_watched: false,
+            observers: Observers::default(),
+            figures: Figures::default(),
             traces_tasks: false,
             serial: 0,
             now: 0,

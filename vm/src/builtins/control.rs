@@ -100,6 +100,14 @@ pub(super) fn begin_recovery(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(state)
 }
 
+/// `(%note-failure condition recovers)`
+pub(super) fn note_failure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    if vm.is_watched {
+        vm.tell_of_failure(arguments[0], arguments[1].is_true());
+    }
+    Ok(Value::NIL)
+}
+
 /// `(%unwind-to-cleanup index failure)`
 pub(super) fn unwind_to_cleanup(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(index) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };

@@ -398,6 +398,7 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::BeginRecovery => control::begin_recovery,
         Builtin::UnwindToCleanup => control::unwind_to_cleanup,
         Builtin::CleaningUp => control::cleaning_up,
+        Builtin::NoteFailure => control::note_failure,
         Builtin::EndTask => control::end_task,
         Builtin::Exit => control::exit,
         Builtin::Backtrace => control::backtrace,

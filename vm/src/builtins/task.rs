@@ -57,11 +57,17 @@ impl Vm {
         is_listed.then_some((task.number, task.object))
     }
 
-    fn make_net_task(&mut self, event: Value, function: Value, priority: u8) -> Result<TaskId, Exit> {
+    fn make_net_task(
+        &mut self,
+        event: Value,
+        name: Value,
+        function: Value,
+        priority: u8,
+    ) -> Result<TaskId, Exit> {
         let function = self.callable(function)?;
         let notice = self.heap.list(&[Value::NIL])?;
         let notify = self.heap.cons(event, notice)?;
-        let options = SpawnOptions { priority, notify, ..SpawnOptions::default() };
+        let options = SpawnOptions { name, priority, notify, ..SpawnOptions::default() };
         let id = self.make_task(function, Value::NIL, options)?;
         let object = self.tasks.get(id).map_or(Value::NIL, |task| task.object);
         self.heap.set_car(notice, object);
@@ -97,13 +103,15 @@ pub(super) fn spawn(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.tasks.get(id).map_or(Value::NIL, |task| task.object))
 }
 
-/// `(%spawn-net event &rest functions)`
+/// `(%spawn-net event names &rest functions)`
 pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (event, functions) = (arguments[0], &arguments[1..]);
+    let (event, mut names, functions) = (arguments[0], arguments[1], &arguments[2..]);
     let mut made = Vec::with_capacity(functions.len());
     let priority = vm.task().priority;
     for &function in functions {
-        match vm.make_net_task(event, function, priority) {
+        let name = vm.heap.as_cons(names).map_or(Value::NIL, |pair| pair.car);
+        names = vm.heap.cdr(names).unwrap_or(Value::NIL);
+        match vm.make_net_task(event, name, function, priority) {
             Ok(id) => made.push(id),
             Err(exit) => {
                 // None of them has run yet, so nothing has happened.

@@ -246,6 +246,10 @@ impl Host for RealHost {
         self.virtual_time.unwrap_or_else(|| nanoseconds(self.start.elapsed()))
     }
 
+    fn stopwatch(&mut self) -> u64 {
+        nanoseconds(self.start.elapsed())
+    }
+
     fn is_virtual(&self) -> bool {
         self.virtual_time.is_some()
     }

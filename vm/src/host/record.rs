@@ -127,6 +127,11 @@ impl<H: Host> Host for RecordingHost<H> {
         self.note(answer).0
     }
 
+    fn stopwatch(&mut self) -> u64 {
+        // Nothing depends on it, so it is no part of the record.
+        self.host.stopwatch()
+    }
+
     fn is_virtual(&self) -> bool {
         let answer = self.host.is_virtual();
         self.recording.records().push(Record::Virtual(answer));

@@ -154,6 +154,10 @@ impl Vm {
 
     /// A whole cycle at once: because there is no room, or because every safepoint is to be one.
     pub(crate) fn collect_fully(&mut self) {
+        if self.is_watched { self.watched_pause(Vm::collect_fully_now) } else { self.collect_fully_now() }
+    }
+
+    fn collect_fully_now(&mut self) {
         if self.running.is_some() {
             self.save_cpu();
         }
@@ -173,6 +177,10 @@ impl Vm {
 
     /// The collector's turn.
     pub(crate) fn collect_slice(&mut self) {
+        if self.is_watched { self.watched_pause(Vm::collect_slice_now) } else { self.collect_slice_now() }
+    }
+
+    fn collect_slice_now(&mut self) {
         if self.running.is_some() {
             self.save_cpu();
         }

@@ -27,6 +27,8 @@ pub(crate) struct Delivery {
     next: Value,
     /// Who pays for the work.
     account: AccountId,
+    /// The number of the task that signals, or 0.
+    by: u64,
 }
 
 impl Delivery {
@@ -50,6 +52,9 @@ impl Vm {
     /// Signals an event with a list of arguments.
     pub(crate) fn signal(&mut self, event: Value, arguments: Value) -> Result<(), Exit> {
         let any_event = self.any_event;
+        if self.is_watched && (!self.heap.is(event, Kind::Task) || self.slot(event, event::FIRST).is_true()) {
+            self.tell_of_signal(event);
+        }
         if self.deliveries.is_empty()
             && let Some(keepers) = self.keepers_if_few(event)
             && let Some(others) = self.keepers_if_few(any_event)
@@ -64,11 +69,12 @@ impl Vm {
         }
         for (event, arguments) in [(event, arguments), (any_event, Value::NIL)] {
             self.count_signal(event);
-            let account = self.running.as_ref().map_or(AccountId::NONE, |task| task.account);
+            let task = self.running.as_ref();
+            let (account, by) = task.map_or((AccountId::NONE, 0), |task| (task.account, task.number));
             let next = self.slot(event, event::FIRST);
             if next.is_true() {
                 self.accounts.enter(account);
-                self.deliveries.push_back(Delivery { event, arguments, next, account });
+                self.deliveries.push_back(Delivery { event, arguments, next, account, by });
             }
         }
         if self.running.is_some() {
@@ -120,10 +126,11 @@ impl Vm {
         self.count_signal(event);
         let mut link = self.slot(event, event::FIRST);
         let mut woken = 0;
+        let by = self.running.as_ref().map_or(0, |task| task.number);
         while link.is_true() {
             // A wait is in the list once, so ending it does not touch the next link.
             let next = self.slot(link, link::NEXT);
-            self.hand_over(link, arguments, &mut cells);
+            self.hand_over(link, (event, by), arguments, &mut cells);
             woken += 1;
             link = next;
         }
@@ -132,7 +139,7 @@ impl Vm {
 
     /// Works off a part of the signals that are being delivered.
     pub(crate) fn deliver_some(&mut self) {
-        let Some(&Delivery { arguments, next, account, .. }) = self.deliveries.front() else { return };
+        let Some(&Delivery { event, arguments, next, account, by }) = self.deliveries.front() else { return };
         let mut links = Vec::with_capacity(AT_ONCE);
         let (mut link, mut keepers) = (next, 0);
         while link.is_true() && links.len() < AT_ONCE {
@@ -142,7 +149,7 @@ impl Vm {
         }
         let mut cells = self.make_for_end(|vm| vm.cells(keepers, arguments));
         for &link in &links {
-            self.hand_over(link, arguments, &mut cells);
+            self.hand_over(link, (event, by), arguments, &mut cells);
         }
         self.spent += links.len() as u64;
         self.charge_account(account, links.len() as u64);
@@ -164,8 +171,9 @@ impl Vm {
         }
     }
 
-    /// Hands a signal to the wait that `link` belongs to. If that keeps signals, it gets the first of `cells`.
-    fn hand_over(&mut self, link: Value, arguments: Value, cells: &mut Value) {
+    /// Hands a signal, of an event by the task of a number, to the wait that `link` belongs to. If that keeps signals, it gets
+    /// the first of `cells`.
+    fn hand_over(&mut self, link: Value, signal: (Value, u64), arguments: Value, cells: &mut Value) {
         let wait = self.wait_of(link);
         let flags = self.wait_flags(wait);
         if flags & link::KEEPS == 0 {
@@ -178,7 +186,7 @@ impl Vm {
             self.heap.set_cdr(cell, Value::NIL);
             self.enqueue(wait, cell);
         }
-        self.wake_waiter(wait);
+        self.wake_waiter(wait, signal);
     }
 
     /// Adds a cons to the queue of a wait.
@@ -192,7 +200,7 @@ impl Vm {
     }
 
     /// Makes the task runnable that is parked at this wait, if one is.
-    fn wake_waiter(&mut self, wait: Value) {
+    fn wake_waiter(&mut self, wait: Value, (event, by): (Value, u64)) {
         let task = self.slot(wait, link::OWNER);
         let Some(index) = self.slot(task, event::STATE).as_index() else { return };
         let urgent = self.wait_flags(wait) & link::URGENT != 0;
@@ -201,6 +209,9 @@ impl Vm {
             && task.wait == wait
         {
             self.make_runnable(index as u32, urgent);
+            if self.is_watched {
+                self.tell_of_waking(event, by, index as u32);
+            }
         }
     }
 }
