@@ -793,8 +793,8 @@ define_builtins! {
     SetTableValue = internal "%SET-TABLE-VALUE" ("table entry key value");
     /// Adds a key that the table does not have; whether that was done, as no key came or went since `serial`.
     TableAdd = internal "%TABLE-ADD" ("table hash key value serial");
-    /// Takes an entry out of the table; whether that was done, as it still has this very key.
-    TableDelete = internal "%TABLE-DELETE" ("table entry key");
+    /// Takes an entry, whose key has this hash, out of the table; whether that was done, as it still has this very key.
+    TableDelete = internal "%TABLE-DELETE" ("table entry key hash");
 
     // ---- structures
     /// Slot `index` of `instance`, which must be an instance of the class named `class` or a subclass.

@@ -165,7 +165,7 @@ fn finish(hash: u64) -> u32 {
 /// table then finds them in one place of memory. Their order there is mixed as well, so that no step between keys makes hashes
 /// that share their low bits.
 #[inline]
-fn fixnum_hash(n: i64) -> u32 {
+pub(crate) fn fixnum_hash(n: i64) -> u32 {
     let group = finish(mix(0, (n >> 4) as u64));
     group << 4 | (n as u32 ^ group >> 28) & 15
 }
@@ -181,13 +181,13 @@ pub(crate) fn hash(heap: &Heap, test: Test, v: Value) -> u32 {
 
 /// A hash of what is no fixnum, or is compared by `equalp`.
 fn other_hash(heap: &Heap, test: Test, v: Value) -> u32 {
-    if !v.is_address() && test != Test::Equalp {
-        return finish(mix(0, v.bits()));
-    }
     if test == Test::Equal
         && let Some(characters) = heap.string(v)
     {
         return finish(mix(0, characters_hash(characters, false)));
+    }
+    if !v.is_address() && test != Test::Equalp {
+        return finish(mix(0, v.bits()));
     }
     let word = match test {
         Test::Eq => heap.identity(v),
@@ -246,9 +246,12 @@ fn characters_hash(characters: &[u32], loosely: bool) -> u64 {
     }
     // Two characters make a word.
     let (pairs, rest) = characters.as_chunks::<2>();
-    let step = pairs.len() / HASHED_CHARACTERS + 1;
     let start = rest.iter().fold(start, |hash, &code| mix(hash, u64::from(code)));
-    pairs.iter().step_by(step).fold(start, |hash, &[a, b]| mix(hash, u64::from(a) << 32 | u64::from(b)))
+    let mix_pair = |hash, &[a, b]: &[u32; 2]| mix(hash, u64::from(b) << 32 | u64::from(a));
+    match pairs.len() / HASHED_CHARACTERS {
+        0 => pairs.iter().fold(start, mix_pair),
+        more => pairs.iter().step_by(more + 1).fold(start, mix_pair),
+    }
 }
 
 /// The hash of pairs, strings and, `loosely`, arrays and structures, from the first parts in the order of reading.

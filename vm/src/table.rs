@@ -1,20 +1,14 @@
 //! Hash tables: entries in the order of insertion, found by linear hashing.
 //!
-//! ```text
-//! table     | count | used | free | room | entries | heads | test | hash | serial |      header.aux: which test
-//! entries   directory of simple vectors:  | key | value | link | key | value | link | ...
-//! heads     directory of Words32:         | head | head | head | ...
-//! ```
+//! A link leads to an entry: the hash of its key (32 bits), its number, one too high (28 bits; 0 leads nowhere), and whether the
+//! chain goes on behind it. The heads of the chains are links, and each entry has the link to the next of its chain. So a search knows
+//! the hash of a key before it goes there, and a key that is not there is mostly missed without a look at any entry.
+//! `heap/table` has how all this is stored.
 //!
-//! The link of an entry is a fixnum of the hash of its key (32 bits) and the number of the next entry of its bucket
-//! (29 bits). Numbers of entries are one too high in links and heads, so that 0 ends a chain. So a search touches one
-//! word of the heads, and what it needs of an entry is together. A segment of the directories holds [`SEGMENT`] entries,
-//! or the [`PER_ENTRY`] buckets of each; only the first one grows, by doubling.
-//!
-//! Invariant: a table has [`PER_ENTRY`] buckets for each entry that was ever in use (and for one at least). So each new
-//! entry adds as many, and each of these takes its share from one other bucket; nothing is ever rehashed at once, and no
-//! operation takes time in proportion to the size of the table. What was removed leaves a free entry, and the last one freed is the first to be
-//! taken again, which is also where SBCL puts a new key: the order of iteration is the same.
+//! Invariant: a table has [`PER_ENTRY`] chains for each entry that was ever in use (and for one at least). So each new
+//! entry adds as many, and each of these takes its share from one other; nothing is ever rehashed at once, and no
+//! operation takes time in proportion to the size of the table. What was removed leaves a free entry, and the last one freed is
+//! the first to be taken again, which is also where SBCL puts a new key: the order of iteration is the same.
 //!
 //! Not here: tests that are functions of the program. ESL calls them, over [`Table::candidates`], and [`Table::serial`] says
 //! whether keys came or went meanwhile.
@@ -22,59 +16,65 @@
 //! buckets, for the order.
 
 use crate::equality::{self, Test};
+use crate::heap::table::{Counter, ENTRY, MOST, PER_ENTRY, SEGMENT, Storage};
 use crate::heap::{AllocError, Heap, Kind};
 use crate::value::Value;
 
-/// Entries of a segment.
-pub(crate) const SEGMENT: usize = 1 << SHIFT;
-const SHIFT: usize = 12;
-/// Buckets for each entry. With one, a search for a key that is not there looks at one entry on the average, which may be
-/// anywhere in memory; with two at half of one.
-const PER_ENTRY: usize = 2;
 /// Entries for which a new table has room.
 const LEAST: usize = 8;
 
-/// Values of an entry in its segment.
-const ENTRY: usize = 3;
+/// Bits of a link that are the number of an entry.
+const NUMBER_BITS: u32 = MOST.ilog2() + 1;
 
-const COUNT: usize = 0;
-const USED: usize = 1;
-const FREE: usize = 2;
-const ROOM: usize = 3;
-const ENTRIES: usize = 4;
-const HEADS: usize = 5;
-const TEST: usize = 6;
-const HASH: usize = 7;
-const SERIAL: usize = 8;
-const SLOTS: usize = 9;
+/// The link to an entry.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Link(u64);
 
-/// Bits of a link that are the number of the next entry.
-const NEXT_BITS: u32 = 29;
-/// Entries that a table may have: what those bits count.
-const MOST: usize = (1 << NEXT_BITS) - 1;
+impl Link {
+    const END: Link = Link(0);
 
-/// Hash and next entry, as the link of an entry.
-fn link(hash: u32, next: usize) -> Value {
-    Value::index((hash as usize) << NEXT_BITS | next)
+    /// The link to an entry whose key has this hash, and behind which the chain goes on with `next`.
+    #[inline(always)]
+    fn new(hash: u32, entry: usize, next: Link) -> Link {
+        let goes_on = u64::from(next != Link::END);
+        Link((u64::from(hash) << NUMBER_BITS | (entry as u64 + 1)) << 1 | goes_on)
+    }
+
+    /// The link in an entry.
+    #[inline(always)]
+    fn of(v: Value) -> Link {
+        Link(v.bits() >> 2)
+    }
+
+    #[inline(always)]
+    fn value(self) -> Value {
+        Value::index(self.0 as usize)
+    }
+
+    /// The hash of the key of the entry.
+    #[inline(always)]
+    fn hash(self) -> u32 {
+        (self.0 >> (NUMBER_BITS + 1)) as u32
+    }
+
+    /// The entry, if there is one.
+    #[inline(always)]
+    fn entry(self) -> Option<usize> {
+        ((self.0 >> 1 & ((1 << NUMBER_BITS) - 1)) as usize).checked_sub(1)
+    }
+
+    /// Whether there may be another entry in the chain; if not, there is none.
+    #[inline(always)]
+    fn goes_on(self) -> bool {
+        self.0 & 1 != 0
+    }
 }
 
-/// Hash and next entry in a link.
+/// The link in the entry that a link leads to.
 #[inline]
-fn unlink(link: Value) -> (u32, usize) {
-    let word = link.as_index().unwrap_or(0);
-    ((word >> NEXT_BITS) as u32, word & MOST)
-}
-
-/// Where an entry has its values in its segment.
-#[inline]
-fn place(entry: usize) -> usize {
-    ENTRY * (entry & (SEGMENT - 1))
-}
-
-/// The segment of the heads that a bucket has its head in, and where.
-#[inline]
-fn place_of_head(bucket: usize) -> (usize, usize) {
-    (bucket / (PER_ENTRY * SEGMENT), bucket % (PER_ENTRY * SEGMENT))
+fn next(storage: &Storage<'_>, link: Link) -> Link {
+    let entry = link.entry().and_then(|entry| storage.entry(entry));
+    entry.map_or(Link::END, |[_, _, next]| Link::of(next))
 }
 
 /// How a table compares keys.
@@ -107,7 +107,7 @@ pub(crate) struct Table(Value);
 
 impl Table {
     /// The table that `v` is, if it is one.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn of(heap: &Heap, v: Value) -> Option<Table> {
         if heap.is(v, Kind::HashTable) { Some(Table(v)) } else { None }
     }
@@ -122,14 +122,6 @@ impl Table {
         size: usize,
         functions: [Value; 2],
     ) -> Result<Value, AllocError> {
-        let room = size.clamp(LEAST, SEGMENT).next_power_of_two();
-        let [entries, heads] = fresh_directories(heap, room)?;
-        let mut slots = [Value::small(0); SLOTS];
-        slots[ROOM] = Value::index(room);
-        slots[ENTRIES] = entries;
-        slots[HEADS] = heads;
-        slots[TEST] = functions[0];
-        slots[HASH] = functions[1];
         let number = match comparison {
             Comparison::Native(Test::Eq) => 0,
             Comparison::Native(Test::Eql) => 1,
@@ -137,13 +129,13 @@ impl Table {
             Comparison::Native(Test::Equalp) => 3,
             Comparison::Program => 4,
         };
-        heap.alloc_record(Kind::HashTable, 0, number, &slots)
+        heap.alloc_table(number, size.clamp(LEAST, SEGMENT), functions)
     }
 
     /// How it compares keys.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn comparison(self, heap: &Heap) -> Comparison {
-        match heap.header(self.0).map_or(0, |header| header.aux) {
+        match self.storage(heap).which_test() {
             0 => Comparison::Native(Test::Eq),
             1 => Comparison::Native(Test::Eql),
             2 => Comparison::Native(Test::Equal),
@@ -152,75 +144,60 @@ impl Table {
         }
     }
 
-    #[inline]
-    fn slot(self, heap: &Heap, index: usize) -> Value {
-        heap.record(self.0, Kind::HashTable).map_or(Value::NIL, |slots| slots[index])
+    #[inline(always)]
+    fn storage(self, heap: &Heap) -> Storage<'_> {
+        match heap.table_storage(self.0) {
+            Some(storage) => storage,
+            None => unreachable!("a table was checked to be one"),
+        }
     }
 
-    #[inline]
-    fn number(self, heap: &Heap, index: usize) -> usize {
-        self.slot(heap, index).as_index().unwrap_or(0)
-    }
-
-    fn set_number(self, heap: &mut Heap, index: usize, n: usize) {
-        heap.record_set(self.0, Kind::HashTable, index, Value::index(n));
+    fn counter(self, heap: &Heap, counter: Counter) -> usize {
+        heap.table_counter(self.0, counter).unwrap_or(0)
     }
 
     /// Number of keys.
     pub(crate) fn count(self, heap: &Heap) -> usize {
-        self.number(heap, COUNT)
+        self.counter(heap, Counter::Count)
     }
 
     /// Number of entries that were ever in use: where iteration ends.
     pub(crate) fn used(self, heap: &Heap) -> usize {
-        self.number(heap, USED)
+        self.storage(heap).used()
     }
 
     /// Entries for which there is room without more memory.
     pub(crate) fn room(self, heap: &Heap) -> usize {
-        self.number(heap, ROOM)
+        heap.table_room(self.0).unwrap_or(0)
     }
 
     /// The functions of the program by which it compares and hashes, or `NIL`.
     pub(crate) fn functions(self, heap: &Heap) -> [Value; 2] {
-        [self.slot(heap, TEST), self.slot(heap, HASH)]
-    }
-
-    #[inline]
-    fn view(self, heap: &Heap) -> View<'_> {
-        let slots = heap.record(self.0, Kind::HashTable).and_then(<[Value]>::first_chunk::<SLOTS>);
-        let slots = slots.unwrap_or(&[Value::NIL; SLOTS]);
-        View {
-            heap,
-            entries: heap.vector(slots[ENTRIES]).unwrap_or_default(),
-            heads: heap.vector(slots[HEADS]).unwrap_or_default(),
-            buckets: PER_ENTRY * slots[USED].as_index().unwrap_or(0).max(1),
-        }
+        heap.table_functions(self.0).unwrap_or([Value::NIL; 2])
     }
 
     /// A number that changes whenever a key comes or goes.
     pub(crate) fn serial(self, heap: &Heap) -> usize {
-        self.number(heap, SERIAL)
+        self.counter(heap, Counter::Serial)
     }
 
     fn advance(self, heap: &mut Heap) {
         // Nobody waits for as many changes as there are fixnums.
         let next = self.serial(heap).wrapping_add(1) & (Value::FIXNUM_MAX as usize);
-        self.set_number(heap, SERIAL, next);
+        heap.table_set_counter(self.0, Counter::Serial, next);
     }
 
     /// The entries whose keys have this hash, with the keys.
     pub(crate) fn candidates(self, heap: &Heap, hash: u32) -> Vec<(usize, Value)> {
-        let view = self.view(heap);
+        let storage = self.storage(heap);
         let mut found = Vec::new();
-        let mut next = view.head(view.bucket(hash));
-        while next != 0 {
-            let [key, _, link] = view.entry(next - 1);
-            let (other, after) = unlink(link);
-            if other == hash {
-                found.push((next - 1, key));
+        let mut link = Link(storage.first(hash));
+        while let Some(entry) = link.entry() {
+            let [key, _, next] = storage.entry(entry).unwrap_or(FREE);
+            if link.hash() == hash {
+                found.push((entry, key));
             }
-            next = after;
+            link = Link::of(next);
         }
         found
     }
@@ -228,25 +205,25 @@ impl Table {
     /// Key and value of an entry; `None` for one that is free or was never used.
     #[inline]
     pub(crate) fn entry(self, heap: &Heap, entry: usize) -> Option<(Value, Value)> {
-        let [key, value, _] = self.view(heap).entry(entry);
+        let [key, value, _] = self.storage(heap).entry(entry)?;
         if key == Value::UNBOUND { None } else { Some((key, value)) }
     }
 
     /// The value of an entry, if it has this very key.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn value_of(self, heap: &Heap, entry: usize, key: Value) -> Option<Value> {
-        let [candidate, value, _] = self.view(heap).entry(entry);
+        let [candidate, value, _] = self.storage(heap).entry(entry)?;
         if candidate == key && key != Value::UNBOUND { Some(value) } else { None }
     }
 
     /// Gives an entry another value.
+    #[inline(always)]
     pub(crate) fn set_value(self, heap: &mut Heap, entry: usize, value: Value) {
-        let segment = self.segment(heap, entry);
-        heap.vector_set(segment, place(entry) + 1, value);
+        heap.table_set_entry(self.0, entry, 1, [value]);
     }
 
     /// The entry of `key` and its value, with a test of the machine; `hash` is the key's.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn find(
         self,
         heap: &Heap,
@@ -255,26 +232,31 @@ impl Table {
         hash: u32,
         work: &mut usize,
     ) -> Result<Option<(usize, Value)>, Trouble> {
-        let view = self.view(heap);
-        let mut next = view.head(view.bucket(hash));
-        while next != 0 {
-            let [candidate, value, link] = view.entry(next - 1);
-            let (other, after) = unlink(link);
+        let storage = self.storage(heap);
+        let mut link = Link(storage.first(hash));
+        loop {
             // Where hashes differ, so do keys; that one key is another's very object is seen faster still.
-            if candidate == key {
-                return Ok(Some((next - 1, value)));
-            }
-            if other == hash && test != Test::Eq {
-                match equality::same(heap, test, key, candidate, work) {
-                    Some(true) => return Ok(Some((next - 1, value))),
-                    Some(false) => {}
-                    None => return Err(Trouble::Slowly),
+            if link.hash() == hash
+                && let Some(entry) = link.entry()
+            {
+                let [candidate, value, _] = storage.entry(entry).unwrap_or(FREE);
+                if candidate == key {
+                    return Ok(Some((entry, value)));
+                }
+                if test != Test::Eq {
+                    match equality::same(heap, test, key, candidate, work) {
+                        Some(true) => return Ok(Some((entry, value))),
+                        Some(false) => {}
+                        None => return Err(Trouble::Slowly),
+                    }
                 }
             }
+            if !link.goes_on() {
+                return Ok(None);
+            }
             *work = work.checked_sub(1).ok_or(Trouble::Slowly)?;
-            next = after;
+            link = next(&storage, link);
         }
-        Ok(None)
     }
 
     /// Adds an entry for a key that the table does not have.
@@ -282,62 +264,54 @@ impl Table {
     /// # Errors
     /// As for every allocation; nothing has changed then.
     pub(crate) fn add(self, heap: &mut Heap, hash: u32, key: Value, value: Value) -> Result<(), AllocError> {
-        let free = self.number(heap, FREE);
+        let free = self.counter(heap, Counter::Free);
         let entry = if free > 0 {
-            let (_, next) = unlink(self.view(heap).entry(free - 1)[2]);
-            self.set_number(heap, FREE, next);
+            let [_, _, next] = self.storage(heap).entry(free - 1).unwrap_or(FREE);
+            heap.table_set_counter(self.0, Counter::Free, next.as_index().unwrap_or(0));
             free - 1
         } else {
-            let used = self.used(heap);
-            if used == self.room(heap) {
-                self.grow(heap, used)?;
+            let entry = heap.table_extend(self.0)?;
+            if entry > 0 {
+                (PER_ENTRY * entry..PER_ENTRY * (entry + 1)).for_each(|chain| self.split(heap, chain));
             }
-            self.set_number(heap, USED, used + 1);
-            if used > 0 {
-                (PER_ENTRY * used..PER_ENTRY * (used + 1)).for_each(|bucket| self.split(heap, bucket));
-            }
-            used
+            entry
         };
-        let bucket = self.view(heap).bucket(hash);
-        let head = self.view(heap).head(bucket);
-        let segment = self.segment(heap, entry);
-        for (offset, v) in [key, value, link(hash, head)].into_iter().enumerate() {
-            heap.vector_set(segment, place(entry) + offset, v);
-        }
-        self.set_head(heap, bucket, entry + 1);
+        let storage = self.storage(heap);
+        let chain = storage.head_of(hash);
+        let head = Link(storage.head(chain));
+        heap.table_set_entry(self.0, entry, 0, [key, value, head.value()]);
+        heap.table_set_head(self.0, chain, Link::new(hash, entry, head).0);
         let count = self.count(heap);
-        self.set_number(heap, COUNT, count + 1);
+        heap.table_set_counter(self.0, Counter::Count, count + 1);
         self.advance(heap);
         Ok(())
     }
 
-    /// Frees an entry that is in use.
-    pub(crate) fn delete(self, heap: &mut Heap, entry: usize) {
-        let view = self.view(heap);
-        let (hash, after) = unlink(view.entry(entry)[2]);
-        let bucket = view.bucket(hash);
-        let mut before = view.head(bucket);
-        if before == entry + 1 {
-            self.set_head(heap, bucket, after);
-        } else {
-            while before != 0 {
-                let (other, next) = unlink(view.entry(before - 1)[2]);
-                if next == entry + 1 {
-                    self.set_link(heap, before - 1, link(other, after));
-                    break;
-                }
-                before = next;
+    /// Frees an entry that is in use and whose key has this hash; whether it was found in the chain of that.
+    pub(crate) fn delete(self, heap: &mut Heap, entry: usize, hash: u32) -> bool {
+        let storage = self.storage(heap);
+        let chain = storage.head_of(hash);
+        let mut link = Link(storage.head(chain));
+        let mut before = None;
+        while let Some(current) = link.entry() {
+            let [_, _, next] = storage.entry(current).unwrap_or(FREE);
+            if current == entry {
+                match before {
+                    None => heap.table_set_head(self.0, chain, Link::of(next).0),
+                    Some(before) => heap.table_set_entry(self.0, before, 2, [next]),
+                };
+                let free = self.counter(heap, Counter::Free);
+                heap.table_set_entry(self.0, entry, 0, [Value::UNBOUND, Value::NIL, Value::index(free)]);
+                heap.table_set_counter(self.0, Counter::Free, entry + 1);
+                let count = self.count(heap);
+                heap.table_set_counter(self.0, Counter::Count, count - 1);
+                self.advance(heap);
+                return true;
             }
+            before = Some(current);
+            link = Link::of(next);
         }
-        let free = self.number(heap, FREE);
-        let segment = self.segment(heap, entry);
-        for (offset, v) in [Value::UNBOUND, Value::NIL, link(0, free)].into_iter().enumerate() {
-            heap.vector_set(segment, place(entry) + offset, v);
-        }
-        self.set_number(heap, FREE, entry + 1);
-        let count = self.count(heap);
-        self.set_number(heap, COUNT, count - 1);
-        self.advance(heap);
+        false
     }
 
     /// Forgets all entries.
@@ -345,143 +319,32 @@ impl Table {
     /// # Errors
     /// As for every allocation; nothing has changed then.
     pub(crate) fn clear(self, heap: &mut Heap) -> Result<(), AllocError> {
-        let room = self.room(heap).min(SEGMENT);
-        let [entries, heads] = fresh_directories(heap, room)?;
-        heap.record_set(self.0, Kind::HashTable, ENTRIES, entries);
-        heap.record_set(self.0, Kind::HashTable, HEADS, heads);
-        for slot in [COUNT, USED, FREE] {
-            self.set_number(heap, slot, 0);
-        }
-        self.set_number(heap, ROOM, room);
+        heap.table_clear(self.0)?;
         self.advance(heap);
         Ok(())
     }
 
-    /// Makes room for one entry at least: twice the first segment, or one segment more.
-    fn grow(self, heap: &mut Heap, room: usize) -> Result<(), AllocError> {
-        let (old_entries, old_heads) = (self.slot(heap, ENTRIES), self.slot(heap, HEADS));
-        if room >= MOST - SEGMENT {
-            return Err(AllocError::TooLarge { requested: 8 * ENTRY * MOST });
-        }
-        if room < SEGMENT {
-            let first = heap.vector(old_entries).and_then(|segments| heap.vector(segments[0]));
-            let mut entries = first.unwrap_or_default().to_vec();
-            entries.resize(2 * ENTRY * room, Value::UNBOUND);
-            let first = heap.vector(old_heads).and_then(|segments| heap.words(segments[0]));
-            let heads = first.unwrap_or_default().to_vec();
-            let new_entries = heap.alloc_vector(&entries)?;
-            let new_heads = heap.alloc_words(2 * PER_ENTRY * room, 0)?;
-            if let Some(slots) = heap.words_mut(new_heads) {
-                slots[..heads.len()].copy_from_slice(&heads);
-            }
-            heap.vector_set(old_entries, 0, new_entries);
-            heap.vector_set(old_heads, 0, new_heads);
-            self.set_number(heap, ROOM, 2 * room);
-            return Ok(());
-        }
-        let segments = room >> SHIFT;
-        let entries = heap.alloc_vector_filled(ENTRY * SEGMENT, Value::UNBOUND)?;
-        let heads = heap.alloc_words(PER_ENTRY * SEGMENT, 0)?;
-        let length = heap.vector(old_entries).map_or(0, <[Value]>::len);
-        if segments < length {
-            heap.vector_set(old_entries, segments, entries);
-            heap.vector_set(old_heads, segments, heads);
-        } else {
-            // The directories are a small part of a thousandth of the table, so copying them is a small matter.
-            let mut larger = [old_entries, old_heads];
-            for (directory, segment) in larger.iter_mut().zip([entries, heads]) {
-                let mut segments = heap.vector(*directory).unwrap_or_default().to_vec();
-                segments.push(segment);
-                segments.resize(2 * length.max(1), Value::NIL);
-                *directory = heap.alloc_vector(&segments)?;
-            }
-            heap.record_set(self.0, Kind::HashTable, ENTRIES, larger[0]);
-            heap.record_set(self.0, Kind::HashTable, HEADS, larger[1]);
-        }
-        self.set_number(heap, ROOM, room + SEGMENT);
-        Ok(())
-    }
-
-    /// Moves to the new bucket `new`, which comes from no other new one, what belongs there from the bucket that has held it so far.
+    /// Moves to the new chain `new`, which comes from no other new one, what belongs there from the chain that has held it so far.
     fn split(self, heap: &mut Heap, new: usize) {
         let old = new - (1 << new.ilog2());
-        let mut next = self.view(heap).head(old);
-        let (mut stay, mut move_on) = (0, 0);
+        let mut link = Link(self.storage(heap).head(old));
+        let (mut stay, mut move_on) = (Link::END, Link::END);
         // Both chains come out in reverse, which no search can tell.
-        while next != 0 {
-            let view = self.view(heap);
-            let (hash, after) = unlink(view.entry(next - 1)[2]);
-            let chain = if view.bucket(hash) == new { &mut move_on } else { &mut stay };
-            self.set_link(heap, next - 1, link(hash, *chain));
-            *chain = next;
-            next = after;
+        while let Some(entry) = link.entry() {
+            let storage = self.storage(heap);
+            let [_, _, next] = storage.entry(entry).unwrap_or(FREE);
+            let chain = if storage.head_of(link.hash()) == new { &mut move_on } else { &mut stay };
+            heap.table_set_entry(self.0, entry, 2, [chain.value()]);
+            *chain = Link::new(link.hash(), entry, *chain);
+            link = Link::of(next);
         }
-        self.set_head(heap, old, stay);
-        self.set_head(heap, new, move_on);
-    }
-
-    fn segment(self, heap: &Heap, entry: usize) -> Value {
-        self.view(heap).entries.get(entry >> SHIFT).copied().unwrap_or(Value::NIL)
-    }
-
-    fn set_link(self, heap: &mut Heap, entry: usize, link: Value) {
-        let segment = self.segment(heap, entry);
-        heap.vector_set(segment, place(entry) + 2, link);
-    }
-
-    fn set_head(self, heap: &mut Heap, bucket: usize, head: usize) {
-        let (segment, at) = place_of_head(bucket);
-        let heads = self.view(heap).heads.get(segment).copied().unwrap_or(Value::NIL);
-        if let Some(slot) = heap.words_mut(heads).and_then(|heads| heads.get_mut(at)) {
-            *slot = head as u32;
-        }
+        heap.table_set_head(self.0, old, stay.0);
+        heap.table_set_head(self.0, new, move_on.0);
     }
 }
 
-/// The parts of a table, to be read.
-struct View<'a> {
-    heap: &'a Heap,
-    entries: &'a [Value],
-    heads: &'a [Value],
-    buckets: usize,
-}
-
-impl View<'_> {
-    /// The bucket of a hash: its low bits, one fewer where that bucket is still to come.
-    #[inline]
-    fn bucket(&self, hash: u32) -> usize {
-        let mask = self.buckets.next_power_of_two() - 1;
-        let bucket = hash as usize & mask;
-        if bucket < self.buckets { bucket } else { bucket & mask >> 1 }
-    }
-
-    /// The first entry of a bucket, one too high; 0 if there is none.
-    #[inline]
-    fn head(&self, bucket: usize) -> usize {
-        let (segment, at) = place_of_head(bucket);
-        let heads = self.heads.get(segment).and_then(|&heads| self.heap.words(heads));
-        heads.and_then(|heads| heads.get(at)).map_or(0, |&head| head as usize)
-    }
-
-    /// Key, value and link of an entry; what a free one has where there is none.
-    #[inline]
-    fn entry(&self, entry: usize) -> [Value; ENTRY] {
-        let segment = self.entries.get(entry >> SHIFT).and_then(|&segment| self.heap.vector(segment));
-        let at = place(entry);
-        segment.and_then(|segment| segment.get(at..at + ENTRY)?.try_into().ok()).unwrap_or([
-            Value::UNBOUND,
-            Value::NIL,
-            Value::small(0),
-        ])
-    }
-}
-
-/// Directories with one empty segment each.
-fn fresh_directories(heap: &mut Heap, room: usize) -> Result<[Value; 2], AllocError> {
-    let entries = heap.alloc_vector_filled(ENTRY * room, Value::UNBOUND)?;
-    let heads = heap.alloc_words(PER_ENTRY * room, 0)?;
-    Ok([heap.alloc_vector(&[entries])?, heap.alloc_vector(&[heads])?])
-}
+/// What an entry is that was never in use; no link leads there.
+const FREE: [Value; ENTRY] = [Value::UNBOUND, Value::NIL, Value::small(0)];
 
 #[cfg(test)]
 mod tests {
@@ -552,42 +415,43 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn agrees_with_the_model(
-            range in prop_oneof![Just(4), Just(30), Just(500)],
-            operations in prop::collection::vec((0u8..10, any::<u16>(), any::<i16>()), 0..800),
-        ) {
-            let mut heap = Heap::for_tests();
-            let table = new(&mut heap, Test::Eql);
-            let mut model = Model::default();
-            for (operation, key, value) in operations {
-                let (key, value) = (i32::from(key) % range, i32::from(value));
-                match operation {
-                    0..6 => {
-                        put(&mut heap, table, key, value);
-                        model.put(key, value);
-                    }
-                    6..9 => {
-                        let found = find(&heap, table, key);
-                        if let Some(entry) = found {
-                            table.delete(&mut heap, entry);
-                        }
-                        prop_assert_eq!(found.is_some(), model.remove(key));
-                    }
-                    _ if value % 16 == 0 => {
-                        table.clear(&mut heap).unwrap();
-                        model = Model::default();
-                    }
-                    _ => prop_assert_eq!(find(&heap, table, key).is_some(), model.places.contains_key(&key)),
-                }
-                prop_assert_eq!(table.count(&heap), model.places.len());
-            }
-            prop_assert_eq!(entries(&heap, table), model.entries());
-            for key in model.places.keys() {
-                prop_assert!(find(&heap, table, *key).is_some());
-            }
-        }
-    }
+           #[test]
+           fn agrees_with_the_model(
+               range in prop_oneof![Just(4), Just(30), Just(500)],
+               operations in prop::collection::vec((0u8..10, any::<u16>(), any::<i16>()), 0..800),
+           ) {
+               let mut heap = Heap::for_tests();
+               let table = new(&mut heap, Test::Eql);
+               let mut model = Model::default();
+               for (operation, key, value) in operations {
+                   let (key, value) = (i32::from(key) % range, i32::from(value));
+                   match operation {
+                       0..6 => {
+                           put(&mut heap, table, key, value);
+                           model.put(key, value);
+                       }
+                       6..9 => {
+                           let found = find(&heap, table, key);
+                           if let Some(entry) = found {
+                               let hash = equality::hash(&heap, Test::Eql, Value::small(key));
+    assert!(table.delete(&mut heap, entry, hash));
+                           }
+                           prop_assert_eq!(found.is_some(), model.remove(key));
+                       }
+                       _ if value % 16 == 0 => {
+                           table.clear(&mut heap).unwrap();
+                           model = Model::default();
+                       }
+                       _ => prop_assert_eq!(find(&heap, table, key).is_some(), model.places.contains_key(&key)),
+                   }
+                   prop_assert_eq!(table.count(&heap), model.places.len());
+               }
+               prop_assert_eq!(entries(&heap, table), model.entries());
+               for key in model.places.keys() {
+                   prop_assert!(find(&heap, table, *key).is_some());
+               }
+           }
+       }
 
     #[test]
     fn a_large_table_keeps_everything() {
@@ -605,7 +469,8 @@ mod tests {
         }
         for key in (0..n).step_by(2) {
             let entry = find(&heap, table, key * 7).unwrap();
-            table.delete(&mut heap, entry);
+            let hash = equality::hash(&heap, Test::Eql, Value::small(key * 7));
+            assert!(table.delete(&mut heap, entry, hash));
         }
         let expected: Vec<(i32, i32)> = (0..n).skip(1).step_by(2).map(|key| (key * 7, key)).collect();
         assert_eq!(entries(&heap, table), expected);
@@ -635,7 +500,8 @@ mod tests {
         let before = table.serial(&heap);
         table.set_value(&mut heap, 3, Value::T);
         assert_eq!(table.serial(&heap), before);
-        table.delete(&mut heap, 3);
+        assert!(!table.delete(&mut heap, 3, 6), "not in that chain");
+        assert!(table.delete(&mut heap, 3, 13));
         assert_ne!(table.serial(&heap), before);
     }
 }

@@ -33,7 +33,7 @@ fn table(vm: &mut Vm, v: Value) -> Result<Table, Exit> {
 /// The entry of a key, if it has one; and its hash, if that was needed to know.
 ///
 /// The key is often the one that was looked up last, as in `(incf (gethash key table))`: that entry is tried first.
-#[inline]
+#[inline(always)]
 fn find(vm: &mut Vm, table: Table, key: Value) -> Result<Place, Exit> {
     let Comparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
     let (last_key, last_entry) = vm.last_lookup;
@@ -42,7 +42,22 @@ fn find(vm: &mut Vm, table: Table, key: Value) -> Result<Place, Exit> {
     {
         return Ok(Place::Entry(last_entry, value));
     }
+    match key.as_fixnum() {
+        // A fixnum is the same as itself alone.
+        Some(n) if test != Test::Equalp => search(vm, table, Test::Eq, key, equality::fixnum_hash(n)),
+        _ => find_other(vm, table, test, key),
+    }
+}
+
+/// As [`find`], for keys of any kind.
+#[inline(never)]
+fn find_other(vm: &mut Vm, table: Table, test: Test, key: Value) -> Result<Place, Exit> {
     let hash = equality::hash(&vm.heap, test, key);
+    search(vm, table, test, key, hash)
+}
+
+#[inline(always)]
+fn search(vm: &mut Vm, table: Table, test: Test, key: Value, hash: u32) -> Result<Place, Exit> {
     let mut work = LIMIT;
     let found = table.find(&vm.heap, test, key, hash, &mut work)?;
     vm.charge(LIMIT - work);
@@ -111,11 +126,12 @@ fn add(vm: &mut Vm, table: Table, hash: u32, key: Value, value: Value) -> Result
 /// `(remhash key table)`
 pub(super) fn remhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[1])?;
-    let place = find(vm, table, arguments[0])?;
-    if let Place::Entry(entry, _) = place {
-        table.delete(&mut vm.heap, entry);
-    }
-    Ok(matches!(place, Place::Entry(..)).into())
+    let Comparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
+    let hash = equality::hash(&vm.heap, test, arguments[0]);
+    let mut work = LIMIT;
+    let found = table.find(&vm.heap, test, arguments[0], hash, &mut work)?;
+    vm.charge(LIMIT - work);
+    Ok(found.is_some_and(|(entry, _)| table.delete(&mut vm.heap, entry, hash)).into())
 }
 
 /// `(clrhash table)`
@@ -253,11 +269,9 @@ pub(super) fn table_add(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::T)
 }
 
-/// `(%table-delete table entry key)`: whether it was done, as the entry still has this very key.
+/// `(%table-delete table entry key hash)`: whether it was done, as the entry still has this very key and hash.
 pub(super) fn table_delete(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (table, found) = entry_of_key(vm, arguments)?;
-    if let Some((entry, _)) = found {
-        table.delete(&mut vm.heap, entry);
-    }
-    Ok(found.is_some().into())
+    let hash = hash_argument(vm, arguments[3])?;
+    Ok(found.is_some_and(|(entry, _)| table.delete(&mut vm.heap, entry, hash)).into())
 }

@@ -235,8 +235,8 @@ impl Terms {
                     self.release(cdr);
                 }
                 Data::Object(v) => {
-                    if let Some((table, _, Some(entry))) = self.find_object(heap, v) {
-                        table.delete(heap, entry);
+                    if let Some((table, hash, Some(entry))) = self.find_object(heap, v) {
+                        table.delete(heap, entry, hash);
                     }
                 }
                 _ => {}

@@ -46,7 +46,7 @@ impl Heap {
     }
 
     #[inline(always)]
-    fn object_of(&self, v: Value, kind: Kind) -> Option<*mut Header> {
+    pub(super) fn object_of(&self, v: Value, kind: Kind) -> Option<*mut Header> {
         let object = v.as_object_ptr()?;
         // SAFETY: an object value is the address of a live object.
         if unsafe { (*object).kind } == kind { Some(object) } else { None }
@@ -114,7 +114,7 @@ impl Heap {
 
     /// Sets slot `index` of a record of this kind; `None` if `v` is none or has no such slot.
     ///
-    /// Not for symbols, functions and arrays, nor the class (slot 0) of a structure: these give `None`.
+    /// Not for symbols, functions, arrays and hash tables, nor the class (slot 0) of a structure: these give `None`.
     #[inline]
     pub fn record_set(&mut self, v: Value, kind: Kind, index: usize, new: Value) -> Option<()> {
         if !kind.is_record() || is_vouched_for(kind) && (kind != Kind::Structure || index == 0) {

@@ -39,7 +39,7 @@ pub enum Kind {
     Array = 0x05,
     /// A ratio in lowest terms: numerator, denominator.
     Ratio = 0x06,
-    /// A hash table; `aux` is its test.
+    /// A hash table: [`HashTable`]; `aux` is its test.
     HashTable = 0x07,
     /// An instance of a structure, condition types included: class, then the slots. [`Structure`].
     Structure = 0x08,
@@ -67,6 +67,8 @@ pub enum Kind {
     Float = 0x40,
     /// An integer outside the fixnums: limbs of 64 bits, least first, no leading zero; the sign is in `flags`.
     Bignum = 0x41,
+    /// Words of 64 bits, for indexes.
+    Words64 = 0x42,
     /// A string: code points of 32 bits.
     String = 0x50,
     /// Words of 32 bits, for indexes.
@@ -76,7 +78,7 @@ pub enum Kind {
 }
 
 /// All kinds, for tests and tables.
-pub const KINDS: [Kind; 23] = [
+pub const KINDS: [Kind; 24] = [
     Kind::Symbol,
     Kind::Function,
     Kind::Box,
@@ -97,6 +99,7 @@ pub const KINDS: [Kind; 23] = [
     Kind::Code,
     Kind::Float,
     Kind::Bignum,
+    Kind::Words64,
     Kind::String,
     Kind::Words32,
     Kind::Bytes,
@@ -351,6 +354,34 @@ impl Bignum {
     pub const NEGATIVE: u8 = 1;
 }
 
+/// A hash table. `used` and `room` are counts, `entries` and `heads` directories of segments; the heap sees to that (`table`).
+#[repr(C)]
+#[derive(Copy, Clone, Debug)]
+pub struct HashTable {
+    /// Kind, length 9, and which test in `aux`.
+    pub header: Header,
+    /// Number of keys.
+    pub count: Value,
+    /// Number of entries that were ever in use.
+    pub used: Value,
+    /// The entry freed last, one too high.
+    pub free: Value,
+    /// Entries for which there is room.
+    pub room: Value,
+    /// Directory of the segments of entries.
+    pub entries: Value,
+    /// Directory of the segments of heads.
+    pub heads: Value,
+    /// The test, a function of the program, or `nil`.
+    pub test: Value,
+    /// The hash function of the program, or `nil`.
+    pub hash: Value,
+    /// Changes whenever a key comes or goes.
+    pub serial: Value,
+}
+
+const _: () = assert!(size_of::<HashTable>() == 80);
+
 /// An instance of a structure.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
@@ -384,6 +415,8 @@ mod tests {
             (Kind::Bytes, 9, 32),
             (Kind::Bignum, 2, 32),
             (Kind::Words32, 2, 16),
+            (Kind::Words64, 2, 32),
+            (Kind::HashTable, 9, 80),
             (Kind::Code, Code::len(0, 0), 80),
             (Kind::Code, Code::len(2, 3), 112),
         ];

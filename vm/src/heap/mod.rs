@@ -5,7 +5,7 @@
 //! layout    their form, to the byte                      alloc     bump allocation into holes
 //! mark      incremental marking                          sweep     lazy sweeping
 //! arena     1 MiB pieces of memory, in blocks            large     big objects, one by one
-//! metadata  one byte per granule
+//! metadata  one byte per granule                         table    the storage of hash tables
 //! ```
 //!
 //! Objects never move. A cycle of the collector marks what is reachable, in slices between which the program runs, then
@@ -46,6 +46,7 @@ mod mark;
 mod metadata;
 mod object;
 mod sweep;
+pub(crate) mod table;
 
 pub use access::BignumRef;
 pub use alloc::AllocError;

@@ -358,6 +358,11 @@ impl Heap {
         self.raw_filled(Kind::Words32, len, fill)
     }
 
+    /// New words of 64 bits, all 0.
+    pub(super) fn alloc_words64(&mut self, len: usize) -> Result<Value, AllocError> {
+        self.raw_filled(Kind::Words64, len, 0u64)
+    }
+
     /// New bytes.
     pub fn alloc_bytes(&mut self, bytes: &[u8]) -> Result<Value, AllocError> {
         self.raw_from(Kind::Bytes, 0, bytes)
@@ -384,6 +389,16 @@ impl Heap {
         // SAFETY: `allocate` gave us at least 16 aligned bytes of our own.
         unsafe { object.write(Header { kind, flags, aux, len: len as u32 }) };
         Ok(object)
+    }
+
+    /// A new record of a kind whose contents the heap vouches for; that they are as they should be is up to the caller.
+    pub(super) fn vouched_record(
+        &mut self,
+        kind: Kind,
+        aux: u16,
+        slots: &[Value],
+    ) -> Result<Value, AllocError> {
+        self.record_from(kind, 0, aux, &[], slots)
     }
 
     /// A record of the values of `first` and then those of `rest`.
@@ -432,5 +447,5 @@ impl Heap {
 
 /// Kinds of which the heap guarantees something about the contents.
 pub(super) const fn is_vouched_for(kind: Kind) -> bool {
-    matches!(kind, Kind::Symbol | Kind::Function | Kind::Array | Kind::Structure)
+    matches!(kind, Kind::Symbol | Kind::Function | Kind::Array | Kind::Structure | Kind::HashTable)
 }
