@@ -1,0 +1,24 @@
+# failure_handled: an exception that the `try` around it ends in, and gives a result for.
+
+
+class Broken(Exception):
+    def __init__(self, x):
+        self.x = x
+
+
+def operate(x):
+    raise Broken(x)
+
+
+def main():
+    total = 0
+    for i in range(1000000):
+        try:
+            value = operate(i)
+        except Broken as broken:
+            value = broken.x + 1
+        total = (total + value) % 1000003
+    print(total)
+
+
+main()
