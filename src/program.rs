@@ -267,7 +267,7 @@ pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Report, String> {
     machine.set_main(main);
     let outcome = machine.run(u64::MAX);
     machine.flush();
-    if let Some(report) = machine.report(main).map(String::from) {
+    if let Some(report) = machine.report(main) {
         machine.complain(&report);
     }
     let ended = match (outcome, machine.result(main)) {

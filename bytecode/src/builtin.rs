@@ -805,24 +805,24 @@ define_builtins! {
     IsInstance = internal "%INSTANCE-P" ("class object");
 
     // ---- failures and the control stack
-    /// How many entries the control stack has.
-    ControlHeight = internal "%CONTROL-HEIGHT" ("");
-    /// The innermost handlers below `height` that no mask hides: index of the entry, its kind, and what goes with it: 0 and a
-    /// list of `(type . function)`, 1 and the types of cases, 2 and the table or state of recovery procedures, 3 for a
-    /// cleanup, the last two only if `failure` is true. `NIL` if there are none.
+    /// The innermost handlers below `height`, or of all if that is `NIL`, that no mask hides: index of the entry, its kind,
+    /// and what goes with it: 0 and a list of `(type . function)`, 1 and the types of cases; for a `failure`, its condition
+    /// or cause, also 2 and the table or state of recovery procedures, 3 for a cleanup. `NIL` if there are none. Those who
+    /// watch the run are told of a failure for which all are searched.
     NextHandler = internal "%NEXT-HANDLER" ("height failure");
     /// Unwinds to the entry with this index, of the cases of a `handler-case`, and has one of them take the condition.
     TakeCase = internal "%TAKE-CASE" ("index case condition");
-    /// Makes the state of the recovery procedures of the entry with this index: a copy of `table` with their function first.
-    BeginRecovery = internal "%BEGIN-RECOVERY" ("index table");
+    /// The state of the recovery procedures of the entry with this index: `table` if it is one, otherwise a copy of it, made
+    /// here, with their function first. Those who watch the run are told that there is recovery from `failure`.
+    BeginRecovery = internal "%BEGIN-RECOVERY" ("index table failure");
     /// Unwinds to the cleanup for failures with this index, which has `failure` when it has run.
     UnwindToCleanup = internal "%UNWIND-TO-CLEANUP" ("index failure");
     /// What the innermost running cleanup was given by `%UNWIND-TO-CLEANUP`, or `NIL`.
     CleaningUp = internal "%CLEANING-UP" ("");
-    /// Tells those who watch the run that this task fails with a condition, or that a recovery procedure deals with one.
-    NoteFailure = internal "%NOTE-FAILURE" ("condition recovers");
-    /// Ends the running task as failed, with this condition: its text in a few words, and a report for people.
-    EndTask = internal "%END-TASK" ("condition text report");
+    /// Ends the running task as failed, with this condition: its text in a few words, and for people what has happened
+    /// where, and the line that says that there is no recovery. In a cleanup of a task that ends already, or that leaves an
+    /// expired limit, ends the cleanup, and the report goes with that of the task.
+    EndTask = internal "%END-TASK" ("condition text story ending");
     /// Ends the run with this status, from 0 to 255. The remaining tasks are aborted.
     Exit = internal "%EXIT" ("status");
     /// The innermost `limit` frames, each a list of the function's name, and source, line and column if known.

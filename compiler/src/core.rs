@@ -281,9 +281,9 @@ pub enum NodeKind {
     HandlerCase(NodeId, Vec<HandlerClause>),
     /// Runs a body with recovery procedures.
     Recovery {
-        /// A vector: `NIL`, then for each clause its cause and how often it may run.
+        /// A vector: `NIL`, then for each clause its cause and how often it may run, then `NIL`.
         table: Datum,
-        /// The function that runs the clauses, always a lambda: of the form's state, the number of the clause, and the
+        /// The function that runs the clauses, always a lambda: of the form's state, the place of the clause in it, and the
         /// list of the failure's arguments. Throws to the state: it with `NIL` to run the body again, `T` with a result
         /// to leave the form.
         procedures: NodeId,

@@ -10,7 +10,7 @@ mod editor;
 use std::io::{BufRead, IsTerminal, Write};
 
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_vm::host::{FileAccess, RealHost};
+use esl_vm::host::{FileAccess, Output, RealHost};
 use esl_vm::task::TaskResult;
 use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
@@ -79,6 +79,7 @@ pub fn run(config: Config, library: &Library) -> Result<u8, u8> {
     let mut machine = program::machine(config, Box::new(host)).map_err(setup)?;
     program::set_library(&mut machine, library).map_err(setup)?;
     let mut session = Session { machine, failure: None };
+    session.machine.complain_to(Output::Standard);
     session.call("%REPL-BEGIN", "");
     interrupt_on_signal(session.machine.interrupt_flag(), waker);
     if std::io::stdin().is_terminal() {
@@ -196,7 +197,7 @@ impl Session {
         self.machine.run_until(Some(task), u64::MAX);
         self.machine.set_interruptible(None);
         let result = self.machine.result(task);
-        let report = self.machine.report(task).map(String::from);
+        let report = self.machine.report(task);
         self.machine.forget(task);
         self.machine.flush();
         match result {

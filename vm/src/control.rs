@@ -222,6 +222,12 @@ impl Control {
         self.entries.iter().rposition(|entry| entry.kind == EntryKind::Running && entry.data == data)
     }
 
+    /// Where the unwinding goes that a cleanup which runs has interrupted, if nothing that the cleanup does can cancel it.
+    pub(crate) fn final_unwinding(&self) -> Option<Target> {
+        let pending = self.running.iter().rev().filter_map(|running| running.pending.as_ref());
+        pending.map(|unwinding| unwinding.target).find(|target| target.is_final())
+    }
+
     /// Index of the innermost entry that catches `tag`.
     pub(crate) fn find_catch(&self, tag: Value) -> Option<usize> {
         let catches = |entry: &Entry| matches!(entry.kind, EntryKind::Catch | EntryKind::Recovery);

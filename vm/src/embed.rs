@@ -109,11 +109,20 @@ impl Vm {
         self.flush_output();
     }
 
-    /// Writes to the standard error output.
+    /// Writes reports from here on to this stream, in place of the standard error output.
+    pub fn complain_to(&mut self, output: Output) {
+        self.complaints = output;
+    }
+
+    /// Writes a report, on lines of its own.
     pub fn complain(&mut self, text: &str) {
+        let mut characters: Vec<u32> = text.chars().map(u32::from).collect();
+        if self.console.column(self.complaints) > 0 {
+            characters.insert(0, u32::from('\n'));
+        }
         self.flush_output();
-        // If that cannot be written there is nobody to tell.
-        _ = self.host.write(Output::Error, text.as_bytes());
+        self.console.write(&mut *self.host, self.complaints, &characters);
+        self.flush_output();
     }
 
     /// Whether a condition that ended a task says that the memory is exhausted.

@@ -115,7 +115,7 @@ impl Vm {
         let name = self.slot(self.task().object, event::NAME);
         let label = self.label_of(name, self.task().number);
         match (end, report) {
-            (End::Failed(_), Some(report)) => self.complain(&format!("In {label}:\n{report}")),
+            (End::Failed(_), Some(report)) => self.complain(&format!("In {label}:\n{}", report.text())),
             (End::Failed(condition), None) => {
                 let cause = self.describe(condition);
                 self.complain(&format!("In {label}:\nFailure {cause}, no recovery available.\nAborted\n"));

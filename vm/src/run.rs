@@ -306,8 +306,8 @@ impl Vm {
     }
 
     /// What is to be said of the failure that ended a task.
-    pub fn report(&self, id: TaskId) -> Option<&str> {
-        self.tasks.get(id)?.extra.as_ref()?.report.as_deref()
+    pub fn report(&self, id: TaskId) -> Option<String> {
+        Some(self.tasks.get(id)?.extra.as_ref()?.report.as_ref()?.text())
     }
 
     /// Ticks that a task has used.

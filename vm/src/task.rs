@@ -116,11 +116,33 @@ define_flags! {
     oversized set_oversized = 7;
 }
 
+/// What is to be said of a failure.
+#[derive(Clone, Debug)]
+pub(crate) struct FailureReport {
+    /// What has happened, and where.
+    pub story: String,
+    /// The line that says that there is no recovery.
+    pub ending: String,
+}
+
+impl FailureReport {
+    /// Adds the story of a failure of a cleanup that this one has had run.
+    pub(crate) fn add_cleanup(&mut self, story: &str) {
+        self.story.push_str("In a cleanup after that:\n");
+        self.story.push_str(story);
+    }
+
+    /// All of it.
+    pub(crate) fn text(&self) -> String {
+        format!("{}{}Aborted\n", self.story, self.ending)
+    }
+}
+
 /// What few tasks need.
 #[derive(Default)]
 pub(crate) struct Extra {
-    /// What is to be said of the failure that ended it.
-    pub report: Option<String>,
+    /// What is to be said of the failure that ends it.
+    pub report: Option<FailureReport>,
     /// How it ended, for the embedder.
     pub end: Option<End>,
     /// What it returned, for the embedder.

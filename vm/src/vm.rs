@@ -12,7 +12,7 @@ use crate::database::Database;
 use crate::embed::HostFunction;
 use crate::figures::Figures;
 use crate::heap::{AllocError, Heap, HeapConfig, Kind};
-use crate::host::{Console, Host};
+use crate::host::{Console, Host, Output};
 use crate::interp::Cpu;
 use crate::interp::call::{Arguments, make_starter};
 use crate::limit::{Accounts, CLEANUP_TICKS, CLEANUP_TIME};
@@ -187,6 +187,8 @@ pub struct Vm {
     pub(crate) collected_at: Option<(*const u32, u64, i32)>,
     /// The text of a failure that no library was there to deal with.
     pub(crate) last_words: Option<String>,
+    /// Where reports are written.
+    pub(crate) complaints: Output,
 
     /// The status that the program has asked to end with.
     pub(crate) exit_status: Option<u8>,
@@ -269,6 +271,7 @@ impl Vm {
             charged: 0,
             collected_at: None,
             last_words: None,
+            complaints: Output::Error,
             exit_status: None,
             config,
         })
@@ -329,9 +332,12 @@ impl Vm {
         self.exit_status
     }
 
-    /// Names the task that an interrupt aborts.
+    /// Names the task that an interrupt aborts; reports call it the main task.
     pub fn set_interruptible(&mut self, id: Option<TaskId>) {
         self.interruptible = id;
+        if let Some(task) = id.and_then(|id| self.tasks.get(id)) {
+            self.main_number = Some(task.number);
+        }
     }
 
     /// Takes an interrupt: the task that it aborts.

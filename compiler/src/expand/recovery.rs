@@ -14,7 +14,7 @@ use crate::core::*;
 use crate::diagnostic::code;
 
 /// Functions and operators that do not return.
-const LEAVING: &[&str] = &["FAIL", "NEXT-BINDINGS", "EXIT"];
+const LEAVING: &[&str] = &["FAIL", "%FAIL-FOR", "NEXT-BINDINGS", "EXIT"];
 const LEAVING_STANDARD: &[&str] = &["ERROR", "INVOKE-RESTART", "ABORT"];
 
 /// `(%with-recovery table (%named-lambda …) . body)`: see [`NodeKind::Recovery`].

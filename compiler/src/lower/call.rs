@@ -330,7 +330,7 @@ impl<'a> Frame<'_, 'a> {
 
 /// Whether a function fails: backtraces are to show who has called it.
 fn fails(function: &Symbol) -> bool {
-    function.is_cl("ERROR") || *function == Symbol::esl("FAIL")
+    function.is_cl("ERROR") || [Symbol::esl("FAIL"), Symbol::esl("%FAIL-FOR")].contains(function)
 }
 
 /// Whether a builtin takes so many arguments.

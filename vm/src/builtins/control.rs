@@ -1,9 +1,12 @@
 //! Calls, multiple values, and what the library needs to signal a failure: the handlers on the control stack, the end of
 //! a task, backtraces.
 
+use smallvec::SmallVec;
+
 use crate::control::{End, EntryKind, Target, Unwinding};
 use crate::interp::call::MAX_SPREAD;
 use crate::raise::{Exit, Outcome, Raised};
+use crate::task::FailureReport;
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -58,16 +61,18 @@ pub(super) fn values_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Err(Exit::Values)
 }
 
-/// `(%control-height)`: how many entries the control stack has, for `%next-handler` and `%with-mask`.
-pub(super) fn control_height(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
-    Ok(Value::index(vm.task().control.entries.len()))
-}
-
 /// `(%next-handler height failure)`
 pub(super) fn next_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(height) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
-    let mut steps = 0;
+    let height = match arguments[0].as_index() {
+        Some(height) => height,
+        None if arguments[0].is_nil() => usize::MAX,
+        None => return vm.type_error(arguments[0], "UNSIGNED-BYTE"),
+    };
     let is_failure = arguments[1].is_true();
+    if vm.is_watched && is_failure && arguments[0].is_nil() {
+        vm.tell_of_failure(arguments[1], false);
+    }
+    let mut steps = 0;
     let found = vm.task().control.find_handlers(height, is_failure, &mut steps);
     vm.charge(steps);
     let Some(found) = found else { return Ok(Value::NIL) };
@@ -82,30 +87,33 @@ pub(super) fn next_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Err(Exit::Values)
 }
 
-/// `(%begin-recovery index table)`
+/// `(%begin-recovery index table failure)`
 pub(super) fn begin_recovery(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let index = arguments[0].as_index().unwrap_or(usize::MAX);
-    let Some(function) = vm.recovery_function(index)? else {
-        return vm.raise(Raised::Control("the recovery procedures of a failure are no longer there".into()));
+    let table = arguments[1];
+    let items = vm.heap.vector(table).unwrap_or_default();
+    let state = if items.first().is_some_and(|first| first.is_true()) {
+        table
+    } else {
+        let mut items: SmallVec<[Value; 16]> = items.into();
+        let index = arguments[0].as_index().unwrap_or(usize::MAX);
+        let Some(function) = vm.recovery_function(index)? else {
+            return vm
+                .raise(Raised::Control("the recovery procedures of a failure are no longer there".into()));
+        };
+        if let Some(first) = items.first_mut() {
+            *first = function;
+        }
+        let state = vm.heap.alloc_vector(&items)?;
+        vm.charge(items.len());
+        if let Some(entry) = vm.task_mut().control.entries.get_mut(index) {
+            entry.data = state;
+        }
+        state
     };
-    let mut items = vm.heap.vector(arguments[1]).map(<[Value]>::to_vec).unwrap_or_default();
-    if let Some(first) = items.first_mut() {
-        *first = function;
-    }
-    let state = vm.heap.alloc_vector(&items)?;
-    vm.charge(items.len());
-    if let Some(entry) = vm.task_mut().control.entries.get_mut(index) {
-        entry.data = state;
+    if vm.is_watched {
+        vm.tell_of_failure(arguments[2], true);
     }
     Ok(state)
-}
-
-/// `(%note-failure condition recovers)`
-pub(super) fn note_failure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    if vm.is_watched {
-        vm.tell_of_failure(arguments[0], arguments[1].is_true());
-    }
-    Ok(Value::NIL)
 }
 
 /// `(%unwind-to-cleanup index failure)`
@@ -142,10 +150,24 @@ pub(super) fn take_case(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%end-task condition text report)`
+/// `(%end-task condition text story ending)`
 pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.last_words = vm.heap.string_text(arguments[1]);
-    vm.task_mut().extra_mut().report = vm.heap.string_text(arguments[2]);
+    let [story, ending] = [2, 3].map(|index| vm.heap.string_text(arguments[index]).unwrap_or_default());
+    match vm.task().control.final_unwinding() {
+        Some(Target::Root(End::Failed(_))) => {
+            if let Some(report) = &mut vm.task_mut().extra_mut().report {
+                report.add_cleanup(&story);
+            }
+        }
+        Some(_) => {
+            let label = vm.task_label(vm.task().object);
+            vm.complain(&format!("In a cleanup of {label}:\n{story}{ending}"));
+        }
+        None => {
+            vm.last_words = vm.heap.string_text(arguments[1]);
+            vm.task_mut().extra_mut().report = Some(FailureReport { story, ending });
+        }
+    }
     vm.begin_end(End::Failed(arguments[0]));
     Err(Exit::Unwind)
 }
