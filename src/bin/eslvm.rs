@@ -114,7 +114,11 @@ fn main() -> ExitCode {
             let library = Library::new([file.as_path()], &library);
             run(&file, arguments, &limits, stats, timeline.as_deref(), &trace, &library)
         }
-        Action::Repl { limits } => esl::repl::run(limits.config(), &Library::new([Path::new("-")], &library)),
+        Action::Repl { limits } => esl::repl::run(
+            limits.config(),
+            limits.clock == Clock::Virtual,
+            &Library::new([Path::new("-")], &library),
+        ),
     };
     ExitCode::from(status.unwrap_or_else(|status| status))
 }

@@ -1,12 +1,14 @@
 //! Lines from a terminal: editing, history across sessions, completion of names.
 
+use std::io::Write;
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rustyline::error::ReadlineError;
 use rustyline::history::DefaultHistory;
-use rustyline::{Completer, Helper, Highlighter, Hinter, Validator};
+use rustyline::{Completer, ExternalPrinter, Helper, Highlighter, Hinter, Validator};
 
-use super::{Line, Lines};
+use super::typing::{Line, Lines};
 
 /// The helper of the line editor.
 #[derive(Default, Helper, Hinter, Highlighter, Validator, Completer)]
@@ -48,6 +50,22 @@ impl rustyline::completion::Completer for NameCompleter {
     }
 }
 
+/// What prints above the line that is being edited, once there is an editor.
+#[derive(Clone, Default)]
+pub(super) struct Printer(Arc<Mutex<Option<Box<dyn ExternalPrinter + Send>>>>);
+
+impl Printer {
+    /// Prints bytes of the program: above the line that is being edited, if one is.
+    pub(super) fn print(&self, bytes: &[u8]) -> std::io::Result<()> {
+        let mut printer = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(printer) = &mut *printer {
+            return printer.print(String::from_utf8_lossy(bytes).into_owned()).map_err(std::io::Error::other);
+        }
+        let mut out = std::io::stdout().lock();
+        out.write_all(bytes).and_then(|()| out.flush())
+    }
+}
+
 /// A terminal with line editing.
 pub(super) struct Editor {
     editor: Option<rustyline::Editor<Names, DefaultHistory>>,
@@ -55,9 +73,13 @@ pub(super) struct Editor {
 }
 
 impl Editor {
-    /// An editor with the history of earlier sessions, if there is one.
-    pub(super) fn new() -> Editor {
+    /// An editor with the history of earlier sessions, if there is one; its printer goes to `printer`.
+    pub(super) fn new(printer: &Printer) -> Editor {
         let mut editor = rustyline::Editor::<Names, DefaultHistory>::new().ok();
+        let external = editor.as_mut().and_then(|editor| editor.create_external_printer().ok());
+        if let Some(external) = external {
+            *printer.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(external));
+        }
         let history = std::env::home_dir().map(|home| home.join(".esl-history"));
         if let (Some(editor), Some(history)) = (&mut editor, &history) {
             editor.set_helper(Some(Names::default()));
@@ -79,10 +101,6 @@ impl Lines for Editor {
             Err(ReadlineError::Eof) => Line::End,
             Err(error) => Line::Failed(error.to_string()),
         }
-    }
-
-    fn completes(&self) -> bool {
-        true
     }
 
     fn learn(&mut self, names: Vec<String>) {

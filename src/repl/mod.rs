@@ -3,14 +3,19 @@
 //! Lines are gathered until they hold a whole form. With a terminal there are line editing, history and completion; from a
 //! pipe forms are read alike and nothing but results is written. Reading, evaluating and printing are functions of the
 //! library; here is only what has to do with lines.
+//!
+//! Tasks that a form has made go on in the background: while other forms are evaluated, and while a line is awaited. They are
+//! aborted, and their cleanups awaited, at the end of the session.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "the REPL talks with people")]
 
 mod editor;
+mod typing;
 
-use std::io::{BufRead, IsTerminal, Write};
+use std::io::{IsTerminal, Write};
 
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_vm::host::{FileAccess, Output, RealHost};
+use esl_vm::run::RunOutcome;
 use esl_vm::task::TaskResult;
 use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
@@ -18,59 +23,28 @@ use esl_vm::vm::{Config, Vm};
 use crate::command::{SUCCESS, USAGE, complain, interrupt_on_signal};
 use crate::library::Library;
 use crate::program;
+use editor::Printer;
+use typing::{Line, Typing};
 
 /// The prompt, and the one for further lines of a form.
 const PROMPT: &str = "? ";
 const CONTINUATION: &str = "  ";
 
-/// Where lines come from.
-trait Lines {
-    /// The next line, without its newline; `None` at the end.
-    fn next(&mut self, prompt: &str) -> Line;
-    /// Notes a whole form for the history.
-    fn remember(&mut self, form: &str);
-    /// Whether names are completed.
-    fn completes(&self) -> bool {
-        false
-    }
-    /// Takes the names that are there now.
-    fn learn(&mut self, _names: Vec<String>) {}
-}
-
-/// What reading a line gave.
-enum Line {
-    /// A line.
-    Text(String),
-    /// The person wants to drop what was typed so far.
-    Dropped,
-    /// There are no more lines.
-    End,
-    /// Reading failed.
-    Failed(String),
-}
-
-/// Lines from a pipe or a file.
-struct Pipe;
-
-impl Lines for Pipe {
-    fn next(&mut self, _prompt: &str) -> Line {
-        let mut line = String::new();
-        match std::io::stdin().lock().read_line(&mut line) {
-            Ok(0) => Line::End,
-            Ok(_) => Line::Text(line.trim_end_matches(['\n', '\r']).to_string()),
-            Err(error) => Line::Failed(error.to_string()),
-        }
-    }
-
-    fn remember(&mut self, _form: &str) {}
-}
-
 /// Runs the REPL until the end of the input or `:quit`, with the modules of `library`. Gives the exit status.
 ///
 /// # Errors
 /// The exit status, if the machine could not be made.
-pub fn run(config: Config, library: &Library) -> Result<u8, u8> {
-    let host = RealHost::new(Vec::new()).with_files(FileAccess::All);
+pub fn run(config: Config, virtual_time: bool, library: &Library) -> Result<u8, u8> {
+    let mut host = RealHost::new(Vec::new()).with_files(FileAccess::All);
+    let is_interactive = std::io::stdin().is_terminal();
+    let printer = Printer::default();
+    if is_interactive {
+        let printer = printer.clone();
+        host = host.with_screen(Box::new(move |bytes| printer.print(bytes)));
+    }
+    if virtual_time {
+        host = host.with_virtual_time();
+    }
     let waker = host.waker();
     let setup = |text| {
         complain(text);
@@ -78,20 +52,27 @@ pub fn run(config: Config, library: &Library) -> Result<u8, u8> {
     };
     let mut machine = program::machine(config, Box::new(host)).map_err(setup)?;
     program::set_library(&mut machine, library).map_err(setup)?;
-    let mut session = Session { machine, failure: None };
-    session.machine.complain_to(Output::Standard);
+    machine.complain_to(Output::Standard);
+    let typing = Typing::begin(is_interactive, printer, machine.stop_flag(), waker.clone())
+        .map_err(|error| setup(format!("no thread can be made: {error}")))?;
+    let mut session = Session { machine, typing, virtual_time, failure: None };
     session.call("%REPL-BEGIN", "");
     interrupt_on_signal(session.machine.interrupt_flag(), waker);
-    if std::io::stdin().is_terminal() {
-        let mut editor = editor::Editor::new();
-        session.talk(&mut editor)
-    } else {
-        session.talk(&mut Pipe)
-    }
+    let status = session.talk();
+    session.machine.abort_all();
+    session.machine.run(u64::MAX);
+    session.machine.flush();
+    status
 }
+
+/// Ticks that background tasks run between two looks at what they have written.
+const BACKGROUND_TICKS: u64 = 100_000;
 
 struct Session {
     machine: Vm,
+    typing: Typing,
+    /// Whether time passes only while a form is evaluated.
+    virtual_time: bool,
     /// The report of the last failure, for `:bt`.
     failure: Option<String>,
 }
@@ -107,28 +88,58 @@ enum Next {
 }
 
 impl Session {
-    fn talk(&mut self, lines: &mut dyn Lines) -> Result<u8, u8> {
+    /// Runs background tasks until the next line has come.
+    fn next_line(&mut self, prompt: &'static str) -> Line {
+        self.typing.ask(prompt);
+        loop {
+            if let Some(line) = self.typing.take() {
+                return line;
+            }
+            let outcome = if self.virtual_time {
+                self.machine.run_ready(BACKGROUND_TICKS)
+            } else {
+                self.machine.run(BACKGROUND_TICKS)
+            };
+            self.machine.flush();
+            if self.machine.exit_status().is_some() && !self.typing.is_interactive {
+                return Line::End;
+            }
+            match outcome {
+                RunOutcome::TicksUsed | RunOutcome::Stopped => {}
+                RunOutcome::Done | RunOutcome::Waiting | RunOutcome::BudgetSpent => {
+                    return self.typing.wait();
+                }
+            }
+        }
+    }
+
+    fn talk(&mut self) -> Result<u8, u8> {
         let mut text = String::new();
         loop {
             let prompt = if text.is_empty() { PROMPT } else { CONTINUATION };
-            if text.is_empty() && lines.completes() {
-                lines.learn(self.machine.accessible_names());
+            if text.is_empty() && self.typing.is_interactive {
+                self.typing.learn(self.machine.accessible_names());
             }
-            match lines.next(prompt) {
+            let line = self.next_line(prompt);
+            if let Next::Quit(status) = self.next() {
+                // A task has asked for the end meanwhile.
+                return Ok(status);
+            }
+            match line {
                 Line::Text(line)
                     if text.is_empty() && line.trim_start().starts_with(':') && is_command(&line) =>
                 {
                     if let Next::Quit(status) = self.command(line.trim()) {
                         return Ok(status);
                     }
-                    lines.remember(&line);
+                    self.typing.remember(&line);
                 }
                 Line::Text(line) => {
                     text.push_str(&line);
                     text.push('\n');
                     match self.evaluate(&text) {
                         Next::More => {}
-                        Next::Form => lines.remember(std::mem::take(&mut text).trim_end()),
+                        Next::Form => self.typing.remember(std::mem::take(&mut text).trim_end()),
                         Next::Quit(status) => return Ok(status),
                     }
                 }
@@ -178,6 +189,7 @@ impl Session {
                 Some(report) => print!("{report}"),
                 None => println!("Nothing has failed."),
             },
+            ":tasks" => print!("{}", self.machine.task_report()),
             _ => print!("{HELP}"),
         }
         self.next()
@@ -194,7 +206,8 @@ impl Session {
             }
         };
         self.machine.set_interruptible(Some(task));
-        self.machine.run_until(Some(task), u64::MAX);
+        // A line that is awaited does not end an evaluation; it may have come just now.
+        while self.machine.run_until(Some(task), u64::MAX) == RunOutcome::Stopped {}
         self.machine.set_interruptible(None);
         let result = self.machine.result(task);
         let report = self.machine.report(task);
@@ -234,12 +247,13 @@ fn in_short(report: &str) -> String {
 /// Whether a line that begins with a colon is a command of the REPL, not a keyword to be evaluated.
 fn is_command(line: &str) -> bool {
     let word = line.split_whitespace().next().unwrap_or("");
-    matches!(word, ":quit" | ":exit" | ":load" | ":bt" | ":help")
+    matches!(word, ":quit" | ":exit" | ":load" | ":bt" | ":tasks" | ":help")
 }
 
 const HELP: &str = "\
 :load FILE   evaluate the forms of a file
 :bt          show where the last failure came from
+:tasks       show the tasks, who made them, and what they wait for
 :help        this list; (help 'name) says what a function does
 :quit        end
 ";

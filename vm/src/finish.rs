@@ -29,6 +29,11 @@ impl Vm {
         }
     }
 
+    /// Asks for the end of every task, as if the program had asked to end.
+    pub fn abort_all(&mut self) {
+        self.abort_others();
+    }
+
     /// Asks for the end of every task but the running one.
     pub(crate) fn abort_others(&mut self) {
         for id in self.tasks.ids() {

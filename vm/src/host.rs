@@ -18,7 +18,7 @@ mod record;
 mod virtual_host;
 
 pub(crate) use console::{Console, Taken, column_after, encode};
-pub use real::{FileAccess, MessageSender, RealHost, Waker};
+pub use real::{FileAccess, MessageSender, RealHost, Screen, Waker};
 pub use record::{Record, Recording, RecordingHost, ReplayHost};
 pub use virtual_host::{Captured, VirtualHost};
 

@@ -5,6 +5,8 @@
 //! runnable the machine sleeps in the host until the first timer, or until something comes from outside (`clock`).
 //! Not here: making tasks (`spawn`), and their ends (`finish`).
 
+use std::sync::atomic::Ordering::Relaxed;
+
 use crate::interp::{self, Leave};
 use crate::limit::AccountId;
 use crate::observe::Seen;
@@ -26,6 +28,8 @@ pub enum RunOutcome {
     BudgetSpent,
     /// The ticks that this call was given are used up.
     TicksUsed,
+    /// The embedder has set the flag of [`Vm::stop_flag`].
+    Stopped,
 }
 
 impl Vm {
@@ -75,6 +79,15 @@ impl Vm {
 
     /// Runs tasks in turn, as [`Vm::run`] does, but only until the named one has ended.
     pub fn run_until(&mut self, id: Option<TaskId>, ticks: u64) -> RunOutcome {
+        self.run_tasks(id, ticks, true)
+    }
+
+    /// Runs tasks in turn, as [`Vm::run`] does, but comes back instead of waiting when all of them wait.
+    pub fn run_ready(&mut self, ticks: u64) -> RunOutcome {
+        self.run_tasks(None, ticks, false)
+    }
+
+    fn run_tasks(&mut self, id: Option<TaskId>, ticks: u64, may_wait: bool) -> RunOutcome {
         let end = self.spent.saturating_add(ticks);
         loop {
             if let Some(id) = id
@@ -88,6 +101,9 @@ impl Vm {
             if self.spent >= end {
                 return RunOutcome::TicksUsed;
             }
+            if self.stop.load(Relaxed) && self.stop.swap(false, Relaxed) {
+                return RunOutcome::Stopped;
+            }
             if let Some(interrupted) = self.take_interrupt() {
                 self.was_interrupted = true;
                 self.abort(interrupted);
@@ -100,7 +116,7 @@ impl Vm {
                     if self.alive == 0 {
                         return RunOutcome::Done;
                     }
-                    if !self.idle() {
+                    if !may_wait || !self.idle() {
                         return RunOutcome::Waiting;
                     }
                 }

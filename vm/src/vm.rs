@@ -167,6 +167,8 @@ pub struct Vm {
     pub(crate) starter: Value,
     /// Set from outside to abort the task that the embedder names with [`Vm::interruptible`].
     pub(crate) interrupt: Arc<AtomicBool>,
+    /// Set from outside to have a run come back.
+    pub(crate) stop: Arc<AtomicBool>,
     /// The task that an interrupt aborts.
     pub(crate) interruptible: Option<TaskId>,
     /// Whether an interrupt has aborted one.
@@ -262,6 +264,7 @@ impl Vm {
             spent: 0,
             starter,
             interrupt: Arc::default(),
+            stop: Arc::default(),
             interruptible: None,
             was_interrupted: false,
             values: Vec::new(),
@@ -325,6 +328,11 @@ impl Vm {
     /// A flag that makes the machine abort a task at the end of its slice when it is set.
     pub fn interrupt_flag(&self) -> Arc<AtomicBool> {
         self.interrupt.clone()
+    }
+
+    /// A flag that makes the run under way, or the next one, come back at the end of a slice when it is set.
+    pub fn stop_flag(&self) -> Arc<AtomicBool> {
+        self.stop.clone()
     }
 
     /// The status that the program has asked to end with.

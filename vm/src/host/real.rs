@@ -74,6 +74,9 @@ pub enum FileAccess {
     All,
 }
 
+/// Takes bytes that are written.
+pub type Screen = Box<dyn FnMut(&[u8]) -> std::io::Result<()> + Send>;
+
 /// The system, as the operating system shows it to the process.
 pub struct RealHost {
     start: Instant,
@@ -88,6 +91,8 @@ pub struct RealHost {
     reader: Option<Sender<()>>,
     is_reading: bool,
     is_woken: bool,
+    /// Where both output streams go instead of to the process's own.
+    screen: Option<Screen>,
     /// The time, if it is virtual.
     virtual_time: Option<u64>,
 }
@@ -108,8 +113,16 @@ impl RealHost {
             reader: None,
             is_reading: false,
             is_woken: false,
+            screen: None,
             virtual_time: None,
         }
+    }
+
+    /// Has what the program writes to its output streams go to `screen`.
+    #[must_use]
+    pub fn with_screen(mut self, screen: Screen) -> RealHost {
+        self.screen = Some(screen);
+        self
     }
 
     /// Grants access to files.
@@ -311,6 +324,9 @@ impl Host for RealHost {
     }
 
     fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError> {
+        if let Some(screen) = &mut self.screen {
+            return screen(bytes).map_err(|error| error_of(&error));
+        }
         let written = match output {
             Output::Standard => {
                 let mut out = std::io::stdout().lock();

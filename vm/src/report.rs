@@ -1,19 +1,50 @@
-//! What is said when no task can ever run again: who waits, for what, and where.
+//! What is said of tasks: when no task can ever run again, who waits, for what, and where; and the tree of all of them.
+
+use std::collections::BTreeMap;
 
 use crate::heap::Kind;
 use crate::interp;
 use crate::task::{Task, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::wait::event;
 
 /// Tasks that a report names.
 const SHOWN: usize = 20;
+/// Tasks that the tree of them shows.
+const SHOWN_IN_TREE: usize = 1000;
 /// Frames in which the line of the program is looked for.
 const FRAMES: usize = 50;
 
 /// Whether a source is one of the library, by the name that its build gives it.
 fn is_of_library(source: &str) -> bool {
     source.starts_with("stdlib/") && source.ends_with(".esl")
+}
+
+/// The order in which tasks are shown, each after its maker, and how deep below the first of them. `tasks` are the numbers of each task
+/// and of its maker, in the order of the former.
+fn depths(tasks: impl Iterator<Item = (u64, u64)>) -> Vec<(usize, usize)> {
+    let mut made: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+    let mut numbers = Vec::new();
+    let mut makers = Vec::new();
+    for (position, (number, maker)) in tasks.enumerate() {
+        made.entry(maker).or_default().push(position);
+        numbers.push(number);
+        makers.push(maker);
+    }
+    let is_there = |number: &u64| numbers.binary_search(number).is_ok();
+    let mut open: Vec<(usize, usize)> = (0..numbers.len())
+        .rev()
+        .filter(|&position| !is_there(&makers[position]))
+        .map(|root| (root, 0))
+        .collect();
+    let mut order = Vec::new();
+    while let Some((position, depth)) = open.pop() {
+        order.push((position, depth));
+        let children = made.get(&numbers[position]).map_or(&[][..], Vec::as_slice);
+        open.extend(children.iter().rev().map(|&child| (child, depth + 1)));
+    }
+    order
 }
 
 impl Vm {
@@ -36,6 +67,37 @@ impl Vm {
         }
         if tasks.len() > SHOWN {
             text.push_str(&format!("  and {} more\n", tasks.len() - SHOWN));
+        }
+        text
+    }
+
+    /// A text that shows the tasks of the program: each below the one that made it, what it does and where, and the ticks that
+    /// it has used.
+    pub fn task_report(&self) -> String {
+        let mut tasks: Vec<&Task> = self
+            .tasks
+            .iter()
+            .filter(|task| task.state != TaskState::Ended && !task.flags.hidden() && !task.flags.kept())
+            .collect();
+        tasks.sort_unstable_by_key(|task| task.number);
+        let maker = |task: &Task| self.slot(task.object, event::RESULT).as_index().unwrap_or(0) as u64;
+        let depths = depths(tasks.iter().map(|task| (task.number, maker(task))));
+        let mut text = String::new();
+        for (position, depth) in depths.iter().take(SHOWN_IN_TREE) {
+            let task = tasks[*position];
+            let label = self.task_label(task.object);
+            let state = match task.state {
+                TaskState::Runnable => "can run".to_string(),
+                _ => format!("waits for {}", self.reason_of(task)),
+            };
+            let place = self.program_place(task).map_or(String::new(), |place| format!(", {place}"));
+            let indent = "  ".repeat((*depth).min(20));
+            text.push_str(&format!("{indent}{label} {state}{place}, {} ticks\n", task.ticks));
+        }
+        if tasks.is_empty() {
+            text.push_str("There are no tasks.\n");
+        } else if tasks.len() > SHOWN_IN_TREE {
+            text.push_str(&format!("and {} more\n", tasks.len() - SHOWN_IN_TREE));
         }
         text
     }
@@ -88,5 +150,20 @@ impl Vm {
             let place = self.source_place(code, word as u32).filter(|place| !is_of_library(&place.source))?;
             Some(format!("{}:{}:{}", place.source, place.line, place.column))
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::depths;
+
+    #[test]
+    fn tasks_come_after_their_makers() {
+        let tasks = [(2, 1), (4, 2), (5, 3), (7, 4), (8, 2), (9, 5)];
+        let tree: Vec<(u64, usize)> = depths(tasks.into_iter())
+            .into_iter()
+            .map(|(position, depth)| (tasks[position].0, depth))
+            .collect();
+        assert_eq!(tree, [(2, 0), (4, 1), (7, 2), (8, 1), (5, 0), (9, 1)]);
     }
 }
