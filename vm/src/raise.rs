@@ -64,9 +64,9 @@ pub enum Raised {
     HeapExhausted,
 }
 
-/// Why a builtin gives no value.
+/// Why a builtin gives no value. As wide as a value, so that an [`Outcome`] comes back in two registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
+#[repr(u64)]
 pub enum Exit {
     /// It failed; [`Vm::raised`] says how.
     Raise,

@@ -60,7 +60,9 @@ fn find_other(vm: &mut Vm, table: Table, test: Test, key: Value) -> Result<Place
 fn search(vm: &mut Vm, table: Table, test: Test, key: Value, hash: u32) -> Result<Place, Exit> {
     let mut work = LIMIT;
     let found = table.find(&vm.heap, test, key, hash, &mut work)?;
-    vm.charge(LIMIT - work);
+    if work != LIMIT {
+        vm.charge(LIMIT - work);
+    }
     Ok(match found {
         Some((entry, value)) => {
             vm.last_lookup = (key, entry);
