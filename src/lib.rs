@@ -21,6 +21,7 @@
 pub mod command;
 pub mod data;
 pub mod engine;
+pub mod explore;
 pub mod library;
 pub mod program;
 pub mod repl;

@@ -14,7 +14,7 @@ use esl_compiler::diagnostic::Sources;
 use esl_compiler::session::Compiler;
 use esl_vm::host::{FileAccess, Host, RealHost};
 use esl_vm::run::RunOutcome;
-use esl_vm::task::TaskResult;
+use esl_vm::task::{TaskId, TaskResult};
 use esl_vm::vm::{Config, Vm};
 
 use crate::library::Library;
@@ -261,16 +261,29 @@ pub fn run(program: &Program, config: Config, host: Box<dyn Host + Send>) -> Res
 /// # Errors
 /// As [`run`].
 pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Report, String> {
+    let main = begin(machine, program)?;
+    let outcome = machine.run(u64::MAX);
+    let ended = end(machine, main, outcome);
+    let (tasks, turns, switches) = machine.tasks_turns_and_switches();
+    Ok(Report { ended, ticks: machine.ticks(), tasks, turns, switches, heap: machine.heap_stats() })
+}
+
+/// Makes the main task of a program in a machine that has the library.
+pub(crate) fn begin(machine: &mut Vm, program: &Program) -> Result<TaskId, String> {
     let functions = machine.load_module(&program.module).map_err(|error| error.to_string())?;
     let main = machine.spawn_library("%RUN-TOPLEVEL", &[functions])?;
     machine.set_interruptible(Some(main));
     machine.set_main(main);
-    let outcome = machine.run(u64::MAX);
+    Ok(main)
+}
+
+/// How a program with this main task has ended; reports what there is to report.
+pub(crate) fn end(machine: &mut Vm, main: TaskId, outcome: RunOutcome) -> Ended {
     machine.flush();
     if let Some(report) = machine.report(main) {
         machine.complain(&report);
     }
-    let ended = match (outcome, machine.result(main)) {
+    match (outcome, machine.result(main)) {
         (RunOutcome::BudgetSpent, _) => Ended::BudgetSpent,
         (RunOutcome::Waiting, _) => {
             let report = machine.deadlock_report();
@@ -287,9 +300,7 @@ pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Report, String> {
             }
         }
         _ => Ended::Normally(machine.exit_status().unwrap_or(0)),
-    };
-    let (tasks, turns, switches) = machine.tasks_turns_and_switches();
-    Ok(Report { ended, ticks: machine.ticks(), tasks, turns, switches, heap: machine.heap_stats() })
+    }
 }
 
 #[cfg(test)]

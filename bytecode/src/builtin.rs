@@ -1032,10 +1032,12 @@ define_builtins! {
     ForceOutput = cl "FORCE-OUTPUT" ("&optional stream");
 
     // ---- the logical database
-    /// Adds a fact to the database: `T` if it was new, or the fact that it replaces as the value of a property.
-    AssertFact = internal "%ASSERT" ("fact");
-    /// Removes a fact from the database; whether it was there, or 0 for a pattern with variables.
-    RetractFact = internal "%RETRACT" ("fact");
+    /// Adds a fact to the database: `T` if it was new, or the fact that it replaces as the value of a property. Does nothing
+    /// and gives `:locked` if the table `locks` has entries.
+    AssertFact = internal "%ASSERT" ("fact locks");
+    /// Removes a fact from the database; whether it was there, or 0 for a pattern with variables. Does nothing and gives
+    /// `:locked` if the table `locks` has entries.
+    RetractFact = internal "%RETRACT" ("fact locks");
     /// From now on the last of `width` arguments of facts of this name is unique for given others; `NIL` if there are rules
     /// for such facts.
     MakeProperty = internal "%MAKE-PROPERTY" ("name width");
@@ -1056,8 +1058,9 @@ define_builtins! {
     QueryTell = internal "%QUERY-TELL" ("query holds");
     /// The next answers of a query, a list of binding lists; empty when all were given.
     QueryAnswers = internal "%QUERY-ANSWERS" ("query");
-    /// Removes the next fact that a query has found and that is still there, and gives it; `NIL` when all were seen to, `T` to be asked again.
-    RetractNext = internal "%RETRACT-NEXT" ("query");
+    /// Removes the next fact that a query has found and that is still there, and gives it; `NIL` when all were seen to, `T` to be
+    /// asked again. Does nothing and gives `:locked` if the table `locks` has entries.
+    RetractNext = internal "%RETRACT-NEXT" ("query locks");
     /// Ends a query.
     CloseQuery = internal "%CLOSE-QUERY" ("query");
 

@@ -112,7 +112,7 @@ fn is_waiting(task: &Task, serial: u64) -> bool {
 }
 
 /// Whether a timer of a task is still of use.
-fn is_wanted(task: Option<&Task>, due: Due) -> bool {
+pub(crate) fn is_wanted(task: Option<&Task>, due: Due) -> bool {
     let Some(task) = task else { return false };
     match due {
         Due::Wait(serial) => is_waiting(task, serial),

@@ -4,6 +4,7 @@
 
 pub mod builtins;
 pub mod embed;
+pub mod explore;
 pub mod figures;
 pub mod heap;
 pub mod host;

@@ -110,6 +110,17 @@ impl Accounts {
         }
     }
 
+    /// Calls `visit` with the ticks that are left of an account and of those above it, as far as they matter.
+    pub(crate) fn visit_left(&self, id: AccountId, visit: &mut dyn FnMut(u64)) {
+        let mut id = id;
+        while let Some(account) = self.get(id) {
+            if account.status != Status::Closed {
+                visit(account.left as u64);
+            }
+            id = account.parent;
+        }
+    }
+
     /// The ticks that may be used before one of these accounts is spent.
     pub(crate) fn left(&self, id: AccountId) -> u64 {
         let (mut id, mut least) = (id, i64::MAX);
@@ -137,6 +148,16 @@ pub(crate) struct Limit {
 }
 
 impl Limit {
+    /// Index of its entry in the control stack.
+    pub(crate) fn entry(&self) -> usize {
+        self.entry as usize
+    }
+
+    /// Why it has expired, if it has.
+    pub(crate) fn expired(&self) -> Option<Value> {
+        self.expired
+    }
+
     /// Its number.
     pub(crate) fn number(&self) -> u64 {
         self.number

@@ -125,7 +125,7 @@ impl Vm {
     }
 
     /// Gives a runnable task its turn: one slice, or as many as it takes to leave a critical section.
-    fn give_turn(&mut self, index: u32, end: u64) {
+    pub(crate) fn give_turn(&mut self, index: u32, end: u64) {
         loop {
             let limit = end.saturating_sub(self.spent);
             let leave = self.run_slice(index, limit);

@@ -80,6 +80,11 @@ pub(crate) struct Flags(u16);
 macro_rules! define_flags {
     ($( $(#[doc = $doc:literal])* $name:ident $set:ident = $bit:literal ; )*) => {
         impl Flags {
+            /// All of them, as a word.
+            pub(crate) const fn bits(self) -> u16 {
+                self.0
+            }
+
             $(
                 $(#[doc = $doc])*
                 #[inline(always)]
@@ -114,6 +119,8 @@ define_flags! {
     attention set_attention = 6;
     /// It has waited twice with a stack that is much too large.
     oversized set_oversized = 7;
+    /// It stands at a point, before it does what others can see: see `explore`.
+    at_point set_at_point = 8;
 }
 
 /// What is to be said of a failure.

@@ -54,6 +54,13 @@ impl Timers {
         self.heap.peek().map(|Reverse(timer)| timer.0)
     }
 
+    /// All timers, in order.
+    pub(crate) fn in_order(&self) -> Vec<Timer> {
+        let mut timers: Vec<Timer> = self.heap.iter().map(|Reverse(timer)| *timer).collect();
+        timers.sort_unstable();
+        timers
+    }
+
     /// The first timer itself.
     pub(crate) fn peek(&self) -> Option<(u32, Due)> {
         self.heap.peek().map(|Reverse(timer)| (timer.2, timer.3))

@@ -10,6 +10,7 @@ use esl_bytecode::datum::Datum;
 use crate::control::End;
 use crate::database::Database;
 use crate::embed::HostFunction;
+use crate::explore::Points;
 use crate::figures::Figures;
 use crate::heap::{AllocError, Heap, HeapConfig, Kind};
 use crate::host::{Console, Host, Output};
@@ -195,6 +196,8 @@ pub struct Vm {
     /// The status that the program has asked to end with.
     pub(crate) exit_status: Option<u8>,
 
+    /// Where tasks stop while schedules are explored.
+    pub(crate) points: Points,
     /// Limits and settings.
     pub(crate) config: Config,
 }
@@ -276,6 +279,7 @@ impl Vm {
             last_words: None,
             complaints: Output::Error,
             exit_status: None,
+            points: Points::default(),
             config,
         })
     }

@@ -45,7 +45,7 @@ pub(crate) mod event {
 }
 
 /// Slots and flags of a wait.
-mod link {
+pub(crate) mod link {
     /// The task; in the links after the first, the first.
     pub(super) const OWNER: usize = 0;
     /// The event whose list it is in, or `NIL`.
@@ -58,7 +58,7 @@ mod link {
     /// The arguments of the signal; of a wait that keeps signals, a pair of the first and the last of a list of them.
     pub(super) const QUEUE: usize = 5;
     /// When it ends by itself, in nanoseconds, or `NIL`.
-    pub(super) const DEADLINE: usize = 6;
+    pub(crate) const DEADLINE: usize = 6;
     pub(super) const LENGTH: usize = 7;
 
     /// Flag: signals are kept until the wait is closed.

@@ -4,6 +4,7 @@
 use crate::database::{Fault, Problem, Progress};
 use crate::heap::AllocError;
 use crate::raise::{Exit, Outcome, Raised};
+use crate::table::Table;
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -33,8 +34,17 @@ fn checked<T>(vm: &mut Vm, outcome: Result<T, Fault>) -> Result<T, Exit> {
     }
 }
 
-/// `(%assert fact)`
+/// Whether the table `locks` has entries: then a change has to be made where they are told of it.
+fn has_locks(vm: &Vm, locks: Value) -> bool {
+    Table::of(&vm.heap, locks).is_some_and(|table| table.count(&vm.heap) > 0)
+}
+
+/// `(%assert fact locks)`
 pub(super) fn assert_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point()?;
+    if has_locks(vm, arguments[1]) {
+        return Ok(vm.world.known.locked);
+    }
     prepare(vm)?;
     let mut work = 0;
     let outcome = vm.database.assert(&mut vm.heap, arguments[0], &mut work);
@@ -44,6 +54,7 @@ pub(super) fn assert_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%make-property name width)`
 pub(super) fn make_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point()?;
     prepare(vm)?;
     if !vm.world.is_symbol(&vm.heap, arguments[0]) {
         return vm.type_error(arguments[0], "SYMBOL");
@@ -57,6 +68,7 @@ pub(super) fn make_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%property-value property)`
 pub(super) fn property_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point_of_read()?;
     prepare(vm)?;
     let mut work = 0;
     let outcome = vm.database.property_value(&mut vm.heap, arguments[0], &mut work);
@@ -69,8 +81,12 @@ pub(super) fn property_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%retract fact)`
+/// `(%retract fact locks)`
 pub(super) fn retract_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point()?;
+    if has_locks(vm, arguments[1]) {
+        return Ok(vm.world.known.locked);
+    }
     prepare(vm)?;
     let mut work = 0;
     let outcome = vm.database.retract(&mut vm.heap, arguments[0], &mut work);
@@ -83,6 +99,7 @@ pub(super) fn retract_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%define-rule head body source)`
 pub(super) fn define_rule(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point()?;
     prepare(vm)?;
     let &[head, body, source] = arguments else { unreachable!("the table says three") };
     let mut work = 0;
@@ -94,6 +111,7 @@ pub(super) fn define_rule(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%open-query query bindings facts)`
 pub(super) fn open_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point_of_read()?;
     prepare(vm)?;
     let &[query, bindings, facts] = arguments else { unreachable!("the table says three") };
     let mut work = 0;
@@ -159,6 +177,7 @@ fn raise_problem(vm: &mut Vm, problem: Problem) -> Outcome {
 
 /// `(%begin-query query bindings)`
 pub(super) fn begin_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point_of_read()?;
     prepare(vm)?;
     let &[query, bindings] = arguments else { unreachable!("the table says two") };
     let mut work = 0;
@@ -212,8 +231,12 @@ pub(super) fn query_answers(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(open(vm, answers)??)
 }
 
-/// `(%retract-next query)`
+/// `(%retract-next query locks)`
 pub(super) fn retract_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point()?;
+    if has_locks(vm, arguments[1]) {
+        return Ok(vm.world.known.locked);
+    }
     let key = query(vm, arguments[0])?;
     let mut work = 0;
     let fact = vm.database.retract_next(&mut vm.heap, key, &mut work);

@@ -73,6 +73,7 @@ pub(super) fn make_event(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(signal event &rest arguments)`, `(signal-event event &rest arguments)`
 pub(super) fn signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point()?;
     if !vm.is_event(arguments[0]) {
         return vm.event_error(arguments[0]);
     }
@@ -83,6 +84,7 @@ pub(super) fn signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(event-count event)`
 pub(super) fn event_count(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point_of_read()?;
     if !vm.is_event(arguments[0]) {
         return vm.event_error(arguments[0]);
     }
@@ -91,6 +93,7 @@ pub(super) fn event_count(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%count-events events)`
 pub(super) fn count_events(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point_of_read()?;
     let sum = vm.count_of_events(arguments[0])?;
     Ok(Value::fixnum(sum).unwrap_or(Value::small(0)))
 }
@@ -136,6 +139,7 @@ pub(super) fn wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             None => vm.park(wait, None),
         };
     }
+    vm.point()?;
     if vm.was_signalled_since(events, count)? {
         return Ok(Value::NIL);
     }
@@ -145,6 +149,7 @@ pub(super) fn wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%open-wait events seconds count what)`
 pub(super) fn open_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point()?;
     let &[events, seconds, count, what] = arguments else { unreachable!("the table says four") };
     let deadline = if seconds.is_nil() {
         None

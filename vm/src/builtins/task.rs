@@ -138,6 +138,7 @@ pub(super) fn taskp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(task-status task)`
 pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point_of_read()?;
     let task = vm.expect_task(arguments[0])?;
     let state = vm.slot(task, event::STATE);
     let Some(index) = state.as_index() else { return Ok(state) };
@@ -170,10 +171,13 @@ pub(super) fn task_ticks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%task-end task)`: the status of a task that has ended, then its values, or the condition; `NIL` before.
 pub(super) fn task_end(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point_of_read()?;
     let task = vm.expect_task(arguments[0])?;
-    if !vm.has_ended(task) {
-        return Ok(Value::NIL);
-    }
+    if vm.has_ended(task) { give_end(vm, task) } else { Ok(Value::NIL) }
+}
+
+/// The status of a task that has ended, then its values, or the condition.
+fn give_end(vm: &mut Vm, task: Value) -> Outcome {
     let (status, result) = (vm.slot(task, event::STATE), vm.slot(task, event::RESULT));
     let has_one_value = vm.heap.header(task).is_some_and(|header| header.aux == 1);
     vm.values.clear();
@@ -221,15 +225,19 @@ pub(super) fn tasks_from(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%join task child)`
 pub(super) fn join(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    if vm.task().wait.is_nil() {
+        vm.point()?;
+    }
     let task = vm.expect_task(arguments[0])?;
     match vm.wait_for_end(task, false, arguments[1].is_true()) {
         Some(outcome) => outcome,
-        None => task_end(vm, arguments),
+        None => give_end(vm, task),
     }
 }
 
 /// `(%request-abort task)`
 pub(super) fn request_abort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point()?;
     let task = vm.expect_task(arguments[0])?;
     if let Some(index) = vm.slot(task, event::STATE).as_index()
         && let Some(id) = vm.tasks.id_at(index as u32)
@@ -262,6 +270,7 @@ pub(super) fn abort_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%add-checkpoint id)`
 pub(super) fn add_checkpoint(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point()?;
     vm.wait_for_deliveries()?;
     let task = vm.task().object;
     let list = vm.heap.cons(arguments[0], vm.slot(task, event::CHECKPOINTS))?;
@@ -272,6 +281,7 @@ pub(super) fn add_checkpoint(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%checkpoints task)`
 pub(super) fn checkpoints(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point_of_read()?;
     let task = vm.expect_task(arguments[0])?;
     Ok(vm.slot(task, event::CHECKPOINTS))
 }
@@ -290,6 +300,7 @@ pub(super) fn make_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%interrupt-by guard)`
 pub(super) fn interrupt_by(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point()?;
     if vm.is_guard(arguments[0]) {
         vm.set_slot(arguments[0], guard::IS_OPEN, Value::T);
         vm.interrupt_by(arguments[0]);
@@ -299,6 +310,7 @@ pub(super) fn interrupt_by(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%close-guard guard)`
 pub(super) fn close_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point()?;
     if vm.is_guard(arguments[0]) {
         vm.set_slot(arguments[0], guard::IS_OPEN, Value::NIL);
     }
@@ -315,6 +327,7 @@ pub(super) fn open_limit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%begin-critical)`
 pub(super) fn begin_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    vm.point()?;
     let ticks = i64::from(vm.config.critical_ticks);
     let task = vm.task_mut();
     if task.critical == 0 {

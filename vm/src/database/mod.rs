@@ -453,6 +453,34 @@ impl Database {
         heap.set_external(self.footprint())
     }
 
+    // For those who look at states.
+
+    /// Whether no query is open.
+    pub(crate) fn is_quiet(&self) -> bool {
+        self.queries.is_empty()
+    }
+
+    /// Calls `visit` with words and objects that say which facts and rules there are, and in which order they came.
+    pub(crate) fn visit_state(&self, visit: &mut dyn FnMut(Result<u64, Value>)) {
+        let mut rows: Vec<(u64, &Relation, u32)> = Vec::new();
+        for relation in &self.relations {
+            rows.extend(relation.live_rows().map(|row| (relation.born(row), relation, row)));
+        }
+        rows.sort_unstable_by_key(|&(born, ..)| born);
+        for (_, relation, row) in rows {
+            visit(Ok(relation.width as u64));
+            for &term in [&relation.functor].into_iter().chain(relation.row(row)) {
+                self.terms.visit_state(term, visit);
+            }
+        }
+        for rule in self.rules.predicates.iter().flat_map(|predicate| &predicate.rules) {
+            self.terms.visit_state(rule.source, visit);
+        }
+        for relation in self.relations.iter().filter(|relation| relation.is_property()) {
+            self.terms.visit_state(relation.functor, visit);
+        }
+    }
+
     // Keeping order.
 
     /// Bytes that the database takes, about.

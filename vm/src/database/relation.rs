@@ -193,6 +193,11 @@ impl Relation {
         self.set.find(hash_cells(cells), is_it)
     }
 
+    /// The rows that are facts now.
+    pub(super) fn live_rows(&self) -> impl Iterator<Item = u32> {
+        (0..self.spans.len() as u32).filter(|&row| self.is_live(row))
+    }
+
     /// Whether its last argument is unique for given others.
     pub(super) fn is_property(&self) -> bool {
         self.is_property

@@ -147,6 +147,38 @@ impl Terms {
         Term(Value::term(index))
     }
 
+    /// Calls `visit` with words and objects that tell a term from all others.
+    pub(super) fn visit_state(&self, term: Term, visit: &mut dyn FnMut(Result<u64, Value>)) {
+        let mut open = vec![term];
+        while let Some(term) = open.pop() {
+            let Some(index) = term.0.as_term() else {
+                visit(Err(term.0));
+                continue;
+            };
+            match &self.nodes[index as usize].data {
+                Data::Pair { car, cdr, .. } => {
+                    visit(Ok(1));
+                    open.extend([*cdr, *car]);
+                }
+                Data::Ratio(numerator, denominator) => {
+                    visit(Ok(2));
+                    open.extend([*denominator, *numerator]);
+                }
+                Data::Text(characters) => {
+                    visit(Ok(3 + 8 * characters.len() as u64));
+                    characters.iter().for_each(|&c| visit(Ok(u64::from(c))));
+                }
+                Data::Big(negative, limbs) => {
+                    visit(Ok(4 + u64::from(*negative) + 8 * limbs.len() as u64));
+                    limbs.iter().for_each(|&limb| visit(Ok(limb)));
+                }
+                Data::Float(bits) => [6, *bits].into_iter().for_each(|word| visit(Ok(word))),
+                Data::Object(v) => visit(Err(*v)),
+                Data::Free => visit(Ok(7)),
+            }
+        }
+    }
+
     /// Another holder for a term.
     pub(super) fn retain(&mut self, term: Term) {
         if let Some(index) = term.0.as_term() {

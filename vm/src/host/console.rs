@@ -20,6 +20,8 @@ pub(crate) struct Console {
     output: Vec<u8>,
     /// Characters since the last line end, by stream.
     columns: [usize; 2],
+    /// A hash of all that was written to standard output, if that is wanted.
+    noted: Option<u64>,
     broken: bool,
     /// Why standard output could not be written, until somebody asks.
     failure: Option<HostError>,
@@ -50,6 +52,11 @@ impl Console {
         *column = column_after(*column, characters);
         match output {
             Output::Standard => {
+                if let Some(noted) = &mut self.noted {
+                    for &c in characters {
+                        *noted = (noted.rotate_left(5) ^ u64::from(c)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+                    }
+                }
                 encode(characters, &mut self.output);
                 if self.output.len() >= BLOCK {
                     self.flush(host);
@@ -63,6 +70,16 @@ impl Console {
                 let _ = host.write(Output::Error, &bytes);
             }
         }
+    }
+
+    /// From now on what is written to standard output is noted, or not.
+    pub(crate) fn note_all(&mut self, on: bool) {
+        self.noted = on.then_some(0);
+    }
+
+    /// A hash of what was noted.
+    pub(crate) fn noted(&self) -> u64 {
+        self.noted.unwrap_or(0)
     }
 
     /// Writes what standard output has gathered.

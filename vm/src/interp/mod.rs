@@ -18,7 +18,7 @@ pub(crate) mod call;
 mod cold;
 mod collect;
 pub(crate) use collect::top_of_task;
-pub(crate) use raise::frames_of_task;
+pub(crate) use raise::{entry_word, frames_of_task, visit_frames};
 mod control;
 mod double;
 mod raise;
@@ -175,10 +175,15 @@ pub(crate) fn load(vm: &mut Vm, ticks: i32) {
 /// Sees to what was noted of the task in `vm.running`, which is loaded: it may begin to unwind, or find itself in another
 /// function.
 pub(crate) fn see_to_attention(vm: &mut Vm) -> Result<(), Leave> {
-    if let Some(function) = vm.see_to_running_task() {
-        interrupt(vm, function, &[])?;
+    let was_unwinding = vm.task().control.is_unwinding();
+    let function = vm.see_to_running_task();
+    if function.is_some() || vm.task().control.is_unwinding() != was_unwinding {
+        vm.close_point();
     }
-    Ok(())
+    match function {
+        Some(function) => interrupt(vm, function, &[]),
+        None => Ok(()),
+    }
 }
 
 /// Calls `function` where the task in `vm.running`, which is loaded, stands.
@@ -240,6 +245,7 @@ unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
                 Signal::Call => call::slow_call(vm),
                 Signal::ReturnAll => call::return_all(vm),
                 Signal::Unwind => control::unwind(vm),
+                Signal::TaskExit if vm.stops_before_end() => return Err(Leave::Slice),
                 Signal::TaskExit => {
                     vm.finish_task();
                     return Err(Leave::Ended);

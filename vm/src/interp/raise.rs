@@ -243,6 +243,65 @@ impl Vm {
     }
 }
 
+/// A frame with what it holds.
+pub(crate) struct FrameView<'a> {
+    /// The function.
+    pub function: Value,
+    /// As in [`FrameAt`].
+    pub word: usize,
+    /// As in [`FrameAt`].
+    pub is_exact: bool,
+    /// Its registers, up to the frame above it.
+    pub registers: &'a [Value],
+}
+
+/// Calls `visit` with the frames of a task that does not run, innermost first.
+pub(crate) fn visit_frames(task: &Task, visit: &mut dyn FnMut(FrameView<'_>)) {
+    let bottom = task.stack.start();
+    // SAFETY: the task stands where it was noted at the switch; frames are linked as in `frames_of`, and the frame at the
+    // root, which the stub at the end of the task runs in, has nothing but its function.
+    unsafe {
+        let mut pc = task.pc;
+        let mut base = bottom.add(task.base as usize);
+        let mut is_exact = true;
+        let mut end = usize::MAX;
+        while base.addr() >= bottom.addr() + 4 * size_of::<Value>() {
+            let function = *base.sub(2);
+            let code = code_of(function);
+            let start = code.byte_add((*code).words_offset()).cast::<u32>().cast_const();
+            let word = pc.addr().wrapping_sub(start.addr()) / size_of::<u32>();
+            let nregs = (*code).nregs as usize;
+            let registers = std::slice::from_raw_parts(base, nregs.min(end));
+            visit(FrameView { function, word, is_exact, registers });
+            let return_to: *const u32 = std::ptr::with_exposed_provenance((*base.sub(1)).bits() as usize);
+            if return_to == stubs::task_exit() {
+                break;
+            }
+            end = (*return_to.sub(2) >> 8 & 0xff) as usize;
+            base = base.sub(2 + end);
+            is_exact = stubs::is_return_above(return_to);
+            pc = return_to;
+            if is_exact {
+                let nregs = (*code_of(*base.sub(2))).nregs as usize;
+                pc = std::ptr::with_exposed_provenance((*base.add(nregs)).bits() as usize);
+            }
+        }
+    }
+}
+
+/// The word of the code of its frame at which an entry of a task that does not run lands, if it has one.
+pub(crate) fn entry_word(task: &Task, entry: &Entry) -> Option<usize> {
+    if entry.pc.is_null() {
+        return None;
+    }
+    // SAFETY: the frame of an entry is live.
+    unsafe {
+        let code = code_of(*task.stack.start().add(entry.base as usize).sub(2));
+        let start = code.byte_add((*code).words_offset()).cast::<u32>().cast_const();
+        Some(entry.pc.addr().wrapping_sub(start.addr()) / size_of::<u32>())
+    }
+}
+
 /// The frames of a task that does not run, innermost first, at most `limit` of them.
 pub(crate) fn frames_of_task(task: &Task, limit: usize) -> Vec<FrameAt> {
     let start = task.stack.start();

@@ -76,6 +76,7 @@ define_known! {
     internal = keyword "INTERNAL";
     external = keyword "EXTERNAL";
     inherited = keyword "INHERITED";
+    locked = keyword "LOCKED";
     test = keyword "TEST";
     unfinished = keyword "UNFINISHED";
 }

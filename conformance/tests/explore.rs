@@ -1,0 +1,185 @@
+//! Explores all schedules of small programs: shows what never happens, and finds what does.
+
+use esl::explore::{Exploration, Grain, Outcome, Settings, explore, follow};
+use esl::program::{self, Ended, Program, Source};
+
+fn compile(text: &str) -> Program {
+    let compiled = program::compile(&[Source::new("explored.esl", text)]);
+    let messages: Vec<&String> = compiled.diagnostics.iter().map(|diagnostic| &diagnostic.message).collect();
+    compiled.program.unwrap_or_else(|| panic!("the program compiles: {messages:?}"))
+}
+
+#[allow(clippy::print_stdout, reason = "a test of this kind has its figures to say")]
+fn say<T>(grain: Grain, found: &Exploration<T>) {
+    println!("{grain:?}: {} states, {} runs, {} endings", found.states, found.runs, found.endings.len());
+}
+
+/// Everything that runs of a program come to. Each ending is reached again by its choices.
+fn endings(text: &str, grain: Grain) -> Exploration<Outcome> {
+    let program = compile(text);
+    let settings = Settings { grain, ..Settings::default() };
+    let found = explore(&program, &settings).expect("the program can be begun");
+    assert!(found.is_complete, "more than {} states", found.states);
+    for ending in &found.endings {
+        let again = follow(&program, &settings, &ending.choices).expect("the program can be begun");
+        assert_eq!(again, ending.what, "choices {:?}", ending.choices);
+    }
+    say(grain, &found);
+    found
+}
+
+/// The outputs of runs that have all ended well, in order.
+fn outputs(found: &Exploration<Outcome>) -> Vec<String> {
+    let mut outputs = Vec::new();
+    for ending in &found.endings {
+        let Outcome { ended, output, errors } = &ending.what;
+        assert_eq!(*ended, Ended::Normally(0), "choices {:?}\n{output}{errors}", ending.choices);
+        outputs.push(output.split_whitespace().collect::<Vec<_>>().join(" "));
+    }
+    outputs.sort_unstable();
+    outputs.dedup();
+    outputs
+}
+
+/// That each schedule of a program ends well, and what they write.
+fn check(text: &str, grain: Grain, expected: &[&str]) -> Exploration<Outcome> {
+    let found = endings(text, grain);
+    assert_eq!(outputs(&found), expected);
+    assert_eq!((&found.endless, found.has_cycle), (&None, false), "a run may go on for ever");
+    found
+}
+
+/// The tasks that stopped the Remote Agent in flight in May 1999: each waits for the other's signal unless its counter shows
+/// that there was one. `wait` is how the first argument is waited for unless its count differs from `seen`.
+fn remote_agent(wait: &str) -> String {
+    format!(
+        "(defvar *first* (make-event 'first))
+         (defvar *second* (make-event 'second))
+         (defmacro wait (event) {wait})
+         (task-net
+           (a (let ((seen 0))
+                (dotimes (i 3)
+                  (wait *first*)
+                  (setq seen (event-count *first*))
+                  (signal *second*))))
+           (b (let ((seen 0))
+                (dotimes (i 3)
+                  (signal *first*)
+                  (wait *second*)
+                  (setq seen (event-count *second*))))))
+         (princ 'done)"
+    )
+}
+
+#[test]
+fn a_counter_tested_before_the_wait_deadlocks() {
+    let text = remote_agent("`(when (= seen (event-count ,event)) (wait-for-events ,event))");
+    for grain in [Grain::Changes, Grain::Reads] {
+        let found = endings(&text, grain);
+        let deadlock = found.endings.iter().find(|ending| ending.what.ended == Ended::Deadlocked);
+        let deadlock = deadlock.expect("a schedule deadlocks");
+        // One untimely switch is enough: between the test and the wait.
+        let switches = deadlock.choices.iter().filter(|&&choice| choice != 0).count();
+        assert!(switches <= 2, "{:?}", deadlock.choices);
+        assert!(deadlock.what.errors.contains("waits for event FIRST"), "{}", deadlock.what.errors);
+        assert!(found.endings.iter().any(|ending| ending.what.output == "DONE"), "other schedules end");
+    }
+}
+
+#[test]
+fn a_counter_tested_by_the_wait_does_not_deadlock() {
+    let text = remote_agent("`(wait-for-events ,event :unless-count seen)");
+    for grain in [Grain::Changes, Grain::Reads] {
+        check(&text, grain, &["DONE"]);
+    }
+}
+
+/// Two tasks that want different values of one property, and a change from outside: what was model-checked in 1997.
+const TWO_TASKS: &str = "
+  (define-property power (device))
+  (to-achieve (power device value)
+    (t (assert (list 'power device value))))
+  (defvar *outcomes* (list nil nil))
+  (defvar *ended* 0)
+  (defun want (number value)
+    (setf (nth number *outcomes*)
+          (with-recovery-procedures ((:property-lock-unavailable (abort :unavailable))
+                                     (:maintained-property-violation (abort :violated)))
+            (with-maintained-property (power 'camera value)
+              (sleep 0)
+              (power 'camera))))
+    (when (= (incf *ended*) 2)
+      (print *outcomes*)
+      (print (hash-table-count esl::*%locks*))))
+  (spawn (want 0 :on))
+  (spawn (want 1 :off))
+  (assert '(power camera :broken))";
+
+#[test]
+fn two_tasks_a_change_and_the_daemon() {
+    // Whoever holds the lock finds the value that it wants, or is told of the violation; the other one waits for nothing. Never
+    // do both find theirs violated, since there is one change only; in the end no lock is left.
+    check(
+        TWO_TASKS,
+        Grain::Changes,
+        &[
+            "(:ON :OFF) 0",
+            "(:ON :UNAVAILABLE) 0",
+            "(:ON :VIOLATED) 0",
+            "(:UNAVAILABLE :OFF) 0",
+            "(:UNAVAILABLE :VIOLATED) 0",
+            "(:VIOLATED :OFF) 0",
+            "(:VIOLATED :UNAVAILABLE) 0",
+        ],
+    );
+}
+
+#[test]
+fn no_lock_is_held_by_a_task_that_has_ended() {
+    // The last task looks once, so it looks at every state.
+    let text = "
+      (define-property power (device))
+      (to-achieve (power device value)
+        (t (assert (list 'power device value))))
+      (defun held-by-the-dead ()
+        (without-interrupts
+          (let ((found nil))
+            (maphash (lambda (key lock)
+                       (dolist (subscription (svref lock 5))
+                         (unless (member (task-status (svref subscription 0)) '(:running :waiting))
+                           (setq found key))))
+                     esl::*%locks*)
+            found)))
+      (let ((task (spawn (with-maintained-property (power 'camera :on) (sleep 0)))))
+        (spawn (abort-task task))
+        (spawn (print (held-by-the-dead))))";
+    check(text, Grain::Reads, &["NIL"]);
+}
+
+#[test]
+fn a_violated_subscriber_recovers() {
+    let text = "
+      (define-property power (device))
+      (to-achieve (power device value)
+        (t (assert (list 'power device value))))
+      (spawn
+        (with-automatic-recoveries
+          (with-maintained-property (power 'camera :on)
+            (sleep 0)
+            (without-interrupts (print (power 'camera))))))
+      (assert '(power camera :off))";
+    // What is read is read after the recovery, or before the change; or the change comes when the lock is held but nobody has
+    // looked yet: the interrupt waits for the end of the critical section.
+    check(text, Grain::Changes, &[":ON"]);
+}
+
+#[test]
+fn what_runs_for_ever_is_told_from_what_may_run_for_ever() {
+    let found = endings(
+        "(defvar *stop* nil) (spawn (setq *stop* t)) (loop (when *stop* (return)) (sleep 0))",
+        Grain::Changes,
+    );
+    assert!(found.has_cycle && found.endless.is_none(), "{found:?}");
+    let found = endings("(spawn (loop (sleep 0)))", Grain::Changes);
+    assert!(found.has_cycle && found.endless.is_some() && found.endings.is_empty(), "{found:?}");
+}

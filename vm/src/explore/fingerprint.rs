@@ -1,0 +1,460 @@
+//! Fingerprints of states: what a program may still do depends on what is hashed here, and on the schedule.
+//!
+//! A state consists of the tasks that have not ended (frames, control stacks, bindings, waits, what is noted of them), the values,
+//! functions and properties of symbols, facts and rules, timers, and all objects that can be reached from there. Objects have no
+//! addresses in it: each is the number of those that were met before it, in an order that depends on the state alone. Tables are
+//! hashed in the order of their entries, facts in that of their assertion, times relative to now.
+//!
+//! Not part of a state: ticks (but for budgets), the numbers of tasks, the order of queues, registers that will not be read
+//! (`live`), what is reachable from code only, and the outside. While a query is open at a point, each state is another one.
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use super::live::Live;
+use crate::control::{Control, End, Entry, Target, Unwinding};
+use crate::heap::layout::Symbol as SymbolObject;
+use crate::heap::{Heap, Kind};
+use crate::interp;
+use crate::load::image_origin;
+use crate::shape::{Shape, Sort};
+use crate::table::Table;
+use crate::task::{Task, TaskState};
+use crate::timer::Due;
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::wait::{event, link};
+use crate::world::GivenMap;
+
+/// Two hashes of 64 bits of a sequence of words, mixed apart from each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct Digest(u64, u64);
+
+impl Digest {
+    pub(super) fn add(&mut self, word: u64) {
+        // Each line is a bijection of the hash for a given word, and of the word for a given hash.
+        self.0 = (self.0 ^ word).wrapping_mul(0xD6E8_FEB8_6659_FD93);
+        self.0 ^= self.0 >> 32;
+        self.1 = (self.1.rotate_left(27) ^ word.rotate_left(32)).wrapping_mul(0x9FB2_1C65_1E98_DF25);
+        self.1 ^= self.1 >> 29;
+    }
+
+    fn add_all(&mut self, words: impl ExactSizeIterator<Item = u64>) {
+        self.add(words.len() as u64);
+        words.for_each(|word| self.add(word));
+    }
+
+    pub(super) fn add_text(&mut self, text: &str) {
+        self.add_all(text.bytes().map(u64::from));
+    }
+
+    fn bits(self) -> u128 {
+        u128::from(self.0) << 64 | u128::from(self.1)
+    }
+}
+
+/// Makes fingerprints, and remembers of functions what does not change.
+#[derive(Default)]
+pub(super) struct Fingerprints {
+    /// What tells the code of a function from others, by its address in the present machine.
+    codes: GivenMap<u64, Digest>,
+    /// The collector's cycle in which the addresses are good.
+    cycle: u64,
+    /// Which registers are live, by what tells the code.
+    live: HashMap<Digest, Rc<Live>>,
+}
+
+impl Fingerprints {
+    /// Another machine comes, with other addresses.
+    pub(super) fn begin_machine(&mut self) {
+        self.codes.clear();
+    }
+
+    /// The fingerprint of the state of a machine in which no task runs.
+    pub(super) fn of(&mut self, vm: &mut Vm) -> u128 {
+        if self.cycle != vm.heap.cycle_id() {
+            self.cycle = vm.heap.cycle_id();
+            self.codes.clear();
+        }
+        let now = vm.time();
+        let mut walk = Walk {
+            vm,
+            known: self,
+            digest: Digest::default(),
+            numbers: GivenMap::default(),
+            met: Vec::new(),
+            next: 0,
+            now,
+        };
+        walk.machine();
+        while let Some(&object) = walk.met.get(walk.next) {
+            walk.next += 1;
+            walk.object(object);
+        }
+        walk.digest.bits()
+    }
+}
+
+/// What sort of code a function has.
+fn sort_of(heap: &Heap, function: Value) -> Option<Sort> {
+    let code = heap.code(heap.function_code(function)?)?;
+    Some(Shape::unpack(code.spare[0]).sort)
+}
+
+/// One walk through a state.
+struct Walk<'a> {
+    vm: &'a Vm,
+    known: &'a mut Fingerprints,
+    digest: Digest,
+    /// The numbers of the objects that were met, by address.
+    numbers: GivenMap<u64, u32>,
+    /// These objects, and how many of them were looked into.
+    met: Vec<Value>,
+    next: usize,
+    now: u64,
+}
+
+impl Walk<'_> {
+    fn heap(&self) -> &Heap {
+        &self.vm.heap
+    }
+
+    fn word(&mut self, word: u64) {
+        self.digest.add(word);
+    }
+
+    /// A value: the word that it is, or the number of the object.
+    fn value(&mut self, v: Value) {
+        if !v.is_address() {
+            self.word(0);
+            return self.word(v.bits());
+        }
+        let next = self.met.len() as u32;
+        let number = *self.numbers.entry(v.bits()).or_insert(next);
+        if number == next {
+            self.met.push(v);
+        }
+        self.word(1);
+        self.word(u64::from(number));
+    }
+
+    fn values(&mut self, values: &[Value]) {
+        self.word(values.len() as u64);
+        values.iter().for_each(|&v| self.value(v));
+    }
+
+    fn time(&mut self, time: u64) {
+        self.word(time.wrapping_sub(self.now));
+    }
+
+    /// Everything from which the rest is reached.
+    fn machine(&mut self) {
+        let vm = self.vm;
+        let mut tasks: Vec<&Task> = vm.tasks.iter().filter(|task| task.state != TaskState::Ended).collect();
+        tasks.sort_unstable_by_key(|task| task.number);
+        self.word(tasks.len() as u64);
+        for task in &tasks {
+            // All tasks first, so that their numbers are their places in this order.
+            self.value(task.object);
+        }
+        for task in &tasks {
+            self.task(task);
+        }
+        self.timers();
+        self.symbols();
+        self.facts();
+        self.word(vm.exit_status.map_or(0, |status| 1 + u64::from(status)));
+        self.word(vm.console.noted());
+    }
+
+    fn task(&mut self, task: &Task) {
+        self.word(u64::from(task.flags.bits()));
+        self.word(u64::from(task.priority) << 16 | u64::from(task.critical) << 8 | task.state as u64);
+        self.value(task.wait);
+        self.value(task.notify);
+        self.frames(task);
+        if let Some(control) = task.control.get() {
+            self.control(task, control);
+        }
+        let mut words = Vec::new();
+        self.vm.accounts.visit_left(task.account, &mut |left| words.push(left));
+        self.digest.add_all(words.into_iter());
+        if let Some(extra) = &task.extra {
+            self.word(extra.limits.len() as u64);
+            for limit in &extra.limits {
+                self.word(limit.entry() as u64);
+                self.value(limit.expired().unwrap_or(Value::NIL));
+            }
+            self.values(&extra.interrupts);
+        }
+    }
+
+    fn frames(&mut self, task: &Task) {
+        let mut is_innermost = true;
+        interp::visit_frames(task, &mut |frame| {
+            self.word(frame.word as u64);
+            self.value(frame.function);
+            let live = self.live(frame.function);
+            let mut registers = live.at(frame.word);
+            if frame.is_exact && !is_innermost {
+                // What took the place of this instruction may be followed by it or by the next one.
+                registers = registers.with(live.at(frame.word + 1)).with(live.at(frame.word + 2));
+            }
+            is_innermost = false;
+            for (register, &v) in frame.registers.iter().enumerate() {
+                if registers.contains(register) {
+                    self.word(register as u64);
+                    self.value(v);
+                }
+            }
+        });
+    }
+
+    fn control(&mut self, task: &Task, control: &Control) {
+        self.word(control.entries.len() as u64);
+        for entry in &control.entries {
+            let Entry { data, base, bindings, window, want, kind, .. } = *entry;
+            self.word(u64::from(base) << 32 | u64::from(bindings));
+            self.word(u64::from(window) << 16 | u64::from(want) << 8 | kind as u64);
+            self.word(interp::entry_word(task, entry).map_or(u64::MAX, |word| word as u64));
+            self.value(data);
+        }
+        self.word(control.running.len() as u64);
+        for running in &control.running {
+            self.unwinding(running.pending.as_ref());
+            self.values(&running.values);
+            match running.allowance {
+                Some(allowance) => self.time(allowance.time),
+                None => self.word(0),
+            }
+        }
+        self.unwinding(control.unwinding.as_ref());
+        for binding in control.bindings.iter() {
+            self.value(binding.symbol);
+            self.value(binding.value);
+        }
+    }
+
+    fn unwinding(&mut self, unwinding: Option<&Unwinding>) {
+        let Some(Unwinding { target, values }) = unwinding else { return self.word(0) };
+        match *target {
+            Target::Root(End::Succeeded) => self.word(1),
+            Target::Root(End::Aborted) => self.word(2),
+            Target::Root(End::Spent) => self.word(3),
+            Target::Root(End::Failed(condition)) => {
+                self.word(4);
+                self.value(condition);
+            }
+            Target::Entry(index) => self.word((index as u64) << 4 | 5),
+            Target::Limit(index) => self.word((index as u64) << 4 | 6),
+            Target::Cleanup(index) => self.word((index as u64) << 4 | 7),
+        }
+        self.values(values);
+    }
+
+    /// What is to happen, in order: when, to whom, and what.
+    fn timers(&mut self) {
+        for (time, _, index, due) in self.vm.timers.in_order() {
+            let Some(task) = self.vm.tasks.at(index) else { continue };
+            if !crate::clock::is_wanted(Some(task), due) {
+                continue;
+            }
+            self.time(time);
+            self.value(task.object);
+            match due {
+                Due::Wait(_) => self.word(0),
+                Due::Cleanup => self.word(1),
+                Due::Limit(number) => {
+                    let limits = task.extra.iter().flat_map(|extra| &extra.limits);
+                    let position = limits.take_while(|limit| limit.number() != number).count();
+                    self.word(2 + position as u64);
+                }
+            }
+        }
+    }
+
+    /// What symbols of packages have that is not the language's from the beginning.
+    fn symbols(&mut self) {
+        let vm = self.vm;
+        let mut named = Vec::new();
+        vm.world.each_symbol(&mut |symbol, v| {
+            let Some(object) = vm.heap.symbol(v) else { return };
+            let has_value = object.value != Value::UNBOUND
+                && object.header.flags & (SymbolObject::CONSTANT | SymbolObject::KEYWORD) == 0;
+            let has_function = image_origin(&vm.heap, object.function).is_none()
+                && sort_of(&vm.heap, object.function) == Some(Sort::Bytecode);
+            if has_value || has_function || object.plist.is_true() {
+                named.push((symbol.clone(), *object, has_value, has_function));
+            }
+        });
+        named.sort_unstable_by(|(a, ..), (b, ..)| (a.package(), a.name()).cmp(&(b.package(), b.name())));
+        for (symbol, object, has_value, has_function) in named {
+            self.digest.add_text(symbol.name());
+            if has_value {
+                self.value(object.value);
+            }
+            if has_function {
+                self.value(object.function);
+            }
+            self.value(object.plist);
+        }
+    }
+
+    fn facts(&mut self) {
+        let vm = self.vm;
+        if !vm.database.is_quiet() {
+            // Where a query stands is not looked into: no other state is like this one.
+            self.word(vm.serial);
+            self.word(vm.spent);
+        }
+        vm.database.visit_state(&mut |item| match item {
+            Ok(word) => self.word(word),
+            Err(v) => self.value(v),
+        });
+    }
+
+    /// What an object holds.
+    fn object(&mut self, v: Value) {
+        if let Some(pair) = self.heap().as_cons(v) {
+            self.value(pair.car);
+            return self.value(pair.cdr);
+        }
+        let Some(header) = self.heap().header(v) else { return };
+        self.word(header.kind as u64 | u64::from(header.flags) << 8 | u64::from(header.aux) << 16);
+        let vm = self.vm;
+        match header.kind {
+            Kind::Symbol => match vm.world.name_of(&vm.heap, v) {
+                Some(symbol) => {
+                    self.digest.add_text(symbol.package().map_or("", |package| package));
+                    self.digest.add_text(symbol.name());
+                }
+                None => {
+                    let Some(&object) = vm.heap.symbol(v) else { return };
+                    [object.name, object.value, object.plist].into_iter().for_each(|v| self.value(v));
+                }
+            },
+            Kind::Function => self.function(v),
+            Kind::Code => {
+                let code = self.code(v);
+                self.digest.add_all([code.0, code.1].into_iter());
+            }
+            Kind::HashTable => {
+                let Some(table) = Table::of(&vm.heap, v) else { return };
+                self.word(table.count(&vm.heap) as u64);
+                for (key, value) in (0..table.used(&vm.heap)).filter_map(|at| table.entry(&vm.heap, at)) {
+                    self.value(key);
+                    self.value(value);
+                }
+                table.functions(&vm.heap).into_iter().for_each(|v| self.value(v));
+            }
+            Kind::Task => {
+                let slots = vm.heap.record(v, Kind::Task).unwrap_or_default().to_vec();
+                let is_alive = slots[event::STATE].is_fixnum();
+                for (index, v) in slots.into_iter().enumerate() {
+                    // Where it is, and the number of its maker.
+                    if !(is_alive && (index == event::STATE || index == event::RESULT)) {
+                        self.value(v);
+                    }
+                }
+            }
+            Kind::Wait => {
+                for (index, &v) in vm.heap.record(v, Kind::Wait).unwrap_or_default().iter().enumerate() {
+                    match v.as_index() {
+                        Some(time) if index == link::DEADLINE => self.time(time as u64),
+                        _ => self.value(v),
+                    }
+                }
+            }
+            Kind::Package | Kind::Class => self.digest.add_text(&vm.describe(v)),
+            kind if kind.is_record() => {
+                let slots = vm.heap.record(v, kind).unwrap_or_default();
+                self.values(slots);
+            }
+            _ => self.raw(v),
+        }
+    }
+
+    /// An object without values in it.
+    fn raw(&mut self, v: Value) {
+        let heap = &self.vm.heap;
+        if let Some(characters) = heap.string(v) {
+            self.digest.add_all(characters.iter().map(|&c| u64::from(c)));
+        } else if let Some(words) = heap.words(v) {
+            self.digest.add_all(words.iter().map(|&word| u64::from(word)));
+        } else if let Some(bytes) = heap.bytes(v) {
+            self.digest.add_all(bytes.iter().map(|&byte| u64::from(byte)));
+        } else if let Some(number) = heap.bignum(v) {
+            self.digest.add_all(number.limbs.iter().copied());
+        } else if let Some(number) = heap.as_double(v) {
+            self.digest.add(number.to_bits());
+        }
+    }
+
+    fn function(&mut self, function: Value) {
+        let code = self.code_of_function(function);
+        self.digest.add_all([code.0, code.1].into_iter());
+        // What a function of the library without captures has in that place is its number.
+        let heap = &self.vm.heap;
+        let count = match sort_of(heap, function) {
+            Some(Sort::Lazy) | None => 0,
+            Some(Sort::Bytecode) => {
+                let code = heap.function_code(function).and_then(|code| heap.code(code));
+                code.map_or(0, |code| code.spare[1] as usize)
+            }
+            Some(Sort::Native | Sort::Undefined) => usize::MAX,
+        };
+        let captures = heap.function_captures(function).unwrap_or_default();
+        self.values(&captures[..captures.len().min(count)]);
+    }
+
+    /// What tells the code of a function from all others: of one of the library its number.
+    fn code_of_function(&mut self, function: Value) -> Digest {
+        match image_origin(self.heap(), function) {
+            Some((image, number)) => Digest(image as u64, u64::from(number)),
+            None => self.heap().function_code(function).map_or(Digest::default(), |code| self.code(code)),
+        }
+    }
+
+    /// What tells a code from all others: its words, where they were written, and its constants.
+    fn code(&mut self, code: Value) -> Digest {
+        if let Some(&digest) = self.known.codes.get(&code.bits()) {
+            return digest;
+        }
+        let heap = &self.vm.heap;
+        let mut digest = Digest(1, 1);
+        let words = heap.code_words(code).unwrap_or_default();
+        digest.add_all(words.iter().map(|&word| u64::from(word)));
+        let mut open: Vec<Value> = heap.code(code).map_or(Vec::new(), |code| vec![code.debug, code.name]);
+        open.extend(heap.code_constants(code).unwrap_or_default());
+        // Constants are not looked into further than a look shows; the places in the source tell the rest.
+        for v in open.into_iter().rev() {
+            match heap.kind(v) {
+                Some(Kind::Function | Kind::Code) => digest.add(2),
+                Some(Kind::Record) => {
+                    let slots = heap.record(v, Kind::Record).unwrap_or_default();
+                    let places = slots.iter().find_map(|&slot| heap.words(slot)).unwrap_or_default();
+                    digest.add_all(places.iter().map(|&word| u64::from(word)));
+                }
+                _ => digest.add_text(&self.vm.describe(v)),
+            }
+        }
+        self.known.codes.insert(code.bits(), digest);
+        digest
+    }
+
+    /// The registers that a function may still read, by place.
+    fn live(&mut self, function: Value) -> Rc<Live> {
+        let digest = self.code_of_function(function);
+        if let Some(live) = self.known.live.get(&digest) {
+            return live.clone();
+        }
+        let heap = &self.vm.heap;
+        let code = heap.function_code(function).unwrap_or(Value::NIL);
+        let words = heap.code_words(code).unwrap_or_default();
+        let captures = heap.code(code).map_or(0, |code| code.spare[1] as usize);
+        let words = &words[..words.len().saturating_sub(captures)];
+        let live = Rc::new(Live::of(heap, words, heap.code_constants(code).unwrap_or_default()));
+        self.known.live.insert(digest, live.clone());
+        live
+    }
+}

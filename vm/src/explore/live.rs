@@ -1,0 +1,167 @@
+//! Which registers of a frame may still be read from a place of its code on: only these belong to a state. The others
+//! hold what is left of earlier work, and would make two states of one.
+//!
+//! A register that may be read is never said not to be. It may be the other way round: what a landing of a
+//! control entry reads counts everywhere in its function.
+
+use esl_bytecode::module::CaptureSource;
+use esl_bytecode::opcode::Instr;
+use esl_bytecode::operand::{Base, Count, Role};
+
+use crate::heap::Heap;
+use crate::shape::capture_source;
+use crate::value::Value;
+
+/// A set of registers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Registers([u64; 4]);
+
+impl Registers {
+    pub(super) fn contains(self, register: usize) -> bool {
+        self.0[register >> 6 & 3] >> (register & 63) & 1 != 0
+    }
+
+    fn insert(&mut self, register: usize) {
+        self.0[register >> 6 & 3] |= 1 << (register & 63);
+    }
+
+    fn insert_range(&mut self, first: usize, count: usize) {
+        (first..(first + count).min(256)).for_each(|register| self.insert(register));
+    }
+
+    pub(super) fn with(self, other: Registers) -> Registers {
+        Registers(std::array::from_fn(|word| self.0[word] | other.0[word]))
+    }
+
+    fn without(self, other: Registers) -> Registers {
+        Registers(std::array::from_fn(|word| self.0[word] & !other.0[word]))
+    }
+}
+
+/// An instruction, as far as it matters here.
+struct Step {
+    at: usize,
+    reads: Registers,
+    writes: Registers,
+    /// Words to which control goes from here.
+    next: [Option<usize>; 2],
+    /// Where the entry lands that it pushes.
+    landing: Option<usize>,
+}
+
+/// For each word at which an instruction begins, the registers that may be read from there on.
+#[derive(Debug, Default)]
+pub(super) struct Live(Vec<Registers>);
+
+impl Live {
+    /// What is live in a function with these words and constants.
+    pub(super) fn of(heap: &Heap, words: &[u32], constants: &[Value]) -> Live {
+        let mut steps = Vec::new();
+        let mut at = 0;
+        while let Some(instruction) = Instr::decode(words, at) {
+            steps.push(step(heap, constants, at, instruction));
+            at += instruction.opcode().words();
+        }
+        let mut live = vec![Registers::default(); words.len() + 1];
+        let mut landed = Registers::default();
+        let mut has_changed = true;
+        while has_changed {
+            has_changed = false;
+            for step in steps.iter().rev() {
+                let after = step.next.iter().flatten();
+                let after =
+                    after.fold(landed, |all, &at| all.with(live.get(at).copied().unwrap_or_default()));
+                let before = after.without(step.writes).with(step.reads).with(landed);
+                has_changed |= before != live[step.at];
+                live[step.at] = before;
+                if let Some(landing) = step.landing.and_then(|at| live.get(at)) {
+                    landed = landed.with(*landing);
+                }
+            }
+        }
+        Live(live)
+    }
+
+    /// Whether a register may be read from word `at` on.
+    pub(super) fn at(&self, at: usize) -> Registers {
+        self.0.get(at).copied().unwrap_or_default()
+    }
+}
+
+fn step(heap: &Heap, constants: &[Value], at: usize, instruction: Instr) -> Step {
+    let after = at + instruction.opcode().words();
+    let (mut reads, mut writes) = (Registers::default(), Registers::default());
+    let mut jump = None;
+    instruction.visit_operands(|role| match role {
+        Role::Read(register) => reads.insert(usize::from(register)),
+        Role::Write(register) => writes.insert(usize::from(register)),
+        Role::Forward(by) | Role::Backward(by) => jump = after.checked_add_signed(by as isize),
+        _ => {}
+    });
+    let range = |set: &mut Registers, Base(first): Base, skipped: usize, Count(count): Count| {
+        set.insert_range(usize::from(first) + skipped, usize::from(count));
+    };
+    let (mut falls_through, mut lands) = (true, false);
+    match instruction {
+        Instr::List { first, count, .. } | Instr::SetValues { first, count } => {
+            range(&mut reads, first, 0, count);
+        }
+        Instr::LoadNil { first, count } | Instr::GetValues { first, count } => {
+            range(&mut writes, first, 0, count);
+        }
+        Instr::ReturnValues { first, count } => {
+            range(&mut reads, first, 0, count);
+            falls_through = false;
+        }
+        Instr::Return { .. } | Instr::ReturnAll {} | Instr::JumpAlways { .. } | Instr::Loop { .. } => {
+            falls_through = false;
+        }
+        Instr::Call { window, count, .. } | Instr::Apply { window, count, .. } => {
+            range(&mut reads, window, 0, Count(1));
+            range(&mut reads, window, 2, count);
+            range(&mut writes, window, 0, Count(u8::MAX));
+        }
+        Instr::CallGlobal { window, count, .. }
+        | Instr::CallSelf { window, count, .. }
+        | Instr::CallBuiltin { window, count, .. } => {
+            range(&mut reads, window, 2, count);
+            range(&mut writes, window, 0, Count(u8::MAX));
+        }
+        Instr::TailCall { window, count, .. } | Instr::TailApply { window, count, .. } => {
+            range(&mut reads, window, 0, Count(1));
+            range(&mut reads, window, 2, count);
+            falls_through = false;
+        }
+        Instr::TailCallGlobal { window, count, .. } | Instr::TailCallBuiltin { window, count, .. } => {
+            range(&mut reads, window, 2, count);
+            falls_through = false;
+        }
+        Instr::MakeClosure { function, .. } => {
+            for register in captured_registers(heap, constants.get(usize::from(function.0)).copied()) {
+                reads.insert(register);
+            }
+        }
+        Instr::PushCatch { .. }
+        | Instr::PushCleanup { .. }
+        | Instr::PushHandlerCase { .. }
+        | Instr::PushRecovery { .. }
+        | Instr::PushFailureCleanup { .. } => lands = true,
+        _ => {}
+    }
+    let landing = if lands { jump.take() } else { None };
+    Step { at, reads, writes, next: [falls_through.then_some(after), jump], landing }
+}
+
+/// The registers from which the captures of a closure are taken.
+fn captured_registers(heap: &Heap, code: Option<Value>) -> Vec<usize> {
+    let Some((code, layout)) = code.and_then(|code| Some((code, heap.code(code)?))) else {
+        return Vec::new();
+    };
+    let words = heap.code_words(code).unwrap_or_default();
+    let captures = words.len().saturating_sub(layout.spare[1] as usize);
+    let register = |&word: &u32| match capture_source(word) {
+        CaptureSource::Register(register) => Some(usize::from(register)),
+        CaptureSource::Capture(_) | CaptureSource::Later => None,
+    };
+    words[captures..].iter().filter_map(register).collect()
+}

@@ -1,0 +1,281 @@
+//! Exploring: running a program under every schedule, to find those that end badly or to show that there is none.
+//!
+//! ```text
+//! point         where a task may have to let others go first, and running from point to point
+//! fingerprint   telling states apart           live   which registers of a frame belong to a state
+//! ```
+//!
+//! **Points.** A task is taken to run undisturbed from one *point* to the next. It stands at a point just before it does
+//! something that other tasks can see, or looks at what they do: before it begins a wait, signals, passes a checkpoint,
+//! changes the database, enters a critical section, asks for an abort, and before its end; with [`Grain::Reads`] also
+//! before it counts signals, asks what became of a task, or queries the database. Nothing that happens between two points
+//! is visible to other tasks by these means, so any schedule of the machine does what one of those explored does. What
+//! tasks share in another way (variables, tables, structures) is not looked at: programs protect that by critical sections,
+//! which are one step each. A task that comes to no point is stopped after [`Settings::turn`] ticks.
+//!
+//! **Choices.** At each point any runnable task may go on, whatever its priority (every one has its turns sometimes). First
+//! comes the task that has just run, then the others from the oldest to the newest; a choice is an index into that order, and a list
+//! of choices gives a schedule: [`Vm::follow`] runs it again. Time is virtual, and moves when all tasks wait.
+//!
+//! **Search.** Going back is starting again: a machine is begun anew, follows the choices that lead to a place where another
+//! one was possible, and goes on with that one until it ends or comes to a state that is known. So nothing has to be copied or undone, and
+//! every schedule that is reported has been run from its beginning. Places are taken in the order of how
+//! often a task had to give way that could have gone on, so the first schedule that leads to an ending is one with the fewest such switches.
+//!
+//! **States** are told apart by fingerprints of 128 bits (see `fingerprint`). That two states are confused can be
+//! neglected; one state that is taken for two costs time only.
+//!
+//! Not here: the outside (what is in files, what was read). What a command will do: begin machines as for `run`, with a captured outside;
+//! write the numbers of states and schedules, and for each ending its first schedule; `run` with that list shows it again, with traces.
+//! Source: Musuvathi and Qadeer 2007 for the order by preemptions; state hashes are as old as SPIN (Holzmann 1988).
+
+mod fingerprint;
+mod live;
+mod point;
+#[cfg(test)]
+mod tests;
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
+use crate::run::RunOutcome;
+use crate::vm::Vm;
+use fingerprint::Fingerprints;
+pub(crate) use point::Points;
+
+/// Before what a task stands at a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Grain {
+    /// Before it changes what others can see, or begins to wait.
+    #[default]
+    Changes,
+    /// Also before it looks at what others have changed.
+    Reads,
+}
+
+/// How to explore.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Where points are.
+    pub grain: Grain,
+    /// Ticks after which a task is stopped that comes to no point.
+    pub turn: u32,
+    /// States after which to give up.
+    pub states: usize,
+    /// Whether states are told apart by what was written to standard output, too. Without, an ending stands for all
+    /// runs that came to the same states on the way, whatever they had written by then.
+    pub output: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings { grain: Grain::Changes, turn: 100_000, states: 1_000_000, output: true }
+    }
+}
+
+/// A way in which runs end.
+#[derive(Clone, Debug)]
+pub struct Ending<T> {
+    /// What the caller says of it.
+    pub what: T,
+    /// The choices that lead there.
+    pub choices: Vec<u32>,
+    /// How many of the runs ended so.
+    pub runs: usize,
+}
+
+/// What exploring has found.
+#[derive(Clone, Debug)]
+pub struct Exploration<T> {
+    /// Different states at points.
+    pub states: usize,
+    /// Runs: one for each choice that led to a state from which something was left to be seen, and for each ending.
+    pub runs: usize,
+    /// The ways to end, the one with the fewest switches first.
+    pub endings: Vec<Ending<T>>,
+    /// Choices that lead to a state from which no schedule leads to an end, if there is one.
+    pub endless: Option<Vec<u32>>,
+    /// Whether a schedule comes back to a state in which it has been: it can go on for ever, be it that tasks are treated unfairly.
+    pub has_cycle: bool,
+    /// Whether all states were seen; otherwise there were more than [`Settings::states`].
+    pub is_complete: bool,
+}
+
+/// A place in the tree of choices: the choice made last, after those of another place.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    parent: u32,
+    choice: u32,
+    /// The state in which it was made.
+    state: u32,
+}
+
+const ROOT: u32 = 0;
+
+/// What is known during a search.
+#[derive(Default)]
+struct Search {
+    nodes: Vec<Node>,
+    /// Places to go on from, by the number of switches that lead there; each has the latest last.
+    open: Vec<Vec<u32>>,
+    /// States by their fingerprints.
+    states: HashMap<u128, u32>,
+    /// The place from which each state was seen first.
+    places: Vec<u32>,
+    /// From which state to which others a step leads.
+    steps: Vec<(u32, u32)>,
+    /// States from which a step leads to the end.
+    last: Vec<u32>,
+}
+
+impl Search {
+    fn node(&mut self, node: Node) -> u32 {
+        self.nodes.push(node);
+        (self.nodes.len() - 1) as u32
+    }
+
+    fn open(&mut self, switches: usize, node: u32) {
+        if self.open.len() <= switches {
+            self.open.resize(switches + 1, Vec::new());
+        }
+        self.open[switches].push(node);
+    }
+
+    /// The place with the fewest switches to go on from.
+    fn next(&mut self) -> Option<(usize, u32)> {
+        self.open.iter_mut().enumerate().find_map(|(switches, nodes)| Some((switches, nodes.pop()?)))
+    }
+
+    /// The choices that lead to a place.
+    fn choices(&self, node: u32) -> Vec<u32> {
+        let mut choices = Vec::new();
+        let mut at = node;
+        while at != ROOT {
+            choices.push(self.nodes[at as usize].choice);
+            at = self.nodes[at as usize].parent;
+        }
+        choices.reverse();
+        choices
+    }
+
+    /// Choices that lead to a state from which the end cannot be reached.
+    fn endless(&self) -> Option<Vec<u32>> {
+        let mut before = vec![Vec::new(); self.places.len()];
+        for &(from, to) in &self.steps {
+            before[to as usize].push(from);
+        }
+        let mut ends = vec![false; self.places.len()];
+        let mut found = self.last.clone();
+        while let Some(state) = found.pop() {
+            if !std::mem::replace(&mut ends[state as usize], true) {
+                found.extend(&before[state as usize]);
+            }
+        }
+        let stuck = ends.iter().position(|ends| !ends)?;
+        Some(self.choices(self.places[stuck]))
+    }
+
+    /// Whether steps lead from a state back to it: what is left when states without a step to them are taken away.
+    fn has_cycle(&self) -> bool {
+        let mut after = vec![Vec::new(); self.places.len()];
+        let mut steps_to = vec![0_u32; self.places.len()];
+        for &(from, to) in &self.steps {
+            after[from as usize].push(to);
+            steps_to[to as usize] += 1;
+        }
+        let mut free: Vec<u32> =
+            (0..self.places.len() as u32).filter(|&state| steps_to[state as usize] == 0).collect();
+        let mut taken = 0;
+        while let Some(state) = free.pop() {
+            taken += 1;
+            for &next in &after[state as usize] {
+                steps_to[next as usize] -= 1;
+                if steps_to[next as usize] == 0 {
+                    free.push(next);
+                }
+            }
+        }
+        taken < self.places.len()
+    }
+}
+
+/// Runs under all schedules the program that each machine of `begin` is about to run: its main task has been made. `judge` says how a
+/// run has ended.
+///
+/// The machines have to be alike: the same program, settings and outside. The clock of their host is virtual.
+///
+/// # Errors
+/// Those of `begin`.
+pub fn explore<T: PartialEq, E>(
+    settings: &Settings,
+    mut begin: impl FnMut() -> Result<Vm, E>,
+    mut judge: impl FnMut(&mut Vm, RunOutcome) -> T,
+) -> Result<Exploration<T>, E> {
+    let mut search = Search::default();
+    let root = search.node(Node { parent: ROOT, choice: 0, state: 0 });
+    search.open(0, root);
+    let mut fingerprints = Fingerprints::default();
+    let mut endings: Vec<Ending<T>> = Vec::new();
+    let (mut runs, mut is_complete) = (0, true);
+    while let Some((switches, place)) = search.next() {
+        if !is_complete {
+            break;
+        }
+        let mut machine = begin()?;
+        machine.explore_by(settings);
+        fingerprints.begin_machine();
+        runs += 1;
+        let choices = search.choices(place);
+        let mut given = choices.iter().copied();
+        // Where the run is: the choices so far, and the state in which the last step began.
+        let mut node = place;
+        let mut before = (place != ROOT).then(|| search.nodes[place as usize].state);
+        let outcome = machine.run_by_points(&mut |vm, runnable| {
+            if runnable.count > 1
+                && let Some(choice) = given.next()
+            {
+                return Some(choice);
+            }
+            if given.len() > 0 {
+                return Some(0);
+            }
+            let next = search.places.len() as u32;
+            let (state, is_new) = match search.states.entry(fingerprints.of(vm)) {
+                Entry::Occupied(known) => (*known.get(), false),
+                Entry::Vacant(free) => (*free.insert(next), true),
+            };
+            if let Some(before) = before {
+                search.steps.push((before, state));
+            }
+            if !is_new {
+                return None;
+            }
+            search.places.push(node);
+            if search.places.len() >= settings.states {
+                is_complete = false;
+                return None;
+            }
+            before = Some(state);
+            if runnable.count > 1 {
+                // A switch is one where the task that has just run could have gone on.
+                let switches = switches + usize::from(runnable.has_last);
+                for choice in (1..runnable.count).rev() {
+                    let other = search.node(Node { parent: node, choice, state });
+                    search.open(switches, other);
+                }
+                node = search.node(Node { parent: node, choice: 0, state });
+            }
+            Some(0)
+        });
+        let Some(outcome) = outcome else { continue };
+        search.last.extend(before);
+        let what = judge(&mut machine, outcome);
+        match endings.iter_mut().find(|ending| ending.what == what) {
+            Some(ending) => ending.runs += 1,
+            None => endings.push(Ending { what, choices: search.choices(node), runs: 1 }),
+        }
+    }
+    let endless = if is_complete { search.endless() } else { None };
+    let (states, has_cycle) = (search.states.len(), search.has_cycle());
+    Ok(Exploration { states, runs, endings, endless, has_cycle, is_complete })
+}
