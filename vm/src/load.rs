@@ -17,6 +17,7 @@ use esl_bytecode::BigInt;
 use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::file::ReadError;
 use esl_bytecode::module::{Constant, Function, Module, PoolIdx};
+use esl_bytecode::package::PackageId;
 use esl_bytecode::symbol::{Home, Symbol};
 use esl_bytecode::verify::{VerifyError, verify};
 
@@ -338,12 +339,9 @@ impl Vm {
             let mut parameters = Vec::new();
             for word in info.lambda_list.split_whitespace() {
                 let word = word.to_uppercase();
-                let symbol = if word.starts_with('&') {
-                    self.world.intern_cl(&mut self.heap, &word)?
-                } else {
-                    self.world.intern_esl(&mut self.heap, &word)?
-                };
-                parameters.push(symbol);
+                let known = self.world.packages().find(PackageId::ESL, &word);
+                let symbol = known.map_or_else(|| Symbol::esl(&word), |(symbol, _)| symbol);
+                parameters.push(self.world.intern(&mut self.heap, &symbol)?);
             }
             return Ok((self.heap.list(&parameters)?, documentation));
         }
