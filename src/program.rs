@@ -256,6 +256,18 @@ pub fn run(program: &Program, config: Config, host: Box<dyn Host + Send>) -> Res
     run_in(&mut machine, program)
 }
 
+/// Loads a program into a machine that has the library, and makes its main task. Running the machine runs it.
+///
+/// # Errors
+/// As [`run`].
+pub fn begin(machine: &mut Vm, program: &Program) -> Result<TaskId, String> {
+    let functions = machine.load_module(&program.module).map_err(|error| error.to_string())?;
+    let main = machine.spawn_library("%RUN-TOPLEVEL", &[functions])?;
+    machine.set_interruptible(Some(main));
+    machine.set_main(main);
+    Ok(main)
+}
+
 /// Runs a program in a machine that has the library.
 ///
 /// # Errors
@@ -266,15 +278,6 @@ pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Report, String> {
     let ended = end(machine, main, outcome);
     let (tasks, turns, switches) = machine.tasks_turns_and_switches();
     Ok(Report { ended, ticks: machine.ticks(), tasks, turns, switches, heap: machine.heap_stats() })
-}
-
-/// Makes the main task of a program in a machine that has the library.
-pub(crate) fn begin(machine: &mut Vm, program: &Program) -> Result<TaskId, String> {
-    let functions = machine.load_module(&program.module).map_err(|error| error.to_string())?;
-    let main = machine.spawn_library("%RUN-TOPLEVEL", &[functions])?;
-    machine.set_interruptible(Some(main));
-    machine.set_main(main);
-    Ok(main)
 }
 
 /// How a program with this main task has ended; reports what there is to report.

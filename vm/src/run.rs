@@ -113,6 +113,9 @@ impl Vm {
             match self.queues.next(&self.tasks, &mut self.choices) {
                 Some(index) => self.give_turn(index, end),
                 None => {
+                    if !self.deliveries.is_empty() {
+                        continue;
+                    }
                     if self.alive == 0 {
                         return RunOutcome::Done;
                     }
@@ -134,11 +137,12 @@ impl Vm {
                 Leave::Ended => return,
                 Leave::Slice => {
                     let passes = std::mem::take(&mut self.passes_turn);
-                    let goes_on = task.critical > 0 || self.slice_is_cut && !passes;
+                    let holds = std::mem::take(&mut self.holds_task) && !self.deliveries.is_empty();
+                    let goes_on = task.critical > 0 || self.slice_is_cut && !passes && !holds;
                     if goes_on && self.spent < end && !self.is_budget_spent() {
                         continue;
                     }
-                    return self.make_runnable(index, false);
+                    return if holds { self.hold(index) } else { self.make_runnable(index, false) };
                 }
                 Leave::Parked => return self.park_task(index),
             }
@@ -161,6 +165,7 @@ impl Vm {
             self.show(number, Seen::Runs);
         }
         self.slice_is_cut = false;
+        self.holds_task = false;
         self.had_attention = self.task().flags.attention();
         self.scan_before_running();
         let slice = self.slice_of_running_task(limit);

@@ -107,6 +107,10 @@ pub struct Vm {
     pub(crate) accounts: Accounts,
     /// Signals that are being handed out, in the order in which they were given.
     pub(crate) deliveries: VecDeque<Delivery>,
+    /// Tasks that are held back until then, each with its serial number.
+    pub(crate) held: Vec<(u32, u64)>,
+    /// Whether the running task is to be held back.
+    pub(crate) holds_task: bool,
     /// Whether more timers are due than were seen to.
     pub(crate) more_is_due: bool,
     /// Tasks that wait for input.
@@ -235,6 +239,8 @@ impl Vm {
             timers: Timers::default(),
             accounts: Accounts::default(),
             deliveries: VecDeque::new(),
+            held: Vec::new(),
+            holds_task: false,
             more_is_due: false,
             readers: Vec::new(),
             any_event,

@@ -1,9 +1,10 @@
 //! Signals, and handing them to those who wait.
 //!
 //! A signal is one step for the program, but it may have a million waiters. Those beyond the first thousand are a
-//! [`Delivery`], which the scheduler works off between turns, a thousand at a time. Until that is done no wait begins
-//! or times out, and no task signals: it tries again in its next turn ([`Exit::Again`]). So nobody can tell the difference:
-//! who waits when the signal is given gets it, and who begins later does not.
+//! [`Delivery`], which the scheduler works off between turns, a thousand at a time. Until that is done the task that signals is
+//! held back, and so is whoever would begin to wait, let a wait time out, or signal; the latter try again then
+//! ([`Exit::Again`]). So nobody can tell the difference: who waits when the signal is given gets it and goes on before the
+//! task that has given it, and who begins later does not.
 
 use super::{event, link};
 use crate::heap::Kind;
@@ -78,6 +79,7 @@ impl Vm {
             }
         }
         if self.running.is_some() {
+            self.holds_task = true;
             self.end_slice_here();
         }
         Ok(())
@@ -87,8 +89,12 @@ impl Vm {
     ///
     /// # Errors
     /// [`Exit::Again`] if there are some.
-    pub(crate) fn wait_for_deliveries(&self) -> Result<(), Exit> {
-        if self.deliveries.is_empty() || self.running.is_none() { Ok(()) } else { Err(Exit::Again) }
+    pub(crate) fn wait_for_deliveries(&mut self) -> Result<(), Exit> {
+        if self.deliveries.is_empty() || self.running.is_none() {
+            return Ok(());
+        }
+        self.holds_task = true;
+        Err(Exit::Again)
     }
 
     /// How many of those who wait for `event` keep signals; `None` if there are too many to see to in one step.
@@ -158,6 +164,26 @@ impl Vm {
             _ => {
                 self.deliveries.pop_front();
                 self.accounts.leave(account);
+                if self.deliveries.is_empty() {
+                    self.release_held();
+                }
+            }
+        }
+    }
+
+    /// Keeps a task that can run from running until the signals under way are delivered.
+    pub(crate) fn hold(&mut self, index: u32) {
+        let serial = self.next_serial();
+        if let Some(task) = self.tasks.at_mut(index) {
+            task.serial = serial;
+            self.held.push((index, serial));
+        }
+    }
+
+    fn release_held(&mut self) {
+        for (index, serial) in std::mem::take(&mut self.held) {
+            if self.tasks.at(index).is_some_and(|task| task.serial == serial) {
+                self.make_runnable(index, false);
             }
         }
     }
