@@ -109,7 +109,9 @@ impl Vm {
                 self.abort(interrupted);
             }
             self.look_at_clock();
-            self.deliver_some();
+            if !self.deliveries.is_empty() {
+                self.deliver_some();
+            }
             match self.queues.next(&self.tasks, &mut self.choices) {
                 Some(index) => self.give_turn(index, end),
                 None => {
@@ -151,7 +153,9 @@ impl Vm {
 
     /// Gives a runnable task one slice.
     fn run_slice(&mut self, index: u32, limit: u64) -> Leave {
-        self.deliver_some();
+        if !self.deliveries.is_empty() {
+            self.deliver_some();
+        }
         let Some(task) = self.tasks.take(index) else { return Leave::Ended };
         let account = task.account;
         self.running = Some(task);

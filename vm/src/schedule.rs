@@ -46,6 +46,7 @@ impl RunQueues {
     pub(crate) fn next(&mut self, tasks: &Tasks, choices: &mut Choices) -> Option<u32> {
         self.turns += 1;
         if self.turns & 1 == 0
+            && !self.urgent.is_empty()
             && let Some(index) = pop(&mut self.urgent, tasks, &mut Choices::first())
         {
             return Some(index);
@@ -58,7 +59,9 @@ impl RunQueues {
             }
         }
         for queue in self.queues.iter_mut().rev() {
-            if let Some(index) = pop(queue, tasks, choices) {
+            if !queue.is_empty()
+                && let Some(index) = pop(queue, tasks, choices)
+            {
                 return Some(index);
             }
         }

@@ -166,34 +166,25 @@ impl Vm {
     /// A failure if something else is among them; [`Exit::Collect`]; [`Exit::Again`] while a signal is being delivered.
     pub(crate) fn open_wait(&mut self, events: Value, options: WaitOptions) -> Outcome {
         self.wait_for_deliveries()?;
-        let mut list = Vec::new();
-        if events.is_list() {
-            for event in self.list_items(events, MAX_EVENTS)? {
-                if !self.is_event(event) {
-                    return self.event_error(event);
-                }
-                if !list.contains(&event) {
-                    list.push(event);
-                }
-            }
-            self.charge(64 * list.len());
-        } else if self.is_event(events) {
-            list.push(events);
-        } else {
+        if self.is_event(events) {
+            let wait = self.make_wait(options)?;
+            self.link(wait, events);
+            return Ok(wait);
+        }
+        if !events.is_list() {
             return self.event_error(events);
         }
-        let owner = self.task().object;
-        let deadline = options.deadline.and_then(|time| Value::fixnum(time as i64)).unwrap_or(Value::NIL);
-        let queue = if options.keeps { self.heap.cons(Value::NIL, Value::NIL)? } else { Value::NIL };
-        let flags =
-            [(options.keeps, link::KEEPS), (options.urgent, link::URGENT), (options.child, link::CHILD)];
-        let flags = flags.iter().filter(|(is_set, _)| *is_set).fold(0, |all, (_, flag)| all | flag);
-        let mut slots = [Value::NIL; link::LENGTH];
-        slots[link::OWNER] = owner;
-        slots[link::QUEUE] = queue;
-        slots[link::DEADLINE] = deadline;
-        slots[link::MORE] = options.what;
-        let first = self.heap.alloc_record(Kind::Wait, flags, 0, &slots)?;
+        let mut list = Vec::new();
+        for event in self.list_items(events, MAX_EVENTS)? {
+            if !self.is_event(event) {
+                return self.event_error(event);
+            }
+            if !list.contains(&event) {
+                list.push(event);
+            }
+        }
+        self.charge(64 * list.len());
+        let first = self.make_wait(options)?;
         let mut links = Vec::with_capacity(list.len());
         links.push(first);
         let mut more = options.what;
@@ -213,12 +204,27 @@ impl Vm {
         Ok(first)
     }
 
+    /// A wait of the running task that is in no list yet.
+    fn make_wait(&mut self, options: WaitOptions) -> Outcome {
+        let deadline = options.deadline.and_then(|time| Value::fixnum(time as i64)).unwrap_or(Value::NIL);
+        let queue = if options.keeps { self.heap.cons(Value::NIL, Value::NIL)? } else { Value::NIL };
+        let mut flags = if options.keeps { link::KEEPS } else { 0 };
+        flags |= if options.urgent { link::URGENT } else { 0 };
+        flags |= if options.child { link::CHILD } else { 0 };
+        let mut slots = [Value::NIL; link::LENGTH];
+        slots[link::OWNER] = self.task().object;
+        slots[link::QUEUE] = queue;
+        slots[link::DEADLINE] = deadline;
+        slots[link::MORE] = options.what;
+        Ok(self.heap.alloc_record(Kind::Wait, flags, 0, &slots)?)
+    }
+
     /// Puts a link at the end of the list of an event.
     fn link(&mut self, link: Value, event: Value) {
         let last = self.slot(event, event::LAST);
         self.set_slot(link, link::EVENT, event);
-        self.set_slot(link, link::PREVIOUS, last);
         if last.is_true() {
+            self.set_slot(link, link::PREVIOUS, last);
             self.set_slot(last, link::NEXT, link);
         } else {
             self.set_slot(event, event::FIRST, link);
@@ -244,8 +250,12 @@ impl Vm {
         } else {
             self.set_slot(event, event::LAST, previous);
         }
-        for slot in [link::EVENT, link::PREVIOUS, link::NEXT] {
-            self.set_slot(link, slot, Value::NIL);
+        self.set_slot(link, link::EVENT, Value::NIL);
+        if previous.is_true() {
+            self.set_slot(link, link::PREVIOUS, Value::NIL);
+        }
+        if next.is_true() {
+            self.set_slot(link, link::NEXT, Value::NIL);
         }
     }
 

@@ -53,8 +53,15 @@ impl Vm {
     /// Signals an event with a list of arguments.
     pub(crate) fn signal(&mut self, event: Value, arguments: Value) -> Result<(), Exit> {
         let any_event = self.any_event;
-        if self.is_watched && (!self.heap.is(event, Kind::Task) || self.slot(event, event::FIRST).is_true()) {
+        let is_awaited = self.slot(event, event::FIRST).is_true();
+        let any_is_awaited = self.slot(any_event, event::FIRST).is_true();
+        if self.is_watched && (is_awaited || !self.heap.is(event, Kind::Task)) {
             self.tell_of_signal(event);
+        }
+        if !is_awaited && !any_is_awaited {
+            self.count_signal(event);
+            self.count_signal(any_event);
+            return Ok(());
         }
         if self.deliveries.is_empty()
             && let Some(keepers) = self.keepers_if_few(event)
@@ -64,7 +71,11 @@ impl Vm {
             let cells = self.cells(keepers, arguments)?;
             let other_cells = self.cells(others, Value::NIL)?;
             let mut woken = self.deliver(event, arguments, cells);
-            woken += self.deliver(any_event, Value::NIL, other_cells);
+            if any_is_awaited {
+                woken += self.deliver(any_event, Value::NIL, other_cells);
+            } else {
+                self.count_signal(any_event);
+            }
             self.charge(64 * woken);
             return Ok(());
         }
