@@ -1,6 +1,14 @@
 //! Runs the programs about tasks under many schedules: what the language promises holds under each of them.
 //!
-//! A failure names the seed and the slice, and the choices that were made: `Choices::given` reproduces the run from them.
+//! A failure names the seed and the slice, and the choices that were made: `Choices::given` reproduces the run from them. By hand:
+//!
+//! ```text
+//! ESL_SCHEDULE="NAME.esl 7 0,1,1,0" cargo test -p esl-conformance --test schedules a_given -- --nocapture
+//! ```
+//!
+//! runs a program of `programs/tasks` with slices of at most seven ticks and these choices, and prints what it does.
+
+#![allow(clippy::print_stdout, reason = "a test reports")]
 
 use std::path::Path;
 
@@ -66,8 +74,8 @@ fn programs_do_what_they_say_under_every_schedule() {
                 let run = run(&program, Choices::seeded(seed), slice);
                 if run.lines != expected.output || run.status != expected.expected_status() {
                     failures.push(format!(
-                        "{name}, seed {seed}, slice {slice}: status {}\nexpected {:?}\nfound    {:?}\n{}choices {:?}",
-                        run.status, expected.output, run.lines, run.errors, run.choices
+                        "{name}, seed {seed}, slice {slice}: status {}\nexpected {:?}\nfound    {:?}\n{}ESL_SCHEDULE=\"{name} {slice} {}\"",
+                        run.status, expected.output, run.lines, run.errors, as_text(&run.choices)
                     ));
                     break 'schedules;
                 }
@@ -75,6 +83,23 @@ fn programs_do_what_they_say_under_every_schedule() {
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n\n"));
+}
+
+/// Choices as they are given by hand.
+fn as_text(choices: &[u32]) -> String {
+    choices.iter().map(u32::to_string).collect::<Vec<_>>().join(",")
+}
+
+#[test]
+fn a_given_schedule_is_run_again() {
+    let Ok(given) = std::env::var("ESL_SCHEDULE") else { return };
+    let words: Vec<&str> = given.split(' ').collect();
+    let [name, slice, choices] = words[..] else { panic!("a name, a slice and choices, not {given}") };
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("programs/tasks");
+    let text = std::fs::read_to_string(folder.join(name)).expect("the program can be read");
+    let choices: Vec<u32> = choices.split(',').map(|choice| choice.parse().expect("a number")).collect();
+    let run = run(&compile(name, &text), Choices::given(&choices), slice.parse().expect("a number of ticks"));
+    println!("status {}\n{}\n{}", run.status, run.lines.join("\n"), run.errors);
 }
 
 /// Four tasks that each write their name a few times.

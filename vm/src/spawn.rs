@@ -102,6 +102,9 @@ impl Vm {
         task.notify = options.notify;
         task.flags.set_daemon(options.daemon);
         task.flags.set_hidden(options.hidden);
+        let bindings = self.running.as_ref().and_then(|parent| parent.control.get());
+        // They are copied.
+        self.charge(bindings.map_or(0, |control| 2 * control.bindings.len()));
         if let Some(parent) = &self.running {
             self.accounts.enter(parent.account);
             task.account = parent.account;
