@@ -148,3 +148,29 @@ fn a_drawing_of_a_long_run_shows_its_beginning() {
     assert!(svg.contains("Only the beginning of the run is shown") && svg.contains("101 more tasks"));
     assert!(svg.len() < 4 << 20);
 }
+
+#[test]
+fn figures_tell_of_pauses_and_of_tasks() {
+    let source = Path::new(env!("CARGO_TARGET_TMPDIR")).join("figures.esl");
+    std::fs::write(&source, PROGRAM).expect("the program can be written");
+    let run = |option: &str| {
+        let output = Command::new(ESLVM).args(["run", "--clock", "virtual", option]).arg(&source).output();
+        String::from_utf8(output.expect("the command can be run").stderr).expect("text")
+    };
+    let all = run("--stats=tasks");
+    let figure = |name: &str| {
+        let line = all.lines().find(|line| line.trim_start().starts_with(name));
+        let figure =
+            line.and_then(|line| line.split_whitespace().rev().find_map(|word| word.parse::<f64>().ok()));
+        figure.unwrap_or_else(|| panic!("no {name} in {all}"))
+    };
+    for name in ["ticks", "turns", "switches", "peak heap", "collections", "pauses", "longest"] {
+        assert!(figure(name) > 0.0, "{name}");
+    }
+    assert!(figure("switches") <= figure("turns"));
+    let tasks: Vec<&str> = all.lines().filter(|line| line.contains("  task ")).collect();
+    // Most ticks first: the one that loops has had most.
+    assert!(tasks[0].contains("aborted") && tasks[0].ends_with("less\""), "{all}");
+    assert!(all.contains("succeeded  the main task") && all.contains("failed     task UNLUCKY"), "{all}");
+    assert!(!run("--stats").contains("  task "));
+}
