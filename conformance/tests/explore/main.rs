@@ -1,5 +1,7 @@
 //! Explores all schedules of small programs: shows what never happens, and finds what does.
 
+mod defects;
+
 use esl::explore::{Exploration, Grain, Outcome, Settings, explore, follow};
 use esl::program::{self, Ended, Program, Source};
 
@@ -15,7 +17,7 @@ fn say<T>(grain: Grain, found: &Exploration<T>) {
 }
 
 /// Everything that runs of a program come to. Each ending is reached again by its choices.
-fn endings(text: &str, grain: Grain) -> Exploration<Outcome> {
+pub(crate) fn endings(text: &str, grain: Grain) -> Exploration<Outcome> {
     let program = compile(text);
     let settings = Settings { grain, ..Settings::default() };
     let found = explore(&program, &settings).expect("the program can be begun");
@@ -42,7 +44,7 @@ fn outputs(found: &Exploration<Outcome>) -> Vec<String> {
 }
 
 /// That each schedule of a program ends well, and what they write.
-fn check(text: &str, grain: Grain, expected: &[&str]) -> Exploration<Outcome> {
+pub(crate) fn check(text: &str, grain: Grain, expected: &[&str]) -> Exploration<Outcome> {
     let found = endings(text, grain);
     assert_eq!(outputs(&found), expected);
     assert_eq!((&found.endless, found.has_cycle), (&None, false), "a run may go on for ever");
