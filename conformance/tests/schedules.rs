@@ -54,8 +54,17 @@ fn compile(name: &str, text: &str) -> Program {
 }
 
 #[test]
-fn programs_do_what_they_say_under_every_schedule() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("programs/tasks");
+fn programs_with_tasks_do_what_they_say_under_every_schedule() {
+    check_programs("tasks");
+}
+
+#[test]
+fn programs_with_locks_do_what_they_say_under_every_schedule() {
+    check_programs("locks");
+}
+
+fn check_programs(folder: &str) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("programs").join(folder);
     let mut names: Vec<String> = std::fs::read_dir(&folder)
         .expect("the folder is there")
         .map(|entry| entry.expect("it can be read").file_name().to_string_lossy().into_owned())

@@ -101,7 +101,7 @@ fn a_task_that_has_released_is_not_interrupted() {
     );
 }
 
-/// Back with: in `wait/signal.rs`, waking a task takes a pending abort from it.
+/// Back with: `Vm::wake_waiter` takes a pending abort from the task.
 #[test]
 fn a_wake_up_does_not_revive_an_aborted_task() {
     check_locks(

@@ -11,6 +11,8 @@
 
 use std::collections::BTreeMap;
 
+use smallvec::SmallVec;
+
 use super::term::{MAX_SIZE, Term, TermError, Terms};
 use crate::heap::{AllocError, Heap};
 use crate::value::Value;
@@ -43,7 +45,7 @@ pub(super) struct Pattern {
     /// Its place among the generators of its query, in the order of the text.
     pub(super) rank: usize,
     pub(super) functor: Term,
-    pub(super) arguments: Vec<Term>,
+    pub(super) arguments: SmallVec<[Term; 6]>,
     /// What is matched with the list of all further arguments; `NIL` for none.
     pub(super) tail: Term,
 }
@@ -202,7 +204,7 @@ impl<'a> Parser<'a> {
         Parser {
             terms,
             heap,
-            held: Vec::new(),
+            held: Vec::with_capacity(8),
             names: Vec::new(),
             ranks: 0,
             inherited: BTreeMap::new(),
@@ -320,7 +322,7 @@ impl<'a> Parser<'a> {
         let rank = self.ranks;
         self.ranks += 1;
         let functor = self.term(pair.car)?;
-        let mut arguments = Vec::new();
+        let mut arguments = SmallVec::new();
         let mut rest = pair.cdr;
         while let Some(pair) = self.heap.as_cons(rest) {
             arguments.push(self.term(pair.car)?);

@@ -263,7 +263,7 @@ impl Query {
             }
             Access::Chain(index, row) => (index, row),
         };
-        self.choices.push(Choice::Rows {
+        let choice = Choice::Rows {
             relation,
             index,
             row,
@@ -271,9 +271,11 @@ impl Query {
             trail: self.trail.len(),
             rank: pattern.rank,
             next,
-        });
+        };
+        // Its first fact is looked for at once. If the work is used up on the way, the choice is there to come back to.
         self.state = State::Back;
-        Ok(None)
+        let goes_on = self.next_row(database, choice, work);
+        Ok(if goes_on { None } else { Some(Progress::More) })
     }
 
     fn matched_row(&mut self, relation: u32, row: u32, rank: usize, born: u64) {
@@ -285,6 +287,10 @@ impl Query {
 
     /// Goes back to the latest choice; false if the work is used up on the way.
     fn go_back(&mut self, database: &mut Database, work: &mut usize) -> Result<bool, Problem> {
+        if let Some(Choice::Table { .. }) = self.choices.last() {
+            self.next_table_answer();
+            return Ok(true);
+        }
         let Some(choice) = self.choices.pop() else {
             self.next_work(database)?;
             return Ok(true);
@@ -305,7 +311,7 @@ impl Query {
                 }
                 return Ok(!is_unfinished);
             }
-            Choice::Table { .. } => self.next_table_answer(choice),
+            Choice::Table { .. } => unreachable!("seen to above"),
             Choice::Branch { goal, at, trail } => {
                 self.undo(trail);
                 let Goal::Branch { alternatives, rank, ranks_end } = &self.goals[goal as usize] else {
@@ -529,26 +535,33 @@ impl Query {
         }
     }
 
-    fn next_table_answer(&mut self, choice: Choice) {
-        let Choice::Table { table, at, variables, consumer, trail, rank, next } = choice else {
+    /// The next answer of the table that the latest choice is about.
+    fn next_table_answer(&mut self) {
+        let Query { choices, tables, consumers, bindings, trail: bound, .. } = self;
+        let Some(Choice::Table { table, at, variables, consumer, trail, rank, next }) = choices.last_mut()
+        else {
             unreachable!("answers of a table")
         };
-        self.undo(trail);
-        let answers = &self.tables[table as usize].tuples;
-        if at >= answers.len() {
-            if let Some(consumer) = consumer {
-                let consumer = &mut self.consumers[consumer as usize];
-                consumer.at = at;
+        for variable in bound.drain(*trail..) {
+            bindings[variable as usize] = Term::UNBOUND;
+        }
+        let answers = &tables[*table as usize].tuples;
+        if *at >= answers.len() {
+            if let Some(consumer) = *consumer {
+                let consumer = &mut consumers[consumer as usize];
+                consumer.at = *at;
                 consumer.is_idle = true;
             }
+            choices.pop();
             return;
         }
-        for (&variable, &value) in variables.iter().zip(answers.get(at)) {
-            self.bindings[variable as usize] = value;
-            self.trail.push(variable);
+        for (&variable, &value) in variables.iter().zip(answers.get(*at)) {
+            bindings[variable as usize] = value;
+            bound.push(variable);
         }
-        self.set_key(rank, at as u64);
-        self.choices.push(Choice::Table { table, at: at + 1, variables, consumer, trail, rank, next });
+        let (rank, key, next) = (*rank, *at as u64, *next);
+        *at += 1;
+        self.set_key(rank, key);
         self.state = State::Goal(next);
     }
 
@@ -603,7 +616,7 @@ impl Query {
         self.stratum = stratum;
         self.state = State::Back;
         if rule == 0 {
-            let pattern = Pattern { rank: 0, functor: *functor, arguments: call, tail: Term::NIL };
+            let pattern = Pattern { rank: 0, functor: *functor, arguments: call.into(), tail: Term::NIL };
             self.set_aside(Work::Expand { table, rule: 1 }, stratum);
             let Some(relation) = database.find_relation(pattern.functor, pattern.arguments.len()) else {
                 return Ok(());
@@ -665,33 +678,38 @@ impl Query {
 
     /// An answer has been found.
     fn solved(&mut self, database: &mut Database) -> Result<(), Problem> {
-        let (table, rule) = match &self.sinks[self.sink as usize] {
+        let Query { sinks, sink, tables, bindings, held, .. } = self;
+        let (table, rule) = match &sinks[*sink as usize] {
             Sink::Query => {
                 self.answer();
                 return Ok(());
             }
             Sink::Facts(table) => (*table, None),
-            Sink::Rule(table, rule) => (*table, Some(rule.clone())),
+            Sink::Rule(table, rule) => (*table, Some(rule)),
         };
-        let width = self.tables[table as usize].width;
+        let Answers { call, tuples, width, .. } = &mut tables[table as usize];
+        let width = *width;
         let is_new = match rule {
-            None => self.tables[table as usize].tuples.insert(self.bindings[..width].iter().copied()),
+            None => tuples.insert(bindings[..width].iter().copied()),
             Some(rule) => {
                 let mut values: SmallVec<[Term; 4]> = SmallVec::from_elem(Term::UNBOUND, width);
                 let mut bound = Vec::new();
-                for (position, &head) in rule.head.arguments.iter().enumerate() {
-                    let part = self.tables[table as usize].call[position];
+                for (&head, &part) in rule.head.arguments.iter().zip(&*call) {
                     if database.terms.is_ground(part) {
                         continue;
                     }
-                    let Some(term) = database.terms.instantiate(head, &self.bindings, &mut self.held)? else {
+                    let Some(term) = database.terms.instantiate(head, bindings, held)? else {
                         return Err(Problem::Unbound(rule.head.functor));
                     };
-                    if !database.terms.matches(part, term, &mut values, &mut bound) {
+                    if let Some(place) = part.as_variable().map(|variable| &mut values[variable])
+                        && place.is_unbound()
+                    {
+                        *place = term;
+                    } else if !database.terms.matches(part, term, &mut values, &mut bound) {
                         return Ok(());
                     }
                 }
-                self.tables[table as usize].tuples.insert(values.into_iter())
+                tuples.insert(values.into_iter())
             }
         };
         if is_new {

@@ -76,6 +76,11 @@ fn variables_of(terms: &Terms, pattern: &Pattern, visit: &mut dyn FnMut(usize)) 
 impl Planner<'_> {
     /// Makes the goals of a formula after which `next` comes. `bound` says what is bound before.
     pub(super) fn plan(&mut self, formula: &Formula, bound: &mut Bound, next: GoalId) -> GoalId {
+        if let Formula::Pattern(pattern) = formula {
+            // There is nothing to arrange, and nobody asks what is bound behind it.
+            self.work += 1;
+            return self.emit_pattern(pattern, next);
+        }
         let arranged = self.arrange(formula, bound);
         self.emit(&arranged, next)
     }

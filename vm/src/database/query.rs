@@ -215,7 +215,8 @@ impl Query {
             }
         };
         let rules = if wants_facts { Arc::default() } else { database.rules.clone() };
-        let mut goals = vec![Goal::Solved];
+        let mut goals = Vec::with_capacity(4);
+        goals.push(Goal::Solved);
         let mut planner =
             Planner { database, rules: &rules, goals: &mut goals, is_reordered: false, work: 0 };
         let start = planner.plan(&formula, &mut vec![false; names.len()], 0);

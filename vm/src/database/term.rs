@@ -508,6 +508,12 @@ impl Terms {
 
     /// Calls `visit` with the number of each variable in a pattern, in textual order.
     pub(super) fn variables(&self, pattern: Term, visit: &mut dyn FnMut(usize)) {
+        if let Some(variable) = pattern.as_variable() {
+            return visit(variable);
+        }
+        if self.is_ground(pattern) {
+            return;
+        }
         let mut open = vec![pattern];
         while let Some(term) = open.pop() {
             if let Some(variable) = term.as_variable() {
