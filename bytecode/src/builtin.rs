@@ -957,8 +957,8 @@ define_builtins! {
     BeginFile = internal "%BEGIN-FILE" ("name text");
     /// The functions that run the top-level forms of a compiled file, in order.
     CompiledFile = internal "%COMPILED-FILE" ("path");
-    /// A handle of a text that is compiled form by form.
-    OpenText = internal "%OPEN-TEXT" ("text");
+    /// A handle of a text that is compiled form by form. Functions of a text with a name know where they stand in it.
+    OpenText = internal "%OPEN-TEXT" ("text &optional name");
     /// A handle of the compilation of the next form of a text, `NIL` at its end.
     NextForm = internal "%NEXT-FORM" ("handle");
     /// Tells a compilation what became of its last step, and returns the next one: `:expand` function form environment,

@@ -197,10 +197,26 @@ pub trait Compilation: Send {
     ) -> Step;
 }
 
+/// A part of a text from which one form was read. Spans in the form are those of the whole text.
+#[derive(Clone, Copy, Debug)]
+pub struct Part<'a> {
+    /// Name of the source.
+    pub name: &'a str,
+    /// The part.
+    pub text: &'a str,
+    /// Byte of the whole at which it begins.
+    pub start: u32,
+    /// Line there, from 0.
+    pub line: u32,
+    /// Characters before it on that line.
+    pub column: u32,
+}
+
 /// A compiler, for a virtual machine that evaluates at run time.
 pub trait Compile: Send {
-    /// Begins to compile one form. Its value is what the last top-level function of the module returns.
-    fn compile_form(&self, form: Datum) -> Box<dyn Compilation>;
+    /// Begins to compile one form, which is from nowhere or from a part of a text. Its value is what the last top-level
+    /// function of the module returns.
+    fn compile_form(&self, form: Datum, part: Option<Part<'_>>) -> Box<dyn Compilation>;
     /// Begins to compile a whole text, called `name` in diagnostics.
     fn compile_text(&self, name: &str, text: &str) -> Box<dyn Compilation>;
     /// Reads one datum of `text` from byte `start` on: the datum, `None` at the end of the text, and the offset after it.

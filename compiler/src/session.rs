@@ -14,7 +14,7 @@ mod parts;
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use esl_bytecode::compile::{Answer, Compilation, Compile, Environment, Required, Step};
+use esl_bytecode::compile::{Answer, Compilation, Compile, Environment, Part, Required, Step};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::link::join;
@@ -104,8 +104,12 @@ impl Compiler {
 }
 
 impl Compile for Compiler {
-    fn compile_form(&self, form: Datum) -> Box<dyn Compilation> {
-        Box::new(self.session(Input::Form(Some(form)), SourceLines::new()))
+    fn compile_form(&self, form: Datum, part: Option<Part<'_>>) -> Box<dyn Compilation> {
+        let mut lines = SourceLines::new();
+        if let Some(part) = part {
+            lines.add_part(part);
+        }
+        Box::new(self.session(Input::Form(Some(form)), lines))
     }
 
     fn compile_text(&self, name: &str, text: &str) -> Box<dyn Compilation> {

@@ -14,7 +14,7 @@ use crate::core::*;
 use crate::diagnostic::code;
 
 /// Functions and operators that do not return.
-const LEAVING: &[&str] = &["FAIL", "%FAIL-FOR", "NEXT-BINDINGS", "EXIT"];
+const LEAVING: &[&str] = &["FAIL", "%FAIL-FOR", "%NO-CASE", "NEXT-BINDINGS", "EXIT"];
 const LEAVING_STANDARD: &[&str] = &["ERROR", "INVOKE-RESTART", "ABORT"];
 
 /// `(%with-recovery table (%named-lambda …) . body)`: see [`NodeKind::Recovery`].
@@ -117,21 +117,25 @@ impl Machine {
     }
 }
 
-/// Whether the end of a form is never reached, or is one that says that its value is meant.
+/// Whether the end of a form is never reached, or is one that says that its value is meant. A `NIL` that a macro has put at
+/// the end of what it makes of a form, as `dolist` does, says nothing.
 fn leaves_or_resumes(core: &Core, node: NodeId) -> bool {
     let mut inside: FxHashSet<BlockId> = FxHashSet::default();
-    let mut pending = vec![node];
-    while let Some(node) = pending.pop() {
+    let mut pending = vec![(node, None)];
+    while let Some((node, around)) = pending.pop() {
+        let span = core.nodes[node.index()].span;
+        let inside_it = |node: NodeId| (node, Some(span));
         match &core.nodes[node.index()].kind {
+            NodeKind::Constant(constant) if constant.is_nil() && around == Some(span) => return false,
             NodeKind::Constant(_) | NodeKind::Values(_) | NodeKind::Throw(..) | NodeKind::Go(..) => {}
             NodeKind::ReturnFrom(block, value) => {
                 if inside.contains(block) {
-                    pending.push(*value);
+                    pending.push(inside_it(*value));
                 }
             }
             NodeKind::Block(block, body) => {
                 inside.insert(*block);
-                pending.push(*body);
+                pending.push(inside_it(*body));
             }
             NodeKind::If(_, consequent, alternative) => {
                 // What `when` and `cond` leave out is not said.
@@ -139,10 +143,10 @@ fn leaves_or_resumes(core: &Core, node: NodeId) -> bool {
                 if is_left_out(consequent) || is_left_out(alternative) {
                     return false;
                 }
-                pending.extend([*consequent, *alternative]);
+                pending.extend([*consequent, *alternative].map(inside_it));
             }
             NodeKind::Progn(forms) => match forms.last() {
-                Some(last) => pending.push(*last),
+                Some(last) => pending.push(inside_it(*last)),
                 None => return false,
             },
             NodeKind::Let { body, .. }
@@ -154,10 +158,10 @@ fn leaves_or_resumes(core: &Core, node: NodeId) -> bool {
             | NodeKind::FirstValues(body, _)
             | NodeKind::UnwindProtect(body, _)
             | NodeKind::FailureCleanup(body, _)
-            | NodeKind::Recovery { body, .. } => pending.push(*body),
+            | NodeKind::Recovery { body, .. } => pending.push(inside_it(*body)),
             NodeKind::HandlerCase(body, clauses) => {
-                pending.push(*body);
-                pending.extend(clauses.iter().map(|clause| clause.body));
+                pending.push(inside_it(*body));
+                pending.extend(clauses.iter().map(|clause| inside_it(clause.body)));
             }
             NodeKind::Tagbody(_, items) => match items.last() {
                 Some(TagbodyItem::Form(last)) => {
@@ -176,7 +180,7 @@ fn leaves_or_resumes(core: &Core, node: NodeId) -> bool {
             }
             NodeKind::Call(Callee::Value(function), _) | NodeKind::Apply(Callee::Value(function), _) => {
                 match core.nodes[function.index()].kind {
-                    NodeKind::Lambda(lambda) => pending.push(core.lambdas[lambda.index()].body),
+                    NodeKind::Lambda(lambda) => pending.push(inside_it(core.lambdas[lambda.index()].body)),
                     _ => return false,
                 }
             }

@@ -3,6 +3,7 @@
 use std::cell::Cell;
 use std::sync::Arc;
 
+use esl_bytecode::compile::Part;
 use esl_bytecode::span::{SourceId, Span};
 
 /// The texts of a compilation, to turn spans into lines. A span that lies in none of them has no line.
@@ -15,6 +16,8 @@ pub struct SourceLines {
 struct SourceText {
     name: String,
     text: Arc<str>,
+    /// Where the text begins in the source: its byte, its line from 0, and the characters before it there.
+    first: (u32, u32, u32),
     /// Offsets at which lines begin.
     starts: Vec<u32>,
     /// The place that was asked for last, since questions come nearly in order and lines may be very long.
@@ -36,10 +39,19 @@ impl SourceLines {
 
     /// Adds a source, which gets the next number.
     pub fn add(&mut self, name: &str, text: Arc<str>) -> SourceId {
+        self.add_text(name, text, (0, 0, 0))
+    }
+
+    /// Adds a source of which there is only a part.
+    pub fn add_part(&mut self, part: Part<'_>) -> SourceId {
+        self.add_text(part.name, part.text.into(), (part.start, part.line, part.column))
+    }
+
+    fn add_text(&mut self, name: &str, text: Arc<str>, first: (u32, u32, u32)) -> SourceId {
         let breaks = text.bytes().enumerate().filter(|&(_, byte)| byte == b'\n');
         let starts = std::iter::once(0).chain(breaks.map(|(at, _)| at as u32 + 1)).collect();
         let id = SourceId(self.sources.len() as u32);
-        self.sources.push(SourceText { name: name.to_string(), text, starts, last: Cell::default() });
+        self.sources.push(SourceText { name: name.to_string(), text, first, starts, last: Cell::default() });
         id
     }
 
@@ -51,7 +63,8 @@ impl SourceLines {
     /// Line and column, from 1, of the start of `span`; columns count characters.
     pub fn line_and_column(&self, span: Span) -> Option<(u32, u32)> {
         let source = self.sources.get(span.source.0 as usize)?;
-        let offset = span.start as usize;
+        let (first_byte, first_line, first_column) = source.first;
+        let offset = span.start.checked_sub(first_byte)? as usize;
         if offset > source.text.len() {
             return None;
         }
@@ -65,7 +78,7 @@ impl SourceLines {
         };
         let column = before + source.text.get(from..offset)?.chars().count() as u32;
         source.last.set(LastPlace { line, offset, column });
-        Some((line as u32 + 1, column + 1))
+        Some((first_line + line as u32 + 1, if line == 0 { first_column } else { 0 } + column + 1))
     }
 }
 
@@ -85,5 +98,15 @@ mod tests {
         assert_eq!(place(0), Some((1, 1)));
         assert_eq!(place(100), None);
         assert_eq!(lines.line_and_column(Span::new(SourceId(1), 0, 0)), None);
+    }
+
+    #[test]
+    fn a_part_knows_where_it_begins() {
+        let mut lines = SourceLines::new();
+        let id = lines.add_part(Part { name: "a.esl", text: " (x\n y)", start: 20, line: 4, column: 7 });
+        let place = |at| lines.line_and_column(Span::new(id, at, at));
+        assert_eq!(place(21), Some((5, 9)));
+        assert_eq!(place(25), Some((6, 2)));
+        assert_eq!(place(19), None);
     }
 }

@@ -68,7 +68,7 @@ fn warnings_do_not_keep_a_program_from_compiling() {
 fn a_form_becomes_a_module_whose_last_function_gives_its_value() {
     let mut host = FakeHost::new();
     let form = host.read("(progn (print 1) (load-time-value (print 2)))");
-    let mut compilation = Compiler::default().compile_form(form);
+    let mut compilation = Compiler::default().compile_form(form, None);
     let (module, found) = drive(&mut *compilation, &mut host);
     assert!(found.is_empty(), "{found:?}");
     assert_eq!(module.expect("it compiles").toplevel.len(), 2);

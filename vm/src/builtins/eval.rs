@@ -16,7 +16,7 @@
 //!
 //! Diagnostics are a list of `(severity code text)`. Whoever begins a compilation ends it with `%end-compilation`.
 
-use esl_bytecode::compile::{Answer, Compilation, Compile, Step};
+use esl_bytecode::compile::{Answer, Compilation, Compile, Part, Step};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::file;
@@ -46,10 +46,41 @@ fn is_unfinished(code: &str) -> bool {
 enum Session {
     /// A compilation.
     Compilation(Box<Running>),
-    /// A text of which form by form is compiled: all of it, and the byte where the next form begins.
-    Text(Box<str>, usize),
+    /// A text of which form by form is compiled.
+    Text(Text),
     /// One that somebody works on.
     Taken,
+}
+
+/// A text, and where the next of its forms begins.
+struct Text {
+    text: Box<str>,
+    /// What it is called, if places in it are of interest.
+    name: Option<String>,
+    position: usize,
+    /// Line there, from 0.
+    line: u32,
+    /// Characters before it on that line.
+    column: u32,
+}
+
+impl Text {
+    /// What lies between the position and `end`.
+    fn part(&self, end: usize) -> Option<Part<'_>> {
+        let text = &self.text[self.position..end];
+        let start = self.position as u32;
+        Some(Part { name: self.name.as_deref()?, text, start, line: self.line, column: self.column })
+    }
+
+    /// Goes on to `end`.
+    fn pass(&mut self, end: usize) {
+        let passed = &self.text[self.position..end];
+        let last = passed.rfind('\n');
+        self.line += passed.bytes().filter(|&byte| byte == b'\n').count() as u32;
+        let after = last.map_or(passed, |at| &passed[at + 1..]).chars().count() as u32;
+        self.column = if last.is_some() { after } else { self.column + after };
+        self.position = end;
+    }
 }
 
 /// A compilation that a program runs.
@@ -248,7 +279,7 @@ enum Read {
 pub(super) fn begin_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut unit = Unit::default();
     let form = vm.as_form(&mut unit, arguments[0], Span::default())?;
-    let compilation = vm.with_compiler(|_, compiler| compiler.compile_form(form))?;
+    let compilation = vm.with_compiler(|_, compiler| compiler.compile_form(form, None))?;
     Ok(vm.begin(compilation, unit))
 }
 
@@ -280,31 +311,37 @@ pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%open-text text)`
+/// `(%open-text text &optional name)`
 pub(super) fn open_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(text) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
     vm.charge(text.len());
-    Ok(vm.world.compiler.add(Session::Text(text.into(), 0)))
+    let name = match optional(arguments, 1) {
+        name if name.is_nil() => None,
+        name => Some(vm.designated_text(name)?),
+    };
+    let text = Text { text: text.into(), name, position: 0, line: 0, column: 0 };
+    Ok(vm.world.compiler.add(Session::Text(text)))
 }
 
 /// `(%next-form text)`: the compilation of the next form of a text, `NIL` at its end.
 pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (id, mut session) = vm.take_session(arguments[0])?;
     let next = match &mut session {
-        Session::Text(text, position) => begin_form(vm, text, position),
+        Session::Text(text) => begin_form(vm, text),
         _ => vm.program_error("there are no forms in a compilation"),
     };
     vm.put_back(id, session);
     next
 }
 
-fn begin_form(vm: &mut Vm, text: &str, position: &mut usize) -> Outcome {
-    match vm.read_datum(text, *position)? {
+fn begin_form(vm: &mut Vm, text: &mut Text) -> Outcome {
+    match vm.read_datum(&text.text, text.position)? {
         Read::End => Ok(Value::NIL),
         Read::Unfinished => vm.raise(Raised::Reader("the text ends inside of a form".into())),
         Read::Datum(datum, end) => {
-            let compilation = vm.with_compiler(|_, compiler| compiler.compile_form(datum))?;
-            *position = end;
+            let part = text.part(end);
+            let compilation = vm.with_compiler(|_, compiler| compiler.compile_form(datum, part))?;
+            text.pass(end);
             Ok(vm.begin(compilation, Unit::default()))
         }
     }

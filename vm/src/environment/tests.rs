@@ -3,7 +3,7 @@ use std::sync::Arc;
 use esl_bytecode::assembler::assemble;
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::{
-    Answer, Compilation, Compile, CompileTimeHost, LocalDefinition, MacroCall, MacroRef, Step,
+    Answer, Compilation, Compile, CompileTimeHost, LocalDefinition, MacroCall, MacroRef, Part, Step,
 };
 use esl_bytecode::datum::DatumKind;
 use esl_bytecode::diagnostic::Diagnostic;
@@ -187,7 +187,7 @@ impl Compilation for ToyCompilation {
 }
 
 impl Compile for Toy {
-    fn compile_form(&self, form: Datum) -> Box<dyn Compilation> {
+    fn compile_form(&self, form: Datum, _: Option<Part<'_>>) -> Box<dyn Compilation> {
         Box::new(ToyCompilation::Start(form))
     }
 
