@@ -116,6 +116,7 @@ impl Expectations {
 }
 
 pub mod chapter;
+pub mod differential;
 pub mod session;
 
 #[cfg(test)]

@@ -1,0 +1,155 @@
+//! Programs made by chance, and a checklist, answer as under SBCL. The programs and SBCL's answers are stored; with `ESL_BLESS=1` they
+//! are made anew, for which SBCL must be installed. See `differential/README.md`.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use esl::host::VirtualHost;
+use esl::program::{self, Source};
+use esl::{Config, Engine};
+use esl_conformance::differential::{Grammar, answers};
+
+/// What the stored programs were made with.
+const SEED: u64 = 1997;
+
+/// Names that no program can be compared about, and why.
+const EXCEPTIONS: &[(&str, &str)] = &[
+    ("* ** *** + -", "*, + and - are used as functions; the REPL sets the variables"),
+    ("apropos apropos-list describe", "what they write is the implementation's own"),
+    ("clear-input sleep random", "their effect is none, or by chance; used, not compared"),
+    (
+        "defpackage in-package make-package use-package import export shadow list-all-packages",
+        "programs share a package",
+    ),
+    ("package-nicknames package-use-list package-error-package", "packages of the two differ"),
+    ("file-error-pathname load open probe-file delete-file with-open-file", "programs have no files"),
+    ("require provide *modules*", "modules are files"),
+    ("print-not-readable-object unbound-slot-instance", "nothing signals these errors"),
+    ("type-of", "it names the implementation's own types"),
+    ("signal assert abort", "written with the prefix of their package"),
+    ("t nil", "used everywhere"),
+];
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("differential")
+}
+
+fn read(name: &str) -> String {
+    std::fs::read_to_string(folder().join(name)).unwrap_or_default()
+}
+
+fn is_blessing() -> bool {
+    std::env::var_os("ESL_BLESS").is_some()
+}
+
+fn generated() -> String {
+    let mut grammar = Grammar::parse(&read("grammar.txt"), SEED).expect("the grammar is sound");
+    let mut text = format!(";;;; Made from `grammar.txt` with the seed {SEED}: change that, not this.\n\n");
+    text.push_str(&grammar.programs().join("\n"));
+    text
+}
+
+/// SBCL's output for a file of programs.
+fn sbcl(programs: &str) -> String {
+    let output = Command::new("timeout")
+        .args(["60", "sbcl", "--script", "run-sbcl.lisp", "prelude.lisp", programs])
+        .current_dir(folder())
+        .output()
+        .expect("SBCL is installed");
+    assert!(
+        output.status.success(),
+        "SBCL failed, or took more than a minute:\n{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    String::from_utf8(output.stdout).expect("SBCL writes UTF-8")
+}
+
+/// ESL's output for programs.
+fn esl(programs: &str) -> String {
+    let sources = [Source::new("prelude.lisp", read("prelude.lisp")), Source::new("programs.lisp", programs)];
+    let compiled = program::compile(&sources);
+    let errors: Vec<&str> = compiled
+        .diagnostics
+        .iter()
+        .filter(|diagnostic| diagnostic.severity == esl_bytecode::diagnostic::Severity::Error)
+        .map(|diagnostic| diagnostic.message.as_str())
+        .collect();
+    assert!(errors.is_empty(), "the programs do not compile: {errors:#?}");
+    let host = VirtualHost::new();
+    let captured = host.captured();
+    let program = compiled.program.expect("there was no error");
+    program::run(&program, Config::default(), Box::new(host)).expect("it can be run");
+    captured.output()
+}
+
+#[track_caller]
+fn compare(programs: &str, stored: &str) {
+    let (expected, found) = (answers(stored), answers(&esl(programs)));
+    let mut wrong = Vec::new();
+    for (number, answer) in &expected {
+        let own = found.get(number).map_or("no answer\n", String::as_str);
+        if own != answer {
+            let begin = format!(";;; {number}\n");
+            let program = programs.split_once(&begin).map_or("", |(_, rest)| rest);
+            let program = program.split("\n;;").next().unwrap_or_default();
+            wrong.push(format!("{number}: {program}\nSBCL: {answer}ESL:  {own}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{} of {} answers differ\n{}", wrong.len(), expected.len(), wrong.join("\n"));
+    assert_eq!(found.len(), expected.len(), "a program has no stored answer: regenerate");
+}
+
+#[test]
+fn generated_programs_answer_as_under_sbcl() {
+    let programs = generated();
+    if is_blessing() {
+        std::fs::write(folder().join("generated.lisp"), &programs).expect("the programs can be written");
+        std::fs::write(folder().join("generated.answers"), sbcl("generated.lisp"))
+            .expect("the answers can be written");
+    }
+    assert!(
+        programs == read("generated.lisp"),
+        "the grammar has changed: ESL_BLESS=1 cargo test -p esl-conformance --test differential"
+    );
+    compare(&programs, &read("generated.answers"));
+}
+
+#[test]
+fn the_checklist_answers_as_under_sbcl() {
+    if is_blessing() {
+        std::fs::write(folder().join("checklist.answers"), sbcl("checklist.lisp"))
+            .expect("the answers can be written");
+    }
+    compare(&read("checklist.lisp"), &read("checklist.answers"));
+}
+
+#[test]
+fn every_operator_is_reached() {
+    let text = (read("generated.lisp") + &read("checklist.lisp")).to_uppercase();
+    let used: BTreeSet<&str> = text
+        .split(|c: char| c.is_whitespace() || "()'`,@#\"".contains(c))
+        .map(|word| word.trim_start_matches("CL:"))
+        .collect();
+    let mut engine =
+        Engine::with(Config::default(), Box::new(VirtualHost::new())).expect("there is room for the library");
+    let names = "(let ((names nil))
+       (dolist (s (apropos-list \"\" \"COMMON-LISP\") (format nil \"~{~a~^ ~}\" names))
+         (when (or (special-operator-p s) (macro-function s) (fboundp s) (boundp s))
+           (push (symbol-name s) names))))";
+    let names = engine.eval(names).expect("the names can be listed").to_string();
+    let excepted: BTreeSet<String> =
+        EXCEPTIONS.iter().flat_map(|(names, _)| names.split(' ')).map(str::to_uppercase).collect();
+    let missing: Vec<&str> = names
+        .trim_matches('"')
+        .split(' ')
+        .filter(|name| !used.contains(name) && !excepted.contains(*name))
+        .collect();
+    assert!(names.len() > 500, "the names are listed");
+    assert!(
+        missing.is_empty(),
+        "no program uses {} names: {}",
+        missing.len(),
+        missing.join(" ").to_lowercase()
+    );
+}
