@@ -8,7 +8,7 @@ use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::compile::{
     Accessor, Arity, Environment, Global, GlobalFunction, GlobalVariable, InternError,
 };
-use esl_bytecode::datum::Datum;
+use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::module::Parameters;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol, setf_cell};
@@ -205,22 +205,15 @@ impl Vm {
         })
     }
 
-    /// What the library says to use in place of a function that it leaves out: `*instead*` is a list of pairs of
-    /// strings, the name and the text.
+    /// What the library says of a name of Common Lisp that it leaves out.
     fn instead_of(&self, symbol: &Symbol) -> Option<String> {
         if !symbol.is_in(CL_PACKAGE) {
             return None;
         }
-        let mut list = self.heap.symbol(self.world.known.instead)?.value;
-        while let Some(pair) = self.heap.as_cons(list) {
-            list = pair.cdr;
-            let entry = self.heap.as_cons(pair.car)?;
-            let name = self.heap.string(entry.car)?;
-            if symbol.name().chars().map(u32::from).eq(name.iter().copied()) {
-                return self.heap.string_text(entry.cdr);
-            }
+        match self.property(symbol, &Symbol::esl("%INSTEAD"))?.kind() {
+            DatumKind::String(text) => Some(text.to_string()),
+            _ => None,
         }
-        None
     }
 }
 

@@ -189,6 +189,11 @@ impl Unit {
         }
         uses.into_iter()
             .map(|(symbol, spans)| {
+                if let Some(instead) = similar.environment.global(&symbol).instead {
+                    let message =
+                        format!("{} is not in the subset of Common Lisp that ESL has", name(&symbol));
+                    return Diagnostic::warning(code::NOT_IN_SUBSET.name, message, spans[0]).help(instead);
+                }
                 let message = format!("no variable is called {}", name(&symbol));
                 let diagnostic = with_uses(code::UNDEFINED_VARIABLE.at(spans[0], message), &spans[1..]);
                 similar.help(diagnostic, &symbol, true)
@@ -217,7 +222,7 @@ impl Similar<'_> {
         if !function.is_setf
             && let Some(instead) = self.environment.global(&function.symbol).instead
         {
-            let message = format!("{} is not part of ESL", function.shown());
+            let message = format!("{} is not in the subset of Common Lisp that ESL has", function.shown());
             return Diagnostic::warning(code::NOT_IN_SUBSET.name, message, uses[0]).help(instead);
         }
         let message = format!("no function is called {}", function.shown());

@@ -70,8 +70,6 @@ define_known! {
     waiting = keyword "WAITING";
     // Properties under which the machine keeps data on a symbol.
     accessor = esl "%ACCESSOR";
-    // Variables of the library that the machine looks at.
-    instead = esl "%INSTEAD";
     // Answers and options in keywords.
     internal = keyword "INTERNAL";
     external = keyword "EXTERNAL";
