@@ -36,7 +36,8 @@ fn one_of_each(heap: &mut Heap) -> Vec<(Option<Kind>, Value)> {
     let vector = heap.alloc_vector(&[n(1), n(2)]).unwrap();
     let class = heap.alloc_record(Kind::Class, 0, 0, &[n(1)]).unwrap();
     let mut all = vec![(None, heap.cons(n(1), n(2)).unwrap())];
-    for kind in KINDS {
+    // Only the machine itself makes hash tables, and the words that they consist of.
+    for kind in KINDS.into_iter().filter(|kind| !matches!(kind, Kind::HashTable | Kind::Words64)) {
         let v = match kind {
             Kind::Symbol => symbol(heap, "car"),
             Kind::Function => function(heap),
@@ -119,14 +120,14 @@ fn slots_are_set_within_bounds_only() {
     assert_eq!(heap.vector_set(v, usize::MAX, n(1)), None);
     assert_eq!(heap.vector(v), Some(&[Value::NIL, Value::NIL, n(1)][..]));
 
-    let table = heap.alloc_record_filled(Kind::HashTable, 2, 4, Value::NIL).unwrap();
-    assert_eq!(heap.record_set(table, Kind::HashTable, 3, n(1)), Some(()));
-    assert_eq!(heap.record_set(table, Kind::HashTable, 4, n(1)), None);
-    assert_eq!(heap.record_set(table, Kind::Package, 0, n(1)), None);
-    assert_eq!(heap.header(table).map(|Header { aux, len, .. }| (aux, len)), Some((2, 4)));
-    heap.set_aux(table, Kind::HashTable, 1).unwrap();
-    heap.set_flags(table, Kind::HashTable, 9).unwrap();
-    assert_eq!(heap.header(table).map(|h| (h.aux, h.flags)), Some((1, 9)));
+    let stream = heap.alloc_record_filled(Kind::Stream, 2, 4, Value::NIL).unwrap();
+    assert_eq!(heap.record_set(stream, Kind::Stream, 3, n(1)), Some(()));
+    assert_eq!(heap.record_set(stream, Kind::Stream, 4, n(1)), None);
+    assert_eq!(heap.record_set(stream, Kind::Package, 0, n(1)), None);
+    assert_eq!(heap.header(stream).map(|Header { aux, len, .. }| (aux, len)), Some((2, 4)));
+    heap.set_aux(stream, Kind::Stream, 1).unwrap();
+    heap.set_flags(stream, Kind::Stream, 9).unwrap();
+    assert_eq!(heap.header(stream).map(|h| (h.aux, h.flags)), Some((1, 9)));
 
     let empty = heap.alloc_vector(&[]).unwrap();
     assert_eq!(heap.vector(empty), Some(&[][..]));
