@@ -41,8 +41,11 @@ fn help_says_what_the_reference_says() {
     let found =
         std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/manual/reference.md"))
             .expect("the reference is there");
-    let usage =
-        help.lines().next().and_then(|line| line.strip_prefix("member is a function: ")).expect("it is a function");
+    let usage = help
+        .lines()
+        .next()
+        .and_then(|line| line.strip_prefix("member is a function: "))
+        .expect("it is a function");
     let row = found.lines().find(|row| row.starts_with(&format!("| `{usage}` |"))).expect("it has a row");
     let first = help.lines().nth(1).expect("it has a text").trim();
     assert!(row.contains(first), "{row}\n{help}");
