@@ -14,7 +14,7 @@ local function run(rounds, size)
   for round = 1, rounds do
     map_entries(function(key, value) sum = (sum + key + value) % 1000003 end, t)
   end
-  for round = 1, rounds // 4 do
+  for round = 1, math.floor(rounds / 4) do
     map_entries(function(key, value) t[key] = value + 1 end, t)
   end
   map_entries(function(key, value) sum = (sum + value) % 1000003 end, t)

@@ -15,7 +15,7 @@ local function sort_vectors(rounds, size)
       vector[i] = next_random()
     end
     table.sort(vector, function(a, b) return a > b end)
-    sum = (sum + vector[size // 2 + 1]) % 1000003
+    sum = (sum + vector[math.floor(size / 2) + 1]) % 1000003
   end
   print(sum)
 end
