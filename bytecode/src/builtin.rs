@@ -1091,6 +1091,13 @@ define_builtins! {
     Eventp = internal "%EVENTP" ("object");
     /// The event that every signal of any event signals too, without arguments.
     AnyEvent = internal "%ANY-EVENT" ("");
+    /// Waits until one of `events`, an event or a list of events, is signalled, and returns the arguments of the signal as
+    /// values. The options are `[test] &key timeout unless-count`: with `test`, waits until a signal whose arguments answer true to
+    /// it; it runs in this task, and no signal is lost meanwhile. Fails with `:timeout` after `timeout` seconds. Does not wait,
+    /// and returns `NIL`, if the sum of the counts of `events` is no longer `unless-count`.
+    WaitForEvents = esl "WAIT-FOR-EVENTS" ("events &rest options") slowly "%SLOW-WAIT-FOR-EVENTS";
+    /// The same as `wait-for-events`.
+    WaitForEvent = esl "WAIT-FOR-EVENT" ("events &rest options") slowly "%SLOW-WAIT-FOR-EVENT";
     /// Waits for the next signal of one of `events` and returns its arguments; returns at once if `count` is not `NIL`
     /// and no longer the sum of their counts. `what` is for reports.
     Wait = internal "%WAIT" ("events count what");
@@ -1109,12 +1116,17 @@ define_builtins! {
     PassTurn = internal "%PASS-TURN" ("");
 
     // ---- tasks
-    /// A new task that calls a function. `daemon` may be `:internal` for one that is not listed. `notify` is told of its
-    /// end: an event and arguments as a list, or a guard.
+    /// A new task that calls a function. `daemon` may be `:internal` for one that is not listed. `notify` is a guard that
+    /// is told of its end.
     Spawn = internal "%SPAWN" ("function &optional name priority budget daemon notify");
-    /// New tasks, one for each function and name, that begin together; `event` is signalled with each at its end. They have
-    /// the priority of this task.
-    SpawnNet = internal "%SPAWN-NET" ("event names &rest functions");
+    /// New tasks, one for each function and name, that begin together: a net, and the tasks. They have the priority of this
+    /// task. `what` is for reports.
+    SpawnNet = internal "%SPAWN-NET" ("what names &rest functions");
+    /// Waits until a task of a net has ended with `status`, and returns the first that has; or until all have ended, and
+    /// returns `NIL`.
+    AwaitNet = internal "%AWAIT-NET" ("net status");
+    /// Ends the tasks of a net that are left, and waits for that. The net may be `NIL`.
+    EndNet = internal "%END-NET" ("net") slowly "%SLOW-END-NET";
     /// The task that runs.
     CurrentTask = esl "CURRENT-TASK" ("");
     /// Whether `object` is a task.
@@ -1127,6 +1139,8 @@ define_builtins! {
     TaskTicks = internal "%TASK-TICKS" ("task");
     /// The status of a task that has ended, then its values, or the condition; `NIL` before.
     TaskEnd = internal "%TASK-END" ("task");
+    /// The first value of a task that has returned; `NIL` of another.
+    TaskValue = internal "%TASK-VALUE" ("task");
     /// The tasks that have not ended, oldest first; with those that are not listed if `hidden`.
     AllTasks = internal "%ALL-TASKS" ("hidden") slowly "%SLOW-ALL-TASKS";
     /// Some of these tasks, in no order, from a number on; and the number for the next ones, `NIL` if there are no more.

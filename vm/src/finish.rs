@@ -87,8 +87,9 @@ impl Vm {
         let has_waiters = self.slot(object, event::FIRST).is_true();
         let arguments: &[Value] = if has_waiters { &[self.world.known.task_end] } else { &[] };
         self.make_for_end(|vm| vm.signal_event(object, arguments).map(|()| Value::NIL));
-        if let Some(pair) = self.heap.as_cons(notify) {
-            self.make_for_end(|vm| vm.signal(pair.car, pair.cdr).map(|()| Value::NIL));
+        if self.heap.is(notify, Kind::Wait) {
+            let cell = self.make_for_end(|vm| Ok(vm.heap.cons(object, Value::NIL)?));
+            self.keep(notify, cell, object);
         } else if notify.is_true() {
             self.interrupt_by(notify);
         }

@@ -209,7 +209,7 @@ impl Vm {
         if leave == Leave::Ended && !task.flags.kept() {
             self.running_index = u32::MAX;
             if let Some(id) = self.tasks.id_at(index) {
-                self.tasks.remove(id);
+                self.tasks.retire(id, task);
             }
         } else {
             self.tasks.put_back(index, task);

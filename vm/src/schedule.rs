@@ -29,6 +29,8 @@ struct Queued {
 #[derive(Default)]
 pub(crate) struct RunQueues {
     queues: [VecDeque<Queued>; PRIORITIES],
+    /// A bit for each queue, by priority; not set for one that is empty.
+    occupied: u8,
     urgent: VecDeque<Queued>,
     /// Turns so far.
     turns: u64,
@@ -38,8 +40,13 @@ impl RunQueues {
     /// Adds a task.
     #[inline]
     pub(crate) fn push(&mut self, index: u32, serial: u64, priority: u8, urgent: bool) {
-        let queue = if urgent { &mut self.urgent } else { &mut self.queues[usize::from(priority)] };
-        queue.push_back(Queued { index, serial });
+        let queued = Queued { index, serial };
+        if urgent {
+            self.urgent.push_back(queued);
+        } else {
+            self.queues[usize::from(priority)].push_back(queued);
+            self.occupied |= 1 << priority;
+        }
     }
 
     /// Takes out the task whose turn it is.
@@ -58,12 +65,12 @@ impl RunQueues {
                 return Some(index);
             }
         }
-        for queue in self.queues.iter_mut().rev() {
-            if !queue.is_empty()
-                && let Some(index) = pop(queue, tasks, choices)
-            {
+        while self.occupied != 0 {
+            let priority = self.occupied.ilog2();
+            if let Some(index) = pop(&mut self.queues[priority as usize], tasks, choices) {
                 return Some(index);
             }
+            self.occupied &= !(1 << priority);
         }
         pop(&mut self.urgent, tasks, &mut Choices::first())
     }

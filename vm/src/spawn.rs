@@ -6,7 +6,7 @@
 use crate::heap::Kind;
 use crate::interp;
 use crate::raise::Exit;
-use crate::task::{DEFAULT_PRIORITY, Task, TaskId, TaskState};
+use crate::task::{DEFAULT_PRIORITY, TaskId, TaskState};
 use crate::trace::Happening;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -25,7 +25,7 @@ pub(crate) struct SpawnOptions {
     pub daemon: bool,
     /// Whether it belongs to the library.
     pub hidden: bool,
-    /// Who is told of its end, see [`Task::notify`].
+    /// Who is told of its end, see [`crate::task::Task::notify`].
     pub notify: Value,
 }
 
@@ -87,7 +87,7 @@ impl Vm {
         slots[event::RESULT] = parent;
         let object = self.heap.alloc_record(Kind::Task, 0, 0, &slots)?;
         let words = interp::call::first_words(&self.heap, function, arguments);
-        let mut task = Box::new(Task::new(object, words));
+        let mut task = self.tasks.make(object, words);
         interp::call::first_frame(&self.heap, &mut task, self.starter, function, arguments);
         // A new task holds nothing that was not found in a cycle under way: what it is made of is in hands of a task
         // that has been scanned, or of the host.

@@ -47,6 +47,11 @@ impl Stack {
         Stack { start: allocate(capacity), capacity: capacity as u32 }
     }
 
+    /// A stack without words, in the place of one that is taken away.
+    pub(crate) const fn none() -> Stack {
+        Stack { start: NonNull::dangling(), capacity: 0 }
+    }
+
     /// Address of the first word.
     #[inline(always)]
     pub(crate) fn start(&self) -> *mut Value {
@@ -101,8 +106,10 @@ impl Stack {
 
 impl Drop for Stack {
     fn drop(&mut self) {
-        // SAFETY: the segment was allocated with this layout.
-        unsafe { dealloc(self.start.as_ptr().cast(), layout(self.capacity())) };
+        if self.capacity > 0 {
+            // SAFETY: the segment was allocated with this layout.
+            unsafe { dealloc(self.start.as_ptr().cast(), layout(self.capacity())) };
+        }
     }
 }
 

@@ -46,8 +46,7 @@ pub(crate) struct Task {
     pub object: Value,
     /// The wait at which it is parked, from then until it goes on; otherwise `NIL`.
     pub wait: Value,
-    /// Who is told of its end beside those who wait for it: a list of an event and what it is signalled with, a guard, or
-    /// `NIL`.
+    /// Who is told of its end beside those who wait for it: the wait of a net, a guard, or `NIL`.
     pub notify: Value,
     /// Ticks that it has used.
     pub ticks: u64,
@@ -180,8 +179,12 @@ pub enum TaskResult {
 impl Task {
     /// A task that has yet to be given a frame.
     pub(crate) fn new(object: Value, words: usize) -> Task {
+        Task::with_stack(object, Stack::new(words))
+    }
+
+    fn with_stack(object: Value, stack: Stack) -> Task {
         Task {
-            stack: Stack::new(words),
+            stack,
             pc: std::ptr::null(),
             control: LazyControl::default(),
             extra: None,
@@ -202,6 +205,12 @@ impl Task {
         }
     }
 
+    /// Makes a task that has ended, and holds nothing any more, a new one.
+    fn renew(&mut self, object: Value) {
+        let stack = std::mem::replace(&mut self.stack, Stack::none());
+        *self = Task::with_stack(object, stack);
+    }
+
     /// What few tasks need, made if it is not there.
     pub(crate) fn extra_mut(&mut self) -> &mut Extra {
         self.extra.get_or_insert_default()
@@ -220,6 +229,10 @@ impl Task {
     }
 }
 
+/// Records that are kept to be used again.
+const SPARE: usize = 64;
+/// The most words of stack that a record is kept with.
+const SPARE_WORDS: usize = 64;
 /// The priority of a task that is given none.
 pub(crate) const DEFAULT_PRIORITY: u8 = 4;
 /// How many priorities there are.
@@ -243,11 +256,33 @@ struct Place {
 pub(crate) struct Tasks {
     places: Vec<Place>,
     free: Vec<u32>,
+    /// Records of tasks that have ended, to be used again.
+    #[allow(clippy::vec_box, reason = "the boxes are what is kept: they go into places as they are")]
+    spare: Vec<Box<Task>>,
     /// The collector has yet to meet the tasks before this place.
     unmet: usize,
 }
 
 impl Tasks {
+    /// A task that has yet to be given a frame, with at least so many words of stack.
+    pub(crate) fn make(&mut self, object: Value, words: usize) -> Box<Task> {
+        match self.spare.pop() {
+            Some(mut task) if task.stack.capacity() >= words => {
+                task.renew(object);
+                task
+            }
+            _ => Box::new(Task::new(object, words)),
+        }
+    }
+
+    /// Frees the place of a task that has ended, and keeps its record if few are kept.
+    pub(crate) fn retire(&mut self, id: TaskId, task: Box<Task>) {
+        self.remove(id);
+        if self.spare.len() < SPARE && task.stack.capacity() <= SPARE_WORDS {
+            self.spare.push(task);
+        }
+    }
+
     /// Takes in a task.
     pub(crate) fn insert(&mut self, task: Box<Task>) -> TaskId {
         let index = self.free.pop().unwrap_or_else(|| {

@@ -109,8 +109,7 @@ impl Vm {
     /// Slot `index` of an object of the machine; `NIL` if it has none.
     #[inline]
     pub(crate) fn slot(&self, object: Value, index: usize) -> Value {
-        let slots = self.heap.kind(object).and_then(|kind| self.heap.record(object, kind));
-        slots.and_then(|slots| slots.get(index)).copied().unwrap_or(Value::NIL)
+        self.heap.slot(object, index).unwrap_or(Value::NIL)
     }
 
     #[inline]
@@ -290,6 +289,12 @@ impl Vm {
     /// The arguments of the signal for which a wait of the running task was, if it has come.
     pub(crate) fn take_signalled(&mut self, wait: Value) -> Option<Value> {
         (self.wait_flags(wait) & link::SIGNALLED != 0).then(|| self.slot(wait, link::QUEUE))
+    }
+
+    /// Leaves the wait at which the running task was parked. Its signal has come, so it is in no list any more.
+    pub(crate) fn leave_signalled(&mut self) {
+        let wait = std::mem::replace(&mut self.task_mut().wait, Value::NIL);
+        self.heap.log_if_marking(wait);
     }
 
     /// The arguments of the first signal that a wait has kept.

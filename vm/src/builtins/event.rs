@@ -56,8 +56,13 @@ impl Vm {
     }
 
     fn give_list(&mut self, list: Value) -> Outcome {
-        self.values.clear();
         let mut rest = list;
+        if let Some(pair) = self.heap.as_cons(list)
+            && (pair.cdr.is_nil() || self.cpu.wants_one)
+        {
+            return Ok(pair.car);
+        }
+        self.values.clear();
         while let Some(pair) = self.heap.as_cons(rest) {
             self.values.push(pair.car);
             rest = pair.cdr;
@@ -126,14 +131,13 @@ pub(super) fn take_or_park(vm: &mut Vm, events: Value, options: WaitOptions) -> 
     vm.park(wait, None)
 }
 
-/// `(%wait events count what)`
-pub(super) fn wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[events, count, what] = arguments else { unreachable!("the table says three") };
+/// Waits for a signal of `events` that comes after they were counted, if `count` is not `NIL`, and gives its arguments.
+fn wait_for_signal(vm: &mut Vm, events: Value, count: Value, what: Value) -> Outcome {
     let wait = vm.task().wait;
     if wait.is_true() {
         return match vm.take_signalled(wait) {
             Some(arguments) => {
-                vm.cancel_wait();
+                vm.leave_signalled();
                 vm.give_list(arguments)
             }
             None => vm.park(wait, None),
@@ -145,6 +149,19 @@ pub(super) fn wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
     let wait = vm.open_wait(events, WaitOptions { what, ..WaitOptions::default() })?;
     vm.park(wait, None)
+}
+
+/// `(wait-for-events events &rest options)`, `(wait-for-event events &rest options)`
+pub(super) fn wait_for_events(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match arguments {
+        &[events] => wait_for_signal(vm, events, Value::NIL, Value::NIL),
+        _ => Err(Exit::Slowly),
+    }
+}
+
+/// `(%wait events count what)`
+pub(super) fn wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    wait_for_signal(vm, arguments[0], arguments[1], arguments[2])
 }
 
 /// `(%open-wait events seconds count what)`

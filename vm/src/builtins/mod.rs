@@ -24,6 +24,7 @@
 //!   `%table-value`, `%set-table-value`, `%table-delete`; one not found is added with `%table-add` and the `%table-serial`
 //!   from before. Where one of these says that the table has changed meanwhile, all over again.
 //! - `%slow-table-next`: the builtin from `%table-skip` on.
+//! - `%slow-wait-for-events`: all that has options.
 //!
 //! [`Exit::Call`]: crate::raise::Exit::Call
 //! [`Exit::Slowly`]: crate::raise::Exit::Slowly
@@ -505,6 +506,7 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::EventName => event::event_name,
         Builtin::Eventp => event::eventp,
         Builtin::AnyEvent => event::any_event,
+        Builtin::WaitForEvents | Builtin::WaitForEvent => event::wait_for_events,
         Builtin::Wait => event::wait,
         Builtin::OpenWait => event::open_wait,
         Builtin::TakeSignal => event::take_signal,
@@ -514,13 +516,16 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::PassTurn => event::pass_turn,
 
         Builtin::Spawn => task::spawn,
-        Builtin::SpawnNet => task::spawn_net,
+        Builtin::SpawnNet => net::spawn_net,
+        Builtin::AwaitNet => net::await_net,
+        Builtin::EndNet => net::end_net,
         Builtin::CurrentTask => task::current_task,
         Builtin::Taskp => task::taskp,
         Builtin::TaskStatus => task::task_status,
         Builtin::TaskNumber => task::task_number,
         Builtin::TaskTicks => task::task_ticks,
         Builtin::TaskEnd => task::task_end,
+        Builtin::TaskValue => task::task_value,
         Builtin::AllTasks => task::all_tasks,
         Builtin::TasksFrom => task::tasks_from,
         Builtin::Join => task::join,
@@ -552,6 +557,7 @@ mod integer;
 mod library;
 mod list;
 mod lookup;
+mod net;
 mod number;
 mod outside;
 mod package;

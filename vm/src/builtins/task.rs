@@ -7,7 +7,7 @@ use crate::heap::Kind;
 use crate::limit::guard;
 use crate::raise::{Exit, Outcome};
 use crate::spawn::SpawnOptions;
-use crate::task::{DEFAULT_PRIORITY, PRIORITIES, TaskId, TaskState};
+use crate::task::{DEFAULT_PRIORITY, PRIORITIES, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{WaitOptions, event};
@@ -17,12 +17,12 @@ impl Vm {
     ///
     /// # Errors
     /// A failure if it is none.
-    fn expect_task(&mut self, v: Value) -> Result<Value, Exit> {
+    pub(super) fn expect_task(&mut self, v: Value) -> Result<Value, Exit> {
         if self.heap.is(v, Kind::Task) { Ok(v) } else { self.task_error(v) }
     }
 
     /// Whether a task has ended.
-    fn has_ended(&self, task: Value) -> bool {
+    pub(super) fn has_ended(&self, task: Value) -> bool {
         !self.slot(task, event::STATE).is_fixnum()
     }
 
@@ -56,23 +56,6 @@ impl Vm {
         let is_listed = task.state != TaskState::Ended && (shows_hidden || !task.flags.hidden());
         is_listed.then_some((task.number, task.object))
     }
-
-    fn make_net_task(
-        &mut self,
-        event: Value,
-        name: Value,
-        function: Value,
-        priority: u8,
-    ) -> Result<TaskId, Exit> {
-        let function = self.callable(function)?;
-        let notice = self.heap.list(&[Value::NIL])?;
-        let notify = self.heap.cons(event, notice)?;
-        let options = SpawnOptions { name, priority, notify, ..SpawnOptions::default() };
-        let id = self.make_task(function, Value::NIL, options)?;
-        let object = self.tasks.get(id).map_or(Value::NIL, |task| task.object);
-        self.heap.set_car(notice, object);
-        Ok(id)
-    }
 }
 
 /// `(%spawn function &optional name priority budget daemon notify)`
@@ -101,29 +84,6 @@ pub(super) fn spawn(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     };
     let id = vm.make_task(function, Value::NIL, options)?;
     Ok(vm.tasks.get(id).map_or(Value::NIL, |task| task.object))
-}
-
-/// `(%spawn-net event names &rest functions)`
-pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (event, mut names, functions) = (arguments[0], arguments[1], &arguments[2..]);
-    let mut made = Vec::with_capacity(functions.len());
-    let priority = vm.task().priority;
-    for &function in functions {
-        let name = vm.heap.as_cons(names).map_or(Value::NIL, |pair| pair.car);
-        names = vm.heap.cdr(names).unwrap_or(Value::NIL);
-        match vm.make_net_task(event, name, function, priority) {
-            Ok(id) => made.push(id),
-            Err(exit) => {
-                // None of them has run yet, so nothing has happened.
-                made.into_iter().for_each(|id| vm.forget(id));
-                return Err(exit);
-            }
-        }
-    }
-    let tasks: Vec<Value> =
-        made.into_iter().map(|id| vm.tasks.get(id).map_or(Value::NIL, |task| task.object)).collect();
-    vm.charge(64 * tasks.len());
-    vm.give_values(&tasks)
 }
 
 /// `(current-task)`
@@ -192,6 +152,17 @@ fn give_end(vm: &mut Vm, task: Value) -> Outcome {
         }
     }
     Err(Exit::Values)
+}
+
+/// `(%task-value task)`
+pub(super) fn task_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let task = vm.expect_task(arguments[0])?;
+    if vm.slot(task, event::STATE) != vm.world.known.succeeded {
+        return Ok(Value::NIL);
+    }
+    let result = vm.slot(task, event::RESULT);
+    let has_one_value = vm.heap.header(task).is_some_and(|header| header.aux == 1);
+    Ok(if has_one_value { result } else { vm.heap.car(result).unwrap_or(Value::NIL) })
 }
 
 /// `(%all-tasks hidden)`

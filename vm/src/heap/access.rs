@@ -112,6 +112,19 @@ impl Heap {
         Some(unsafe { slice::from_raw_parts(object.add(1).cast(), (*object).len as usize) })
     }
 
+    /// Slot `index` of a record, of whatever kind; `None` if `v` is none or has no such slot.
+    #[inline(always)]
+    pub fn slot(&self, v: Value, index: usize) -> Option<Value> {
+        let object = v.as_object_ptr()?;
+        // SAFETY: an object value is the address of a live object; a live record has `len` values after its header.
+        unsafe {
+            if !(*object).kind.is_record() || index >= (*object).len as usize {
+                return None;
+            }
+            Some(*object.add(1).cast::<Value>().add(index))
+        }
+    }
+
     /// Sets slot `index` of a record of this kind; `None` if `v` is none or has no such slot.
     ///
     /// Not for symbols, functions, arrays and hash tables, nor the class (slot 0) of a structure: these give `None`.

@@ -1,7 +1,8 @@
 //! Sweeping: what the last marking did not reach is free.
 //!
 //! Blocks are swept when the allocator comes to them, or by slices, whichever is first; large objects by slices only.
-//! An arena in which nothing is left goes back to the system, but for a few that are kept.
+//! An arena in which nothing is left goes back to the system, but for those that will be filled before the next cycle: to
+//! take them from the system again would cost more than to fill them.
 //!
 //! Guarantees: every block is swept once between two markings. What is allocated while sweeping is not touched by it.
 
@@ -14,8 +15,6 @@ use super::{Heap, Phase, SliceOutcome};
 const BLOCK_VISITS: i64 = 512;
 /// Visits that freeing a large object counts as.
 const FREE_VISITS: i64 = 64;
-/// One empty arena is kept, and one more for this many in use.
-const ARENAS_PER_SPARE: usize = 8;
 /// Least allocation, in bytes, between two cycles, however close the limit is.
 const LEAST_THRESHOLD: u64 = 256 << 10;
 
@@ -95,8 +94,7 @@ impl Heap {
         if self.arenas[arena].as_ref().is_none_or(|arena| !arena.is_empty()) {
             return;
         }
-        let in_use = self.arenas.iter().flatten().count();
-        if self.sweep.spares <= in_use / ARENAS_PER_SPARE && self.committed <= self.limit {
+        if (self.sweep.spares * ARENA) as u64 <= self.pacing.threshold && self.committed <= self.limit {
             self.sweep.spares += 1;
         } else {
             self.arenas[arena] = None;

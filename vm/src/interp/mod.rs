@@ -207,6 +207,9 @@ pub(crate) fn run(vm: &mut Vm) -> Leave {
         // SAFETY: `vm.cpu` describes the running task: its pc lies in code that its innermost frame keeps alive and that
         // has passed the verifier, its base in its stack, with room for the registers of that code.
         let signal = unsafe { dispatch(vm) };
+        if signal == Signal::Exit(Exit::Park) && vm.task().critical == 0 {
+            return Leave::Parked;
+        }
         // SAFETY: `dispatch` has put its registers back.
         let signal = unsafe { settle(vm, signal) };
         if let Err(leave) = signal {

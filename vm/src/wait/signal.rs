@@ -226,6 +226,15 @@ impl Vm {
         self.wake_waiter(wait, signal);
     }
 
+    /// Adds `cell`, a cons or `NIL`, to the queue of a wait as of a signal of `event`, and has who waits go on.
+    pub(crate) fn keep(&mut self, wait: Value, cell: Value, event: Value) {
+        if cell.is_cons() {
+            self.enqueue(wait, cell);
+        }
+        let by = self.running.as_ref().map_or(0, |task| task.number);
+        self.wake_waiter(wait, (event, by));
+    }
+
     /// Adds a cons to the queue of a wait.
     fn enqueue(&mut self, wait: Value, cell: Value) {
         let queue = self.slot(wait, link::QUEUE);

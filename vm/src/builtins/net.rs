@@ -1,0 +1,102 @@
+//! Nets: tasks that belong to a form, from which the library makes `task-net` and `or-parallel`.
+//!
+//! A net is a list of a wait and the tasks. The wait is for no event; each of the tasks is put into its queue at its end.
+
+use smallvec::{SmallVec, smallvec};
+
+use crate::builtins::LIMIT;
+use crate::heap::Kind;
+use crate::raise::{Exit, Outcome};
+use crate::spawn::SpawnOptions;
+use crate::task::TaskId;
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::wait::{WaitOptions, event};
+
+impl Vm {
+    /// The wait of a net.
+    ///
+    /// # Errors
+    /// A failure if it is none.
+    fn wait_of_net(&mut self, net: Value) -> Result<Value, Exit> {
+        match self.heap.as_cons(net) {
+            Some(pair) if self.heap.is(pair.car, Kind::Wait) => Ok(pair.car),
+            _ => self.type_error(net, "LIST"),
+        }
+    }
+
+    /// The first task of a net of which something is true.
+    fn find_in_net(&self, net: Value, test: impl Fn(Value) -> bool) -> Option<Value> {
+        let mut rest = self.heap.cdr(net)?;
+        for _ in 0..LIMIT {
+            let pair = self.heap.as_cons(rest)?;
+            if test(pair.car) {
+                return Some(pair.car);
+            }
+            rest = pair.cdr;
+        }
+        None
+    }
+
+    fn has_net_ended(&self, net: Value) -> bool {
+        self.find_in_net(net, |task| !self.has_ended(task)).is_none()
+    }
+}
+
+/// `(%spawn-net what names &rest functions)`
+pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (what, mut names, functions) = (arguments[0], arguments[1], &arguments[2..]);
+    let priority = vm.task().priority;
+    let wait = vm.open_wait(Value::NIL, WaitOptions { keeps: true, what, ..WaitOptions::default() })?;
+    let mut made: SmallVec<[TaskId; 8]> = SmallVec::new();
+    // The first value is the net.
+    let mut values: SmallVec<[Value; 8]> = smallvec![Value::NIL];
+    let mut make = || {
+        for &function in functions {
+            let name = vm.heap.car(names).unwrap_or(Value::NIL);
+            names = vm.heap.cdr(names).unwrap_or(Value::NIL);
+            let options = SpawnOptions { name, priority, notify: wait, ..SpawnOptions::default() };
+            let function = vm.callable(function)?;
+            let id = vm.make_task(function, Value::NIL, options)?;
+            made.push(id);
+            values.push(vm.tasks.get(id).map_or(Value::NIL, |task| task.object));
+        }
+        let tasks = vm.heap.list(&values[1..])?;
+        Ok(vm.heap.cons(wait, tasks)?)
+    };
+    match make() {
+        Ok(net) => values[0] = net,
+        Err(exit) => {
+            // None of them has run yet, so nothing has happened.
+            made.into_iter().for_each(|id| vm.forget(id));
+            return Err(exit);
+        }
+    }
+    vm.charge(64 * functions.len());
+    vm.give_values(&values)
+}
+
+/// `(%await-net net status)`
+pub(super) fn await_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[net, status] = arguments else { unreachable!("the table says two") };
+    let wait = vm.wait_of_net(net)?;
+    vm.task_mut().wait = Value::NIL;
+    while let Some(task) = vm.take_kept(wait) {
+        vm.charge(1);
+        if vm.slot(task, event::STATE) == status {
+            return Ok(task);
+        }
+    }
+    if vm.has_net_ended(net) {
+        // One that has ended when there was no room to say so has not been in the queue.
+        let ended = vm.find_in_net(net, |task| vm.slot(task, event::STATE) == status);
+        return Ok(ended.unwrap_or(Value::NIL));
+    }
+    vm.park(wait, None)
+}
+
+/// `(%end-net net)`
+pub(super) fn end_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.point_of_read()?;
+    if arguments[0].is_nil() || vm.has_net_ended(arguments[0]) { Ok(Value::NIL) } else { Err(Exit::Slowly) }
+}
