@@ -92,12 +92,16 @@ pub fn compile_with(sources: &[Source], library: &Library, modules: Modules) -> 
         Ok(machine) => machine,
         Err(text) => {
             let diagnostic = Diagnostic::error("macro-failed", text, Default::default());
-            return Compiled { program: None, diagnostics: vec![diagnostic], sources: compiler.sources() };
+            return Compiled {
+                program: None,
+                diagnostics: vec![diagnostic],
+                sources: compilation.sources().clone(),
+            };
         }
     };
-    let (module, diagnostics) = drive_with(&mut *compilation, &mut machine, &mut |name| library.find(name));
+    let (module, diagnostics) = drive_with(&mut compilation, &mut machine, &mut |name| library.find(name));
     let program = module.map(|module| Program { module });
-    Compiled { program, diagnostics, sources: compiler.sources() }
+    Compiled { program, diagnostics, sources: compilation.sources().clone() }
 }
 
 /// The machine in which macros run: it may read the modules of the library.
@@ -135,17 +139,16 @@ impl Program {
 
 /// A source with its macros expanded, as text, and what was found on the way. Modules that it requires are left out.
 pub fn expand(source: &Source, library: &Library) -> (String, Compiled) {
-    let compiler = Compiler::default().apart();
-    let mut expansion = compiler.expand_text(&source.name, &source.text);
+    let mut expansion = Compiler::default().apart().expand_text(&source.name, &source.text);
     match compile_time_machine(library) {
         Ok(mut machine) => {
             let (_, diagnostics) = drive_with(&mut expansion, &mut machine, &mut |name| library.find(name));
-            let sources = compiler.sources();
-            (expansion.text().to_string(), Compiled { program: None, diagnostics, sources })
+            let sources = expansion.sources().clone();
+            (expansion.expansion().to_string(), Compiled { program: None, diagnostics, sources })
         }
         Err(text) => {
             let diagnostic = Diagnostic::error("macro-failed", text, Default::default());
-            let sources = compiler.sources();
+            let sources = expansion.sources().clone();
             (String::new(), Compiled { program: None, diagnostics: vec![diagnostic], sources })
         }
     }

@@ -213,3 +213,82 @@ fn files_that_are_compiled_together_share_their_modules() {
     folder.compile(&["one.esl", "two.esl", "-o", "out.eslb"]);
     folder.check_run(&["out.eslb"], "1\n2");
 }
+
+/// What is in the files of the next test, and what is said about them: positions in the file, not in the form.
+const MISTAKES: [(&str, &str, &str); 3] = [
+    (
+        "warned.esl",
+        "(defvar *x* 1) (defun f (x)\n  (frob *x*))\n\n(defun é () (list 'é (car 1 2)))\n",
+        "\
+warning[unused-variable]: the variable `x` is never used
+ --> warned.esl:1:26
+  |
+1 | (defvar *x* 1) (defun f (x)
+  |                          ^
+  |
+  = help: if that is meant, write `(declare (ignore x))`
+
+warning[undefined-function]: no function is called `frob`
+ --> warned.esl:2:4
+  |
+2 |   (frob *x*))
+  |    ^^^^
+
+warning[wrong-argument-count]: `car` takes 1 argument, but is given 2
+ --> warned.esl:4:22
+  |
+4 | (defun é () (list 'é (car 1 2)))
+  |                      ^^^^^^^^^
+
+",
+    ),
+    (
+        "wrong.esl",
+        "(print 1)\n(defmacro m () '(if)) (list\n  (m) (if))\n",
+        "\
+error[malformed-form]: `if` takes a test, a form for true, and at most one for false
+ --> wrong.esl:3:3
+  |
+3 |   (m) (if))
+  |   ^^^ in the expansion of `m`
+
+error[malformed-form]: `if` takes a test, a form for true, and at most one for false
+ --> wrong.esl:3:7
+  |
+3 |   (m) (if))
+  |       ^^^^
+",
+    ),
+    (
+        "unclosed.esl",
+        "(print 1)\n(print (list 1\n 2)\n",
+        "\
+error[unclosed-list]: expected `)`, found the end of the text
+ --> unclosed.esl:2:1
+  |
+2 | (print (list 1
+  | ^ this list is not closed
+",
+    ),
+];
+
+#[test]
+fn what_is_wrong_in_a_file_that_is_loaded_is_reported_there() {
+    let files = MISTAKES.map(|(name, text, _)| (name, text));
+    let folder = Folder::new("mistakes", &files);
+    for (name, _, said) in MISTAKES {
+        let is_warned = name == "warned.esl";
+        std::fs::write(folder.0.join("main.esl"), format!("(load \"{name}\")")).expect("it can be written");
+        let (status, _, errors) = folder.run(ESLVM, &["run", "main.esl"], "");
+        assert_eq!(status, i32::from(!is_warned), "{errors}");
+        assert!(errors.starts_with(said), "{name}:\n{errors}");
+        // A module is compiled as a whole, and when it is required as the program runs, by what the machine brings along.
+        let module = name.trim_end_matches(".esl");
+        let text = format!("(let ((name \"{module}\")) (require name))");
+        std::fs::write(folder.0.join("main.esl"), text).expect("it can be written");
+        let (status, _, errors) = folder.run(ESLVM, &["run", "main.esl"], "");
+        assert_eq!(status, i32::from(!is_warned), "{errors}");
+        let said = said.replace("--> ", "--> ./");
+        assert!(errors.starts_with(&said), "{name}, required:\n{errors}");
+    }
+}

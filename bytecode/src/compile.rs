@@ -5,6 +5,7 @@
 //! A compilation is a machine of steps: it never runs a macro itself but says that one is to be run, and is told the
 //! outcome. So a running program can compile in a task that is preempted and aborted like any other.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::datum::{Datum, ObjectId};
@@ -195,18 +196,20 @@ pub trait Compilation: Send {
         answer: Answer,
         charge: &mut dyn FnMut(u64),
     ) -> Step;
+    /// Draws one of its diagnostics as it is shown to people, with the source line when it is known.
+    fn render(&self, diagnostic: &Diagnostic) -> String;
 }
 
 /// A part of a text from which one form was read. Spans in the form are those of the whole text.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Part<'a> {
     /// Name of the source.
     pub name: &'a str,
-    /// The part.
-    pub text: &'a str,
-    /// Byte of the whole at which it begins.
-    pub start: u32,
-    /// Line there, from 0.
+    /// The whole text.
+    pub text: &'a Arc<str>,
+    /// The bytes of the part.
+    pub range: Range<usize>,
+    /// Line at which it begins, from 0.
     pub line: u32,
     /// Characters before it on that line.
     pub column: u32,
@@ -229,8 +232,8 @@ pub trait Compile: Send {
         text: &str,
         start: usize,
     ) -> Result<(Option<Datum>, usize), Box<Diagnostic>>;
-    /// Draws a diagnostic as it is shown to people, with the source line when it is known.
-    fn render(&self, diagnostic: &Diagnostic) -> String;
+    /// Draws a diagnostic of a text that was read as it is shown to people; with the source line, if a name is given.
+    fn render(&self, diagnostic: &Diagnostic, name: Option<&str>, text: &str) -> String;
 }
 
 /// Runs the compile-time parts of a program. Implemented over a virtual machine.
@@ -304,22 +307,31 @@ pub struct Place {
 /// The offsets at which the lines of a text begin, to turn spans into places.
 #[derive(Clone, Debug)]
 pub struct LineIndex {
+    /// Number of the first line, from 0.
+    first: u32,
     starts: Vec<u32>,
 }
 
 impl LineIndex {
     /// Finds the lines of `text`.
     pub fn new(text: &str) -> LineIndex {
-        let breaks = text.bytes().enumerate().filter(|&(_, byte)| byte == b'\n');
-        LineIndex { starts: std::iter::once(0).chain(breaks.map(|(i, _)| i as u32 + 1)).collect() }
+        LineIndex::of_part(text, 0..text.len(), 0)
     }
 
-    /// Line and column of the start of `span`, which lies in `text`.
+    /// Finds the lines of a part of `text`, which begins in line `first`, from 0.
+    pub fn of_part(text: &str, part: Range<usize>, first: u32) -> LineIndex {
+        let start = text[..part.start].rfind('\n').map_or(0, |at| at + 1);
+        let breaks = text.as_bytes()[part.clone()].iter().enumerate().filter(|&(_, &byte)| byte == b'\n');
+        let starts = breaks.map(|(at, _)| (part.start + at) as u32 + 1);
+        LineIndex { first, starts: std::iter::once(start as u32).chain(starts).collect() }
+    }
+
+    /// Line and column of the start of `span`, which lies in the part of `text` whose lines these are.
     pub fn place(&self, text: &str, span: Span) -> Place {
         let line = self.starts.partition_point(|&start| start <= span.start).max(1) - 1;
         let start = self.starts[line] as usize;
         let end = (span.start as usize).min(text.len());
         let column = text.get(start..end).map_or(0, |prefix| prefix.chars().count());
-        Place { source: span.source, line: line as u32 + 1, column: column as u32 + 1 }
+        Place { source: span.source, line: self.first + line as u32 + 1, column: column as u32 + 1 }
     }
 }

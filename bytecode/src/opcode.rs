@@ -281,7 +281,8 @@ macro_rules! for_each_opcode {
             /// Ends a cleanup: goes on with what it interrupted, or with the next instruction after `enter-cleanup`.
             EndCleanup = 0x81, "end-cleanup", silent { };
             /// Throws the value list to the catch for the tag `R[tag]`. Fails with `control-error`, nothing unwound,
-            /// when there is none; `kind` says which form it was: 0 `throw`, 1 `return-from`, 2 `go`.
+            /// when there is none; `kind` says which form it was: 0 `throw`, 1 `return-from`, 2 `go`. Then the value list is
+            /// what a recovery gave.
             Throw = 0x82, "throw", effect { tag: Reg, kind: Count };
             /// Pushes recovery procedures. `R[state]` is their table, a vector, or what the machine has made of it. A throw
             /// to `R[state]` pops them, delivers two values to the window, and goes on at `to`, where the function that

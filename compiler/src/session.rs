@@ -12,7 +12,7 @@
 
 mod parts;
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use esl_bytecode::compile::{Answer, Compilation, Compile, Environment, Part, Required, Step};
 use esl_bytecode::datum::Datum;
@@ -34,8 +34,6 @@ use parts::{Next, Parts, renumber_uninterned};
 pub struct Compiler {
     /// The number that diagnostics give to the first source.
     source: SourceId,
-    /// The text that was compiled last, for drawing its diagnostics.
-    sources: Arc<Mutex<Sources>>,
     /// Whether modules stay outside of the program, to be found when it runs.
     apart: bool,
 }
@@ -53,21 +51,16 @@ impl Compiler {
         self
     }
 
-    /// The texts that were compiled last, those of required modules included.
-    pub fn sources(&self) -> Sources {
-        self.sources.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-
     /// Begins to compile a whole text for the sake of what its macros expand to.
-    pub fn expand_text(&self, name: &str, text: &str) -> Expansion {
-        Expansion(Session { listing: Some(String::new()), ..self.texts(&[(name, text)]) })
+    pub fn expand_text(&self, name: &str, text: &str) -> Texts {
+        Texts(Session { listing: Some(String::new()), ..self.texts(&[(name, text)]) })
     }
 
     /// Begins to compile texts, each with its name, to one module that runs them in order. To one another they are like
     /// parts of one text, but each is read, and runs, in the package `ESL-USER` until it says otherwise. Diagnostics
     /// number them from the compiler's source number on.
-    pub fn compile_texts(&self, texts: &[(&str, &str)]) -> Box<dyn Compilation> {
-        Box::new(self.texts(texts))
+    pub fn compile_texts(&self, texts: &[(&str, &str)]) -> Texts {
+        Texts(self.texts(texts))
     }
 
     fn texts(&self, texts: &[(&str, &str)]) -> Session {
@@ -82,15 +75,14 @@ impl Compiler {
             sources.add(name, Some(text.clone()));
             parts.add(lines.add(name, text.clone()), text);
         }
-        *self.sources.lock().unwrap_or_else(PoisonError::into_inner) = sources;
-        self.session(Input::Texts(parts), lines)
+        self.session(Input::Texts(parts), lines, sources)
     }
 
-    fn session(&self, input: Input, lines: SourceLines) -> Session {
+    fn session(&self, input: Input, lines: SourceLines, sources: Sources) -> Session {
         Session {
             input,
             source: self.source,
-            sources: self.sources.clone(),
+            sources,
             apart: self.apart,
             asked: None,
             loading: None,
@@ -106,10 +98,12 @@ impl Compiler {
 impl Compile for Compiler {
     fn compile_form(&self, form: Datum, part: Option<Part<'_>>) -> Box<dyn Compilation> {
         let mut lines = SourceLines::new();
+        let mut sources = Sources::new();
         if let Some(part) = part {
-            lines.add_part(part);
+            sources.add_part(&part);
+            lines.add_part(&part);
         }
-        Box::new(self.session(Input::Form(Some(form)), lines))
+        Box::new(self.session(Input::Form(Some(form)), lines, sources))
     }
 
     fn compile_text(&self, name: &str, text: &str) -> Box<dyn Compilation> {
@@ -125,8 +119,11 @@ impl Compile for Compiler {
         read_datum(environment, text, start)
     }
 
-    fn render(&self, diagnostic: &Diagnostic) -> String {
-        let sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
+    fn render(&self, diagnostic: &Diagnostic, name: Option<&str>, text: &str) -> String {
+        let mut sources = Sources::new();
+        if let Some(name) = name {
+            sources.add(name, Some(text.into()));
+        }
         Renderer::default().render(diagnostic, &sources)
     }
 }
@@ -144,7 +141,8 @@ enum Input {
 struct Session {
     input: Input,
     source: SourceId,
-    sources: Arc<Mutex<Sources>>,
+    /// The texts, for drawing diagnostics.
+    sources: Sources,
     apart: bool,
     /// The module that was asked for, and the form that requires it.
     asked: Option<(String, Span)>,
@@ -159,17 +157,22 @@ struct Session {
     listing: Option<String>,
 }
 
-/// A compilation of a text that also gives the program with its macros expanded.
-pub struct Expansion(Session);
+/// A compilation of whole texts.
+pub struct Texts(Session);
 
-impl Expansion {
-    /// The expanded program so far, form by form.
-    pub fn text(&self) -> &str {
+impl Texts {
+    /// The texts, those of required modules included.
+    pub fn sources(&self) -> &Sources {
+        &self.0.sources
+    }
+
+    /// The program so far with its macros expanded, form by form, if it is compiled for the sake of that.
+    pub fn expansion(&self) -> &str {
         self.0.listing.as_deref().unwrap_or_default()
     }
 }
 
-impl Compilation for Expansion {
+impl Compilation for Texts {
     fn step(
         &mut self,
         environment: &mut dyn Environment,
@@ -177,6 +180,10 @@ impl Compilation for Expansion {
         charge: &mut dyn FnMut(u64),
     ) -> Step {
         self.0.step(environment, answer, charge)
+    }
+
+    fn render(&self, diagnostic: &Diagnostic) -> String {
+        self.0.render(diagnostic)
     }
 }
 
@@ -228,6 +235,10 @@ impl Compilation for Session {
             }
         }
     }
+
+    fn render(&self, diagnostic: &Diagnostic) -> String {
+        Renderer::default().render(diagnostic, &self.sources)
+    }
 }
 
 impl Session {
@@ -250,10 +261,7 @@ impl Session {
         let Input::Texts(parts) = &mut self.input else { return };
         match answer {
             Answer::Module(Required::Source { name: path, text }) => {
-                self.sources
-                    .lock()
-                    .unwrap_or_else(PoisonError::into_inner)
-                    .add(path.clone(), Some(text.clone()));
+                self.sources.add(path.clone(), Some(text.clone()));
                 let source = self.lines.add(&path, text.clone());
                 parts.enter(name, span, source, text);
             }
@@ -268,10 +276,9 @@ impl Session {
 
     /// Makes the sources of a compiled module sources of this compilation, though their texts are not at hand.
     fn take_sources(&mut self, module: &mut Module) {
-        let mut sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
         let first = self.lines.names().count() as u32;
         for name in &module.sources {
-            sources.add(name.clone(), None);
+            self.sources.add(name.clone(), None);
             self.lines.add(name, "".into());
         }
         for entry in module.functions.iter_mut().flat_map(|function| &mut function.lines) {

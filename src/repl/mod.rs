@@ -16,7 +16,7 @@ use std::io::{IsTerminal, Write};
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_vm::host::{FileAccess, Output, RealHost};
 use esl_vm::run::RunOutcome;
-use esl_vm::task::TaskResult;
+use esl_vm::task::{TaskId, TaskResult};
 use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
 
@@ -184,7 +184,11 @@ impl Session {
                 self.machine.flush();
                 return Next::Quit(SUCCESS);
             }
-            ":load" => drop(self.call("%REPL-LOAD", argument.trim())),
+            ":load" => {
+                let path = argument.trim();
+                let bare = path.strip_prefix('"').and_then(|path| path.strip_suffix('"'));
+                self.call("%REPL-LOAD", bare.unwrap_or(path));
+            }
             ":bt" => match &self.failure {
                 Some(report) => print!("{report}"),
                 None => println!("Nothing has failed."),
@@ -193,6 +197,17 @@ impl Session {
             _ => print!("{HELP}"),
         }
         self.next()
+    }
+
+    /// Runs the machine until `task` has ended, or can never do so.
+    fn run(&mut self, task: TaskId) -> RunOutcome {
+        loop {
+            // A line that is awaited does not end an evaluation; it may have come just now.
+            match self.machine.run_until(Some(task), u64::MAX) {
+                RunOutcome::Stopped => {}
+                outcome => return outcome,
+            }
+        }
     }
 
     /// Calls a function of the library with a text, in a task that Ctrl-C aborts. `None` if it did not return.
@@ -206,8 +221,12 @@ impl Session {
             }
         };
         self.machine.set_interruptible(Some(task));
-        // A line that is awaited does not end an evaluation; it may have come just now.
-        while self.machine.run_until(Some(task), u64::MAX) == RunOutcome::Stopped {}
+        if self.run(task) == RunOutcome::Waiting {
+            let report = self.machine.deadlock_report();
+            self.machine.complain(&report);
+            self.machine.abort(task);
+            self.run(task);
+        }
         self.machine.set_interruptible(None);
         let result = self.machine.result(task);
         let report = self.machine.report(task);

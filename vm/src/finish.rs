@@ -123,11 +123,15 @@ impl Vm {
         match (end, report) {
             (End::Failed(_), Some(report)) => self.complain(&format!("In {label}:\n{}", report.text())),
             (End::Failed(condition), None) => {
-                let cause = self.describe(condition);
-                self.complain(&format!("In {label}:\nFailure {cause}, no recovery available.\nAborted\n"));
+                self.complain(&format!("In {label}:\n{}", self.report_in_short(condition)));
             }
             _ => {}
         }
+    }
+
+    /// What is to be said of a failure that has ended a task when there was no room for more.
+    pub(crate) fn report_in_short(&self, condition: Value) -> String {
+        format!("Failure {}, no recovery available.\nAborted\n", self.describe(condition))
     }
 
     /// Ends the run with the running task, if it is the last that matters.

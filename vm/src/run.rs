@@ -7,6 +7,7 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
+use crate::control::End;
 use crate::interp::{self, Leave};
 use crate::limit::AccountId;
 use crate::observe::Seen;
@@ -332,7 +333,12 @@ impl Vm {
 
     /// What is to be said of the failure that ended a task.
     pub fn report(&self, id: TaskId) -> Option<String> {
-        Some(self.tasks.get(id)?.extra.as_ref()?.report.as_ref()?.text())
+        let extra = self.tasks.get(id)?.extra.as_ref()?;
+        match (&extra.report, extra.end) {
+            (Some(report), _) => Some(report.text()),
+            (None, Some(End::Failed(condition))) => Some(self.report_in_short(condition)),
+            _ => None,
+        }
     }
 
     /// Ticks that a task has used.

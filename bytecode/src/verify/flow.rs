@@ -327,6 +327,7 @@ impl Flow<'_> {
             Instr::Throw { tag, .. } => {
                 read(state, tag.0)?;
                 expect_value_list(value_list)?;
+                state.registers.value_list = true;
             }
 
             _ => return self.step_plain(state, instr, next),

@@ -1,14 +1,17 @@
 //! The texts of a compilation, for drawing diagnostics.
 
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use esl_bytecode::compile::{LineIndex, Place};
+use esl_bytecode::compile::{LineIndex, Part, Place};
 use esl_bytecode::span::{SourceId, Span};
 
 #[derive(Clone, Debug)]
 struct Source {
     name: String,
     text: Option<Arc<str>>,
+    /// The part of the text that is of interest, and the line in which it begins.
+    part: (Range<usize>, u32),
     /// Made when it is first asked for: most texts have no diagnostics.
     lines: OnceLock<LineIndex>,
 }
@@ -27,8 +30,18 @@ impl Sources {
 
     /// Adds a source and gives its number, the next one. Without a text, its diagnostics are shown without excerpts.
     pub fn add(&mut self, name: impl Into<String>, text: Option<Arc<str>>) -> SourceId {
+        let length = text.as_ref().map_or(0, |text| text.len());
+        self.add_source(name.into(), text, (0..length, 0))
+    }
+
+    /// Adds a source of which only a part is looked at.
+    pub fn add_part(&mut self, part: &Part<'_>) -> SourceId {
+        self.add_source(part.name.into(), Some(part.text.clone()), (part.range.clone(), part.line))
+    }
+
+    fn add_source(&mut self, name: String, text: Option<Arc<str>>, part: (Range<usize>, u32)) -> SourceId {
         let id = SourceId(u32::try_from(self.sources.len()).expect("fewer than 2^32 sources"));
-        self.sources.push(Source { name: name.into(), text, lines: OnceLock::new() });
+        self.sources.push(Source { name, text, part, lines: OnceLock::new() });
         id
     }
 
@@ -46,8 +59,11 @@ impl Sources {
     pub fn place(&self, span: Span) -> Option<Place> {
         let source = self.get(span.source)?;
         let text = source.text.as_ref()?;
-        let inside = text.is_char_boundary(span.start as usize);
-        inside.then(|| source.lines.get_or_init(|| LineIndex::new(text)).place(text, span))
+        let (part, line) = &source.part;
+        let start = span.start as usize;
+        let inside = (part.start..=part.end).contains(&start) && text.is_char_boundary(start);
+        let lines = || LineIndex::of_part(text, part.clone(), *line);
+        inside.then(|| source.lines.get_or_init(lines).place(text, span))
     }
 
     /// Line and column of the position after `span`.

@@ -75,6 +75,28 @@ impl Frame<'_, '_> {
         }
     }
 
+    /// Passes on the value list.
+    pub(super) fn deliver_values(&mut self, dest: Dest) {
+        match dest {
+            Dest::Effect | Dest::All => {}
+            Dest::Tail => self.end(Instr::ReturnAll {}),
+            Dest::Values(first, count) => {
+                self.registers.reserve(first, usize::from(count));
+                self.emit(Instr::GetValues { first: Base(first), count: Count(count) });
+            }
+            _ => self.deliver_first(dest),
+        }
+    }
+
+    /// Passes on the first value of the value list.
+    pub(super) fn deliver_first(&mut self, dest: Dest) {
+        if !matches!(dest, Dest::Effect) {
+            let target = self.target(dest);
+            self.emit(Instr::GetValues { first: Base(target), count: Count(1) });
+            self.deliver(target, dest);
+        }
+    }
+
     /// Passes on `NIL`.
     pub(super) fn deliver_nil(&mut self, dest: Dest) {
         match dest {

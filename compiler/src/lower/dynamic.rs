@@ -45,10 +45,7 @@ impl Frame<'_, '_> {
             // Control never comes back from the cleanup either.
             _ if !returns => self.deliver_nil(dest),
             (Dest::Keep(register), _) => self.deliver(register, dest),
-            (Dest::All, Dest::Values(first, count)) => {
-                self.registers.reserve(first, usize::from(count));
-                self.emit(Instr::GetValues { first: Base(first), count: Count(count) });
-            }
+            (Dest::All, Dest::Values(..)) => self.deliver_values(dest),
             _ => self.finish(inner, dest),
         }
     }

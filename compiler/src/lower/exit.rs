@@ -186,7 +186,7 @@ impl Frame<'_, '_> {
     }
 
     /// Throws the value list to the tag of a block or tagbody, which is in `register` if this frame owns it. A throw
-    /// that fails, for the place was left long ago, may be recovered from: then the form gives `NIL`.
+    /// that fails, for the place was left long ago, may be recovered from: then the form gives the value of that.
     fn throw_to_own(&mut self, lexical: Lexical, register: u8, kind: ThrowKind, dest: Dest) {
         let mut tag = register;
         if self.builder.resolution.frame(lexical.owner(self.core)) != self.lambda {
@@ -195,7 +195,7 @@ impl Frame<'_, '_> {
             self.fetch(Place::Capture(index), Dest::Fresh(tag));
         }
         self.emit(Instr::Throw { tag: Reg(tag), kind: Count(kind as u8) });
-        self.deliver_nil(dest);
+        self.deliver_first(dest);
     }
 
     pub(super) fn catch(&mut self, tag: NodeId, body: NodeId, dest: Dest) {
@@ -215,6 +215,6 @@ impl Frame<'_, '_> {
         self.form(values, Dest::All);
         self.emit(Instr::Throw { tag: register, kind: Count(ThrowKind::Throw as u8) });
         self.registers.release(top);
-        self.deliver_nil(dest);
+        self.deliver_first(dest);
     }
 }

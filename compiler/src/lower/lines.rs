@@ -43,8 +43,9 @@ impl SourceLines {
     }
 
     /// Adds a source of which there is only a part.
-    pub fn add_part(&mut self, part: Part<'_>) -> SourceId {
-        self.add_text(part.name, part.text.into(), (part.start, part.line, part.column))
+    pub fn add_part(&mut self, part: &Part<'_>) -> SourceId {
+        let text = part.text[part.range.clone()].into();
+        self.add_text(part.name, text, (part.range.start as u32, part.line, part.column))
     }
 
     fn add_text(&mut self, name: &str, text: Arc<str>, first: (u32, u32, u32)) -> SourceId {
@@ -103,7 +104,10 @@ mod tests {
     #[test]
     fn a_part_knows_where_it_begins() {
         let mut lines = SourceLines::new();
-        let id = lines.add_part(Part { name: "a.esl", text: " (x\n y)", start: 20, line: 4, column: 7 });
+        let text: Arc<str> = "(a)\n\n(b)\n(c)\n1234567 (x\n y) (z)".into();
+        let part = Part { name: "a.esl", text: &text, range: 20..27, line: 4, column: 7 };
+        assert_eq!(&text[part.range.clone()], " (x\n y)");
+        let id = lines.add_part(&part);
         let place = |at| lines.line_and_column(Span::new(id, at, at));
         assert_eq!(place(21), Some((5, 9)));
         assert_eq!(place(25), Some((6, 2)));

@@ -85,19 +85,7 @@ impl<'a> Frame<'_, 'a> {
         let src = self.operand(list, &[]);
         self.emit(Instr::ListToValues { src });
         self.registers.release(top);
-        match dest {
-            Dest::Effect | Dest::All => {}
-            Dest::Tail => self.finish(Dest::All, dest),
-            Dest::Values(first, count) => {
-                self.registers.reserve(first, usize::from(count));
-                self.emit(Instr::GetValues { first: Base(first), count: Count(count) });
-            }
-            _ => {
-                let register = self.target(dest);
-                self.emit(Instr::GetValues { first: Base(register), count: Count(1) });
-                self.deliver(register, dest);
-            }
-        }
+        self.deliver_values(dest);
     }
 
     pub(super) fn bind_values(&mut self, targets: &[Target], form: NodeId, body: NodeId, dest: Dest) {

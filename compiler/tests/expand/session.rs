@@ -1,6 +1,8 @@
 //! Compilations from text to module.
 
-use esl_bytecode::compile::{Compile, Step, drive};
+use std::sync::Arc;
+
+use esl_bytecode::compile::{Compilation, Compile, Part, Step, drive};
 use esl_bytecode::diagnostic::Severity;
 use esl_bytecode::span::SourceId;
 use esl_bytecode::verify::verify;
@@ -26,7 +28,8 @@ fn a_text_becomes_one_module_with_a_function_for_each_form() {
 fn errors_of_all_phases_are_reported_in_the_order_of_the_text() {
     let compiler = Compiler::for_source(SourceId(3));
     let text = "(let 5)\n(print ,x)\n(undefined)\n(car 1 2)\n(print 1))";
-    let (module, found) = drive(&mut *compiler.compile_text("test.esl", text), &mut FakeHost::new());
+    let mut compilation = compiler.compile_text("test.esl", text);
+    let (module, found) = drive(&mut *compilation, &mut FakeHost::new());
     assert!(module.is_none());
     let codes: Vec<&str> = found.iter().map(|finding| finding.code).collect();
     let expected = [
@@ -38,7 +41,8 @@ fn errors_of_all_phases_are_reported_in_the_order_of_the_text() {
     ];
     assert_eq!(codes, expected);
     assert!(found.iter().all(|finding| finding.primary.span.source == SourceId(3)));
-    assert!(compiler.render(&found[0]).contains("test.esl:1:6"), "{}", compiler.render(&found[0]));
+    let shown = compilation.render(&found[0]);
+    assert!(shown.contains("test.esl:1:6"), "{shown}");
 }
 
 #[test]
@@ -47,12 +51,14 @@ fn texts_that_are_compiled_together_know_each_other() {
         [("a.esl", "(defun first-one () (second-one))"), ("b.esl", "(defun second-one () (third-one))")];
     let mut host = FakeHost::new();
     let compiler = Compiler::for_source(SourceId(5));
-    let (module, found) = drive(&mut *compiler.compile_texts(&texts), &mut host);
+    let mut compilation = compiler.compile_texts(&texts);
+    let (module, found) = drive(&mut compilation, &mut host);
     assert_eq!(module.expect("it compiles").sources, ["a.esl", "b.esl"]);
     assert_eq!(found.len(), 1);
     assert_eq!(found[0].message, "no function is called `third-one`");
     assert_eq!(found[0].primary.span.source, SourceId(6));
-    assert!(compiler.render(&found[0]).contains("b.esl:1:23"), "{}", compiler.render(&found[0]));
+    let shown = compilation.render(&found[0]);
+    assert!(shown.contains("b.esl:1:23"), "{shown}");
 }
 
 #[test]
@@ -73,6 +79,21 @@ fn a_form_becomes_a_module_whose_last_function_gives_its_value() {
     assert!(found.is_empty(), "{found:?}");
     assert_eq!(module.expect("it compiles").toplevel.len(), 2);
     assert_eq!(host.loaded.len(), 1, "the first form is evaluated before the second is looked at");
+}
+
+#[test]
+fn what_is_said_of_a_form_of_a_text_has_its_place_in_the_text() {
+    let mut host = FakeHost::new();
+    let compiler = Compiler::default();
+    let text: Arc<str> = "(list 1)\n(é) (list\n (let 5))\n(car)".into();
+    let start = "(list 1)\n(é)".len();
+    let (form, end) = compiler.read(&mut host, &text, start).expect("it is a datum");
+    let part = Part { name: "test.esl", text: &text, range: start..end, line: 1, column: 3 };
+    let mut compilation = compiler.compile_form(form.expect("there is one"), Some(part));
+    let (_, found) = drive(&mut *compilation, &mut host);
+    let shown = compilation.render(&found[0]);
+    let lines: Vec<&str> = shown.lines().skip(1).take(4).collect();
+    assert_eq!(lines, [" --> test.esl:3:7", "  |", "3 |  (let 5))", "  |       ^"], "{shown}");
 }
 
 #[test]
@@ -101,5 +122,5 @@ fn a_program_can_be_shown_with_its_macros_expanded() {
     let (module, _) = drive(&mut expansion, &mut FakeHost::new());
     assert!(module.is_some());
     let expected = "(if *x* (print 1) ())\n\n(%set-function 'h (%named-lambda h () (block h 2)))\n\n";
-    assert_eq!(expansion.text(), expected);
+    assert_eq!(expansion.expansion(), expected);
 }

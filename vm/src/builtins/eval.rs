@@ -16,6 +16,8 @@
 //!
 //! Diagnostics are a list of `(severity code text)`. Whoever begins a compilation ends it with `%end-compilation`.
 
+use std::sync::Arc;
+
 use esl_bytecode::compile::{Answer, Compilation, Compile, Part, Step};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
@@ -54,7 +56,7 @@ enum Session {
 
 /// A text, and where the next of its forms begins.
 struct Text {
-    text: Box<str>,
+    text: Arc<str>,
     /// What it is called, if places in it are of interest.
     name: Option<String>,
     position: usize,
@@ -67,9 +69,9 @@ struct Text {
 impl Text {
     /// What lies between the position and `end`.
     fn part(&self, end: usize) -> Option<Part<'_>> {
-        let text = &self.text[self.position..end];
-        let start = self.position as u32;
-        Some(Part { name: self.name.as_deref()?, text, start, line: self.line, column: self.column })
+        let name = self.name.as_deref()?;
+        let range = self.position..end;
+        Some(Part { name, text: &self.text, range, line: self.line, column: self.column })
     }
 
     /// Goes on to `end`.
@@ -189,7 +191,7 @@ impl Vm {
     }
 
     /// Tells the program what a compilation wants.
-    fn tell(&mut self, step: &Step) -> Outcome {
+    fn tell(&mut self, compilation: &dyn Compilation, step: &Step) -> Outcome {
         let mut results = [Value::NIL; 4];
         let kind = match step {
             Step::Expand(call) => {
@@ -215,7 +217,7 @@ impl Vm {
                     let functions = self.load_in_unit(module);
                     results[1] = self.loaded(functions)?;
                 }
-                results[2] = self.diagnostics(diagnostics)?;
+                results[2] = self.diagnostics(compilation, diagnostics)?;
                 "DONE"
             }
         };
@@ -223,10 +225,11 @@ impl Vm {
         self.give_values(&results)
     }
 
-    fn diagnostics(&mut self, diagnostics: &[Diagnostic]) -> Outcome {
+    fn diagnostics(&mut self, compilation: &dyn Compilation, diagnostics: &[Diagnostic]) -> Outcome {
         let mut list = Value::NIL;
         for diagnostic in diagnostics.iter().rev() {
-            let text = self.with_compiler(|_, compiler| compiler.render(diagnostic))?;
+            let text = compilation.render(diagnostic);
+            self.charge(text.len());
             let severity = match diagnostic.severity {
                 Severity::Warning => "WARNING",
                 Severity::Error => "ERROR",
@@ -240,18 +243,20 @@ impl Vm {
         Ok(list)
     }
 
-    /// Reads a datum of `text` from byte `start` on.
-    fn read_datum(&mut self, text: &str, start: usize) -> Result<Read, Exit> {
+    /// Reads a datum of `text`, which may have a name, from byte `start` on.
+    fn read_datum(&mut self, text: &str, start: usize, name: Option<&str>) -> Result<Read, Exit> {
         let read = self.with_compiler(|vm, compiler| {
             let read = compiler.read(vm, text, start);
-            read.map_err(|diagnostic| (is_unfinished(diagnostic.code), compiler.render(&diagnostic)))
+            read.map_err(|diagnostic| {
+                (is_unfinished(diagnostic.code), compiler.render(&diagnostic, name, text))
+            })
         })?;
         let end = read.as_ref().map_or(text.len(), |&(_, end)| end);
         self.charge(end.saturating_sub(start));
         match read {
             Ok((Some(datum), end)) => Ok(Read::Datum(datum, end)),
             Ok((None, _)) => Ok(Read::End),
-            Err((true, _)) => Ok(Read::Unfinished),
+            Err((true, text)) => Ok(Read::Unfinished(text)),
             Err((false, text)) => self.raise(Raised::Reader(text)),
         }
     }
@@ -271,8 +276,8 @@ enum Read {
     Datum(Datum, usize),
     /// There is nothing but white space.
     End,
-    /// The datum goes on after the end of the text.
-    Unfinished,
+    /// The datum goes on after the end of the text, of which this is said.
+    Unfinished(String),
 }
 
 /// `(%begin-compilation form)`
@@ -335,9 +340,9 @@ pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 fn begin_form(vm: &mut Vm, text: &mut Text) -> Outcome {
-    match vm.read_datum(&text.text, text.position)? {
+    match vm.read_datum(&text.text, text.position, text.name.as_deref())? {
         Read::End => Ok(Value::NIL),
-        Read::Unfinished => vm.raise(Raised::Reader("the text ends inside of a form".into())),
+        Read::Unfinished(what) => vm.raise(Raised::Reader(what)),
         Read::Datum(datum, end) => {
             let part = text.part(end);
             let compilation = vm.with_compiler(|_, compiler| compiler.compile_form(datum, part))?;
@@ -373,7 +378,7 @@ fn step(vm: &mut Vm, running: &mut Running, kind: Value, outcome: Value) -> Outc
         }
     };
     let outer = vm.world.unit.replace(std::mem::take(&mut running.unit));
-    let told = vm.tell(&step);
+    let told = vm.tell(&*running.compilation, &step);
     running.unit = vm.world.unit.replace(outer);
     let work = running.unit.take_work();
     vm.charge(work as usize);
@@ -399,14 +404,14 @@ pub(super) fn read_from_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let first = optional(arguments, 1).as_index().unwrap_or(0);
     let text: String =
         characters.iter().map(|&code| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
-    match vm.read_datum(&text, 0)? {
+    match vm.read_datum(&text, 0, None)? {
         Read::Datum(datum, end) => {
             let object = vm.read_object(&datum)?;
             let end = first + text[..end].chars().count();
             vm.give_values(&[Value::T, object, Value::index(end)])
         }
         Read::End => vm.give_values(&[Value::NIL, Value::NIL, Value::index(first + characters.len())]),
-        Read::Unfinished => {
+        Read::Unfinished(_) => {
             let unfinished = vm.world.known.unfinished;
             vm.give_values(&[unfinished, Value::NIL, Value::index(first + characters.len())])
         }
@@ -422,19 +427,19 @@ pub(super) fn read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             Source::Text(text) => (text.clone(), false),
             Source::Console { text, is_at_end } => (text.clone(), !is_at_end),
         };
-        let (status, object, end) = match vm.read_datum(&text, 0)? {
+        let (status, object, end) = match vm.read_datum(&text, 0, None)? {
             // What ends where the input does may go on in what is still to come.
             Read::Datum(_, end) if may_grow && end == text.len() && !text.ends_with([')', '"']) => {
                 vm.more_input()?;
                 continue;
             }
             Read::Datum(datum, end) => (Value::T, vm.read_object(&datum)?, end),
-            Read::End | Read::Unfinished if may_grow => {
+            Read::End | Read::Unfinished(_) if may_grow => {
                 vm.more_input()?;
                 continue;
             }
             Read::End => (Value::NIL, Value::NIL, text.len()),
-            Read::Unfinished => (vm.world.known.unfinished, Value::NIL, text.len()),
+            Read::Unfinished(_) => (vm.world.known.unfinished, Value::NIL, text.len()),
         };
         vm.skip_source(stream, &source, text[..end].chars().count());
         return vm.give_values(&[status, object]);

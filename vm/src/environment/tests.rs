@@ -184,6 +184,10 @@ impl Compilation for ToyCompilation {
             (_, answer) => panic!("{answer:?}"),
         }
     }
+
+    fn render(&self, diagnostic: &Diagnostic) -> String {
+        diagnostic.message.clone()
+    }
 }
 
 impl Compile for Toy {
@@ -212,7 +216,7 @@ impl Compile for Toy {
         Ok((Some(Datum::list([Datum::symbol(name, span())], span())), start + skipped + word.len()))
     }
 
-    fn render(&self, diagnostic: &Diagnostic) -> String {
+    fn render(&self, diagnostic: &Diagnostic, _: Option<&str>, _: &str) -> String {
         diagnostic.message.clone()
     }
 }

@@ -454,12 +454,11 @@ impl Vm {
     /// Makes room in the running task's stack for `words` words in all.
     ///
     /// # Errors
-    /// `:stack-exhausted` at the limit. Handling that has a reserve; when it is used up too, the task ends.
+    /// `:stack-exhausted` at the limit. Handling that has a reserve; see [`Vm::leave_reserve`].
     fn reserve_stack(&mut self, words: usize) -> Result<(), Exit> {
         if words > self.stack_limit() {
             if self.task().flags.uses_reserve() {
-                let condition = self.world.known.stack_exhausted;
-                self.begin_end(crate::control::End::Failed(condition));
+                self.leave_reserve(self.world.known.stack_exhausted);
                 return Err(Exit::Unwind);
             }
             self.task_mut().flags.set_uses_reserve(true);

@@ -293,6 +293,18 @@ impl Vm {
         if symbols.is_true() { self.type_error(symbols, "LIST") } else { Ok(()) }
     }
 
+    /// The reserve is used up that was for handling the exhaustion of stack or heap: leaves what has handled it, which
+    /// the library has put into a catch, so that the failure goes on outward. Without that, the task ends with `cause`.
+    pub(crate) fn leave_reserve(&mut self, cause: Value) {
+        match self.task().control.find_catch(self.world.known.reserve) {
+            Some(index) => {
+                let unwinding = Unwinding { target: Target::Entry(index), values: Vec::new() };
+                self.task_mut().control.unwinding = Some(unwinding);
+            }
+            None => self.begin_end(End::Failed(cause)),
+        }
+    }
+
     /// Begins to unwind the running task to its root, which ends it.
     pub(crate) fn begin_end(&mut self, end: End) {
         self.task_mut().control.unwinding = Some(Unwinding { target: Target::Root(end), values: Vec::new() });

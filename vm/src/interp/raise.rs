@@ -110,8 +110,7 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
             vm.cpu.ticks -= 1;
         }
         if !vm.heap.open_reserve() {
-            let condition = vm.world.known.heap_exhausted;
-            vm.begin_end(crate::control::End::Failed(condition));
+            vm.leave_reserve(vm.world.known.heap_exhausted);
             return Signal::Unwind;
         }
         return Signal::Exit(vm.raise::<()>(crate::raise::Raised::HeapExhausted).unwrap_err());

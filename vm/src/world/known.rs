@@ -53,6 +53,7 @@ define_known! {
     setf = cl "SETF";
     structure_object = cl "STRUCTURE-OBJECT";
     raise = esl "%RAISE";
+    reserve = esl "%RESERVE";
     allow_other_keys = keyword "ALLOW-OTHER-KEYS";
     stack_exhausted = keyword "STACK-EXHAUSTED";
     heap_exhausted = keyword "HEAP-EXHAUSTED";
