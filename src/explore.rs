@@ -39,11 +39,15 @@ pub struct Outcome {
     pub errors: String,
 }
 
+/// What is done to a machine before the program is loaded.
+type Prepare<'a> = &'a dyn Fn(&mut Vm) -> Result<(), String>;
+
 /// A machine that is about to run a program, its main task, and what it will write.
-fn begin(program: &Program) -> Result<(Vm, TaskId, Captured), String> {
+fn begin(program: &Program, prepare: Prepare<'_>) -> Result<(Vm, TaskId, Captured), String> {
     let host = VirtualHost::new();
     let captured = host.captured();
     let mut machine = program::machine(Default::default(), Box::new(host))?;
+    prepare(&mut machine)?;
     let main = program::begin(&mut machine, program)?;
     Ok((machine, main, captured))
 }
@@ -53,9 +57,21 @@ fn begin(program: &Program) -> Result<(Vm, TaskId, Captured), String> {
 /// # Errors
 /// A text, if the program could not be begun.
 pub fn explore(program: &Program, settings: &Settings) -> Result<Exploration<Outcome>, String> {
+    explore_with(program, settings, &|_| Ok(()))
+}
+
+/// As [`explore`], with something done to each machine before the program is loaded.
+///
+/// # Errors
+/// As for [`explore`], and those of `prepare`.
+pub fn explore_with(
+    program: &Program,
+    settings: &Settings,
+    prepare: Prepare<'_>,
+) -> Result<Exploration<Outcome>, String> {
     let present = RefCell::new(None);
     let begin = || {
-        let (machine, main, captured) = begin(program)?;
+        let (machine, main, captured) = begin(program, prepare)?;
         present.replace(Some((main, captured)));
         Ok(machine)
     };
@@ -71,7 +87,7 @@ pub fn explore(program: &Program, settings: &Settings) -> Result<Exploration<Out
 /// # Errors
 /// As for [`explore`].
 pub fn follow(program: &Program, settings: &Settings, choices: &[u32]) -> Result<Outcome, String> {
-    let (mut machine, main, captured) = begin(program)?;
+    let (mut machine, main, captured) = begin(program, &|_| Ok(()))?;
     let outcome = machine.follow(settings, choices);
     let ended = program::end(&mut machine, main, outcome);
     Ok(Outcome { ended, output: captured.output(), errors: captured.error() })

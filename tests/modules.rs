@@ -177,6 +177,33 @@ fn modules_in_a_circle_are_reported() {
 }
 
 #[test]
+fn two_tasks_that_require_a_module_run_it_once() {
+    let files = [
+        (
+            "main.esl",
+            "(defun have (name)
+               (with-recovery-procedures ((:general-failure (abort :failed)))
+                 (require name)))
+             (print (multiple-value-list (task-net (a (have \"slow\")) (b (have \"slow\")) (c (have \"slow\")))))
+             (print (multiple-value-list (task-net (a (have \"bad\")) (b (have \"bad\")))))
+             (let ((first (spawn (have \"slower\"))) (second (spawn (have \"slower\"))))
+               (sleep 1/100)
+               (abort-task first)
+               (print (nth-value 1 (wait-for-task second))))
+             (print *modules*)",
+        ),
+        ("slow.esl", "(princ 'begun) (sleep 1/100) (print 'done)"),
+        ("bad.esl", "(print 'bad) (sleep 1/100) (fail :spoilt)"),
+        ("slower.esl", "(print 'slower) (sleep 1/10)"),
+    ];
+    let folder = Folder::new("at-once", &files);
+    // Whoever waits for one that fails, or whose task is aborted, has a try of its own.
+    let expected =
+        "BEGUN\nDONE\n(T NIL NIL)\nBAD\nBAD\n(:FAILED :FAILED)\nSLOWER\nSLOWER\nT\n(\"slower\" \"slow\")";
+    folder.check_run(&["--clock", "virtual", "main.esl"], expected);
+}
+
+#[test]
 fn what_is_wrong_in_a_module_is_reported_there() {
     let files = [("main.esl", "(require \"a\")\n(undefined-one)"), ("a.esl", "(print 1)\n(let 5)")];
     let folder = Folder::new("wrong", &files);

@@ -741,3 +741,31 @@ e") (read-from-string "#:g") (read-from-string ":Key")))
 
 ;;; 202
 (answer 202 (list (coerce 1 'float) (coerce 'a 'symbol) (coerce "a" 'character) (coerce 1.5 'double-float) (coerce #'car 'function) (handler-case (coerce 1.5 'integer) (error () 'error))))
+
+;;;; What was found since.
+
+;; the order of sets, long ones too
+;;; 203
+(answer 203 (let ((a (loop for i below 25 collect i)) (b (loop for i from 20 below 50 collect i)))
+              (list (union a b) (intersection a b) (set-difference a b) (set-exclusive-or a b)
+                    (nunion (copy-list a) (copy-list b)) (nset-exclusive-or (copy-list a) (copy-list b)))))
+
+;; duplicates stay
+;;; 204
+(answer 204 (let ((a (list 1 1 2)) (b (list 3 3)) (c (list 2))) (list (union a b) (set-difference a c) (intersection a c))))
+
+;; the first word may begin with a digit
+;;; 205
+(answer 205 (list (format nil "~@(~a~)" "2 ITEMS") (format nil "~@(~a~)" "- iTEMS") (format nil "~:(~a~)" "2 items 3rd")))
+
+;; of nothing
+;;; 206
+(answer 206 (list (loop for x in nil maximize x) (loop for x in nil minimize x) (loop for x in '(-3) maximize x)))
+
+;; bounds that lie outside
+;;; 207
+(answer 207 (handler-case (replace (list 1 2 3) '(a b) :start1 1 :end1 5) (type-error () 'type-error)))
+
+;; a handler for something that is no type
+;;; 208
+(answer 208 (handler-case (handler-case (error "x") (no-such-type208 () 1)) (error () 'outer)))

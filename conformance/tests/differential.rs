@@ -43,9 +43,9 @@ fn is_blessing() -> bool {
     std::env::var_os("ESL_BLESS").is_some()
 }
 
-fn generated() -> String {
-    let mut grammar = Grammar::parse(&read("grammar.txt"), SEED).expect("the grammar is sound");
-    let mut text = format!(";;;; Made from `grammar.txt` with the seed {SEED}: change that, not this.\n\n");
+fn generated(seed: u64) -> String {
+    let mut grammar = Grammar::parse(&read("grammar.txt"), seed).expect("the grammar is sound");
+    let mut text = format!(";;;; Made from `grammar.txt` with the seed {seed}: change that, not this.\n\n");
     text.push_str(&grammar.programs().join("\n"));
     text
 }
@@ -102,7 +102,7 @@ fn compare(programs: &str, stored: &str) {
 
 #[test]
 fn generated_programs_answer_as_under_sbcl() {
-    let programs = generated();
+    let programs = generated(SEED);
     if is_blessing() {
         std::fs::write(folder().join("generated.lisp"), &programs).expect("the programs can be written");
         std::fs::write(folder().join("generated.answers"), sbcl("generated.lisp"))
@@ -113,6 +113,28 @@ fn generated_programs_answer_as_under_sbcl() {
         "the grammar has changed: ESL_BLESS=1 cargo test -p esl-conformance --test differential"
     );
     compare(&programs, &read("generated.answers"));
+}
+
+/// Needs SBCL: `ESL_SEEDS=1-12 cargo test -p esl-conformance --test differential -- --ignored`.
+#[test]
+#[ignore = "looks for new differences, with SBCL"]
+fn programs_of_other_seeds_answer_as_under_sbcl() {
+    let seeds = std::env::var("ESL_SEEDS").unwrap_or_else(|_| "1-4".to_string());
+    let (first, last) = seeds.split_once('-').unwrap_or((&seeds, &seeds));
+    let number = |text: &str| text.parse::<u64>().expect("ESL_SEEDS is a number or FIRST-LAST");
+    let file = std::env::temp_dir().join(format!("esl-programs-{}.lisp", std::process::id()));
+    let mut failures = Vec::new();
+    for seed in number(first)..=number(last) {
+        let programs = generated(seed);
+        std::fs::write(&file, &programs).expect("the programs can be written");
+        let stored = sbcl(&file.to_string_lossy());
+        let compared = std::panic::catch_unwind(|| compare(&programs, &stored));
+        if compared.is_err() {
+            failures.push(seed);
+        }
+    }
+    std::fs::remove_file(&file).expect("the programs can be removed");
+    assert!(failures.is_empty(), "these seeds have shown differences: {failures:?}");
 }
 
 #[test]
@@ -126,7 +148,7 @@ fn the_checklist_answers_as_under_sbcl() {
 
 #[test]
 fn every_operator_is_reached() {
-    let text = (generated() + &read("checklist.lisp")).to_uppercase();
+    let text = (generated(SEED) + &read("checklist.lisp")).to_uppercase();
     let used: BTreeSet<&str> = text
         .split(|c: char| c.is_whitespace() || "()'`,@#\"".contains(c))
         .map(|word| word.trim_start_matches("CL:"))

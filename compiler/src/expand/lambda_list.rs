@@ -178,9 +178,12 @@ impl Parser {
         Ok(())
     }
 
-    /// Whether nothing but `&whole`'s place has been read.
+    /// Whether nothing has been read.
     fn is_fresh(&self) -> bool {
-        self.part == Part::Required && self.parsed.required.is_empty() && self.parsed.whole.is_none()
+        self.part == Part::Required
+            && self.parsed.required.is_empty()
+            && self.parsed.whole.is_none()
+            && self.parsed.environment.is_none()
     }
 
     fn parameter(&mut self, item: &Datum) -> Checked {

@@ -64,6 +64,11 @@ impl Vm {
         self.world.is_open = false;
     }
 
+    /// Opens the language again, until [`Vm::seal`]: for tests that put a defect into the library.
+    pub fn unseal(&mut self) {
+        self.world.is_open = true;
+    }
+
     /// Does something outside of all tasks that may find no room: then once more, after a collection.
     fn with_room<T>(
         &mut self,

@@ -1,0 +1,88 @@
+//! Puts a defect into the library of a machine: some of its functions, from the text of the library with changes.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use esl::host::VirtualHost;
+use esl::{Config, program};
+use esl_bytecode::compile::{Compile, drive};
+use esl_bytecode::diagnostic::Severity;
+use esl_bytecode::module::Module;
+use esl_bytecode::symbol::{ESL_PACKAGE, USER_PACKAGE};
+use esl_compiler::diagnostic::Sources;
+use esl_compiler::session::Compiler;
+use esl_vm::vm::Vm;
+
+/// A change of the library: in this file, the text, which stands there once, becomes the other.
+pub(crate) type Change = (&'static str, &'static str, &'static str);
+
+/// Functions to be put into the library of a machine.
+pub(crate) struct Defect {
+    module: Module,
+}
+
+/// The functions of the library that `changes` are about, changed.
+pub(crate) fn changed_functions(changes: &[Change]) -> Defect {
+    let mut texts: Vec<(&str, String)> = Vec::new();
+    for &(file, from, to) in changes {
+        let index = texts.iter().position(|(name, _)| *name == file).unwrap_or_else(|| {
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stdlib").join(file);
+            texts.push((file, std::fs::read_to_string(path).expect("the library has such a file")));
+            texts.len() - 1
+        });
+        let text = &mut texts[index].1;
+        assert_eq!(text.matches(from).count(), 1, "this stands once in {file}: {from}");
+        *text = text.replace(from, &format!("{MARK}{to}"));
+    }
+    let functions: String =
+        texts.iter().flat_map(|(_, text)| forms(text)).filter(|form| form.contains(MARK)).collect();
+    Defect { module: compile(&functions.replace(MARK, "")) }
+}
+
+/// Stands where a text was changed.
+const MARK: char = '\u{1}';
+
+/// The forms of a file, each of which begins a line.
+fn forms(text: &str) -> impl Iterator<Item = String> {
+    text.split("\n(").skip(1).map(|form| format!("\n({form}"))
+}
+
+fn compile(text: &str) -> Module {
+    let mut machine =
+        program::machine(Config::default(), Box::new(VirtualHost::new())).expect("there is room");
+    let mut module = None;
+    opened(&mut machine, |machine| {
+        machine.begin_unit();
+        let source = Sources::new().add("defect.esl", Some(Arc::from(text)));
+        let mut compilation = Compiler::for_source(source).compile_text("defect.esl", text);
+        let (compiled, diagnostics) = drive(&mut *compilation, machine);
+        let errors: Vec<_> =
+            diagnostics.iter().filter(|diagnostic| diagnostic.severity == Severity::Error).collect();
+        assert!(errors.is_empty(), "{errors:?}\n{text}");
+        module = compiled;
+        Ok(())
+    })
+    .expect("the package of the library is there");
+    module.expect("it compiles")
+}
+
+/// Does `work` in a machine whose language is open for it.
+fn opened(machine: &mut Vm, work: impl FnOnce(&mut Vm) -> Result<(), String>) -> Result<(), String> {
+    let no_room = |_| "there is no room".to_string();
+    machine.unseal();
+    machine.enter_package(ESL_PACKAGE).map_err(no_room)?;
+    work(machine)?;
+    machine.enter_package(USER_PACKAGE).map_err(no_room)?;
+    machine.seal();
+    Ok(())
+}
+
+impl Defect {
+    /// Has the functions of a machine's library replaced.
+    pub(crate) fn put_into(&self, machine: &mut Vm) -> Result<(), String> {
+        opened(machine, |machine| {
+            let functions = machine.load_module(&self.module).map_err(|error| error.to_string())?;
+            machine.run_toplevel(functions, u64::MAX).map(|_| ())
+        })
+    }
+}
