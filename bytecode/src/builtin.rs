@@ -815,6 +815,10 @@ define_builtins! {
     /// The state of the recovery procedures of the entry with this index: `table` if it is one, otherwise a copy of it, made
     /// here, with their function first. Those who watch the run are told that there is recovery from `failure`.
     BeginRecovery = internal "%BEGIN-RECOVERY" ("index table failure");
+    /// Has `values`, a list, stand for the values of the operation for whose failure this function of the library was called,
+    /// and that the recovery procedures of the entry `index` have handled: if that is inside of functions of the library, for
+    /// those of the outermost.
+    StandIn = internal "%STAND-IN" ("index values");
     /// Unwinds to the cleanup for failures with this index, which has `failure` when it has run.
     UnwindToCleanup = internal "%UNWIND-TO-CLEANUP" ("index failure");
     /// What the innermost running cleanup was given by `%UNWIND-TO-CLEANUP`, or `NIL`.
@@ -825,7 +829,8 @@ define_builtins! {
     EndTask = internal "%END-TASK" ("condition text story ending");
     /// Ends the run with this status, from 0 to 255. The remaining tasks are aborted.
     Exit = internal "%EXIT" ("status");
-    /// The innermost `limit` frames, each a list of the function's name, and source, line and column if known.
+    /// The innermost `limit` frames, each a list of the function's name, and source, line and column if known. A function that
+    /// has no name is `(lambda)`, a form at top level `NIL`.
     Backtrace = internal "%BACKTRACE" ("limit");
     /// Calls the embedder's function with this number.
     CallHost = internal "%CALL-HOST" ("number &rest arguments");

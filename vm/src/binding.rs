@@ -21,6 +21,8 @@ pub(crate) struct Binding {
     pub symbol: Value,
     /// Its value in this task.
     pub value: Value,
+    /// Offset in the stack of the base of the frame that has made it.
+    pub base: u32,
 }
 
 /// The dynamic bindings of a task, newest last.
@@ -56,6 +58,7 @@ impl Bindings {
         let is_new = |binding: &&Binding| seen.insert(binding.symbol.bits(), ()).is_none();
         let mut all: Vec<Binding> = self.all.iter().rev().filter(is_new).copied().collect();
         all.reverse();
+        all.iter_mut().for_each(|binding| binding.base = 0);
         let mut copy = Bindings { all: Vec::with_capacity(all.len()), table: None };
         all.into_iter().for_each(|binding| copy.push(binding));
         copy
@@ -77,6 +80,12 @@ impl Bindings {
             self.uncover(length);
         }
         self.all.truncate(length);
+    }
+
+    /// Undoes those of the frame with this base and of frames inside it.
+    pub(crate) fn truncate_from(&mut self, base: u32) {
+        let length = self.all.iter().rposition(|binding| binding.base < base).map_or(0, |last| last + 1);
+        self.truncate(length);
     }
 
     /// The value of the newest binding of `symbol`.
@@ -165,7 +174,7 @@ mod tests {
                     }
                     _ => for repeat in 0..20 {
                         let (symbol, value) = (Value::small(name + repeat / 7), Value::small(number as i32));
-                        bindings.push(Binding { symbol, value });
+                        bindings.push(Binding { symbol, value, base: 0 });
                         model.push((symbol, value));
                     }
                 }

@@ -85,6 +85,14 @@ pub(crate) enum Target {
     Limit(usize),
     /// At the entry with this index, a running cleanup that is cut off.
     Cleanup(usize),
+    /// At the frame with this base, which returns the values. Its entries and those of frames inside it are popped, so
+    /// that so many are left.
+    Return {
+        /// Entries that are left.
+        entries: usize,
+        /// Offset of the frame's base in the stack.
+        base: u32,
+    },
 }
 
 impl Target {
@@ -103,6 +111,7 @@ impl Target {
         match self {
             Target::Root(_) => 0,
             Target::Entry(index) | Target::Limit(index) | Target::Cleanup(index) => index + 1,
+            Target::Return { entries, .. } => entries,
         }
     }
 }

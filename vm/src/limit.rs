@@ -366,6 +366,7 @@ impl Vm {
         let passes_by = task.control.unwinding.as_ref().is_some_and(|unwinding| match unwinding.target {
             Target::Root(_) => true,
             Target::Entry(index) | Target::Limit(index) | Target::Cleanup(index) => index <= entry,
+            Target::Return { entries, .. } => entries <= entry,
         });
         if !passes_by {
             task.control.unwinding = Some(Unwinding { target: Target::Limit(entry), values: vec![cause] });

@@ -22,7 +22,7 @@ use esl_bytecode::symbol::{Home, Symbol};
 use esl_bytecode::verify::{VerifyError, verify};
 
 use crate::heap::layout::Code;
-use crate::heap::{AllocError, CodeParts, Heap};
+use crate::heap::{AllocError, CodeParts, Heap, Kind};
 use crate::raise::{Exit, Raised};
 use crate::shape::{Shape, Sort, capture_word};
 use crate::stub;
@@ -173,6 +173,9 @@ impl Loader<'_> {
         self.fill_in(&codes);
         let toplevel: Vec<Value> =
             self.module.toplevel.iter().map(|number| self.functions[number.0 as usize]).collect();
+        for &function in &toplevel {
+            self.heap.set_aux(function, Kind::Function, TOP_LEVEL);
+        }
         Ok(self.heap.list(&toplevel)?)
     }
 
@@ -223,6 +226,9 @@ impl Loader<'_> {
         })
     }
 }
+
+/// What `aux` of a Function is that is a form at top level, or several.
+pub(crate) const TOP_LEVEL: u16 = 1;
 
 /// What a Code is made from.
 struct Parts<'a> {

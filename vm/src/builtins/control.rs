@@ -116,6 +116,25 @@ pub(super) fn begin_recovery(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(state)
 }
 
+/// `(%stand-in index values)`
+pub(super) fn stand_in(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let index = arguments[0].as_index().unwrap_or(usize::MAX);
+    let Some(handler) = vm.task().control.entries.get(index) else { return Ok(Value::NIL) };
+    let handler = handler.base;
+    let mut values = Vec::new();
+    let mut rest = arguments[1];
+    while let Some(pair) = vm.heap.as_cons(rest) {
+        values.push(pair.car);
+        rest = pair.cdr;
+    }
+    vm.charge(values.len());
+    let Some(base) = vm.frame_of_operation(handler) else { return vm.give_values(&values) };
+    let control = &mut vm.task_mut().control;
+    let entries = control.entries.partition_point(|entry| entry.base < base);
+    control.unwinding = Some(Unwinding { target: Target::Return { entries, base }, values });
+    Err(Exit::Unwind)
+}
+
 /// `(%unwind-to-cleanup index failure)`
 pub(super) fn unwind_to_cleanup(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(index) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
@@ -189,6 +208,10 @@ pub(super) fn backtrace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     for frame in vm.frames(limit) {
         let Some(code) = vm.heap.function_code(frame.function) else { continue };
         let name = vm.heap.code(code).map_or(Value::NIL, |code| code.name);
+        let is_top_level =
+            vm.heap.header(frame.function).is_some_and(|header| header.aux == crate::load::TOP_LEVEL);
+        let name =
+            if name.is_nil() && !is_top_level { vm.heap.list(&[vm.world.known.lambda])? } else { name };
         // A caller stands behind its call.
         let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
         let row = match vm.source_place(code, word as u32) {

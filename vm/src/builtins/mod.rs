@@ -396,6 +396,7 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::NextHandler => control::next_handler,
         Builtin::TakeCase => control::take_case,
         Builtin::BeginRecovery => control::begin_recovery,
+        Builtin::StandIn => control::stand_in,
         Builtin::UnwindToCleanup => control::unwind_to_cleanup,
         Builtin::CleaningUp => control::cleaning_up,
         Builtin::EndTask => control::end_task,

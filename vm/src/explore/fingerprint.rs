@@ -248,6 +248,10 @@ impl Walk<'_> {
             Target::Entry(index) => self.word((index as u64) << 4 | 5),
             Target::Limit(index) => self.word((index as u64) << 4 | 6),
             Target::Cleanup(index) => self.word((index as u64) << 4 | 7),
+            Target::Return { entries, base } => {
+                self.word((entries as u64) << 4 | 8);
+                self.word(u64::from(base));
+            }
         }
         self.values(values);
     }

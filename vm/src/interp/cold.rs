@@ -418,7 +418,8 @@ pub(super) unsafe fn bind(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
         let word = *pc;
         let symbol = symbol_constant(base, word >> 16);
         let value = *base.add(operands(word).0);
-        match vm.bind(symbol, value) {
+        let offset = vm.offset_of(base) as u32;
+        match vm.bind(symbol, value, offset) {
             Ok(()) => Signal::Next,
             Err(exit) => Signal::Exit(exit),
         }
@@ -547,7 +548,7 @@ impl Vm {
     ///
     /// # Errors
     /// A failure if it is a constant, or if there are too many bindings.
-    pub(crate) fn bind(&mut self, symbol: Value, value: Value) -> Result<(), Exit> {
+    pub(crate) fn bind(&mut self, symbol: Value, value: Value, base: u32) -> Result<(), Exit> {
         let Some(cell) = self.heap.symbol(symbol) else { return self.type_error(symbol, "SYMBOL") };
         let flags = cell.header.flags;
         if flags & Symbol::CONSTANT != 0 {
@@ -562,7 +563,7 @@ impl Vm {
         if bindings.len() >= limit {
             return self.raise(Raised::StackExhausted);
         }
-        bindings.push(Binding { symbol, value });
+        bindings.push(Binding { symbol, value, base });
         Ok(())
     }
 }

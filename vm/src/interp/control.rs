@@ -84,7 +84,8 @@ pub(super) unsafe fn bind_list(vm: &mut Vm, pc: *const u32, base: *mut Value) ->
     let (symbols, values) =
         unsafe { (*base.add((*pc >> 8 & 0xff) as usize), *base.add((*pc >> 16 & 0xff) as usize)) };
     let height = vm.task().control.bindings.len();
-    match vm.bind_list(symbols, values) {
+    let offset = vm.offset_of(base) as u32;
+    match vm.bind_list(symbols, values, offset) {
         Ok(()) => Signal::Next,
         Err(exit) => {
             vm.task_mut().control.bindings.truncate(height);
@@ -155,6 +156,14 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
             Target::Entry(index) | Target::Limit(index) if index + 1 >= height => {
                 // SAFETY: the entry's frame is live: entries of a frame are popped before it is left.
                 return unsafe { land(vm, unwinding.values) };
+            }
+            Target::Return { entries, base } if height <= entries => {
+                task.control.bindings.truncate_from(base);
+                vm.values = unwinding.values;
+                // SAFETY: the frame is live: it lies inside those of the entries that are left, and nothing has left it.
+                vm.cpu.base = unsafe { vm.task().stack.start().add(base as usize) };
+                vm.close_reserves();
+                return Signal::ReturnAll;
             }
             Target::Root(end) if height == 0 => {
                 task.control.bindings.truncate(0);
@@ -275,8 +284,8 @@ impl Vm {
         self.cpu.base = unsafe { self.task().stack.start().add(entry.base as usize) };
     }
 
-    /// Binds the symbols of a list to the items of another.
-    fn bind_list(&mut self, symbols: Value, values: Value) -> Result<(), Exit> {
+    /// Binds the symbols of a list to the items of another, for the frame with this base.
+    fn bind_list(&mut self, symbols: Value, values: Value, base: u32) -> Result<(), Exit> {
         let (mut symbols, mut values) = (symbols, values);
         while let Some(pair) = self.heap.as_cons(symbols) {
             let value = match self.heap.as_cons(values) {
@@ -287,7 +296,7 @@ impl Vm {
                 None => Value::UNBOUND,
             };
             self.charge(64);
-            self.bind(pair.car, value)?;
+            self.bind(pair.car, value, base)?;
             symbols = pair.cdr;
         }
         if symbols.is_true() { self.type_error(symbols, "LIST") } else { Ok(()) }

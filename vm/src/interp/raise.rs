@@ -242,6 +242,42 @@ impl Vm {
     }
 }
 
+impl Vm {
+    /// The base of the frame that is to return what stands for the values of an operation that has failed: of the outermost
+    /// function of the library around the failure, inside the frame of the handler, whose base is `handler`. `None` if the
+    /// program itself has failed. To be asked by a builtin that was called by the function that deals with the failure.
+    pub(crate) fn frame_of_operation(&mut self, handler: u32) -> Option<u32> {
+        let (mut found, mut looked_at) = (None, 0);
+        let mut base = self.cpu.base;
+        // SAFETY: `vm.cpu.base` is that of the innermost frame; frames are linked as in `frames_of`. The handler's lies
+        // outside of it, so the walk ends before the root.
+        unsafe {
+            loop {
+                let return_to: *const u32 = std::ptr::with_exposed_provenance((*base.sub(1)).bits() as usize);
+                if return_to == stubs::task_exit() {
+                    break;
+                }
+                let call = *return_to.sub(2);
+                let is_named = stubs::is_error_return(return_to)
+                    || matches!(Opcode::from_number(call as u8), Some(Opcode::CallGlobal | Opcode::CallSelf));
+                if found.is_some() && !is_named {
+                    // Its caller was given it as a value: it may be the program's, which has called on by a tail call.
+                    break;
+                }
+                base = base.sub(2 + (call >> 8 & 0xff) as usize);
+                let offset = self.offset_of(base) as u32;
+                if offset <= handler || !(*code_of(*base.sub(2))).owner.is_fixnum() {
+                    break;
+                }
+                found = Some(offset);
+                looked_at += 1;
+            }
+        }
+        self.charge(looked_at);
+        found
+    }
+}
+
 /// A frame with what it holds.
 pub(crate) struct FrameView<'a> {
     /// The function.

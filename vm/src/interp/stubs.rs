@@ -51,12 +51,17 @@ pub(crate) fn interrupt_return(window: u8) -> *const u32 {
 
 /// Whether a return address is one of [`error_return`] or [`interrupt_return`]: the frame has its pc behind its registers.
 pub(crate) fn is_return_above(pc: *const u32) -> bool {
-    let address = pc.addr();
-    let is_in = |table: &'static [[u32; 3]; 256]| {
-        let start = table.as_ptr().addr();
-        address >= start && address < start + size_of_val(table)
-    };
-    is_in(&ERROR_RETURN) || is_in(&INTERRUPT_RETURN)
+    is_in(&ERROR_RETURN, pc) || is_in(&INTERRUPT_RETURN, pc)
+}
+
+/// Whether a return address is one of [`error_return`].
+pub(crate) fn is_error_return(pc: *const u32) -> bool {
+    is_in(&ERROR_RETURN, pc)
+}
+
+fn is_in(table: &'static [[u32; 3]; 256], pc: *const u32) -> bool {
+    let start = table.as_ptr().addr();
+    pc.addr() >= start && pc.addr() < start + size_of_val(table)
 }
 
 /// Length in words of the instruction that begins with `word`.

@@ -51,6 +51,7 @@ define_known! {
     standard_output = cl "*STANDARD-OUTPUT*";
     error_output = cl "*ERROR-OUTPUT*";
     setf = cl "SETF";
+    lambda = cl "LAMBDA";
     structure_object = cl "STRUCTURE-OBJECT";
     raise = esl "%RAISE";
     reserve = esl "%RESERVE";
