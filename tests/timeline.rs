@@ -26,14 +26,19 @@ const PROGRAM: &str = r#"
 
 /// Runs a program with options; gives what it has written to a file with this name.
 fn run(name: &str, program: &str, options: &[&str]) -> String {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let (source, file): (PathBuf, PathBuf) = (folder.join(format!("{name}.esl")), folder.join(name));
+    let source = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.esl"));
     std::fs::write(&source, program).expect("the program can be written");
+    run_file(name, &source, options)
+}
+
+/// As [`run`], with the program in a file.
+fn run_file(name: &str, source: &Path, options: &[&str]) -> String {
+    let file: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let status = Command::new(ESLVM)
         .arg("run")
         .args(options)
         .arg("--timeline")
-        .args([&file, &source])
+        .args([&file, source])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .status();
@@ -50,9 +55,12 @@ fn text<'a>(event: &'a Value, member: &str) -> &'a str {
 /// inside slices. Gives its events.
 fn check(trace: &str) -> Vec<Value> {
     let mut trace: Value = serde_json::from_str(trace).expect("it is JSON");
+    assert!(matches!(text(&trace, "displayTimeUnit"), "ms" | "ns"));
     let Value::Array(events) = trace["traceEvents"].take() else { panic!("no list of events") };
+    let mut names: HashMap<(u64, u64), String> = HashMap::new();
+    let mut processes: HashMap<u64, String> = HashMap::new();
     let mut slices: HashMap<(u64, u64), Vec<String>> = HashMap::new();
-    let mut flows: HashMap<u64, (String, bool)> = HashMap::new();
+    let mut flows: HashMap<u64, (String, String, bool)> = HashMap::new();
     let mut latest = 0.0;
     for event in &events {
         let track = (event["pid"].as_u64().expect("a process"), event["tid"].as_u64().expect("a track"));
@@ -62,26 +70,41 @@ fn check(trace: &str) -> Vec<Value> {
         let name = text(event, "name").to_string();
         let open = slices.entry(track).or_default();
         match text(event, "ph") {
-            "M" => assert!(event["args"].is_object(), "{event}"),
-            "B" => open.push(name),
+            "M" => {
+                let of_track = match &name[..] {
+                    "process_name" => processes.insert(track.0, text(&event["args"], "name").into()),
+                    "thread_name" => names.insert(track, text(&event["args"], "name").into()),
+                    "thread_sort_index" => event["args"]["sort_index"].as_i64().map(|_| String::new()),
+                    _ => panic!("no such metadata: {event}"),
+                };
+                assert!(name != "thread_sort_index" || of_track.is_some(), "{event}");
+                continue;
+            }
+            "B" => {
+                assert!(!text(event, "cat").is_empty(), "{event}");
+                open.push(name);
+            }
             "E" => assert_eq!(open.pop(), Some(name), "{event}"),
             "i" => assert_eq!(text(event, "s"), "t"),
             "s" => {
                 assert!(!open.is_empty(), "{event} is in no slice");
                 let id = event["id"].as_u64().expect("a number");
-                assert!(flows.insert(id, (name, false)).is_none(), "{event} is there twice");
+                let flow = (name, text(event, "cat").to_string(), false);
+                assert!(flows.insert(id, flow).is_none(), "{event} is there twice");
             }
             "f" => {
                 assert!(!open.is_empty() && text(event, "bp") == "e", "{event} is in no slice");
                 let flow = flows.get_mut(&event["id"].as_u64().expect("a number")).expect("it has begun");
-                assert_eq!(*flow, (name, false), "{event}");
-                flow.1 = true;
+                assert_eq!(*flow, (name, text(event, "cat").to_string(), false), "{event}");
+                flow.2 = true;
             }
             phase => panic!("the phase {phase} is not used"),
         }
+        assert!(names.contains_key(&track) && processes.contains_key(&track.0), "{event}: nameless track");
+        assert!(event.get("dur").is_none(), "{event}: only complete events have one");
     }
     assert!(slices.values().all(Vec::is_empty), "slices that do not end: {slices:?}");
-    assert!(flows.values().all(|(_, has_ended)| *has_ended), "flows that do not end: {flows:?}");
+    assert!(flows.values().all(|(.., has_ended)| *has_ended), "flows that do not end: {flows:?}");
     events
 }
 
@@ -112,6 +135,17 @@ fn a_trace_keeps_the_rules_of_its_format() {
         let trace = run(&format!("{clock}.json"), PROGRAM, &["--clock", clock]);
         check_contents(&check(&trace));
     }
+}
+
+#[test]
+fn the_trace_of_a_large_program_keeps_them_too() {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/rover.esl");
+    let events = check(&run_file("rover.json", &source, &["--clock", "virtual"]));
+    let is_there = |phase: &str, name: &str| {
+        events.iter().any(|event| text(event, "ph") == phase && text(event, "name").starts_with(name))
+    };
+    assert!(is_there("B", "waits for") && is_there("s", "") && is_there("i", "recovers from"));
+    assert!(events.len() > 300, "{}", events.len());
 }
 
 #[test]

@@ -470,7 +470,7 @@ define_builtins! {
     /// Makes `character` character `index` of a string, and returns it.
     SetChar = internal "%SET-CHAR" ("string index character");
     /// A fresh string of `size` times `character`.
-    MakeString = internal "%MAKE-STRING" ("size character");
+    MakeString = internal "%MAKE-STRING" ("size character") slowly "%SLOW-MAKE-STRING";
     /// Whether two parts of strings are the same.
     StringEqualExactly = internal "%STRING=" ("left right &optional start1 end1 start2 end2") slowly "%SLOW-STRING=";
     /// Whether two parts of strings are the same, whatever the case.
@@ -751,7 +751,11 @@ define_builtins! {
     /// The element in front of the fill pointer, which moves back to it.
     VectorPop = cl "VECTOR-POP" ("vector");
     /// A fresh simple vector of `size` times `object`.
-    MakeVector = internal "%MAKE-VECTOR" ("size object");
+    MakeVector = internal "%MAKE-VECTOR" ("size object") slowly "%SLOW-MAKE-VECTOR";
+    /// Memory for a simple vector or string of `size` elements, which is one when all have been filled.
+    BeginVector = internal "%BEGIN-VECTOR" ("size string-p");
+    /// Fills more elements of such a vector with `object`, or with 0 if that has an address; whether all are filled now.
+    FillMore = internal "%FILL-MORE" ("vector object");
     /// An array that is not simple, over the simple vector or string `data`; `fill-pointer` is `NIL`, `T` or an
     /// index.
     MakeArray = internal "%MAKE-ARRAY" ("dimensions data fill-pointer adjustable");
@@ -980,13 +984,20 @@ define_builtins! {
     /// Standard input, output or error: 0, 1 or 2.
     StandardStream = internal "%STANDARD-STREAM" ("number");
     /// A stream that reads the characters of `string` from `start` to before `end`.
-    MakeStringInput = internal "%MAKE-STRING-INPUT" ("string start end");
+    MakeStringInput = internal "%MAKE-STRING-INPUT" ("string start end") slowly "%SLOW-MAKE-STRING-INPUT";
+    /// A stream that reads from `string`, which nobody else may have.
+    ReadFromCopy = internal "%READ-FROM-COPY" ("string");
     /// How many characters of its string such a stream has read.
     StringInputPosition = internal "%STRING-INPUT-POSITION" ("stream");
     /// A stream that gathers what is written to it.
     MakeStringOutput = internal "%MAKE-STRING-OUTPUT" ("");
     /// What a string stream has gathered since this was last asked.
-    GetOutputStreamString = cl "GET-OUTPUT-STREAM-STRING" ("stream");
+    GetOutputStreamString = cl "GET-OUTPUT-STREAM-STRING" ("stream") slowly "%SLOW-GET-OUTPUT-STREAM-STRING";
+    /// How many characters a string stream has gathered since it was last asked for them.
+    GatheredLength = internal "%GATHERED-LENGTH" ("stream");
+    /// The strings in which a string stream has gathered them, the last first; it begins afresh. `NIL` if they are not `length`
+    /// characters any more. The last string may be longer than what is in it.
+    TakeGathered = internal "%TAKE-GATHERED" ("stream length");
     /// A stream that reads a text file.
     OpenInput = internal "%OPEN-INPUT" ("path");
     /// A stream that writes a text file: 0 replaces it, 1 appends to it, 2 fails if there is one.
@@ -1022,11 +1033,11 @@ define_builtins! {
     /// Puts the character that was read last back into a stream.
     UnreadChar = cl "UNREAD-CHAR" ("character &optional stream");
     /// The next line of a stream, and whether it has no line end. Waits for standard input.
-    ReadLine = cl "READ-LINE" ("&optional stream eof-error-p eof-value recursive-p");
+    ReadLine = cl "READ-LINE" ("&optional stream eof-error-p eof-value recursive-p") slowly "%SLOW-READ-LINE";
     /// Writes a character to a stream, and returns it.
     WriteChar = cl "WRITE-CHAR" ("character &optional stream");
     /// Writes a part of a string to a stream, and returns the string.
-    WriteStringPart = internal "%WRITE-STRING" ("string stream start end");
+    WriteStringPart = internal "%WRITE-STRING" ("string stream start end") slowly "%SLOW-WRITE-STRING";
     /// Ends the line that is being written to a stream.
     Terpri = cl "TERPRI" ("&optional stream");
     /// Ends the line that is being written to a stream, unless it is empty; whether it did.

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use esl_bytecode::opcode::Opcode;
+
 use crate::heap::Kind;
-use crate::interp;
+use crate::interp::{self, FrameAt};
 use crate::task::{Task, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -19,6 +21,23 @@ const FRAMES: usize = 50;
 /// Whether a source is one of the library, by the name that its build gives it.
 fn is_of_library(source: &str) -> bool {
     source.starts_with("stdlib/") && source.ends_with(".esl")
+}
+
+/// The word of the one tail call in some code; none if there are several.
+fn tail_call_in(words: &[u32]) -> Option<usize> {
+    let mut found = None;
+    let mut at = 0;
+    while let Some(opcode) = words.get(at).and_then(|&word| Opcode::from_number(word as u8)) {
+        let is_tail_call = matches!(
+            opcode,
+            Opcode::TailCall | Opcode::TailCallGlobal | Opcode::TailCallBuiltin | Opcode::TailApply
+        );
+        if is_tail_call && found.replace(at).is_some() {
+            return None;
+        }
+        at += opcode.words();
+    }
+    found
 }
 
 /// The order in which tasks are shown, each after its maker, and how deep below the first of them. `tasks` are the numbers of each task
@@ -142,13 +161,21 @@ impl Vm {
         }
     }
 
-    /// The innermost place of the program, not of the library, at which a task stands.
+    /// The innermost place of the program, not of the library, at which a task stands; if tail calls have left no frame of the
+    /// program, that of the tail call in the function with which the task began, or of its beginning if there are several.
     fn program_place(&self, task: &Task) -> Option<String> {
-        interp::frames_of_task(task, FRAMES).into_iter().find_map(|frame| {
-            let code = self.heap.function_code(frame.function)?;
-            let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
+        let place = |code: Value, word: usize| {
             let place = self.source_place(code, word as u32).filter(|place| !is_of_library(&place.source))?;
             Some(format!("{}:{}:{}", place.source, place.line, place.column))
+        };
+        let in_frame = |frame: FrameAt| {
+            let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
+            place(self.heap.function_code(frame.function)?, word)
+        };
+        let frames = interp::frames_of_task(task, FRAMES);
+        frames.into_iter().find_map(in_frame).or_else(|| {
+            let code = interp::call::first_code_of(task);
+            place(code, tail_call_in(self.heap.code_words(code)?).unwrap_or(0))
         })
     }
 }

@@ -36,8 +36,11 @@ fn one_of_each(heap: &mut Heap) -> Vec<(Option<Kind>, Value)> {
     let vector = heap.alloc_vector(&[n(1), n(2)]).unwrap();
     let class = heap.alloc_record(Kind::Class, 0, 0, &[n(1)]).unwrap();
     let mut all = vec![(None, heap.cons(n(1), n(2)).unwrap())];
-    // Only the machine itself makes hash tables, and the words that they consist of.
-    for kind in KINDS.into_iter().filter(|kind| !matches!(kind, Kind::HashTable | Kind::Words64)) {
+    // Only the machine itself makes hash tables, the words that they consist of, and what it has yet to fill.
+    let is_internal = |kind: &Kind| {
+        matches!(kind, Kind::HashTable | Kind::Words64 | Kind::UnfinishedVector | Kind::UnfinishedString)
+    };
+    for kind in KINDS.into_iter().filter(|kind| !is_internal(kind)) {
         let v = match kind {
             Kind::Symbol => symbol(heap, "car"),
             Kind::Function => function(heap),

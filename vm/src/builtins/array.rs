@@ -13,6 +13,8 @@ use crate::vm::Vm;
 
 use super::COPY_LIMIT;
 
+/// Elements of a long vector that is being made that are filled at once.
+const FILLED_AT_ONCE: usize = 1 << 13;
 /// The greatest number of dimensions.
 const MAX_RANK: usize = 64;
 
@@ -190,7 +192,7 @@ impl Vm {
 
 /// `vector`
 pub(super) fn vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.charge(arguments.len());
+    vm.charge_elements(arguments.len());
     Ok(vm.heap.alloc_vector(arguments)?)
 }
 
@@ -394,7 +396,7 @@ pub(super) fn vector_push_extend(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// A copy of `data` with room for `size` elements, the new ones zero, `NUL` or `0`.
 fn extended(vm: &mut Vm, data: Value, size: usize) -> Outcome {
     let length = Elements::of_data(&vm.heap, data).map_or(0, Elements::len);
-    if length > COPY_LIMIT {
+    if size > COPY_LIMIT {
         return Err(Exit::Slowly);
     }
     let new = match vm.heap.kind(data) {
@@ -402,7 +404,7 @@ fn extended(vm: &mut Vm, data: Value, size: usize) -> Outcome {
         Some(Kind::Bytes) => vm.heap.alloc_bytes_filled(size, 0)?,
         _ => vm.heap.alloc_vector_filled(size, Value::small(0))?,
     };
-    vm.charge(size);
+    vm.charge_elements(size);
     vm.copy_elements(data, 0, new, 0, length)?;
     Ok(new)
 }
@@ -421,9 +423,27 @@ pub(super) fn vector_pop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `%make-vector`
 pub(super) fn make_vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let size = vm.count(arguments[0])?;
+    if size > COPY_LIMIT {
+        return Err(Exit::Slowly);
+    }
     let vector = vm.heap.alloc_vector_filled(size, arguments[1])?;
-    vm.charge(size);
+    vm.charge_elements(size);
     Ok(vector)
+}
+
+/// `%begin-vector`
+pub(super) fn begin_vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let size = vm.count(arguments[0])?;
+    Ok(vm.heap.begin_vector(size, arguments[1].is_true())?)
+}
+
+/// `%fill-more`
+pub(super) fn fill_more(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.charge_elements(FILLED_AT_ONCE);
+    match vm.heap.fill_more(arguments[0], arguments[1], FILLED_AT_ONCE) {
+        Some(is_finished) => Ok(Value::boolean(is_finished)),
+        None => vm.type_error(arguments[0], "VECTOR"),
+    }
 }
 
 /// `%make-array`: an array over data that is there.

@@ -25,7 +25,7 @@ impl Vm {
         if !rest.is_nil() {
             return self.type_error(rest, "LIST");
         }
-        self.charge(items.len());
+        self.charge_elements(items.len());
         Ok(items)
     }
 
@@ -37,7 +37,7 @@ impl Vm {
                 Some(pair) => rest = pair.cdr,
                 None if length == 0 && !rest.is_nil() => return self.type_error(rest, "LIST"),
                 None => {
-                    self.charge(length);
+                    self.charge_elements(length);
                     return Ok((length, rest));
                 }
             }
@@ -68,7 +68,7 @@ impl Vm {
                 None => return self.type_error(rest, "LIST"),
             };
         }
-        self.charge(count);
+        self.charge_elements(count);
         Ok(rest)
     }
 
@@ -198,13 +198,13 @@ pub(super) fn list_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(list &rest objects)`
 pub(super) fn list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.charge(arguments.len());
+    vm.charge_elements(arguments.len());
     Ok(vm.heap.list(arguments)?)
 }
 
 /// `(list* object &rest objects)`
 pub(super) fn list_star(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.charge(arguments.len());
+    vm.charge_elements(arguments.len());
     match arguments.split_last() {
         Some((&last, items)) => Ok(vm.heap.list_with_tail(items, last)?),
         None => Ok(Value::NIL),
@@ -217,7 +217,7 @@ pub(super) fn make_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if size > LIMIT {
         return Err(Exit::Slowly);
     }
-    vm.charge(size);
+    vm.charge_elements(size);
     let mut list = Value::NIL;
     for _ in 0..size {
         list = vm.heap.cons(arguments[1], list)?;
@@ -376,7 +376,7 @@ pub(super) fn copy_tree(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             open.push(half);
         }
     }
-    vm.charge(visited);
+    vm.charge_elements(visited);
     Ok(copy)
 }
 

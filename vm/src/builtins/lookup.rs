@@ -19,11 +19,11 @@ fn find_pair(
     let mut rest = list;
     for visited in 0..LIMIT {
         let Some(pair) = vm.heap.as_cons(rest) else {
-            vm.charge(visited);
+            vm.charge_elements(visited);
             return if rest.is_nil() { Ok(rest) } else { vm.type_error(rest, "LIST") };
         };
         if wanted(vm, pair.car)? {
-            vm.charge(visited);
+            vm.charge_elements(visited);
             return Ok(rest);
         }
         rest = pair.cdr;
@@ -94,12 +94,12 @@ fn find_property(vm: &mut Vm, plist: Value, indicator: Value) -> Result<Option<[
     let (mut before, mut rest) = (Value::NIL, plist);
     for visited in 0..LIMIT {
         let Some(pair) = vm.heap.as_cons(rest) else {
-            vm.charge(visited);
+            vm.charge_elements(visited);
             return if rest.is_nil() { Ok(None) } else { vm.type_error(rest, "LIST") };
         };
         let Some(value) = vm.heap.as_cons(pair.cdr) else { return vm.type_error(pair.cdr, "CONS") };
         if pair.car == indicator {
-            vm.charge(visited);
+            vm.charge_elements(visited);
             return Ok(Some([before, rest, pair.cdr]));
         }
         (before, rest) = (pair.cdr, value.cdr);
@@ -169,6 +169,6 @@ pub(super) fn get_properties(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !rest.is_nil() {
         return vm.type_error(rest, "LIST");
     }
-    vm.charge(work);
+    vm.charge_elements(work);
     vm.give_values(&[Value::NIL; 3])
 }

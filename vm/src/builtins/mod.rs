@@ -12,7 +12,7 @@
 //! builtin on parts, and may not be given the whole again:
 //! - Lists: plain loops. `%slow-list-length` walks at two speeds and gives `NIL` for a circle; all others may go round for
 //!   ever.
-//! - Vectors and strings: parts of at most 65 536 elements, by the `start` and `end` of the builtin, or by `%replace`
+//! - Vectors and strings: parts of at most 16 384 elements, by the `start` and `end` of the builtin, or by `%replace`
 //!   into a fresh `%make-vector` or `%make-string`.
 //! - `%slow-+`, `%slow--`, `%slow-*`, `%slow-/` and their like of more than two numbers: pair by pair. Of two large integers,
 //!   the product by halves of the longer one (`ash`, `%ldb`); quotients by long division, a few limbs of the dividend at a
@@ -40,7 +40,7 @@ use crate::vm::Vm;
 pub const LIMIT: usize = 4096;
 
 /// Elements that one call of a builtin may copy where that is little more than copying memory.
-pub(crate) const COPY_LIMIT: usize = 1 << 17;
+pub(crate) const COPY_LIMIT: usize = 1 << 15;
 
 /// A function that is written in Rust. The number of arguments has been checked against the table.
 pub type Native = fn(&mut Vm, &[Value]) -> Outcome;
@@ -355,6 +355,8 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::VectorPushExtend => array::vector_push_extend,
         Builtin::VectorPop => array::vector_pop,
         Builtin::MakeVector => array::make_vector,
+        Builtin::BeginVector => array::begin_vector,
+        Builtin::FillMore => array::fill_more,
         Builtin::MakeArray => array::make_array,
         Builtin::AdjustArray => array::adjust_array,
         Builtin::MakeHashTable => table::make_hash_table,
@@ -471,9 +473,12 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::ReadStream => eval::read,
         Builtin::StandardStream => stream::standard_stream,
         Builtin::MakeStringInput => stream::make_string_input,
+        Builtin::ReadFromCopy => stream::read_from_copy,
         Builtin::StringInputPosition => stream::string_input_position,
         Builtin::MakeStringOutput => stream::make_string_output,
         Builtin::GetOutputStreamString => stream::get_output_stream_string,
+        Builtin::GatheredLength => stream::gathered_length,
+        Builtin::TakeGathered => stream::take_gathered,
         Builtin::OpenInput => stream::open_input,
         Builtin::OpenOutput => stream::open_output,
         Builtin::CloseStream => stream::close,

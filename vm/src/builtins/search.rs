@@ -83,7 +83,11 @@ fn in_vector(
             found
         }
     };
-    vm.charge(range.len());
+    vm.charge_elements(match &found {
+        Ok(Some(index)) if from_end => range.len() - index,
+        Ok(Some(index)) => *index,
+        _ => range.len(),
+    });
     Ok(found?.map(|index| range.start + index))
 }
 
@@ -106,7 +110,7 @@ pub(super) fn count_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         if end - start > COPY_LIMIT {
             return Err(Exit::Slowly);
         }
-        vm.charge(end - start);
+        vm.charge_elements(end - start);
         let heap = &vm.heap;
         let is_it = |index: &usize| {
             vector_elements(heap, sequence)

@@ -28,7 +28,10 @@ impl Vm {
         to_start: usize,
         count: usize,
     ) -> Result<(), Exit> {
-        self.charge(count);
+        self.charge_elements(count);
+        if self.heap.vector_copy(from, from_start, to, to_start, count).is_some() {
+            return Ok(());
+        }
         let Some(elements) = all_elements(&self.heap, from) else { return Ok(()) };
         let elements = Owned::of(elements.part(from_start, from_start + count));
         if let Owned::Characters(characters) = &elements
@@ -152,7 +155,7 @@ fn list_element(vm: &mut Vm, list: Value, index: Value) -> Outcome {
     for at in 0..=wanted.min(LIMIT) {
         match vm.heap.as_cons(rest) {
             Some(_) if at == wanted => {
-                vm.charge(at);
+                vm.charge_elements(at);
                 return Ok(rest);
             }
             Some(pair) => rest = pair.cdr,
@@ -172,7 +175,7 @@ pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         if end - start > COPY_LIMIT {
             return Err(Exit::Slowly);
         }
-        vm.charge(end - start);
+        vm.charge_elements(end - start);
         if let Some(characters) = vm.heap.string(sequence) {
             let part: SmallVec<[u32; 64]> = SmallVec::from_slice(&characters[start..end]);
             return Ok(vm.heap.alloc_string(&part)?);
@@ -202,7 +205,7 @@ pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             None => return vm.type_error(rest, "LIST"),
         }
     }
-    vm.charge(wanted);
+    vm.charge_elements(wanted);
     if start.as_index().is_none_or(|start| start > wanted) {
         // The failure tells how long the list is.
         let length = vm.list_items(sequence, LIMIT)?.len();
@@ -226,7 +229,7 @@ pub(super) fn reverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             return Err(Exit::Slowly);
         }
         let mut reversed = Owned::of(elements);
-        vm.charge(length);
+        vm.charge_elements(length);
         reversed.reverse();
         return new_vector(vm, &reversed);
     }
@@ -246,7 +249,7 @@ pub(super) fn nreverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         if length > COPY_LIMIT {
             return Err(Exit::Slowly);
         }
-        vm.charge(length);
+        vm.charge_elements(length);
         if let Some(characters) = vm.heap.string_mut(data) {
             characters[..length].reverse();
             return Ok(sequence);
@@ -278,11 +281,14 @@ pub(super) fn fill(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
     let data = data_of(&vm.heap, vector).unwrap_or(vector);
     vm.check_element(data, item)?;
-    vm.charge(end - start);
+    vm.charge_elements(end - start);
     if let Some(code) = item.as_character()
         && let Some(characters) = vm.heap.string_mut(data)
     {
         characters[start..end].fill(code);
+        return Ok(vector);
+    }
+    if vm.heap.vector_fill(data, start, end, item).is_some() {
         return Ok(vector);
     }
     for index in start..end {
@@ -334,7 +340,7 @@ pub(super) fn vector_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if end - start > LIMIT {
         return Err(Exit::Slowly);
     }
-    vm.charge(end - start);
+    vm.charge_elements(end - start);
     let mut list = Value::NIL;
     for index in (start..end).rev() {
         let item = vector_elements(&vm.heap, vector).and_then(|elements| elements.get(index));

@@ -1,10 +1,14 @@
 //! Streams: the standard ones, and those that read from or write to a string or a text file.
 //!
 //! A Stream is a record; `aux` is its [`Sort`], [`slot`] names its slots. A file is read as a whole when it is opened;
-//! what is written to one is gathered, and goes out in blocks and when the stream is closed. Every output stream knows
-//! its column.
+//! what is written to one is gathered, and goes out in blocks and when the stream is closed. What is written to a string is
+//! gathered in strings that are never made longer, so that a character takes as long behind a million others as before
+//! them. Every output stream knows its column.
+
+use smallvec::SmallVec;
 
 use crate::builtins::expect::optional;
+use crate::builtins::{COPY_LIMIT, LIMIT};
 use crate::control::End;
 use crate::equality::characters_of;
 use crate::heap::{AllocError, Heap, Kind};
@@ -35,7 +39,11 @@ mod slot {
     pub(super) const OPEN: usize = 5;
     /// How the next block is written to the file: number of a `WriteMode`.
     pub(super) const MODE: usize = 6;
-    pub(super) const LEN: usize = 7;
+    /// What it has gathered before what is in its buffer: full strings, the last first.
+    pub(super) const FULL: usize = 7;
+    /// Number of characters in these.
+    pub(super) const BEFORE: usize = 8;
+    pub(super) const LEN: usize = 9;
 }
 
 /// What a stream is.
@@ -57,7 +65,9 @@ impl Sort {
 }
 
 /// Characters that a file's stream gathers before it writes them.
-const BLOCK: usize = 1 << 16;
+const BLOCK: usize = 1 << 15;
+/// Characters that a string stream gathers in one string, but for what is written at once.
+const GATHERED: usize = 1 << 13;
 /// Characters that `peek-char` skips at once.
 const SKIP_LIMIT: usize = 1 << 14;
 /// Characters of the first buffer of a string stream.
@@ -90,6 +100,7 @@ fn make_stream(
     slots[slot::COLUMN] = Value::small(0);
     slots[slot::OPEN] = Value::T;
     slots[slot::MODE] = Value::small(0);
+    slots[slot::BEFORE] = Value::small(0);
     heap.alloc_record(Kind::Stream, 0, sort as u16, &slots)
 }
 
@@ -200,7 +211,7 @@ impl Vm {
 
     /// Writes characters to an open output stream.
     fn write_characters(&mut self, stream: Value, sort: Sort, characters: &[u32]) -> Result<(), Exit> {
-        self.charge(characters.len());
+        self.charge_elements(characters.len());
         match sort {
             Sort::StandardOutput => {
                 self.console.write(&mut *self.host, Output::Standard, characters);
@@ -211,12 +222,7 @@ impl Vm {
                 Ok(())
             }
             _ => {
-                let position = self.stream_index(stream, slot::POSITION);
-                let end = position + characters.len();
-                let buffer = self.room_for(stream, position, end)?;
-                if let Some(room) = self.heap.string_mut(buffer).and_then(|all| all.get_mut(position..end)) {
-                    room.copy_from_slice(characters);
-                }
+                let end = self.gather(stream, sort, characters)?;
                 let column = column_after(self.stream_index(stream, slot::COLUMN), characters);
                 self.set_stream_slot(stream, slot::POSITION, Value::index(end));
                 self.set_stream_slot(stream, slot::COLUMN, Value::index(column));
@@ -225,20 +231,45 @@ impl Vm {
         }
     }
 
-    /// A buffer of at least `end` characters with what was gathered up to `position`.
-    fn room_for(&mut self, stream: Value, position: usize, end: usize) -> Result<Value, Exit> {
+    /// Puts characters behind those in the buffer of a stream; where the next will go.
+    fn gather(&mut self, stream: Value, sort: Sort, characters: &[u32]) -> Result<usize, Exit> {
+        let position = self.stream_index(stream, slot::POSITION);
         let buffer = self.stream_slot(stream, slot::BUFFER);
         let capacity = self.heap.string(buffer).map_or(0, <[u32]>::len);
+        let end = position + characters.len();
         if end <= capacity {
-            return Ok(buffer);
+            if let Some(room) = self.heap.string_mut(buffer).and_then(|all| all.get_mut(position..end)) {
+                room.copy_from_slice(characters);
+            }
+            return Ok(end);
+        }
+        let (now, rest) = characters.split_at((capacity - position).min(characters.len()));
+        if sort == Sort::StringOutput && end > GATHERED {
+            // The buffer is filled up, and another one goes on.
+            let next = self.heap.alloc_string_filled(rest.len().max(GATHERED), 0)?;
+            let full = self.heap.cons(buffer, self.stream_slot(stream, slot::FULL))?;
+            if let Some(room) = self.heap.string_mut(buffer) {
+                room[position..].copy_from_slice(now);
+            }
+            if let Some(room) = self.heap.string_mut(next) {
+                room[..rest.len()].copy_from_slice(rest);
+            }
+            let before = self.stream_index(stream, slot::BEFORE) + capacity;
+            self.set_stream_slot(stream, slot::BUFFER, next);
+            self.set_stream_slot(stream, slot::FULL, full);
+            self.set_stream_slot(stream, slot::BEFORE, Value::index(before));
+            self.charge_elements(GATHERED);
+            return Ok(rest.len());
         }
         let larger = self.heap.alloc_string_filled(end.max(capacity * 2).max(FIRST_BUFFER), 0)?;
         let gathered = self.heap.string(buffer).map_or(Vec::new(), |all| all[..position].to_vec());
         if let Some(room) = self.heap.string_mut(larger) {
             room[..position].copy_from_slice(&gathered);
+            room[position..end].copy_from_slice(characters);
         }
         self.set_stream_slot(stream, slot::BUFFER, larger);
-        Ok(larger)
+        self.charge_elements(position);
+        Ok(end)
     }
 
     /// Writes what a file's stream has gathered.
@@ -290,6 +321,18 @@ impl Vm {
             Sort::StandardError => self.console.column(Output::Error),
             _ => self.stream_index(stream, slot::COLUMN),
         }
+    }
+
+    /// As [`Vm::characters`], unless they are too many for one step.
+    fn few_characters(&mut self, v: Value, start: Value, end: Value) -> Result<Vec<u32>, Exit> {
+        let length = characters_of(&self.heap, v).map_or(0, <[u32]>::len);
+        if length > COPY_LIMIT {
+            let (start, end) = self.bounds(start, end, length)?;
+            if end - start > COPY_LIMIT {
+                return Err(Exit::Slowly);
+            }
+        }
+        self.characters(v, start, end)
     }
 
     /// The characters of a string, also of one with a fill pointer, from `start` to before `end`.
@@ -351,10 +394,18 @@ pub(super) fn standard_stream(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%make-string-input string start end)`
 pub(super) fn make_string_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let characters = vm.characters(arguments[0], arguments[1], arguments[2])?;
-    vm.charge(characters.len());
+    let characters = vm.few_characters(arguments[0], arguments[1], arguments[2])?;
+    vm.charge_elements(characters.len());
     let buffer = vm.heap.alloc_string(&characters)?;
     Ok(make_stream(&mut vm.heap, Sort::StringInput, buffer, 0, characters.len())?)
+}
+
+/// `(%read-from-copy string)`
+pub(super) fn read_from_copy(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(length) = vm.heap.string(arguments[0]).map(<[u32]>::len) else {
+        return vm.type_error(arguments[0], "SIMPLE-STRING");
+    };
+    Ok(make_stream(&mut vm.heap, Sort::StringInput, arguments[0], 0, length)?)
 }
 
 /// `(%string-input-position stream)`
@@ -375,13 +426,49 @@ pub(super) fn get_output_stream_string(vm: &mut Vm, arguments: &[Value]) -> Outc
     if vm.sort_of(stream) != Some(Sort::StringOutput) {
         return vm.type_error(stream, "STRING-STREAM");
     }
-    let length = vm.stream_index(stream, slot::POSITION);
+    let position = vm.stream_index(stream, slot::POSITION);
+    let length = vm.stream_index(stream, slot::BEFORE) + position;
+    if length > COPY_LIMIT {
+        return Err(Exit::Slowly);
+    }
+    let full = vm.list_items(vm.stream_slot(stream, slot::FULL), LIMIT)?;
+    let mut gathered: SmallVec<[u32; 64]> = SmallVec::with_capacity(length);
+    for &string in full.iter().rev() {
+        gathered.extend_from_slice(vm.heap.string(string).unwrap_or_default());
+    }
     let buffer = vm.stream_slot(stream, slot::BUFFER);
-    let gathered = vm.heap.string(buffer).map_or(Vec::new(), |all| all[..length].to_vec());
-    vm.charge(length);
+    gathered.extend_from_slice(vm.heap.string(buffer).map_or(&[], |all| &all[..position]));
+    vm.charge_elements(length);
     let text = vm.heap.alloc_string(&gathered)?;
     vm.set_stream_slot(stream, slot::POSITION, Value::small(0));
+    vm.set_stream_slot(stream, slot::FULL, Value::NIL);
+    vm.set_stream_slot(stream, slot::BEFORE, Value::small(0));
     Ok(text)
+}
+
+/// `(%gathered-length stream)`
+pub(super) fn gathered_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let stream = arguments[0];
+    if vm.sort_of(stream) != Some(Sort::StringOutput) {
+        return vm.type_error(stream, "STRING-STREAM");
+    }
+    Ok(Value::index(vm.stream_index(stream, slot::BEFORE) + vm.stream_index(stream, slot::POSITION)))
+}
+
+/// `(%take-gathered stream length)`
+pub(super) fn take_gathered(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let stream = arguments[0];
+    if gathered_length(vm, arguments)? != arguments[1] {
+        return Ok(Value::NIL);
+    }
+    let fresh = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
+    let last = vm.stream_slot(stream, slot::BUFFER);
+    let strings = vm.heap.cons(last, vm.stream_slot(stream, slot::FULL))?;
+    vm.set_stream_slot(stream, slot::BUFFER, fresh);
+    vm.set_stream_slot(stream, slot::POSITION, Value::small(0));
+    vm.set_stream_slot(stream, slot::FULL, Value::NIL);
+    vm.set_stream_slot(stream, slot::BEFORE, Value::small(0));
+    Ok(strings)
 }
 
 /// `(%open-input path)`
@@ -435,7 +522,7 @@ pub(super) fn file_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
     match vm.host.read_file(&path) {
         Ok(bytes) => {
-            vm.charge(bytes.len());
+            vm.charge_elements(bytes.len());
             Ok(vm.heap.alloc_str(&String::from_utf8_lossy(&bytes))?)
         }
         Err(error) => vm.file_error("read", &path, &error),

@@ -18,6 +18,9 @@ use super::COPY_LIMIT;
 use super::expect::optional;
 use super::types::is_string;
 
+/// Length of a pattern times that of the string in which it may be looked for at once.
+const SEARCH_LIMIT: usize = 1 << 20;
+
 impl Vm {
     /// The string that a designator stands for: a string itself, the name of a symbol, a character as a string of one.
     pub(crate) fn string_designator(&mut self, v: Value) -> Outcome {
@@ -40,7 +43,7 @@ impl Vm {
         if end - start > COPY_LIMIT {
             return Err(Exit::Slowly);
         }
-        self.charge(end - start);
+        self.charge_elements(end - start);
         Ok((string, start, end))
     }
 }
@@ -90,8 +93,11 @@ pub(super) fn set_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn make_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let size = vm.count(arguments[0])?;
     let Some(code) = arguments[1].as_character() else { return vm.type_error(arguments[1], "CHARACTER") };
+    if size > COPY_LIMIT {
+        return Err(Exit::Slowly);
+    }
     let string = vm.heap.alloc_string_filled(size, code)?;
-    vm.charge(size);
+    vm.charge_elements(size);
     Ok(string)
 }
 
@@ -232,7 +238,7 @@ fn trimmed(vm: &mut Vm, arguments: &[Value], left: bool, right: bool) -> Outcome
         if right { characters.iter().rposition(is_kept).map_or(from, |at| at + 1) } else { characters.len() };
     let kept = characters[from..to.max(from)].to_vec();
     let removed = end - start - kept.len();
-    vm.charge(bag.len().saturating_mul(removed));
+    vm.charge_elements(bag.len().saturating_mul(removed));
     Ok(vm.heap.alloc_string(&kept)?)
 }
 
@@ -261,7 +267,7 @@ pub(super) fn concat(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         }
         characters.extend_from_slice(more);
     }
-    vm.charge(characters.len());
+    vm.charge_elements(characters.len());
     Ok(vm.heap.alloc_string(&characters)?)
 }
 
@@ -275,7 +281,7 @@ pub(super) fn search(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
     let (string, start, end) = vm.designated_part(string, start, end)?;
     let length = text(vm, pattern).len();
-    if length.saturating_mul(end - start) > 8 * COPY_LIMIT {
+    if length.saturating_mul(end - start) > SEARCH_LIMIT {
         return Err(Exit::Slowly);
     }
     let (pattern, part) = (text(vm, pattern), &text(vm, string)[start..end]);
@@ -302,6 +308,6 @@ pub(super) fn search(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         Some(at) => at,
         None => starts.len(),
     };
-    vm.charge((passed + compared) / 4);
+    vm.charge_elements((passed + compared) / 4);
     Ok(found.map_or(Value::NIL, |at| Value::index(start + at)))
 }

@@ -61,7 +61,7 @@ fn search(vm: &mut Vm, table: Table, test: Test, key: Value, hash: u32) -> Resul
     let mut work = LIMIT;
     let found = table.find(&vm.heap, test, key, hash, &mut work)?;
     if work != LIMIT {
-        vm.charge(LIMIT - work);
+        vm.charge_elements(LIMIT - work);
     }
     Ok(match found {
         Some((entry, value)) => {
@@ -93,7 +93,7 @@ pub(super) fn make_hash_table(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     };
     let size = vm.count(size)?;
     let table = Table::make(&mut vm.heap, comparison, size, [test_function, hash_function])?;
-    vm.charge(size.min(LIMIT));
+    vm.charge_elements(size.min(LIMIT));
     Ok(table)
 }
 
@@ -132,7 +132,7 @@ pub(super) fn remhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let hash = equality::hash(&vm.heap, test, arguments[0]);
     let mut work = LIMIT;
     let found = table.find(&vm.heap, test, arguments[0], hash, &mut work)?;
-    vm.charge(LIMIT - work);
+    vm.charge_elements(LIMIT - work);
     Ok(found.is_some_and(|(entry, _)| table.delete(&mut vm.heap, entry, hash)).into())
 }
 
@@ -176,7 +176,7 @@ pub(super) fn table_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let used = table.used(&vm.heap);
     for at in position..used.min(position.saturating_add(LIMIT)) {
         if let Some((key, value)) = table.entry(&vm.heap, at) {
-            vm.charge(at - position);
+            vm.charge_elements(at - position);
             return vm.give_values(&[Value::index(at + 1), key, value]);
         }
     }
@@ -191,7 +191,7 @@ pub(super) fn table_skip(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
     let position = vm.count(arguments[1])?;
     let end = table.used(&vm.heap).min(position.saturating_add(LIMIT)).max(position);
-    vm.charge(end - position);
+    vm.charge_elements(end - position);
     let next = (position..end).find(|&at| table.entry(&vm.heap, at).is_some());
     Ok(Value::index(next.unwrap_or(end)))
 }
@@ -219,7 +219,7 @@ pub(super) fn table_candidates(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
     let hash = hash_argument(vm, arguments[1])?;
     let candidates = table.candidates(&vm.heap, hash);
-    vm.charge(candidates.len());
+    vm.charge_elements(candidates.len());
     let mut list = Value::NIL;
     for (entry, key) in candidates {
         let pair = vm.heap.cons(Value::index(entry), key)?;

@@ -161,6 +161,46 @@ impl Heap {
         self.set_slot(v, Kind::SimpleVector, index, new)
     }
 
+    /// Copies elements of a simple vector over those of another, or of the same, as if by way of a third; `None` if one
+    /// is none or has not so many.
+    pub(crate) fn vector_copy(
+        &mut self,
+        from: Value,
+        from_start: usize,
+        to: Value,
+        to_start: usize,
+        count: usize,
+    ) -> Option<()> {
+        let source = self.vector(from)?.get(from_start..)?.get(..count)?.as_ptr();
+        let old = self.vector(to)?.get(to_start..)?.get(..count)?.len();
+        debug_assert_eq!(old, count);
+        let to = self.object_of(to, Kind::SimpleVector)?;
+        // SAFETY: both ranges are inside of live vectors; all that is overwritten was marked before.
+        unsafe {
+            let target = to.add(1).cast::<Value>().add(to_start);
+            if self.marking {
+                (0..count).for_each(|i| self.mark(*target.add(i)));
+            }
+            target.copy_from(source, count);
+        }
+        Some(())
+    }
+
+    /// Sets the elements of a simple vector from `start` to before `end`; `None` if `v` is none or has not so many.
+    pub(crate) fn vector_fill(&mut self, v: Value, start: usize, end: usize, value: Value) -> Option<()> {
+        let count = self.vector(v)?.get(start..end)?.len();
+        let object = self.object_of(v, Kind::SimpleVector)?;
+        // SAFETY: the range is inside of a live vector; all that is overwritten was marked before.
+        unsafe {
+            let target = object.add(1).cast::<Value>().add(start);
+            if self.marking {
+                (0..count).for_each(|i| self.mark(*target.add(i)));
+            }
+            (0..count).for_each(|i| *target.add(i) = value);
+        }
+        Some(())
+    }
+
     /// What a box holds.
     #[inline(always)]
     pub fn unbox(&self, v: Value) -> Option<Value> {

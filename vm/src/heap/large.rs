@@ -1,4 +1,5 @@
-//! Large objects: above an eighth of a block, each in memory of its own, which the sweep gives back to the system.
+//! Large objects: above an eighth of a block, each in memory of its own, which the sweep gives back to the system, piece by
+//! piece: the system takes as long for that as it took to provide the memory.
 //!
 //! ```text
 //! | LargeHeader (32 bytes) | Header | elements ...
@@ -9,7 +10,7 @@
 
 use super::arena::LARGE;
 use super::layout::{GRANULE, Header};
-use std::alloc::{Layout, alloc, dealloc};
+use std::alloc::{Layout, alloc, dealloc, realloc};
 use std::ptr::NonNull;
 
 /// What stands before a large object.
@@ -25,6 +26,8 @@ pub(super) struct LargeHeader {
     pub(super) epoch: u8,
     /// Marked, but still to be followed.
     pub(super) gray: bool,
+    /// Elements that were filled, of an object that is unfinished.
+    pub(super) filled: u32,
 }
 
 const _: () = assert!(size_of::<LargeHeader>() == 32 && size_of::<LargeHeader>().is_multiple_of(GRANULE));
@@ -51,7 +54,7 @@ impl LargeObject {
         // SAFETY: the size is not zero, and the header is written at once.
         unsafe {
             let header = NonNull::new(alloc(layout))?.cast::<LargeHeader>();
-            header.write(LargeHeader { bytes, number, index, epoch, gray: false });
+            header.write(LargeHeader { bytes, number, index, epoch, gray: false, filled: 0 });
             header.as_ptr().expose_provenance();
             Some(LargeObject(header))
         }
@@ -61,6 +64,21 @@ impl LargeObject {
     pub(super) fn object(&self) -> NonNull<u8> {
         // SAFETY: the allocation is longer than the header.
         unsafe { self.0.add(1).cast() }
+    }
+
+    /// Gives about so many bytes from the end of an object that nobody uses any more back to the system; how many that
+    /// were. None if few would be left, or the system does not want them: then it is to be dropped.
+    pub(super) fn shrink(&mut self, bytes: usize) -> Option<usize> {
+        let old = self.header().bytes;
+        let bytes = bytes / GRANULE * GRANULE;
+        let new = old.checked_sub(bytes).filter(|&new| bytes > 0 && new > super::arena::LARGE)?;
+        // SAFETY: allocated with this layout, and longer than before it is not; the header is at the start, which stays.
+        unsafe {
+            let layout = Layout::from_size_align_unchecked(old, GRANULE);
+            self.0 = NonNull::new(realloc(self.0.as_ptr().cast(), layout, new))?.cast();
+        }
+        self.header_mut().bytes = new;
+        Some(bytes)
     }
 
     /// The header.

@@ -7,8 +7,8 @@
 //!
 //! Guarantees: an object is one of three sorts, told by its kind: all slots are values ([`Kind::is_record`]), none is
 //! ([`Kind::is_raw`]), or it is [`Kind::Code`]. `len` counts the elements after the header in the unit of the kind
-//! (values, limbs, characters, words, bytes), so kind and `len` alone give the size, and neither ever changes.
-//! A header carries nothing of the collector.
+//! (values, limbs, characters, words, bytes), so kind and `len` alone give the size, and neither ever changes, but for the
+//! kind of an unfinished vector or string, once: into that of a finished one. A header carries nothing of the collector.
 //!
 //! Not here: making objects (`object`), checked access (`access`), tracing (`mark`).
 
@@ -69,16 +69,20 @@ pub enum Kind {
     Bignum = 0x41,
     /// Words of 64 bits, for indexes.
     Words64 = 0x42,
+    /// A large simple vector to be, not all of which has been filled: nobody reads it until then.
+    UnfinishedVector = 0x43,
     /// A string: code points of 32 bits.
     String = 0x50,
     /// Words of 32 bits, for indexes.
     Words32 = 0x51,
+    /// A large string to be, as [`Kind::UnfinishedVector`].
+    UnfinishedString = 0x52,
     /// Bytes.
     Bytes = 0x60,
 }
 
 /// All kinds, for tests and tables.
-pub const KINDS: [Kind; 24] = [
+pub const KINDS: [Kind; 26] = [
     Kind::Symbol,
     Kind::Function,
     Kind::Box,
@@ -100,8 +104,10 @@ pub const KINDS: [Kind; 24] = [
     Kind::Float,
     Kind::Bignum,
     Kind::Words64,
+    Kind::UnfinishedVector,
     Kind::String,
     Kind::Words32,
+    Kind::UnfinishedString,
     Kind::Bytes,
 ];
 
@@ -136,7 +142,7 @@ impl Kind {
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
 pub struct Header {
-    /// What the object is. Never changes.
+    /// What the object is.
     pub kind: Kind,
     /// Bits that the kind gives a meaning to.
     pub flags: u8,

@@ -162,6 +162,57 @@ impl Heap {
         self.alloc_record_filled(Kind::SimpleVector, 0, len, fill)
     }
 
+    /// A vector or string to be, of `len` elements, which [`Heap::fill_more`] fills piece by piece: the system takes its time
+    /// for memory that is touched for the first time. One that is not large is filled at once, with 0 or the character of
+    /// code 0.
+    pub(crate) fn begin_vector(&mut self, len: usize, is_string: bool) -> Result<Value, AllocError> {
+        let kind = if is_string { Kind::UnfinishedString } else { Kind::UnfinishedVector };
+        if !super::large::is_large(kind.size(len)) {
+            return if is_string {
+                self.alloc_string_filled(len, 0)
+            } else {
+                self.alloc_vector_filled(len, Value::small(0))
+            };
+        }
+        let object = self.begin_object(kind, 0, 0, len)?;
+        // SAFETY: nobody reads the elements of an unfinished object: the collector does not look inside, and `access` has
+        // nothing for these kinds.
+        Ok(unsafe { Value::from_object(object) })
+    }
+
+    /// Fills the next elements of what [`Heap::begin_vector`] began, at most so many; whether that were the last, and it is
+    /// a vector or string now. A value with an address is not filled in, but 0 in its place. `None` if `v` is not unfinished.
+    pub(crate) fn fill_more(&mut self, v: Value, fill: Value, count: usize) -> Option<bool> {
+        let object = v.as_object_ptr()?;
+        // SAFETY: a live object; if unfinished it is large, so that it has a large header, and its elements from `filled` to
+        // `len` are ours to write. When all are written it is what its new kind says.
+        unsafe {
+            let finished = match (*object).kind {
+                Kind::UnfinishedVector => Kind::SimpleVector,
+                Kind::UnfinishedString => Kind::String,
+                _ => return None,
+            };
+            let large = super::large::header_of(object);
+            let (from, len) = ((*large).filled as usize, (*object).len as usize);
+            let to = len.min(from.saturating_add(count));
+            if finished == Kind::String {
+                let code = fill.as_character().unwrap_or(0);
+                let characters = object.add(1).cast::<u32>();
+                (from..to).for_each(|i| characters.add(i).write(code));
+            } else {
+                // What has an address would have to be found by the collector.
+                let fill = if fill.is_address() { Value::small(0) } else { fill };
+                let values = object.add(1).cast::<Value>();
+                (from..to).for_each(|i| values.add(i).write(fill));
+            }
+            (*large).filled = to as u32;
+            if to == len {
+                (*object).kind = finished;
+            }
+            Some(to == len)
+        }
+    }
+
     /// A new ratio. That it is in lowest terms and its denominator above one is up to the caller.
     pub fn alloc_ratio(&mut self, numerator: Value, denominator: Value) -> Result<Value, AllocError> {
         self.record_from(Kind::Ratio, 0, 0, &[], &[numerator, denominator])
@@ -448,4 +499,108 @@ impl Heap {
 /// Kinds of which the heap guarantees something about the contents.
 pub(super) const fn is_vouched_for(kind: Kind) -> bool {
     matches!(kind, Kind::Symbol | Kind::Function | Kind::Array | Kind::Structure | Kind::HashTable)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Elements of a large vector, few enough for Miri.
+    const LONG: usize = crate::heap::arena::LARGE;
+
+    #[test]
+    fn long_vectors_are_filled_in_pieces() {
+        let mut heap = Heap::for_tests();
+        let v = heap.begin_vector(LONG, false).unwrap();
+        assert_eq!((heap.kind(v), heap.vector(v)), (Some(Kind::UnfinishedVector), None));
+        assert_eq!(heap.fill_more(v, Value::T, LONG - 1), Some(false));
+        assert_eq!(heap.vector(v), None);
+        assert_eq!(heap.fill_more(v, Value::NIL, 10), Some(true));
+        let elements = heap.vector(v).unwrap();
+        assert_eq!((elements.len(), elements[LONG - 2], elements[LONG - 1]), (LONG, Value::T, Value::NIL));
+        assert_eq!(heap.fill_more(v, Value::T, 1), None, "it is finished");
+    }
+
+    #[test]
+    fn long_strings_are_filled_in_pieces() {
+        let mut heap = Heap::for_tests();
+        let v = heap.begin_vector(LONG, true).unwrap();
+        let a = Value::character('a' as u32).unwrap();
+        assert_eq!((heap.fill_more(v, a, LONG / 2), heap.string(v)), (Some(false), None));
+        assert_eq!(heap.fill_more(v, Value::T, usize::MAX), Some(true));
+        let characters = heap.string(v).unwrap();
+        assert_eq!((characters[0], characters[LONG - 1]), ('a' as u32, 0));
+    }
+
+    #[test]
+    fn short_ones_are_finished_at_once() {
+        let mut heap = Heap::for_tests();
+        let v = heap.begin_vector(3, false).unwrap();
+        assert_eq!(heap.vector(v), Some(&[Value::small(0); 3][..]));
+        let v = heap.begin_vector(2, true).unwrap();
+        assert_eq!(heap.string(v), Some(&[0, 0][..]));
+        assert_eq!(heap.fill_more(v, Value::NIL, 1), None);
+    }
+
+    /// What is found nowhere else must not be in there: nobody looks inside until it is finished.
+    #[test]
+    fn nothing_with_an_address_is_filled_in() {
+        let mut heap = Heap::for_tests();
+        let v = heap.begin_vector(LONG, false).unwrap();
+        let cell = heap.cons(Value::T, Value::NIL).unwrap();
+        assert_eq!(heap.fill_more(v, cell, LONG), Some(true));
+        assert!(heap.vector(v).unwrap().iter().all(|&element| element == Value::small(0)));
+    }
+
+    #[test]
+    fn an_unfinished_vector_lives_through_a_collection() {
+        let mut heap = Heap::for_tests();
+        let v = heap.begin_vector(LONG, false).unwrap();
+        let dead = heap.begin_vector(LONG, false).unwrap();
+        heap.fill_more(v, Value::T, LONG / 2);
+        heap.fill_more(dead, Value::T, LONG / 2);
+        // SAFETY: nothing but `v` is used below.
+        unsafe { heap.collect_fully(|heap| heap.mark(v)) };
+        assert_eq!(heap.fill_more(v, Value::T, LONG), Some(true));
+        assert!(heap.vector(v).unwrap().iter().all(|&element| element == Value::T));
+        heap.check().unwrap();
+    }
+
+    /// The collector is given what is copied over, as if it had been stored over.
+    #[test]
+    fn copying_over_elements_keeps_the_snapshot() {
+        let mut heap = Heap::for_tests();
+        let cell = heap.cons(Value::T, Value::NIL).unwrap();
+        let v = heap.alloc_vector(&[Value::T, cell, cell, Value::NIL]).unwrap();
+        heap.begin_cycle();
+        assert_eq!(heap.vector_copy(v, 0, v, 1, 1), Some(()));
+        assert!(heap.is_marked(cell));
+        assert_eq!(heap.vector(v).unwrap(), &[Value::T, Value::T, cell, Value::NIL]);
+        assert_eq!(heap.vector_copy(v, 1, v, 0, 3), Some(()), "overlapping");
+        assert_eq!(heap.vector(v).unwrap(), &[Value::T, cell, Value::NIL, Value::NIL]);
+        assert_eq!(heap.vector_fill(v, 1, 3, Value::T), Some(()));
+        assert_eq!(heap.vector(v).unwrap(), &[Value::T, Value::T, Value::T, Value::NIL]);
+        assert_eq!((heap.vector_copy(v, 2, v, 0, 3), heap.vector_fill(v, 2, 5, Value::T)), (None, None));
+    }
+
+    #[test]
+    fn large_objects_are_given_back_in_pieces() {
+        let mut heap = Heap::for_tests();
+        let size = 40 * LONG;
+        let before = heap.stats().committed;
+        heap.alloc_bytes_filled(size, 1).unwrap();
+        heap.begin_cycle();
+        while let crate::heap::SliceOutcome::More = heap.slice(100) {}
+        // SAFETY: nothing is used below.
+        unsafe { heap.end_marking() };
+        let mut committed = vec![heap.stats().committed];
+        while heap.phase() == crate::heap::Phase::Sweeping {
+            _ = heap.slice(1);
+            heap.check().unwrap();
+            committed.push(heap.stats().committed);
+        }
+        assert_eq!(heap.stats().committed, before);
+        assert!(committed.is_sorted_by(|a, b| a >= b), "{committed:?}");
+        assert!(cfg!(miri) || committed.iter().filter(|&&c| c > before && c < committed[0]).count() > 3);
+    }
 }

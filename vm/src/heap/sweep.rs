@@ -13,8 +13,12 @@ use super::{Heap, Phase, SliceOutcome};
 
 /// Visits that the sweep of a block counts as.
 const BLOCK_VISITS: i64 = 512;
-/// Visits that freeing a large object counts as.
+/// Visits that freeing a large object counts as, besides its bytes.
 const FREE_VISITS: i64 = 64;
+/// Bytes given back to the system that count as one visit.
+const BYTES_PER_VISIT: usize = 256;
+/// Bytes of a large object that are given back at once.
+const FREE_PIECE: usize = 64 << 10;
 /// Least allocation, in bytes, between two cycles, however close the limit is.
 const LEAST_THRESHOLD: u64 = 256 << 10;
 
@@ -66,11 +70,13 @@ impl Heap {
                 self.sweep.at = (arena, block + 1);
                 if block == BLOCKS {
                     self.sweep.at = (arena + 1, 1);
-                    self.release_if_empty(arena);
+                    if self.release_if_empty(arena) {
+                        // The system takes its time for so much.
+                        *left = (*left).min(0);
+                    }
                 }
             } else if self.sweep.large > 0 {
-                self.sweep.large -= 1;
-                *left -= if self.free_large_if_dead(self.sweep.large) { FREE_VISITS } else { 1 };
+                self.free_large_if_dead(self.sweep.large - 1, left);
             } else {
                 debug_assert_eq!(self.sweep.live, self.stats.live, "marking and sweeping count alike");
                 self.phase = Phase::Idle;
@@ -89,33 +95,48 @@ impl Heap {
         {}
     }
 
-    /// Gives an arena in which nothing lives back to the system, unless it is to be kept. None is kept beyond the limit.
-    fn release_if_empty(&mut self, arena: usize) {
+    /// Gives an arena in which nothing lives back to the system, unless it is to be kept; whether it did. None is kept beyond
+    /// the limit.
+    fn release_if_empty(&mut self, arena: usize) -> bool {
         if self.arenas[arena].as_ref().is_none_or(|arena| !arena.is_empty()) {
-            return;
+            return false;
         }
         if (self.sweep.spares * ARENA) as u64 <= self.pacing.threshold && self.committed <= self.limit {
             self.sweep.spares += 1;
-        } else {
-            self.arenas[arena] = None;
-            self.committed -= ARENA;
+            return false;
         }
+        self.arenas[arena] = None;
+        self.committed -= ARENA;
+        true
     }
 
-    /// Frees the large object at an index unless it was marked; whether it did.
-    fn free_large_if_dead(&mut self, index: usize) -> bool {
+    /// Looks at the last large object that was not looked at, and frees it unless it was marked: as much of it as the budget
+    /// is for.
+    fn free_large_if_dead(&mut self, index: usize, left: &mut i64) {
         let header = self.large[index].header();
         debug_assert!(!header.gray && header.index == index);
         if header.epoch == self.epoch {
             self.sweep.live += (header.bytes - super::large::footprint(0)) as u64;
-            return false;
+            self.sweep.large = index;
+            *left -= 1;
+            return;
         }
-        self.committed -= header.bytes;
+        let piece = FREE_PIECE.max(*left as usize * BYTES_PER_VISIT);
+        if header.bytes > piece
+            && let Some(bytes) = self.large[index].shrink(piece)
+        {
+            self.committed -= bytes;
+            *left -= (bytes / BYTES_PER_VISIT) as i64;
+            return;
+        }
+        let bytes = self.large[index].header().bytes;
+        self.committed -= bytes;
+        *left -= FREE_VISITS + (bytes / BYTES_PER_VISIT) as i64;
+        self.sweep.large = index;
         self.large.swap_remove(index);
         if let Some(moved) = self.large.get_mut(index) {
             moved.header_mut().index = index;
         }
-        true
     }
 
     /// Looks for contradictions in the metadata and the books; for tests. Says nothing of blocks still to be swept.

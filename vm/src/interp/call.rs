@@ -361,6 +361,7 @@ pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function
         unsafe {
             let start = task.stack.start();
             *start = starter;
+            *start.add(1) = first_code(heap, function);
             *start.add(2) = function;
             *start.add(3) = Value::from_bits(stub.expose_provenance() as u64);
         }
@@ -373,6 +374,7 @@ pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function
         let start = task.stack.start();
         // A link for the frame that the stub at the end of the task runs in.
         *start = starter;
+        *start.add(1) = first_code(heap, function);
         *start.add(2) = starter;
         *start.add(3) = Value::from_bits(stub.expose_provenance() as u64);
         *start.add(4) = function;
@@ -380,6 +382,17 @@ pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function
         task.pc = (*code_of(starter)).entry;
     }
     task.base = 4;
+}
+
+/// What the second word of a task's stack holds: the code with which the task began, for those who want to know where that was
+/// written when a tail call has taken the place of its frame. Not the function, which would keep what it has captured.
+fn first_code(heap: &Heap, function: Value) -> Value {
+    heap.function_code(function).unwrap_or(Value::NIL)
+}
+
+/// The code with which a task began.
+pub(crate) fn first_code_of(task: &Task) -> Value {
+    task.stack.words(2).get(1).copied().unwrap_or(Value::NIL)
 }
 
 /// Lets go of everything that a task that has ended holds on its stacks.

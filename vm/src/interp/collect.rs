@@ -30,6 +30,10 @@ unsafe fn top_of(task: &Task, base: usize) -> usize {
 /// Charged by whoever wants the slice to end at the next tick; the task goes on with the next slice.
 const END_OF_SLICE: u64 = 1 << 40;
 
+/// Turns of the collector after which a slice ends, however many ticks are left: they take their time too. The ticks are
+/// not charged.
+const TURNS_IN_SLICE: u32 = 8;
+
 /// Words of a stack that count as one visit of the collector.
 const WORDS_PER_VISIT: usize = 4;
 
@@ -85,6 +89,12 @@ impl Vm {
             self.collect_fully();
         } else if self.heap.gc_due() {
             self.collect_slice();
+            self.cpu.collections += 1;
+            if left > 0 && self.cpu.collections >= TURNS_IN_SLICE {
+                self.cpu.granted -= left;
+                self.cpu.ticks = 0;
+                return Some(Leave::Slice);
+            }
         }
         if left > 0 {
             self.cpu.ticks = left;

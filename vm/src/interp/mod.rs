@@ -18,7 +18,7 @@ pub(crate) mod call;
 mod cold;
 mod collect;
 pub(crate) use collect::top_of_task;
-pub(crate) use raise::{entry_word, frames_of_task, visit_frames};
+pub(crate) use raise::{FrameAt, entry_word, frames_of_task, visit_frames};
 mod control;
 mod double;
 mod raise;
@@ -106,6 +106,8 @@ pub(crate) struct Cpu {
     pub reserve: i32,
     /// Ticks of this slice that were given out at its beginning.
     pub granted: i32,
+    /// Turns of the collector in this slice.
+    pub collections: u32,
 }
 
 impl Cpu {
@@ -118,6 +120,7 @@ impl Cpu {
             ticks: 0,
             reserve: 0,
             granted: 0,
+            collections: 0,
         }
     }
 }
@@ -168,7 +171,7 @@ pub(crate) fn load(vm: &mut Vm, ticks: i32) {
     // SAFETY: the base of a task lies in its stack.
     let base = unsafe { task.stack.start().add(task.base as usize) };
     let stack_end = vm.stack_end();
-    vm.cpu = Cpu { pc, base, stack_end, wants_one: false, ticks, reserve: 0, granted: ticks };
+    vm.cpu = Cpu { pc, base, stack_end, wants_one: false, ticks, reserve: 0, granted: ticks, collections: 0 };
     vm.arm();
 }
 

@@ -1,6 +1,7 @@
 //! Reading characters and lines.
 
 use super::{SKIP_LIMIT, Sort, slot};
+use crate::builtins::COPY_LIMIT;
 use crate::builtins::expect::optional;
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
@@ -52,7 +53,7 @@ pub(in crate::builtins) fn peek_char(vm: &mut Vm, arguments: &[Value]) -> Outcom
         }
     }
     // What was skipped stays so: whoever takes over goes on from there.
-    vm.charge(SKIP_LIMIT);
+    vm.charge_elements(SKIP_LIMIT);
     Err(Exit::Slowly)
 }
 
@@ -70,7 +71,7 @@ pub(in crate::builtins) fn read_line(vm: &mut Vm, arguments: &[Value]) -> Outcom
     let (line, is_cut) = if sort == Sort::StandardInput {
         let taken = vm.console.read_line(&mut *vm.host);
         let Some((line, is_cut)) = vm.taken(taken)? else { return end_of_line(vm, stream, arguments) };
-        vm.charge(line.len());
+        vm.charge_elements(line.len());
         match vm.heap.alloc_string(&line) {
             Ok(text) => (text, is_cut),
             Err(error) => {
@@ -86,9 +87,12 @@ pub(in crate::builtins) fn read_line(vm: &mut Vm, arguments: &[Value]) -> Outcom
         }
         let buffer = vm.stream_slot(stream, slot::BUFFER);
         let rest = vm.heap.string(buffer).map_or(&[][..], |all| &all[start..end]);
-        let length = rest.iter().position(|&c| c == u32::from('\n'));
+        let length = rest.iter().take(COPY_LIMIT).position(|&c| c == u32::from('\n'));
+        if length.is_none() && rest.len() > COPY_LIMIT {
+            return Err(Exit::Slowly);
+        }
         let line = rest[..length.unwrap_or(rest.len())].to_vec();
-        vm.charge(line.len());
+        vm.charge_elements(line.len());
         let text = vm.heap.alloc_string(&line)?;
         let next = start + line.len() + usize::from(length.is_some());
         vm.set_stream_slot(stream, slot::POSITION, Value::index(next));

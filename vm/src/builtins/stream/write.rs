@@ -17,7 +17,7 @@ pub(in crate::builtins) fn write_char(vm: &mut Vm, arguments: &[Value]) -> Outco
 /// `(%write-string string stream start end)`
 pub(in crate::builtins) fn write_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[string, stream, start, end] = arguments else { unreachable!("the table says four") };
-    let characters = vm.characters(string, start, end)?;
+    let characters = vm.few_characters(string, start, end)?;
     let (stream, sort) = vm.designated_stream(stream, false)?;
     vm.write_characters(stream, sort, &characters)?;
     Ok(string)

@@ -1,0 +1,60 @@
+//! What is said when no task can ever run again: every task that waits, for what, and where in the program.
+
+use std::path::Path;
+use std::process::Command;
+
+/// Runs a program; its exit status, and what it has written to standard error.
+fn run(name: &str, program: &str) -> (Option<i32>, String) {
+    let source = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::write(&source, program).expect("the program can be written");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_eslvm"));
+    let output = command.args(["run", "--clock", "virtual"]).arg(&source).output();
+    let output = output.expect("the command can be run");
+    (output.status.code(), String::from_utf8(output.stderr).expect("text"))
+}
+
+/// The lines of a report, with the name of the file alone in place of its path.
+fn lines(name: &str, report: &str) -> Vec<String> {
+    let short = |line: &str| match (line.rfind(", "), line.rfind(name)) {
+        (Some(comma), Some(at)) => format!("{}, {}", &line[..comma], &line[at..]),
+        _ => line.to_string(),
+    };
+    report.lines().map(|line| short(line.trim())).collect()
+}
+
+/// A tail call leaves no frame of the one who waits: then it is said where that is written with which the task began.
+#[test]
+fn every_task_that_waits_is_named_with_its_place() {
+    let program = r#"(defvar *door* (make-event 'door)) (defvar *main* (current-task))
+(defun await (event)
+  (wait-for-event event))
+(spawn (:name 'in-the-middle) (list (wait-for-event *door*)))
+(spawn (:name 'at-the-end)
+  (princ-to-string 'something)
+  (wait-for-event *door*))
+(spawn (:name 'by-a-function) (await *door*))
+(spawn (:name 'one-of-two)
+  (if *door* (checkpoint-wait (current-task) 'never) (wait-for-task *main*)))
+(spawn (:name 'until)
+  (wait-until (eq *door* nil)))
+(task-net
+  (left (wait-for-task right))
+  (right (checkpoint-wait left 'done)))
+"#;
+    let (status, report) = run("deadlock.esl", program);
+    assert_eq!(status, Some(4), "{report}");
+    assert_eq!(
+        lines("deadlock.esl", &report),
+        [
+            "Deadlock: no task can ever run again.",
+            "the main task waits for its tasks, deadlock.esl:13:1",
+            "task IN-THE-MIDDLE waits for event DOOR, deadlock.esl:4:37",
+            "task AT-THE-END waits for event DOOR, deadlock.esl:7:3",
+            "task BY-A-FUNCTION waits for event DOOR, deadlock.esl:3:3",
+            "task ONE-OF-TWO waits for checkpoint NEVER of task ONE-OF-TWO, deadlock.esl:10:7",
+            "task UNTIL waits for (EQ *DOOR* NIL) to be true, deadlock.esl:12:3",
+            "task LEFT waits for the end of task RIGHT, deadlock.esl:14:9",
+            "task RIGHT waits for checkpoint DONE of task LEFT, deadlock.esl:15:10",
+        ]
+    );
+}
