@@ -183,6 +183,16 @@ fn files_that_cannot_be_read() {
 }
 
 #[test]
+fn files_that_a_program_cannot_make() {
+    let folder = Folder::new("cannot_make");
+    let text = "(handler-case (open \"no-such-folder/x\" :direction :output)
+                  (file-error (condition) (print (file-error-pathname condition)) (error condition)))";
+    let done = run(ESLVM, &["run", &folder.file("main.esl", text)], b"");
+    assert!(done.output.contains("\"no-such-folder/x\""), "{done:?}");
+    check(&done, 1, "The file \"no-such-folder/x\": it cannot be written");
+}
+
+#[test]
 fn wrong_command_lines() {
     for (arguments, message) in [
         (&["frob"][..], "unrecognized subcommand"),

@@ -278,11 +278,7 @@ impl Vm {
         let buffer = self.stream_slot(stream, slot::BUFFER);
         let mut bytes = Vec::new();
         encode(self.heap.string(buffer).map_or(&[], |all| &all[..position]), &mut bytes);
-        let mode = match self.stream_index(stream, slot::MODE) {
-            0 => WriteMode::Replace,
-            1 => WriteMode::Append,
-            _ => WriteMode::Create,
-        };
+        let mode = write_mode(self.stream_index(stream, slot::MODE));
         let name = self.text_of(self.stream_slot(stream, slot::NAME)).unwrap_or_default();
         // What cannot be written is not tried again: the next block would fail too, and closing has to succeed.
         self.set_stream_slot(stream, slot::POSITION, Value::small(0));
@@ -490,10 +486,23 @@ pub(super) fn open_output(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = make_stream(&mut vm.heap, Sort::FileOutput, buffer, 0, 0)?;
     let name = vm.heap.alloc_str(&path)?;
     vm.set_stream_slot(stream, slot::NAME, name);
-    vm.set_stream_slot(stream, slot::MODE, Value::index(mode));
-    // Written at once, so that a file that cannot be made fails here.
-    vm.write_out(stream)?;
-    Ok(stream)
+    // Nothing is written at once, so that a file that cannot be made fails here.
+    match vm.host.write_file(&path, &[], write_mode(mode)) {
+        Ok(()) => {
+            vm.set_stream_slot(stream, slot::MODE, Value::small(1));
+            Ok(stream)
+        }
+        Err(error) => vm.file_error("written", &path, &error),
+    }
+}
+
+/// What the mode of a stream says of the file.
+fn write_mode(mode: usize) -> WriteMode {
+    match mode {
+        0 => WriteMode::Replace,
+        1 => WriteMode::Append,
+        _ => WriteMode::Create,
+    }
 }
 
 /// `(%close stream abort)`
