@@ -770,6 +770,8 @@ define_builtins! {
     Gethash = cl "GETHASH" ("key table &optional default") slowly "%SLOW-GETHASH";
     /// Makes `value` the value of `key`, and returns it.
     Puthash = internal "%PUTHASH" ("key table value") slowly "%SLOW-PUTHASH";
+    /// Adds `delta` to the value of `key`, or to `default` if it has none, and returns the sum.
+    AddToValue = internal "%ADD-TO-VALUE" ("key table default delta") slowly "%SLOW-ADD-TO-VALUE";
     /// Takes `key` out of the table; whether it was there.
     Remhash = cl "REMHASH" ("key table") slowly "%SLOW-REMHASH";
     /// Takes everything out of the table, and returns it.

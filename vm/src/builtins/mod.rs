@@ -362,6 +362,7 @@ pub const fn native(builtin: Builtin) -> Native {
         Builtin::MakeHashTable => table::make_hash_table,
         Builtin::Gethash => table::gethash,
         Builtin::Puthash => table::puthash,
+        Builtin::AddToValue => table::add_to_value,
         Builtin::Remhash => table::remhash,
         Builtin::Clrhash => table::clrhash,
         Builtin::HashTableCount => table::hash_table_count,

@@ -5,6 +5,7 @@
 //! has found is checked again where it is used: an entry must still have the very key, a table the same keys.
 
 use crate::equality::{self, Test};
+use crate::number;
 use crate::raise::{Exit, Outcome};
 use crate::table::{Comparison, Table, Trouble};
 use crate::value::Value;
@@ -115,6 +116,28 @@ pub(super) fn puthash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         Place::None(hash) => add(vm, table, hash, key, value)?,
     }
     Ok(value)
+}
+
+/// `(%add-to-value key table default delta)`
+pub(super) fn add_to_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let &[key, table_value, default, delta] = arguments else { unreachable!("the table says four") };
+    let table = table(vm, table_value)?;
+    let place = find(vm, table, key)?;
+    let old = match place {
+        Place::Entry(_, value) => value,
+        Place::None(_) => default,
+    };
+    let sum = match number::add(vm, old, delta) {
+        Err(Exit::Collect) => return Err(Exit::Collect),
+        // The twin fails at the addition, so that what it may be given instead of the sum is stored.
+        Err(_) => return Err(Exit::Slowly),
+        Ok(sum) => sum,
+    };
+    match place {
+        Place::Entry(entry, _) => table.set_value(&mut vm.heap, entry, sum),
+        Place::None(hash) => add(vm, table, hash, key, sum)?,
+    }
+    Ok(sum)
 }
 
 fn add(vm: &mut Vm, table: Table, hash: u32, key: Value, value: Value) -> Result<(), Exit> {
