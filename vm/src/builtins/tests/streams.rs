@@ -76,7 +76,7 @@ fn files_are_read_whole_and_written_in_blocks() {
     assert_eq!(evaluate(&mut vm, "(%file-text \"in\")"), "\"äb\\n\"");
     let missing = "file-error none: it cannot be read: there is no such file";
     assert_eq!(evaluate(&mut vm, "(%open-input \"none\")"), missing);
-    let exists = "stream-error: it cannot be written: the file exists already";
+    let exists = "file-error log: it cannot be written: the file exists already";
     assert_eq!(evaluate(&mut vm, "(%open-output \"log\" 2)"), exists);
     assert_eq!(evaluate(&mut vm, "(%close (%open-output \"log\" 1) nil)"), "T");
     assert_eq!(captured.file("log"), Some(b"old\n".to_vec()));
