@@ -769,3 +769,12 @@ e") (read-from-string "#:g") (read-from-string ":Key")))
 ;; a handler for something that is no type
 ;;; 208
 (answer 208 (handler-case (handler-case (error "x") (no-such-type208 () 1)) (error () 'outer)))
+
+;; a # within a name
+;;; 209
+(answer 209 (list (prin1-to-string '|A#|) (prin1-to-string '|#A|) (read-from-string "a#") (princ-to-string '|A#|)))
+
+;; a bound that is wrong, where nothing is to be done
+;;; 210
+(answer 210 (list (handler-case (remove 1 (vector 1 2) :end 5 :count 0) (type-error () 'type-error))
+                  (handler-case (remove 1 (list 1 2) :start -1) (type-error () 'type-error))))

@@ -86,17 +86,16 @@ fn in_case(characters: &[u32], case: Value) -> Vec<u32> {
     characters.iter().map(change).collect()
 }
 
-/// Whether a name read as it stands would be another symbol, or none.
+/// Whether a name read as it stands would be another symbol, or none, or has a character that would do that elsewhere.
 fn needs_bars(characters: &[u32]) -> bool {
     let is_plain = |&code: &u32| {
         let c = char::from_u32(code).unwrap_or(' ');
         character::upcase(code) == code
-            && !matches!(c, '"' | '\'' | '(' | ')' | ',' | ';' | '`' | ':' | '|' | '\\')
+            && !matches!(c, '"' | '#' | '\'' | '(' | ')' | ',' | ';' | '`' | ':' | '|' | '\\')
             && !c.is_whitespace()
             && !c.is_control()
     };
     characters.is_empty()
-        || characters[0] == '#' as u32
         || !characters.iter().all(is_plain)
         || characters.iter().all(|&code| code == '.' as u32)
         || looks_like_a_number(characters)
@@ -146,9 +145,9 @@ mod tests {
             ("A:B", "|A:B|"),
             ("A|B\\", "|A\\|B\\\\|"),
             ("#A", "|#A|"),
+            ("A#", "|A#|"),
         ] {
             check(name, expected);
         }
-        check("A#", "A#");
     }
 }
