@@ -119,8 +119,11 @@ pub(super) fn begin_recovery(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(%stand-in index values)`
 pub(super) fn stand_in(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let index = arguments[0].as_index().unwrap_or(usize::MAX);
-    let Some(handler) = vm.task().control.entries.get(index) else { return Ok(Value::NIL) };
-    let handler = handler.base;
+    let control = &vm.task().control;
+    let Some(handler) = control.entries.get(index) else { return Ok(Value::NIL) };
+    // A cleanup of the library goes on to its end, and so does what it has interrupted.
+    let cleanup = control.innermost_cleanup().and_then(|index| control.entries.get(index));
+    let around = cleanup.map_or(handler.base, |cleanup| cleanup.base.max(handler.base));
     let mut values = Vec::new();
     let mut rest = arguments[1];
     while let Some(pair) = vm.heap.as_cons(rest) {
@@ -128,7 +131,7 @@ pub(super) fn stand_in(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         rest = pair.cdr;
     }
     vm.charge(values.len());
-    let Some(base) = vm.frame_of_operation(handler) else { return vm.give_values(&values) };
+    let Some(base) = vm.frame_of_operation(around) else { return vm.give_values(&values) };
     let control = &mut vm.task_mut().control;
     let entries = control.entries.partition_point(|entry| entry.base < base);
     control.unwinding = Some(Unwinding { target: Target::Return { entries, base }, values });

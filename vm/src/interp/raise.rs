@@ -244,13 +244,13 @@ impl Vm {
 
 impl Vm {
     /// The base of the frame that is to return what stands for the values of an operation that has failed: of the outermost
-    /// function of the library around the failure, inside the frame of the handler, whose base is `handler`. `None` if the
-    /// program itself has failed. To be asked by a builtin that was called by the function that deals with the failure.
-    pub(crate) fn frame_of_operation(&mut self, handler: u32) -> Option<u32> {
+    /// function of the library around the failure, inside the frame whose base is `around`. `None` if the program itself has
+    /// failed. To be asked by a builtin that was called by the function that deals with the failure.
+    pub(crate) fn frame_of_operation(&mut self, around: u32) -> Option<u32> {
         let (mut found, mut looked_at) = (None, 0);
         let mut base = self.cpu.base;
-        // SAFETY: `vm.cpu.base` is that of the innermost frame; frames are linked as in `frames_of`. The handler's lies
-        // outside of it, so the walk ends before the root.
+        // SAFETY: `vm.cpu.base` is that of the innermost frame; frames are linked as in `frames_of`, down to the root,
+        // whose link is a stub's.
         unsafe {
             loop {
                 let return_to: *const u32 = std::ptr::with_exposed_provenance((*base.sub(1)).bits() as usize);
@@ -266,7 +266,7 @@ impl Vm {
                 }
                 base = base.sub(2 + (call >> 8 & 0xff) as usize);
                 let offset = self.offset_of(base) as u32;
-                if offset <= handler || !(*code_of(*base.sub(2))).owner.is_fixnum() {
+                if offset <= around || !(*code_of(*base.sub(2))).owner.is_fixnum() {
                     break;
                 }
                 found = Some(offset);
