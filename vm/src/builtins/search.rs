@@ -48,9 +48,13 @@ fn in_vector(
 ) -> Result<Option<usize>, Exit> {
     let Some(elements) = vector_elements(&vm.heap, vector) else { return Ok(None) };
     let limit = if test == Test::Equal { LIMIT } else { COPY_LIMIT };
-    if range.len() > limit {
-        return Err(Exit::Slowly);
-    }
+    // Of many elements a part is looked at: what is found there need not be left to the twin.
+    let is_partial = range.len() > limit;
+    let range = match is_partial {
+        true if from_end => range.end - limit..range.end,
+        true => range.start..range.start + limit,
+        false => range,
+    };
     let found = match (elements.part(range.start, range.end), item.as_character()) {
         (Elements::Characters(characters), Some(code)) => {
             let mut matches = characters.iter();
@@ -88,7 +92,11 @@ fn in_vector(
         Ok(Some(index)) => *index,
         _ => range.len(),
     });
-    Ok(found?.map(|index| range.start + index))
+    match found? {
+        Some(index) => Ok(Some(range.start + index)),
+        None if is_partial => Err(Exit::Slowly),
+        None => Ok(None),
+    }
 }
 
 /// `(%position-eql item sequence start end from-end)`

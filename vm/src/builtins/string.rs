@@ -279,11 +279,16 @@ pub(super) fn search(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             return vm.type_error(v, "STRING");
         }
     }
-    let (string, start, end) = vm.designated_part(string, start, end)?;
+    let (start, end) = vm.bounds(start, end, text(vm, string).len())?;
     let length = text(vm, pattern).len();
-    if length.saturating_mul(end - start) > SEARCH_LIMIT {
-        return Err(Exit::Slowly);
-    }
+    // A long string is searched in part: what is often found there need not be left to the twin.
+    let limit = COPY_LIMIT.min(SEARCH_LIMIT / length.max(1));
+    let is_partial = end - start > limit;
+    let (start, end) = match is_partial {
+        true if from_end.is_true() => (end - limit, end),
+        true => (start, start + limit),
+        false => (start, end),
+    };
     let (pattern, part) = (text(vm, pattern), &text(vm, string)[start..end]);
     let Some((&first, rest)) = pattern.split_first() else {
         return Ok(Value::index(if from_end.is_true() { end } else { start }));
@@ -308,6 +313,10 @@ pub(super) fn search(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         Some(at) => at,
         None => starts.len(),
     };
-    vm.charge_elements((passed + compared) / 4);
-    Ok(found.map_or(Value::NIL, |at| Value::index(start + at)))
+    vm.charge_elements(passed / 4 + compared);
+    match found {
+        Some(at) => Ok(Value::index(start + at)),
+        None if is_partial => Err(Exit::Slowly),
+        None => Ok(Value::NIL),
+    }
 }
