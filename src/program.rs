@@ -348,6 +348,25 @@ mod tests {
     }
 
     #[test]
+    fn what_cleanups_may_take_can_be_set() {
+        let text =
+            "(let ((task (spawn (unwind-protect (loop) (dotimes (i 5000)) (princ 'a) (sleep 5) (princ 'b)))))
+                      (sleep 0)
+                      (abort-task task)
+                      (princ 'over))";
+        let output = |config: Config| {
+            let program = compile(&[Source::new("cleanup.esl", text)]).program.expect("it compiles");
+            let host = VirtualHost::new();
+            let captured = host.captured();
+            run(&program, config, Box::new(host)).expect("it runs");
+            captured.output()
+        };
+        assert_eq!(output(COMPILE_TIME_CONFIG), "ABOVER");
+        assert_eq!(output(Config { cleanup_ticks: 1000, ..COMPILE_TIME_CONFIG }), "OVER");
+        assert_eq!(output(Config { cleanup_time: 1_000_000_000, ..COMPILE_TIME_CONFIG }), "AOVER");
+    }
+
+    #[test]
     fn each_source_begins_in_the_package_of_the_user() {
         let first = "(defpackage :inner (:use :esl)) (in-package :inner) (princ (package-name *package*))";
         let second = "(princ (list (package-name *package*) (symbol-package 'x)))";
