@@ -778,3 +778,21 @@ e") (read-from-string "#:g") (read-from-string ":Key")))
 ;;; 210
 (answer 210 (list (handler-case (remove 1 (vector 1 2) :end 5 :count 0) (type-error () 'type-error))
                   (handler-case (remove 1 (list 1 2) :start -1) (type-error () 'type-error))))
+
+;; at the end of a hash table its variables are NIL
+;;; 211
+(answer 211 (let ((h (make-hash-table))) (setf (gethash 'a h) 1 (gethash 'b h) 2)
+              (list (loop for k being the hash-keys of h using (hash-value v) finally (return (list k v)))
+                    (loop for k being the hash-keys of h do (when (eq k 'a) (loop-finish)) finally (return k))
+                    (loop for nil being the hash-keys of h count t))))
+
+;; a variable that is there twice
+;;; 212
+(answer 212 (handler-case (eval '(loop with m = 0 for x in '(1 2) sum x into m)) (program-error () 'program-error)))
+
+;; WHILE between iteration clauses
+;;; 213
+(answer 213 (with-input-from-string (in "12 ")
+              (loop for d = (peek-char nil in nil nil) while (and d (digit-char-p d))
+                    for v = (digit-char-p (read-char in)) then (+ (* 10 v) (digit-char-p (read-char in)))
+                    finally (return v))))
