@@ -55,6 +55,11 @@ impl rustyline::completion::Completer for NameCompleter {
 pub(super) struct Printer(Arc<Mutex<Option<Box<dyn ExternalPrinter + Send>>>>);
 
 impl Printer {
+    /// From now on prints as if there were no editor.
+    pub(super) fn leave_editor(&self) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
     /// Prints bytes of the program: above the line that is being edited, if one is.
     pub(super) fn print(&self, bytes: &[u8]) -> std::io::Result<()> {
         let mut printer = self.0.lock().unwrap_or_else(PoisonError::into_inner);

@@ -9,6 +9,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "the REPL talks with people")]
 
 mod editor;
+mod terminal;
 mod typing;
 
 use std::io::{IsTerminal, Write};
@@ -100,10 +101,10 @@ impl Session {
             } else {
                 self.machine.run(BACKGROUND_TICKS)
             };
-            self.machine.flush();
-            if self.machine.exit_status().is_some() && !self.typing.is_interactive {
+            if self.machine.exit_status().is_some() && self.typing.leave() {
                 return Line::End;
             }
+            self.machine.flush();
             match outcome {
                 RunOutcome::TicksUsed | RunOutcome::Stopped => {}
                 RunOutcome::Done | RunOutcome::Waiting | RunOutcome::BudgetSpent => {

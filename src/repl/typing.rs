@@ -10,6 +10,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use esl_vm::host::Waker;
 
 use super::editor::{Editor, Printer};
+use super::terminal::Terminal;
 
 /// What reading a line gave.
 pub(super) enum Line {
@@ -63,6 +64,9 @@ pub(super) struct Typing {
     has_come: Arc<AtomicBool>,
     /// Whether a person types at a terminal.
     pub is_interactive: bool,
+    /// How the terminal was, if there is one.
+    terminal: Option<Terminal>,
+    printer: Printer,
 }
 
 impl Typing {
@@ -77,9 +81,11 @@ impl Typing {
         let (requests, asked) = channel();
         let (answer, lines) = channel();
         let flag = has_come.clone();
+        let terminal = if is_interactive { Terminal::now() } else { None };
+        let above = printer.clone();
         std::thread::Builder::new().name("typing".into()).spawn(move || {
             let mut source: Box<dyn Lines> =
-                if is_interactive { Box::new(Editor::new(&printer)) } else { Box::new(Pipe) };
+                if is_interactive { Box::new(Editor::new(&above)) } else { Box::new(Pipe) };
             while let Ok(request) = asked.recv() {
                 match request {
                     Request::Line(prompt) => {
@@ -96,7 +102,7 @@ impl Typing {
                 }
             }
         })?;
-        Ok(Typing { requests, lines, has_come, is_interactive })
+        Ok(Typing { requests, lines, has_come, is_interactive, terminal, printer })
     }
 
     fn request(&self, request: Request) {
@@ -107,6 +113,18 @@ impl Typing {
     /// Has the next line read.
     pub(super) fn ask(&self, prompt: &'static str) {
         self.request(Request::Line(prompt));
+    }
+
+    /// Gives up the line that is awaited, for good; whether that can be done.
+    pub(super) fn leave(&self) -> bool {
+        if !self.is_interactive {
+            return true;
+        }
+        let is_left = self.terminal.as_ref().is_some_and(Terminal::restore);
+        if is_left {
+            self.printer.leave_editor();
+        }
+        is_left
     }
 
     /// Notes a whole form for the history.

@@ -11,6 +11,20 @@ use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
 
+/// Tasks that are asked to end in one step.
+const AT_ONCE: usize = 1000;
+
+/// All tasks are being asked to end, so many at a time.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EndOfAll {
+    /// The place of the next one.
+    place: usize,
+    /// Those with a higher number were made afterwards.
+    made: u64,
+    /// The number of the one that wants it, or 0.
+    except: u64,
+}
+
 impl Vm {
     /// Asks for the end of a task, wherever it is. It unwinds, and runs its cleanups, within two slices; inside a cleanup
     /// or a critical section the request waits for its end.
@@ -34,13 +48,35 @@ impl Vm {
         self.abort_others();
     }
 
-    /// Asks for the end of every task but the running one.
+    /// Asks for the end of every task but the running one. Where there are many, the rest are asked between turns, and only those
+    /// that are being ended have turns until then.
     pub(crate) fn abort_others(&mut self) {
-        for id in self.tasks.ids() {
-            if self.running.is_none() || id.index != self.running_index {
+        let except = self.running.as_ref().map_or(0, |task| task.number);
+        self.end_of_all = Some(EndOfAll { place: 0, made: self.made, except });
+        self.abort_more();
+        if self.end_of_all.is_some()
+            && let Some(task) = &mut self.running
+        {
+            task.flags.set_urgent(true);
+        }
+    }
+
+    /// Asks the next tasks to end, if all are to.
+    pub(crate) fn abort_more(&mut self) {
+        let Some(all) = self.end_of_all else { return };
+        let end = self.tasks.places().min(all.place + AT_ONCE);
+        for index in all.place..end {
+            let index = index as u32;
+            if let Some(task) = self.tasks.at(index)
+                && task.number <= all.made
+                && task.number != all.except
+                && let Some(id) = self.tasks.id_at(index)
+            {
                 self.abort(id);
             }
         }
+        let is_over = end == self.tasks.places();
+        self.end_of_all = if is_over { None } else { Some(EndOfAll { place: end, ..all }) };
     }
 
     /// Notes how the running task has ended, and tells those who want to know.

@@ -48,7 +48,7 @@ enum Status {
     Form(u32, u64),
     /// All tasks that charge it.
     Tasks,
-    /// Nobody: its form is left.
+    /// Nobody: its form was left before it was spent.
     Closed,
 }
 
@@ -216,7 +216,8 @@ impl Vm {
         let limit = self.task_mut().extra.as_mut().and_then(|extra| extra.limits.pop());
         let Some(limit) = limit else { return };
         if let Some(account) = self.accounts.get_mut(limit.account) {
-            account.status = Status::Closed;
+            // Tasks that were made inside and have not had their turn since it was spent are still to end.
+            account.status = if account.left > 0 { Status::Closed } else { Status::Tasks };
             // The task never ceased to be a user of the account above.
             let parent = account.parent;
             self.task_mut().account = parent;

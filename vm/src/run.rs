@@ -113,10 +113,14 @@ impl Vm {
             if !self.deliveries.is_empty() {
                 self.deliver_some();
             }
-            match self.queues.next(&self.tasks, &mut self.choices) {
+            let next = match self.end_of_all {
+                None => self.queues.next(&self.tasks, &mut self.choices),
+                Some(_) => self.next_while_all_end(),
+            };
+            match next {
                 Some(index) => self.give_turn(index, end),
                 None => {
-                    if !self.deliveries.is_empty() {
+                    if !self.deliveries.is_empty() || self.end_of_all.is_some() {
                         continue;
                     }
                     if self.alive == 0 {
@@ -128,6 +132,13 @@ impl Vm {
                 }
             }
         }
+    }
+
+    /// Asks more tasks to end; whose turn it is among those that do.
+    #[cold]
+    fn next_while_all_end(&mut self) -> Option<u32> {
+        self.abort_more();
+        self.queues.next_urgent(&self.tasks)
     }
 
     /// Gives a runnable task its turn: one slice, or as many as it takes to leave a critical section.

@@ -49,6 +49,11 @@ impl RunQueues {
         }
     }
 
+    /// Takes out the first of those that are being ended, or wait for that.
+    pub(crate) fn next_urgent(&mut self, tasks: &Tasks) -> Option<u32> {
+        pop(&mut self.urgent, tasks, &mut Choices::first())
+    }
+
     /// Takes out the task whose turn it is.
     pub(crate) fn next(&mut self, tasks: &Tasks, choices: &mut Choices) -> Option<u32> {
         self.turns += 1;

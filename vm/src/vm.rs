@@ -12,6 +12,7 @@ use crate::database::Database;
 use crate::embed::HostFunction;
 use crate::explore::Points;
 use crate::figures::Figures;
+use crate::finish::EndOfAll;
 use crate::heap::{AllocError, Heap, HeapConfig, Kind};
 use crate::host::{Console, Host, Output};
 use crate::interp::Cpu;
@@ -109,6 +110,8 @@ pub struct Vm {
     pub(crate) deliveries: VecDeque<Delivery>,
     /// Tasks that are held back until then, each with its serial number.
     pub(crate) held: Vec<(u32, u64)>,
+    /// How far all tasks have been asked to end, while that is under way.
+    pub(crate) end_of_all: Option<EndOfAll>,
     /// Whether the running task is to be held back.
     pub(crate) holds_task: bool,
     /// Whether more timers are due than were seen to.
@@ -239,6 +242,7 @@ impl Vm {
             timers: Timers::default(),
             accounts: Accounts::default(),
             deliveries: VecDeque::new(),
+            end_of_all: None,
             held: Vec::new(),
             holds_task: false,
             more_is_due: false,

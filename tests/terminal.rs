@@ -1,0 +1,69 @@
+//! A session at a terminal: one that is a pair of files, with nobody to see it.
+#![cfg(unix)]
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::process::{Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::tcgetattr;
+
+/// What the session has written, as it comes.
+fn read_on(mut side: File) -> Receiver<String> {
+    let (sender, output) = channel();
+    std::thread::spawn(move || {
+        let mut bytes = [0; 4096];
+        while let Ok(count @ 1..) = side.read(&mut bytes) {
+            if sender.send(String::from_utf8_lossy(&bytes[..count]).into_owned()).is_err() {
+                return;
+            }
+        }
+    });
+    output
+}
+
+/// Reads on until something was written.
+fn await_text(output: &Receiver<String>, text: &str) -> String {
+    let mut all = String::new();
+    while !all.contains(text) {
+        match output.recv_timeout(Duration::from_secs(20)) {
+            Ok(more) => all.push_str(&more),
+            Err(error) => panic!("{error}; no {text} in {all:?}"),
+        }
+    }
+    all
+}
+
+/// It does so while the next line is edited, and leaves the terminal as it was.
+#[test]
+fn a_task_ends_the_session_at_once() {
+    let person = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("there are terminals");
+    grantpt(&person).and_then(|()| unlockpt(&person)).expect("it is ours");
+    let name = ptsname(&person, Vec::new()).expect("it has a name").into_string().expect("text");
+    let terminal = File::options().read(true).write(true).open(name).expect("it can be opened");
+    let before = tcgetattr(&terminal).expect("it is a terminal");
+    let stdio = || Stdio::from(terminal.try_clone().expect("it can be shared"));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_eslvm"))
+        .arg("repl")
+        .env("TERM", "xterm")
+        .env("HOME", env!("CARGO_TARGET_TMPDIR"))
+        .stdin(stdio())
+        .stdout(stdio())
+        .stderr(stdio())
+        .spawn()
+        .expect("the command can be run");
+    let mut person = File::from(person);
+    let output = read_on(person.try_clone().expect("it can be shared"));
+    await_text(&output, "? ");
+    let form =
+        "(progn (spawn (sleep 0.2) (unwind-protect (exit 7) (print (list 'cleaned 'up)))) (list 'go))\r";
+    person.write_all(form.as_bytes()).expect("it is read");
+    await_text(&output, "(GO)");
+    let status = child.wait().expect("it ends");
+    assert_eq!(status.code(), Some(7));
+    await_text(&output, "(CLEANED UP)");
+    let after = tcgetattr(&terminal).expect("it is still a terminal");
+    assert_eq!((after.local_modes, after.input_modes), (before.local_modes, before.input_modes));
+}
