@@ -97,6 +97,8 @@ impl Vm {
             format!("task {}", self.describe(name))
         } else if self.main_number == Some(number) {
             "the main task".into()
+        } else if number == 0 {
+            "a task that has ended".into()
         } else {
             format!("task {number}")
         }
