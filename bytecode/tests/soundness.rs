@@ -181,8 +181,8 @@ impl<'a> Model<'a> {
                 None => Next::Left,
             },
             (Substitute::Effect, _) => {
-                // M5: the value list is empty then, and not what others have left.
-                self.value_list = matches!(instr, Instr::ListToValues { .. });
+                // M5: the value list is empty then, or what the recovery gave, and not what others have left.
+                self.value_list = matches!(instr, Instr::ListToValues { .. } | Instr::Throw { .. });
                 Next::Instruction
             }
             (Substitute::Never | Substitute::Silent, _) => self.step(instr, next),

@@ -20,13 +20,16 @@ impl PackageId {
     pub const ESL: PackageId = PackageId(2);
     /// `ESL-USER`, also called `USER`.
     pub const USER: PackageId = PackageId(3);
+    /// `COMMON-LISP-USER`, also called `CL-USER`.
+    pub const CL_USER: PackageId = PackageId(4);
 }
 
 impl Packages {
     /// The standard packages, with the names of Common Lisp and of the builtins.
     ///
     /// `ESL` uses `COMMON-LISP` and exports its names again, but for those that it takes over. So a package that uses
-    /// only `ESL`, as `ESL-USER` does, has all of the language.
+    /// only `ESL`, as `ESL-USER` does, has all of the language. `COMMON-LISP-USER` is for programs that say that they are
+    /// in it: there the names that `ESL` takes over mean what they mean in Common Lisp.
     pub fn standard() -> Packages {
         let mut packages = Packages::empty();
         for (id, name, nickname) in [
@@ -34,6 +37,7 @@ impl Packages {
             (PackageId::KEYWORD, KEYWORD_PACKAGE, None),
             (PackageId::ESL, ESL_PACKAGE, None),
             (PackageId::USER, USER_PACKAGE, Some("USER")),
+            (PackageId::CL_USER, "COMMON-LISP-USER", Some("CL-USER")),
         ] {
             let added = packages.add(name.into(), nickname.map(Into::into).into_iter().collect());
             debug_assert_eq!(added, id);
@@ -42,6 +46,7 @@ impl Packages {
         packages.table[PackageId::ESL].uses = vec![PackageId::CL];
         packages.table[PackageId::ESL].exports_again = Some(PackageId::CL);
         packages.table[PackageId::USER].uses = vec![PackageId::ESL];
+        packages.table[PackageId::CL_USER].uses = vec![PackageId::CL];
         for name in TAKEN_OVER {
             let entry = Entry { home: PackageId::ESL, external: true, shadowing: true, symbol: None };
             packages.table[PackageId::ESL].symbols.insert(name.into(), entry);
