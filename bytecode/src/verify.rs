@@ -61,7 +61,7 @@
 //! * **M4.** An unwinding lands as V10 says. A running cleanup that another unwinding passes is dropped.
 //!   A cleanup for failures that a failure has reached goes on behind its `end-cleanup`, with a value list.
 //! * **M5.** The value list always consists of objects. `enter-cleanup` keeps it for `end-cleanup`. A `throw` that is tried
-//!   again throws the values that it had. A `list-to-values` that is recovered from leaves it empty.
+//!   again throws the values that it had; one that is recovered from leaves what the recovery gave, a `list-to-values` an empty one.
 //! * **M6.** Everything that depends on data is checked when it happens: types of operands (`push-mask` and
 //!   `push-handlers` too), index and slot bounds, arity, the length of spread lists, the sizes of the stacks.
 //!
