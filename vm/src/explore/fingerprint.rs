@@ -391,6 +391,8 @@ impl Walk<'_> {
             self.digest.add_all(number.limbs.iter().copied());
         } else if let Some(number) = heap.as_double(v) {
             self.digest.add(number.to_bits());
+        } else if let Some((filled, len)) = heap.filled(v) {
+            self.digest.add_all([filled as u64, len as u64].into_iter());
         }
     }
 

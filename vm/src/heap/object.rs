@@ -213,6 +213,16 @@ impl Heap {
         }
     }
 
+    /// How many elements of an unfinished object have been filled, of how many; `None` if `v` is none.
+    pub(crate) fn filled(&self, v: Value) -> Option<(usize, usize)> {
+        let object = v.as_object_ptr()?;
+        // SAFETY: a live object; an unfinished one is large, so that it has a large header.
+        unsafe {
+            matches!((*object).kind, Kind::UnfinishedVector | Kind::UnfinishedString)
+                .then(|| ((*super::large::header_of(object)).filled as usize, (*object).len as usize))
+        }
+    }
+
     /// A new ratio. That it is in lowest terms and its denominator above one is up to the caller.
     pub fn alloc_ratio(&mut self, numerator: Value, denominator: Value) -> Result<Value, AllocError> {
         self.record_from(Kind::Ratio, 0, 0, &[], &[numerator, denominator])
@@ -514,11 +524,12 @@ mod tests {
         let v = heap.begin_vector(LONG, false).unwrap();
         assert_eq!((heap.kind(v), heap.vector(v)), (Some(Kind::UnfinishedVector), None));
         assert_eq!(heap.fill_more(v, Value::T, LONG - 1), Some(false));
+        assert_eq!(heap.filled(v), Some((LONG - 1, LONG)));
         assert_eq!(heap.vector(v), None);
         assert_eq!(heap.fill_more(v, Value::NIL, 10), Some(true));
         let elements = heap.vector(v).unwrap();
         assert_eq!((elements.len(), elements[LONG - 2], elements[LONG - 1]), (LONG, Value::T, Value::NIL));
-        assert_eq!(heap.fill_more(v, Value::T, 1), None, "it is finished");
+        assert_eq!((heap.fill_more(v, Value::T, 1), heap.filled(v)), (None, None), "it is finished");
     }
 
     #[test]
