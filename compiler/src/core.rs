@@ -72,6 +72,8 @@ pub struct Variable {
     pub is_captured: bool,
     /// Whether anything reads it, or uses the value of an assignment to it.
     pub is_read: bool,
+    /// Whether it is a local function that can be seen never to return.
+    pub never_returns: bool,
 }
 
 /// A function's text.

@@ -123,6 +123,7 @@ impl Machine {
             is_assigned: false,
             is_captured: false,
             is_read: false,
+            never_returns: false,
         });
         VarId(variables.len() as u32 - 1)
     }

@@ -96,7 +96,7 @@ fn local_functions(
         entries.push(Entry::Function(name.cell, Function::Local(variable, text.arity())));
         let lambda = machine.lambda(to);
         functions.push((variable, lambda));
-        lambdas.push(Job::Lambda(Box::new(text), lambda, to));
+        lambdas.extend([Job::Lambda(Box::new(text), lambda, to), Job::CheckReturn(variable, lambda)]);
     }
     let inside = machine.child(to);
     machine.fill(to, NodeKind::Functions { definitions: functions, body: inside.node });

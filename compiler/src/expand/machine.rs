@@ -22,7 +22,7 @@ use super::place::Place;
 use super::scope::{Entry, Scope};
 use super::toplevel::Top;
 use super::unit::Unit;
-use crate::core::{LambdaId, NodeId, NodeKind};
+use crate::core::{LambdaId, NodeId, NodeKind, VarId};
 use crate::diagnostic::code;
 
 /// How deeply nodes may be nested.
@@ -62,6 +62,8 @@ pub(super) enum Job {
     EnterMacros(Vec<Symbol>),
     /// Looks at the finished body of a recovery clause, which may be empty.
     CheckClause(To, bool),
+    /// Looks at the finished text of a local function, which is kept in this variable.
+    CheckReturn(VarId, LambdaId),
     /// Processes a top-level form.
     TopLevel(Datum, Top),
     /// Ends a chunk.
@@ -208,6 +210,7 @@ impl Machine {
                 self.schedule([Job::Expand(form, inside), Job::FinishChunk]);
             }
             Job::CheckClause(to, is_empty) => self.check_clause(to, is_empty),
+            Job::CheckReturn(function, lambda) => self.check_return(function, lambda),
             Job::EnterMacros(names) => self.enter_macros(names),
             Job::TopLevel(form, top) => {
                 let top = top.at(&form);

@@ -108,18 +108,35 @@ fn leave(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> 
 impl Machine {
     /// Warns if control can fall off the end of a recovery clause without its saying so.
     pub(super) fn check_clause(&mut self, to: To, is_empty: bool) {
-        if is_empty || !leaves_or_resumes(self.core(), to.node) {
+        if is_empty || !ends(self.core(), to.node, End::LeavesOrResumes) {
             let message = "this clause can end without saying how to go on, and its value then stands for that of \
                            the operation that failed";
             let help = "end it with `(retry)`, `(abort …)` or `(fail …)`, or with `(values …)` to go on behind the failure";
             self.report(code::CLAUSE_FALLS_OFF.at(to.span, message.to_string()).help(help), to.origin);
         }
     }
+
+    /// Notes whether a local function, whose text has been expanded, never returns.
+    pub(super) fn check_return(&mut self, function: VarId, lambda: LambdaId) {
+        let core = self.core();
+        let body = core.lambdas[lambda.index()].body;
+        core.variables[function.index()].never_returns = ends(core, body, End::Leaves(function));
+    }
 }
 
-/// Whether the end of a form is never reached, or is one that says that its value is meant. A `NIL` that a macro has put at
-/// the end of what it makes of a form, as `dolist` does, says nothing.
-fn leaves_or_resumes(core: &Core, node: NodeId) -> bool {
+/// What is asked of the end of a form.
+#[derive(Clone, Copy)]
+enum End {
+    /// That it is never reached, or says that its value is meant.
+    LeavesOrResumes,
+    /// That it is never reached: the end of this function's body.
+    Leaves(VarId),
+}
+
+/// Whether the end of a form is as is asked. A `NIL` that a macro has put at the end of what it makes of a form, as `dolist`
+/// does, does not say that it is meant. A function that calls itself at its end does not return there.
+fn ends(core: &Core, node: NodeId, end: End) -> bool {
+    let leaves = matches!(end, End::Leaves(_));
     let mut inside: FxHashSet<BlockId> = FxHashSet::default();
     let mut pending = vec![(node, None)];
     while let Some((node, around)) = pending.pop() {
@@ -127,7 +144,10 @@ fn leaves_or_resumes(core: &Core, node: NodeId) -> bool {
         let inside_it = |node: NodeId| (node, Some(span));
         match &core.nodes[node.index()].kind {
             NodeKind::Constant(constant) if constant.is_nil() && around == Some(span) => return false,
+            NodeKind::Constant(_) | NodeKind::Values(_) if leaves => return false,
             NodeKind::Constant(_) | NodeKind::Values(_) | NodeKind::Throw(..) | NodeKind::Go(..) => {}
+            // It may be left from anywhere inside.
+            NodeKind::Block(block, _) if leaves && core.blocks[block.index()].is_used => return false,
             NodeKind::ReturnFrom(block, value) => {
                 if inside.contains(block) {
                     pending.push(inside_it(*value));
@@ -172,9 +192,15 @@ fn leaves_or_resumes(core: &Core, node: NodeId) -> bool {
                 _ => return false,
             },
             NodeKind::Call(Callee::Global(function), _) => {
-                let leaves = LEAVING.iter().any(|name| super::form::is_esl(function, name))
+                let is_known = LEAVING.iter().any(|name| super::form::is_esl(function, name))
                     || LEAVING_STANDARD.iter().any(|name| function.is_cl(name));
-                if !leaves {
+                if !is_known {
+                    return false;
+                }
+            }
+            NodeKind::Call(Callee::Local(function), _) | NodeKind::Apply(Callee::Local(function), _) => {
+                let is_itself = matches!(end, End::Leaves(own) if own == *function);
+                if !is_itself && !core.variables[function.index()].never_returns {
                     return false;
                 }
             }

@@ -162,7 +162,15 @@ impl Builder {
     fn variable(&mut self, symbol: &Symbol, span: Span) -> VarId {
         let owner = self.lambda;
         let name = symbol.clone();
-        let variable = Variable { name, span, owner, is_assigned: false, is_captured: false, is_read: false };
+        let variable = Variable {
+            name,
+            span,
+            owner,
+            is_assigned: false,
+            is_captured: false,
+            is_read: false,
+            never_returns: false,
+        };
         self.core.variables.push(variable);
         VarId(self.core.variables.len() as u32 - 1)
     }
