@@ -2,7 +2,7 @@
 //!
 //! What is opened up here behaves as the function does, also when it fails: the operands are evaluated in order, and
 //! one instruction does the work, so that a value put in its place stands for the whole call. Sums and products of more
-//! than two numbers are the exception.
+//! than two numbers are the exception, and what sets a place: it gives what was to be stored.
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::opcode::{Instr, TypeCode};
@@ -52,9 +52,11 @@ enum Shape {
     Not,
     Eq,
     Eql,
-    /// An instruction for effect on the first two arguments; the call gives one of them.
-    Store(fn(Reg, Reg) -> Instr, usize),
-    /// The same with three, of which it gives the last.
+    /// An instruction for effect on two arguments; the call gives the second.
+    Store(fn(Reg, Reg) -> Instr),
+    /// An instruction for effect on two arguments, if nobody asks for the value of the call.
+    Change(fn(Reg, Reg) -> Instr),
+    /// As `Store` with three, of which it gives the last.
     StoreAt(fn(Reg, Reg, Reg) -> Instr),
     List,
     ListStar,
@@ -123,10 +125,10 @@ fn shape(builtin: Builtin, count: usize) -> Option<Shape> {
         (B::Char | B::Schar, 2) => Binary(|dst, string, index| Instr::CharRef { dst, string, index }),
         (B::CharEqualExactly, 2) => Binary(|dst, left, right| Instr::CharEq { dst, left, right }),
         (B::Aref, 2) => Binary(|dst, array, index| Instr::ArrayRef { dst, array, index }),
-        (B::Rplaca, 2) => Store(|pair, value| Instr::SetCar { pair, value }, 0),
-        (B::Rplacd, 2) => Store(|pair, value| Instr::SetCdr { pair, value }, 0),
-        (B::SetCar, 2) => Store(|pair, value| Instr::SetCar { pair, value }, 1),
-        (B::SetCdr, 2) => Store(|pair, value| Instr::SetCdr { pair, value }, 1),
+        (B::Rplaca, 2) => Change(|pair, value| Instr::SetCar { pair, value }),
+        (B::Rplacd, 2) => Change(|pair, value| Instr::SetCdr { pair, value }),
+        (B::SetCar, 2) => Store(|pair, value| Instr::SetCar { pair, value }),
+        (B::SetCdr, 2) => Store(|pair, value| Instr::SetCdr { pair, value }),
         (B::SetSvref, 3) => StoreAt(|vector, index, value| Instr::VectorSet { vector, index, value }),
         (B::SetAref, 3) => StoreAt(|array, index, value| Instr::ArraySet { array, index, value }),
         (B::List, _) => List,
@@ -156,7 +158,9 @@ pub(super) fn takes_literals(core: &Core, builtin: Builtin, arguments: &[NodeId]
         Some(Shape::Compare(comparison)) => {
             !has_literal_form(comparison) || literal_int(core, arguments[index]).is_none()
         }
-        Some(Shape::Binary(_) | Shape::Quotient(_) | Shape::Store(..) | Shape::StoreAt(_)) => true,
+        Some(
+            Shape::Binary(_) | Shape::Quotient(_) | Shape::Store(_) | Shape::Change(_) | Shape::StoreAt(_),
+        ) => true,
         _ => false,
     }
 }
@@ -206,11 +210,16 @@ impl<'a> Frame<'_, 'a> {
             (Shape::Not, [object]) => self.not(*object, dest),
             (Shape::Eq, [left, right]) => self.identical(false, *left, *right, dest),
             (Shape::Eql, [left, right]) => self.identical(true, *left, *right, dest),
-            (Shape::Store(instr, result), [object, value]) => {
-                let operands = self.operands(*object, *value);
-                self.emit(instr(operands.0, operands.1));
+            (Shape::Store(instr), [object, value]) => {
+                let (object, value) = self.operands(*object, *value);
+                self.emit(instr(object, value));
                 self.registers.release(top);
-                self.deliver(if result == 0 { operands.0.0 } else { operands.1.0 }, dest);
+                self.deliver(value.0, dest);
+            }
+            (Shape::Change(instr), [object, value]) if matches!(dest, Dest::Effect) => {
+                let (object, value) = self.operands(*object, *value);
+                self.emit(instr(object, value));
+                self.registers.release(top);
             }
             (Shape::StoreAt(instr), [object, index, value]) => {
                 let object = self.operand(*object, &[*index, *value]);

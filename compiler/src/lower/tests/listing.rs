@@ -221,7 +221,7 @@ fn places() {
         &[
             "(let ((v (f))) (%set-svref v 0 (+ (svref v 0) 1)))",
             "(%set-aref (f) 1 (g))",
-            "(list (rplaca (f) 1) (%set-cdr (f) 2))",
+            "(progn (rplaca (f) 1) (rplacd (f) (%set-cdr (f) 2)))",
         ],
     );
 }
