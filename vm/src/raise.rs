@@ -26,6 +26,8 @@ pub enum Expected {
 pub enum Raised {
     /// `type-error`: the datum is not of the expected type.
     Type(Value, Expected),
+    /// `type-error`: the value of this special variable is not of the expected type.
+    Variable(Value, Value, Expected),
     /// `division-by-zero`: name of the operation in `COMMON-LISP`, operands.
     DivisionByZero(&'static str, [Value; 2]),
     /// `arithmetic-error` with a text: the result does not exist or is too large.
@@ -136,17 +138,12 @@ impl Vm {
         let raised = self.raised.clone().unwrap_or(Raised::Simple("an operation failed".into()));
         let arguments: SmallVec<[Value; 16]> = match raised {
             Raised::Type(datum, expected) => {
-                let expected = match expected {
-                    Expected::Type(name) => self.world.intern_cl(&mut self.heap, name)?,
-                    Expected::Index(limit) => {
-                        // (INTEGER 0 (limit))
-                        let limit = self.heap.list(&[Value::index(limit)])?;
-                        let integer = self.world.intern_cl(&mut self.heap, "INTEGER")?;
-                        self.heap.list(&[integer, Value::small(0), limit])?
-                    }
-                    Expected::Specifier(specifier) => specifier,
-                };
+                let expected = self.specifier(expected)?;
                 smallvec![self.keyword("TYPE-ERROR")?, datum, expected]
+            }
+            Raised::Variable(symbol, datum, expected) => {
+                let expected = self.specifier(expected)?;
+                smallvec![self.keyword("VARIABLE-TYPE-ERROR")?, symbol, datum, expected]
             }
             Raised::DivisionByZero(operation, operands) => {
                 let operation = self.world.intern_cl(&mut self.heap, operation)?;
@@ -186,6 +183,20 @@ impl Vm {
         };
         self.raised = None;
         Ok(arguments)
+    }
+
+    /// The type specifier of what was expected.
+    fn specifier(&mut self, expected: Expected) -> Outcome {
+        Ok(match expected {
+            Expected::Type(name) => self.world.intern_cl(&mut self.heap, name)?,
+            Expected::Index(limit) => {
+                // (INTEGER 0 (limit))
+                let limit = self.heap.list(&[Value::index(limit)])?;
+                let integer = self.world.intern_cl(&mut self.heap, "INTEGER")?;
+                self.heap.list(&[integer, Value::small(0), limit])?
+            }
+            Expected::Specifier(specifier) => specifier,
+        })
     }
 
     fn raised_text(&mut self, kind: &str, text: &str) -> Result<SmallVec<[Value; 16]>, Exit> {

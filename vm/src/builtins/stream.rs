@@ -13,7 +13,7 @@ use crate::control::End;
 use crate::equality::characters_of;
 use crate::heap::{AllocError, Heap, Kind};
 use crate::host::{HostError, Output, Taken, WriteMode, column_after, encode};
-use crate::raise::{Exit, Outcome, Raised};
+use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -154,7 +154,13 @@ impl Vm {
             Value::T => terminal,
             v => v,
         };
-        let Some(sort) = self.sort_of(stream) else { return self.type_error(stream, "STREAM") };
+        let Some(sort) = self.sort_of(stream) else {
+            let expected = Expected::Type("STREAM");
+            return self.raise(match v {
+                Value::NIL => Raised::Variable(variable, stream, expected),
+                _ => Raised::Type(stream, expected),
+            });
+        };
         if sort.is_input() != is_input {
             let text = if is_input { "it is not open for reading" } else { "it is not open for writing" };
             return self.raise(Raised::Stream(stream, text.into()));

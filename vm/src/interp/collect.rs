@@ -253,7 +253,8 @@ impl Raised {
     /// Calls `visit` with every value of the failure.
     fn visit(&self, visit: &mut dyn FnMut(Value)) {
         match self {
-            Raised::Type(datum, expected) => {
+            Raised::Type(datum, expected) | Raised::Variable(_, datum, expected) => {
+                // The variable is known to the machine.
                 visit(*datum);
                 if let Expected::Specifier(specifier) = expected {
                     visit(*specifier);

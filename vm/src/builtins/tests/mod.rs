@@ -210,6 +210,9 @@ fn show_result(vm: &mut Vm, result: &Result<Vec<Value>, Exit>) -> String {
                 };
                 format!("type-error {} {expected}", show(vm, datum))
             }
+            Some(Raised::Variable(symbol, datum, Expected::Type(name))) => {
+                format!("type-error {} of {} {name}", show(vm, datum), show(vm, symbol))
+            }
             Some(Raised::DivisionByZero(..)) => "division-by-zero".into(),
             Some(Raised::FloatOverflow(_)) => "floating-point-overflow".into(),
             Some(Raised::Arithmetic(..)) => "arithmetic-error".into(),
