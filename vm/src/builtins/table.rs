@@ -33,7 +33,7 @@ fn table(vm: &mut Vm, v: Value) -> Result<Table, Exit> {
 
 /// The entry of a key, if it has one; and its hash, if that was needed to know.
 ///
-/// The key is often the one that was looked up last, as in `(incf (gethash key table))`: that entry is tried first.
+/// The key is often the one that was looked up last, as in `(push item (gethash key table))`: that entry is tried first.
 #[inline(always)]
 fn find(vm: &mut Vm, table: Table, key: Value) -> Result<Place, Exit> {
     let Comparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
