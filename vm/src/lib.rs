@@ -2,11 +2,14 @@
 
 #![deny(unsafe_code)]
 
+pub use esl_heap::{heap, value};
+
+pub(crate) use esl_heap::{character, stack};
+
 pub mod builtins;
 pub mod embed;
 pub mod explore;
 pub mod figures;
-pub mod heap;
 pub mod host;
 pub mod load;
 pub mod observe;
@@ -14,11 +17,9 @@ pub mod raise;
 pub mod run;
 pub mod schedule;
 pub mod task;
-pub mod value;
 pub mod vm;
 
 mod binding;
-mod character;
 mod clock;
 mod control;
 mod database;
@@ -33,7 +34,6 @@ mod number;
 mod report;
 mod shape;
 mod spawn;
-mod stack;
 mod stub;
 mod table;
 mod timer;

@@ -19,10 +19,11 @@ use esl_bytecode::file::ReadError;
 use esl_bytecode::module::{Constant, Function, Module, PoolIdx};
 use esl_bytecode::package::PackageId;
 use esl_bytecode::symbol::{Home, Symbol};
-use esl_bytecode::verify::{VerifyError, verify};
+use esl_bytecode::verify::VerifyError;
 
 use crate::heap::layout::Code;
 use crate::heap::{AllocError, CodeParts, Heap, Kind};
+use crate::interp::trust::{self, Verified};
 use crate::raise::{Exit, Raised};
 use crate::shape::{Shape, Sort, capture_word};
 use crate::stub;
@@ -42,9 +43,6 @@ pub(crate) use image::{
     origin as image_origin,
 };
 pub use prepare::prepare;
-
-/// Says that a module has passed the verifier, or is part of this program.
-pub(crate) struct Verified(());
 
 /// Why a module was not loaded.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -123,9 +121,8 @@ pub(crate) fn load(
     module: &Module,
     shared: &mut dyn Shared,
 ) -> Result<Value, LoadError> {
-    verify(module).map_err(LoadError::Refused)?;
-    Loader { heap, world, module, shared, verified: Verified(()), pool: Vec::new(), functions: Vec::new() }
-        .load()
+    let verified = Verified::module(module).map_err(LoadError::Refused)?;
+    Loader { heap, world, module, shared, verified, pool: Vec::new(), functions: Vec::new() }.load()
 }
 
 /// A module on its way into the heap.
@@ -145,7 +142,7 @@ impl Loader<'_> {
     fn load(mut self) -> Result<Value, LoadError> {
         // Data may contain functions, and functions each other, so functions are made before they have their code.
         let shape = Shape::other(Sort::Lazy, 0);
-        let stub = self.heap.alloc_stub(Value::NIL, Value::NIL, shape, 0, stub::word(stub::LAZY, 0))?;
+        let stub = trust::alloc_stub(self.heap, Value::NIL, Value::NIL, shape, 0, stub::word(stub::LAZY, 0))?;
         for function in &self.module.functions {
             let has_captures = !function.captures.is_empty();
             let object = if has_captures { Value::NIL } else { self.heap.alloc_function(stub, &[])? };
@@ -166,7 +163,7 @@ impl Loader<'_> {
             if object.is_nil() {
                 *object = code;
             } else {
-                self.heap.function_set_code(*object, code);
+                trust::replace_stub(self.heap, *object, code);
             }
             codes.push(code);
         }
@@ -184,7 +181,7 @@ impl Loader<'_> {
         for (function, &code) in self.module.functions.iter().zip(codes) {
             for (index, &PoolIdx(constant)) in function.constants.iter().enumerate() {
                 if let Constant::Function(number) = self.module.constants[constant as usize] {
-                    self.heap.code_set_constant(code, index, self.functions[number.0 as usize]);
+                    trust::set_constant(self.heap, code, index, self.functions[number.0 as usize]);
                 }
             }
         }
@@ -260,7 +257,7 @@ fn make_code(
         constants: parts.constants,
         words: &words,
     };
-    heap.alloc_verified_code(parts, verified)
+    trust::alloc_code(heap, parts, verified)
 }
 
 /// The constants of a function's Code: its own, then the names of its keys.

@@ -3,7 +3,7 @@
 //! A link leads to an entry: the hash of its key (32 bits), its number, one too high (28 bits; 0 leads nowhere), and whether the
 //! chain goes on behind it. The heads of the chains are links, and each entry has the link to the next of its chain. So a search knows
 //! the hash of a key before it goes there, and a key that is not there is mostly missed without a look at any entry.
-//! `heap/table` has how all this is stored.
+//! `esl_heap::heap::table` has how all this is stored.
 //!
 //! Invariant: a table has [`PER_ENTRY`] chains for each entry that was ever in use (and for one at least). So each new
 //! entry adds as many, and each of these takes its share from one other; nothing is ever rehashed at once, and no
@@ -420,7 +420,7 @@ mod tests {
                range in prop_oneof![Just(4), Just(30), Just(500)],
                operations in prop::collection::vec((0u8..10, any::<u16>(), any::<i16>()), 0..800),
            ) {
-               let mut heap = Heap::for_tests();
+               let mut heap = crate::interp::trust::heap_for_tests();
                let table = new(&mut heap, Test::Eql);
                let mut model = Model::default();
                for (operation, key, value) in operations {
@@ -455,7 +455,7 @@ mod tests {
 
     #[test]
     fn a_large_table_keeps_everything() {
-        let mut heap = Heap::for_tests();
+        let mut heap = crate::interp::trust::heap_for_tests();
         let table = new(&mut heap, Test::Eql);
         let n = 3 * SEGMENT as i32 + 17;
         for key in 0..n {
@@ -486,7 +486,7 @@ mod tests {
 
     #[test]
     fn keys_of_one_hash_are_candidates() {
-        let mut heap = Heap::for_tests();
+        let mut heap = crate::interp::trust::heap_for_tests();
         let table = new(&mut heap, Test::Eql);
         for key in 0..20 {
             table.add(&mut heap, 5 + 8 * (key as u32 % 2), Value::small(key), Value::NIL).unwrap();

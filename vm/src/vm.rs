@@ -15,8 +15,8 @@ use crate::figures::Figures;
 use crate::finish::EndOfAll;
 use crate::heap::{AllocError, Heap, HeapConfig, Kind};
 use crate::host::{Console, Host, Output};
-use crate::interp::Cpu;
 use crate::interp::call::{Arguments, make_starter};
+use crate::interp::{Cpu, trust};
 use crate::limit::{Accounts, CLEANUP_TICKS, CLEANUP_TIME};
 use crate::observe::Observers;
 use crate::raise::Raised;
@@ -220,10 +220,7 @@ impl Vm {
     /// [`AllocError`] if the limit of memory leaves no room for what every machine has.
     pub fn new(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, AllocError> {
         let heap_config = HeapConfig { limit: config.memory, ..HeapConfig::default() };
-        // SAFETY: the machine uses its heap's values with its heap only, and drops both together. Values that an embedder
-        // gets hold of come with the promise that the documentation of `Vm` asks for.
-        #[allow(unsafe_code, reason = "the one place where a machine is given its heap")]
-        let mut heap = unsafe { Heap::new(heap_config) };
+        let mut heap = trust::new_heap(heap_config);
         let world = World::new(&mut heap)?;
         let starter = make_starter(&mut heap)?;
         let any_event =

@@ -25,6 +25,7 @@ mod raise;
 pub(crate) mod stubs;
 #[cfg(test)]
 mod tests;
+pub(crate) mod trust;
 
 use esl_bytecode::for_each_opcode;
 

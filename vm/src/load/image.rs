@@ -16,8 +16,9 @@ use esl_bytecode::module::{Function, FunctionNumber, PoolIdx};
 use esl_bytecode::symbol::Symbol;
 
 use super::definitions::{Definition, Definitions, name_of};
-use super::{LoadError, Parts, Verified, character, data, debug, integer, make_code, own_constants, ratio};
+use super::{LoadError, Parts, character, data, debug, integer, make_code, own_constants, ratio};
 use crate::heap::{AllocError, Heap};
+use crate::interp::trust::{self, Verified};
 use crate::raise::Exit;
 use crate::shape::{Shape, Sort};
 use crate::stub;
@@ -112,7 +113,7 @@ pub(crate) fn open(heap: &mut Heap, world: &mut World, module: Arc<ModuleImage>)
         symbols: heap.alloc_vector_filled(module.symbol_count(), Value::UNSUPPLIED)?,
         pool: heap.alloc_vector_filled(module.constant_count(), Value::UNSUPPLIED)?,
         functions: heap.alloc_vector_filled(module.function_count(), Value::UNSUPPLIED)?,
-        lazy: heap.alloc_stub(Value::NIL, Value::index(number), shape, 1, word)?,
+        lazy: trust::alloc_stub(heap, Value::NIL, Value::index(number), shape, 1, word)?,
         module: module.clone(),
     };
     world.images.0.push(image);
@@ -298,7 +299,7 @@ impl ImageLoader<'_> {
                         code
                     }
                 };
-                self.heap.code_set_constant(code, index, inner_code);
+                trust::set_constant(self.heap, code, index, inner_code);
             }
         }
         Ok(first)
@@ -331,8 +332,7 @@ impl ImageLoader<'_> {
         };
         let debug = Value::index(number.0 as usize);
         let parts = Parts { function: &function, constants: &constants, name, debug };
-        // The image is part of this program: its build has verified it.
-        Ok(make_code(self.heap, &Verified(()), &parts, Value::index(self.image))?)
+        Ok(make_code(self.heap, &Verified::image(), &parts, Value::index(self.image))?)
     }
 }
 
@@ -375,7 +375,7 @@ impl Vm {
         let mut loader = ImageLoader { heap: &mut self.heap, world: &mut self.world, image };
         let code = loader.code(FunctionNumber(number));
         let code = self.loaded(code)?;
-        self.heap.function_set_code(function, code);
+        trust::replace_stub(&mut self.heap, function, code);
         self.charge(self.heap.code_words(code).map_or(0, <[u32]>::len));
         Ok(())
     }

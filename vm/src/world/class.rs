@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     fn world() -> (Heap, World) {
-        let mut heap = Heap::for_tests();
+        let mut heap = crate::interp::trust::heap_for_tests();
         let world = World::new(&mut heap).unwrap();
         (heap, world)
     }

@@ -23,6 +23,7 @@ use crate::builtins::stream::standard_streams;
 use crate::datum::Unit;
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{AllocError, Heap, Kind};
+use crate::interp::trust;
 use crate::load::Images;
 use crate::shape::{Shape, Sort};
 use crate::stub;
@@ -109,7 +110,8 @@ impl World {
     /// [`AllocError`] when the heap is too small for it.
     pub(crate) fn new(heap: &mut Heap) -> Result<World, AllocError> {
         let shape = Shape::other(Sort::Undefined, 0);
-        let undefined = heap.alloc_stub(Value::NIL, Value::NIL, shape, 1, stub::word(stub::UNDEFINED, 0))?;
+        let undefined =
+            trust::alloc_stub(heap, Value::NIL, Value::NIL, shape, 1, stub::word(stub::UNDEFINED, 0))?;
         let mut world = World {
             known: Known::NONE,
             is_open: true,
@@ -260,7 +262,7 @@ impl World {
     fn make_builtin(&mut self, heap: &mut Heap, builtin: Builtin, name: Value) -> Result<Value, AllocError> {
         let number = builtin.number();
         let shape = Shape::other(Sort::Native, number as u16);
-        let code = heap.alloc_stub(name, Value::NIL, shape, 0, stub::native_word(builtin))?;
+        let code = trust::alloc_stub(heap, name, Value::NIL, shape, 0, stub::native_word(builtin))?;
         heap.alloc_function(code, &[])
     }
 
@@ -431,7 +433,7 @@ mod tests {
 
     #[test]
     fn a_symbol_has_one_object_and_a_builtin_its_function() {
-        let mut heap = Heap::for_tests();
+        let mut heap = crate::interp::trust::heap_for_tests();
         let mut world = World::new(&mut heap).unwrap();
         let car = world.intern_cl(&mut heap, "CAR").unwrap();
         assert_eq!(world.intern(&mut heap, &Symbol::cl("CAR")), Ok(car));
@@ -454,7 +456,7 @@ mod tests {
 
     #[test]
     fn nil_and_t_are_immediates_with_companions() {
-        let mut heap = Heap::for_tests();
+        let mut heap = crate::interp::trust::heap_for_tests();
         let mut world = World::new(&mut heap).unwrap();
         assert_eq!(world.intern_cl(&mut heap, "NIL"), Ok(Value::NIL));
         assert_eq!(world.intern_cl(&mut heap, "T"), Ok(Value::T));

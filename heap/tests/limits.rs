@@ -1,9 +1,9 @@
 //! Allocation and collection at large: limits, pacing, what goes back to the system, and structures of great depth.
 
-use esl_vm::heap::{
+use esl_heap::heap::{
     AllocError, Heap, HeapConfig, HeapStats, Kind, Phase, RESERVE, SLICE_VISITS, SliceOutcome,
 };
-use esl_vm::value::Value;
+use esl_heap::value::Value;
 
 fn heap(config: HeapConfig) -> Heap {
     // SAFETY: every test keeps the values of its heap.

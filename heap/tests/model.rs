@@ -6,9 +6,9 @@
 //! all the time: every object that the program meets holds what the shadow says. The stacks follow the rule that the
 //! collector is built on: a stack is scanned before its task runs in a cycle, otherwise any time, once.
 
-use esl_vm::heap::layout::Code;
-use esl_vm::heap::{AllocError, CodeParts, Heap, HeapConfig, Kind, Phase, SliceOutcome};
-use esl_vm::value::Value;
+use esl_heap::heap::layout::Code;
+use esl_heap::heap::{AllocError, CodeParts, Heap, HeapConfig, Kind, Phase, SliceOutcome};
+use esl_heap::value::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A small generator (splitmix64), so that a seed is all that a failure needs.

@@ -34,8 +34,6 @@
 //!
 //! Not here: which roots there are, when to run a slice, weak references.
 
-#![allow(unsafe_code)]
-
 pub mod layout;
 
 mod access;
@@ -46,7 +44,7 @@ mod mark;
 mod metadata;
 mod object;
 mod sweep;
-pub(crate) mod table;
+pub mod table;
 
 pub use access::BignumRef;
 pub use alloc::AllocError;
@@ -250,7 +248,7 @@ impl Heap {
     ///
     /// # Errors
     /// [`AllocError::NeedCollection`] if the limit is passed.
-    pub(crate) fn set_external(&mut self, bytes: usize) -> Result<(), AllocError> {
+    pub fn set_external(&mut self, bytes: usize) -> Result<(), AllocError> {
         self.external = bytes;
         if self.committed + bytes > self.limit_now() { Err(AllocError::NeedCollection) } else { Ok(()) }
     }

@@ -30,8 +30,6 @@
 //! Source: the float encoding is the one-range member of the family in Melançon, Serrano and Feeley 2024
 //! (arXiv 2411.16544), as in CRuby's flonums; the tags follow the measurements in the design notes.
 
-#![allow(unsafe_code)]
-
 use crate::heap::layout::{Cons, Header};
 use std::fmt;
 
@@ -76,7 +74,7 @@ const fn immediate(sub: u64, payload: u64) -> Value {
 
 impl Value {
     /// What moves the exponents of the window to the two patterns that the rotation turns into the tag.
-    pub(crate) const DOUBLE_BIAS: u64 = 3 << 60;
+    pub const DOUBLE_BIAS: u64 = 3 << 60;
 
     /// The empty list and falsehood.
     pub const NIL: Value = immediate(SUB_NIL, 0);
@@ -99,7 +97,7 @@ impl Value {
     /// The one double that is not a number; payloads of other NaNs are dropped.
     pub const NAN: Value = immediate(SUB_NAN, 0);
     /// What debug builds write over freed memory. No live object holds it.
-    pub(crate) const POISON: Value = immediate(SUB_POISON, 0xBAD_F00D);
+    pub const POISON: Value = immediate(SUB_POISON, 0xBAD_F00D);
 
     /// Least fixnum, −2^61.
     pub const FIXNUM_MIN: i64 = -(1 << 61);
@@ -278,25 +276,25 @@ impl Value {
 
     /// The entry with this index among the terms of the database. Never seen by a program.
     #[inline(always)]
-    pub(crate) const fn term(index: u32) -> Value {
+    pub const fn term(index: u32) -> Value {
         immediate(SUB_TERM, index as u64)
     }
 
     /// The index, if this is an entry among the terms of the database.
     #[inline(always)]
-    pub(crate) const fn as_term(self) -> Option<u32> {
+    pub const fn as_term(self) -> Option<u32> {
         if self.0 & 0xFF == SUB_TERM << 3 | TAG_IMMEDIATE { Some((self.0 >> 8) as u32) } else { None }
     }
 
     /// The logical variable with this number. Never seen by a program.
     #[inline(always)]
-    pub(crate) const fn variable(number: u32) -> Value {
+    pub const fn variable(number: u32) -> Value {
         immediate(SUB_VARIABLE, number as u64)
     }
 
     /// The number, if this is a logical variable.
     #[inline(always)]
-    pub(crate) const fn as_variable(self) -> Option<u32> {
+    pub const fn as_variable(self) -> Option<u32> {
         if self.0 & 0xFF == SUB_VARIABLE << 3 | TAG_IMMEDIATE { Some((self.0 >> 8) as u32) } else { None }
     }
 
@@ -379,7 +377,7 @@ impl Value {
     /// # Safety
     /// `cons` is the address of an initialised cons in the heap of this VM.
     #[inline(always)]
-    pub(crate) unsafe fn from_cons(cons: *mut Cons) -> Value {
+    pub unsafe fn from_cons(cons: *mut Cons) -> Value {
         let address = cons.expose_provenance() as u64;
         debug_assert!(address & 15 == 0);
         Value(address + TAG_CONS)
@@ -390,7 +388,7 @@ impl Value {
     /// # Safety
     /// `object` is the address of an object in the heap of this VM, all of it initialised.
     #[inline(always)]
-    pub(crate) unsafe fn from_object(object: *mut Header) -> Value {
+    pub unsafe fn from_object(object: *mut Header) -> Value {
         let address = object.expose_provenance() as u64;
         debug_assert!(address & 15 == 0);
         Value(address + TAG_OBJECT)

@@ -1,8 +1,8 @@
 //! Access to objects from safe code: what goes in comes out, and what does not fit is refused.
 
-use esl_vm::heap::layout::{Array, Code, Header, KINDS, Symbol};
-use esl_vm::heap::{AllocError, CodeParts, Heap, HeapConfig, Kind};
-use esl_vm::value::Value;
+use esl_heap::heap::layout::{Array, Code, Header, KINDS, Symbol};
+use esl_heap::heap::{AllocError, CodeParts, Heap, HeapConfig, Kind};
+use esl_heap::value::Value;
 
 fn heap() -> Heap {
     // SAFETY: every test has one heap and keeps its values.

@@ -5,7 +5,7 @@
 
 /// The upper case of a letter that has one; the character itself otherwise.
 #[inline]
-pub(crate) fn upcase(code: u32) -> u32 {
+pub fn upcase(code: u32) -> u32 {
     if code < 0x80 {
         return if code.wrapping_sub('a' as u32) < 26 { code - 32 } else { code };
     }
@@ -14,7 +14,7 @@ pub(crate) fn upcase(code: u32) -> u32 {
 
 /// The lower case of a letter that has one; the character itself otherwise.
 #[inline]
-pub(crate) fn downcase(code: u32) -> u32 {
+pub fn downcase(code: u32) -> u32 {
     if code < 0x80 {
         return if code.wrapping_sub('A' as u32) < 26 { code + 32 } else { code };
     }
@@ -23,7 +23,7 @@ pub(crate) fn downcase(code: u32) -> u32 {
 
 /// What letters that differ in case only share.
 #[inline]
-pub(crate) fn fold(code: u32) -> u32 {
+pub fn fold(code: u32) -> u32 {
     downcase(code)
 }
 
@@ -48,23 +48,23 @@ fn lower(c: char) -> Option<char> {
 }
 
 /// Whether it is a letter with a lower case.
-pub(crate) fn is_upper(code: u32) -> bool {
+pub fn is_upper(code: u32) -> bool {
     downcase(code) != code
 }
 
 /// Whether it is a letter with an upper case.
-pub(crate) fn is_lower(code: u32) -> bool {
+pub fn is_lower(code: u32) -> bool {
     upcase(code) != code
 }
 
 /// Whether it is a letter.
-pub(crate) fn is_alphabetic(code: u32) -> bool {
+pub fn is_alphabetic(code: u32) -> bool {
     // What the standard library calls alphabetic takes in marks that go above letters.
     char::from_u32(code).is_some_and(char::is_alphabetic) && !(0x300..0x370).contains(&code)
 }
 
 /// Whether it is a letter or a digit.
-pub(crate) fn is_alphanumeric(code: u32) -> bool {
+pub fn is_alphanumeric(code: u32) -> bool {
     is_alphabetic(code) || char::from_u32(code).is_some_and(char::is_numeric) && !is_small_number(code)
 }
 
@@ -74,7 +74,7 @@ fn is_small_number(code: u32) -> bool {
 }
 
 /// Whether it is not for control.
-pub(crate) fn is_graphic(code: u32) -> bool {
+pub fn is_graphic(code: u32) -> bool {
     (0x20..0x7F).contains(&code) || code >= 0xA0
 }
 
@@ -94,7 +94,7 @@ fn is_invisible(c: char) -> bool {
 }
 
 /// The weight of a digit in `radix`, from 2 to 36, if it is one. Other scripts' digits do not count.
-pub(crate) fn digit_weight(code: u32, radix: u32) -> Option<u32> {
+pub fn digit_weight(code: u32, radix: u32) -> Option<u32> {
     char::from_u32(code)?.to_digit(radix)
 }
 
@@ -146,7 +146,7 @@ const NAMES: [(u32, &str); 42] = [
 
 /// The name of a character: a word for those that show nothing, `U` and its code in hexadecimal for other ones that do
 /// not print as themselves. Characters that do have none.
-pub(crate) fn name(code: u32) -> Option<String> {
+pub fn name(code: u32) -> Option<String> {
     if let Some((_, name)) = NAMES.iter().find(|&&(named, _)| named == code) {
         return Some((*name).into());
     }
@@ -154,7 +154,7 @@ pub(crate) fn name(code: u32) -> Option<String> {
 }
 
 /// The character with this name, in any case.
-pub(crate) fn named(name: &str) -> Option<u32> {
+pub fn named(name: &str) -> Option<u32> {
     if let Some(&(code, _)) = NAMES.iter().find(|(_, known)| known.eq_ignore_ascii_case(name)) {
         return Some(code);
     }

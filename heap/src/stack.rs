@@ -13,7 +13,6 @@
 //!    clear and so looks like a fixnum.
 //! 2. Words that may hold an address of a dead object are above the top of the running frame; [`Stack::wipe`] clears
 //!    them before each scan.
-#![allow(unsafe_code)]
 
 use std::alloc::{Layout, alloc, dealloc, handle_alloc_error};
 use std::ptr::NonNull;
@@ -21,7 +20,7 @@ use std::ptr::NonNull;
 use crate::value::Value;
 
 /// A stack.
-pub(crate) struct Stack {
+pub struct Stack {
     start: NonNull<Value>,
     capacity: u32,
 }
@@ -42,35 +41,35 @@ fn segment(words: usize) -> usize {
 
 impl Stack {
     /// A stack of nils with at least `words` words.
-    pub(crate) fn new(words: usize) -> Stack {
+    pub fn new(words: usize) -> Stack {
         let capacity = segment(words);
         Stack { start: allocate(capacity), capacity: capacity as u32 }
     }
 
     /// A stack without words, in the place of one that is taken away.
-    pub(crate) const fn none() -> Stack {
+    pub const fn none() -> Stack {
         Stack { start: NonNull::dangling(), capacity: 0 }
     }
 
     /// Address of the first word.
     #[inline(always)]
-    pub(crate) fn start(&self) -> *mut Value {
+    pub fn start(&self) -> *mut Value {
         self.start.as_ptr()
     }
 
     /// Number of words.
     #[inline(always)]
-    pub(crate) fn capacity(&self) -> usize {
+    pub fn capacity(&self) -> usize {
         self.capacity as usize
     }
 
     /// Makes room for at least `words` words, keeping the contents. Moves the stack.
-    pub(crate) fn grow(&mut self, words: usize) {
+    pub fn grow(&mut self, words: usize) {
         self.move_to(segment(words.max(self.capacity() + self.capacity() / 4)));
     }
 
     /// Gives back what is not needed for the words below `top`. Moves the stack.
-    pub(crate) fn shrink(&mut self, top: usize) {
+    pub fn shrink(&mut self, top: usize) {
         self.move_to(segment(top));
     }
 
@@ -88,7 +87,7 @@ impl Stack {
     }
 
     /// Clears everything from `top` on, so that what is below is all that a scan sees.
-    pub(crate) fn wipe(&mut self, top: usize) {
+    pub fn wipe(&mut self, top: usize) {
         // The interpreter does not note how high it has written: that would cost each call a store.
         for index in top..self.capacity() {
             // SAFETY: the index is below the capacity.
@@ -97,7 +96,7 @@ impl Stack {
     }
 
     /// The words below `top`.
-    pub(crate) fn words(&self, top: usize) -> &[Value] {
+    pub fn words(&self, top: usize) -> &[Value] {
         debug_assert!(top <= self.capacity());
         // SAFETY: invariant 1.
         unsafe { std::slice::from_raw_parts(self.start.as_ptr(), top.min(self.capacity())) }

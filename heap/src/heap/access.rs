@@ -163,7 +163,7 @@ impl Heap {
 
     /// Copies elements of a simple vector over those of another, or of the same, as if by way of a third; `None` if one
     /// is none or has not so many.
-    pub(crate) fn vector_copy(
+    pub fn vector_copy(
         &mut self,
         from: Value,
         from_start: usize,
@@ -187,7 +187,7 @@ impl Heap {
     }
 
     /// Sets the elements of a simple vector from `start` to before `end`; `None` if `v` is none or has not so many.
-    pub(crate) fn vector_fill(&mut self, v: Value, start: usize, end: usize, value: Value) -> Option<()> {
+    pub fn vector_fill(&mut self, v: Value, start: usize, end: usize, value: Value) -> Option<()> {
         let count = self.vector(v)?.get(start..end)?.len();
         let object = self.object_of(v, Kind::SimpleVector)?;
         // SAFETY: the range is inside of a live vector; all that is overwritten was marked before.
@@ -279,18 +279,22 @@ impl Heap {
         Some(unsafe { (*object.cast::<Function>()).code })
     }
 
-    /// Gives a function other code; `None` if `v` is no function, or `code` no Code, or one that has more captures. Only
-    /// the loader does so, when it puts the real code in place of a stub.
-    pub(crate) fn function_set_code(&mut self, v: Value, code: Value) -> Option<()> {
-        if self.code(code)?.spare[1] as usize > self.function_captures(v)?.len() {
+    /// Puts other code in place of a function's; `None` if `v` is no function or `code` no Code.
+    ///
+    /// # Safety
+    /// The old code of the function is not being executed, and the new code reads no capture that the function lacks.
+    pub unsafe fn function_set_code(&mut self, v: Value, code: Value) -> Option<()> {
+        if !self.is(code, Kind::Code) {
             return None;
         }
         self.set_slot(v, Kind::Function, 0, code)
     }
 
-    /// Sets a constant of code; `None` if `v` is none or has no such constant. Only for constants of which the
-    /// interpreter expects nothing, or a class in place of its name.
-    pub(crate) fn code_set_constant(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
+    /// Sets a constant of code; `None` if `v` is no Code or has no such constant.
+    ///
+    /// # Safety
+    /// The code's words may run with the new constant: it is of the sort that they take for granted.
+    pub unsafe fn code_set_constant(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
         let object = self.object_of(v, Kind::Code)?;
         // SAFETY: a live code object has `nconsts` values at the fixed offset, and `index` is below that.
         unsafe {

@@ -10,8 +10,6 @@
 
 use super::layout::{Bignum, Boxed, Code, Cons, Float, Function, Header, Kind, MAX_LENGTH, Symbol, Vector};
 use super::{AllocError, Heap};
-use crate::load::Verified;
-use crate::shape::{Shape, Sort};
 use crate::value::Value;
 
 /// What a Code object is made from.
@@ -27,7 +25,7 @@ pub struct CodeParts<'a> {
     pub arity: u32,
     /// Number of registers of a frame.
     pub nregs: u32,
-    /// The packed shape, and the number of captures: see [`crate::shape`].
+    /// Two words of the caller's own, such as the number of captures.
     pub spare: [u64; 2],
     /// The constants.
     pub constants: &'a [Value],
@@ -165,7 +163,7 @@ impl Heap {
     /// A vector or string to be, of `len` elements, which [`Heap::fill_more`] fills piece by piece: the system takes its time
     /// for memory that is touched for the first time. One that is not large is filled at once, with 0 or the character of
     /// code 0.
-    pub(crate) fn begin_vector(&mut self, len: usize, is_string: bool) -> Result<Value, AllocError> {
+    pub fn begin_vector(&mut self, len: usize, is_string: bool) -> Result<Value, AllocError> {
         let kind = if is_string { Kind::UnfinishedString } else { Kind::UnfinishedVector };
         if !super::large::is_large(kind.size(len)) {
             return if is_string {
@@ -182,7 +180,7 @@ impl Heap {
 
     /// Fills the next elements of what [`Heap::begin_vector`] began, at most so many; whether that were the last, and it is
     /// a vector or string now. A value with an address is not filled in, but 0 in its place. `None` if `v` is not unfinished.
-    pub(crate) fn fill_more(&mut self, v: Value, fill: Value, count: usize) -> Option<bool> {
+    pub fn fill_more(&mut self, v: Value, fill: Value, count: usize) -> Option<bool> {
         let object = v.as_object_ptr()?;
         // SAFETY: a live object; if unfinished it is large, so that it has a large header, and its elements from `filled` to
         // `len` are ours to write. When all are written it is what its new kind says.
@@ -214,7 +212,7 @@ impl Heap {
     }
 
     /// How many elements of an unfinished object have been filled, of how many; `None` if `v` is none.
-    pub(crate) fn filled(&self, v: Value) -> Option<(usize, usize)> {
+    pub fn filled(&self, v: Value) -> Option<(usize, usize)> {
         let object = v.as_object_ptr()?;
         // SAFETY: a live object; an unfinished one is large, so that it has a large header.
         unsafe {
@@ -343,45 +341,6 @@ impl Heap {
             std::ptr::copy_nonoverlapping(parts.words.as_ptr(), words, nwords);
             Ok(Value::from_object(object))
         }
-    }
-
-    /// New code of one word of the machine's own, such as what stands in for a function that is not there yet. `shape`
-    /// says that it is no bytecode, so its constants and registers are never looked at.
-    ///
-    /// # Panics
-    /// When `shape` is that of bytecode.
-    pub(crate) fn alloc_stub(
-        &mut self,
-        name: Value,
-        owner: Value,
-        shape: Shape,
-        ncaptures: usize,
-        word: u32,
-    ) -> Result<Value, AllocError> {
-        assert_ne!(shape.sort, Sort::Bytecode, "a stub is no bytecode");
-        let parts = CodeParts {
-            name,
-            debug: Value::NIL,
-            owner,
-            arity: Code::ANY_ARITY,
-            nregs: 0,
-            spare: [shape.pack(), ncaptures as u64],
-            constants: &[],
-            words: &[word],
-        };
-        // SAFETY: a call of code without an exact arity looks at the shape, which says that there is no bytecode.
-        unsafe { self.alloc_code(parts) }
-    }
-
-    /// New code of a function that was verified, laid out as [`crate::shape`] says.
-    pub(crate) fn alloc_verified_code(
-        &mut self,
-        parts: CodeParts<'_>,
-        _verified: &Verified,
-    ) -> Result<Value, AllocError> {
-        // SAFETY: the token says that the loader has taken the parts from a module that the verifier has accepted, or
-        // that is part of this program.
-        unsafe { self.alloc_code(parts) }
     }
 
     /// A new string of these code points.

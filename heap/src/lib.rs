@@ -1,0 +1,26 @@
+//! Values of the ESL virtual machine, and the garbage-collected heap where they live.
+//!
+//! | module | content |
+//! | --- | --- |
+//! | [`value`] | [`Value`]: one word that is any datum |
+//! | [`heap`] | [`Heap`]: allocation, checked access, incremental collection |
+//! | [`stack`] | the register stack of one task |
+//! | [`character`] | case, classes and names of characters |
+//!
+//! Guarantees: safe code cannot break memory safety through this crate, however odd the caller, once the two promises of
+//! [`Heap::new`] and [`Heap::end_marking`] are kept. Every function with a contract is an `unsafe fn` that states it.
+//!
+//! Not here: roots, the time at which to collect, and everything that a program does with its data.
+
+pub mod character;
+pub mod heap;
+pub mod stack;
+pub mod value;
+
+pub use heap::{AllocError, Heap, HeapConfig, Kind};
+pub use value::Value;
+
+/// The example of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
