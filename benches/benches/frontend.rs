@@ -1,6 +1,6 @@
-//! What happens to a program before it runs: reading, compiling, the file format and its verification. The unit of
-//! throughput is a line of the program.
-#![allow(missing_docs, reason = "criterion's macros make functions without")]
+//! Benchmarks of the steps before a program runs: reading, compiling, loading and verifying a file. The unit
+//! of throughput is a line of the program.
+#![allow(missing_docs, reason = "criterion's macros create undocumented functions")]
 
 use std::hint::black_box;
 
@@ -12,7 +12,7 @@ use esl_compiler::diagnostic::Sources;
 use esl_compiler::reader::{BareEnvironment, Reader};
 use esl_compiler::session::Compiler;
 
-/// A program as a user would write it.
+/// A typical program.
 const PLANT: &str = include_str!("../../examples/plant.esl");
 
 fn frontend(criterion: &mut Criterion) {

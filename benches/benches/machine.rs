@@ -1,5 +1,5 @@
-//! The machine: the interpreter, the collector, and what a start takes.
-#![allow(missing_docs, reason = "criterion's macros make functions without")]
+//! Benchmarks of the machine: the interpreter, the collector, and start-up.
+#![allow(missing_docs, reason = "criterion's macros create undocumented functions")]
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -20,7 +20,7 @@ fn engine(definitions: &str) -> Engine {
     engine
 }
 
-/// A few of the things that programs spend their time on; a call takes about a millisecond.
+/// Measures typical operations of programs; each call takes about a millisecond.
 fn interpreter(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("interpreter");
     for (name, definitions, call) in [
@@ -32,8 +32,10 @@ fn interpreter(criterion: &mut Criterion) {
         ),
         (
             "lists",
-            "(defun f (n) (let ((sum 0)) (dolist (x (mapcar (lambda (x) (* x 2)) (loop for i below n collect i)) sum)
-               (incf sum x))))",
+            "(defun f (n)
+               (let ((sum 0))
+                 (dolist (x (mapcar (lambda (x) (* x 2)) (loop for i below n collect i)) sum)
+                   (incf sum x))))",
             "(f 5000)",
         ),
         (
@@ -50,7 +52,7 @@ fn interpreter(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Builds and drops trees beside what lives on. The unit of throughput is a byte allocated.
+/// Builds and drops trees beside live data. The unit of throughput is an allocated byte.
 fn collector(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("collector");
     group
@@ -60,26 +62,27 @@ fn collector(criterion: &mut Criterion) {
         .warm_up_time(Duration::from_secs(1));
     for (name, live) in [("allocate_with_1_MB_live", 1_000_000), ("allocate_with_100_MB_live", 100_000_000)] {
         let mut engine = engine(DEFINITIONS);
-        engine.eval(&format!("(defvar *live* (tree {}))", live / CONS)).expect("there is room");
-        group.throughput(Throughput::Bytes(TURN * CONS));
+        engine.eval(&format!("(defvar *live* (tree {}))", live / CONS_BYTES)).expect("there is room");
+        group.throughput(Throughput::Bytes(CONSES * CONS_BYTES));
         group.bench_function(name, |bencher| {
-            bencher.iter(|| engine.eval(&format!("(churn {TURN})")).expect("it runs"));
+            bencher.iter(|| engine.eval(&format!("(churn {CONSES})")).expect("it runs"));
         });
     }
     let mut engine = engine(DEFINITIONS);
-    engine.eval(&format!("(defvar *live* (tree {}))", 100_000_000 / CONS)).expect("there is room");
+    engine.eval(&format!("(defvar *live* (tree {}))", 100_000_000 / CONS_BYTES)).expect("there is room");
     group.throughput(Throughput::Elements(1));
-    // The time of a whole cycle would be of no interest: this reports the longest wait of a cycle as the time of an
-    // iteration.
+    // The duration of a whole cycle says nothing about pauses: the time of an iteration is the longest step
+    // in it.
     group.bench_function("longest_step_with_100_MB_live", |bencher| {
         bencher.iter_custom(|iterations| (0..iterations).map(|_| longest_step(&mut engine)).sum());
     });
     group.finish();
 }
 
-const CONS: u64 = 16;
-/// Conses that a turn allocates.
-const TURN: u64 = 500_000;
+/// Bytes of a cons.
+const CONS_BYTES: u64 = 16;
+/// Conses allocated by one iteration.
+const CONSES: u64 = 500_000;
 
 const DEFINITIONS: &str = "
 (defun tree (n)
@@ -92,7 +95,7 @@ const DEFINITIONS: &str = "
     (dotimes (i n)
       (setq kept (if (= (mod i 1000) 0) nil (cons i kept))))))";
 
-/// The time that this thread has run: what other processes take is not part of a pause of this one.
+/// Returns the CPU time of this thread, which excludes time taken by other processes.
 #[cfg(unix)]
 fn thread_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
@@ -105,8 +108,8 @@ fn thread_time() -> Duration {
     START.elapsed()
 }
 
-/// Runs a program that allocates as much as it takes for a whole cycle, in steps of a slice's length, and gives the
-/// longest of these: a slice of the program with a turn of the collector in it.
+/// Returns the longest step of a program that allocates enough for two whole cycles, run in steps of one
+/// slice. Each step is a slice of the program with a collector turn in it.
 fn longest_step(engine: &mut Engine) -> Duration {
     let machine = engine.machine();
     let cycles = machine.heap_stats().cycles;
@@ -118,7 +121,7 @@ fn longest_step(engine: &mut Engine) -> Duration {
         let start = thread_time();
         let outcome = machine.run(2000);
         longest = longest.max(thread_time() - start);
-        assert_eq!(outcome, RunOutcome::TicksUsed, "the program goes on for ever");
+        assert_eq!(outcome, RunOutcome::TicksUsed, "the program is endless");
     }
     machine.abort(id);
     while machine.result(id) == TaskResult::Running {
@@ -128,7 +131,7 @@ fn longest_step(engine: &mut Engine) -> Duration {
     longest
 }
 
-/// What it takes to make a machine with the library, and to run the shortest of programs in it.
+/// Measures the creation of a machine with the library, and a minimal program in it.
 fn startup(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("startup");
     let host = || Box::new(VirtualHost::new());

@@ -1,4 +1,4 @@
--- closures: making them, calling them, and assigning to what they capture.
+-- closures: creating them, calling them, and assigning to captured variables.
 
 local function make_adder(n)
   return function(x) return x + n end

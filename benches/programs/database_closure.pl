@@ -1,4 +1,4 @@
-% The transitive closure of a graph of a thousand nodes with circles.
+% The transitive closure of a cyclic graph of a thousand nodes.
 :- dynamic edge/2.
 :- table path/2.
 path(X, Y) :- edge(X, Y).

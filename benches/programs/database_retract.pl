@@ -1,4 +1,4 @@
-% Half a million facts that come and go one by one, and as many that go at once.
+% Half a million facts asserted and retracted one by one, and as many retracted at once.
 :- dynamic state/2.
 add(I, V) :- ( state(I, V) -> true ; assertz(state(I, V)) ).
 fill :- forall(between(0, 499999, I), ( V is I mod 10, add(I, V) )).

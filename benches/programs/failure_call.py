@@ -1,4 +1,4 @@
-# failure_call: what the other programs of this family do besides: a loop, a call, a sum.
+# failure_call: the work common to all failure programs: a loop, a call, a sum.
 
 
 def operate(x):

@@ -1,4 +1,4 @@
-;;; failure_enter: entering a form that handles a condition, whose body signals none.
+;;; failure_enter: entering a form that handles a condition while its body signals none.
 
 (define-condition negative (serious-condition) ((x :initarg :x)))
 

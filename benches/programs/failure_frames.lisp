@@ -1,4 +1,4 @@
-;;; failure_frames: a condition that is signalled a hundred calls inside the form that handles it.
+;;; failure_frames: a condition signalled a hundred calls inside the form that handles it.
 
 (define-condition broken (serious-condition) ((x :initarg :x :reader broken-x)))
 

@@ -1,4 +1,4 @@
-# failure_frames: an exception a hundred calls inside the `try`.
+# failure_frames: an exception raised a hundred calls inside the `try`.
 
 
 class Broken(Exception):

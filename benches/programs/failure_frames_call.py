@@ -1,4 +1,4 @@
-# failure_frames_call: what failure_frames does besides: calls a hundred deep.
+# failure_frames_call: failure_frames without the failures: calls a hundred deep.
 
 
 def descend(depth, x):

@@ -1,4 +1,4 @@
--- failure_handled: an error that the protected call around it ends in, and gives a result for.
+-- failure_handled: an error caught by the enclosing protected call, which returns a result.
 
 local function operate(x)
   error({ cause = "broken", x = x })

@@ -1,4 +1,4 @@
-# failure_handled: an exception that the `try` around it ends in, and gives a result for.
+# failure_handled: an exception caught by the enclosing `try`, which returns a result.
 
 
 class Broken(Exception):

@@ -1,4 +1,4 @@
-;;; failure_retried: a condition whose handler mends what is broken and has the form evaluated again.
+;;; failure_retried: a condition whose handler repairs the cause and evaluates the form again.
 
 (defvar *broken* nil)
 

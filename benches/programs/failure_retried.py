@@ -1,4 +1,4 @@
-# failure_retried: an exception after which what is broken is mended, and the call made again.
+# failure_retried: an exception whose cause is repaired before the call is repeated.
 
 broken = False
 

@@ -1,3 +1,3 @@
-# hello: what it costs to start, print one line and end.
+# hello: the cost of starting, printing one line and ending.
 
 print("hello")

@@ -1,4 +1,4 @@
--- sequences_find_if: the first element that a predicate is true of, and of what a key function gives.
+-- sequences_find_if: the first element that satisfies a predicate, directly or after a key function.
 
 local function find_if(predicate, list)
   for i = 1, #list do

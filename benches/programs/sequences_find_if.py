@@ -1,4 +1,4 @@
-# sequences_find_if: the first element that a predicate is true of, and of what a key function gives.
+# sequences_find_if: the first element that satisfies a predicate, directly or after a key function.
 
 
 def find_if(predicate, items):

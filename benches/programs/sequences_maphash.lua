@@ -1,4 +1,4 @@
--- sequences_maphash: a function called with each entry of a table, to read it and to change it.
+-- sequences_maphash: a function called with each entry of a table, first to read, then to change it.
 
 local function map_entries(f, t)
   for key, value in pairs(t) do

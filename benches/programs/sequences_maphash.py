@@ -1,4 +1,4 @@
-# sequences_maphash: a function called with each entry of a dictionary, to read it and to change it.
+# sequences_maphash: a function called with each entry of a dictionary, first to read, then to change it.
 
 
 def run(rounds, size):

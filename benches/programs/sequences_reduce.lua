@@ -1,4 +1,4 @@
--- sequences_reduce: arrays folded with functions of the program's.
+-- sequences_reduce: arrays folded with user-defined functions.
 
 local function reduce(f, list, value)
   local first = 1

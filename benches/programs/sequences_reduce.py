@@ -1,4 +1,4 @@
-# sequences_reduce: lists folded with functions of the program's.
+# sequences_reduce: lists folded with user-defined functions.
 
 from functools import reduce
 

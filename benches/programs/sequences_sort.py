@@ -1,4 +1,4 @@
-# sequences_sort: sorting with a predicate of the program's.
+# sequences_sort: sorting with a user-defined predicate.
 
 from functools import cmp_to_key
 

@@ -1,4 +1,4 @@
--- sort: the library's sort of a vector, with a predicate given by the program.
+-- sort: the library's sort of a vector, with a user-defined predicate.
 
 local seed = 42
 

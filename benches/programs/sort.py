@@ -1,5 +1,5 @@
-# sort: the library's sort of a vector, with a predicate given by the program.
-# (Predicates, not keys, are what this row is about; Python calls them through cmp_to_key.)
+# sort: the library's sort of a vector, with a user-defined predicate.
+# (This row measures predicates, not keys; Python calls predicates through cmp_to_key.)
 
 from functools import cmp_to_key
 

@@ -1,4 +1,5 @@
-%% task_abort_beside_sleepers: kills of an endless loop, while ten thousand others wake every 100 ms. The median of a hundred.
+%% task_abort_beside_sleepers: kills of an endless loop, while ten thousand others wake every 100 ms.
+%% Reports the median of a hundred.
 -module(task_abort_beside_sleepers).
 -export([main/0]).
 

@@ -3,7 +3,8 @@
 -export([main/0]).
 
 main() ->
-    Pids = [spawn_monitor(fun() -> receive Value -> exit({value, Value}) end end) || _ <- lists:seq(1, 1000000)],
+    Pids = [spawn_monitor(fun() -> receive Value -> exit({value, Value}) end end)
+            || _ <- lists:seq(1, 1000000)],
     [Pid ! 1 || {Pid, _} <- Pids],
     io:format("~b~n", [lists:foldl(fun collect/2, 0, Pids)]).
 

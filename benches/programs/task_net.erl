@@ -1,4 +1,4 @@
-%% task_net: two processes that run side by side and are waited for, two hundred thousand times.
+%% task_net: two processes run side by side and awaited, two hundred thousand times.
 -module(task_net).
 -export([main/0]).
 

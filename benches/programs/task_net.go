@@ -1,4 +1,4 @@
-// task_net: two goroutines that run side by side and are waited for, two hundred thousand times.
+// task_net: two goroutines run side by side and awaited, two hundred thousand times.
 package main
 
 import (

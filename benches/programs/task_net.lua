@@ -1,4 +1,4 @@
--- task_net: two coroutines that are run by turns to their ends, two hundred thousand times.
+-- task_net: two coroutines run alternately to their ends, two hundred thousand times.
 local sum = 0
 for i = 0, 199999 do
   local a = coroutine.create(function() return i end)

@@ -1,4 +1,4 @@
--- task_ping_pong: two coroutines, switched to by a third thread of control, that hand each other a value a million times.
+-- task_ping_pong: two coroutines that pass each other a value a million times; the main program resumes them.
 local ping, pong
 local answer = coroutine.create(function()
   for _ = 1, 1000000 do

@@ -1,4 +1,4 @@
-// task_ring: a thousand goroutines in a ring hand a number on, each adding one, a thousand times around.
+// task_ring: a thousand goroutines in a ring pass on a number, each adding one, a thousand times around.
 package main
 
 import "fmt"

@@ -1,4 +1,4 @@
--- task_ring: a thousand coroutines in a ring hand a number on, each adding one, a thousand times around.
+-- task_ring: a thousand coroutines in a ring pass on a number, each adding one, a thousand times around.
 local ring = {}
 for i = 1, 1000 do
   ring[i] = coroutine.create(function(value)

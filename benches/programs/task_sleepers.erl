@@ -3,7 +3,8 @@
 -export([main/0]).
 
 main() ->
-    Refs = [element(2, spawn_monitor(fun() -> sleeper(1 + (I rem 100) div 10, 10) end)) || I <- lists:seq(0, 99999)],
+    Refs = [element(2, spawn_monitor(fun() -> sleeper(1 + (I rem 100) div 10, 10) end))
+            || I <- lists:seq(0, 99999)],
     [receive {'DOWN', Ref, process, _, _} -> ok end || Ref <- Refs],
     io:format("~b~n", [length(Refs)]).
 

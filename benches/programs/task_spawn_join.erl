@@ -1,4 +1,4 @@
-%% task_spawn_join: a million processes, one after another, each made and waited for.
+%% task_spawn_join: a million processes, one after another, each created and awaited.
 -module(task_spawn_join).
 -export([main/0]).
 

@@ -1,4 +1,4 @@
-// task_spawn_join: a million goroutines, one after another, each made and waited for.
+// task_spawn_join: a million goroutines, one after another, each created and awaited.
 package main
 
 import "fmt"

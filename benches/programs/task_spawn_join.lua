@@ -1,4 +1,4 @@
--- task_spawn_join: a million coroutines, one after another, each made and run to its end.
+-- task_spawn_join: a million coroutines, one after another, each created and run to its end.
 local sum = 0
 for i = 0, 999999 do
   local _, value = coroutine.resume(coroutine.create(function() return i end))

@@ -1,4 +1,4 @@
-%% task_spawn_many: a hundred thousand processes made, then all waited for.
+%% task_spawn_many: a hundred thousand processes created, then all awaited.
 -module(task_spawn_many).
 -export([main/0]).
 

@@ -1,4 +1,4 @@
-// task_spawn_many: a hundred thousand goroutines made, then all waited for.
+// task_spawn_many: a hundred thousand goroutines created, then all awaited.
 package main
 
 import "fmt"

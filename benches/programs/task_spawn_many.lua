@@ -1,4 +1,4 @@
--- task_spawn_many: a hundred thousand coroutines made, then all run to their end.
+-- task_spawn_many: a hundred thousand coroutines created, then all run to their end.
 local tasks = {}
 for i = 0, 99999 do tasks[#tasks + 1] = coroutine.create(function() return i + 1 end) end
 local sum = 0

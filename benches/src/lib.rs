@@ -1,1 +1,1 @@
-//! Benchmarks of ESL.
+//! Benchmarks of ESL. The library is empty; the benches are in `benches/`, the programs in `programs/`.

@@ -1,4 +1,4 @@
-//! A text as a program: what compiles passes the verifier, and runs without harm.
+//! Compiles a text as a program: compiled code passes the verifier and runs without harm.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|text: &str| {

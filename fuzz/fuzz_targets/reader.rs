@@ -1,4 +1,4 @@
-//! Bytes as a source file: no panic, no wait.
+//! Reads bytes as a source file: no panic, no endless loop.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
