@@ -6,7 +6,7 @@ use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// `a + b`.
+/// Returns `a + b`.
 pub(crate) fn add(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     if let (Some(x), Some(y)) = (a.as_fixnum(), b.as_fixnum())
         && let Some(result) = Value::fixnum(x + y)
@@ -31,7 +31,7 @@ pub(crate) fn add(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     }
 }
 
-/// `a - b`.
+/// Returns `a - b`.
 pub(crate) fn subtract(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     if let (Some(x), Some(y)) = (a.as_fixnum(), b.as_fixnum())
         && let Some(result) = Value::fixnum(x - y)
@@ -56,7 +56,7 @@ pub(crate) fn subtract(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     }
 }
 
-/// `- a`.
+/// Returns `-a`.
 pub(crate) fn negate(vm: &mut Vm, a: Value) -> Outcome {
     match vm.number(a, "NUMBER")? {
         Number::Int(n) => {
@@ -71,7 +71,7 @@ pub(crate) fn negate(vm: &mut Vm, a: Value) -> Outcome {
     }
 }
 
-/// `a · b`.
+/// Returns `a · b`.
 pub(crate) fn multiply(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     if let Some((x, y)) = unboxed_doubles(a, b) {
         return vm.float_value("*", x * y);
@@ -99,7 +99,7 @@ pub(crate) fn multiply(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     }
 }
 
-/// `a / b`: a ratio where integers do not divide.
+/// Returns `a / b`, a ratio where the division of integers leaves a remainder.
 pub(crate) fn divide(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     if let Some((x, y)) = unboxed_doubles(a, b) {
         return float_quotient(vm, "/", [a, b], x, y);
@@ -122,7 +122,8 @@ pub(crate) fn divide(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     }
 }
 
-/// The quotient of doubles, which the values `operands` are.
+/// Returns the quotient of the doubles `x` and `y`; `operands` are their values, for the condition of a
+/// failure.
 pub(crate) fn float_quotient(vm: &mut Vm, op: &'static str, operands: [Value; 2], x: f64, y: f64) -> Outcome {
     if y == 0.0 && x != 0.0 {
         return vm.raise(Raised::DivisionByZero(op, operands));
@@ -130,7 +131,7 @@ pub(crate) fn float_quotient(vm: &mut Vm, op: &'static str, operands: [Value; 2]
     vm.float_value(op, x / y)
 }
 
-/// A double and a double or fixnum, as doubles, if neither needs a look at the heap.
+/// Returns two doubles, or a double and a fixnum, as doubles, if neither is an object in the heap.
 #[inline]
 pub(crate) fn unboxed_doubles(a: Value, b: Value) -> Option<(f64, f64)> {
     match (a.as_fixnum(), b.as_fixnum()) {
@@ -148,12 +149,12 @@ pub(crate) enum Pair {
     Floats(f64, f64),
 }
 
-/// The numbers that `a` and `b` are, brought to one type by contagion.
+/// Returns the numbers `a` and `b`, converted to one type by contagion.
 pub(crate) fn operands(vm: &mut Vm, op: &'static str, a: Value, b: Value) -> Result<Pair, Exit> {
     typed_operands(vm, op, a, b, "NUMBER")
 }
 
-/// As [`operands`], where something else is not of type `expected`.
+/// As [`operands`], with type errors that name `expected`.
 pub(crate) fn typed_operands(
     vm: &mut Vm,
     op: &'static str,
@@ -173,13 +174,16 @@ pub(crate) fn typed_operands(
     })
 }
 
-/// Charges for arithmetic on ratios, unless their parts are too large for one operation.
+/// Charges for arithmetic on ratios.
+///
+/// # Errors
+/// [`Exit::Slowly`] if the parts are too large for one operation.
 pub(crate) fn check_ratios(vm: &mut Vm, x: &Ratio, y: &Ratio) -> Result<(), Exit> {
     check_gcd(vm, x.len(), y.len())
 }
 
-/// As [`check_ratios`], for a sum: with an integer it takes one product and no divisor, so that of a ratio and a fixnum is
-/// never too much.
+/// As [`check_ratios`], for a sum. A sum with an integer takes one product and no divisor, so that a ratio
+/// plus a fixnum is always within the limit.
 fn check_sum(vm: &mut Vm, x: &Ratio, y: &Ratio) -> Result<(), Exit> {
     if x.denominator.is_one() || y.denominator.is_one() {
         return vm.check_work(2 * x.len(), y.len());
@@ -187,7 +191,10 @@ fn check_sum(vm: &mut Vm, x: &Ratio, y: &Ratio) -> Result<(), Exit> {
     check_ratios(vm, x, y)
 }
 
-/// Charges for a greatest common divisor of integers of `a` and `b` limbs, unless that is too much for one operation.
+/// Charges for a greatest common divisor of integers of `a` and `b` limbs.
+///
+/// # Errors
+/// [`Exit::Slowly`] if that is too much work for one operation.
 pub(crate) fn check_gcd(vm: &mut Vm, a: usize, b: usize) -> Result<(), Exit> {
     let (long, short) = (a.max(b), a.min(b));
     if short > limit::GCD_LIMBS || 2 * long.saturating_mul(short) > limit::WORK_LIMIT {

@@ -1,4 +1,4 @@
-//! Integers as infinite rows of bits in two's complement.
+//! Bits of integers, as infinite rows of bits in two's complement.
 
 use num_bigint::BigInt;
 use num_traits::Signed;
@@ -8,21 +8,21 @@ use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// A way to join the bits of two integers.
+/// A bitwise operation on two integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum BitOperation {
-    /// Bits that are in both.
+    /// Bits set in both.
     And,
-    /// Bits that are in either.
+    /// Bits set in either.
     Or,
-    /// Bits that are in one and not in the other.
+    /// Bits set in exactly one.
     Xor,
 }
 
-/// The integers joined bit by bit.
+/// Returns `a` and `b` joined bit by bit.
 pub(crate) fn join(vm: &mut Vm, operation: BitOperation, a: Value, b: Value) -> Outcome {
     if let (Some(a), Some(b)) = (a.as_fixnum(), b.as_fixnum()) {
-        // Two's complement of fixnums is closed under all of these.
+        // Fixnums in two's complement are closed under all of these.
         let joined = match operation {
             BitOperation::And => a & b,
             BitOperation::Or => a | b,
@@ -35,14 +35,14 @@ pub(crate) fn join(vm: &mut Vm, operation: BitOperation, a: Value, b: Value) -> 
     vm.integer_value("LOGAND", &a.joined(operation, &b))
 }
 
-/// `(lognot a)`
+/// Implements `(lognot a)`.
 pub(crate) fn complement(vm: &mut Vm, a: Value) -> Outcome {
     let a = vm.integer(a)?;
     vm.charge(a.len());
     vm.integer_value("LOGNOT", &a.complement())
 }
 
-/// `(ash a count)`
+/// Implements `(ash a count)`.
 pub(crate) fn shift(vm: &mut Vm, a: Value, count: Value) -> Outcome {
     let (n, count) = (vm.integer(a)?, vm.integer(count)?);
     vm.charge(n.len());
@@ -53,14 +53,14 @@ pub(crate) fn shift(vm: &mut Vm, a: Value, count: Value) -> Outcome {
         let shift = u64::try_from(count.negated().to_big()).unwrap_or(u64::MAX);
         return vm.integer_value("ASH", &n.shifted_right(shift));
     }
-    // What does not fit is beyond the limit anyway.
+    // A count beyond 64 bits exceeds the limit in any case.
     let shift = u64::try_from(count.to_big()).unwrap_or(u64::MAX >> 1).min(u64::MAX >> 1);
     vm.check_bits("ASH", n.bits() + shift)?;
     vm.charge(shift as usize / 64);
     vm.integer_value("ASH", &n.shifted_left(shift))
 }
 
-/// `(logbitp index a)`: an index past the last bit sees the sign.
+/// Implements `(logbitp index a)`: an index past the last bit sees the sign.
 pub(crate) fn bit(vm: &mut Vm, index: Value, a: Value) -> Result<bool, Exit> {
     let n = vm.integer(a)?;
     match Int::of(&vm.heap, index) {
@@ -72,17 +72,17 @@ pub(crate) fn bit(vm: &mut Vm, index: Value, a: Value) -> Result<bool, Exit> {
     }
 }
 
-/// `size` bits of `a` from bit `position` up, as an integer that is not negative.
+/// Returns `size` bits of `a` from bit `position` up, as an integer that is not negative.
 pub(crate) fn field(vm: &mut Vm, size: u64, position: u64, a: &Int) -> Result<Int, Exit> {
     vm.charge(a.len());
     let shifted = a.shifted_right(position);
-    // Above the length of a number that is not negative there is nothing.
+    // A number that is not negative has only zeros above its length.
     let size = if shifted.is_negative() { size } else { size.min(shifted.bits()) };
     vm.check_bits("LDB", size)?;
     Ok(shifted.joined(BitOperation::And, &mask(size)))
 }
 
-/// `a` with the field of `size` bits from `position` up replaced by the lowest bits of `new`.
+/// Returns `a` with the field of `size` bits from `position` up replaced by the lowest bits of `new`.
 pub(crate) fn deposit(vm: &mut Vm, new: &Int, size: u64, position: u64, a: &Int) -> Result<Int, Exit> {
     if size == 0 {
         return Ok(a.clone());
@@ -95,13 +95,13 @@ pub(crate) fn deposit(vm: &mut Vm, new: &Int, size: u64, position: u64, a: &Int)
     Ok(kept.joined(BitOperation::Or, &placed))
 }
 
-/// `size` ones.
+/// Returns an integer of `size` ones.
 fn mask(size: u64) -> Int {
     Int::ONE.shifted_left(size).minus(&Int::ONE)
 }
 
 impl Int {
-    /// Both joined bit by bit.
+    /// Returns both integers joined bit by bit.
     pub(crate) fn joined(&self, operation: BitOperation, other: &Int) -> Int {
         if let (Int::Small(a), Int::Small(b)) = (self, other) {
             return Int::Small(match operation {
@@ -118,7 +118,7 @@ impl Int {
         })
     }
 
-    /// All bits turned over: `-1 - self`.
+    /// Returns the integer with all bits inverted: `-1 - self`.
     pub(crate) fn complement(&self) -> Int {
         match self {
             Int::Small(n) => Int::Small(!n),
@@ -126,7 +126,7 @@ impl Int {
         }
     }
 
-    /// The bit with this index.
+    /// Returns the bit at `index`.
     pub(crate) fn bit(&self, index: u64) -> bool {
         match self {
             Int::Small(n) => n >> index.min(127) & 1 == 1,
@@ -134,7 +134,7 @@ impl Int {
         }
     }
 
-    /// Ones of an integer that is not negative, zeros of a negative one.
+    /// Returns the number of ones of an integer that is not negative, of zeros of a negative one.
     pub(crate) fn count_bits(&self) -> u64 {
         let ones = |n: &BigInt| n.iter_u64_digits().map(|limb| u64::from(limb.count_ones())).sum();
         match self {
@@ -144,7 +144,7 @@ impl Int {
         }
     }
 
-    /// Bits that it takes in two's complement, the sign not counted.
+    /// Returns the length in two's complement, in bits, without the sign.
     pub(crate) fn length(&self) -> u64 {
         if self.is_negative() { self.complement().bits() } else { self.bits() }
     }

@@ -9,7 +9,7 @@ use crate::raise::Exit;
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// Both as doubles of just the same value, if neither needs a look at the heap.
+/// Returns both numbers as doubles of exactly their values, if neither is an object in the heap.
 #[inline]
 fn exact_doubles(a: Value, b: Value) -> Option<(f64, f64)> {
     let exact = |v: Value| match v.as_fixnum() {
@@ -20,7 +20,7 @@ fn exact_doubles(a: Value, b: Value) -> Option<(f64, f64)> {
     Some((exact(a)?, exact(b)?))
 }
 
-/// `(= a b)`.
+/// Implements `(= a b)`.
 pub(crate) fn num_equal(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
     if let Some((x, y)) = exact_doubles(a, b) {
         return Ok(x == y);
@@ -33,7 +33,7 @@ pub(crate) fn num_equal(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
     Ok(same_value(&vm.heap, a, b))
 }
 
-/// Whether both are numbers of one value, whatever their types.
+/// Returns whether both are numbers of equal value, whatever their types.
 pub(crate) fn same_value(heap: &Heap, a: Value, b: Value) -> bool {
     if let (Some(x), Some(y)) = (heap.as_double(a), heap.as_double(b)) {
         return x == y;
@@ -41,7 +41,7 @@ pub(crate) fn same_value(heap: &Heap, a: Value, b: Value) -> bool {
     if eql(heap, a, b) {
         return super::is_number(heap, a);
     }
-    // Of one type, rationals have one representation; so one of them must be a double.
+    // Rationals of equal value are `eql`, so one of the two must be a double.
     let (x, other) = match (heap.as_double(a), heap.as_double(b)) {
         (Some(x), None) => (x, b),
         (None, Some(x)) => (x, a),
@@ -54,17 +54,17 @@ pub(crate) fn same_value(heap: &Heap, a: Value, b: Value) -> bool {
     }
 }
 
-/// `(< a b)`.
+/// Implements `(< a b)`.
 pub(crate) fn less(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
     Ok(compare(vm, "<", a, b, "REAL")? == Some(Ordering::Less))
 }
 
-/// `(<= a b)`.
+/// Implements `(<= a b)`.
 pub(crate) fn less_or_equal(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
     Ok(matches!(compare(vm, "<=", a, b, "REAL")?, Some(Ordering::Less | Ordering::Equal)))
 }
 
-/// −1, 0 or 1, as `a` is below, at or above zero.
+/// Returns −1, 0 or 1, as `a` is below, at or above zero.
 pub(crate) fn sign(vm: &mut Vm, a: Value, expected: &'static str) -> Result<i32, Exit> {
     match sign_of(&vm.heap, a) {
         Some(sign) => Ok(sign),
@@ -72,7 +72,7 @@ pub(crate) fn sign(vm: &mut Vm, a: Value, expected: &'static str) -> Result<i32,
     }
 }
 
-/// As [`sign`]; nothing for what is no number.
+/// As [`sign`]; `None` unless `a` is a number.
 pub(crate) fn sign_of(heap: &Heap, a: Value) -> Option<i32> {
     if let Some(n) = a.as_fixnum() {
         return Some(n.signum() as i32);
@@ -87,7 +87,7 @@ pub(crate) fn sign_of(heap: &Heap, a: Value) -> Option<i32> {
     Some(i32::from(x > 0.0) - i32::from(x < 0.0))
 }
 
-/// How `a` compares with `b`; nothing when one is not a number in the sense of floats.
+/// Compares `a` with `b`; `None` if one of them is a NaN.
 fn compare(
     vm: &mut Vm,
     op: &'static str,
@@ -122,7 +122,7 @@ fn compare(
 
 fn float_and_int(x: f64, n: &Int) -> Option<Ordering> {
     match n {
-        // Integers of 53 bits are doubles exactly.
+        // Integers below 2^53 are exact as doubles.
         Int::Small(n) if n.unsigned_abs() < 1 << 53 => x.partial_cmp(&(*n as f64)),
         _ if !x.is_finite() => x.partial_cmp(&0.0),
         _ => {
@@ -137,7 +137,8 @@ fn float_and_ratio(vm: &mut Vm, op: &'static str, x: f64, r: &Ratio) -> Result<O
     if x.is_finite() { float::rational(x).compare(vm, op, r).map(Some) } else { Ok(x.partial_cmp(&0.0)) }
 }
 
-/// `(eql a b)`: the same object, or numbers of one type with one value, the sign of zero counted.
+/// Implements `(eql a b)`: the same object, or numbers of one type and value, where zeros of different sign
+/// differ.
 #[inline]
 pub(crate) fn eql(heap: &Heap, a: Value, b: Value) -> bool {
     a == b || a.is_object() && b.is_object() && boxed_eql(heap, a, b)
@@ -153,7 +154,7 @@ fn boxed_eql(heap: &Heap, a: Value, b: Value) -> bool {
         Some(Kind::Float) => heap.as_double(a).map(f64::to_bits) == heap.as_double(b).map(f64::to_bits),
         Some(Kind::Bignum) => heap.bignum(a) == heap.bignum(b),
         Some(Kind::Ratio) => match (heap.ratio(a), heap.ratio(b)) {
-            // The parts are integers, so this goes one level deep.
+            // The parts are integers, so the recursion is one level deep.
             (Some((a, b)), Some((c, d))) => eql(heap, a, c) && eql(heap, b, d),
             _ => false,
         },

@@ -1,6 +1,6 @@
 //! Trigonometric and hyperbolic functions, on doubles.
 //!
-//! What computes them is in `transcendental`.
+//! Here are names, domains and failures; the computation is in `transcendental`.
 
 use super::transcendental;
 use crate::raise::{Outcome, Raised};
@@ -10,11 +10,11 @@ use crate::vm::Vm;
 /// A function of one double.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Elementary {
-    /// Its name in `COMMON-LISP`.
+    /// Name in `COMMON-LISP`.
     pub(crate) name: &'static str,
-    /// The function.
+    /// The function itself.
     pub(crate) function: fn(f64) -> f64,
-    /// Where its results are real.
+    /// Whether the result is real for this argument.
     pub(crate) domain: fn(f64) -> bool,
 }
 
@@ -48,7 +48,7 @@ elementary! {
 }
 
 impl Elementary {
-    /// The function at `a`.
+    /// Applies the function to `a`.
     pub(crate) fn apply(&self, vm: &mut Vm, a: Value) -> Outcome {
         let x = vm.double_of(self.name, a, "NUMBER")?;
         if !(self.domain)(x) {
@@ -62,7 +62,7 @@ impl Elementary {
     }
 }
 
-/// `(atan y x)`: the angle of the point with these coordinates.
+/// Implements `(atan y x)`: the angle of the point with these coordinates.
 pub(crate) fn angle(vm: &mut Vm, y: Value, x: Value) -> Outcome {
     let (y, x) = (vm.double_of("ATAN", y, "REAL")?, vm.double_of("ATAN", x, "REAL")?);
     vm.float_value("ATAN", transcendental::atan2(y, x))

@@ -1,9 +1,9 @@
-//! Doubles: their parts, and the way between them and the rationals, each rounded once.
+//! Doubles: their parts, and conversion to and from rationals, each rounded once.
 
 use super::{Int, Ratio};
 
-/// The double nearest to `mantissa · 2^exponent`, halves to even: infinite when it is too large, and exact about
-/// denormalized numbers. `mantissa` may hold in its last bit that something follows, if it has 66 bits or more.
+/// Returns the double nearest to `mantissa · 2^exponent`, halves to even: infinite on overflow, and exact
+/// about denormalized numbers. If `mantissa` has 66 bits or more, its last bit may say that more bits follow.
 pub(crate) fn rounded(mantissa: u128, exponent: i64) -> f64 {
     if mantissa == 0 {
         return 0.0;
@@ -13,7 +13,7 @@ pub(crate) fn rounded(mantissa: u128, exponent: i64) -> f64 {
     if leading > 1023 {
         return f64::INFINITY;
     }
-    // Numbers below 2^-1022 have fewer bits.
+    // Denormalized numbers, below 2^-1022, have fewer bits.
     let precision = if leading >= -1022 { 53 } else { 53 - (-1022 - leading) };
     if precision < 0 {
         return 0.0;
@@ -29,7 +29,7 @@ pub(crate) fn rounded(mantissa: u128, exponent: i64) -> f64 {
     libm::scalbn((kept + u128::from(up)) as f64, (exponent + drop) as i32)
 }
 
-/// Mantissa (with the sign) and exponent of a finite double: `x = mantissa · 2^exponent`, exactly.
+/// Returns mantissa (with the sign) and exponent of a finite double: `x = mantissa · 2^exponent`, exactly.
 pub(crate) fn decode(x: f64) -> (i64, i32) {
     let bits = x.to_bits();
     let fraction = (bits & ((1 << 52) - 1)) as i64;
@@ -39,7 +39,7 @@ pub(crate) fn decode(x: f64) -> (i64, i32) {
     (if x.is_sign_negative() { -mantissa } else { mantissa }, exponent)
 }
 
-/// The rational with exactly the value of a finite double.
+/// Returns the rational with exactly the value of a finite double.
 pub(crate) fn rational(x: f64) -> Ratio {
     let (mantissa, exponent) = decode(x);
     if mantissa == 0 || exponent >= 0 {
@@ -52,8 +52,8 @@ pub(crate) fn rational(x: f64) -> Ratio {
     }
 }
 
-/// The simplest rational that reads as the finite double `x`: the one with the least denominator in the interval that
-/// rounds to `x`.
+/// Returns the simplest rational that reads as the finite double `x`: the one with the least denominator in
+/// the interval that rounds to `x`.
 pub(crate) fn rationalize(x: f64) -> Ratio {
     let (mantissa, exponent) = decode(x);
     if exponent >= 0 || mantissa == 0 {
@@ -68,7 +68,8 @@ pub(crate) fn rationalize(x: f64) -> Ratio {
     if mantissa < 0 { simplest.negated() } else { simplest }
 }
 
-/// The ratio with the least denominator in the closed interval, whose ends are above zero, by continued fractions.
+/// Returns the ratio with the least denominator in a closed interval of numbers above zero, by continued
+/// fractions.
 fn simplest_between(low: Ratio, high: Ratio) -> Ratio {
     let (mut low, mut high) = (low, high);
     // The last two convergents p/q.
@@ -87,17 +88,17 @@ fn simplest_between(low: Ratio, high: Ratio) -> Ratio {
             numerator: r.numerator.minus(&quotient.times(&r.denominator)),
             denominator: r.denominator.clone(),
         };
-        // Taking reciprocals turns the interval round.
+        // Reciprocals reverse the order of the ends.
         (low, high) = (fraction(&high).inverted(), fraction(&low).inverted());
     }
 }
 
-/// `x · 2^exponent`, rounded once.
+/// Returns `x · 2^exponent`, rounded once.
 pub(crate) fn scaled(x: f64, exponent: i64) -> f64 {
     libm::scalbn(x, exponent.clamp(-5000, 5000) as i32)
 }
 
-/// Fraction from 1/2 to below 1 without the sign, and the exponent that goes with it, of a finite double.
+/// Returns the fraction of a finite double, from 1/2 to below 1 without the sign, and its exponent.
 pub(crate) fn fraction_and_exponent(x: f64) -> (f64, i32) {
     libm::frexp(x.abs())
 }

@@ -1,21 +1,21 @@
 //! Greatest common divisors.
 //!
-//! Below 128 bits Euclid's and then the binary algorithm; above, Lehmer's: the leading bits of both numbers tell many
-//! quotients at once, which are then applied to the whole numbers in one pass.
+//! Up to 128 bits, Euclid's algorithm and then the binary one. Above, Lehmer's: the leading bits of both
+//! numbers determine many quotients at once, which are then applied to the whole numbers in one pass.
 //!
-//! Source: Knuth, volume 2, 4.5.2, algorithm L, in the form with Collins' condition that CPython uses.
+//! Source: Knuth, volume 2, 4.5.2, algorithm L, with Collins' condition in the form that CPython uses.
 
 use num_bigint::BigUint;
 
 use super::Int;
 
-/// The greatest common divisor, not negative.
+/// Returns the greatest common divisor, which is not negative.
 pub(crate) fn gcd(a: &Int, b: &Int) -> Int {
     reduced(a, b, usize::MAX).0
 }
 
-/// Two smaller numbers with the same greatest common divisor as `a` and `b`, after so many steps. The second of them is
-/// zero when the first is the divisor. Neither is negative.
+/// Returns two smaller numbers with the same greatest common divisor as `a` and `b`, after at most `steps`
+/// steps. When the second is zero, the first is the divisor. Neither is negative.
 pub(crate) fn reduced(a: &Int, b: &Int, steps: usize) -> (Int, Int) {
     if let (Int::Small(a), Int::Small(b)) = (a, b) {
         return (Int::from_unsigned(small_gcd(a.unsigned_abs(), b.unsigned_abs())), Int::ZERO);
@@ -31,7 +31,7 @@ pub(crate) fn reduced(a: &Int, b: &Int, steps: usize) -> (Int, Int) {
         if b.is_empty() {
             break;
         }
-        // Where lengths differ, the leading bits would tell little.
+        // The leading bits of numbers of different length determine little.
         let matrix = if b.len() == a.len() { cofactors(&a, &b) } else { None };
         (a, b) = match matrix {
             Some(matrix) => {
@@ -46,7 +46,7 @@ pub(crate) fn reduced(a: &Int, b: &Int, steps: usize) -> (Int, Int) {
     (Int::from_limbs(&a), Int::from_limbs(&b))
 }
 
-/// Steps of reduction for numbers of `limbs` limbs that together stay within a call's limit of work.
+/// Returns how many steps of reduction of numbers of `limbs` limbs stay within the limit of work of one call.
 pub(crate) fn steps_within_limit(limbs: usize) -> usize {
     (super::limit::WORK_LIMIT / (8 * limbs)).max(1)
 }
@@ -94,7 +94,7 @@ fn small_gcd(mut a: u128, mut b: u128) -> u128 {
     u128::from(a << shift)
 }
 
-/// What several steps of Euclid's algorithm make of a pair: `(p·a + q·b, r·a + s·b)`.
+/// The effect of several steps of Euclid's algorithm on a pair: `(p·a + q·b, r·a + s·b)`.
 struct Matrix {
     p: i64,
     q: i64,
@@ -102,11 +102,12 @@ struct Matrix {
     s: i64,
 }
 
-/// The steps that the leading bits of `a` and `b`, of the same length, allow for certain; `None` if not even one.
+/// Returns the steps that the leading bits of `a` and `b`, of the same length, determine for certain; `None`
+/// if there is no such step.
 fn cofactors(a: &[u64], b: &[u64]) -> Option<Matrix> {
     let last = a.len() - 1;
     let shift = a[last].leading_zeros();
-    // 62 bits: the steps below stay within a signed word.
+    // With 62 bits, the steps below stay within a signed word.
     let leading = |n: &[u64]| ((u128::from(n[last]) << 64 | u128::from(n[last - 1])) << shift >> 66) as i64;
     let (mut x, mut y) = (leading(a), leading(b));
     let (mut p, mut q, mut r, mut s) = (1i64, 0i64, 0i64, 1i64);
@@ -122,7 +123,7 @@ fn cofactors(a: &[u64], b: &[u64]) -> Option<Matrix> {
         (p, r) = (r, p - quotient * r);
         (q, s) = (s, q - quotient * s);
         (x, y) = (y, x - quotient * y);
-        // Half the bits of a word: the products below must not overflow.
+        // Cofactors have at most half the bits of a word, so that the products below do not overflow.
         if r.abs().max(s.abs()) >> 31 != 0 {
             break;
         }
@@ -130,7 +131,7 @@ fn cofactors(a: &[u64], b: &[u64]) -> Option<Matrix> {
     (q != 0).then_some(Matrix { p, q, r, s })
 }
 
-/// `p·a + q·b`, which is not negative.
+/// Returns `p·a + q·b`, which is not negative.
 fn combination(a: &[u64], p: i64, b: &[u64], q: i64) -> Vec<u64> {
     let mut carry = 0i128;
     let mut sum: Vec<u64> = a

@@ -1,7 +1,7 @@
-//! Integers of any size, taken out of their values.
+//! Integers of any size, read from and written to values.
 //!
-//! An [`Int`] is `Small` exactly when it fits 127 bits and a sign: sums and products of fixnums, and most of what
-//! programs do beyond them, never touch the allocator of the host. Above that it is a `BigInt`.
+//! An [`Int`] is `Small` exactly when it fits 127 bits and a sign: sums and products of fixnums, and most
+//! integers of programs beyond them, never touch the native allocator. Above that it is a `BigInt`.
 //!
 //! Not here: the limits of size and work, which the callers check ([`super::limit`]).
 
@@ -18,9 +18,9 @@ use crate::value::Value;
 /// An integer of any size.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Int {
-    /// One that fits.
+    /// An integer of at most 127 bits and a sign.
     Small(i128),
-    /// One that does not.
+    /// A longer one.
     Big(BigInt),
 }
 
@@ -30,7 +30,7 @@ impl Int {
     /// One.
     pub(crate) const ONE: Int = Int::Small(1);
 
-    /// The integer that `v` is, if it is one.
+    /// Returns the integer that `v` is; `None` for any other value.
     pub(crate) fn of(heap: &Heap, v: Value) -> Option<Int> {
         if let Some(n) = v.as_fixnum() {
             return Some(Int::Small(i128::from(n)));
@@ -51,7 +51,7 @@ impl Int {
         Some(Int::Small(if big.negative { -magnitude } else { magnitude }))
     }
 
-    /// The integer `n`, in the form that fits.
+    /// Returns the integer `n` in its one form.
     pub(crate) fn from_big(n: BigInt) -> Int {
         match n.to_i128() {
             Some(small) => Int::Small(small),
@@ -59,7 +59,7 @@ impl Int {
         }
     }
 
-    /// As a `BigInt`.
+    /// Returns the integer as a `BigInt`.
     pub(crate) fn to_big(&self) -> BigInt {
         match self {
             Int::Small(n) => BigInt::from(*n),
@@ -67,7 +67,7 @@ impl Int {
         }
     }
 
-    /// The integer with these limbs, least first.
+    /// Returns the integer with these limbs, least first.
     pub(crate) fn from_limbs(limbs: &[u64]) -> Int {
         match *limbs {
             [] => Int::ZERO,
@@ -80,7 +80,7 @@ impl Int {
         }
     }
 
-    /// Sign and limbs as the heap keeps them.
+    /// Returns whether the integer is negative, and its limbs in the heap's order, least first.
     pub(crate) fn limbs(&self) -> (bool, SmallVec<[u64; 8]>) {
         match self {
             Int::Small(n) => {
@@ -91,7 +91,7 @@ impl Int {
         }
     }
 
-    /// The fixnum, if it is one.
+    /// Returns the fixnum; `None` if the integer does not fit.
     pub(crate) fn as_fixnum(&self) -> Option<i64> {
         match self {
             Int::Small(n) => {
@@ -101,7 +101,7 @@ impl Int {
         }
     }
 
-    /// Bits of the magnitude; 0 for zero.
+    /// Returns the length of the magnitude in bits; 0 for zero.
     pub(crate) fn bits(&self) -> u64 {
         match self {
             Int::Small(n) => u64::from(128 - n.unsigned_abs().leading_zeros()),
@@ -109,22 +109,22 @@ impl Int {
         }
     }
 
-    /// Limbs of 64 bits of the magnitude, at least 1: the unit of work.
+    /// Returns the length of the magnitude in limbs of 64 bits, at least 1: the unit of work.
     pub(crate) fn len(&self) -> usize {
         (self.bits() as usize).div_ceil(64).max(1)
     }
 
-    /// Whether it is zero.
+    /// Returns whether the integer is zero.
     pub(crate) fn is_zero(&self) -> bool {
         matches!(self, Int::Small(0))
     }
 
-    /// Whether it is one.
+    /// Returns whether the integer is one.
     pub(crate) fn is_one(&self) -> bool {
         matches!(self, Int::Small(1))
     }
 
-    /// Whether it is below zero.
+    /// Returns whether the integer is below zero.
     pub(crate) fn is_negative(&self) -> bool {
         match self {
             Int::Small(n) => *n < 0,
@@ -132,7 +132,7 @@ impl Int {
         }
     }
 
-    /// Whether it is odd.
+    /// Returns whether the integer is odd.
     pub(crate) fn is_odd(&self) -> bool {
         match self {
             Int::Small(n) => n & 1 == 1,
@@ -140,7 +140,7 @@ impl Int {
         }
     }
 
-    /// −1, 0 or 1.
+    /// Returns −1, 0 or 1, the sign.
     pub(crate) fn signum(&self) -> i32 {
         match self {
             Int::Small(n) => n.signum() as i32,
@@ -154,7 +154,7 @@ impl Int {
         }
     }
 
-    /// With the other sign.
+    /// Returns the integer with the opposite sign.
     pub(crate) fn negated(&self) -> Int {
         match self {
             Int::Small(n) if let Some(negated) = n.checked_neg() => Int::Small(negated),
@@ -162,12 +162,12 @@ impl Int {
         }
     }
 
-    /// Without its sign.
+    /// Returns the magnitude.
     pub(crate) fn abs(&self) -> Int {
         if self.is_negative() { self.negated() } else { self.clone() }
     }
 
-    /// The sum.
+    /// Returns the sum.
     pub(crate) fn plus(&self, other: &Int) -> Int {
         match (self, other) {
             (Int::Small(a), Int::Small(b)) if let Some(sum) = a.checked_add(*b) => Int::Small(sum),
@@ -177,7 +177,7 @@ impl Int {
         }
     }
 
-    /// The difference.
+    /// Returns the difference.
     pub(crate) fn minus(&self, other: &Int) -> Int {
         match (self, other) {
             (Int::Small(a), Int::Small(b)) if let Some(difference) = a.checked_sub(*b) => {
@@ -190,7 +190,7 @@ impl Int {
         }
     }
 
-    /// The product.
+    /// Returns the product.
     pub(crate) fn times(&self, other: &Int) -> Int {
         match (self, other) {
             (Int::Small(a), Int::Small(b)) if let Some(product) = a.checked_mul(*b) => Int::Small(product),
@@ -206,7 +206,7 @@ impl Int {
         }
     }
 
-    /// Quotient rounded towards zero, and the remainder with it. `other` is not zero.
+    /// Returns the quotient, rounded towards zero, and the remainder. `other` is not zero.
     pub(crate) fn div_rem(&self, other: &Int) -> (Int, Int) {
         match (self, other) {
             (Int::Small(a), Int::Small(b)) if let Some(quotient) = a.checked_div(*b) => {
@@ -219,12 +219,12 @@ impl Int {
         }
     }
 
-    /// The quotient where the division is known to leave no remainder.
+    /// Returns the quotient of a division without remainder.
     pub(crate) fn exact_quotient(&self, other: &Int) -> Int {
         if other.is_one() { self.clone() } else { self.div_rem(other).0 }
     }
 
-    /// Twice, four times … the integer: `self · 2^shift`.
+    /// Returns `self · 2^shift`.
     pub(crate) fn shifted_left(&self, shift: u64) -> Int {
         match self {
             Int::Small(0) => Int::ZERO,
@@ -233,7 +233,7 @@ impl Int {
         }
     }
 
-    /// The integer part, rounded down, of `self / 2^shift`.
+    /// Returns `self / 2^shift`, rounded down.
     pub(crate) fn shifted_right(&self, shift: u64) -> Int {
         match self {
             Int::Small(n) => Int::Small(n >> shift.min(127)),
@@ -242,7 +242,7 @@ impl Int {
         }
     }
 
-    /// The value that tells how it compares with `other`.
+    /// Compares with `other`.
     pub(crate) fn compare(&self, other: &Int) -> Ordering {
         match (self, other) {
             (Int::Small(a), Int::Small(b)) => a.cmp(b),
@@ -264,12 +264,12 @@ impl Int {
         }
     }
 
-    /// The nearest double, halves to even; infinite when it is too large for one.
+    /// Returns the nearest double, halves to even; infinite on overflow.
     pub(crate) fn to_f64(&self) -> f64 {
         match self {
             Int::Small(n) => *n as f64,
             Int::Big(n) => {
-                // The 127 leading bits decide, with one more that says whether anything follows.
+                // The 126 leading bits decide, with one more that says whether any later bit is set.
                 let shift = n.bits() - 126;
                 let leading = (n.magnitude() >> shift).to_u128().expect("126 bits fit");
                 let sticky = n.magnitude().trailing_zeros().is_some_and(|zeros| zeros < shift);
@@ -279,7 +279,7 @@ impl Int {
         }
     }
 
-    /// The integer that a finite double without fraction is.
+    /// Returns the integer equal to a finite double without fraction.
     pub(crate) fn from_f64(x: f64) -> Int {
         if x.abs() < 2f64.powi(126) {
             return Int::Small(x as i128);
@@ -302,7 +302,7 @@ impl From<BigUint> for Int {
 }
 
 impl Int {
-    /// The integer `n`.
+    /// Returns the integer `n`.
     pub(crate) fn from_unsigned(n: u128) -> Int {
         match i128::try_from(n) {
             Ok(n) => Int::Small(n),

@@ -1,8 +1,8 @@
-//! Sums, differences and products of magnitudes as the heap keeps them: limbs of 64 bits, least first.
+//! Sums, differences and products of magnitudes in the heap's representation: limbs of 64 bits, least first.
 //!
-//! What programs do with big integers is mostly a sum or a product with something small; here that takes no detour over
-//! another representation and no allocation of the host. Products of two long numbers are left to `num-bigint`, which
-//! knows better ways than the one from school.
+//! Most operations on big integers are sums, or products with a small factor. Here they work on the heap's
+//! limbs directly, without a conversion and without native allocation. Products of two long numbers are left
+//! to `num-bigint`, whose algorithms are subquadratic.
 
 use std::cmp::Ordering;
 
@@ -13,20 +13,20 @@ use crate::raise::Outcome;
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// Limbs of a result; up to this many stay on the native stack.
+/// Limbs of a result; up to 24 stay on the native stack.
 pub(crate) type Limbs = SmallVec<[u64; 24]>;
 
-/// Products in which the shorter number has more limbs are for `num-bigint`.
+/// Greatest length, in limbs, of the shorter factor of a product; longer ones are for `num-bigint`.
 const SCHOOL_LIMBS: usize = 32;
 
-/// An integer in the heap, or a fixnum made to look like one.
+/// An integer in the heap, or a fixnum in the same form.
 pub(crate) struct Operand<'a> {
     negative: bool,
     limbs: &'a [u64],
 }
 
 impl<'a> Operand<'a> {
-    /// The integer that `v` is, if it is one. `room` holds the limb of a fixnum.
+    /// Returns the integer that `v` is; `None` for any other value. `room` holds the limb of a fixnum.
     #[inline]
     pub(crate) fn of(heap: &'a Heap, v: Value, room: &'a mut [u64; 1]) -> Option<Operand<'a>> {
         if let Some(n) = v.as_fixnum() {
@@ -37,17 +37,17 @@ impl<'a> Operand<'a> {
         Some(Operand { negative: big.negative, limbs: big.limbs })
     }
 
-    /// Number of limbs, at least 1.
+    /// Returns the number of limbs, at least 1.
     pub(crate) fn len(&self) -> usize {
         self.limbs.len().max(1)
     }
 
-    /// Bits of the magnitude.
+    /// Returns the length of the magnitude in bits.
     pub(crate) fn bits(&self) -> u64 {
         self.limbs.last().map_or(0, |last| 64 * self.limbs.len() as u64 - u64::from(last.leading_zeros()))
     }
 
-    /// How it compares with `other`.
+    /// Compares with `other`.
     pub(crate) fn compare(&self, other: &Operand<'_>) -> Ordering {
         let lengths = self.limbs.len().cmp(&other.limbs.len());
         let magnitudes = lengths.then_with(|| self.limbs.iter().rev().cmp(other.limbs.iter().rev()));
@@ -59,12 +59,12 @@ impl<'a> Operand<'a> {
         }
     }
 
-    /// With the other sign.
+    /// Returns the operand with the opposite sign.
     pub(crate) fn negated(self) -> Operand<'a> {
         Operand { negative: !self.negative, limbs: self.limbs }
     }
 
-    /// The sum: whether it is negative, and its magnitude.
+    /// Returns the sum: whether it is negative, and its magnitude.
     pub(crate) fn plus(&self, other: &Operand<'_>) -> (bool, Limbs) {
         if self.negative == other.negative {
             return (self.negative, sum(self.limbs, other.limbs));
@@ -76,7 +76,7 @@ impl<'a> Operand<'a> {
         }
     }
 
-    /// The product, unless both numbers are long: whether it is negative, and its magnitude.
+    /// Returns the product (whether it is negative, and its magnitude), unless both numbers are long.
     pub(crate) fn times(&self, other: &Operand<'_>) -> Option<(bool, Limbs)> {
         let (long, short) = if self.limbs.len() < other.limbs.len() { (other, self) } else { (self, other) };
         if short.limbs.len() > SCHOOL_LIMBS {
@@ -106,7 +106,7 @@ fn sum(a: &[u64], b: &[u64]) -> Limbs {
     result
 }
 
-/// `a - b`, where `a` is not less.
+/// Returns `a - b`, where `a` is not less.
 fn difference(a: &[u64], b: &[u64]) -> Limbs {
     let mut result = Limbs::with_capacity(a.len());
     let mut borrow = false;
@@ -135,7 +135,8 @@ fn product(long: &[u64], short: &[u64]) -> Limbs {
 }
 
 impl Vm {
-    /// The integer of this sign and magnitude as the value of operation `op`, which fails if it is too large.
+    /// Returns the integer with this sign and magnitude as a value. Fails as operation `op` if it has too
+    /// many bits.
     pub(crate) fn limbs_value(&mut self, op: &'static str, negative: bool, limbs: &[u64]) -> Outcome {
         let significant = limbs.iter().rposition(|&limb| limb != 0).map_or(0, |last| last + 1);
         let limbs = &limbs[..significant];

@@ -1,36 +1,40 @@
-//! How large a number may grow, and how much work one operation may do.
+//! Limits: the size of a number, and the work of one operation.
 //!
-//! Measured on one core of a 2.5 GHz server, release build, in microseconds: a product of 1024 by 1024 limbs 230, of
-//! 65 520 by 16 limbs 1100; a quotient of 1024 by 512 limbs 190, of 32 000 by 16 limbs 1200; a greatest common divisor of two
-//! numbers of 256 limbs 450; the decimal digits of 1024 limbs 660; reading 16 384 digits 270; a root of 512 limbs 350. The limits are half of
-//! that, where the work grows with the square a quarter or so: other tasks wait for the longest step.
+//! Measured on one core of a 2.5 GHz server, release build, in microseconds: a product of 1024 by 1024 limbs
+//! 230, of 65,520 by 16 limbs 1100; a quotient of 1024 by 512 limbs 190, of 32,000 by 16 limbs 1200; a
+//! greatest common divisor of two numbers of 256 limbs 450; the decimal digits of 1024 limbs 660; reading
+//! 16,384 digits 270; a root of 512 limbs 350. The limits are half of these sizes, so that quadratic work
+//! takes about a quarter of the time: other tasks wait for the longest step.
 
 use crate::raise::{Exit, Raised};
 use crate::vm::Vm;
 
-/// Greatest number of bits of an integer.
+/// Greatest size of an integer, in bits.
 pub(crate) const BIT_LIMIT: u64 = 1 << 22;
 
-/// Pairs of limbs that one multiplication may work on. A division counts double.
+/// Greatest product of the operands' lengths in one multiplication, in pairs of limbs. A division counts
+/// double.
 pub(crate) const WORK_LIMIT: usize = 1 << 19;
 
-/// Limbs of each integer of which one operation may take a greatest common divisor, or that may meet in ratios.
+/// Greatest length, in limbs, of the operands of a greatest common divisor and of the parts of ratios in one
+/// operation.
 pub(crate) const GCD_LIMBS: usize = 128;
 
-/// Limbs of an integer whose root one operation may take.
+/// Greatest length, in limbs, of an integer whose root is taken in one operation.
 pub(crate) const ROOT_LIMBS: usize = 256;
 
-/// Limbs of an integer whose digits one operation may write in a radix that is no power of two.
+/// Greatest length, in limbs, of an integer written in one operation in a radix that is not a power of two.
 pub(crate) const DIGIT_LIMBS: usize = 512;
 
-/// Digits that one operation may write in a radix that is a power of two, where that is linear.
+/// Greatest number of digits written in one operation in a radix that is a power of two, which takes linear
+/// time.
 pub(crate) const WRITTEN_DIGITS: u64 = 1 << 17;
 
-/// Digits that one operation may read.
+/// Greatest number of digits read in one operation.
 pub(crate) const PARSED_DIGITS: usize = 8192;
 
 impl Vm {
-    /// Fails if an integer of so many bits is too large.
+    /// Fails as operation `op` if an integer of `bits` bits is too large.
     pub(crate) fn check_bits(&mut self, op: &'static str, bits: u64) -> Result<(), Exit> {
         if bits <= BIT_LIMIT {
             return Ok(());
@@ -41,7 +45,10 @@ impl Vm {
         ))
     }
 
-    /// Charges for work on `a` by `b` limbs, unless it is too much for one operation.
+    /// Charges for work on `a` by `b` limbs.
+    ///
+    /// # Errors
+    /// [`Exit::Slowly`] if that is too much for one operation.
     pub(crate) fn check_work(&mut self, a: usize, b: usize) -> Result<(), Exit> {
         let work = a.saturating_mul(b);
         if work > WORK_LIMIT {

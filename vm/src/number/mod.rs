@@ -1,21 +1,23 @@
 //! The numeric tower: integers of any size, ratios and doubles, with the contagion of Common Lisp.
 //!
-//! Pure functions on values, used by the builtins and by the interpreter where an instruction meets operands that are
-//! not both fixnums or both doubles.
+//! Functions on values, for the builtins, and for the interpreter when the operands of an instruction are
+//! neither two fixnums nor two doubles.
 //!
-//! Guarantees: results are normalized, so that a number has one representation (a bignum that fits is a fixnum, a
-//! ratio is in lowest terms with a denominator above one) and `eql` need not compute. A float and a rational are
-//! compared by their exact values. No result is infinite or not a number: the operation fails as under SBCL's traps.
+//! Guarantees: results are normalized, so that a number has one representation (a bignum never fits a fixnum;
+//! a ratio is in lowest terms with a denominator above one) and `eql` compares representations. A float and a
+//! rational are compared by their exact values. Results are always finite: an operation whose result would be
+//! infinite or a NaN fails, as under SBCL's traps.
 //!
-//! Work is bounded, since nothing can interrupt it:
-//! - No integer has more than [`limit::BIT_LIMIT`] bits. An operation whose result would have more fails with an
-//!   arithmetic error before it begins.
-//! - Steps that are quadratic in the sizes of their operands (products, quotients, greatest common divisors, digits) take
-//!   at most the work named in [`limit`]. Above, the outcome is [`Exit::Slowly`], and the ESL function in the row of the
-//!   builtin of that name (`+`, `*`, `floor`, …) does the operation in pieces.
-//! - What was done is charged: a unit for each pair of limbs that was multiplied or limb that was copied.
+//! Work is bounded, because a builtin cannot be interrupted:
+//! - No integer has more than [`limit::BIT_LIMIT`] bits. An operation whose result would have more fails with
+//!   an arithmetic error before it begins.
+//! - Steps that are quadratic in the sizes of their operands (products, quotients, greatest common divisors,
+//!   digits) take at most the work named in [`limit`]. Above, the outcome is [`Exit::Slowly`], and the ESL
+//!   function in the builtin's row of the table (`+`, `*`, `floor`, …) does the operation in pieces.
+//! - Work is charged: one unit for each pair of limbs multiplied and for each limb copied.
 //!
-//! Not here: what the reader takes for a number (the compiler), functions of any number of arguments (`builtins`).
+//! Not here: the syntax of numbers (the compiler's reader), functions of any number of arguments
+//! (`builtins`).
 
 use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Outcome, Raised};
@@ -44,19 +46,19 @@ pub(crate) mod rounding;
 pub(crate) mod text;
 mod transcendental;
 
-/// A number, taken out of its value.
+/// A number, read from its value.
 #[derive(Clone, Debug)]
 pub(crate) enum Number {
     /// An integer of any size.
     Int(Int),
-    /// A ratio that is no integer.
+    /// A ratio; never an integer.
     Ratio(Ratio),
     /// A double.
     Float(f64),
 }
 
 impl Number {
-    /// The number that `v` is, if it is one.
+    /// Returns the number that `v` is; `None` for any other value.
     pub(crate) fn of(heap: &Heap, v: Value) -> Option<Number> {
         if let Some(x) = v.as_double() {
             return Some(Number::Float(x));
@@ -73,22 +75,22 @@ impl Number {
     }
 }
 
-/// Whether `v` is an integer.
+/// Returns whether `v` is an integer.
 pub(crate) fn is_integer(heap: &Heap, v: Value) -> bool {
     v.is_fixnum() || heap.is(v, Kind::Bignum)
 }
 
-/// Whether `v` is an integer or a ratio.
+/// Returns whether `v` is an integer or a ratio.
 pub(crate) fn is_rational(heap: &Heap, v: Value) -> bool {
     v.is_fixnum() || matches!(heap.kind(v), Some(Kind::Bignum | Kind::Ratio))
 }
 
-/// Whether `v` is a double.
+/// Returns whether `v` is a double.
 pub(crate) fn is_float(heap: &Heap, v: Value) -> bool {
     v.as_double().is_some() || heap.is(v, Kind::Float)
 }
 
-/// Whether `v` is a number; all numbers are real.
+/// Returns whether `v` is a number; all numbers are real.
 pub(crate) fn is_number(heap: &Heap, v: Value) -> bool {
     v.is_fixnum()
         || v.as_double().is_some()
@@ -96,7 +98,7 @@ pub(crate) fn is_number(heap: &Heap, v: Value) -> bool {
 }
 
 impl Vm {
-    /// The number that `v` is; a type error that names `expected` otherwise.
+    /// Returns the number that `v` is. Any other value is a type error that names `expected`.
     pub(crate) fn number(&mut self, v: Value, expected: &'static str) -> Result<Number, Exit> {
         match Number::of(&self.heap, v) {
             Some(number) => {
@@ -111,7 +113,7 @@ impl Vm {
         }
     }
 
-    /// The integer that `v` is; a type error otherwise.
+    /// Returns the integer that `v` is. Any other value is a type error.
     pub(crate) fn integer(&mut self, v: Value) -> Result<Int, Exit> {
         match Int::of(&self.heap, v) {
             Some(n) => {
@@ -122,8 +124,8 @@ impl Vm {
         }
     }
 
-    /// The double that `v` is or rounds to; a type error that names `expected` for what is no number, a failure of `op`
-    /// for a rational that is too large.
+    /// Returns the double that `v` is or rounds to. Any other value is a type error that names `expected`; a
+    /// rational that is too large fails as operation `op`.
     pub(crate) fn double_of(
         &mut self,
         op: &'static str,
@@ -144,7 +146,7 @@ impl Vm {
         if x.is_finite() { Ok(x) } else { self.raise(Raised::FloatOverflow(op)) }
     }
 
-    /// The integer `n` as the value of operation `op`, which fails if it is too large.
+    /// Returns the integer `n` as a value. Fails as operation `op` if it has too many bits.
     pub(crate) fn integer_value(&mut self, op: &'static str, n: &Int) -> Outcome {
         if let Some(n) = n.as_fixnum().and_then(Value::fixnum) {
             return Ok(n);
@@ -153,7 +155,8 @@ impl Vm {
         self.limbs_value(op, negative, &limbs)
     }
 
-    /// The quotient of two integers in lowest terms, `denominator` above zero, as the value of operation `op`.
+    /// Returns the ratio `r` as a value, an integer if its denominator is 1. Fails as operation `op` if a
+    /// part has too many bits.
     pub(crate) fn ratio_value(&mut self, op: &'static str, r: &Ratio) -> Outcome {
         let numerator = self.integer_value(op, &r.numerator)?;
         if r.denominator.is_one() {
@@ -163,7 +166,8 @@ impl Vm {
         Ok(self.heap.alloc_ratio(numerator, denominator)?)
     }
 
-    /// The double `x` as the value of operation `op` on finite numbers, which fails if it overflowed or has no value.
+    /// Returns the double `x`, a result of operation `op` on finite numbers, as a value. Fails as `op` if it
+    /// is infinite or a NaN.
     #[inline]
     pub(crate) fn float_value(&mut self, op: &'static str, x: f64) -> Outcome {
         if x.is_finite() { Ok(self.heap.float(x)?) } else { self.float_trap(op, x) }
@@ -178,7 +182,7 @@ impl Vm {
         }
     }
 
-    /// Gives several values.
+    /// Returns several values; just the first if the caller wants one.
     #[inline]
     pub(crate) fn give_values(&mut self, values: &[Value]) -> Outcome {
         if self.cpu.wants_one {

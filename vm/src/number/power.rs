@@ -1,7 +1,7 @@
 //! Powers, roots, exponentials and logarithms.
 //!
-//! Powers with an integer exponent of exact numbers are exact; everything else is a double. Where Common Lisp would give
-//! a complex number, these fail with an arithmetic error.
+//! Powers of exact numbers with an integer exponent are exact; all other results are doubles. Where Common
+//! Lisp would return a complex number, these functions fail with an arithmetic error.
 
 use num_traits::Pow;
 
@@ -11,7 +11,7 @@ use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// `(expt base power)`
+/// Implements `(expt base power)`.
 pub(crate) fn expt(vm: &mut Vm, base: Value, power: Value) -> Outcome {
     let (x, y) = (vm.number(base, "NUMBER")?, vm.number(power, "NUMBER")?);
     match (x, y) {
@@ -43,7 +43,7 @@ pub(crate) fn expt(vm: &mut Vm, base: Value, power: Value) -> Outcome {
     }
 }
 
-/// An integer to an exponent that is not negative. 0 to the 0 is 1.
+/// Returns an integer to the power of an exponent that is not negative. 0 to the power of 0 is 1.
 fn int_power(vm: &mut Vm, base: &Int, exponent: &Int) -> Result<Int, Exit> {
     if base.is_one() || exponent.is_zero() {
         return Ok(Int::ONE);
@@ -61,7 +61,7 @@ fn int_power(vm: &mut Vm, base: &Int, exponent: &Int) -> Result<Int, Exit> {
     let least_bits = (base.bits() - 1).saturating_mul(exponent).saturating_add(1);
     vm.check_bits("EXPT", least_bits)?;
     let limbs = (odd.bits().saturating_mul(exponent) as usize).div_ceil(64);
-    // The last product is of two halves, and all others together cost a third of it.
+    // The last product has factors of half the length; all others together cost a third of it.
     vm.check_work(limbs / 2 + 1, if odd.bits() == 1 { 1 } else { limbs / 2 + 1 })?;
     let power = match odd {
         Int::Small(1) => Int::ONE,
@@ -93,7 +93,7 @@ fn real_power(vm: &mut Vm, operands: [Value; 2], is_float: bool, x: f64, y: f64)
     vm.float_value("EXPT", transcendental::pow(x, y))
 }
 
-/// `(sqrt a)`
+/// Implements `(sqrt a)`.
 pub(crate) fn sqrt(vm: &mut Vm, a: Value) -> Outcome {
     let x = vm.double_of("SQRT", a, "NUMBER")?;
     if x < 0.0 {
@@ -103,7 +103,7 @@ pub(crate) fn sqrt(vm: &mut Vm, a: Value) -> Outcome {
     vm.float_value("SQRT", x.sqrt())
 }
 
-/// `(isqrt a)`: the greatest integer whose square is not above `a`.
+/// Implements `(isqrt a)`: the greatest integer whose square is at most `a`.
 pub(crate) fn isqrt(vm: &mut Vm, a: Value) -> Outcome {
     match Int::of(&vm.heap, a) {
         Some(n) if !n.is_negative() => {
@@ -121,28 +121,29 @@ pub(crate) fn isqrt(vm: &mut Vm, a: Value) -> Outcome {
     }
 }
 
-/// `(exp a)`
+/// Implements `(exp a)`.
 pub(crate) fn exp(vm: &mut Vm, a: Value) -> Outcome {
     let x = vm.double_of("EXP", a, "NUMBER")?;
     vm.float_value("EXP", transcendental::exp(x))
 }
 
-/// The natural logarithm of 2 in two parts, the first of which has so few bits that its products with counts are exact.
+/// The natural logarithm of 2 in two parts. The first has so few bits that its product with a bit count is
+/// exact.
 const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
-/// `(log a)`
+/// Implements `(log a)`.
 pub(crate) fn log(vm: &mut Vm, a: Value) -> Outcome {
     let (bits, x) = log_parts(vm, a)?;
     vm.float_value("LOG", natural_log(bits, x))
 }
 
-/// The logarithm of `x · 2^bits`.
+/// Returns the natural logarithm of `x · 2^bits`.
 fn natural_log(bits: f64, x: f64) -> f64 {
     (transcendental::log(x) + bits * LN_2_LOW) + bits * LN_2_HIGH
 }
 
-/// `(log a base)`
+/// Implements `(log a base)`.
 pub(crate) fn log_in_base(vm: &mut Vm, a: Value, base: Value) -> Outcome {
     vm.number(a, "NUMBER")?;
     if super::sign(vm, base, "NUMBER")? == 0 {
@@ -160,7 +161,8 @@ pub(crate) fn log_in_base(vm: &mut Vm, a: Value, base: Value) -> Outcome {
     vm.float_value("LOG", numerator / denominator)
 }
 
-/// A number above zero as `x · 2^bits`, where `x` is a double; `bits` is 0 unless the number is beyond the doubles.
+/// Returns a number above zero as `(bits, x)`, meaning `x · 2^bits`; `bits` is 0 unless the number is beyond
+/// the doubles.
 fn log_parts(vm: &mut Vm, a: Value) -> Result<(f64, f64), Exit> {
     let number = vm.number(a, "NUMBER")?;
     let (is_zero, is_negative) = match &number {
@@ -181,13 +183,13 @@ fn log_parts(vm: &mut Vm, a: Value) -> Result<(f64, f64), Exit> {
     })
 }
 
-/// A ratio above zero as `x · 2^bits`.
+/// Returns a ratio above zero as `(bits, x)`, meaning `x · 2^bits`.
 fn scaled(r: &Ratio) -> (f64, f64) {
     let x = r.to_f64();
     if x.is_normal() {
         return (0.0, x);
     }
-    // The leading bits of both parts are all that a double can tell of a quotient.
+    // A double holds no more of a quotient than the leading bits of both parts determine.
     let cut = |n: &Int| n.bits().saturating_sub(120);
     let (above, below) = (cut(&r.numerator), cut(&r.denominator));
     let leading = |n: &Int, cut: u64| n.shifted_right(cut).to_f64();
@@ -195,7 +197,8 @@ fn scaled(r: &Ratio) -> (f64, f64) {
     (above as f64 - below as f64, x)
 }
 
-/// The exponent, if `a` is a power of `base` and both are integers: a quotient of rounded logarithms may miss it.
+/// Returns the exponent if `a` is a power of `base` and both are integers; a quotient of rounded logarithms
+/// may miss it.
 fn exact_log(vm: &Vm, a: Value, base: Value) -> Option<f64> {
     let (a, base) = (Int::of(&vm.heap, a)?, Int::of(&vm.heap, base)?);
     if base.bits() < 2 || a.bits() > 4096 {
@@ -210,7 +213,7 @@ fn exact_log(vm: &Vm, a: Value, base: Value) -> Option<f64> {
 }
 
 impl Int {
-    /// Zeros below the lowest one; 0 for zero.
+    /// Returns the number of zeros below the lowest one; 0 for zero.
     pub(crate) fn trailing_zeros(&self) -> u64 {
         match self {
             Int::Small(0) => 0,

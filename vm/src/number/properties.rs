@@ -1,5 +1,5 @@
-//! The tower against the definitions: every operation on integers and ratios is that of `num-rational`, and floats read
-//! back from their text.
+//! The tower against its definitions: operations on integers and ratios agree with `num-rational`, and floats
+//! read back from their text.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// Integers of all sizes, with a liking for the edges of fixnums and machine words.
+/// Integers of all sizes, with emphasis on the edges of fixnums and machine words.
 fn integer() -> impl Strategy<Value = BigInt> {
     prop_oneof![
         (-20i64..20).prop_map(BigInt::from),
@@ -41,7 +41,7 @@ fn value(vm: &mut Vm, x: &BigRational) -> Value {
     vm.ratio_value("", &ratio).unwrap()
 }
 
-/// The rational that a value is, checked to be in its one representation.
+/// Returns the rational that a value is, checked to be in its one representation.
 fn rational_of(vm: &Vm, v: Value) -> BigRational {
     let integer = |v: Value| {
         let n = Int::of(&vm.heap, v).unwrap();
@@ -146,7 +146,7 @@ proptest! {
         let same = vm.ratio_value("", &float::rational(x)).unwrap();
         prop_assert_eq!(rational_of(&vm, same), exact.clone());
         prop_assert!(num_equal(&mut vm, v, same).unwrap());
-        // The simplest rational is no larger than the exact one, and rounds to the same double.
+        // The simplest rational has at most the exact one's denominator, and rounds to the same double.
         let simple = float::rationalize(x);
         prop_assert!(simple.denominator.to_big() <= *exact.denom());
         prop_assert_eq!(simple.to_f64(), x);

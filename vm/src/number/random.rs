@@ -1,7 +1,10 @@
-//! Random numbers that are the same in every run: xoshiro256**, seeded by a number.
+//! Random numbers, the same in every run: xoshiro256**, seeded by a number.
 //!
-//! A state is a record with one slot, eight words of 32 bits. Who draws passes the state; nothing here is hidden.
-//! Source: Blackman and Vigna, "Scrambled linear pseudorandom number generators", 2021; SplitMix64 spreads the seed.
+//! A state is a record with one slot, a vector of eight 32-bit words. The state is always an argument;
+//! nothing is hidden here.
+//!
+//! Source: Blackman and Vigna, "Scrambled linear pseudorandom number generators", 2021; SplitMix64 spreads
+//! the seed.
 
 use num_bigint::{BigInt, BigUint};
 
@@ -11,7 +14,7 @@ use crate::raise::Outcome;
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// A new state.
+/// Returns a new state.
 pub(crate) fn make_state(vm: &mut Vm, seed: u64) -> Outcome {
     let mut words = Vec::with_capacity(8);
     let mut at = seed;
@@ -26,7 +29,7 @@ pub(crate) fn make_state(vm: &mut Vm, seed: u64) -> Outcome {
     state_of(vm, &words)
 }
 
-/// A new state that goes on as `state` would.
+/// Returns a copy of `state`, which produces the same numbers.
 pub(crate) fn copy_state(vm: &mut Vm, state: Value) -> Outcome {
     let words = words_of(vm, state)?;
     let words = vm.heap.words(words).unwrap_or_default().to_vec();
@@ -48,7 +51,7 @@ fn words_of(vm: &mut Vm, state: Value) -> Outcome {
     }
 }
 
-/// A number from 0 to below `limit`, of its type.
+/// Returns a number from 0 to below `limit`, of the type of `limit`.
 pub(crate) fn random(vm: &mut Vm, limit: Value, state: Value) -> Outcome {
     let object = words_of(vm, state)?;
     let mut generator = Generator::load(vm, object);
@@ -66,7 +69,7 @@ pub(crate) fn random(vm: &mut Vm, limit: Value, state: Value) -> Outcome {
         }
         _ => return vm.type_error(limit, "REAL"),
     };
-    // The state moves on only when nothing can fail any more.
+    // The state advances only once no failure is possible.
     generator.store(vm, object);
     Ok(result)
 }
@@ -100,13 +103,13 @@ impl Generator {
         result
     }
 
-    /// An integer from 0 to below `limit`, which is above zero, each as likely as the others.
+    /// Returns an integer from 0 to below `limit`, uniformly distributed. `limit` is above zero.
     fn below(&mut self, limit: &Int) -> Int {
         if let Some(limit) = limit.as_fixnum() {
             let limit = limit.unsigned_abs();
             let mask = u64::MAX >> (limit | 1).leading_zeros();
             loop {
-                // Half of the draws at least are below the limit.
+                // At least half of the draws are below the limit.
                 let drawn = self.next() & mask;
                 if drawn < limit {
                     return Int::from(drawn as i64);

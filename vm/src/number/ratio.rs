@@ -9,28 +9,28 @@ use crate::raise::{Exit, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// A quotient of integers. An integer is one with the denominator 1.
+/// A quotient of integers; an integer has the denominator 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Ratio {
-    /// Above the line; carries the sign.
+    /// Numerator, which carries the sign.
     pub(crate) numerator: Int,
-    /// Below the line; above zero, and without a common divisor with the numerator.
+    /// Denominator; above zero, and coprime to the numerator.
     pub(crate) denominator: Int,
 }
 
 impl Ratio {
-    /// The ratio that `v` is, if it is one.
+    /// Returns the ratio that `v` is; `None` for any other value.
     pub(crate) fn of(heap: &Heap, v: Value) -> Option<Ratio> {
         let (numerator, denominator) = heap.ratio(v)?;
         Some(Ratio { numerator: Int::of(heap, numerator)?, denominator: Int::of(heap, denominator)? })
     }
 
-    /// The integer `n` over 1.
+    /// Returns the integer `n` over 1.
     pub(crate) fn integer(n: Int) -> Ratio {
         Ratio { numerator: n, denominator: Int::ONE }
     }
 
-    /// `numerator / denominator` in lowest terms. The denominator is not zero.
+    /// Returns `numerator / denominator` in lowest terms. The denominator is not zero.
     pub(crate) fn reduced(numerator: &Int, denominator: &Int) -> Ratio {
         let divisor = gcd(numerator, denominator);
         let divisor = if denominator.is_negative() { divisor.negated() } else { divisor };
@@ -40,9 +40,9 @@ impl Ratio {
         }
     }
 
-    /// The sum.
+    /// Returns the sum.
     pub(crate) fn plus(&self, other: &Ratio) -> Ratio {
-        // Knuth 4.5.1: the divisors are much smaller than the products that they save.
+        // Knuth 4.5.1: these divisors are much smaller than that of the full products.
         let divisor = gcd(&self.denominator, &other.denominator);
         let (left, right) =
             (self.denominator.exact_quotient(&divisor), other.denominator.exact_quotient(&divisor));
@@ -57,7 +57,7 @@ impl Ratio {
         }
     }
 
-    /// The product.
+    /// Returns the product.
     pub(crate) fn times(&self, other: &Ratio) -> Ratio {
         let first = gcd(&self.numerator, &other.denominator);
         let second = gcd(&other.numerator, &self.denominator);
@@ -67,12 +67,12 @@ impl Ratio {
         Ratio { numerator, denominator }
     }
 
-    /// With the other sign.
+    /// Returns the ratio with the opposite sign.
     pub(crate) fn negated(&self) -> Ratio {
         Ratio { numerator: self.numerator.negated(), denominator: self.denominator.clone() }
     }
 
-    /// One divided by it. It is not zero.
+    /// Returns the reciprocal of a ratio that is not zero.
     pub(crate) fn inverted(&self) -> Ratio {
         if self.numerator.is_negative() {
             Ratio { numerator: self.denominator.negated(), denominator: self.numerator.negated() }
@@ -81,17 +81,17 @@ impl Ratio {
         }
     }
 
-    /// Limbs of the larger part: the unit of work.
+    /// Returns the length of the longer part in limbs: the unit of work.
     pub(crate) fn len(&self) -> usize {
         self.numerator.len().max(self.denominator.len())
     }
 
-    /// The nearest double, halves to even; infinite when it is too large for one.
+    /// Returns the nearest double, halves to even; infinite on overflow.
     pub(crate) fn to_f64(&self) -> f64 {
         if self.denominator.is_one() {
             return self.numerator.to_f64();
         }
-        // A quotient of at least 66 bits, and whether there was a remainder: enough for one rounding.
+        // A quotient of at least 66 bits, and whether there was a remainder, determine the one rounding.
         let shift = 66 + self.denominator.bits() as i64 - self.numerator.bits() as i64;
         let (mut numerator, mut denominator) = (self.numerator.abs(), self.denominator.clone());
         if shift > 0 {
@@ -106,13 +106,13 @@ impl Ratio {
         if self.numerator.is_negative() { -magnitude } else { magnitude }
     }
 
-    /// How it compares with `other`, unless that takes too much work.
+    /// Compares with `other`. Fails as operation `op` if that takes too much work.
     pub(crate) fn compare(&self, vm: &mut Vm, op: &'static str, other: &Ratio) -> Result<Ordering, Exit> {
         let (left, right) = (self.numerator.signum(), other.numerator.signum());
         if left != right || left == 0 {
             return Ok(left.cmp(&right));
         }
-        // a/b against c/d is a·d against c·b; the lengths of the products often decide.
+        // a/b against c/d is a·d against c·b; the lengths of these products often decide.
         let low = (self.numerator.bits() + other.denominator.bits()) as i64;
         let high = (other.numerator.bits() + self.denominator.bits()) as i64;
         if (low - high).abs() > 1 {

@@ -1,7 +1,7 @@
-//! Division with a quotient that is an integer: `floor`, `ceiling`, `truncate`, `round`, `mod`, `rem`.
+//! Division with an integer quotient: `floor`, `ceiling`, `truncate`, `round`, `mod`, `rem`.
 //!
-//! On floats the quotient is the rounded float quotient, truncated, and the remainder is computed from it, as SBCL does;
-//! so `(floor 1.0 0.1)` is 10, although 0.1 is a little more than a tenth.
+//! On floats, the quotient is the truncated float quotient, and the remainder is computed from it, as in
+//! SBCL; so `(floor 1.0 0.1)` is 10, although the double 0.1 is slightly more than a tenth.
 
 use std::cmp::Ordering;
 
@@ -11,23 +11,23 @@ use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// Which integer near a quotient is taken.
+/// The choice of an integer near a quotient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rounding {
-    /// The greatest that is not above it.
+    /// The greatest integer not above it.
     Floor,
-    /// The least that is not below it.
+    /// The least integer not below it.
     Ceiling,
     /// Its integer part.
     Truncate,
-    /// The nearest; halves go to the even one.
+    /// The nearest integer; halves go to the even one.
     Round,
 }
 
 impl Rounding {
-    /// What to add to the truncated quotient of a division by `divisor` that left `remainder`.
+    /// Returns the correction of the truncated quotient of a division that left a remainder: −1, 0 or 1.
     ///
-    /// `half` tells how twice the remainder compares with the divisor, both without sign.
+    /// `half` compares twice the remainder with the divisor, both without sign.
     fn step(self, remainder_negative: bool, divisor_negative: bool, is_odd: bool, half: Ordering) -> i32 {
         let outward = if remainder_negative == divisor_negative { 1 } else { -1 };
         match self {
@@ -56,17 +56,17 @@ enum Division {
     Float(Int, f64),
 }
 
-/// The remainder that goes with `floor`.
+/// Returns the remainder of `floor`.
 pub(crate) fn modulo(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     rest(vm, Rounding::Floor, a, b)
 }
 
-/// The remainder that goes with `truncate`.
+/// Returns the remainder of `truncate`.
 pub(crate) fn remainder(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     rest(vm, Rounding::Truncate, a, b)
 }
 
-/// Quotient and remainder, as two values.
+/// Returns quotient and remainder, as two values.
 pub(crate) fn both(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Outcome {
     let division = match small(rounding, a, b) {
         Some((quotient, remainder)) => Division::Ints(quotient, remainder),
@@ -81,14 +81,14 @@ pub(crate) fn both(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Outco
     vm.give_values(&[quotient, remainder])
 }
 
-/// The quotient as a float, and the remainder: `ffloor` and its like.
+/// Returns the quotient as a float, and the remainder: `ffloor` and its family.
 pub(crate) fn both_with_float(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Outcome {
     let division = division(vm, rounding, a, b)?;
     let (Division::Ints(quotient, _) | Division::Ratio(quotient, _) | Division::Float(quotient, _)) =
         &division;
     let mut x = quotient.to_f64();
     if quotient.is_zero() && rounding != Rounding::Floor && rounding != Rounding::Round {
-        // A float quotient between -1 and 0 is minus zero.
+        // A float quotient between -1 and 0 becomes minus zero.
         if let Division::Float(_, remainder) = &division
             && (*remainder < 0.0) != (super::sign(vm, b, "REAL")? < 0)
             && *remainder != 0.0
@@ -117,7 +117,7 @@ fn remainder_value(vm: &mut Vm, division: Division) -> Outcome {
     }
 }
 
-/// Fixnums, without zero as the divisor.
+/// Divides fixnums; `None` for other values and for a divisor of zero.
 fn small(rounding: Rounding, a: Value, b: Value) -> Option<(Int, Int)> {
     let (a, b) = (a.as_fixnum()?, b.as_fixnum().filter(|&b| b != 0)?);
     let (mut quotient, mut remainder) = (a / b, a % b);
@@ -145,7 +145,7 @@ fn division(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Result<Divis
         Pair::Ratios(_, y) if y.numerator.is_zero() => vm.raise(Raised::DivisionByZero("/", [a, b])),
         Pair::Ratios(x, y) => {
             check_ratios(vm, &x, &y)?;
-            // x / y is the quotient of integers n / d, and its remainder belongs over the common denominator.
+            // x / y is the integer quotient n / d; its remainder belongs over the common denominator.
             let n = x.numerator.times(&y.denominator);
             let d = x.denominator.times(&y.numerator);
             let (quotient, remainder) = int_division(vm, rounding, &n, &d)?;
@@ -190,7 +190,7 @@ fn float_division(
     let mut remainder = x - whole * y;
     if remainder != 0.0 {
         let half = (2.0 * remainder.abs()).partial_cmp(&y.abs()).unwrap_or(Ordering::Less);
-        // The rounded quotient may be past the exact one; then the sign of the remainder would tell the wrong side.
+        // The rounded quotient may exceed the exact one; the sign of the remainder then names the wrong side.
         let is_negative = if rounding == Rounding::Round { remainder < 0.0 } else { x < 0.0 };
         let step = rounding.step(is_negative, y < 0.0, quotient.is_odd(), half);
         quotient = quotient.plus(&Int::from(i64::from(step)));

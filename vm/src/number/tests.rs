@@ -1,4 +1,4 @@
-//! Values of the tower against known results, and against the definitions in `num-bigint`.
+//! The tower against known results.
 
 use super::*;
 
@@ -31,7 +31,7 @@ fn show(vm: &Vm, v: Value) -> String {
     }
 }
 
-/// Applies a function of two numbers.
+/// Applies a function to two numbers.
 fn apply(f: fn(&mut Vm, Value, Value) -> Outcome, a: &str, b: &str) -> String {
     let mut vm = Vm::for_tests();
     let (a, b) = (parse(&mut vm, a), parse(&mut vm, b));
@@ -224,7 +224,7 @@ fn float_quotients_of_ffloor() {
     check(fround, &[("-0.3", "1", "0.0 -0.3")]);
 }
 
-/// The relation of two numbers, from all three comparisons.
+/// Returns the relation of two numbers, from all three comparisons.
 fn relation(a: &str, b: &str) -> &'static str {
     let mut vm = Vm::for_tests();
     let (a, b) = (parse(&mut vm, a), parse(&mut vm, b));

@@ -1,7 +1,7 @@
 //! Numbers as text: integers in any radix, doubles by the shortest digits that read back.
 //!
-//! Not here: what `*print-base*` and `*print-radix*` ask for, and the directives of `format`, which are written in ESL
-//! over these; reading numbers in source text (the compiler's reader).
+//! Not here: the effect of `*print-base*` and `*print-radix*`, and the directives of `format`, which are
+//! written in ESL on top of these functions; reading numbers in source text (the compiler's reader).
 
 use num_bigint::{BigInt, BigUint};
 use num_integer::Integer;
@@ -11,11 +11,11 @@ use super::{Int, float, limit};
 use crate::raise::Exit;
 use crate::vm::Vm;
 
-/// The digits of `n` in `radix`, from 2 to 36, with `-` in front of a negative number.
+/// Returns the digits of `n` in `radix`, from 2 to 36, with `-` in front of a negative number.
 ///
 /// # Errors
-/// [`Exit::Slowly`] for a number above [`limit::DIGIT_LIMBS`] in a radix that is no power of two, or with more than about
-/// [`limit::WRITTEN_DIGITS`] digits.
+/// [`Exit::Slowly`] for a number above [`limit::DIGIT_LIMBS`] in a radix that is not a power of two, or with
+/// more than about [`limit::WRITTEN_DIGITS`] digits.
 pub(crate) fn integer_text(vm: &mut Vm, n: &Int, radix: u32) -> Result<String, Exit> {
     match n {
         Int::Small(n) if radix == 10 => Ok(n.to_string()),
@@ -36,7 +36,7 @@ pub(crate) fn integer_text(vm: &mut Vm, n: &Int, radix: u32) -> Result<String, E
     }
 }
 
-/// A double as `prin1` writes it: positional from 1e-3 to below 1e7, else with an exponent.
+/// Returns a double as `prin1` writes it: positional from 1e-3 to below 1e7, else with an exponent.
 pub(crate) fn float_text(x: f64) -> String {
     if x.is_nan() {
         return "#<FLOAT NAN>".into();
@@ -60,21 +60,22 @@ pub(crate) fn float_text(x: f64) -> String {
     format!("{sign}{first}.{rest}e{exponent}")
 }
 
-/// The shortest digits of a finite double above zero that read back, without a point, and the decimal exponent of the
-/// first of them.
+/// Returns the shortest digits of a finite double above zero that read back, without a point, and the decimal
+/// exponent of the first digit.
 fn scientific(x: f64) -> (String, i32) {
     let text = format!("{x:e}");
     let (digits, exponent) = text.split_once('e').expect("this format has an exponent");
     (digits.replace('.', ""), exponent.parse().expect("an exponent is an integer"))
 }
 
-/// Decimal digits of a finite double that is not negative, and where the point goes: the number is `0.d1d2d3… · 10^k`.
+/// Returns the position of the point and the decimal digits of a finite double that is not negative: the
+/// number is `0.d1d2d3… · 10^k`.
 ///
-/// With a `position`, digits below `10^position` are not wanted: the digits are the shortest in the closed interval of
-/// half a unit of that position about the exact value. This is what `format` prints.
+/// With a `position`, digits below `10^position` are dropped: the digits are the shortest in the closed
+/// interval of half a unit of that position about the exact value. `format` prints these.
 ///
-/// Source: Burger and Dybvig, "Printing floating-point numbers quickly and accurately", 1996, with the cutoff of
-/// SBCL's `flonum-to-digits`, whose every choice is kept.
+/// Source: Burger and Dybvig, "Printing floating-point numbers quickly and accurately", 1996, with the cutoff
+/// of SBCL's `flonum-to-digits`, whose every choice is kept.
 pub(crate) fn float_digits(x: f64, position: Option<i32>) -> (i32, String) {
     let Some(position) = position else {
         if x == 0.0 {
@@ -98,7 +99,7 @@ pub(crate) fn float_digits(x: f64, position: Option<i32>) -> (i32, String) {
     } else {
         s <<= exponent.unsigned_abs();
     }
-    // Half a unit of the position asked for: s · 10^position / 2, on a common scale.
+    // Half a unit of the requested position: s · 10^position / 2, on a common scale.
     let power: BigUint = Pow::pow(BigUint::from(10u32), position.unsigned_abs());
     if position < 0 {
         for n in [&mut r, &mut s, &mut low, &mut high] {
@@ -142,8 +143,8 @@ fn scale_and_generate(mut r: BigUint, mut s: BigUint, mut low: BigUint, mut high
             (true, false) => digit,
             (true, true) => digit + u32::from(&r * 2u32 >= s),
         };
-        // Scaling has seen to it that no carry leaves the first digit, and an interval that let one out of a later
-        // digit would have ended the digit before.
+        // Scaling ensures that the first digit does not carry; an interval with a carry out of a later digit
+        // would have ended at the digit before.
         digits.push(char::from_digit(digit, 10).unwrap_or('9'));
         if is_low || is_high {
             return (k, digits);
@@ -151,12 +152,12 @@ fn scale_and_generate(mut r: BigUint, mut s: BigUint, mut low: BigUint, mut high
     }
 }
 
-/// What `parse-integer` finds.
+/// The result of reading an integer.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Parsed {
     /// An integer, and the index after its last digit.
     Integer(Int, usize),
-    /// No digit where one is expected; the index of what stands there.
+    /// No digit where one is expected; the index of the character there.
     Nothing(usize),
     /// Too many digits for one operation.
     TooLong,
@@ -199,7 +200,7 @@ pub(crate) fn parse_integer(characters: &[u32], start: usize, radix: u32) -> Par
     Parsed::Integer(if is_negative { magnitude.negated() } else { magnitude }, at)
 }
 
-/// What `parse-integer` skips.
+/// Returns whether `parse-integer` skips the character.
 pub(crate) fn is_blank(code: u32) -> bool {
     matches!(code, 0x20 | 0x08..=0x0D | 0xA0)
 }

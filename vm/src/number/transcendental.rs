@@ -1,8 +1,8 @@
 //! Elementary functions on doubles.
 //!
-//! Where a correctly rounded function is at hand it is taken: its digits are the same on every machine, and those of a
-//! good C library but for one result in some hundred. The inverse hyperbolic functions and `tanh` are the classical ones,
-//! written in plain arithmetic, whose digits C libraries share.
+//! Correctly rounded functions are used where available: their digits are the same on every machine, and
+//! agree with those of a good C library in all but about one result in a hundred. The inverse hyperbolic
+//! functions and `tanh` are the classical ones in plain arithmetic, whose digits C libraries share.
 
 pub(crate) use libm::{acosh, asinh, atanh, tanh};
 pub(crate) use pxfm::{
@@ -10,13 +10,13 @@ pub(crate) use pxfm::{
     f_log2 as log2, f_pow as pow, f_sin as sin, f_tan as tan,
 };
 
-/// The angle of a point. One too small for a double is a zero with the sign of `y`.
+/// Returns the angle of a point. An angle too small for a double is a zero with the sign of `y`.
 pub(crate) fn atan2(y: f64, x: f64) -> f64 {
     let angle = pxfm::f_atan2(y, x);
     if angle == 0.0 { angle.copysign(y) } else { angle }
 }
 
-/// The hyperbolic sine, which has the sign of `x` at zero as well.
+/// Returns the hyperbolic sine; at zero, too, it has the sign of `x`.
 pub(crate) fn sinh(x: f64) -> f64 {
     if x == 0.0 { x } else { pxfm::f_sinh(x) }
 }
