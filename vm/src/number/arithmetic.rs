@@ -201,7 +201,7 @@ pub(crate) fn check_gcd(vm: &mut Vm, a: usize, b: usize) -> Result<(), Exit> {
         return Err(Exit::Slowly);
     }
     if long > 2 {
-        // One division brings both to the size of the shorter, then every limb takes two passes over the numbers.
+        // One division brings both to the size of the shorter; then every limb takes two passes over both.
         vm.charge((long + 4 * short) * short);
     }
     Ok(())

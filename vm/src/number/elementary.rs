@@ -28,7 +28,10 @@ fn within_one(x: f64) -> bool {
 
 macro_rules! elementary {
     ($( $id:ident = $name:literal $function:path, $domain:expr; )*) => {
-        $( pub(crate) const $id: Elementary = Elementary { name: $name, function: $function, domain: $domain }; )*
+        $(
+            pub(crate) const $id: Elementary =
+                Elementary { name: $name, function: $function, domain: $domain };
+        )*
     };
 }
 

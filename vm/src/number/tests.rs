@@ -1,6 +1,7 @@
 //! The tower against known results.
 
 use super::*;
+use crate::raise::Expected;
 
 /// Reads `3`, `-1/2`, `1.5` or `2^70+1` (powers of two make bignums readable).
 fn parse(vm: &mut Vm, text: &str) -> Value {
@@ -301,12 +302,10 @@ fn what_is_no_number_is_named() {
         (add(&mut vm, Value::small(1), Value::T), "NUMBER"),
     ] {
         assert_eq!(result, Err(Exit::Raise));
-        assert!(
-            matches!(vm.raised, Some(Raised::Type(Value::T, crate::raise::Expected::Type(t))) if t == expected)
-        );
+        assert!(matches!(vm.raised, Some(Raised::Type(Value::T, Expected::Type(t))) if t == expected));
     }
     assert_eq!(less(&mut vm, Value::small(1), Value::NIL), Err(Exit::Raise));
-    assert!(matches!(vm.raised, Some(Raised::Type(Value::NIL, crate::raise::Expected::Type("REAL")))));
+    assert!(matches!(vm.raised, Some(Raised::Type(Value::NIL, Expected::Type("REAL")))));
 }
 
 #[test]
