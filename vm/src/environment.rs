@@ -20,6 +20,9 @@ use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::{World, find_builtin};
 
+pub(crate) use compiler::{Compiler, Job, JobId, Running, Text};
+
+mod compiler;
 mod host;
 mod similar;
 

@@ -10,6 +10,7 @@ use esl_bytecode::datum::Datum;
 use crate::control::End;
 use crate::database::Database;
 use crate::embed::HostFunction;
+use crate::environment::Compiler;
 use crate::explore::Points;
 use crate::figures::Figures;
 use crate::finish::EndOfAll;
@@ -92,6 +93,8 @@ pub struct Vm {
     /// What one of them has given, while there is no room for it.
     pub(crate) host_answer: Option<Result<Datum, String>>,
 
+    /// The compiler, and the compilations that programs run.
+    pub(crate) compiler: Compiler,
     /// Facts and rules.
     pub(crate) database: Database,
 
@@ -260,6 +263,7 @@ impl Vm {
             now: 0,
             looked_at: 0,
             moved_at: 0,
+            compiler: Compiler::default(),
             database: Database::default(),
             running: None,
             running_index: u32::MAX,

@@ -16,150 +16,38 @@
 //!
 //! Diagnostics are a list of `(severity code text)`. Whoever begins a compilation ends it with `%end-compilation`.
 
-use std::sync::Arc;
-
-use esl_bytecode::compile::{Answer, Compilation, Compile, Part, Step};
+use esl_bytecode::compile::{Answer, Compilation, Step};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::file;
 use esl_bytecode::span::Span;
 use esl_bytecode::verify::verify;
-use slotmap::{Key, KeyData, SlotMap, new_key_type};
 
 use crate::builtins::expect::optional;
 use crate::builtins::stream::Source;
 use crate::datum::Unit;
+use crate::environment::{Job, JobId, Running, Text};
 use crate::load::{Alone, load};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
-
-new_key_type! {
-    /// Names a compilation that a program runs.
-    struct SessionId;
-}
 
 /// Whether a diagnostic with this code says that a text ends in the middle of a datum.
 fn is_unfinished(code: &str) -> bool {
     code.starts_with("unclosed-") || code.starts_with("unfinished-")
 }
 
-/// What the program has a handle of.
-enum Session {
-    /// A compilation.
-    Compilation(Box<Running>),
-    /// A text of which form by form is compiled.
-    Text(Text),
-    /// One that somebody works on.
-    Taken,
-}
-
-/// A text, and where the next of its forms begins.
-struct Text {
-    text: Arc<str>,
-    /// What it is called, if places in it are of interest.
-    name: Option<String>,
-    position: usize,
-    /// Line there, from 0.
-    line: u32,
-    /// Characters before it on that line.
-    column: u32,
-}
-
-impl Text {
-    /// What lies between the position and `end`.
-    fn part(&self, end: usize) -> Option<Part<'_>> {
-        let name = self.name.as_deref()?;
-        let range = self.position..end;
-        Some(Part { name, text: &self.text, range, line: self.line, column: self.column })
-    }
-
-    /// Goes on to `end`.
-    fn pass(&mut self, end: usize) {
-        let passed = &self.text[self.position..end];
-        let last = passed.rfind('\n');
-        self.line += passed.bytes().filter(|&byte| byte == b'\n').count() as u32;
-        let after = last.map_or(passed, |at| &passed[at + 1..]).chars().count() as u32;
-        self.column = if last.is_some() { after } else { self.column + after };
-        self.position = end;
-    }
-}
-
-/// A compilation that a program runs.
-struct Running {
-    compilation: Box<dyn Compilation>,
-    unit: Unit,
-    /// What the compilation wants, until the program has been told: there may be no room at first.
-    step: Option<Step>,
-    /// Whether it waits for the value of a module that was to be loaded.
-    keeps: bool,
-}
-
-/// The compiler of a machine, and what programs compile.
-#[derive(Default)]
-pub(crate) struct Compiler {
-    compiler: Option<Box<dyn Compile>>,
-    sessions: SlotMap<SessionId, Session>,
-}
-
-impl Compiler {
-    /// Calls `visit` with every object that compilations remember.
-    pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
-        for session in self.sessions.values() {
-            if let Session::Compilation(running) = session {
-                running.unit.roots(visit);
-            }
-        }
-    }
-
-    fn add(&mut self, session: Session) -> Value {
-        let id = self.sessions.insert(session).data().as_ffi();
-        // A key's version stays far below the limit: it grows by two each time that a place is used again.
-        Value::handle(id as u32, (id >> 32) as u32 % Value::GENERATION_LIMIT).unwrap_or(Value::NIL)
-    }
-
-    fn find(&self, handle: Value) -> Option<SessionId> {
-        let (index, generation) = handle.as_handle()?;
-        let id = SessionId::from(KeyData::from_ffi(u64::from(generation) << 32 | u64::from(index)));
-        self.sessions.contains_key(id).then_some(id)
-    }
-}
-
 impl Vm {
-    /// Gives the machine a compiler, for `eval`, `load` and `read`.
-    pub fn set_compiler(&mut self, compiler: Box<dyn Compile>) {
-        self.world.compiler.compiler = Some(compiler);
-    }
-
-    /// Does something with the compiler, which may ask about the program meanwhile.
-    fn with_compiler<T>(&mut self, work: impl FnOnce(&mut Vm, &dyn Compile) -> T) -> Result<T, Exit> {
-        let Some(compiler) = self.world.compiler.compiler.take() else {
-            return self.program_error("this machine has no compiler");
-        };
-        let result = work(self, &*compiler);
-        self.world.compiler.compiler = Some(compiler);
-        Ok(result)
-    }
-
     fn begin(&mut self, compilation: Box<dyn Compilation>, unit: Unit) -> Value {
         let running = Running { compilation, unit, step: None, keeps: false };
-        self.world.compiler.add(Session::Compilation(Box::new(running)))
+        self.compiler.add(Job::Compilation(Box::new(running)))
     }
 
-    /// Takes a session out of the table; [`Vm::put_back`] puts it back.
-    fn take_session(&mut self, handle: Value) -> Result<(SessionId, Session), Exit> {
-        let sessions = &mut self.world.compiler;
-        if let Some(id) = sessions.find(handle)
-            && let Some(session) = sessions.sessions.get_mut(id)
-        {
-            return Ok((id, std::mem::replace(session, Session::Taken)));
-        }
-        self.program_error("this compilation is over")
-    }
-
-    fn put_back(&mut self, id: SessionId, session: Session) {
-        if let Some(place) = self.world.compiler.sessions.get_mut(id) {
-            *place = session;
+    /// Takes the job that `handle` names out of the table, until `Compiler::put_back`.
+    fn take_job(&mut self, handle: Value) -> Result<(JobId, Job), Exit> {
+        match self.compiler.take(handle) {
+            Some(taken) => Ok(taken),
+            None => self.program_error("this compilation is over"),
         }
     }
 
@@ -325,17 +213,17 @@ pub(super) fn open_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         name => Some(vm.designated_text(name)?),
     };
     let text = Text { text: text.into(), name, position: 0, line: 0, column: 0 };
-    Ok(vm.world.compiler.add(Session::Text(text)))
+    Ok(vm.compiler.add(Job::Text(text)))
 }
 
 /// `(%next-form text)`: the compilation of the next form of a text, `NIL` at its end.
 pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (id, mut session) = vm.take_session(arguments[0])?;
-    let next = match &mut session {
-        Session::Text(text) => begin_form(vm, text),
+    let (id, mut job) = vm.take_job(arguments[0])?;
+    let next = match &mut job {
+        Job::Text(text) => begin_form(vm, text),
         _ => vm.program_error("there are no forms in a compilation"),
     };
-    vm.put_back(id, session);
+    vm.compiler.put_back(id, job);
     next
 }
 
@@ -354,12 +242,12 @@ fn begin_form(vm: &mut Vm, text: &mut Text) -> Outcome {
 
 /// `(%compilation-step handle kind outcome)`
 pub(super) fn compilation_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (id, mut session) = vm.take_session(arguments[0])?;
-    let told = match &mut session {
-        Session::Compilation(running) => step(vm, running, arguments[1], arguments[2]),
+    let (id, mut job) = vm.take_job(arguments[0])?;
+    let told = match &mut job {
+        Job::Compilation(running) => step(vm, running, arguments[1], arguments[2]),
         _ => vm.program_error("a text is no compilation"),
     };
-    vm.put_back(id, session);
+    vm.compiler.put_back(id, job);
     told
 }
 
@@ -391,9 +279,7 @@ fn step(vm: &mut Vm, running: &mut Running, kind: Value, outcome: Value) -> Outc
 
 /// `(%end-compilation handle)`
 pub(super) fn end_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    if let Some(id) = vm.world.compiler.find(arguments[0]) {
-        vm.world.compiler.sessions.remove(id);
-    }
+    vm.compiler.end(arguments[0]);
     Ok(Value::NIL)
 }
 

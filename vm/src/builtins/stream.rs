@@ -1,9 +1,8 @@
 //! Streams: the standard ones, and those that read from or write to a string or a text file.
 //!
-//! A Stream is a record; `aux` is its [`Sort`], [`slot`] names its slots. A file is read as a whole when it is opened;
-//! what is written to one is gathered, and goes out in blocks and when the stream is closed. What is written to a string is
-//! gathered in strings that are never made longer, so that a character takes as long behind a million others as before
-//! them. Every output stream knows its column.
+//! A Stream is a record ([`crate::world::stream`]). A file is read as a whole when it is opened; output to a file
+//! is gathered, and written in blocks and when the stream is closed. Output to a string is gathered in strings that
+//! never grow, so that the millionth character takes as long as the first. Every output stream knows its column.
 
 use smallvec::SmallVec;
 
@@ -11,58 +10,18 @@ use crate::builtins::expect::optional;
 use crate::builtins::{COPY_LIMIT, LIMIT};
 use crate::control::End;
 use crate::equality::characters_of;
-use crate::heap::{AllocError, Heap, Kind};
+use crate::heap::Kind;
 use crate::host::{HostError, Output, Taken, WriteMode, column_after, encode};
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::world::stream::{StreamKind, make_stream, slot};
 
 mod read;
 mod write;
 
 pub(super) use read::{listen, peek_char, read_char, read_char_no_hang, read_line, unread_char};
 pub(super) use write::{finish_output, fresh_line, terpri, write_char, write_string};
-
-/// Slots of a Stream.
-mod slot {
-    /// What it reads from or has gathered, a String.
-    pub(super) const BUFFER: usize = 0;
-    /// How much of that was read or written, in characters.
-    pub(super) const POSITION: usize = 1;
-    /// Where reading ends.
-    pub(super) const END: usize = 2;
-    /// Characters since the last line end that was written.
-    pub(super) const COLUMN: usize = 3;
-    /// Name of its file.
-    pub(super) const NAME: usize = 4;
-    /// Whether it is open.
-    pub(super) const OPEN: usize = 5;
-    /// How the next block is written to the file: number of a `WriteMode`.
-    pub(super) const MODE: usize = 6;
-    /// What it has gathered before what is in its buffer: full strings, the last first.
-    pub(super) const FULL: usize = 7;
-    /// Number of characters in these.
-    pub(super) const BEFORE: usize = 8;
-    pub(super) const LEN: usize = 9;
-}
-
-/// What a stream is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u16)]
-enum Sort {
-    StandardInput = 0,
-    StandardOutput = 1,
-    StandardError = 2,
-    StringInput = 3,
-    StringOutput = 4,
-    FileOutput = 5,
-}
-
-impl Sort {
-    fn is_input(self) -> bool {
-        matches!(self, Sort::StandardInput | Sort::StringInput)
-    }
-}
 
 /// Characters that a file's stream gathers before it writes them.
 const BLOCK: usize = 1 << 15;
@@ -86,49 +45,10 @@ pub(crate) enum Source {
     },
 }
 
-fn make_stream(
-    heap: &mut Heap,
-    sort: Sort,
-    buffer: Value,
-    start: usize,
-    end: usize,
-) -> Result<Value, AllocError> {
-    let mut slots = [Value::NIL; slot::LEN];
-    slots[slot::BUFFER] = buffer;
-    slots[slot::POSITION] = Value::index(start);
-    slots[slot::END] = Value::index(end);
-    slots[slot::COLUMN] = Value::small(0);
-    slots[slot::OPEN] = Value::T;
-    slots[slot::MODE] = Value::small(0);
-    slots[slot::BEFORE] = Value::small(0);
-    heap.alloc_record(Kind::Stream, 0, sort as u16, &slots)
-}
-
-/// Standard input, output and error.
-///
-/// # Errors
-/// As for every allocation.
-pub(crate) fn standard_streams(heap: &mut Heap) -> Result<[Value; 3], AllocError> {
-    let mut stream = |sort| make_stream(heap, sort, Value::NIL, 0, 0);
-    Ok([stream(Sort::StandardInput)?, stream(Sort::StandardOutput)?, stream(Sort::StandardError)?])
-}
-
 impl Vm {
     /// Writes what standard output has gathered.
     pub(crate) fn flush_output(&mut self) {
         self.console.flush(&mut *self.host);
-    }
-
-    fn sort_of(&self, stream: Value) -> Option<Sort> {
-        let header = self.heap.header(stream).filter(|header| header.kind == Kind::Stream)?;
-        Some(match header.aux {
-            0 => Sort::StandardInput,
-            1 => Sort::StandardOutput,
-            2 => Sort::StandardError,
-            3 => Sort::StringInput,
-            4 => Sort::StringOutput,
-            _ => Sort::FileOutput,
-        })
     }
 
     fn stream_slot(&self, stream: Value, index: usize) -> Value {
@@ -144,7 +64,7 @@ impl Vm {
     }
 
     /// The open stream that `v` designates for reading or writing: `NIL` is the standard one, `T` the terminal.
-    fn designated_stream(&mut self, v: Value, is_input: bool) -> Result<(Value, Sort), Exit> {
+    fn designated_stream(&mut self, v: Value, is_input: bool) -> Result<(Value, StreamKind), Exit> {
         let known = self.world.known;
         let [input, output, _] = self.world.streams;
         let (variable, terminal) =
@@ -154,21 +74,21 @@ impl Vm {
             Value::T => terminal,
             v => v,
         };
-        let Some(sort) = self.sort_of(stream) else {
+        let Some(kind) = StreamKind::of(&self.heap, stream) else {
             let expected = Expected::Type("STREAM");
             return self.raise(match v {
                 Value::NIL => Raised::Variable(variable, stream, expected),
                 _ => Raised::Type(stream, expected),
             });
         };
-        if sort.is_input() != is_input {
+        if kind.is_input() != is_input {
             let text = if is_input { "it is not open for reading" } else { "it is not open for writing" };
             return self.raise(Raised::Stream(stream, text.into()));
         }
         if self.stream_slot(stream, slot::OPEN).is_nil() {
             return self.raise(Raised::Stream(stream, "it is closed".into()));
         }
-        Ok((stream, sort))
+        Ok((stream, kind))
     }
 
     /// Gives the program what standard input has to say; `None` at the end.
@@ -185,8 +105,8 @@ impl Vm {
         }
     }
 
-    fn next_character(&mut self, stream: Value, sort: Sort) -> Result<Option<u32>, Exit> {
-        if sort == Sort::StandardInput {
+    fn next_character(&mut self, stream: Value, kind: StreamKind) -> Result<Option<u32>, Exit> {
+        if kind == StreamKind::StandardInput {
             let taken = self.console.read(&mut *self.host);
             return self.taken(taken);
         }
@@ -200,8 +120,8 @@ impl Vm {
         Ok(character)
     }
 
-    fn give_back(&mut self, stream: Value, sort: Sort, character: u32) {
-        if sort == Sort::StandardInput {
+    fn give_back(&mut self, stream: Value, kind: StreamKind, character: u32) {
+        if kind == StreamKind::StandardInput {
             self.console.unread(character);
             return;
         }
@@ -216,29 +136,29 @@ impl Vm {
     }
 
     /// Writes characters to an open output stream.
-    fn write_characters(&mut self, stream: Value, sort: Sort, characters: &[u32]) -> Result<(), Exit> {
+    fn write_characters(&mut self, stream: Value, kind: StreamKind, characters: &[u32]) -> Result<(), Exit> {
         self.charge_elements(characters.len());
-        match sort {
-            Sort::StandardOutput => {
+        match kind {
+            StreamKind::StandardOutput => {
                 self.console.write(&mut *self.host, Output::Standard, characters);
                 self.check_output()
             }
-            Sort::StandardError => {
+            StreamKind::StandardError => {
                 self.console.write(&mut *self.host, Output::Error, characters);
                 Ok(())
             }
             _ => {
-                let end = self.gather(stream, sort, characters)?;
+                let end = self.gather(stream, kind, characters)?;
                 let column = column_after(self.stream_index(stream, slot::COLUMN), characters);
                 self.set_stream_slot(stream, slot::POSITION, Value::index(end));
                 self.set_stream_slot(stream, slot::COLUMN, Value::index(column));
-                if sort == Sort::FileOutput && end >= BLOCK { self.write_out(stream) } else { Ok(()) }
+                if kind == StreamKind::FileOutput && end >= BLOCK { self.write_out(stream) } else { Ok(()) }
             }
         }
     }
 
     /// Puts characters behind those in the buffer of a stream; where the next will go.
-    fn gather(&mut self, stream: Value, sort: Sort, characters: &[u32]) -> Result<usize, Exit> {
+    fn gather(&mut self, stream: Value, kind: StreamKind, characters: &[u32]) -> Result<usize, Exit> {
         let position = self.stream_index(stream, slot::POSITION);
         let buffer = self.stream_slot(stream, slot::BUFFER);
         let capacity = self.heap.string(buffer).map_or(0, <[u32]>::len);
@@ -250,7 +170,7 @@ impl Vm {
             return Ok(end);
         }
         let (now, rest) = characters.split_at((capacity - position).min(characters.len()));
-        if sort == Sort::StringOutput && end > GATHERED {
+        if kind == StreamKind::StringOutput && end > GATHERED {
             // The buffer is filled up, and another one goes on.
             let next = self.heap.alloc_string_filled(rest.len().max(GATHERED), 0)?;
             let full = self.heap.cons(buffer, self.stream_slot(stream, slot::FULL))?;
@@ -317,10 +237,10 @@ impl Vm {
         }
     }
 
-    fn column_of(&self, stream: Value, sort: Sort) -> usize {
-        match sort {
-            Sort::StandardOutput => self.console.column(Output::Standard),
-            Sort::StandardError => self.console.column(Output::Error),
+    fn column_of(&self, stream: Value, kind: StreamKind) -> usize {
+        match kind {
+            StreamKind::StandardOutput => self.console.column(Output::Standard),
+            StreamKind::StandardError => self.console.column(Output::Error),
             _ => self.stream_index(stream, slot::COLUMN),
         }
     }
@@ -351,8 +271,8 @@ impl Vm {
     /// # Errors
     /// A failure if it is no open input stream.
     pub(crate) fn source(&mut self, stream: Value) -> Result<Source, Exit> {
-        let (stream, sort) = self.designated_stream(stream, true)?;
-        if sort == Sort::StandardInput {
+        let (stream, kind) = self.designated_stream(stream, true)?;
+        if kind == StreamKind::StandardInput {
             return Ok(Source::Console { text: self.console.pending(), is_at_end: self.console.is_at_end() });
         }
         let (start, end) = (self.stream_index(stream, slot::POSITION), self.stream_index(stream, slot::END));
@@ -399,7 +319,7 @@ pub(super) fn make_string_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let characters = vm.few_characters(arguments[0], arguments[1], arguments[2])?;
     vm.charge_elements(characters.len());
     let buffer = vm.heap.alloc_string(&characters)?;
-    Ok(make_stream(&mut vm.heap, Sort::StringInput, buffer, 0, characters.len())?)
+    Ok(make_stream(&mut vm.heap, StreamKind::StringInput, buffer, 0, characters.len())?)
 }
 
 /// `(%read-from-copy string)`
@@ -407,7 +327,7 @@ pub(super) fn read_from_copy(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(length) = vm.heap.string(arguments[0]).map(<[u32]>::len) else {
         return vm.type_error(arguments[0], "SIMPLE-STRING");
     };
-    Ok(make_stream(&mut vm.heap, Sort::StringInput, arguments[0], 0, length)?)
+    Ok(make_stream(&mut vm.heap, StreamKind::StringInput, arguments[0], 0, length)?)
 }
 
 /// `(%string-input-position stream)`
@@ -419,13 +339,13 @@ pub(super) fn string_input_position(vm: &mut Vm, arguments: &[Value]) -> Outcome
 /// `(%make-string-output)`
 pub(super) fn make_string_output(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     let buffer = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
-    Ok(make_stream(&mut vm.heap, Sort::StringOutput, buffer, 0, 0)?)
+    Ok(make_stream(&mut vm.heap, StreamKind::StringOutput, buffer, 0, 0)?)
 }
 
 /// `(get-output-stream-string stream)`
 pub(super) fn get_output_stream_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = arguments[0];
-    if vm.sort_of(stream) != Some(Sort::StringOutput) {
+    if StreamKind::of(&vm.heap, stream) != Some(StreamKind::StringOutput) {
         return vm.type_error(stream, "STRING-STREAM");
     }
     let position = vm.stream_index(stream, slot::POSITION);
@@ -451,7 +371,7 @@ pub(super) fn get_output_stream_string(vm: &mut Vm, arguments: &[Value]) -> Outc
 /// `(%gathered-length stream)`
 pub(super) fn gathered_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = arguments[0];
-    if vm.sort_of(stream) != Some(Sort::StringOutput) {
+    if StreamKind::of(&vm.heap, stream) != Some(StreamKind::StringOutput) {
         return vm.type_error(stream, "STRING-STREAM");
     }
     Ok(Value::index(vm.stream_index(stream, slot::BEFORE) + vm.stream_index(stream, slot::POSITION)))
@@ -478,7 +398,7 @@ pub(super) fn open_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
     let buffer = file_text(vm, arguments)?;
     let length = vm.heap.string(buffer).map_or(0, <[u32]>::len);
-    let stream = make_stream(&mut vm.heap, Sort::StringInput, buffer, 0, length)?;
+    let stream = make_stream(&mut vm.heap, StreamKind::StringInput, buffer, 0, length)?;
     let name = vm.heap.alloc_str(&path)?;
     vm.set_stream_slot(stream, slot::NAME, name);
     Ok(stream)
@@ -489,7 +409,7 @@ pub(super) fn open_output(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
     let mode = vm.index_below(arguments[1], 3)?;
     let buffer = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
-    let stream = make_stream(&mut vm.heap, Sort::FileOutput, buffer, 0, 0)?;
+    let stream = make_stream(&mut vm.heap, StreamKind::FileOutput, buffer, 0, 0)?;
     let name = vm.heap.alloc_str(&path)?;
     vm.set_stream_slot(stream, slot::NAME, name);
     // Nothing is written at once, so that a file that cannot be made fails here.
@@ -514,16 +434,16 @@ fn write_mode(mode: usize) -> WriteMode {
 /// `(%close stream abort)`
 pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = arguments[0];
-    let Some(sort) = vm.sort_of(stream) else { return vm.type_error(stream, "STREAM") };
+    let Some(kind) = StreamKind::of(&vm.heap, stream) else { return vm.type_error(stream, "STREAM") };
     if vm.stream_slot(stream, slot::OPEN).is_nil() {
         return Ok(Value::NIL);
     }
-    match sort {
-        Sort::StandardInput | Sort::StandardOutput | Sort::StandardError => {
+    match kind {
+        StreamKind::StandardInput | StreamKind::StandardOutput | StreamKind::StandardError => {
             vm.flush_output();
             return Ok(Value::T);
         }
-        Sort::FileOutput if arguments[1].is_nil() => {
+        StreamKind::FileOutput if arguments[1].is_nil() => {
             vm.set_stream_slot(stream, slot::OPEN, Value::NIL);
             vm.write_out(stream)?;
         }
@@ -563,48 +483,50 @@ pub(super) fn delete_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(streamp object)`
 pub(super) fn streamp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(Value::boolean(vm.sort_of(arguments[0]).is_some()))
+    Ok(Value::boolean(StreamKind::of(&vm.heap, arguments[0]).is_some()))
 }
 
 /// `(input-stream-p stream)`
 pub(super) fn input_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    match vm.sort_of(arguments[0]) {
-        Some(sort) => Ok(Value::boolean(sort.is_input())),
+    match StreamKind::of(&vm.heap, arguments[0]) {
+        Some(kind) => Ok(Value::boolean(kind.is_input())),
         None => vm.type_error(arguments[0], "STREAM"),
     }
 }
 
 /// `(output-stream-p stream)`
 pub(super) fn output_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    match vm.sort_of(arguments[0]) {
-        Some(sort) => Ok(Value::boolean(!sort.is_input())),
+    match StreamKind::of(&vm.heap, arguments[0]) {
+        Some(kind) => Ok(Value::boolean(!kind.is_input())),
         None => vm.type_error(arguments[0], "STREAM"),
     }
 }
 
 /// `(open-stream-p stream)`
 pub(super) fn open_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    match vm.sort_of(arguments[0]) {
+    match StreamKind::of(&vm.heap, arguments[0]) {
         Some(_) => Ok(vm.stream_slot(arguments[0], slot::OPEN)),
         None => vm.type_error(arguments[0], "STREAM"),
     }
 }
 
-/// `(%stream-sort stream)`: a keyword, and the name of its file.
+/// `(%stream-kind stream)`: a keyword, and the name of its file.
 pub(super) fn stream_sort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(sort) = vm.sort_of(arguments[0]) else { return vm.type_error(arguments[0], "STREAM") };
+    let Some(kind) = StreamKind::of(&vm.heap, arguments[0]) else {
+        return vm.type_error(arguments[0], "STREAM");
+    };
     let name = vm.stream_slot(arguments[0], slot::NAME);
-    let sort = match sort {
-        Sort::StandardInput | Sort::StandardOutput | Sort::StandardError => "STANDARD",
-        Sort::StringInput | Sort::StringOutput if name.is_nil() => "STRING",
+    let kind = match kind {
+        StreamKind::StandardInput | StreamKind::StandardOutput | StreamKind::StandardError => "STANDARD",
+        StreamKind::StringInput | StreamKind::StringOutput if name.is_nil() => "STRING",
         _ => "FILE",
     };
-    let sort = vm.world.keyword(&mut vm.heap, sort)?;
-    vm.give_values(&[sort, name])
+    let kind = vm.world.keyword(&mut vm.heap, kind)?;
+    vm.give_values(&[kind, name])
 }
 
 /// `(%stream-column stream)`
 pub(super) fn stream_column(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (stream, sort) = vm.designated_stream(arguments[0], false)?;
-    Ok(Value::index(vm.column_of(stream, sort)))
+    let (stream, kind) = vm.designated_stream(arguments[0], false)?;
+    Ok(Value::index(vm.column_of(stream, kind)))
 }

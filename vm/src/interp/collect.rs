@@ -6,6 +6,7 @@
 
 use super::{Leave, code_of};
 use crate::control::End;
+use crate::environment::Compiler;
 use crate::heap::{Heap, Phase, SLICE_VISITS, SliceOutcome};
 use crate::limit;
 use crate::raise::{Expected, Raised};
@@ -69,8 +70,15 @@ unsafe fn scan(heap: &mut Heap, task: &mut Task) -> usize {
 }
 
 /// Marks everything that is reachable without a task.
-fn mark_roots(heap: &mut Heap, world: &World, lists: [&mut Vec<Value>; 3], raised: Option<&Raised>) {
+fn mark_roots(
+    heap: &mut Heap,
+    world: &World,
+    compiler: &Compiler,
+    lists: [&mut Vec<Value>; 3],
+    raised: Option<&Raised>,
+) {
     world.roots(&mut |value| heap.mark(value));
+    compiler.roots(&mut |value| heap.mark(value));
     for list in lists {
         heap.mark_slice(list);
     }
@@ -171,12 +179,24 @@ impl Vm {
         if self.running.is_some() {
             self.save_cpu();
         }
-        let Vm { heap, world, values, requested_call, pinned, raised, running, tasks, deliveries, .. } = self;
+        let Vm {
+            heap,
+            world,
+            compiler,
+            values,
+            requested_call,
+            pinned,
+            raised,
+            running,
+            tasks,
+            deliveries,
+            ..
+        } = self;
         // SAFETY: all roots and all tasks are marked; `save_cpu` has noted the running frame of the running task, those
         // of the others were noted at the switch.
         unsafe {
             heap.collect_fully(|heap| {
-                mark_roots(heap, world, [values, requested_call, pinned], raised.as_ref());
+                mark_roots(heap, world, compiler, [values, requested_call, pinned], raised.as_ref());
                 deliveries.iter().for_each(|delivery| delivery.visit(&mut |value| heap.mark(value)));
                 for task in running.as_deref_mut().into_iter().chain(tasks.iter_mut()) {
                     _ = scan(heap, task);
@@ -194,7 +214,19 @@ impl Vm {
         if self.running.is_some() {
             self.save_cpu();
         }
-        let Vm { heap, world, values, requested_call, pinned, raised, running, tasks, deliveries, .. } = self;
+        let Vm {
+            heap,
+            world,
+            compiler,
+            values,
+            requested_call,
+            pinned,
+            raised,
+            running,
+            tasks,
+            deliveries,
+            ..
+        } = self;
         match heap.phase() {
             Phase::Marking => {
                 let SliceOutcome::Drained { left } = heap.slice(SLICE_VISITS) else { return };
@@ -224,7 +256,7 @@ impl Vm {
             Phase::Idle => {
                 heap.begin_cycle();
                 tasks.begin_cycle();
-                mark_roots(heap, world, [values, requested_call, pinned], raised.as_ref());
+                mark_roots(heap, world, compiler, [values, requested_call, pinned], raised.as_ref());
                 deliveries.iter().for_each(|delivery| delivery.visit(&mut |value| heap.mark(value)));
                 if let Some(task) = running {
                     // SAFETY: `save_cpu` has noted its running frame.

@@ -18,8 +18,6 @@ use esl_bytecode::builtin::{BUILTINS, Builtin, Visibility};
 use esl_bytecode::package::{PackageId, Packages};
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
-use crate::builtins::eval::Compiler;
-use crate::builtins::stream::standard_streams;
 use crate::datum::Unit;
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{AllocError, Heap, Kind};
@@ -33,6 +31,7 @@ pub(crate) mod class;
 mod defined;
 mod known;
 mod package;
+pub(crate) mod stream;
 
 pub(crate) use known::Known;
 
@@ -97,8 +96,6 @@ pub(crate) struct World {
     pub(crate) images: Images,
     /// What the compilation that is under way remembers.
     pub(crate) unit: RefCell<Unit>,
-    /// The compiler, and what programs compile.
-    pub(crate) compiler: Compiler,
     /// Structure and condition classes by the address of their names.
     classes: GivenMap<u64, Value>,
 }
@@ -130,13 +127,12 @@ impl World {
             is_defining: false,
             images: Images::default(),
             unit: RefCell::default(),
-            compiler: Compiler::default(),
             classes: GivenMap::default(),
         };
         world.nil = world.make_constant(heap, &Symbol::cl("NIL"), Value::NIL)?;
         world.t = world.make_constant(heap, &Symbol::cl("T"), Value::T)?;
         world.known = Known::intern(&mut world, heap)?;
-        world.streams = standard_streams(heap)?;
+        world.streams = stream::standard_streams(heap)?;
         let [input, output, error] = world.streams;
         let package = world.package_object(heap, PackageId::USER)?;
         for (variable, value) in [
@@ -350,7 +346,6 @@ impl World {
         self.package_objects.values().copied().for_each(&mut *visit);
         self.images.roots(visit);
         self.unit.borrow().roots(visit);
-        self.compiler.roots(visit);
         self.classes.values().copied().for_each(&mut *visit);
     }
 }

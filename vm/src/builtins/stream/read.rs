@@ -1,6 +1,6 @@
 //! Reading characters and lines.
 
-use super::{SKIP_LIMIT, Sort, slot};
+use super::{SKIP_LIMIT, StreamKind, slot};
 use crate::builtins::COPY_LIMIT;
 use crate::builtins::expect::optional;
 use crate::raise::{Exit, Outcome};
@@ -9,8 +9,8 @@ use crate::vm::Vm;
 
 /// `(read-char &optional stream (eof-error-p t) eof-value recursive-p)`
 pub(in crate::builtins) fn read_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (stream, sort) = vm.designated_stream(optional(arguments, 0), true)?;
-    match vm.next_character(stream, sort)? {
+    let (stream, kind) = vm.designated_stream(optional(arguments, 0), true)?;
+    match vm.next_character(stream, kind)? {
         Some(code) => Ok(Value::character(code).unwrap_or(Value::NIL)),
         None => vm.at_end(stream, arguments, 1),
     }
@@ -26,10 +26,10 @@ pub(in crate::builtins) fn read_char_no_hang(vm: &mut Vm, arguments: &[Value]) -
 
 /// `(listen &optional stream)`
 pub(in crate::builtins) fn listen(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (stream, sort) = vm.designated_stream(optional(arguments, 0), true)?;
-    match vm.next_character(stream, sort) {
+    let (stream, kind) = vm.designated_stream(optional(arguments, 0), true)?;
+    match vm.next_character(stream, kind) {
         Ok(Some(code)) => {
-            vm.give_back(stream, sort, code);
+            vm.give_back(stream, kind, code);
             Ok(Value::T)
         }
         Ok(None) | Err(Exit::Park) => Ok(Value::NIL),
@@ -40,15 +40,15 @@ pub(in crate::builtins) fn listen(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(peek-char &optional peek-type stream (eof-error-p t) eof-value recursive-p)`
 pub(in crate::builtins) fn peek_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let wanted = optional(arguments, 0);
-    let (stream, sort) = vm.designated_stream(optional(arguments, 1), true)?;
+    let (stream, kind) = vm.designated_stream(optional(arguments, 1), true)?;
     for _ in 0..SKIP_LIMIT {
-        let Some(code) = vm.next_character(stream, sort)? else { return vm.at_end(stream, arguments, 2) };
+        let Some(code) = vm.next_character(stream, kind)? else { return vm.at_end(stream, arguments, 2) };
         let is_it = match wanted.as_character() {
             Some(wanted) => code == wanted,
             None => wanted.is_nil() || !char::from_u32(code).is_some_and(char::is_whitespace),
         };
         if is_it {
-            vm.give_back(stream, sort, code);
+            vm.give_back(stream, kind, code);
             return Ok(Value::character(code).unwrap_or(Value::NIL));
         }
     }
@@ -60,15 +60,15 @@ pub(in crate::builtins) fn peek_char(vm: &mut Vm, arguments: &[Value]) -> Outcom
 /// `(unread-char character &optional stream)`
 pub(in crate::builtins) fn unread_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(code) = arguments[0].as_character() else { return vm.type_error(arguments[0], "CHARACTER") };
-    let (stream, sort) = vm.designated_stream(optional(arguments, 1), true)?;
-    vm.give_back(stream, sort, code);
+    let (stream, kind) = vm.designated_stream(optional(arguments, 1), true)?;
+    vm.give_back(stream, kind, code);
     Ok(Value::NIL)
 }
 
 /// `(read-line &optional stream (eof-error-p t) eof-value recursive-p)`
 pub(in crate::builtins) fn read_line(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (stream, sort) = vm.designated_stream(optional(arguments, 0), true)?;
-    let (line, is_cut) = if sort == Sort::StandardInput {
+    let (stream, kind) = vm.designated_stream(optional(arguments, 0), true)?;
+    let (line, is_cut) = if kind == StreamKind::StandardInput {
         let taken = vm.console.read_line(&mut *vm.host);
         let Some((line, is_cut)) = vm.taken(taken)? else { return end_of_line(vm, stream, arguments) };
         vm.charge_elements(line.len());

@@ -1,6 +1,6 @@
 //! Writing characters, strings and line ends.
 
-use super::Sort;
+use super::StreamKind;
 use crate::builtins::expect::optional;
 use crate::raise::Outcome;
 use crate::value::Value;
@@ -9,8 +9,8 @@ use crate::vm::Vm;
 /// `(write-char character &optional stream)`
 pub(in crate::builtins) fn write_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(code) = arguments[0].as_character() else { return vm.type_error(arguments[0], "CHARACTER") };
-    let (stream, sort) = vm.designated_stream(optional(arguments, 1), false)?;
-    vm.write_characters(stream, sort, &[code])?;
+    let (stream, kind) = vm.designated_stream(optional(arguments, 1), false)?;
+    vm.write_characters(stream, kind, &[code])?;
     Ok(arguments[0])
 }
 
@@ -18,37 +18,37 @@ pub(in crate::builtins) fn write_char(vm: &mut Vm, arguments: &[Value]) -> Outco
 pub(in crate::builtins) fn write_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[string, stream, start, end] = arguments else { unreachable!("the table says four") };
     let characters = vm.few_characters(string, start, end)?;
-    let (stream, sort) = vm.designated_stream(stream, false)?;
-    vm.write_characters(stream, sort, &characters)?;
+    let (stream, kind) = vm.designated_stream(stream, false)?;
+    vm.write_characters(stream, kind, &characters)?;
     Ok(string)
 }
 
 /// `(terpri &optional stream)`
 pub(in crate::builtins) fn terpri(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (stream, sort) = vm.designated_stream(optional(arguments, 0), false)?;
-    vm.write_characters(stream, sort, &[u32::from('\n')])?;
+    let (stream, kind) = vm.designated_stream(optional(arguments, 0), false)?;
+    vm.write_characters(stream, kind, &[u32::from('\n')])?;
     Ok(Value::NIL)
 }
 
 /// `(fresh-line &optional stream)`
 pub(in crate::builtins) fn fresh_line(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (stream, sort) = vm.designated_stream(optional(arguments, 0), false)?;
-    if vm.column_of(stream, sort) == 0 {
+    let (stream, kind) = vm.designated_stream(optional(arguments, 0), false)?;
+    if vm.column_of(stream, kind) == 0 {
         return Ok(Value::NIL);
     }
-    vm.write_characters(stream, sort, &[u32::from('\n')])?;
+    vm.write_characters(stream, kind, &[u32::from('\n')])?;
     Ok(Value::T)
 }
 
 /// `(finish-output &optional stream)`, `(force-output &optional stream)`
 pub(in crate::builtins) fn finish_output(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (stream, sort) = vm.designated_stream(optional(arguments, 0), false)?;
-    match sort {
-        Sort::StandardOutput => {
+    let (stream, kind) = vm.designated_stream(optional(arguments, 0), false)?;
+    match kind {
+        StreamKind::StandardOutput => {
             vm.flush_output();
             vm.check_output()?;
         }
-        Sort::FileOutput => vm.write_out(stream)?,
+        StreamKind::FileOutput => vm.write_out(stream)?,
         _ => {}
     }
     Ok(Value::NIL)

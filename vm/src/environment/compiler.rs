@@ -1,0 +1,151 @@
+//! The compiler of a machine, and the compilations that its programs run with it.
+//!
+//! A program names a compilation, or a text of which it compiles form by form, by a handle. A job is out of the table
+//! while a builtin works on it, since the compiler may ask about the program meanwhile.
+//!
+//! Not here: the steps of a compilation, which are builtins (`builtins::eval`).
+
+use std::sync::Arc;
+
+use esl_bytecode::compile::{Compilation, Compile, Part, Step};
+use slotmap::{Key, KeyData, SlotMap, new_key_type};
+
+use crate::datum::Unit;
+use crate::raise::Exit;
+use crate::value::Value;
+use crate::vm::Vm;
+
+new_key_type! {
+    /// Key of a job in the table.
+    pub(crate) struct JobId;
+}
+
+/// What a handle names.
+pub(crate) enum Job {
+    /// A compilation in progress.
+    Compilation(Box<Running>),
+    /// A text that is compiled form by form.
+    Text(Text),
+    /// Out of the table: a builtin works on it.
+    Taken,
+}
+
+/// A text, and the position of its next form.
+pub(crate) struct Text {
+    /// The whole text.
+    pub(crate) text: Arc<str>,
+    /// Name of the source, if diagnostics are to name places in it.
+    pub(crate) name: Option<String>,
+    /// Offset of the next form, in bytes.
+    pub(crate) position: usize,
+    /// Line of that offset, from 0.
+    pub(crate) line: u32,
+    /// Characters before it on that line.
+    pub(crate) column: u32,
+}
+
+impl Text {
+    /// Returns the text from the position to `end`, if the source has a name.
+    pub(crate) fn part(&self, end: usize) -> Option<Part<'_>> {
+        let name = self.name.as_deref()?;
+        let range = self.position..end;
+        Some(Part { name, text: &self.text, range, line: self.line, column: self.column })
+    }
+
+    /// Moves the position forward to `end`.
+    pub(crate) fn pass(&mut self, end: usize) {
+        let passed = &self.text[self.position..end];
+        let last = passed.rfind('\n');
+        self.line += passed.bytes().filter(|&byte| byte == b'\n').count() as u32;
+        let after = last.map_or(passed, |at| &passed[at + 1..]).chars().count() as u32;
+        self.column = if last.is_some() { after } else { self.column + after };
+        self.position = end;
+    }
+}
+
+/// A compilation in progress.
+pub(crate) struct Running {
+    /// The compiler's state.
+    pub(crate) compilation: Box<dyn Compilation>,
+    /// Objects and uninterned symbols of its data.
+    pub(crate) unit: Unit,
+    /// A step of which the program has not been told yet, since there was no room.
+    pub(crate) step: Option<Step>,
+    /// Whether it waits for the value of a module that was to be loaded.
+    pub(crate) keeps: bool,
+}
+
+/// The compiler of a machine, and the jobs of its programs.
+#[derive(Default)]
+pub(crate) struct Compiler {
+    compiler: Option<Box<dyn Compile>>,
+    jobs: SlotMap<JobId, Job>,
+}
+
+impl Compiler {
+    /// Calls `visit` with every object that compilations keep alive.
+    pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
+        for job in self.jobs.values() {
+            if let Job::Compilation(running) = job {
+                running.unit.roots(visit);
+            }
+        }
+    }
+
+    /// Adds a job and returns its handle.
+    pub(crate) fn add(&mut self, job: Job) -> Value {
+        let id = self.jobs.insert(job).data().as_ffi();
+        // A key's version stays far below the limit: it grows by two for each reuse of a slot.
+        Value::handle(id as u32, (id >> 32) as u32 % Value::GENERATION_LIMIT).unwrap_or(Value::NIL)
+    }
+
+    fn find(&self, handle: Value) -> Option<JobId> {
+        let (index, generation) = handle.as_handle()?;
+        let id = JobId::from(KeyData::from_ffi(u64::from(generation) << 32 | u64::from(index)));
+        self.jobs.contains_key(id).then_some(id)
+    }
+
+    /// Takes the job that `handle` names out of the table, until [`Compiler::put_back`]; `None` if it has ended.
+    pub(crate) fn take(&mut self, handle: Value) -> Option<(JobId, Job)> {
+        let id = self.find(handle)?;
+        let job = self.jobs.get_mut(id)?;
+        Some((id, std::mem::replace(job, Job::Taken)))
+    }
+
+    /// Puts a job back, unless it was ended meanwhile.
+    pub(crate) fn put_back(&mut self, id: JobId, job: Job) {
+        if let Some(slot) = self.jobs.get_mut(id) {
+            *slot = job;
+        }
+    }
+
+    /// Ends the job that `handle` names, if there is one.
+    pub(crate) fn end(&mut self, handle: Value) {
+        if let Some(id) = self.find(handle) {
+            self.jobs.remove(id);
+        }
+    }
+}
+
+impl Vm {
+    /// Gives the machine a compiler, for `eval`, `load` and `read`.
+    pub fn set_compiler(&mut self, compiler: Box<dyn Compile>) {
+        self.compiler.compiler = Some(compiler);
+    }
+
+    /// Applies `work` to the compiler, which may ask about the program meanwhile.
+    ///
+    /// # Errors
+    /// A failure if the machine has no compiler.
+    pub(crate) fn with_compiler<T>(
+        &mut self,
+        work: impl FnOnce(&mut Vm, &dyn Compile) -> T,
+    ) -> Result<T, Exit> {
+        let Some(compiler) = self.compiler.compiler.take() else {
+            return self.program_error("this machine has no compiler");
+        };
+        let result = work(self, &*compiler);
+        self.compiler.compiler = Some(compiler);
+        Ok(result)
+    }
+}
