@@ -266,8 +266,8 @@ impl Unit {
                 }
                 ToDatum::Build(object) => {
                     let count = match parts_of(heap, object) {
-                        Some(Parts::Pair(..)) => 2,
-                        Some(Parts::Items(_, items)) => items.len(),
+                        Some(ObjectParts::Pair(..)) => 2,
+                        Some(ObjectParts::Items(_, items)) => items.len(),
                         None => 0,
                     };
                     let parts = made.split_off(made.len() - count);
@@ -297,8 +297,8 @@ impl Unit {
         }
         let span = known.filter(|_| !is_made).map_or(span, |known| known.span());
         let datum = match parts_of(heap, object) {
-            Some(Parts::Items(None, _)) => Datum::new(DatumKind::Vector(parts.into()), span),
-            Some(Parts::Items(Some(dimensions), _)) => {
+            Some(ObjectParts::Items(None, _)) => Datum::new(DatumKind::Vector(parts.into()), span),
+            Some(ObjectParts::Items(Some(dimensions), _)) => {
                 let dimensions = dimensions.iter().map(|size| size.as_index().unwrap_or(0) as u32).collect();
                 Datum::new(DatumKind::Array(dimensions, parts.into()), span)
             }
@@ -390,35 +390,35 @@ impl Unit {
 }
 
 /// The parts of an object that is no atom.
-enum Parts<'a> {
+enum ObjectParts<'a> {
     Pair(Value, Value),
     /// Dimensions, unless it is a simple vector, and elements.
     Items(Option<&'a [Value]>, &'a [Value]),
 }
 
-fn parts_of(heap: &Heap, object: Value) -> Option<Parts<'_>> {
+fn parts_of(heap: &Heap, object: Value) -> Option<ObjectParts<'_>> {
     if let Some(pair) = heap.as_cons(object) {
-        return Some(Parts::Pair(pair.car, pair.cdr));
+        return Some(ObjectParts::Pair(pair.car, pair.cdr));
     }
     match heap.kind(object)? {
-        Kind::SimpleVector => Some(Parts::Items(None, heap.vector(object)?)),
+        Kind::SimpleVector => Some(ObjectParts::Items(None, heap.vector(object)?)),
         Kind::Array => {
             let dimensions = heap.array_dimensions(object)?;
             let array = heap.array(object)?;
             // Fill pointers and adjustability are beyond what a datum says, and so are elements that are no values.
             let is_plain = array.header.flags & (Array::HAS_FILL_POINTER | Array::ADJUSTABLE) == 0;
             let items = heap.vector(array.data).filter(|_| is_plain && dimensions.len() != 1)?;
-            Some(Parts::Items(Some(dimensions), items))
+            Some(ObjectParts::Items(Some(dimensions), items))
         }
         _ => None,
     }
 }
 
 /// Adds visits to `steps`, the first part on top.
-fn visit_parts(parts: Option<Parts<'_>>, steps: &mut Vec<ToDatum>) {
+fn visit_parts(parts: Option<ObjectParts<'_>>, steps: &mut Vec<ToDatum>) {
     match parts {
-        Some(Parts::Pair(car, cdr)) => steps.extend([ToDatum::Visit(cdr), ToDatum::Visit(car)]),
-        Some(Parts::Items(_, items)) => steps.extend(items.iter().rev().copied().map(ToDatum::Visit)),
+        Some(ObjectParts::Pair(car, cdr)) => steps.extend([ToDatum::Visit(cdr), ToDatum::Visit(car)]),
+        Some(ObjectParts::Items(_, items)) => steps.extend(items.iter().rev().copied().map(ToDatum::Visit)),
         None => {}
     }
 }

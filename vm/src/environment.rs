@@ -20,7 +20,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::{World, find_builtin};
 
-pub(crate) use compiler::{Compiler, Job, JobId, Running, Text};
+pub(crate) use compiler::{ActiveCompilation, Compiler, CompilerJob, FormText, JobId};
 
 mod compiler;
 mod host;

@@ -158,7 +158,8 @@ impl Loader<'_> {
         for (function, object) in self.module.functions.iter().zip(&mut self.functions) {
             let constants = own_constants(function, |PoolIdx(index)| self.pool[index as usize]);
             let debug = debug::describe(self.heap, function, &self.pool, sources)?;
-            let parts = Parts { function, constants: &constants, name: name_of(function, &self.pool), debug };
+            let parts =
+                FunctionParts { function, constants: &constants, name: name_of(function, &self.pool), debug };
             let code = make_code(self.heap, &self.verified, &parts, Value::NIL)?;
             if object.is_nil() {
                 *object = code;
@@ -228,7 +229,7 @@ impl Loader<'_> {
 pub(crate) const TOP_LEVEL: u16 = 1;
 
 /// What a Code is made from.
-struct Parts<'a> {
+struct FunctionParts<'a> {
     function: &'a Function,
     /// Its constants, the names of its keys last.
     constants: &'a [Value],
@@ -239,7 +240,7 @@ struct Parts<'a> {
 fn make_code(
     heap: &mut Heap,
     verified: &Verified,
-    parts: &Parts<'_>,
+    parts: &FunctionParts<'_>,
     owner: Value,
 ) -> Result<Value, AllocError> {
     let function = parts.function;

@@ -1,7 +1,7 @@
 //! The logical database: changes of facts, and queries in steps. Whatever calls functions of the program is ESL, in
 //! `stdlib/database.esl`.
 
-use crate::database::{Fault, Problem, Progress};
+use crate::database::{FormulaError, Progress, QueryError};
 use crate::heap::AllocError;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::table::Table;
@@ -20,14 +20,14 @@ fn prepare(vm: &mut Vm) -> Result<(), Exit> {
 }
 
 /// What goes on with a fault.
-fn checked<T>(vm: &mut Vm, outcome: Result<T, Fault>) -> Result<T, Exit> {
+fn checked<T>(vm: &mut Vm, outcome: Result<T, FormulaError>) -> Result<T, Exit> {
     match outcome {
         Ok(value) => Ok(value),
-        Err(Fault::Room(error)) => Err(error.into()),
-        Err(Fault::Variable(fact)) => {
-            checked(vm, Err(Fault::Malformed(fact, "a fact, which has no variables")))
+        Err(FormulaError::Room(error)) => Err(error.into()),
+        Err(FormulaError::Variable(fact)) => {
+            checked(vm, Err(FormulaError::Malformed(fact, "a fact, which has no variables")))
         }
-        Err(Fault::Malformed(v, expected)) => {
+        Err(FormulaError::Malformed(v, expected)) => {
             let found = vm.describe(v);
             vm.program_error(format!("expected {expected}, found {found}"))
         }
@@ -92,7 +92,7 @@ pub(super) fn retract_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let outcome = vm.database.retract(&mut vm.heap, arguments[0], &mut work);
     vm.charge(4 * work);
     match outcome {
-        Err(Fault::Variable(_)) => Ok(Value::small(0)),
+        Err(FormulaError::Variable(_)) => Ok(Value::small(0)),
         outcome => Ok(checked(vm, outcome)?.into()),
     }
 }
@@ -156,22 +156,22 @@ pub(super) fn query_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             let bindings: Result<Value, AllocError> = bindings;
             vm.give_values(&[test, function, bindings?])
         }
-        Err(problem) => raise_problem(vm, problem),
+        Err(error) => raise_query_error(vm, error),
     }
 }
 
 /// Notes why a query cannot be answered.
-fn raise_problem(vm: &mut Vm, problem: Problem) -> Outcome {
-    match problem {
-        Problem::Circular(functor) => {
+fn raise_query_error(vm: &mut Vm, error: QueryError) -> Outcome {
+    match error {
+        QueryError::Circular(functor) => {
             let functor = vm.database.value(&mut vm.heap, functor)?;
             vm.raise(Raised::Cause("UNSTRATIFIED-RULES", functor))
         }
-        Problem::Unbound(functor) => {
+        QueryError::Unbound(functor) => {
             let functor = vm.database.value(&mut vm.heap, functor)?;
             vm.raise(Raised::Cause("UNBOUND-LOGICAL-VARIABLE", functor))
         }
-        Problem::TooLarge => vm.program_error("a rule builds too large a term"),
+        QueryError::TooLarge => vm.program_error("a rule builds too large a term"),
     }
 }
 
@@ -206,8 +206,8 @@ pub(super) fn begin_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
                 None => Ok(Value::NIL),
             }
         }
-        Some(Err(problem)) => {
-            let raised = raise_problem(vm, problem);
+        Some(Err(error)) => {
+            let raised = raise_query_error(vm, error);
             vm.database.close(&mut vm.heap, key);
             raised
         }

@@ -26,7 +26,7 @@ use esl_bytecode::verify::verify;
 use crate::builtins::expect::optional;
 use crate::builtins::stream::Source;
 use crate::datum::Unit;
-use crate::environment::{Job, JobId, Running, Text};
+use crate::environment::{ActiveCompilation, CompilerJob, FormText, JobId};
 use crate::load::{Alone, load};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
@@ -39,12 +39,12 @@ fn is_unfinished(code: &str) -> bool {
 
 impl Vm {
     fn begin(&mut self, compilation: Box<dyn Compilation>, unit: Unit) -> Value {
-        let running = Running { compilation, unit, step: None, keeps: false };
-        self.compiler.add(Job::Compilation(Box::new(running)))
+        let running = ActiveCompilation { compilation, unit, step: None, keeps: false };
+        self.compiler.add(CompilerJob::Compilation(Box::new(running)))
     }
 
     /// Takes the job that `handle` names out of the table, until `Compiler::put_back`.
-    fn take_job(&mut self, handle: Value) -> Result<(JobId, Job), Exit> {
+    fn take_job(&mut self, handle: Value) -> Result<(JobId, CompilerJob), Exit> {
         match self.compiler.take(handle) {
             Some(taken) => Ok(taken),
             None => self.program_error("this compilation is over"),
@@ -62,7 +62,12 @@ impl Vm {
     }
 
     /// The outcome of the last step, as the program tells it.
-    fn answer(&mut self, running: &mut Running, kind: Value, outcome: Value) -> Result<Answer, Exit> {
+    fn answer(
+        &mut self,
+        running: &mut ActiveCompilation,
+        kind: Value,
+        outcome: Value,
+    ) -> Result<Answer, Exit> {
         let kind = self.designated_text(kind)?;
         let unit = &mut running.unit;
         Ok(match &*kind {
@@ -212,22 +217,22 @@ pub(super) fn open_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         name if name.is_nil() => None,
         name => Some(vm.designated_text(name)?),
     };
-    let text = Text { text: text.into(), name, position: 0, line: 0, column: 0 };
-    Ok(vm.compiler.add(Job::Text(text)))
+    let text = FormText { text: text.into(), name, position: 0, line: 0, column: 0 };
+    Ok(vm.compiler.add(CompilerJob::Text(text)))
 }
 
 /// `(%next-form text)`: the compilation of the next form of a text, `NIL` at its end.
 pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (id, mut job) = vm.take_job(arguments[0])?;
     let next = match &mut job {
-        Job::Text(text) => begin_form(vm, text),
+        CompilerJob::Text(text) => begin_form(vm, text),
         _ => vm.program_error("there are no forms in a compilation"),
     };
     vm.compiler.put_back(id, job);
     next
 }
 
-fn begin_form(vm: &mut Vm, text: &mut Text) -> Outcome {
+fn begin_form(vm: &mut Vm, text: &mut FormText) -> Outcome {
     match vm.read_datum(&text.text, text.position, text.name.as_deref())? {
         Read::End => Ok(Value::NIL),
         Read::Unfinished(what) => vm.raise(Raised::Reader(what)),
@@ -244,14 +249,14 @@ fn begin_form(vm: &mut Vm, text: &mut Text) -> Outcome {
 pub(super) fn compilation_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (id, mut job) = vm.take_job(arguments[0])?;
     let told = match &mut job {
-        Job::Compilation(running) => step(vm, running, arguments[1], arguments[2]),
+        CompilerJob::Compilation(running) => step(vm, running, arguments[1], arguments[2]),
         _ => vm.program_error("a text is no compilation"),
     };
     vm.compiler.put_back(id, job);
     told
 }
 
-fn step(vm: &mut Vm, running: &mut Running, kind: Value, outcome: Value) -> Outcome {
+fn step(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Value) -> Outcome {
     let step = match running.step.take() {
         Some(step) => step,
         None => {

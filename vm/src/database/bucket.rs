@@ -9,7 +9,7 @@
 pub(super) const NONE: u32 = u32::MAX;
 
 #[derive(Clone, Copy, Debug)]
-struct Link {
+struct BucketLink {
     hash: u32,
     next: u32,
 }
@@ -18,7 +18,7 @@ struct Link {
 #[derive(Debug, Default)]
 pub(super) struct Buckets {
     heads: Vec<u32>,
-    links: Vec<Link>,
+    links: Vec<BucketLink>,
     count: usize,
 }
 
@@ -66,17 +66,17 @@ impl Buckets {
         }
         let at = entry as usize;
         if at >= self.links.len() {
-            self.links.resize(at + 1, Link { hash: 0, next: NONE });
+            self.links.resize(at + 1, BucketLink { hash: 0, next: NONE });
         }
         let bucket = self.bucket(hash);
-        self.links[at] = Link { hash, next: self.heads[bucket] };
+        self.links[at] = BucketLink { hash, next: self.heads[bucket] };
         self.heads[bucket] = entry;
         self.count += 1;
     }
 
     /// Removes an entry that was added.
     pub(super) fn remove(&mut self, entry: u32) {
-        let Link { hash, next } = self.links[entry as usize];
+        let BucketLink { hash, next } = self.links[entry as usize];
         let bucket = self.bucket(hash);
         let mut at = self.heads[bucket];
         if at == entry {
@@ -105,7 +105,7 @@ impl Buckets {
         let old = new - (1 << new.ilog2());
         let mut at = std::mem::replace(&mut self.heads[old], NONE);
         while at != NONE {
-            let Link { hash, next } = self.links[at as usize];
+            let BucketLink { hash, next } = self.links[at as usize];
             let bucket = self.bucket(hash);
             self.links[at as usize].next = self.heads[bucket];
             self.heads[bucket] = at;

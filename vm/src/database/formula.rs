@@ -24,7 +24,7 @@ const MOST_PARTS: usize = 1 << 13;
 
 /// What is wrong with a query or a fact.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Fault {
+pub(crate) enum FormulaError {
     /// No room.
     Room(AllocError),
     /// A fact has variables.
@@ -33,9 +33,9 @@ pub(crate) enum Fault {
     Malformed(Value, &'static str),
 }
 
-impl From<AllocError> for Fault {
-    fn from(error: AllocError) -> Fault {
-        Fault::Room(error)
+impl From<AllocError> for FormulaError {
+    fn from(error: AllocError) -> FormulaError {
+        FormulaError::Room(error)
     }
 }
 
@@ -52,7 +52,7 @@ pub(super) struct Pattern {
 
 /// A condition that the program computes.
 #[derive(Clone, Debug)]
-pub(super) struct Test {
+pub(super) struct TestForm {
     pub(super) function: Term,
     /// The variables that it looks at.
     pub(super) variables: Vec<u32>,
@@ -66,7 +66,7 @@ pub(super) enum Formula {
     /// Alternatives, its rank, and the rank after those in it.
     Or(Vec<Formula>, usize, usize),
     Not(Box<Formula>),
-    Test(Test),
+    Test(TestForm),
 }
 
 /// Whether `v` is a logical variable, and whether it is one without a name.
@@ -77,7 +77,7 @@ fn variable_name(heap: &Heap, v: Value) -> Option<bool> {
 }
 
 /// Gives the term of a symbol, held, if it is a variable.
-type OfSymbol<'a> = dyn FnMut(&mut Terms, &mut Heap, Value) -> Result<Option<Term>, Fault> + 'a;
+type OfSymbol<'a> = dyn FnMut(&mut Terms, &mut Heap, Value) -> Result<Option<Term>, FormulaError> + 'a;
 
 /// The term of an object; `symbol` gives the terms of symbols that are variables.
 fn convert(
@@ -86,26 +86,26 @@ fn convert(
     v: Value,
     parts: &mut usize,
     symbol: &mut OfSymbol<'_>,
-) -> Result<Term, Fault> {
+) -> Result<Term, FormulaError> {
     enum Open {
         Make(Value),
         Join,
     }
     let mut atom = |terms: &mut Terms, heap: &mut Heap, v: Value| match symbol(terms, heap, v)? {
         Some(term) => Ok(term),
-        None => terms.atom(heap, v).map_err(Fault::Room),
+        None => terms.atom(heap, v).map_err(FormulaError::Room),
     };
     if !v.is_cons() {
         return atom(terms, heap, v);
     }
     let mut made: Vec<Term> = Vec::new();
     let mut open = vec![Open::Make(v)];
-    let mut walk = || -> Result<(), Fault> {
+    let mut walk = || -> Result<(), FormulaError> {
         while let Some(next) = open.pop() {
             match next {
                 Open::Make(part) => match heap.as_cons(part) {
                     Some(pair) => {
-                        *parts = parts.checked_sub(1).ok_or(Fault::Malformed(v, TOO_LARGE))?;
+                        *parts = parts.checked_sub(1).ok_or(FormulaError::Malformed(v, TOO_LARGE))?;
                         open.push(Open::Join);
                         open.push(Open::Make(pair.cdr));
                         open.push(Open::Make(pair.car));
@@ -114,7 +114,7 @@ fn convert(
                 },
                 Open::Join => {
                     let (cdr, car) = (made.pop().unwrap_or(Term::NIL), made.pop().unwrap_or(Term::NIL));
-                    made.push(terms.pair(car, cdr).map_err(|error| fault_of(error, v))?);
+                    made.push(terms.pair(car, cdr).map_err(|error| formula_error(error, v))?);
                 }
             }
         }
@@ -122,21 +122,21 @@ fn convert(
     };
     match walk() {
         Ok(()) => Ok(made.pop().unwrap_or(Term::NIL)),
-        Err(fault) => {
+        Err(error) => {
             for term in made {
                 terms.release(term);
             }
-            Err(fault)
+            Err(error)
         }
     }
 }
 
 const TOO_LARGE: &str = "a smaller term";
 
-fn fault_of(error: TermError, v: Value) -> Fault {
+fn formula_error(error: TermError, v: Value) -> FormulaError {
     match error {
-        TermError::Room(error) => Fault::Room(error),
-        TermError::TooLarge => Fault::Malformed(v, TOO_LARGE),
+        TermError::Room(error) => FormulaError::Room(error),
+        TermError::TooLarge => FormulaError::Malformed(v, TOO_LARGE),
     }
 }
 
@@ -147,20 +147,20 @@ pub(super) fn fact(
     v: Value,
     cells: &mut Vec<Term>,
     work: &mut usize,
-) -> Result<(), Fault> {
+) -> Result<(), FormulaError> {
     let mut parts = MAX_SIZE as usize;
     let mut rest = v;
-    let mut walk = || -> Result<(), Fault> {
+    let mut walk = || -> Result<(), FormulaError> {
         if !v.is_cons() {
-            return Err(Fault::Malformed(v, "a fact, which is a list"));
+            return Err(FormulaError::Malformed(v, "a fact, which is a list"));
         }
         while let Some(pair) = heap.as_cons(rest) {
-            parts = parts.checked_sub(1).ok_or(Fault::Malformed(v, "a smaller fact"))?;
+            parts = parts.checked_sub(1).ok_or(FormulaError::Malformed(v, "a smaller fact"))?;
             let term =
                 convert(terms, heap, pair.car, &mut parts, &mut |_, heap, part| match part.is_address()
                     && variable_name(heap, part).is_some()
                 {
-                    true => Err(Fault::Variable(v)),
+                    true => Err(FormulaError::Variable(v)),
                     false => Ok(None),
                 })?;
             cells.push(term);
@@ -168,8 +168,8 @@ pub(super) fn fact(
         }
         match rest {
             Value::NIL => Ok(()),
-            rest if variable_name(heap, rest).is_some() => Err(Fault::Variable(v)),
-            _ => Err(Fault::Malformed(v, "a fact, which is a proper list")),
+            rest if variable_name(heap, rest).is_some() => Err(FormulaError::Variable(v)),
+            _ => Err(FormulaError::Malformed(v, "a fact, which is a proper list")),
         }
     };
     let outcome = walk();
@@ -183,7 +183,7 @@ pub(super) fn fact(
 }
 
 /// Makes formulas of what a program has written.
-pub(super) struct Parser<'a> {
+pub(super) struct FormulaParser<'a> {
     pub(super) terms: &'a mut Terms,
     pub(super) heap: &'a mut Heap,
     /// Terms that the formulas hold.
@@ -199,9 +199,9 @@ pub(super) struct Parser<'a> {
     query: Value,
 }
 
-impl<'a> Parser<'a> {
-    pub(super) fn new(terms: &'a mut Terms, heap: &'a mut Heap, query: Value) -> Parser<'a> {
-        Parser {
+impl<'a> FormulaParser<'a> {
+    pub(super) fn new(terms: &'a mut Terms, heap: &'a mut Heap, query: Value) -> FormulaParser<'a> {
+        FormulaParser {
             terms,
             heap,
             held: Vec::with_capacity(8),
@@ -215,11 +215,11 @@ impl<'a> Parser<'a> {
     }
 
     /// Gives variables the values of an association list; the first one counts.
-    pub(super) fn inherit(&mut self, bindings: Value) -> Result<(), Fault> {
+    pub(super) fn inherit(&mut self, bindings: Value) -> Result<(), FormulaError> {
         let mut rest = bindings;
         let mut parts = MAX_SIZE as usize;
         while let Some(pair) = self.heap.as_cons(rest) {
-            parts = parts.checked_sub(1).ok_or(Fault::Malformed(bindings, "fewer bindings"))?;
+            parts = parts.checked_sub(1).ok_or(FormulaError::Malformed(bindings, "fewer bindings"))?;
             rest = pair.cdr;
             let Some(binding) = self.heap.as_cons(pair.car) else { continue };
             if self.inherited.contains_key(&binding.car.bits()) {
@@ -237,16 +237,17 @@ impl<'a> Parser<'a> {
         MOST_PARTS - self.parts
     }
 
-    fn malformed<T>(&self, v: Value, expected: &'static str) -> Result<T, Fault> {
-        Err(Fault::Malformed(v, expected))
+    fn malformed<T>(&self, v: Value, expected: &'static str) -> Result<T, FormulaError> {
+        Err(FormulaError::Malformed(v, expected))
     }
 
-    fn spend(&mut self) -> Result<(), Fault> {
-        self.parts = self.parts.checked_sub(1).ok_or(Fault::Malformed(self.query, "a smaller query"))?;
+    fn spend(&mut self) -> Result<(), FormulaError> {
+        self.parts =
+            self.parts.checked_sub(1).ok_or(FormulaError::Malformed(self.query, "a smaller query"))?;
         Ok(())
     }
 
-    fn variable(&mut self, v: Value, is_anonymous: bool) -> Result<Term, Fault> {
+    fn variable(&mut self, v: Value, is_anonymous: bool) -> Result<Term, FormulaError> {
         if is_anonymous {
             self.names.push(Term::UNBOUND);
             return Ok(Term::variable(self.names.len() as u32 - 1));
@@ -267,7 +268,7 @@ impl<'a> Parser<'a> {
     }
 
     /// The term of a part of a pattern; held by what is parsed.
-    fn term(&mut self, v: Value) -> Result<Term, Fault> {
+    fn term(&mut self, v: Value) -> Result<Term, FormulaError> {
         self.spend()?;
         let term = match v.is_cons() {
             false => match variable_name(self.heap, v) {
@@ -280,7 +281,7 @@ impl<'a> Parser<'a> {
         Ok(term)
     }
 
-    fn compound(&mut self, v: Value) -> Result<Term, Fault> {
+    fn compound(&mut self, v: Value) -> Result<Term, FormulaError> {
         // The variables are found first, since the conversion has the terms to itself.
         let mut open = vec![v];
         let mut known: BTreeMap<u64, Term> = BTreeMap::new();
@@ -296,7 +297,7 @@ impl<'a> Parser<'a> {
                 known.insert(part.bits(), term);
             }
         }
-        let Parser { terms, heap, names, .. } = self;
+        let FormulaParser { terms, heap, names, .. } = self;
         let mut parts = MOST_PARTS;
         let outcome =
             convert(terms, heap, v, &mut parts, &mut |terms, heap, part| match variable_name(heap, part) {
@@ -317,7 +318,7 @@ impl<'a> Parser<'a> {
     }
 
     /// A pattern.
-    pub(super) fn pattern(&mut self, v: Value) -> Result<Pattern, Fault> {
+    pub(super) fn pattern(&mut self, v: Value) -> Result<Pattern, FormulaError> {
         let Some(pair) = self.heap.as_cons(v) else { return self.malformed(v, "a pattern, which is a list") };
         let rank = self.ranks;
         self.ranks += 1;
@@ -336,13 +337,13 @@ impl<'a> Parser<'a> {
     }
 
     /// The term of a text as it is, variables and all.
-    pub(super) fn text(&mut self, v: Value) -> Result<Term, Fault> {
+    pub(super) fn text(&mut self, v: Value) -> Result<Term, FormulaError> {
         let term = convert(self.terms, self.heap, v, &mut self.parts, &mut |_, _, _| Ok(None))?;
         self.held.push(term);
         Ok(term)
     }
 
-    fn items(&mut self, v: Value) -> Result<Vec<Value>, Fault> {
+    fn items(&mut self, v: Value) -> Result<Vec<Value>, FormulaError> {
         let mut items = Vec::new();
         let mut rest = v;
         while let Some(pair) = self.heap.as_cons(rest) {
@@ -360,7 +361,7 @@ impl<'a> Parser<'a> {
     }
 
     /// A formula.
-    pub(super) fn formula(&mut self, v: Value, depth: usize) -> Result<Formula, Fault> {
+    pub(super) fn formula(&mut self, v: Value, depth: usize) -> Result<Formula, FormulaError> {
         if depth > MOST_NESTED {
             return self.malformed(v, "fewer formulas within formulas");
         }
@@ -384,12 +385,12 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn formulas(&mut self, list: Value, depth: usize) -> Result<Vec<Formula>, Fault> {
+    fn formulas(&mut self, list: Value, depth: usize) -> Result<Vec<Formula>, FormulaError> {
         let items = self.items(list)?;
         items.into_iter().map(|item| self.formula(item, depth + 1)).collect()
     }
 
-    fn test(&mut self, v: Value, parts: Value) -> Result<Formula, Fault> {
+    fn test(&mut self, v: Value, parts: Value) -> Result<Formula, FormulaError> {
         let items = self.items(parts)?;
         let Some((&function, looks_at)) = items.split_first() else {
             return self.malformed(v, "(test form)");
@@ -405,6 +406,6 @@ impl<'a> Parser<'a> {
                 variables.push(number as u32);
             }
         }
-        Ok(Formula::Test(Test { function, variables }))
+        Ok(Formula::Test(TestForm { function, variables }))
     }
 }

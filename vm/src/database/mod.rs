@@ -20,12 +20,12 @@
 
 mod bucket;
 mod formula;
-mod machine;
 mod plan;
 mod query;
 mod relation;
 mod rule;
 mod scan;
+mod solver;
 mod term;
 mod tuple;
 
@@ -38,9 +38,9 @@ use std::sync::Arc;
 use crate::heap::{AllocError, Heap};
 use crate::value::Value;
 use bucket::{Buckets, finish, mix};
-pub(crate) use formula::Fault;
-use formula::Parser;
-pub(crate) use query::{Problem, Progress, Query};
+pub(crate) use formula::FormulaError;
+use formula::FormulaParser;
+pub(crate) use query::{Progress, Query, QueryError};
 use relation::Relation;
 use rule::{Rule, Rules};
 pub(crate) use term::Term;
@@ -53,7 +53,7 @@ const FREED_AT_ONCE: usize = 8;
 
 /// A fact that has ended, and the query before which no open one may know it.
 #[derive(Clone, Copy, Debug)]
-struct Ended {
+struct EndedFact {
     relation: u32,
     row: u32,
     serial: u64,
@@ -79,9 +79,9 @@ pub(crate) struct Database {
     /// The number of the next query.
     serial: u64,
     /// Facts that have ended and are still in their chains.
-    ended: VecDeque<Ended>,
+    ended: VecDeque<EndedFact>,
     /// Those that have left their chains.
-    unlinked: VecDeque<Ended>,
+    unlinked: VecDeque<EndedFact>,
     /// Terms to be given up, of queries that were closed.
     released: Vec<Vec<Term>>,
     /// Terms of rules that were replaced, and the query before which no open one may know them.
@@ -114,8 +114,13 @@ impl Database {
     /// Adds a fact; `T` if it is new, or the fact that it replaces, as the value of a property. `work` is what that took.
     ///
     /// # Errors
-    /// [`Fault`] if it is no fact, or there is no room; then nothing has changed.
-    pub(crate) fn assert(&mut self, heap: &mut Heap, fact: Value, work: &mut usize) -> Result<Value, Fault> {
+    /// [`FormulaError`] if it is no fact, or there is no room; then nothing has changed.
+    pub(crate) fn assert(
+        &mut self,
+        heap: &mut Heap,
+        fact: Value,
+        work: &mut usize,
+    ) -> Result<Value, FormulaError> {
         self.tidy(heap);
         heap.set_external(self.footprint())?;
         let mut cells = std::mem::take(&mut self.cells);
@@ -140,7 +145,7 @@ impl Database {
     }
 
     /// Adds a fact whose cells are held.
-    fn add(&mut self, heap: &mut Heap, cells: &[Term], work: &mut usize) -> Result<Value, Fault> {
+    fn add(&mut self, heap: &mut Heap, cells: &[Term], work: &mut usize) -> Result<Value, FormulaError> {
         let (functor, arguments) = (cells[0], &cells[1..]);
         let number = self.relation(functor, arguments.len());
         self.terms.release(functor);
@@ -217,7 +222,7 @@ impl Database {
         heap: &mut Heap,
         arguments: Value,
         work: &mut usize,
-    ) -> Result<Value, Fault> {
+    ) -> Result<Value, FormulaError> {
         let mut cells = std::mem::take(&mut self.cells);
         cells.clear();
         let made = formula::fact(&mut self.terms, heap, arguments, &mut cells, work);
@@ -245,7 +250,12 @@ impl Database {
     ///
     /// # Errors
     /// As for [`Database::assert`].
-    pub(crate) fn retract(&mut self, heap: &mut Heap, fact: Value, work: &mut usize) -> Result<bool, Fault> {
+    pub(crate) fn retract(
+        &mut self,
+        heap: &mut Heap,
+        fact: Value,
+        work: &mut usize,
+    ) -> Result<bool, FormulaError> {
         self.tidy(heap);
         let mut cells = std::mem::take(&mut self.cells);
         cells.clear();
@@ -268,37 +278,37 @@ impl Database {
         self.time += 1;
         self.relations[relation as usize].end(row, self.time);
         self.facts -= 1;
-        self.ended.push_back(Ended { relation, row, serial: self.serial });
+        self.ended.push_back(EndedFact { relation, row, serial: self.serial });
     }
 
     /// Adds a rule, unless the very rule is there.
     ///
     /// # Errors
-    /// [`Fault`] if it is no rule, or there is no room.
+    /// [`FormulaError`] if it is no rule, or there is no room.
     pub(crate) fn define_rule(
         &mut self,
         heap: &mut Heap,
         [head_text, body, source]: [Value; 3],
         work: &mut usize,
-    ) -> Result<(), Fault> {
+    ) -> Result<(), FormulaError> {
         self.tidy(heap);
-        let mut parser = Parser::new(&mut self.terms, heap, head_text);
+        let mut parser = FormulaParser::new(&mut self.terms, heap, head_text);
         let parsed = parser
             .pattern(head_text)
             .and_then(|head| Ok((head, parser.formula(body, 0)?, parser.text(source)?)));
         *work += 4 * parser.work();
-        let Parser { held, names, .. } = parser;
+        let FormulaParser { held, names, .. } = parser;
         let (head, body, source) = match parsed {
             Ok(parts) => parts,
-            Err(fault) => {
+            Err(error) => {
                 held.into_iter().for_each(|term| self.terms.release(term));
-                return Err(fault);
+                return Err(error);
             }
         };
         let relation = self.find_relation(head.functor, head.arguments.len());
         if relation.is_some_and(|number| self.relations[number as usize].is_property()) {
             held.into_iter().for_each(|term| self.terms.release(term));
-            return Err(Fault::Malformed(head_text, "the head of a rule, which is no property"));
+            return Err(FormulaError::Malformed(head_text, "the head of a rule, which is no property"));
         }
         let rule = Rule { head, body, names, source, held };
         if let Some(replaced) = Arc::make_mut(&mut self.rules).add(rule) {
@@ -312,7 +322,7 @@ impl Database {
     /// Begins a query; see [`Query::begin`].
     ///
     /// # Errors
-    /// [`Fault`] if it is no query, or there is no room.
+    /// [`FormulaError`] if it is no query, or there is no room.
     pub(crate) fn open(
         &mut self,
         heap: &mut Heap,
@@ -320,7 +330,7 @@ impl Database {
         inherited: Value,
         wants_facts: bool,
         work: &mut usize,
-    ) -> Result<u64, Fault> {
+    ) -> Result<u64, FormulaError> {
         self.tidy(heap);
         heap.set_external(self.footprint())?;
         let query = Query::begin(self, heap, query, inherited, wants_facts, work)?;
@@ -332,7 +342,7 @@ impl Database {
     }
 
     /// Works on a query.
-    pub(crate) fn step(&mut self, key: u64, work: &mut usize) -> Option<Result<Progress, Problem>> {
+    pub(crate) fn step(&mut self, key: u64, work: &mut usize) -> Option<Result<Progress, QueryError>> {
         let mut query = self.queries.get_mut(&key)?.take()?;
         let before = query.bytes();
         let progress = query.step(self, work);
@@ -498,7 +508,7 @@ impl Database {
             }
             self.ended.pop_front();
             self.relations[ended.relation as usize].unlink(ended.row);
-            self.unlinked.push_back(Ended { serial: self.serial, ..ended });
+            self.unlinked.push_back(EndedFact { serial: self.serial, ..ended });
         }
         for _ in 0..FREED_AT_ONCE {
             let Some(&ended) = self.unlinked.front() else { break };

@@ -9,7 +9,7 @@
 
 use std::rc::Rc;
 
-use super::formula::{Formula, Pattern, Test};
+use super::formula::{Formula, Pattern, TestForm};
 use super::relation::INDEXED_POSITIONS;
 use super::term::{Term, Terms};
 use super::{Database, rule::Rules};
@@ -31,7 +31,7 @@ pub(super) enum Goal {
     /// There is an answer inside.
     Proved,
     /// Goes on if the program says so.
-    Test { test: Test, next: GoalId },
+    Test { test: TestForm, next: GoalId },
     /// An answer.
     Solved,
 }
@@ -53,7 +53,7 @@ enum Arranged<'f> {
     And(Vec<Arranged<'f>>),
     Or(Vec<Arranged<'f>>, usize, usize),
     Not(Box<Arranged<'f>>),
-    Test(&'f Test),
+    Test(&'f TestForm),
 }
 
 /// Makes goals of formulas.

@@ -15,10 +15,10 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 
 use super::Database;
-use super::formula::{Fault, Formula, Parser, Pattern, Test};
-use super::machine::{Choice, Operation, State};
+use super::formula::{Formula, FormulaError, FormulaParser, Pattern, TestForm};
 use super::plan::{Goal, GoalId, Planner};
 use super::rule::{Rule, Rules};
+use super::solver::{Choice, MatchOperation, SolverState};
 use super::term::{Term, TermError};
 use super::tuple::Tuples;
 use crate::heap::Heap;
@@ -58,13 +58,13 @@ pub(super) struct Consumer {
     pub(super) is_idle: bool,
     /// Its variables that stand for those of the table.
     pub(super) variables: SmallVec<[u32; 4]>,
-    pub(super) going_on: GoingOn,
+    pub(super) continuation: Continuation,
     pub(super) rank: usize,
 }
 
 /// Where a computation goes on.
 #[derive(Clone, Debug)]
-pub(super) struct GoingOn {
+pub(super) struct Continuation {
     pub(super) goal: GoalId,
     pub(super) sink: u32,
     pub(super) bindings: Box<[Term]>,
@@ -73,40 +73,40 @@ pub(super) struct GoingOn {
 
 /// What is yet to be done.
 #[derive(Debug)]
-pub(super) enum Work {
+pub(super) enum AgendaItem {
     /// Finds the answers of a table: its facts, then from each rule.
     Expand { table: u32, rule: usize },
     /// Gives answers to a consumer.
     Feed(u32),
     /// Goes on.
-    Resume(GoingOn),
+    Resume(Continuation),
 }
 
 /// An answer with its place among the others.
 #[derive(Debug)]
-pub(super) struct Placed {
+pub(super) struct RankedAnswer {
     pub(super) keys: Box<[u64]>,
     pub(super) number: usize,
     pub(super) values: Box<[Term]>,
 }
 
-impl PartialEq for Placed {
-    fn eq(&self, other: &Placed) -> bool {
+impl PartialEq for RankedAnswer {
+    fn eq(&self, other: &RankedAnswer) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Placed {}
+impl Eq for RankedAnswer {}
 
-impl PartialOrd for Placed {
-    fn partial_cmp(&self, other: &Placed) -> Option<Ordering> {
+impl PartialOrd for RankedAnswer {
+    fn partial_cmp(&self, other: &RankedAnswer) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
 /// The greatest is the one that comes first.
-impl Ord for Placed {
-    fn cmp(&self, other: &Placed) -> Ordering {
+impl Ord for RankedAnswer {
+    fn cmp(&self, other: &RankedAnswer) -> Ordering {
         (&other.keys, other.number).cmp(&(&self.keys, self.number))
     }
 }
@@ -124,7 +124,7 @@ pub(crate) enum Progress {
 
 /// Why a query cannot be answered.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Problem {
+pub(crate) enum QueryError {
     /// A rule with this functor negates what follows from it.
     Circular(Term),
     /// A rule with this functor leaves a variable of its head without a value.
@@ -133,9 +133,9 @@ pub(crate) enum Problem {
     TooLarge,
 }
 
-impl From<TermError> for Problem {
-    fn from(_: TermError) -> Problem {
-        Problem::TooLarge
+impl From<TermError> for QueryError {
+    fn from(_: TermError) -> QueryError {
+        QueryError::TooLarge
     }
 }
 
@@ -159,16 +159,16 @@ pub(crate) struct Query {
     pub(super) consumers: Vec<Consumer>,
     pub(super) sinks: Vec<Sink>,
     /// What is yet to be done, by stratum.
-    pub(super) agenda: Vec<VecDeque<Work>>,
+    pub(super) agenda: Vec<VecDeque<AgendaItem>>,
 
     // ---- what is being computed
-    pub(super) state: State,
+    pub(super) state: SolverState,
     pub(super) sink: u32,
     pub(super) stratum: usize,
     pub(super) bindings: Vec<Term>,
     pub(super) trail: Vec<u32>,
     pub(super) choices: Vec<Choice>,
-    pub(super) operations: Vec<Operation>,
+    pub(super) operations: Vec<MatchOperation>,
     /// The places of facts among those of their patterns, by rank; for the order of answers.
     pub(super) keys: Vec<u64>,
     /// Terms that it holds.
@@ -180,7 +180,7 @@ pub(crate) struct Query {
     pub(super) is_reordered: bool,
     /// Whether one answer may be found twice.
     pub(super) may_repeat: bool,
-    pub(super) placed: BinaryHeap<Placed>,
+    pub(super) placed: BinaryHeap<RankedAnswer>,
     pub(super) found: usize,
     pub(super) tuples: Tuples,
     /// The facts themselves, where these are asked for.
@@ -199,19 +199,19 @@ impl Query {
         inherited: Value,
         wants_facts: bool,
         work: &mut usize,
-    ) -> Result<Query, Fault> {
-        let mut parser = Parser::new(&mut database.terms, heap, query);
+    ) -> Result<Query, FormulaError> {
+        let mut parser = FormulaParser::new(&mut database.terms, heap, query);
         let parsed = parser.inherit(inherited).and_then(|()| match wants_facts {
             true => parser.pattern(query).map(Formula::Pattern),
             false => parser.formula(query, 0),
         });
         *work += parser.work();
-        let Parser { held, names, ranks, .. } = parser;
+        let FormulaParser { held, names, ranks, .. } = parser;
         let formula = match parsed {
             Ok(formula) => formula,
-            Err(fault) => {
+            Err(error) => {
                 held.into_iter().for_each(|term| database.terms.release(term));
-                return Err(fault);
+                return Err(error);
             }
         };
         let rules = if wants_facts { Arc::default() } else { database.rules.clone() };
@@ -237,7 +237,7 @@ impl Query {
             consumers: Vec::new(),
             sinks: vec![Sink::Query],
             agenda: (0..strata).map(|_| VecDeque::new()).collect(),
-            state: State::Goal(start),
+            state: SolverState::Goal(start),
             sink: 0,
             stratum: strata,
             bindings: vec![Term::UNBOUND; names.len()],
@@ -266,7 +266,7 @@ impl Query {
         let values = asked.iter().map(|&variable| bindings[variable as usize]);
         if self.is_reordered {
             let keys = self.keys.clone().into();
-            self.placed.push(Placed { keys, number: self.found, values: values.collect() });
+            self.placed.push(RankedAnswer { keys, number: self.found, values: values.collect() });
             self.found += 1;
         } else if self.may_repeat {
             tuples.insert(values);
@@ -328,7 +328,7 @@ fn is_plain(pattern: &Pattern) -> bool {
 }
 
 /// The variables of a test that have values.
-pub(super) fn test_bindings(test: &Test, names: &[Term], bindings: &[Term]) -> Vec<(Term, Term)> {
+pub(super) fn test_bindings(test: &TestForm, names: &[Term], bindings: &[Term]) -> Vec<(Term, Term)> {
     let all = test.variables.iter().map(|&variable| (names[variable as usize], bindings[variable as usize]));
     all.filter(|(_, value)| !value.is_unbound()).collect()
 }

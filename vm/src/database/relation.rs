@@ -23,7 +23,7 @@ const MOST_INDEXES: usize = 8;
 pub(super) const INDEXED_POSITIONS: usize = 64;
 
 #[derive(Clone, Copy, Debug)]
-struct Link {
+struct ChainLink {
     before: u32,
     after: u32,
 }
@@ -38,7 +38,7 @@ const EMPTY: Ends = Ends { first: NONE, last: NONE };
 
 /// When a row began and ended to be a fact.
 #[derive(Clone, Copy, Debug)]
-struct Span {
+struct Lifespan {
     born: u64,
     died: u64,
 }
@@ -56,7 +56,7 @@ pub(super) struct Index {
     keys: Buckets,
     groups: Vec<Group>,
     free_groups: Vec<u32>,
-    links: Vec<Link>,
+    links: Vec<ChainLink>,
     /// Number of different keys.
     distinct: usize,
     /// The next row to be taken in; [`NONE`] when the index is complete.
@@ -64,7 +64,7 @@ pub(super) struct Index {
 }
 
 #[derive(Debug)]
-struct Wanted {
+struct WantedIndex {
     mask: u64,
     vain: usize,
 }
@@ -78,12 +78,12 @@ pub(super) struct Relation {
     /// Whether its last argument is unique for given others.
     is_property: bool,
     cells: Vec<Term>,
-    spans: Vec<Span>,
-    links: Vec<Link>,
+    spans: Vec<Lifespan>,
+    links: Vec<ChainLink>,
     ends: Ends,
     set: Buckets,
     indexes: Vec<Index>,
-    wanted: Vec<Wanted>,
+    wanted: Vec<WantedIndex>,
     free: Vec<u32>,
     live: usize,
 }
@@ -101,11 +101,11 @@ pub(super) enum Access {
     Build(usize),
 }
 
-fn push(links: &mut Vec<Link>, ends: &mut Ends, row: u32) {
+fn push(links: &mut Vec<ChainLink>, ends: &mut Ends, row: u32) {
     if links.len() <= row as usize {
-        links.resize(row as usize + 1, Link { before: UNLINKED, after: NONE });
+        links.resize(row as usize + 1, ChainLink { before: UNLINKED, after: NONE });
     }
-    links[row as usize] = Link { before: ends.last, after: NONE };
+    links[row as usize] = ChainLink { before: ends.last, after: NONE };
     match ends.last {
         NONE => ends.first = row,
         last => links[last as usize].after = row,
@@ -114,8 +114,8 @@ fn push(links: &mut Vec<Link>, ends: &mut Ends, row: u32) {
 }
 
 /// Takes a row out of its chain. It keeps its successor, for those who stand on it.
-fn unlink(links: &mut [Link], ends: &mut Ends, row: u32) {
-    let Link { before, after } = links[row as usize];
+fn unlink(links: &mut [ChainLink], ends: &mut Ends, row: u32) {
+    let ChainLink { before, after } = links[row as usize];
     match before {
         NONE => ends.first = after,
         before => links[before as usize].after = after,
@@ -259,7 +259,7 @@ impl Relation {
 
     /// Adds a fact that is not there. It holds its cells.
     pub(super) fn add(&mut self, cells: &[Term], time: u64) -> u32 {
-        let span = Span { born: time, died: u64::MAX };
+        let span = Lifespan { born: time, died: u64::MAX };
         let row = match self.free.pop() {
             Some(row) => {
                 let start = row as usize * self.width;
@@ -372,7 +372,7 @@ impl Relation {
         let at = match self.wanted.iter().position(|wanted| wanted.mask == mask) {
             Some(at) => at,
             None if self.wanted.len() < 4 * MOST_INDEXES => {
-                self.wanted.push(Wanted { mask, vain: 0 });
+                self.wanted.push(WantedIndex { mask, vain: 0 });
                 self.wanted.len() - 1
             }
             None => return false,

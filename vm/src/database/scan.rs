@@ -9,13 +9,13 @@ use smallvec::SmallVec;
 use super::Database;
 use super::bucket::NONE;
 use super::formula::Pattern;
-use super::query::{Problem, Query};
+use super::query::{Query, QueryError};
 use super::relation::{Access, INDEXED_POSITIONS};
 use super::term::Term;
 
 /// Where a search through several relations stands. It goes through their facts in the order of assertion.
 #[derive(Debug)]
-pub(super) struct Scan {
+pub(super) struct RelationScan {
     pattern: Rc<Pattern>,
     /// The next relation to be opened.
     opening: u32,
@@ -25,9 +25,9 @@ pub(super) struct Scan {
     is_opened: bool,
 }
 
-impl Scan {
-    pub(super) fn new(pattern: Rc<Pattern>) -> Scan {
-        Scan { pattern, opening: 0, heads: BinaryHeap::new(), indexes: Vec::new(), is_opened: false }
+impl RelationScan {
+    pub(super) fn new(pattern: Rc<Pattern>) -> RelationScan {
+        RelationScan { pattern, opening: 0, heads: BinaryHeap::new(), indexes: Vec::new(), is_opened: false }
     }
 
     pub(super) fn rank(&self) -> usize {
@@ -45,7 +45,7 @@ impl Scan {
         database: &mut Database,
         query: &mut Query,
         work: &mut usize,
-    ) -> Result<Option<(u32, u32)>, Problem> {
+    ) -> Result<Option<(u32, u32)>, QueryError> {
         while !self.is_opened {
             if !self.open(database, query, work)? {
                 return Ok(None);
@@ -78,7 +78,7 @@ impl Scan {
         database: &mut Database,
         query: &mut Query,
         work: &mut usize,
-    ) -> Result<bool, Problem> {
+    ) -> Result<bool, QueryError> {
         let number = self.opening;
         let Some(facts) = database.relations.get(number as usize) else {
             self.is_opened = true;
@@ -132,7 +132,7 @@ impl Scan {
         query: &mut Query,
         relation: u32,
         row: u32,
-    ) -> Result<bool, Problem> {
+    ) -> Result<bool, QueryError> {
         let Database { relations, terms, .. } = database;
         let facts = &relations[relation as usize];
         let cells = facts.row(row);

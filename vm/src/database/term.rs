@@ -52,7 +52,7 @@ impl Term {
 
 /// What is kept of a term that is more than a word.
 #[derive(Debug, PartialEq)]
-enum Data {
+enum TermData {
     Free,
     /// A pair: its halves, the pairs in it, and whether there is no variable in it.
     Pair {
@@ -70,15 +70,15 @@ enum Data {
 }
 
 #[derive(Debug)]
-struct Node {
-    data: Data,
+struct TermNode {
+    data: TermData,
     holders: u32,
 }
 
 /// All terms that are more than a word.
 #[derive(Debug)]
 pub(crate) struct Terms {
-    nodes: Vec<Node>,
+    nodes: Vec<TermNode>,
     buckets: Buckets,
     free: Vec<u32>,
     /// Those that had no holder at some time; [`Terms::sweep`] frees them if they have none still.
@@ -90,7 +90,7 @@ pub(crate) struct Terms {
 }
 
 /// Bytes of a node besides its contents.
-const NODE_BYTES: usize = size_of::<Node>() + 16;
+const NODE_BYTES: usize = size_of::<TermNode>() + 16;
 
 /// Why there is no term.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,18 +121,18 @@ impl Default for Terms {
 }
 
 impl Terms {
-    fn intern(&mut self, hash: u32, data: Data) -> Term {
+    fn intern(&mut self, hash: u32, data: TermData) -> Term {
         if let Some(found) = self.buckets.find(hash, |other| self.nodes[other as usize].data == data) {
             self.nodes[found as usize].holders += 1;
             // What is kept holds its parts once, however often it is made.
-            if let Data::Pair { car, cdr, .. } | Data::Ratio(car, cdr) = data {
+            if let TermData::Pair { car, cdr, .. } | TermData::Ratio(car, cdr) = data {
                 self.release(car);
                 self.release(cdr);
             }
             return Term(Value::term(found));
         }
         self.bytes += NODE_BYTES + data.bytes();
-        let node = Node { data, holders: 1 };
+        let node = TermNode { data, holders: 1 };
         let index = match self.free.pop() {
             Some(index) => {
                 self.nodes[index as usize] = node;
@@ -156,25 +156,25 @@ impl Terms {
                 continue;
             };
             match &self.nodes[index as usize].data {
-                Data::Pair { car, cdr, .. } => {
+                TermData::Pair { car, cdr, .. } => {
                     visit(Ok(1));
                     open.extend([*cdr, *car]);
                 }
-                Data::Ratio(numerator, denominator) => {
+                TermData::Ratio(numerator, denominator) => {
                     visit(Ok(2));
                     open.extend([*denominator, *numerator]);
                 }
-                Data::Text(characters) => {
+                TermData::Text(characters) => {
                     visit(Ok(3 + 8 * characters.len() as u64));
                     characters.iter().for_each(|&c| visit(Ok(u64::from(c))));
                 }
-                Data::Big(negative, limbs) => {
+                TermData::Big(negative, limbs) => {
                     visit(Ok(4 + u64::from(*negative) + 8 * limbs.len() as u64));
                     limbs.iter().for_each(|&limb| visit(Ok(limb)));
                 }
-                Data::Float(bits) => [6, *bits].into_iter().for_each(|word| visit(Ok(word))),
-                Data::Object(v) => visit(Err(*v)),
-                Data::Free => visit(Ok(7)),
+                TermData::Float(bits) => [6, *bits].into_iter().for_each(|word| visit(Ok(word))),
+                TermData::Object(v) => visit(Err(*v)),
+                TermData::Free => visit(Ok(7)),
             }
         }
     }
@@ -210,12 +210,12 @@ impl Terms {
         }
         let is_ground = self.is_ground(car) && self.is_ground(cdr);
         let hash = finish(mix(mix(2, car.bits()), cdr.bits()));
-        Ok(self.intern(hash, Data::Pair { car, cdr, size, is_ground }))
+        Ok(self.intern(hash, TermData::Pair { car, cdr, size, is_ground }))
     }
 
     fn size(&self, term: Term) -> u32 {
         match term.0.as_term().map(|index| &self.nodes[index as usize].data) {
-            Some(Data::Pair { size, .. }) => *size,
+            Some(TermData::Pair { size, .. }) => *size,
             _ => 0,
         }
     }
@@ -224,7 +224,7 @@ impl Terms {
     #[inline]
     pub(super) fn as_pair(&self, term: Term) -> Option<(Term, Term)> {
         match self.nodes[term.0.as_term()? as usize].data {
-            Data::Pair { car, cdr, .. } => Some((car, cdr)),
+            TermData::Pair { car, cdr, .. } => Some((car, cdr)),
             _ => None,
         }
     }
@@ -234,7 +234,9 @@ impl Terms {
     pub(super) fn is_ground(&self, term: Term) -> bool {
         match term.0.as_term() {
             None => term.as_variable().is_none(),
-            Some(index) => !matches!(self.nodes[index as usize].data, Data::Pair { is_ground: false, .. }),
+            Some(index) => {
+                !matches!(self.nodes[index as usize].data, TermData::Pair { is_ground: false, .. })
+            }
         }
     }
 
@@ -254,19 +256,19 @@ impl Terms {
         for _ in 0..most {
             let Some(index) = self.unheld.pop() else { return };
             let node = &mut self.nodes[index as usize];
-            if node.holders > 0 || node.data == Data::Free {
+            if node.holders > 0 || node.data == TermData::Free {
                 continue;
             }
-            let data = std::mem::replace(&mut node.data, Data::Free);
+            let data = std::mem::replace(&mut node.data, TermData::Free);
             self.bytes -= NODE_BYTES + data.bytes();
             self.buckets.remove(index);
             self.free.push(index);
             match data {
-                Data::Pair { car, cdr, .. } | Data::Ratio(car, cdr) => {
+                TermData::Pair { car, cdr, .. } | TermData::Ratio(car, cdr) => {
                     self.release(car);
                     self.release(cdr);
                 }
-                Data::Object(v) => {
+                TermData::Object(v) => {
                     if let Some((table, hash, Some(entry))) = self.find_object(heap, v) {
                         table.delete(heap, entry, hash);
                     }
@@ -297,7 +299,7 @@ impl Terms {
         if entry.is_none() {
             table.add(heap, hash, v, Value::T)?;
         }
-        Ok(self.intern(hash, Data::Object(v)))
+        Ok(self.intern(hash, TermData::Object(v)))
     }
 
     /// Makes the table of objects, if there is none yet: the caller keeps it from being collected.
@@ -320,22 +322,22 @@ impl Terms {
         if let Some(characters) = equality::characters_of(heap, v) {
             let hash =
                 finish(characters.iter().fold(mix(3, characters.len() as u64), |h, &c| mix(h, c.into())));
-            let data = Data::Text(characters.into());
+            let data = TermData::Text(characters.into());
             return Ok(self.intern(hash, data));
         }
         if let Some(n) = heap.bignum(v) {
             let hash = finish(n.limbs.iter().fold(mix(4, n.negative.into()), |hash, &limb| mix(hash, limb)));
-            let data = Data::Big(n.negative, n.limbs.into());
+            let data = TermData::Big(n.negative, n.limbs.into());
             return Ok(self.intern(hash, data));
         }
         if let Some((numerator, denominator)) = heap.ratio(v) {
             let numerator = self.atom(heap, numerator)?;
             let denominator = self.atom(heap, denominator)?;
             let hash = finish(mix(mix(5, numerator.bits()), denominator.bits()));
-            return Ok(self.intern(hash, Data::Ratio(numerator, denominator)));
+            return Ok(self.intern(hash, TermData::Ratio(numerator, denominator)));
         }
         if let Some(x) = heap.as_double(v) {
-            return Ok(self.intern(finish(mix(6, x.to_bits())), Data::Float(x.to_bits())));
+            return Ok(self.intern(finish(mix(6, x.to_bits())), TermData::Float(x.to_bits())));
         }
         if Terms::is_named(heap, v) { Ok(Term(v)) } else { self.object(heap, v) }
     }
@@ -381,16 +383,16 @@ impl Terms {
     fn atom_value(&self, heap: &mut Heap, term: Term) -> Result<Value, AllocError> {
         let Some(index) = term.0.as_term() else { return Ok(term.0) };
         match &self.nodes[index as usize].data {
-            Data::Text(characters) => heap.alloc_string(characters),
-            Data::Big(negative, limbs) => heap.alloc_bignum(*negative, limbs),
-            Data::Ratio(numerator, denominator) => {
+            TermData::Text(characters) => heap.alloc_string(characters),
+            TermData::Big(negative, limbs) => heap.alloc_bignum(*negative, limbs),
+            TermData::Ratio(numerator, denominator) => {
                 let numerator = self.atom_value(heap, *numerator)?;
                 let denominator = self.atom_value(heap, *denominator)?;
                 heap.alloc_ratio(numerator, denominator)
             }
-            Data::Float(bits) => heap.float(f64::from_bits(*bits)),
-            Data::Object(v) => Ok(*v),
-            Data::Free | Data::Pair { .. } => Ok(Value::NIL),
+            TermData::Float(bits) => heap.float(f64::from_bits(*bits)),
+            TermData::Object(v) => Ok(*v),
+            TermData::Free | TermData::Pair { .. } => Ok(Value::NIL),
         }
     }
 
@@ -534,11 +536,11 @@ impl Terms {
     }
 }
 
-impl Data {
+impl TermData {
     fn bytes(&self) -> usize {
         match self {
-            Data::Text(characters) => 4 * characters.len(),
-            Data::Big(_, limbs) => 8 * limbs.len(),
+            TermData::Text(characters) => 4 * characters.len(),
+            TermData::Big(_, limbs) => 8 * limbs.len(),
             _ => 0,
         }
     }

@@ -10,17 +10,17 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 /// A machine, and texts in place of values.
-struct World {
+struct Fixture {
     vm: Vm,
 }
 
-impl World {
-    fn new() -> World {
+impl Fixture {
+    fn new() -> Fixture {
         let mut vm = Vm::for_tests();
         if let Some(objects) = vm.database.prepare(&mut vm.heap).unwrap() {
             vm.pin(objects);
         }
-        World { vm }
+        Fixture { vm }
     }
 
     fn read(&mut self, text: &str) -> Value {
@@ -89,7 +89,7 @@ impl World {
                     let sum: i64 = bindings.iter().filter_map(|(_, Term(value))| value.as_fixnum()).sum();
                     self.vm.database.tell(query, sum % 2 == 0);
                 }
-                Err(problem) => return vec![format!("{problem:?}").split('(').next().unwrap().to_owned()],
+                Err(error) => return vec![format!("{error:?}").split('(').next().unwrap().to_owned()],
             }
         }
         let mut all = Vec::new();
@@ -134,22 +134,22 @@ impl World {
 
 #[track_caller]
 fn check(facts: &str, query: &str, expected: &[&str]) {
-    let mut world = World::new();
+    let mut fixture = Fixture::new();
     for fact in facts.split(';') {
-        world.assert(fact);
+        fixture.assert(fact);
     }
-    assert_eq!(world.query(query), expected, "{query}");
+    assert_eq!(fixture.query(query), expected, "{query}");
 }
 
 #[test]
 fn a_set_of_facts() {
-    let mut world = World::new();
-    assert!(world.assert("(p 1 (2 x) \"s\" 0.5)"));
-    assert!(!world.assert("(p 1 (2 x) \"s\" 0.5)"));
-    assert!(world.assert("(p 1 (2 x) \"t\" 0.5)"));
-    assert!(world.retract("(p 1 (2 x) \"s\" 0.5)"));
-    assert!(!world.retract("(p 1 (2 x) \"s\" 0.5)"));
-    assert_eq!(world.query("(p ?a ?b ?c ?d)").len(), 1);
+    let mut fixture = Fixture::new();
+    assert!(fixture.assert("(p 1 (2 x) \"s\" 0.5)"));
+    assert!(!fixture.assert("(p 1 (2 x) \"s\" 0.5)"));
+    assert!(fixture.assert("(p 1 (2 x) \"t\" 0.5)"));
+    assert!(fixture.retract("(p 1 (2 x) \"s\" 0.5)"));
+    assert!(!fixture.retract("(p 1 (2 x) \"s\" 0.5)"));
+    assert_eq!(fixture.query("(p ?a ?b ?c ?d)").len(), 1);
 }
 
 #[test]
@@ -197,14 +197,14 @@ fn formulas_combine() {
 
 #[test]
 fn the_order_of_answers_does_not_depend_on_the_plan() {
-    let mut world = World::new();
+    let mut fixture = Fixture::new();
     for x in 0..30 {
-        world.assert(&format!("(a {x} {})", x % 3));
-        world.assert(&format!("(b {} {x})", x % 3));
+        fixture.assert(&format!("(a {x} {})", x % 3));
+        fixture.assert(&format!("(b {} {x})", x % 3));
     }
-    world.assert("(c 2)");
-    world.assert("(c 1)");
-    let joined = world.query("(and (a ?x ?k) (b ?k ?y) (c ?k))");
+    fixture.assert("(c 2)");
+    fixture.assert("(c 1)");
+    let joined = fixture.query("(and (a ?x ?k) (b ?k ?y) (c ?k))");
     let mut expected = Vec::new();
     for x in 0..30 {
         for y in 0..30 {
@@ -218,68 +218,68 @@ fn the_order_of_answers_does_not_depend_on_the_plan() {
 
 #[test]
 fn a_query_sees_what_was_there_when_it_began() {
-    let mut world = World::new();
+    let mut fixture = Fixture::new();
     for x in 0..20 {
-        world.assert(&format!("(n {x})"));
+        fixture.assert(&format!("(n {x})"));
     }
-    let query = world.open("(and (n ?x) (n ?x))");
-    _ = world.vm.database.step(query, &mut 5);
+    let query = fixture.open("(and (n ?x) (n ?x))");
+    _ = fixture.vm.database.step(query, &mut 5);
     for x in 0..20 {
-        world.retract(&format!("(n {x})"));
-        world.assert(&format!("(n {})", x + 100));
+        fixture.retract(&format!("(n {x})"));
+        fixture.assert(&format!("(n {})", x + 100));
     }
-    assert!(world.query("(n 5)").is_empty());
-    let answers = world.finish(query, 3);
+    assert!(fixture.query("(n 5)").is_empty());
+    let answers = fixture.finish(query, 3);
     let expected: Vec<String> = (0..20).map(|x| format!("((?X . {x}))")).collect();
     assert_eq!(answers, expected);
-    assert_eq!(world.query("(n ?x)").len(), 20);
+    assert_eq!(fixture.query("(n ?x)").len(), 20);
 }
 
 #[test]
 fn what_has_ended_is_given_back() {
-    let mut world = World::new();
+    let mut fixture = Fixture::new();
     for x in 0..2000 {
-        world.assert(&format!("(state rover (at {x} \"somewhere\"))"));
-        world.retract(&format!("(state rover (at {x} \"somewhere\"))"));
+        fixture.assert(&format!("(state rover (at {x} \"somewhere\"))"));
+        fixture.retract(&format!("(state rover (at {x} \"somewhere\"))"));
         if x == 100 {
-            let query = world.open("(state ?a ?b)");
-            world.finish(query, 10);
+            let query = fixture.open("(state ?a ?b)");
+            fixture.finish(query, 10);
         }
     }
-    world.query("(state ?a ?b)");
-    assert!(world.vm.database.terms.kept() < 20, "{}", world.vm.database.terms.kept());
-    assert!(world.vm.database.footprint() < 4000, "{}", world.vm.database.footprint());
+    fixture.query("(state ?a ?b)");
+    assert!(fixture.vm.database.terms.kept() < 20, "{}", fixture.vm.database.terms.kept());
+    assert!(fixture.vm.database.footprint() < 4000, "{}", fixture.vm.database.footprint());
 }
 
 #[test]
 fn retracting_by_pattern() {
-    let mut world = World::new();
+    let mut fixture = Fixture::new();
     for fact in ["(p 1 2)", "(p 2 2)", "(p 1 3)", "(q 1 2)"] {
-        world.assert(fact);
+        fixture.assert(fact);
     }
-    assert_eq!(world.retract_all("(p 1 ?x)"), ["(P 1 2)", "(P 1 3)"]);
-    assert_eq!(world.retract_all("(?r ?x 2)"), ["(P 2 2)", "(Q 1 2)"]);
-    assert_eq!(world.query("(?r ?x ?y)"), [""; 0]);
+    assert_eq!(fixture.retract_all("(p 1 ?x)"), ["(P 1 2)", "(P 1 3)"]);
+    assert_eq!(fixture.retract_all("(?r ?x 2)"), ["(P 2 2)", "(Q 1 2)"]);
+    assert_eq!(fixture.query("(?r ?x ?y)"), [""; 0]);
 }
 
 #[test]
 fn properties_have_one_value() {
-    let mut world = World::new();
-    let name = world.read("power");
+    let mut fixture = Fixture::new();
+    let name = fixture.read("power");
     for fact in ["(power camera 0)", "(power heater 0)", "(power)"] {
-        world.assert(fact);
+        fixture.assert(fact);
     }
-    assert!(world.vm.database.define_property(&mut world.vm.heap, name, 2, &mut 0).unwrap());
+    assert!(fixture.vm.database.define_property(&mut fixture.vm.heap, name, 2, &mut 0).unwrap());
     for value in 0..50 {
-        assert_eq!(world.assert(&format!("(power camera {value})")), value > 0);
-        assert_eq!(world.query("(power camera ?x)"), [format!("((?X . {value}))")]);
+        assert_eq!(fixture.assert(&format!("(power camera {value})")), value > 0);
+        assert_eq!(fixture.query("(power camera ?x)"), [format!("((?X . {value}))")]);
     }
-    assert_eq!(world.query("(power heater ?x)"), ["((?X . 0))"]);
-    let of_camera = world.read("(power camera)");
-    let value = world.vm.database.property_value(&mut world.vm.heap, of_camera, &mut 0).unwrap();
+    assert_eq!(fixture.query("(power heater ?x)"), ["((?X . 0))"]);
+    let of_camera = fixture.read("(power camera)");
+    let value = fixture.vm.database.property_value(&mut fixture.vm.heap, of_camera, &mut 0).unwrap();
     assert_eq!(value, Value::small(49));
-    world.retract("(power camera 49)");
-    let value = world.vm.database.property_value(&mut world.vm.heap, of_camera, &mut 0).unwrap();
+    fixture.retract("(power camera 49)");
+    let value = fixture.vm.database.property_value(&mut fixture.vm.heap, of_camera, &mut 0).unwrap();
     assert_eq!(value, Value::UNBOUND);
 }
 
@@ -291,41 +291,41 @@ fn rules_in_any_order_end() {
         ["(edge ?x ?y)", "(and (path ?x ?z) (path ?z ?y))"],
     ];
     for rules in bodies {
-        let mut world = World::new();
+        let mut fixture = Fixture::new();
         for body in rules {
-            world.rule("(path ?x ?y)", body);
+            fixture.rule("(path ?x ?y)", body);
         }
         for edge in ["(edge 1 2)", "(edge 2 3)", "(edge 3 1)", "(edge 4 4)"] {
-            world.assert(edge);
+            fixture.assert(edge);
         }
-        let mut from_one = world.query("(path 1 ?y)");
+        let mut from_one = fixture.query("(path 1 ?y)");
         from_one.sort();
         assert_eq!(from_one, ["((?Y . 1))", "((?Y . 2))", "((?Y . 3))"], "{rules:?}");
-        assert_eq!(world.query("(path ?x ?y)").len(), 10, "{rules:?}");
-        assert_eq!(world.query("(path ?x ?x)").len(), 4, "{rules:?}");
-        assert_eq!(world.query("(and (edge ?x ?y) (not (path ?y 1)))"), ["((?X . 4) (?Y . 4))"]);
-        assert_eq!(world.query("(path 1 4)"), [""; 0]);
-        assert_eq!(world.query("(?r 4 ?x)"), ["((?R . EDGE) (?X . 4))", "((?R . PATH) (?X . 4))"]);
+        assert_eq!(fixture.query("(path ?x ?y)").len(), 10, "{rules:?}");
+        assert_eq!(fixture.query("(path ?x ?x)").len(), 4, "{rules:?}");
+        assert_eq!(fixture.query("(and (edge ?x ?y) (not (path ?y 1)))"), ["((?X . 4) (?Y . 4))"]);
+        assert_eq!(fixture.query("(path 1 4)"), [""; 0]);
+        assert_eq!(fixture.query("(?r 4 ?x)"), ["((?R . EDGE) (?X . 4))", "((?R . PATH) (?X . 4))"]);
     }
 }
 
 #[test]
 fn negation_in_rules() {
-    let mut world = World::new();
-    world.rule("(reaches ?x ?y)", "(edge ?x ?y)");
-    world.rule("(reaches ?x ?y)", "(and (reaches ?x ?z) (edge ?z ?y))");
-    world.rule("(cut-off ?x ?y)", "(and (node ?x) (node ?y) (not (reaches ?x ?y)))");
-    world.rule("(well ?x)", "(and (node ?x) (not (cut-off ?x 3)))");
+    let mut fixture = Fixture::new();
+    fixture.rule("(reaches ?x ?y)", "(edge ?x ?y)");
+    fixture.rule("(reaches ?x ?y)", "(and (reaches ?x ?z) (edge ?z ?y))");
+    fixture.rule("(cut-off ?x ?y)", "(and (node ?x) (node ?y) (not (reaches ?x ?y)))");
+    fixture.rule("(well ?x)", "(and (node ?x) (not (cut-off ?x 3)))");
     for fact in ["(node 1)", "(node 2)", "(node 3)", "(edge 1 2)", "(edge 2 3)"] {
-        world.assert(fact);
+        fixture.assert(fact);
     }
-    assert_eq!(world.query("(well ?x)"), ["((?X . 1))", "((?X . 2))"]);
-    assert_eq!(world.query("(cut-off 3 ?y)").len(), 3);
-    world.rule("(win ?x)", "(and (edge ?x ?y) (not (win ?y)))");
-    assert_eq!(world.query("(win ?x)"), ["Circular"]);
-    world.rule("(open ?x ?y)", "(node ?x)");
-    assert_eq!(world.query("(open 1 ?y)"), ["Unbound"]);
-    assert_eq!(world.query("(open 1 7)"), ["NIL"]);
+    assert_eq!(fixture.query("(well ?x)"), ["((?X . 1))", "((?X . 2))"]);
+    assert_eq!(fixture.query("(cut-off 3 ?y)").len(), 3);
+    fixture.rule("(win ?x)", "(and (edge ?x ?y) (not (win ?y)))");
+    assert_eq!(fixture.query("(win ?x)"), ["Circular"]);
+    fixture.rule("(open ?x ?y)", "(node ?x)");
+    assert_eq!(fixture.query("(open 1 ?y)"), ["Unbound"]);
+    assert_eq!(fixture.query("(open 1 7)"), ["NIL"]);
 }
 
 // ---- the model
@@ -481,32 +481,32 @@ proptest! {
         meanwhile in prop::collection::vec((any::<bool>(), fact()), 0..20),
         portion in 1usize..40,
     ) {
-        let mut world = World::new();
+        let mut fixture = Fixture::new();
         let mut facts: Vec<Fact> = Vec::new();
-        let change = |world: &mut World, facts: &mut Vec<Fact>, adds: bool, fact: Fact| {
+        let change = |fixture: &mut Fixture, facts: &mut Vec<Fact>, adds: bool, fact: Fact| {
             let known = facts.iter().position(|other| *other == fact);
             if adds {
-                assert_eq!(world.assert(&text_of(&fact)), known.is_none());
+                assert_eq!(fixture.assert(&text_of(&fact)), known.is_none());
                 if known.is_none() {
                     facts.push(fact);
                 }
             } else {
-                assert_eq!(world.retract(&text_of(&fact)), known.is_some());
+                assert_eq!(fixture.retract(&text_of(&fact)), known.is_some());
                 known.map(|at| facts.remove(at));
             }
         };
         for (kind, fact) in changes {
-            change(&mut world, &mut facts, kind > 0, fact);
+            change(&mut fixture, &mut facts, kind > 0, fact);
         }
         let before = facts.clone();
-        let query = world.open(&first.text());
-        _ = world.vm.database.step(query, &mut portion.clone());
+        let query = fixture.open(&first.text());
+        _ = fixture.vm.database.step(query, &mut portion.clone());
         for (adds, fact) in meanwhile {
-            change(&mut world, &mut facts, adds, fact);
+            change(&mut fixture, &mut facts, adds, fact);
         }
-        prop_assert_eq!(world.query(&second.text()), second.answers(&facts), "{}", second.text());
-        prop_assert_eq!(world.finish(query, portion), first.answers(&before), "{}", first.text());
-        prop_assert_eq!(world.query(&first.text()), first.answers(&facts), "{}", first.text());
+        prop_assert_eq!(fixture.query(&second.text()), second.answers(&facts), "{}", second.text());
+        prop_assert_eq!(fixture.finish(query, portion), first.answers(&before), "{}", first.text());
+        prop_assert_eq!(fixture.query(&first.text()), first.answers(&facts), "{}", first.text());
     }
 
     #[test]
@@ -515,14 +515,14 @@ proptest! {
         shape in 0usize..3,
         portion in 1usize..40,
     ) {
-        let mut world = World::new();
+        let mut fixture = Fixture::new();
         let bodies = ["(and (edge ?x ?z) (path ?z ?y))", "(and (path ?x ?z) (edge ?z ?y))", "(and (path ?x ?z) (path ?z ?y))"];
-        world.rule("(path ?x ?y)", bodies[shape]);
-        world.rule("(path ?x ?y)", "(edge ?x ?y)");
-        world.rule("(apart ?x ?y)", "(and (edge ?x ?) (edge ? ?y) (not (path ?x ?y)))");
+        fixture.rule("(path ?x ?y)", bodies[shape]);
+        fixture.rule("(path ?x ?y)", "(edge ?x ?y)");
+        fixture.rule("(apart ?x ?y)", "(and (edge ?x ?) (edge ? ?y) (not (path ?x ?y)))");
         let mut path = edges.clone();
         for &(x, y) in &edges {
-            world.assert(&format!("(edge {x} {y})"));
+            fixture.assert(&format!("(edge {x} {y})"));
         }
         loop {
             let longer: BTreeSet<_> = path
@@ -536,21 +536,21 @@ proptest! {
             }
         }
         let shown = |pairs: &BTreeSet<(u8, u8)>| pairs.iter().map(|(x, y)| format!("((?A . {x}) (?B . {y}))")).collect::<BTreeSet<_>>();
-        let query = world.open("(path ?a ?b)");
-        let found = world.finish(query, portion);
+        let query = fixture.open("(path ?a ?b)");
+        let found = fixture.finish(query, portion);
         prop_assert_eq!(found.len(), path.len());
         prop_assert_eq!(found.into_iter().collect::<BTreeSet<_>>(), shown(&path));
-        let from = world.query("(path 3 ?b)").len();
+        let from = fixture.query("(path 3 ?b)").len();
         prop_assert_eq!(from, path.iter().filter(|(x, _)| *x == 3).count());
-        let to = world.query("(path ?a 3)").len();
+        let to = fixture.query("(path ?a 3)").len();
         prop_assert_eq!(to, path.iter().filter(|(_, y)| *y == 3).count());
         let apart: BTreeSet<(u8, u8)> = edges
             .iter()
             .flat_map(|&(x, _)| edges.iter().map(move |&(_, y)| (x, y)))
             .filter(|pair| !path.contains(pair))
             .collect();
-        let query = world.open("(apart ?a ?b)");
-        let found = world.finish(query, portion);
+        let query = fixture.open("(apart ?a ?b)");
+        let found = fixture.finish(query, portion);
         prop_assert_eq!(found.into_iter().collect::<BTreeSet<_>>(), shown(&apart));
     }
 }

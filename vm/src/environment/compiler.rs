@@ -21,17 +21,17 @@ new_key_type! {
 }
 
 /// What a handle names.
-pub(crate) enum Job {
+pub(crate) enum CompilerJob {
     /// A compilation in progress.
-    Compilation(Box<Running>),
+    Compilation(Box<ActiveCompilation>),
     /// A text that is compiled form by form.
-    Text(Text),
+    Text(FormText),
     /// Out of the table: a builtin works on it.
     Taken,
 }
 
 /// A text, and the position of its next form.
-pub(crate) struct Text {
+pub(crate) struct FormText {
     /// The whole text.
     pub(crate) text: Arc<str>,
     /// Name of the source, if diagnostics are to name places in it.
@@ -44,7 +44,7 @@ pub(crate) struct Text {
     pub(crate) column: u32,
 }
 
-impl Text {
+impl FormText {
     /// Returns the text from the position to `end`, if the source has a name.
     pub(crate) fn part(&self, end: usize) -> Option<Part<'_>> {
         let name = self.name.as_deref()?;
@@ -64,7 +64,7 @@ impl Text {
 }
 
 /// A compilation in progress.
-pub(crate) struct Running {
+pub(crate) struct ActiveCompilation {
     /// The compiler's state.
     pub(crate) compilation: Box<dyn Compilation>,
     /// Objects and uninterned symbols of its data.
@@ -79,21 +79,21 @@ pub(crate) struct Running {
 #[derive(Default)]
 pub(crate) struct Compiler {
     compiler: Option<Box<dyn Compile>>,
-    jobs: SlotMap<JobId, Job>,
+    jobs: SlotMap<JobId, CompilerJob>,
 }
 
 impl Compiler {
     /// Calls `visit` with every object that compilations keep alive.
     pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
         for job in self.jobs.values() {
-            if let Job::Compilation(running) = job {
+            if let CompilerJob::Compilation(running) = job {
                 running.unit.roots(visit);
             }
         }
     }
 
     /// Adds a job and returns its handle.
-    pub(crate) fn add(&mut self, job: Job) -> Value {
+    pub(crate) fn add(&mut self, job: CompilerJob) -> Value {
         let id = self.jobs.insert(job).data().as_ffi();
         // A key's version stays far below the limit: it grows by two for each reuse of a slot.
         Value::handle(id as u32, (id >> 32) as u32 % Value::GENERATION_LIMIT).unwrap_or(Value::NIL)
@@ -106,14 +106,14 @@ impl Compiler {
     }
 
     /// Takes the job that `handle` names out of the table, until [`Compiler::put_back`]; `None` if it has ended.
-    pub(crate) fn take(&mut self, handle: Value) -> Option<(JobId, Job)> {
+    pub(crate) fn take(&mut self, handle: Value) -> Option<(JobId, CompilerJob)> {
         let id = self.find(handle)?;
         let job = self.jobs.get_mut(id)?;
-        Some((id, std::mem::replace(job, Job::Taken)))
+        Some((id, std::mem::replace(job, CompilerJob::Taken)))
     }
 
     /// Puts a job back, unless it was ended meanwhile.
-    pub(crate) fn put_back(&mut self, id: JobId, job: Job) {
+    pub(crate) fn put_back(&mut self, id: JobId, job: CompilerJob) {
         if let Some(slot) = self.jobs.get_mut(id) {
             *slot = job;
         }

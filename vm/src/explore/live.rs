@@ -14,9 +14,9 @@ use crate::value::Value;
 
 /// A set of registers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Registers([u64; 4]);
+pub(super) struct RegisterSet([u64; 4]);
 
-impl Registers {
+impl RegisterSet {
     pub(super) fn contains(self, register: usize) -> bool {
         self.0[register >> 6 & 3] >> (register & 63) & 1 != 0
     }
@@ -29,20 +29,20 @@ impl Registers {
         (first..(first + count).min(256)).for_each(|register| self.insert(register));
     }
 
-    pub(super) fn with(self, other: Registers) -> Registers {
-        Registers(std::array::from_fn(|word| self.0[word] | other.0[word]))
+    pub(super) fn with(self, other: RegisterSet) -> RegisterSet {
+        RegisterSet(std::array::from_fn(|word| self.0[word] | other.0[word]))
     }
 
-    fn without(self, other: Registers) -> Registers {
-        Registers(std::array::from_fn(|word| self.0[word] & !other.0[word]))
+    fn without(self, other: RegisterSet) -> RegisterSet {
+        RegisterSet(std::array::from_fn(|word| self.0[word] & !other.0[word]))
     }
 }
 
 /// An instruction, as far as it matters here.
-struct Step {
+struct LiveStep {
     at: usize,
-    reads: Registers,
-    writes: Registers,
+    reads: RegisterSet,
+    writes: RegisterSet,
     /// Words to which control goes from here.
     next: [Option<usize>; 2],
     /// Where the entry lands that it pushes.
@@ -51,7 +51,7 @@ struct Step {
 
 /// For each word at which an instruction begins, the registers that may be read from there on.
 #[derive(Debug, Default)]
-pub(super) struct Live(Vec<Registers>);
+pub(super) struct Live(Vec<RegisterSet>);
 
 impl Live {
     /// What is live in a function with these words and constants.
@@ -62,8 +62,8 @@ impl Live {
             steps.push(step(heap, constants, at, instruction));
             at += instruction.opcode().words();
         }
-        let mut live = vec![Registers::default(); words.len() + 1];
-        let mut landed = Registers::default();
+        let mut live = vec![RegisterSet::default(); words.len() + 1];
+        let mut landed = RegisterSet::default();
         let mut has_changed = true;
         while has_changed {
             has_changed = false;
@@ -83,14 +83,14 @@ impl Live {
     }
 
     /// Whether a register may be read from word `at` on.
-    pub(super) fn at(&self, at: usize) -> Registers {
+    pub(super) fn at(&self, at: usize) -> RegisterSet {
         self.0.get(at).copied().unwrap_or_default()
     }
 }
 
-fn step(heap: &Heap, constants: &[Value], at: usize, instruction: Instr) -> Step {
+fn step(heap: &Heap, constants: &[Value], at: usize, instruction: Instr) -> LiveStep {
     let after = at + instruction.opcode().words();
-    let (mut reads, mut writes) = (Registers::default(), Registers::default());
+    let (mut reads, mut writes) = (RegisterSet::default(), RegisterSet::default());
     let mut jump = None;
     instruction.visit_operands(|role| match role {
         Role::Read(register) => reads.insert(usize::from(register)),
@@ -98,7 +98,7 @@ fn step(heap: &Heap, constants: &[Value], at: usize, instruction: Instr) -> Step
         Role::Forward(by) | Role::Backward(by) => jump = after.checked_add_signed(by as isize),
         _ => {}
     });
-    let range = |set: &mut Registers, Base(first): Base, skipped: usize, Count(count): Count| {
+    let range = |set: &mut RegisterSet, Base(first): Base, skipped: usize, Count(count): Count| {
         set.insert_range(usize::from(first) + skipped, usize::from(count));
     };
     let (mut falls_through, mut lands) = (true, false);
@@ -149,7 +149,7 @@ fn step(heap: &Heap, constants: &[Value], at: usize, instruction: Instr) -> Step
         _ => {}
     }
     let landing = if lands { jump.take() } else { None };
-    Step { at, reads, writes, next: [falls_through.then_some(after), jump], landing }
+    LiveStep { at, reads, writes, next: [falls_through.then_some(after), jump], landing }
 }
 
 /// The registers from which the captures of a closure are taken.

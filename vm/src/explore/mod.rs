@@ -103,7 +103,7 @@ pub struct Exploration<T> {
 
 /// A place in the tree of choices: the choice made last, after those of another place.
 #[derive(Clone, Copy, Debug)]
-struct Node {
+struct ChoiceNode {
     parent: u32,
     choice: u32,
     /// The state in which it was made.
@@ -115,7 +115,7 @@ const ROOT: u32 = 0;
 /// What is known during a search.
 #[derive(Default)]
 struct Search {
-    nodes: Vec<Node>,
+    nodes: Vec<ChoiceNode>,
     /// Places to go on from, by the number of switches that lead there; each has the latest last.
     open: Vec<Vec<u32>>,
     /// States by their fingerprints.
@@ -129,7 +129,7 @@ struct Search {
 }
 
 impl Search {
-    fn node(&mut self, node: Node) -> u32 {
+    fn node(&mut self, node: ChoiceNode) -> u32 {
         self.nodes.push(node);
         (self.nodes.len() - 1) as u32
     }
@@ -212,7 +212,7 @@ pub fn explore<T: PartialEq, E>(
     mut judge: impl FnMut(&mut Vm, RunOutcome) -> T,
 ) -> Result<Exploration<T>, E> {
     let mut search = Search::default();
-    let root = search.node(Node { parent: ROOT, choice: 0, state: 0 });
+    let root = search.node(ChoiceNode { parent: ROOT, choice: 0, state: 0 });
     search.open(0, root);
     let mut fingerprints = Fingerprints::default();
     let mut endings: Vec<Ending<T>> = Vec::new();
@@ -260,10 +260,10 @@ pub fn explore<T: PartialEq, E>(
                 // A switch is one where the task that has just run could have gone on.
                 let switches = switches + usize::from(runnable.has_last);
                 for choice in (1..runnable.count).rev() {
-                    let other = search.node(Node { parent: node, choice, state });
+                    let other = search.node(ChoiceNode { parent: node, choice, state });
                     search.open(switches, other);
                 }
-                node = search.node(Node { parent: node, choice: 0, state });
+                node = search.node(ChoiceNode { parent: node, choice: 0, state });
             }
             Some(0)
         });

@@ -33,7 +33,7 @@ pub(super) const STREAM: i64 = 8;
 
 /// What an image defines a symbol as: functions by number, data by index of the constant.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Definition {
+pub(crate) struct ImageDefinition {
     /// Its function.
     pub function: Option<u32>,
     /// Its macro function.
@@ -81,7 +81,7 @@ impl Definitions {
         image: &ModuleImage,
         packages: &[Arc<str>],
         symbol: &Symbol,
-    ) -> Option<Definition> {
+    ) -> Option<ImageDefinition> {
         let wanted = (&**symbol.package()?, symbol.name());
         let last = (self.rows.len() / ROW).checked_sub(1)?;
         let mut at = hash(wanted.0, wanted.1) as usize & last;
@@ -119,13 +119,16 @@ fn vector(image: &ModuleImage, index: PoolIdx) -> Option<PoolIndexes<'_>> {
     }
 }
 
-fn read_row(image: &ModuleImage, row: &[PoolIdx]) -> Definition {
+fn read_row(image: &ModuleImage, row: &[PoolIdx]) -> ImageDefinition {
     let number = |index| match image.constant(index) {
         Ok(ConstantRecord::Function(number)) => Some(number.0),
         _ => None,
     };
-    let functions =
-        Definition { function: number(row[1]), macro_function: number(row[2]), ..Definition::default() };
+    let functions = ImageDefinition {
+        function: number(row[1]),
+        macro_function: number(row[2]),
+        ..ImageDefinition::default()
+    };
     let Some(data) = vector(image, row[3]) else { return functions };
     let flags = match data.get(0).map(|flags| image.constant(flags)) {
         Some(Ok(ConstantRecord::Fixnum(flags))) => flags,
@@ -133,7 +136,7 @@ fn read_row(image: &ModuleImage, row: &[PoolIdx]) -> Definition {
     };
     let value = data.get(1).filter(|_| flags & VALUE != 0);
     let properties: Vec<PoolIdx> = data.iter().skip(2).collect();
-    Definition {
+    ImageDefinition {
         is_special: flags & SPECIAL != 0,
         is_constant: flags & CONSTANT != 0,
         value: value.filter(|_| flags & STREAM == 0),

@@ -15,8 +15,8 @@ use esl_bytecode::file::{ConstantRecord, ModuleImage, SymbolHome};
 use esl_bytecode::module::{Function, FunctionNumber, PoolIdx};
 use esl_bytecode::symbol::Symbol;
 
-use super::definitions::{Definition, Definitions, name_of};
-use super::{LoadError, Parts, character, data, debug, integer, make_code, own_constants, ratio};
+use super::definitions::{Definitions, ImageDefinition, name_of};
+use super::{FunctionParts, LoadError, character, data, debug, integer, make_code, own_constants, ratio};
 use crate::heap::{AllocError, Heap};
 use crate::interp::trust::{self, Verified};
 use crate::raise::Exit;
@@ -55,7 +55,7 @@ impl Images {
     }
 
     /// The definitions of `symbol`, and the number of the image that has them.
-    pub(crate) fn definition(&self, symbol: &Symbol) -> Option<(usize, Definition)> {
+    pub(crate) fn definition(&self, symbol: &Symbol) -> Option<(usize, ImageDefinition)> {
         let find = |(number, image): (usize, &Image)| {
             Some((number, image.definitions.find(&image.module, &image.packages, symbol)?))
         };
@@ -331,7 +331,7 @@ impl ImageLoader<'_> {
             None => Value::NIL,
         };
         let debug = Value::index(number.0 as usize);
-        let parts = Parts { function: &function, constants: &constants, name, debug };
+        let parts = FunctionParts { function: &function, constants: &constants, name, debug };
         Ok(make_code(self.heap, &Verified::image(), &parts, Value::index(self.image))?)
     }
 }

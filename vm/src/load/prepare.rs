@@ -20,7 +20,7 @@ const IS_CONSTANT: &str = "%IS-CONSTANT-WITH";
 
 /// What a register holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Known {
+enum KnownValue {
     Nil,
     True,
     Integer(i32),
@@ -31,22 +31,22 @@ enum Known {
 
 /// What a symbol is.
 #[derive(Clone, Debug, Default)]
-struct Row {
+struct DefinitionRow {
     symbol: Option<PoolIdx>,
     function: Option<PoolIdx>,
     macro_function: Option<PoolIdx>,
     flags: i64,
-    value: Option<Known>,
+    value: Option<KnownValue>,
     /// The newest last.
-    properties: Vec<(PoolIdx, Known)>,
+    properties: Vec<(PoolIdx, KnownValue)>,
 }
 
-type Name = (Arc<str>, String);
+type SymbolName = (Arc<str>, String);
 
 /// What was noted so far.
 #[derive(Clone, Debug, Default)]
 struct Noted {
-    rows: BTreeMap<Name, Row>,
+    rows: BTreeMap<SymbolName, DefinitionRow>,
     /// Symbols that `ESL` exports.
     exports: Vec<PoolIdx>,
 }
@@ -60,7 +60,8 @@ pub fn prepare(mut module: Module) -> Module {
     let mut noted = Noted::default();
     let mut toplevel = Vec::new();
     for number in std::mem::take(&mut module.toplevel) {
-        let mut form = Form { module: &module, registers: [None; 256], changes: Vec::new(), noted: &noted };
+        let mut form =
+            FormRun { module: &module, registers: [None; 256], changes: Vec::new(), noted: &noted };
         match form.run(number) {
             Some(()) => {
                 let changes = form.changes;
@@ -76,29 +77,29 @@ pub fn prepare(mut module: Module) -> Module {
 
 /// One thing that a form does. Symbols have a package.
 #[derive(Clone, Copy, Debug)]
-enum Change {
+enum Effect {
     Function(PoolIdx, PoolIdx),
     Macro(PoolIdx, PoolIdx),
     Special(PoolIdx),
-    Constant(PoolIdx, Known),
-    Value(PoolIdx, Known),
-    Property(PoolIdx, PoolIdx, Known),
+    Constant(PoolIdx, KnownValue),
+    Value(PoolIdx, KnownValue),
+    Property(PoolIdx, PoolIdx, KnownValue),
     Export(PoolIdx),
 }
 
 /// A form that is being run.
-struct Form<'a> {
+struct FormRun<'a> {
     module: &'a Module,
-    registers: [Option<Known>; 256],
-    changes: Vec<Change>,
+    registers: [Option<KnownValue>; 256],
+    changes: Vec<Effect>,
     noted: &'a Noted,
 }
 
-impl Form<'_> {
+impl FormRun<'_> {
     /// Runs a top-level function to its end. `None` if that takes more than constants.
     fn run(&mut self, FunctionNumber(number): FunctionNumber) -> Option<()> {
         let function = &self.module.functions[number as usize];
-        let wide = |index: u32| Known::Constant(function.constants[index as usize]);
+        let wide = |index: u32| KnownValue::Constant(function.constants[index as usize]);
         let constant = |index: u16| wide(index.into());
         let mut pc = 0;
         loop {
@@ -109,22 +110,22 @@ impl Form<'_> {
             match instruction {
                 Instr::LoadConst { dst, constant: index } => self.set(dst.0, constant(index.0)),
                 Instr::MakeClosure { dst, function: index } => self.set(dst.0, constant(index.0)),
-                Instr::LoadInt { dst, value } => self.set(dst.0, Known::Integer(i32::from(value.0))),
-                Instr::LoadTrue { dst } => self.set(dst.0, Known::True),
+                Instr::LoadInt { dst, value } => self.set(dst.0, KnownValue::Integer(i32::from(value.0))),
+                Instr::LoadTrue { dst } => self.set(dst.0, KnownValue::True),
                 Instr::LoadNil { first, count } => {
-                    (0..count.0).for_each(|offset| self.set(first.0 + offset, Known::Nil));
+                    (0..count.0).for_each(|offset| self.set(first.0 + offset, KnownValue::Nil));
                 }
                 Instr::Move { dst, src } => {
                     self.registers[usize::from(dst.0)] = self.registers[usize::from(src.0)]
                 }
                 Instr::JumpAlways { to } => jump(i64::from(to.0)),
                 Instr::JumpIfNil { test, to } => {
-                    if self.get(test.0)? == Known::Nil {
+                    if self.get(test.0)? == KnownValue::Nil {
                         jump(i64::from(to.0));
                     }
                 }
                 Instr::JumpIfNotNil { test, to } => {
-                    if self.get(test.0)? != Known::Nil {
+                    if self.get(test.0)? != KnownValue::Nil {
                         jump(i64::from(to.0));
                     }
                 }
@@ -148,27 +149,27 @@ impl Form<'_> {
         }
     }
 
-    fn get(&self, register: u8) -> Option<Known> {
+    fn get(&self, register: u8) -> Option<KnownValue> {
         self.registers[usize::from(register)]
     }
 
-    fn set(&mut self, register: u8, value: Known) {
+    fn set(&mut self, register: u8, value: KnownValue) {
         self.registers[usize::from(register)] = Some(value);
     }
 
     /// What the one function of the library gives that may be called here.
-    fn call_library(&mut self, function: Known, window: u8, count: u8) -> Option<Known> {
+    fn call_library(&mut self, function: KnownValue, window: u8, count: u8) -> Option<KnownValue> {
         let Constant::Symbol(function) = self.constant(self.symbol(function)?) else { return None };
         let argument = |position: usize| self.registers[usize::from(window) + 2 + position];
         if *function != Symbol::esl(IS_CONSTANT) || count != 2 {
             return None;
         }
         let is_new = !self.noted.has_value(self.module, self.symbol(argument(0)?)?);
-        is_new.then_some(Known::Nil)
+        is_new.then_some(KnownValue::Nil)
     }
 
     /// Notes what a builtin does, and gives its value.
-    fn call(&mut self, builtin: u32, window: u8, count: u8) -> Option<Known> {
+    fn call(&mut self, builtin: u32, window: u8, count: u8) -> Option<KnownValue> {
         let argument = |position: u8| {
             if position < count {
                 self.registers[usize::from(window) + 2 + usize::from(position)]
@@ -179,24 +180,24 @@ impl Form<'_> {
         let name = self.symbol(argument(0)?);
         let value = argument(1);
         let (change, result) = match Builtin::from_number(builtin)? {
-            Builtin::SetFunction => (Change::Function(name?, self.function(value?)?), name),
-            Builtin::SetMacro => (Change::Macro(name?, self.function(value?)?), name),
-            Builtin::ProclaimSpecial => (Change::Special(name?), name),
-            Builtin::DefineConstant => (Change::Constant(name?, self.data(value?)?), name),
+            Builtin::SetFunction => (Effect::Function(name?, self.function(value?)?), name),
+            Builtin::SetMacro => (Effect::Macro(name?, self.function(value?)?), name),
+            Builtin::ProclaimSpecial => (Effect::Special(name?), name),
+            Builtin::DefineConstant => (Effect::Constant(name?, self.data(value?)?), name),
             Builtin::StandardStream => {
-                let Known::Integer(number) = argument(0)? else { return None };
-                return Some(Known::Stream(number));
+                let KnownValue::Integer(number) = argument(0)? else { return None };
+                return Some(KnownValue::Stream(number));
             }
             Builtin::Set => {
                 let known = match value? {
-                    Known::Stream(number) => Known::Stream(number),
+                    KnownValue::Stream(number) => KnownValue::Stream(number),
                     known => self.data(known)?,
                 };
-                self.changes.push(Change::Value(name?, known));
+                self.changes.push(Effect::Value(name?, known));
                 return value;
             }
             Builtin::Put => {
-                self.changes.push(Change::Property(name?, self.symbol(value?)?, self.data(argument(2)?)?));
+                self.changes.push(Effect::Property(name?, self.symbol(value?)?, self.data(argument(2)?)?));
                 return argument(2);
             }
             Builtin::Boundp => {
@@ -204,17 +205,17 @@ impl Form<'_> {
                 let gets_value = self
                     .changes
                     .iter()
-                    .any(|change| matches!(change, Change::Value(symbol, _) if Some(*symbol) == name));
-                return Some(if has_value || gets_value { Known::True } else { Known::Nil });
+                    .any(|change| matches!(change, Effect::Value(symbol, _) if Some(*symbol) == name));
+                return Some(if has_value || gets_value { KnownValue::True } else { KnownValue::Nil });
             }
             Builtin::Export if count == 1 || self.is_esl(value?) => {
                 self.export(argument(0)?)?;
-                return Some(Known::True);
+                return Some(KnownValue::True);
             }
             _ => return None,
         };
         self.changes.push(change);
-        result.map(Known::Constant)
+        result.map(KnownValue::Constant)
     }
 
     fn constant(&self, PoolIdx(index): PoolIdx) -> &Constant {
@@ -222,8 +223,8 @@ impl Form<'_> {
     }
 
     /// The constant, if it is a symbol with a package.
-    fn symbol(&self, known: Known) -> Option<PoolIdx> {
-        let Known::Constant(index) = known else { return None };
+    fn symbol(&self, known: KnownValue) -> Option<PoolIdx> {
+        let KnownValue::Constant(index) = known else { return None };
         match self.constant(index) {
             Constant::Symbol(symbol) if symbol.package().is_some() => Some(index),
             _ => None,
@@ -231,8 +232,8 @@ impl Form<'_> {
     }
 
     /// The constant, if it is a function without captures.
-    fn function(&self, known: Known) -> Option<PoolIdx> {
-        let Known::Constant(index) = known else { return None };
+    fn function(&self, known: KnownValue) -> Option<PoolIdx> {
+        let KnownValue::Constant(index) = known else { return None };
         match self.constant(index) {
             Constant::Function(number) if self.module.functions[number.0 as usize].captures.is_empty() => {
                 Some(index)
@@ -242,21 +243,21 @@ impl Form<'_> {
     }
 
     /// What is known, unless it is a function with captures or an object of the program.
-    fn data(&self, known: Known) -> Option<Known> {
+    fn data(&self, known: KnownValue) -> Option<KnownValue> {
         match known {
-            Known::Constant(index) => match self.constant(index) {
-                Constant::Function(_) => self.function(known).map(Known::Constant),
+            KnownValue::Constant(index) => match self.constant(index) {
+                Constant::Function(_) => self.function(known).map(KnownValue::Constant),
                 Constant::Object(_) | Constant::Class(_) => None,
                 _ => Some(known),
             },
-            Known::Stream(_) => None,
+            KnownValue::Stream(_) => None,
             _ => Some(known),
         }
     }
 
     /// Whether this designates the package `ESL`.
-    fn is_esl(&self, known: Known) -> bool {
-        let Known::Constant(index) = known else { return false };
+    fn is_esl(&self, known: KnownValue) -> bool {
+        let KnownValue::Constant(index) = known else { return false };
         match self.constant(index) {
             Constant::String(text) => **text == *ESL_PACKAGE,
             Constant::Symbol(symbol) => symbol.name() == ESL_PACKAGE,
@@ -265,8 +266,8 @@ impl Form<'_> {
     }
 
     /// Notes the export of a symbol, or of a list of symbols, of `ESL`.
-    fn export(&mut self, known: Known) -> Option<()> {
-        let Known::Constant(mut list) = known else { return None };
+    fn export(&mut self, known: KnownValue) -> Option<()> {
+        let KnownValue::Constant(mut list) = known else { return None };
         let mut symbols = Vec::new();
         if self.symbol(known).is_some() {
             symbols.push(list);
@@ -282,7 +283,7 @@ impl Form<'_> {
         for symbol in symbols {
             match self.constant(symbol) {
                 Constant::Symbol(name) if name.is_in(ESL_PACKAGE) => {
-                    self.changes.push(Change::Export(symbol))
+                    self.changes.push(Effect::Export(symbol))
                 }
                 _ => return None,
             }
@@ -292,7 +293,7 @@ impl Form<'_> {
 }
 
 impl Noted {
-    fn name(module: &Module, PoolIdx(index): PoolIdx) -> Option<Name> {
+    fn name(module: &Module, PoolIdx(index): PoolIdx) -> Option<SymbolName> {
         match &module.constants[index as usize] {
             Constant::Symbol(symbol) => Some((symbol.package()?.clone(), symbol.name().to_owned())),
             _ => None,
@@ -304,15 +305,15 @@ impl Noted {
         row.is_some_and(|row| row.value.is_some())
     }
 
-    fn change(&mut self, module: &Module, change: Change) {
-        let (Change::Function(symbol, _)
-        | Change::Macro(symbol, _)
-        | Change::Special(symbol)
-        | Change::Constant(symbol, _)
-        | Change::Value(symbol, _)
-        | Change::Property(symbol, ..)
-        | Change::Export(symbol)) = change;
-        if let Change::Export(symbol) = change {
+    fn change(&mut self, module: &Module, change: Effect) {
+        let (Effect::Function(symbol, _)
+        | Effect::Macro(symbol, _)
+        | Effect::Special(symbol)
+        | Effect::Constant(symbol, _)
+        | Effect::Value(symbol, _)
+        | Effect::Property(symbol, ..)
+        | Effect::Export(symbol)) = change;
+        if let Effect::Export(symbol) = change {
             self.exports.push(symbol);
             return;
         }
@@ -320,15 +321,15 @@ impl Noted {
         let row = self.rows.entry(name).or_default();
         row.symbol = Some(symbol);
         match change {
-            Change::Function(_, function) => (row.function, row.macro_function) = (Some(function), None),
-            Change::Macro(_, function) => (row.function, row.macro_function) = (None, Some(function)),
-            Change::Special(_) => row.flags |= SPECIAL,
-            Change::Constant(_, value) => {
+            Effect::Function(_, function) => (row.function, row.macro_function) = (Some(function), None),
+            Effect::Macro(_, function) => (row.function, row.macro_function) = (None, Some(function)),
+            Effect::Special(_) => row.flags |= SPECIAL,
+            Effect::Constant(_, value) => {
                 row.flags |= CONSTANT;
                 row.value = Some(value);
             }
-            Change::Value(_, value) => row.value = Some(value),
-            Change::Property(_, indicator, value) => {
+            Effect::Value(_, value) => row.value = Some(value),
+            Effect::Property(_, indicator, value) => {
                 let found = row.properties.iter_mut().find(|(other, _)| {
                     module.constants[other.0 as usize] == module.constants[indicator.0 as usize]
                 });
@@ -337,13 +338,13 @@ impl Noted {
                     None => row.properties.push((indicator, value)),
                 }
             }
-            Change::Export(_) => {}
+            Effect::Export(_) => {}
         }
     }
 
     /// Makes the table the last constant.
     fn write(self, module: &mut Module) {
-        let mut pool = Pool { constants: &mut module.constants };
+        let mut pool = PoolAdditions { constants: &mut module.constants };
         let none = pool.add(Constant::Nil);
         // At most two thirds full.
         let count = (self.rows.len() + self.rows.len() / 2 + 1).next_power_of_two();
@@ -366,38 +367,40 @@ impl Noted {
 }
 
 /// The pool of the module, for additions.
-struct Pool<'a> {
+struct PoolAdditions<'a> {
     constants: &'a mut Vec<Constant>,
 }
 
-impl Pool<'_> {
+impl PoolAdditions<'_> {
     fn add(&mut self, constant: Constant) -> PoolIdx {
         self.constants.push(constant);
         PoolIdx(self.constants.len() as u32 - 1)
     }
 
-    fn known(&mut self, known: Known) -> PoolIdx {
+    fn known(&mut self, known: KnownValue) -> PoolIdx {
         match known {
-            Known::Constant(index) => index,
-            Known::Nil => self.add(Constant::Nil),
-            Known::True => self.add(Constant::True),
-            Known::Integer(value) | Known::Stream(value) => self.add(Constant::Integer(value.into())),
+            KnownValue::Constant(index) => index,
+            KnownValue::Nil => self.add(Constant::Nil),
+            KnownValue::True => self.add(Constant::True),
+            KnownValue::Integer(value) | KnownValue::Stream(value) => {
+                self.add(Constant::Integer(value.into()))
+            }
         }
     }
 
     /// The data of a row, if it has any.
-    fn data(&mut self, row: &Row) -> Option<PoolIdx> {
+    fn data(&mut self, row: &DefinitionRow) -> Option<PoolIdx> {
         if row.flags == 0 && row.value.is_none() && row.properties.is_empty() {
             return None;
         }
         let value = match row.value {
             None => 0,
-            Some(Known::Stream(_)) => VALUE | STREAM,
+            Some(KnownValue::Stream(_)) => VALUE | STREAM,
             Some(_) => VALUE,
         };
         let flags = row.flags | value;
         let mut items = vec![self.add(Constant::Integer(flags.into()))];
-        items.push(self.known(row.value.unwrap_or(Known::Nil)));
+        items.push(self.known(row.value.unwrap_or(KnownValue::Nil)));
         // The newest property comes first.
         for &(indicator, value) in row.properties.iter().rev() {
             items.push(indicator);

@@ -1,6 +1,6 @@
 //! Sum, difference, product and quotient of any two numbers.
 
-use super::limbs::Operand;
+use super::limbs::BigOperand;
 use super::{Int, Number, Ratio, limit};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
@@ -16,7 +16,8 @@ pub(crate) fn add(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     if let Some((x, y)) = unboxed_doubles(a, b) {
         return vm.float_value("+", x + y);
     }
-    if let (Some(x), Some(y)) = (Operand::of(&vm.heap, a, &mut [0]), Operand::of(&vm.heap, b, &mut [0])) {
+    if let (Some(x), Some(y)) = (BigOperand::of(&vm.heap, a, &mut [0]), BigOperand::of(&vm.heap, b, &mut [0]))
+    {
         let (negative, limbs) = x.plus(&y);
         vm.charge(limbs.len());
         return vm.limbs_value("+", negative, &limbs);
@@ -41,7 +42,8 @@ pub(crate) fn subtract(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     if let Some((x, y)) = unboxed_doubles(a, b) {
         return vm.float_value("-", x - y);
     }
-    if let (Some(x), Some(y)) = (Operand::of(&vm.heap, a, &mut [0]), Operand::of(&vm.heap, b, &mut [0])) {
+    if let (Some(x), Some(y)) = (BigOperand::of(&vm.heap, a, &mut [0]), BigOperand::of(&vm.heap, b, &mut [0]))
+    {
         let (negative, limbs) = x.plus(&y.negated());
         vm.charge(limbs.len());
         return vm.limbs_value("-", negative, &limbs);
@@ -76,14 +78,14 @@ pub(crate) fn multiply(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     if let Some((x, y)) = unboxed_doubles(a, b) {
         return vm.float_value("*", x * y);
     }
-    let sizes = Operand::of(&vm.heap, a, &mut [0])
-        .zip(Operand::of(&vm.heap, b, &mut [0]))
+    let sizes = BigOperand::of(&vm.heap, a, &mut [0])
+        .zip(BigOperand::of(&vm.heap, b, &mut [0]))
         .map(|(x, y)| (x.bits() + y.bits(), x.len(), y.len()));
     if let Some((bits, left, right)) = sizes {
         vm.check_bits("*", bits.saturating_sub(1))?;
         vm.check_work(left, right)?;
-        let product = Operand::of(&vm.heap, a, &mut [0])
-            .zip(Operand::of(&vm.heap, b, &mut [0]))
+        let product = BigOperand::of(&vm.heap, a, &mut [0])
+            .zip(BigOperand::of(&vm.heap, b, &mut [0]))
             .and_then(|(x, y)| x.times(&y));
         if let Some((negative, limbs)) = product {
             return vm.limbs_value("*", negative, &limbs);

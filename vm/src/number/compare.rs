@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::limbs::Operand;
+use super::limbs::BigOperand;
 use super::{Int, Number, Ratio, float};
 use crate::heap::{Heap, Kind};
 use crate::raise::Exit;
@@ -101,7 +101,8 @@ fn compare(
     if let Some((x, y)) = exact_doubles(a, b) {
         return Ok(x.partial_cmp(&y));
     }
-    if let (Some(x), Some(y)) = (Operand::of(&vm.heap, a, &mut [0]), Operand::of(&vm.heap, b, &mut [0])) {
+    if let (Some(x), Some(y)) = (BigOperand::of(&vm.heap, a, &mut [0]), BigOperand::of(&vm.heap, b, &mut [0]))
+    {
         let (order, work) = (x.compare(&y), x.len().min(y.len()));
         vm.charge(work);
         return Ok(Some(order));

@@ -20,21 +20,21 @@ pub(crate) type Limbs = SmallVec<[u64; 24]>;
 const SCHOOL_LIMBS: usize = 32;
 
 /// An integer in the heap, or a fixnum in the same form.
-pub(crate) struct Operand<'a> {
+pub(crate) struct BigOperand<'a> {
     negative: bool,
     limbs: &'a [u64],
 }
 
-impl<'a> Operand<'a> {
+impl<'a> BigOperand<'a> {
     /// Returns the integer that `v` is; `None` for any other value. `room` holds the limb of a fixnum.
     #[inline]
-    pub(crate) fn of(heap: &'a Heap, v: Value, room: &'a mut [u64; 1]) -> Option<Operand<'a>> {
+    pub(crate) fn of(heap: &'a Heap, v: Value, room: &'a mut [u64; 1]) -> Option<BigOperand<'a>> {
         if let Some(n) = v.as_fixnum() {
             room[0] = n.unsigned_abs();
-            return Some(Operand { negative: n < 0, limbs: if n == 0 { &[] } else { room } });
+            return Some(BigOperand { negative: n < 0, limbs: if n == 0 { &[] } else { room } });
         }
         let big = heap.bignum(v)?;
-        Some(Operand { negative: big.negative, limbs: big.limbs })
+        Some(BigOperand { negative: big.negative, limbs: big.limbs })
     }
 
     /// Returns the number of limbs, at least 1.
@@ -48,7 +48,7 @@ impl<'a> Operand<'a> {
     }
 
     /// Compares with `other`.
-    pub(crate) fn compare(&self, other: &Operand<'_>) -> Ordering {
+    pub(crate) fn compare(&self, other: &BigOperand<'_>) -> Ordering {
         let lengths = self.limbs.len().cmp(&other.limbs.len());
         let magnitudes = lengths.then_with(|| self.limbs.iter().rev().cmp(other.limbs.iter().rev()));
         match (self.negative, other.negative) {
@@ -60,12 +60,12 @@ impl<'a> Operand<'a> {
     }
 
     /// Returns the operand with the opposite sign.
-    pub(crate) fn negated(self) -> Operand<'a> {
-        Operand { negative: !self.negative, limbs: self.limbs }
+    pub(crate) fn negated(self) -> BigOperand<'a> {
+        BigOperand { negative: !self.negative, limbs: self.limbs }
     }
 
     /// Returns the sum: whether it is negative, and its magnitude.
-    pub(crate) fn plus(&self, other: &Operand<'_>) -> (bool, Limbs) {
+    pub(crate) fn plus(&self, other: &BigOperand<'_>) -> (bool, Limbs) {
         if self.negative == other.negative {
             return (self.negative, sum(self.limbs, other.limbs));
         }
@@ -77,7 +77,7 @@ impl<'a> Operand<'a> {
     }
 
     /// Returns the product (whether it is negative, and its magnitude), unless both numbers are long.
-    pub(crate) fn times(&self, other: &Operand<'_>) -> Option<(bool, Limbs)> {
+    pub(crate) fn times(&self, other: &BigOperand<'_>) -> Option<(bool, Limbs)> {
         let (long, short) = if self.limbs.len() < other.limbs.len() { (other, self) } else { (self, other) };
         if short.limbs.len() > SCHOOL_LIMBS {
             return None;
@@ -184,7 +184,7 @@ mod tests {
             prop_assert_eq!(big(&product(&a, &b)), big(&a) * big(&b));
             let order = big(&a).cmp(&big(&b));
             for (negative, expected) in [(false, order), (true, order.reverse())] {
-                let (a, b) = (Operand { negative, limbs: &a }, Operand { negative, limbs: &b });
+                let (a, b) = (BigOperand { negative, limbs: &a }, BigOperand { negative, limbs: &b });
                 prop_assert_eq!(a.compare(&b), expected);
             }
         }

@@ -7,7 +7,7 @@
 //! A goal that is about a predicate with rules looks for the table of the same call. Unless the table is complete, the rest
 //! of the computation is set aside as one of its consumers, and gets each answer once, whenever it is found. So each
 //! combination of answers is looked at once, and rules end that have finitely many, in whatever order they are
-//! written. Work is done by strata: what is negated is complete before its negation is looked at; a negation that comes to
+//! written. AgendaItem is done by strata: what is negated is complete before its negation is looked at; a negation that comes to
 //! a table which is not is set aside as well.
 //! Source: OLD resolution with tabulation (Tamaki and Sato 1986), with the continuations of SLG; the strata are those of
 //! Apt, Blair and Walker.
@@ -22,16 +22,18 @@ use super::Database;
 use super::bucket::{finish, mix};
 use super::formula::Pattern;
 use super::plan::{Goal, GoalId, Planner};
-use super::query::{Answers, Consumer, GoingOn, Problem, Progress, Query, Sink, Work, test_bindings};
+use super::query::{
+    AgendaItem, Answers, Consumer, Continuation, Progress, Query, QueryError, Sink, test_bindings,
+};
 use super::relation::{Access, INDEXED_POSITIONS};
 use super::rule::{NO_STRATUM, Predicate, Rule};
-use super::scan::Scan;
+use super::scan::RelationScan;
 use super::term::Term;
 use super::tuple::Tuples;
 
 /// What the machine does next.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum State {
+pub(super) enum SolverState {
     /// This goal.
     Goal(GoalId),
     /// Goes back to the latest choice.
@@ -44,7 +46,7 @@ pub(super) enum State {
 
 /// What is done with a cell of a fact.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Operation {
+pub(super) enum MatchOperation {
     /// It has to be this term.
     Same(u32, Term),
     /// It becomes the value of a variable.
@@ -67,7 +69,7 @@ pub(super) enum Choice {
         next: GoalId,
     },
     /// Facts of several relations.
-    Scan { scan: Box<Scan>, trail: usize, next: GoalId },
+    Scan { scan: Box<RelationScan>, trail: usize, next: GoalId },
     /// Answers of a table; with a consumer, those too that are yet to come.
     Table {
         table: u32,
@@ -86,24 +88,24 @@ pub(super) enum Choice {
 
 impl Query {
     /// Works until all answers are found, a test is wanted, or the work is used up.
-    pub(super) fn step(&mut self, database: &mut Database, work: &mut usize) -> Result<Progress, Problem> {
+    pub(super) fn step(&mut self, database: &mut Database, work: &mut usize) -> Result<Progress, QueryError> {
         // Each step gets somewhere.
         *work = (*work).max(LEAST_WORK);
         loop {
             let Some(left) = work.checked_sub(1) else { return Ok(Progress::More) };
             *work = left;
             match self.state {
-                State::Goal(goal) => {
+                SolverState::Goal(goal) => {
                     if let Some(progress) = self.run_goal(database, goal, work)? {
                         return Ok(progress);
                     }
                 }
-                State::Back => {
+                SolverState::Back => {
                     if !self.go_back(database, work)? {
                         return Ok(Progress::More);
                     }
                 }
-                State::Testing(goal) => {
+                SolverState::Testing(goal) => {
                     let Goal::Test { test, .. } = &self.goals[goal as usize] else { unreachable!("a test") };
                     let names = match &self.sinks[self.sink as usize] {
                         Sink::Rule(_, rule) => &rule.names,
@@ -111,7 +113,7 @@ impl Query {
                     };
                     return Ok(Progress::Test(test.function, test_bindings(test, names, &self.bindings)));
                 }
-                State::Done => {
+                SolverState::Done => {
                     let done = self.put_into_order(work);
                     return Ok(if done { Progress::Done } else { Progress::More });
                 }
@@ -121,10 +123,10 @@ impl Query {
 
     /// Tells the outcome of the test that was asked for.
     pub(super) fn tell(&mut self, holds: bool) {
-        if let State::Testing(goal) = self.state
+        if let SolverState::Testing(goal) = self.state
             && let Goal::Test { next, .. } = self.goals[goal as usize]
         {
-            self.state = if holds { State::Goal(next) } else { State::Back };
+            self.state = if holds { SolverState::Goal(next) } else { SolverState::Back };
         }
     }
 
@@ -133,7 +135,7 @@ impl Query {
         database: &mut Database,
         goal: GoalId,
         work: &mut usize,
-    ) -> Result<Option<Progress>, Problem> {
+    ) -> Result<Option<Progress>, QueryError> {
         match &self.goals[goal as usize] {
             Goal::Match { pattern, relation, next } => {
                 let next = *next;
@@ -143,12 +145,12 @@ impl Query {
                         return self.find_rows(database, &pattern, relation, next, work);
                     }
                     None if pattern.functor.as_variable().is_none() && pattern.tail == Term::NIL => {
-                        self.state = State::Back;
+                        self.state = SolverState::Back;
                     }
                     None => {
-                        let scan = Box::new(Scan::new(pattern.clone()));
+                        let scan = Box::new(RelationScan::new(pattern.clone()));
                         self.choices.push(Choice::Scan { scan, trail: self.trail.len(), next });
-                        self.state = State::Back;
+                        self.state = SolverState::Back;
                     }
                 }
             }
@@ -158,10 +160,10 @@ impl Query {
             }
             Goal::Branch { .. } => {
                 self.choices.push(Choice::Branch { goal, at: 0, trail: self.trail.len() });
-                self.state = State::Back;
+                self.state = SolverState::Back;
             }
             Goal::Not { inside, .. } => {
-                self.state = State::Goal(*inside);
+                self.state = SolverState::Goal(*inside);
                 self.choices.push(Choice::Negation { goal, trail: self.trail.len(), is_complete: true });
             }
             Goal::Proved => {
@@ -172,12 +174,12 @@ impl Query {
                         break;
                     }
                 }
-                self.state = State::Back;
+                self.state = SolverState::Back;
             }
-            Goal::Test { .. } => self.state = State::Testing(goal),
+            Goal::Test { .. } => self.state = SolverState::Testing(goal),
             Goal::Solved => {
                 self.solved(database)?;
-                self.state = State::Back;
+                self.state = SolverState::Back;
             }
         }
         Ok(None)
@@ -213,7 +215,7 @@ impl Query {
         relation: u32,
         next: GoalId,
         work: &mut usize,
-    ) -> Result<Option<Progress>, Problem> {
+    ) -> Result<Option<Progress>, QueryError> {
         let width = pattern.arguments.len();
         let mut key: SmallVec<[Term; 8]> = SmallVec::from_elem(Term::UNBOUND, width);
         let first_operation = self.operations.len();
@@ -227,16 +229,16 @@ impl Query {
                     if position < INDEXED_POSITIONS {
                         bound |= 1 << position;
                     }
-                    self.operations.push(Operation::Same(at, term));
+                    self.operations.push(MatchOperation::Same(at, term));
                 }
                 None => match argument.as_variable() {
                     Some(variable) if is_flat && !pattern.arguments[..position].contains(&argument) => {
-                        self.operations.push(Operation::Bind(at, variable as u32));
+                        self.operations.push(MatchOperation::Bind(at, variable as u32));
                     }
                     _ => {
                         // From here on a variable may have a value from this very fact.
                         is_flat = false;
-                        self.operations.push(Operation::Match(at, argument));
+                        self.operations.push(MatchOperation::Match(at, argument));
                     }
                 },
             }
@@ -245,7 +247,7 @@ impl Query {
         let (index, row) = match access {
             Access::Nothing => {
                 self.operations.truncate(first_operation);
-                self.state = State::Back;
+                self.state = SolverState::Back;
                 return Ok(None);
             }
             Access::Build(index) => {
@@ -258,7 +260,7 @@ impl Query {
                 self.operations.truncate(first_operation);
                 let born = database.relations[relation as usize].born(row);
                 self.matched_row(relation, row, pattern.rank, born);
-                self.state = State::Goal(next);
+                self.state = SolverState::Goal(next);
                 return Ok(None);
             }
             Access::Chain(index, row) => (index, row),
@@ -273,7 +275,7 @@ impl Query {
             next,
         };
         // Its first fact is looked for at once. If the work is used up on the way, the choice is there to come back to.
-        self.state = State::Back;
+        self.state = SolverState::Back;
         let goes_on = self.next_row(database, choice, work);
         Ok(if goes_on { None } else { Some(Progress::More) })
     }
@@ -286,7 +288,7 @@ impl Query {
     }
 
     /// Goes back to the latest choice; false if the work is used up on the way.
-    fn go_back(&mut self, database: &mut Database, work: &mut usize) -> Result<bool, Problem> {
+    fn go_back(&mut self, database: &mut Database, work: &mut usize) -> Result<bool, QueryError> {
         if let Some(Choice::Table { .. }) = self.choices.last() {
             self.next_table_answer();
             return Ok(true);
@@ -304,7 +306,7 @@ impl Query {
                 if let Some((relation, row)) = found {
                     let born = database.relations[relation as usize].born(row);
                     self.matched_row(relation, row, scan.rank(), born);
-                    self.state = State::Goal(next);
+                    self.state = SolverState::Goal(next);
                 }
                 if !scan.is_exhausted() {
                     self.choices.push(Choice::Scan { scan, trail, next });
@@ -322,7 +324,7 @@ impl Query {
                 if at + 1 < alternatives.len() {
                     self.choices.push(Choice::Branch { goal, at: at + 1, trail });
                 }
-                self.state = State::Goal(alternative);
+                self.state = SolverState::Goal(alternative);
                 if self.is_reordered && self.sink == 0 {
                     let ranks = rank.min(self.keys.len())..ranks_end.min(self.keys.len());
                     self.keys[ranks].fill(0);
@@ -333,10 +335,10 @@ impl Query {
                 self.undo(trail);
                 let Goal::Not { next, .. } = self.goals[goal as usize] else { unreachable!("a negation") };
                 if is_complete {
-                    self.state = State::Goal(next);
+                    self.state = SolverState::Goal(next);
                 } else if !self.doubt() {
-                    let going_on = self.going_on(goal);
-                    self.set_aside(Work::Resume(going_on), self.stratum);
+                    let continuation = self.continuation(goal);
+                    self.set_aside(AgendaItem::Resume(continuation), self.stratum);
                 }
             }
         }
@@ -378,19 +380,19 @@ impl Query {
                 let cells = facts.row(row);
                 let Query { operations: all, bindings, trail: bound, .. } = self;
                 let matches = all[operations..].iter().all(|operation| match *operation {
-                    Operation::Same(at, term) => cells[at as usize] == term,
-                    Operation::Bind(at, variable) => {
+                    MatchOperation::Same(at, term) => cells[at as usize] == term,
+                    MatchOperation::Bind(at, variable) => {
                         bindings[variable as usize] = cells[at as usize];
                         bound.push(variable);
                         true
                     }
-                    Operation::Match(at, pattern) => {
+                    MatchOperation::Match(at, pattern) => {
                         database.terms.matches(pattern, cells[at as usize], bindings, bound)
                     }
                 });
                 if matches {
                     self.matched_row(relation, row, rank, born);
-                    self.state = State::Goal(next);
+                    self.state = SolverState::Goal(next);
                     if after == super::bucket::NONE {
                         self.operations.truncate(operations);
                     } else {
@@ -408,13 +410,13 @@ impl Query {
 
     // Rules.
 
-    fn going_on(&self, goal: GoalId) -> GoingOn {
+    fn continuation(&self, goal: GoalId) -> Continuation {
         let keys =
             if self.is_reordered && self.sink == 0 { self.keys.clone().into() } else { Box::default() };
-        GoingOn { goal, sink: self.sink, bindings: self.bindings.clone().into(), keys }
+        Continuation { goal, sink: self.sink, bindings: self.bindings.clone().into(), keys }
     }
 
-    fn set_aside(&mut self, work: Work, stratum: usize) {
+    fn set_aside(&mut self, work: AgendaItem, stratum: usize) {
         if self.agenda.len() <= stratum {
             self.agenda.resize_with(stratum + 1, Default::default);
         }
@@ -441,12 +443,12 @@ impl Query {
         pattern: &Pattern,
         predicate: usize,
         next: GoalId,
-    ) -> Result<(), Problem> {
-        self.state = State::Back;
+    ) -> Result<(), QueryError> {
+        self.state = SolverState::Back;
         let Predicate { functor, width, stratum, .. } = &self.rules.predicates[predicate];
         let (functor, width, stratum) = (*functor, *width, *stratum);
         if stratum == NO_STRATUM {
-            return Err(Problem::Circular(functor));
+            return Err(QueryError::Circular(functor));
         }
         // A pattern whose functor is a variable is about this predicate if that can be.
         let before = self.trail.len();
@@ -501,7 +503,7 @@ impl Query {
         let stratum = self.rules.predicates[predicate].stratum;
         let tuples = Tuples::new(width);
         self.tables.push(Answers { predicate, call, stratum, width, tuples, consumers: Vec::new() });
-        self.set_aside(Work::Expand { table, rule: 0 }, stratum);
+        self.set_aside(AgendaItem::Expand { table, rule: 0 }, stratum);
         table
     }
 
@@ -524,14 +526,14 @@ impl Query {
             self.undo(before);
             return;
         }
-        let going_on = self.going_on(next);
+        let continuation = self.continuation(next);
         self.undo(before);
         let consumer = self.consumers.len() as u32;
         let is_idle = self.tables[table as usize].tuples.len() == 0;
-        self.consumers.push(Consumer { table, at: 0, is_idle, variables, going_on, rank });
+        self.consumers.push(Consumer { table, at: 0, is_idle, variables, continuation, rank });
         self.tables[table as usize].consumers.push(consumer);
         if !is_idle {
-            self.set_aside(Work::Feed(consumer), self.stratum);
+            self.set_aside(AgendaItem::Feed(consumer), self.stratum);
         }
     }
 
@@ -562,62 +564,62 @@ impl Query {
         let (rank, key, next) = (*rank, *at as u64, *next);
         *at += 1;
         self.set_key(rank, key);
-        self.state = State::Goal(next);
+        self.state = SolverState::Goal(next);
     }
 
     /// Takes up the next work, of the lowest stratum in which there is some.
-    fn next_work(&mut self, database: &mut Database) -> Result<(), Problem> {
+    fn next_work(&mut self, database: &mut Database) -> Result<(), QueryError> {
         self.trail.clear();
         self.operations.clear();
         let next = self.agenda.iter_mut().find_map(VecDeque::pop_front);
         let Some(work) = next else {
-            self.state = State::Done;
+            self.state = SolverState::Done;
             return Ok(());
         };
         match work {
-            Work::Expand { table, rule } => self.expand(database, table, rule)?,
-            Work::Feed(number) => {
+            AgendaItem::Expand { table, rule } => self.expand(database, table, rule)?,
+            AgendaItem::Feed(number) => {
                 let consumer = &self.consumers[number as usize];
                 let (table, at, rank) = (consumer.table, consumer.at, consumer.rank);
                 let variables = consumer.variables.clone();
-                let going_on = consumer.going_on.clone();
-                let next = going_on.goal;
-                self.resume(going_on);
-                self.state = State::Back;
+                let continuation = consumer.continuation.clone();
+                let next = continuation.goal;
+                self.resume(continuation);
+                self.state = SolverState::Back;
                 let consumer = Some(number);
                 self.choices.push(Choice::Table { table, at, variables, consumer, trail: 0, rank, next });
             }
-            Work::Resume(going_on) => {
-                let goal = going_on.goal;
-                self.resume(going_on);
-                self.state = State::Goal(goal);
+            AgendaItem::Resume(continuation) => {
+                let goal = continuation.goal;
+                self.resume(continuation);
+                self.state = SolverState::Goal(goal);
             }
         }
         Ok(())
     }
 
-    fn resume(&mut self, going_on: GoingOn) {
-        self.sink = going_on.sink;
-        self.stratum = self.stratum_of(going_on.sink);
+    fn resume(&mut self, continuation: Continuation) {
+        self.sink = continuation.sink;
+        self.stratum = self.stratum_of(continuation.sink);
         self.bindings.clear();
-        self.bindings.extend_from_slice(&going_on.bindings);
-        if !going_on.keys.is_empty() {
-            self.keys.copy_from_slice(&going_on.keys);
+        self.bindings.extend_from_slice(&continuation.bindings);
+        if !continuation.keys.is_empty() {
+            self.keys.copy_from_slice(&continuation.keys);
         }
     }
 
     /// Begins to find the answers of a table: its facts first, then from one rule after the other.
-    fn expand(&mut self, database: &mut Database, table: u32, rule: usize) -> Result<(), Problem> {
+    fn expand(&mut self, database: &mut Database, table: u32, rule: usize) -> Result<(), QueryError> {
         let answers = &self.tables[table as usize];
         let (stratum, predicate) = (answers.stratum, answers.predicate);
         let call = answers.call.clone();
         let width = answers.width;
         let Predicate { functor, rules, .. } = &self.rules.predicates[predicate];
         self.stratum = stratum;
-        self.state = State::Back;
+        self.state = SolverState::Back;
         if rule == 0 {
             let pattern = Pattern { rank: 0, functor: *functor, arguments: call.into(), tail: Term::NIL };
-            self.set_aside(Work::Expand { table, rule: 1 }, stratum);
+            self.set_aside(AgendaItem::Expand { table, rule: 1 }, stratum);
             let Some(relation) = database.find_relation(pattern.functor, pattern.arguments.len()) else {
                 return Ok(());
             };
@@ -627,12 +629,12 @@ impl Query {
             self.bindings.resize(width, Term::UNBOUND);
             let pattern = Rc::new(pattern);
             self.goals.push(Goal::Match { pattern, relation: Some(relation), next: SOLVED });
-            self.state = State::Goal(self.goals.len() as GoalId - 1);
+            self.state = SolverState::Goal(self.goals.len() as GoalId - 1);
             return Ok(());
         }
         let Some(found) = rules.get(rule - 1).cloned() else { return Ok(()) };
         if rule < rules.len() {
-            self.set_aside(Work::Expand { table, rule: rule + 1 }, stratum);
+            self.set_aside(AgendaItem::Expand { table, rule: rule + 1 }, stratum);
         }
         self.bindings.clear();
         self.bindings.resize(found.names.len(), Term::UNBOUND);
@@ -651,7 +653,7 @@ impl Query {
         self.sink = self.sinks.len() as u32;
         let start = self.rule_start(database, predicate, rule - 1, given, &found);
         self.sinks.push(Sink::Rule(table, found));
-        self.state = State::Goal(start);
+        self.state = SolverState::Goal(start);
         Ok(())
     }
 
@@ -677,7 +679,7 @@ impl Query {
     }
 
     /// An answer has been found.
-    fn solved(&mut self, database: &mut Database) -> Result<(), Problem> {
+    fn solved(&mut self, database: &mut Database) -> Result<(), QueryError> {
         let Query { sinks, sink, tables, bindings, held, .. } = self;
         let (table, rule) = match &sinks[*sink as usize] {
             Sink::Query => {
@@ -699,7 +701,7 @@ impl Query {
                         continue;
                     }
                     let Some(term) = database.terms.instantiate(head, bindings, held)? else {
-                        return Err(Problem::Unbound(rule.head.functor));
+                        return Err(QueryError::Unbound(rule.head.functor));
                     };
                     if let Some(place) = part.as_variable().map(|variable| &mut values[variable])
                         && place.is_unbound()
@@ -725,8 +727,8 @@ impl Query {
             let consumer = &mut self.consumers[number as usize];
             if consumer.is_idle {
                 consumer.is_idle = false;
-                let stratum = self.stratum_of(self.consumers[number as usize].going_on.sink);
-                self.set_aside(Work::Feed(number), stratum);
+                let stratum = self.stratum_of(self.consumers[number as usize].continuation.sink);
+                self.set_aside(AgendaItem::Feed(number), stratum);
             }
         }
     }
