@@ -19,6 +19,7 @@ pub mod package;
 pub mod span;
 pub mod symbol;
 pub mod verify;
+pub mod word;
 
 pub use num_bigint::BigInt;
 
