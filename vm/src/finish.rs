@@ -105,7 +105,7 @@ impl Vm {
         self.set_slot(object, event::STATE, status);
         let is_awaited = self.slot(object, event::FIRST).is_true();
         let notify = std::mem::replace(&mut self.task_mut().notify, Value::NIL);
-        interp::call::drop_frames(self.task_mut());
+        interp::start::drop_frames(self.task_mut());
         let account = std::mem::replace(&mut self.task_mut().account, AccountId::NONE);
         self.accounts.leave(account);
         self.trace_end(self.slot(object, event::NAME), status);

@@ -34,7 +34,6 @@ mod number;
 mod report;
 mod shape;
 mod spawn;
-mod stub;
 mod table;
 mod timer;
 mod trace;

@@ -23,10 +23,10 @@ use esl_bytecode::verify::VerifyError;
 
 use crate::heap::layout::Code;
 use crate::heap::{AllocError, CodeParts, Heap, Kind};
+use crate::interp::stubs::LAZY_WORD;
 use crate::interp::trust::{self, Verified};
 use crate::raise::{Exit, Raised};
 use crate::shape::{Shape, Sort, capture_word};
-use crate::stub;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::World;
@@ -142,7 +142,7 @@ impl Loader<'_> {
     fn load(mut self) -> Result<Value, LoadError> {
         // Data may contain functions, and functions each other, so functions are made before they have their code.
         let shape = Shape::other(Sort::Lazy, 0);
-        let stub = trust::alloc_stub(self.heap, Value::NIL, Value::NIL, shape, 0, stub::word(stub::LAZY, 0))?;
+        let stub = trust::alloc_stub(self.heap, Value::NIL, Value::NIL, shape, 0, LAZY_WORD)?;
         for function in &self.module.functions {
             let has_captures = !function.captures.is_empty();
             let object = if has_captures { Value::NIL } else { self.heap.alloc_function(stub, &[])? };

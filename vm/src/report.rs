@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use esl_bytecode::opcode::Opcode;
 
 use crate::heap::Kind;
-use crate::interp::{self, FrameAt};
+use crate::interp::frames::{Frame, Frames};
+use crate::interp::start::first_code_of;
 use crate::task::{Task, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -168,13 +169,12 @@ impl Vm {
             let place = self.source_place(code, word as u32).filter(|place| !is_of_library(&place.source))?;
             Some(format!("{}:{}:{}", place.source, place.line, place.column))
         };
-        let in_frame = |frame: FrameAt| {
+        let in_frame = |frame: Frame<'_>| {
             let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
             place(self.heap.function_code(frame.function)?, word)
         };
-        let frames = interp::frames_of_task(task, FRAMES);
-        frames.into_iter().find_map(in_frame).or_else(|| {
-            let code = interp::call::first_code_of(task);
+        Frames::of_task(task).take(FRAMES).find_map(in_frame).or_else(|| {
+            let code = first_code_of(task);
             place(code, tail_call_in(self.heap.code_words(code)?).unwrap_or(0))
         })
     }

@@ -86,9 +86,9 @@ impl Vm {
         slots[event::COUNT] = Value::small(0);
         slots[event::RESULT] = parent;
         let object = self.heap.alloc_record(Kind::Task, 0, 0, &slots)?;
-        let words = interp::call::first_words(&self.heap, function, arguments);
+        let words = interp::start::first_words(&self.heap, function, arguments);
         let mut task = self.tasks.make(object, words);
-        interp::call::first_frame(&self.heap, &mut task, self.starter, function, arguments);
+        interp::start::first_frame(&self.heap, &mut task, self.starter, function, arguments);
         // A new task holds nothing that was not found in a cycle under way: what it is made of is in hands of a task
         // that has been scanned, or of the host.
         self.heap.log_if_marking(function);

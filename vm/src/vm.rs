@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::datum::Datum;
 
 use crate::control::End;
@@ -16,7 +15,8 @@ use crate::figures::Figures;
 use crate::finish::EndOfAll;
 use crate::heap::{AllocError, Heap, HeapConfig, Kind};
 use crate::host::{Console, Host, Output};
-use crate::interp::call::{Arguments, make_starter};
+use crate::interp::arguments::Arguments;
+use crate::interp::start::make_starter;
 use crate::interp::{Cpu, trust};
 use crate::limit::{Accounts, CLEANUP_TICKS, CLEANUP_TIME};
 use crate::observe::Observers;
@@ -332,13 +332,6 @@ impl Vm {
         let mut call = self.requested_call.drain(..);
         let function = call.next().unwrap_or(Value::NIL);
         (function, call.collect())
-    }
-
-    /// The function of the library that takes over from a builtin with too much to do.
-    pub(crate) fn slow_twin(&mut self, number: u16) -> Option<Value> {
-        let name = BUILTINS.get(usize::from(number))?.slowly?;
-        let symbol = self.world.intern_esl(&mut self.heap, name).ok()?;
-        self.is_defined(symbol).then_some(symbol)
     }
 
     /// Whether a symbol has a global function.

@@ -4,7 +4,7 @@
 use smallvec::SmallVec;
 
 use crate::control::{End, EntryKind, Target, Unwinding};
-use crate::interp::call::MAX_SPREAD;
+use crate::interp::arguments::MAX_SPREAD;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::task::FailureReport;
 use crate::value::Value;
@@ -208,15 +208,17 @@ pub(super) fn exit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn backtrace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let limit = arguments[0].as_index().unwrap_or(usize::MAX).min(super::LIMIT);
     let mut rows = Vec::new();
-    for frame in vm.frames(limit) {
-        let Some(code) = vm.heap.function_code(frame.function) else { continue };
+    let frames: Vec<_> =
+        vm.frames().take(limit).map(|frame| (frame.function, frame.word, frame.is_exact)).collect();
+    for (function, word, is_exact) in frames {
+        let Some(code) = vm.heap.function_code(function) else { continue };
         let name = vm.heap.code(code).map_or(Value::NIL, |code| code.name);
         let is_top_level =
-            vm.heap.header(frame.function).is_some_and(|header| header.aux == crate::load::TOP_LEVEL);
+            vm.heap.header(function).is_some_and(|header| header.aux == crate::load::TOP_LEVEL);
         let name =
             if name.is_nil() && !is_top_level { vm.heap.list(&[vm.world.known.lambda])? } else { name };
         // A caller stands behind its call.
-        let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
+        let word = if is_exact { word } else { word.saturating_sub(1) };
         let row = match vm.source_place(code, word as u32) {
             Some(place) => {
                 let source = vm.heap.alloc_str(&place.source)?;

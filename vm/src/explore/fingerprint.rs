@@ -15,7 +15,7 @@ use super::live::Live;
 use crate::control::{Control, End, Entry, Target, Unwinding};
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{Heap, Kind};
-use crate::interp;
+use crate::interp::frames::{Frames, entry_word};
 use crate::load::image_origin;
 use crate::shape::{Shape, Sort};
 use crate::table::Table;
@@ -191,7 +191,7 @@ impl Walk<'_> {
 
     fn frames(&mut self, task: &Task) {
         let mut is_innermost = true;
-        interp::visit_frames(task, &mut |frame| {
+        for frame in Frames::of_task(task) {
             self.word(frame.word as u64);
             self.value(frame.function);
             let live = self.live(frame.function);
@@ -201,13 +201,13 @@ impl Walk<'_> {
                 registers = registers.with(live.at(frame.word + 1)).with(live.at(frame.word + 2));
             }
             is_innermost = false;
-            for (register, &v) in frame.registers.iter().enumerate() {
+            for (register, &v) in frame.registers().iter().enumerate() {
                 if registers.contains(register) {
                     self.word(register as u64);
                     self.value(v);
                 }
             }
-        });
+        }
     }
 
     fn control(&mut self, task: &Task, control: &Control) {
@@ -216,7 +216,7 @@ impl Walk<'_> {
             let Entry { data, base, bindings, window, want, kind, .. } = *entry;
             self.word(u64::from(base) << 32 | u64::from(bindings));
             self.word(u64::from(window) << 16 | u64::from(want) << 8 | kind as u64);
-            self.word(interp::entry_word(task, entry).map_or(u64::MAX, |word| word as u64));
+            self.word(entry_word(task, entry).map_or(u64::MAX, |word| word as u64));
             self.value(data);
         }
         self.word(control.running.len() as u64);

@@ -8,20 +8,15 @@ use esl_bytecode::builtin::Builtin;
 use esl_bytecode::module::CaptureSource;
 use esl_bytecode::opcode::TypeCode;
 
-use super::{Operation, Signal, code_of, constants_of};
-use crate::binding::Binding;
+use super::arguments::MAX_SPREAD;
+use super::{Operation, Signal, aux_at, code_of, constant, constants_of, failure, operation, word_at};
 use crate::builtins::{NATIVES, Native, types};
-use crate::heap::layout::{Code, Function, Kind, Symbol};
+use crate::heap::layout::{Code, Function, Kind};
 use crate::number;
 use crate::raise::{Exit, Expected, Outcome, Raised};
-use crate::shape::{Shape, Sort, capture_source};
+use crate::shape::capture_source;
 use crate::value::Value;
 use crate::vm::Vm;
-
-/// Operands A, B, C of an instruction.
-fn operands(word: u32) -> (usize, usize, usize) {
-    ((word >> 8 & 0xff) as usize, (word >> 16 & 0xff) as usize, (word >> 24) as usize)
-}
 
 /// Puts an outcome into register `dst`.
 unsafe fn finish(base: *mut Value, dst: usize, outcome: Outcome) -> Signal {
@@ -33,12 +28,6 @@ unsafe fn finish(base: *mut Value, dst: usize, outcome: Outcome) -> Signal {
         }
         Err(exit) => Signal::Exit(exit),
     }
-}
-
-/// The operation of a word.
-fn operation(word: u32) -> Operation {
-    // SAFETY: V1.
-    unsafe { std::mem::transmute(word as u8) }
 }
 
 /// The builtin that does what an instruction does.
@@ -74,13 +63,9 @@ fn native(operation: Operation) -> Native {
 /// Has the ESL twin of a builtin do what is too much work for one instruction: its call takes the instruction's place.
 #[cold]
 fn ask_twin(vm: &mut Vm, builtin: Builtin, arguments: &[Value]) -> Outcome {
-    match vm.slow_twin(builtin.number() as u16) {
-        Some(function) => {
-            vm.request_call(function, arguments);
-            Err(Exit::Call)
-        }
-        None => vm.program_error(format!("{} has too much to do at once", builtin.info().name)),
-    }
+    let function = vm.twin_of(builtin.info())?;
+    vm.request_call(function, arguments);
+    Err(Exit::Call)
 }
 
 /// Arithmetic, comparisons that give a value, and characters.
@@ -89,11 +74,11 @@ fn ask_twin(vm: &mut Vm, builtin: Builtin, arguments: &[Value]) -> Outcome {
 pub(super) unsafe fn arithmetic(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: see the module's header.
     unsafe {
-        let word = *pc;
-        let (dst, b, c) = operands(word);
+        let word = word_at(pc);
+        let (dst, b, c) = (word.a(), word.b(), word.c());
         let left = *base.add(b);
         if operation(word) == Operation::AddInt {
-            let outcome = number::add(vm, left, Value::small(word as i32 >> 24));
+            let outcome = number::add(vm, left, Value::small(word.signed_c()));
             return finish(base, dst, outcome);
         }
         let right = *base.add(c);
@@ -123,10 +108,10 @@ pub(super) unsafe fn arithmetic(vm: &mut Vm, pc: *const u32, base: *mut Value) -
 pub(super) unsafe fn compare(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Result<bool, Signal> {
     // SAFETY: see the module's header.
     unsafe {
-        let word = *pc;
-        let (a, b, _) = operands(word);
+        let word = word_at(pc);
+        let (a, b) = (word.a(), word.b());
         let left = *base.add(a);
-        let int = Value::small(word as i32 >> 16);
+        let int = Value::small(word.signed_d());
         let result = match operation(word) {
             Operation::JumpNumEq | Operation::JumpNotNumEq => number::num_equal(vm, left, *base.add(b)),
             Operation::JumpLess | Operation::JumpNotLess | Operation::LoopLess | Operation::LoopNotLess => {
@@ -138,7 +123,7 @@ pub(super) unsafe fn compare(vm: &mut Vm, pc: *const u32, base: *mut Value) -> R
             Operation::JumpGreaterInt | Operation::JumpNotGreaterInt => number::less(vm, int, left),
             _ => {
                 // The counting loop: nothing is stored before the comparison has come out well.
-                let step = Value::small(word as i32 >> 24);
+                let step = Value::small(word.signed_c());
                 let limit = *base.add(b);
                 number::add(vm, left, step).and_then(|sum| {
                     let holds = number::less(vm, sum, limit)?;
@@ -185,7 +170,8 @@ pub(super) fn is_type(vm: &Vm, value: Value, code: u8) -> bool {
 pub(super) unsafe fn cons(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: see the module's header.
     unsafe {
-        let (dst, b, c) = operands(*pc);
+        let word = word_at(pc);
+        let (dst, b, c) = (word.a(), word.b(), word.c());
         let outcome = vm.heap.cons(*base.add(b), *base.add(c)).map_err(Exit::from);
         finish(base, dst, outcome)
     }
@@ -196,7 +182,8 @@ pub(super) unsafe fn cons(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
 pub(super) unsafe fn list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: see the module's header; V3: the items are registers of the frame.
     unsafe {
-        let (dst, first, count) = operands(*pc);
+        let word = word_at(pc);
+        let (dst, first, count) = (word.a(), word.b(), word.c());
         let mut rest = Value::NIL;
         for i in (0..count).rev() {
             rest = match vm.heap.cons(*base.add(first + i), rest) {
@@ -215,11 +202,11 @@ pub(super) unsafe fn list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
 pub(super) unsafe fn list_part(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: see the module's header.
     unsafe {
-        let word = *pc;
-        let (a, b, _) = operands(word);
+        let word = word_at(pc);
+        let (a, b) = (word.a(), word.b());
         let part = match operation(word) {
             Operation::SetCar | Operation::SetCdr => {
-                return Signal::Exit(vm.type_error::<()>(*base.add(a), "CONS").unwrap_err());
+                return failure(vm, Raised::Type(*base.add(a), Expected::Type("CONS")));
             }
             Operation::Cadr | Operation::Cddr => {
                 let list = *base.add(b);
@@ -243,8 +230,8 @@ pub(super) unsafe fn list_part(vm: &mut Vm, pc: *const u32, base: *mut Value) ->
 pub(super) unsafe fn array(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: see the module's header.
     unsafe {
-        let word = *pc;
-        let (a, b, c) = operands(word);
+        let word = word_at(pc);
+        let (a, b, c) = (word.a(), word.b(), word.c());
         let (x, y, z) = (*base.add(a), *base.add(b), *base.add(c));
         match operation(word) {
             operation @ (Operation::VectorRef | Operation::ArrayRef) => {
@@ -265,15 +252,15 @@ pub(super) unsafe fn array(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sig
 pub(super) unsafe fn slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: see the module's header.
     unsafe {
-        let word = *pc;
-        let (a, b, c) = operands(word);
-        let class = class_constant(vm, base, *pc.add(1));
+        let word = word_at(pc);
+        let (a, b, c) = (word.a(), word.b(), word.c());
+        let class = class_constant(vm, base, aux_at(pc) as usize);
         let reads = operation(word) == Operation::Slot;
         let (instance, slot) = if reads { (*base.add(b), c) } else { (*base.add(a), b) };
         let has_slot = vm.heap.structure_slots(instance).is_some_and(|slots| slot < slots.len());
         if !has_slot || !vm.is_instance(instance, class) {
             let raised = Raised::Type(instance, Expected::Specifier(vm.class_name(class)));
-            return Signal::Exit(vm.raise::<()>(raised).unwrap_err());
+            return failure(vm, raised);
         }
         if reads {
             let value = vm.heap.structure_slots(instance).map_or(Value::NIL, |slots| slots[slot]);
@@ -293,16 +280,16 @@ pub(super) unsafe fn slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
 #[inline(never)]
 pub(super) unsafe fn is_instance(vm: &mut Vm, base: *mut Value, value: Value, index: usize) -> bool {
     // SAFETY: by the contract.
-    let class = unsafe { class_constant(vm, base, index as u32) };
+    let class = unsafe { class_constant(vm, base, index) };
     vm.is_instance(value, class)
 }
 
 /// The class that is a constant of the running function. As loaded the constant is the name of the class; the class, as
 /// it is now, is put in its place, also when the class of that name has become another one.
-unsafe fn class_constant(vm: &mut Vm, base: *mut Value, index: u32) -> Value {
+unsafe fn class_constant(vm: &mut Vm, base: *mut Value, index: usize) -> Value {
     // SAFETY: V4.
     unsafe {
-        let constant = constants_of(code_of(*base.sub(2))).add(index as usize).cast_mut();
+        let constant = constants_of(code_of(*base.sub(2))).add(index).cast_mut();
         let name = if vm.heap.is(*constant, Kind::Class) { vm.class_name(*constant) } else { *constant };
         if let Some(class) = vm.find_class(name)
             && class != *constant
@@ -318,7 +305,8 @@ unsafe fn class_constant(vm: &mut Vm, base: *mut Value, index: u32) -> Value {
 pub(super) unsafe fn make_box(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: see the module's header.
     unsafe {
-        let (dst, src, _) = operands(*pc);
+        let word = word_at(pc);
+        let (dst, src) = (word.a(), word.b());
         let outcome = vm.heap.alloc_box(*base.add(src)).map_err(Exit::from);
         finish(base, dst, outcome)
     }
@@ -330,9 +318,9 @@ pub(super) unsafe fn make_closure(vm: &mut Vm, pc: *const u32, base: *mut Value)
     // SAFETY: see the module's header; the constant is the code of a function with captures (`shape`), and V8 says that
     // what they are taken from is there.
     unsafe {
-        let word = *pc;
-        let (dst, _, _) = operands(word);
-        let code = *constants_of(code_of(*base.sub(2))).add((word >> 16) as usize);
+        let word = word_at(pc);
+        let dst = word.a();
+        let code = constant(base, word.d());
         match closure(vm, code, base) {
             Ok(closure) => {
                 *base.add(dst) = closure;
@@ -372,92 +360,13 @@ pub(super) unsafe fn closure(vm: &mut Vm, code: Value, base: *mut Value) -> Resu
     }
 }
 
-/// The symbol that is a constant of the running function.
-unsafe fn symbol_constant(base: *mut Value, index: u32) -> Value {
-    // SAFETY: V4.
-    unsafe { *constants_of(code_of(*base.sub(2))).add(index as usize) }
-}
-
-/// `symbol-value` of a symbol that some task has bound, or that has no value.
-#[inline(never)]
-pub(super) unsafe fn symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
-    unsafe {
-        let word = *pc;
-        let symbol = symbol_constant(base, word >> 16);
-        match vm.symbol_value(symbol) {
-            Some(value) => {
-                *base.add(operands(word).0) = value;
-                Signal::Next
-            }
-            None => Signal::Exit(vm.raise::<()>(Raised::UnboundVariable(symbol)).unwrap_err()),
-        }
-    }
-}
-
-/// `set-symbol-value`.
-#[inline(never)]
-pub(super) unsafe fn set_symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
-    unsafe {
-        let word = *pc;
-        let symbol = symbol_constant(base, word >> 16);
-        let value = *base.add(operands(word).0);
-        match vm.set_symbol_value(symbol, value) {
-            Ok(()) => Signal::Next,
-            Err(exit) => Signal::Exit(exit),
-        }
-    }
-}
-
-/// `bind`.
-#[inline(never)]
-pub(super) unsafe fn bind(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
-    unsafe {
-        let word = *pc;
-        let symbol = symbol_constant(base, word >> 16);
-        let value = *base.add(operands(word).0);
-        let offset = vm.offset_of(base) as u32;
-        match vm.bind(symbol, value, offset) {
-            Ok(()) => Signal::Next,
-            Err(exit) => Signal::Exit(exit),
-        }
-    }
-}
-
-/// `unbind`.
-#[inline(never)]
-pub(super) unsafe fn unbind(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
-    let count = operands(unsafe { *pc }).0;
-    let bindings = &mut vm.task_mut().control.bindings;
-    bindings.truncate(bindings.len().saturating_sub(count));
-    Signal::Next
-}
-
-/// `function-ref`.
-#[inline(never)]
-pub(super) unsafe fn function_ref(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
-    unsafe {
-        let word = *pc;
-        let symbol = symbol_constant(base, word >> 16);
-        let function = (*symbol.object_ptr().cast::<Symbol>()).function;
-        if Shape::unpack((*code_of(function)).spare[0]).sort == Sort::Undefined {
-            return Signal::Exit(vm.raise::<()>(Raised::UndefinedFunction(symbol)).unwrap_err());
-        }
-        *base.add(operands(word).0) = function;
-        Signal::Next
-    }
-}
-
 /// `set-values` and the values of `return-values`.
 #[inline(never)]
 pub(super) unsafe fn set_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: see the module's header; V3: the values are registers of the frame.
     unsafe {
-        let (first, count, _) = operands(*pc);
+        let word = word_at(pc);
+        let (first, count) = (word.a(), word.b());
         vm.values.clear();
         vm.values.extend_from_slice(std::slice::from_raw_parts(base.add(first), count));
     }
@@ -469,7 +378,8 @@ pub(super) unsafe fn set_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -
 pub(super) unsafe fn get_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: see the module's header; V3: the registers are of the frame.
     unsafe {
-        let (first, count, _) = operands(*pc);
+        let word = word_at(pc);
+        let (first, count) = (word.a(), word.b());
         for i in 0..count {
             *base.add(first + i) = vm.values.get(i).copied().unwrap_or(Value::NIL);
         }
@@ -483,87 +393,27 @@ pub(super) unsafe fn values_to_list(vm: &mut Vm, pc: *const u32, base: *mut Valu
     vm.charge(vm.values.len());
     let outcome = vm.heap.list(&vm.values).map_err(Exit::from);
     // SAFETY: see the module's header.
-    unsafe { finish(base, operands(*pc).0, outcome) }
+    unsafe { finish(base, word_at(pc).a(), outcome) }
 }
 
 /// `list-to-values`.
 #[inline(never)]
 pub(super) unsafe fn list_to_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: see the module's header.
-    let list = unsafe { *base.add(operands(*pc).0) };
+    let list = unsafe { *base.add(word_at(pc).a()) };
     vm.values.clear();
     let mut rest = list;
     while rest.is_cons() {
-        if vm.values.len() == super::call::MAX_SPREAD {
-            let text = format!("more than {} values", super::call::MAX_SPREAD);
-            return Signal::Exit(vm.program_error::<()>(text).unwrap_err());
+        if vm.values.len() == MAX_SPREAD {
+            let text = format!("more than {} values", MAX_SPREAD);
+            return failure(vm, Raised::Program(text));
         }
         vm.values.push(vm.heap.car(rest).unwrap_or(Value::NIL));
         rest = vm.heap.cdr(rest).unwrap_or(Value::NIL);
     }
     vm.charge(vm.values.len());
     if rest.is_true() {
-        return Signal::Exit(vm.type_error::<()>(list, "LIST").unwrap_err());
+        return failure(vm, Raised::Type(list, Expected::Type("LIST")));
     }
     Signal::Next
-}
-
-impl Vm {
-    /// The value of a special variable in the running task; `None` if it has none.
-    pub(crate) fn symbol_value(&self, symbol: Value) -> Option<Value> {
-        let cell = self.heap.symbol(symbol)?;
-        let value = if cell.header.flags & Symbol::EVER_BOUND == 0 {
-            cell.value
-        } else {
-            self.running
-                .as_ref()
-                .map_or(cell.value, |task| task.control.bindings.get(symbol).unwrap_or(cell.value))
-        };
-        (value != Value::UNBOUND).then_some(value)
-    }
-
-    /// Sets a special variable in the running task: its binding, or else the global value.
-    ///
-    /// # Errors
-    /// A failure if it is a constant.
-    pub(crate) fn set_symbol_value(&mut self, symbol: Value, value: Value) -> Result<(), Exit> {
-        let Some(cell) = self.heap.symbol(symbol) else { return self.type_error(symbol, "SYMBOL") };
-        let flags = cell.header.flags;
-        if flags & Symbol::CONSTANT != 0 {
-            let name = self.heap.string_text(cell.name).unwrap_or_default();
-            return self.program_error(format!("{name} is a constant and cannot be set"));
-        }
-        if flags & Symbol::EVER_BOUND != 0
-            && let Some(task) = self.running.as_mut()
-            && let Some(place) = task.control.bindings.get_mut(symbol)
-        {
-            *place = value;
-            return Ok(());
-        }
-        self.heap.symbol_set_value(symbol, value);
-        Ok(())
-    }
-
-    /// Binds a special variable in the running task.
-    ///
-    /// # Errors
-    /// A failure if it is a constant, or if there are too many bindings.
-    pub(crate) fn bind(&mut self, symbol: Value, value: Value, base: u32) -> Result<(), Exit> {
-        let Some(cell) = self.heap.symbol(symbol) else { return self.type_error(symbol, "SYMBOL") };
-        let flags = cell.header.flags;
-        if flags & Symbol::CONSTANT != 0 {
-            let name = self.heap.string_text(cell.name).unwrap_or_default();
-            return self.program_error(format!("{name} is a constant and cannot be bound"));
-        }
-        if flags & Symbol::EVER_BOUND == 0 {
-            self.heap.set_flags(symbol, Kind::Symbol, flags | Symbol::EVER_BOUND);
-        }
-        let limit = self.config.stack;
-        let bindings = &mut self.task_mut().control.bindings;
-        if bindings.len() >= limit {
-            return self.raise(Raised::StackExhausted);
-        }
-        bindings.push(Binding { symbol, value, base });
-        Ok(())
-    }
 }

@@ -14,20 +14,27 @@
 //! items. What it owes in return is M1 to M6 there.
 #![allow(unsafe_code)]
 
-pub(crate) mod call;
+pub(crate) mod arguments;
+mod call;
 mod cold;
 mod collect;
-pub(crate) use collect::top_of_task;
-pub(crate) use raise::{FrameAt, entry_word, frames_of_task, visit_frames};
-mod control;
 mod double;
-mod raise;
+mod exit;
+pub(crate) mod frames;
+mod interrupt;
+mod reserve;
+pub(crate) mod start;
 pub(crate) mod stubs;
+mod substitute;
 #[cfg(test)]
 mod tests;
 pub(crate) mod trust;
+mod unwind;
+mod variable;
 
+pub(crate) use collect::top_of_task;
 use esl_bytecode::for_each_opcode;
+use esl_bytecode::word::Word;
 
 use crate::builtins::NATIVES;
 use crate::heap::layout::{Boxed, Code, Function, Kind, Structure, Symbol, Vector};
@@ -44,12 +51,12 @@ macro_rules! define_operations {
         #[allow(dead_code, reason = "operations are made by reading code")]
         pub(crate) enum Operation {
             $( $name = $number, )*
-            /// The function that took the place of an instruction has returned: see `raise`.
-            ErrorReturn = crate::stub::ERROR_RETURN,
+            /// The function that took the place of an instruction has returned: see `substitute`.
+            ErrorReturn = stubs::ERROR_RETURN,
             /// The task's function has returned: its values are in the value list.
-            TaskExit = crate::stub::TASK_EXIT,
-            /// The function that ran where the task was interrupted has returned: see `raise`.
-            InterruptReturn = crate::stub::INTERRUPT_RETURN,
+            TaskExit = stubs::TASK_EXIT,
+            /// The function that ran where the task was interrupted has returned: see `interrupt`.
+            InterruptReturn = stubs::INTERRUPT_RETURN,
         }
     };
 }
@@ -149,6 +156,65 @@ pub(crate) unsafe fn constants_of(code: *mut Code) -> *const Value {
     unsafe { code.byte_add(Code::CONSTANTS_OFFSET).cast() }
 }
 
+/// Constant `index` of the function whose frame has its registers at `base`.
+///
+/// # Safety
+/// `base` is that of a frame, and the code of its function has such a constant.
+#[inline(always)]
+unsafe fn constant(base: *mut Value, index: usize) -> Value {
+    // SAFETY: below the registers of a frame is its function.
+    unsafe { *constants_of(code_of(*base.sub(2))).add(index) }
+}
+
+/// The word of the instruction at `pc`.
+///
+/// # Safety
+/// `pc` points into code.
+#[inline(always)]
+unsafe fn word_at(pc: *const u32) -> Word {
+    // SAFETY: by the contract.
+    Word(unsafe { *pc })
+}
+
+/// The aux word of the instruction at `pc`.
+///
+/// # Safety
+/// `pc` is at an instruction of two words.
+#[inline(always)]
+unsafe fn aux_at(pc: *const u32) -> u32 {
+    // SAFETY: by the contract.
+    unsafe { *pc.add(1) }
+}
+
+/// The operation of a word.
+///
+/// # Safety
+/// The word is one of code that has passed the verifier, or of a stub.
+#[inline(always)]
+unsafe fn operation(word: Word) -> Operation {
+    // SAFETY: V1; stubs consist of operations too.
+    unsafe { std::mem::transmute(word.number()) }
+}
+
+/// A pc as a word of a stack: its low bits are clear, so it looks like a fixnum.
+#[inline(always)]
+fn pc_as_value(pc: *const u32) -> Value {
+    // SAFETY: the bits of a fixnum, since a word of code is aligned to four bytes.
+    unsafe { Value::from_bits(pc.expose_provenance() as u64) }
+}
+
+/// The pc that is in a word of a stack.
+#[inline(always)]
+fn pc_from_value(word: Value) -> *const u32 {
+    std::ptr::with_exposed_provenance(word.bits() as usize)
+}
+
+/// Notes a failure of the instruction that is worked on.
+fn failure(vm: &mut Vm, raised: Raised) -> Signal {
+    vm.raised = Some(raised);
+    Signal::Exit(Exit::Raise)
+}
+
 /// Element `i` of a simple vector, box or other record.
 ///
 /// # Safety
@@ -194,7 +260,7 @@ pub(crate) fn see_to_attention(vm: &mut Vm) -> Result<(), Leave> {
 pub(crate) fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]) -> Result<(), Leave> {
     // SAFETY: as for `run`; a task that does not run stands before an instruction that has had no effect yet.
     unsafe {
-        let signal = raise::interrupt(vm, function, arguments);
+        let signal = interrupt::interrupt(vm, function, arguments);
         settle(vm, signal)
     }
 }
@@ -233,7 +299,7 @@ unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
             signal = match signal {
                 Signal::Reload => return Ok(()),
                 Signal::Next => {
-                    let words = stubs::length(*vm.cpu.pc);
+                    let words = stubs::length(word_at(vm.cpu.pc));
                     vm.cpu.pc = vm.cpu.pc.add(words);
                     return Ok(());
                 }
@@ -244,14 +310,14 @@ unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
                 },
                 Signal::Park if vm.task().critical > 0 => {
                     vm.cancel_wait();
-                    Signal::Exit(vm.raise::<()>(Raised::Failure("WOULD-BLOCK")).unwrap_err())
+                    failure(vm, Raised::Failure("WOULD-BLOCK"))
                 }
                 Signal::Park => return Err(Leave::Parked),
                 Signal::Again => return Err(Leave::Slice),
-                Signal::Exit(exit) => raise::exit(vm, exit),
+                Signal::Exit(exit) => exit::exit(vm, exit),
                 Signal::Call => call::slow_call(vm),
-                Signal::ReturnAll => call::return_all(vm),
-                Signal::Unwind => control::unwind(vm),
+                Signal::ReturnAll => substitute::return_all(vm),
+                Signal::Unwind => unwind::unwind(vm),
                 Signal::TaskExit if vm.stops_before_end() => return Err(Leave::Slice),
                 Signal::TaskExit => {
                     vm.finish_task();
@@ -279,35 +345,10 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
     // object of the program. What depends on data is tested before it is used (M6).
     let signal = unsafe {
         loop {
-            let word = *pc;
-            macro_rules! a {
-                () => {
-                    ((word >> 8) & 0xff) as usize
-                };
-            }
-            macro_rules! b {
-                () => {
-                    ((word >> 16) & 0xff) as usize
-                };
-            }
-            macro_rules! c {
-                () => {
-                    (word >> 24) as usize
-                };
-            }
-            macro_rules! d {
-                () => {
-                    (word >> 16) as usize
-                };
-            }
-            macro_rules! signed_d {
-                () => {
-                    (word as i32 >> 16) as isize
-                };
-            }
+            let word = word_at(pc);
             macro_rules! aux {
                 () => {
-                    *pc.add(1)
+                    aux_at(pc)
                 };
             }
             macro_rules! get {
@@ -400,7 +441,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 ($mixed:path, $x:expr, $y:expr) => {{
                     let v = $mixed($x, $y);
                     if v != Value::UNBOUND {
-                        set!(a!(), v);
+                        set!(word.a(), v);
                         next!(1, 2);
                     }
                     cold!(1, cold::arithmetic)
@@ -408,16 +449,16 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             }
             macro_rules! arithmetic {
                 ($fixnum:ident, $float:tt, $mixed:path) => {{
-                    let (x, y) = (get!(b!()), get!(c!()));
+                    let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) {
                         let (sum, overflow) = (x.bits() as i64).$fixnum(y.bits() as i64);
                         if !overflow {
-                            set!(a!(), Value::from_bits(sum as u64));
+                            set!(word.a(), Value::from_bits(sum as u64));
                             next!(1);
                         }
                     } else if Value::both_windowed_doubles(x, y) {
-                        let result = double::load(base.add(b!())) $float double::load(base.add(c!()));
-                        if double::store(base.add(a!()), result) {
+                        let result = double::load(base.add(word.b())) $float double::load(base.add(word.c()));
+                        if double::store(base.add(word.a()), result) {
                             next!(1, 1);
                         }
                     }
@@ -439,8 +480,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     let offset = aux!() as i32 as isize;
                     compare!(
                         $operator,
-                        get!(a!()),
-                        get!(b!()),
+                        get!(word.a()),
+                        get!(word.b()),
                         jump_if!(2, $jump_when, offset),
                         jump_if!(2, !$jump_when, offset)
                     );
@@ -450,9 +491,9 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             macro_rules! jump_compare_int {
                 ($operator:tt, $jump_when:literal) => {{
                     let offset = aux!() as i32 as isize;
-                    let x = get!(a!());
+                    let x = get!(word.a());
                     if x.is_fixnum() {
-                        let holds = (x.bits() as i64) $operator (((word as i32 >> 16) as i64) << 2);
+                        let holds = (x.bits() as i64) $operator (i64::from(word.signed_d()) << 2);
                         jump_if!(2, holds == $jump_when, offset);
                     }
                     cold_test!(2, $jump_when, offset)
@@ -460,9 +501,9 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             }
             macro_rules! bitwise {
                 ($operator:tt) => {{
-                    let (x, y) = (get!(b!()), get!(c!()));
+                    let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) {
-                        set!(a!(), Value::from_bits(x.bits() $operator y.bits()));
+                        set!(word.a(), Value::from_bits(x.bits() $operator y.bits()));
                         next!(1);
                     }
                     cold!(1, cold::arithmetic)
@@ -477,7 +518,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         break Signal::Call;
                     }
                     *window = $function;
-                    *window.add(1) = Value::from_bits($return_to as u64);
+                    *window.add(1) = pc_as_value($return_to);
                     base = registers;
                     k = constants_of(code);
                     pc = (*code).entry;
@@ -487,45 +528,43 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             macro_rules! return_value {
                 ($value:expr) => {{
                     let value = $value;
-                    let return_to = (*base.sub(1)).bits() as usize;
-                    let return_to: *const u32 = std::ptr::with_exposed_provenance(return_to);
-                    let call = *return_to.sub(2);
-                    if call >> 24 != 0 {
+                    let return_to = pc_from_value(*base.sub(1));
+                    let call = word_at(return_to.sub(2));
+                    if call.c() != 0 {
                         vm.values.clear();
                         vm.values.push(value);
                         break Signal::ReturnAll;
                     }
                     *base.sub(2) = value;
-                    base = base.sub(2 + ((call >> 8) & 0xff) as usize);
+                    base = base.sub(2 + call.a());
                     pc = return_to;
                     k = constants_of(code_of(*base.sub(2)));
                     continue;
                 }};
             }
 
-            // SAFETY: V1; stubs consist of operations too.
-            match std::mem::transmute::<u8, Operation>(word as u8) {
+            match operation(word) {
                 // ---- moves and constants
                 Operation::Move => {
-                    set!(a!(), get!(b!()));
+                    set!(word.a(), get!(word.b()));
                     next!(1)
                 }
                 Operation::LoadInt => {
-                    set!(a!(), Value::small(word as i32 >> 16));
+                    set!(word.a(), Value::small(word.signed_d()));
                     next!(1)
                 }
                 Operation::LoadConst => {
-                    set!(a!(), *k.add(d!()));
+                    set!(word.a(), *k.add(word.d()));
                     next!(1)
                 }
                 Operation::LoadNil => {
-                    for i in 0..b!() {
-                        set!(a!() + i, Value::NIL);
+                    for i in 0..word.b() {
+                        set!(word.a() + i, Value::NIL);
                     }
                     next!(1)
                 }
                 Operation::LoadTrue => {
-                    set!(a!(), Value::T);
+                    set!(word.a(), Value::T);
                     next!(1)
                 }
 
@@ -533,17 +572,17 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 Operation::Add => arithmetic!(overflowing_add, +, double::mixed_add),
                 Operation::Sub => arithmetic!(overflowing_sub, -, double::mixed_subtract),
                 Operation::Mul => {
-                    let (x, y) = (get!(b!()), get!(c!()));
+                    let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) {
                         let (product, overflow) = (x.bits() as i64 >> 2).overflowing_mul(y.bits() as i64);
                         if !overflow {
-                            set!(a!(), Value::from_bits(product as u64));
+                            set!(word.a(), Value::from_bits(product as u64));
                             next!(1);
                         }
                     } else if Value::both_windowed_doubles(x, y)
                         && double::store(
-                            base.add(a!()),
-                            double::load(base.add(b!())) * double::load(base.add(c!())),
+                            base.add(word.a()),
+                            double::load(base.add(word.b())) * double::load(base.add(word.c())),
                         )
                     {
                         next!(1, 1);
@@ -551,11 +590,11 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     mixed!(double::mixed_multiply, x, y)
                 }
                 Operation::Div => {
-                    let (x, y) = (get!(b!()), get!(c!()));
+                    let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_windowed_doubles(x, y)
                         && double::store(
-                            base.add(a!()),
-                            double::load(base.add(b!())) / double::load(base.add(c!())),
+                            base.add(word.a()),
+                            double::load(base.add(word.b())) / double::load(base.add(word.c())),
                         )
                     {
                         next!(1);
@@ -563,18 +602,18 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     mixed!(double::mixed_divide, x, y)
                 }
                 Operation::AddInt => {
-                    let x = get!(b!());
+                    let x = get!(word.b());
                     if x.is_fixnum() {
-                        let addend = i64::from(word as i32 >> 24) << 2;
+                        let addend = i64::from(word.signed_c()) << 2;
                         let (sum, overflow) = (x.bits() as i64).overflowing_add(addend);
                         if !overflow {
-                            set!(a!(), Value::from_bits(sum as u64));
+                            set!(word.a(), Value::from_bits(sum as u64));
                             next!(1);
                         }
                     } else if x.is_windowed_double()
                         && double::store(
-                            base.add(a!()),
-                            double::load(base.add(b!())) + f64::from(word as i32 >> 24),
+                            base.add(word.a()),
+                            double::load(base.add(word.b())) + f64::from(word.signed_c()),
                         )
                     {
                         next!(1, 1);
@@ -582,38 +621,38 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     cold!(1, cold::arithmetic)
                 }
                 Operation::Floor => {
-                    let (x, y) = (get!(b!()), get!(c!()));
+                    let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
                         let quotient = (x.bits() as i64).div_euclid(y.bits() as i64);
-                        set!(a!(), Value::from_bits((quotient << 2) as u64));
+                        set!(word.a(), Value::from_bits((quotient << 2) as u64));
                         next!(1);
                     }
                     cold!(1, cold::arithmetic)
                 }
                 Operation::Truncate => {
-                    let (x, y) = (get!(b!()), get!(c!()));
+                    let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
                         let quotient = (x.bits() as i64) / (y.bits() as i64);
-                        set!(a!(), Value::from_bits((quotient << 2) as u64));
+                        set!(word.a(), Value::from_bits((quotient << 2) as u64));
                         next!(1);
                     }
                     cold!(1, cold::arithmetic)
                 }
                 Operation::Mod => {
-                    let (x, y) = (get!(b!()), get!(c!()));
+                    let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
                         // Both are shifted by two, and so is the remainder.
                         let remainder = (x.bits() as i64).rem_euclid(y.bits() as i64);
-                        set!(a!(), Value::from_bits(remainder as u64));
+                        set!(word.a(), Value::from_bits(remainder as u64));
                         next!(1);
                     }
                     cold!(1, cold::arithmetic)
                 }
                 Operation::Rem => {
-                    let (x, y) = (get!(b!()), get!(c!()));
+                    let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
                         let remainder = (x.bits() as i64) % (y.bits() as i64);
-                        set!(a!(), Value::from_bits(remainder as u64));
+                        set!(word.a(), Value::from_bits(remainder as u64));
                         next!(1);
                     }
                     cold!(1, cold::arithmetic)
@@ -622,16 +661,16 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 Operation::LogIor => bitwise!(|),
                 Operation::LogXor => bitwise!(^),
                 Operation::Ash => {
-                    let (x, y) = (get!(b!()), get!(c!()));
+                    let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) {
                         let (n, shift) = (x.bits() as i64, y.bits() as i64 >> 2);
                         if shift <= 0 {
                             let shifted = n >> (-shift).min(63);
-                            set!(a!(), Value::from_bits((shifted & !3) as u64));
+                            set!(word.a(), Value::from_bits((shifted & !3) as u64));
                             next!(1);
                         }
                         if shift < 62 && (n << shift) >> shift == n {
-                            set!(a!(), Value::from_bits((n << shift) as u64));
+                            set!(word.a(), Value::from_bits((n << shift) as u64));
                             next!(1);
                         }
                     }
@@ -640,71 +679,73 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
 
                 // ---- comparisons that give T or NIL
                 Operation::Not => {
-                    set!(a!(), Value::boolean(get!(b!()).is_nil()));
+                    set!(word.a(), Value::boolean(get!(word.b()).is_nil()));
                     next!(1)
                 }
                 Operation::Eq => {
-                    set!(a!(), Value::boolean(get!(b!()) == get!(c!())));
+                    set!(word.a(), Value::boolean(get!(word.b()) == get!(word.c())));
                     next!(1)
                 }
                 Operation::Eql => {
-                    set!(a!(), Value::boolean(cold::eql(vm, get!(b!()), get!(c!()))));
+                    set!(word.a(), Value::boolean(cold::eql(vm, get!(word.b()), get!(word.c()))));
                     next!(1)
                 }
                 Operation::NumEq => {
-                    compare!(==, get!(b!()), get!(c!()),
-                        { set!(a!(), Value::T); next!(1) }, { set!(a!(), Value::NIL); next!(1) });
+                    compare!(==, get!(word.b()), get!(word.c()),
+                        { set!(word.a(), Value::T); next!(1) }, { set!(word.a(), Value::NIL); next!(1) });
                     cold!(1, cold::arithmetic)
                 }
                 Operation::Less => {
-                    compare!(<, get!(b!()), get!(c!()),
-                        { set!(a!(), Value::T); next!(1) }, { set!(a!(), Value::NIL); next!(1) });
+                    compare!(<, get!(word.b()), get!(word.c()),
+                        { set!(word.a(), Value::T); next!(1) }, { set!(word.a(), Value::NIL); next!(1) });
                     cold!(1, cold::arithmetic)
                 }
                 Operation::LessEq => {
-                    compare!(<=, get!(b!()), get!(c!()),
-                        { set!(a!(), Value::T); next!(1) }, { set!(a!(), Value::NIL); next!(1) });
+                    compare!(<=, get!(word.b()), get!(word.c()),
+                        { set!(word.a(), Value::T); next!(1) }, { set!(word.a(), Value::NIL); next!(1) });
                     cold!(1, cold::arithmetic)
                 }
                 Operation::CharEq => {
-                    let (x, y) = (get!(b!()), get!(c!()));
+                    let (x, y) = (get!(word.b()), get!(word.c()));
                     if x.is_character() && y.is_character() {
-                        set!(a!(), Value::boolean(x == y));
+                        set!(word.a(), Value::boolean(x == y));
                         next!(1);
                     }
                     cold!(1, cold::arithmetic)
                 }
                 Operation::IsType => {
-                    set!(a!(), Value::boolean(cold::is_type(vm, get!(b!()), c!() as u8)));
+                    set!(word.a(), Value::boolean(cold::is_type(vm, get!(word.b()), word.c() as u8)));
                     next!(1)
                 }
 
                 // ---- jumps forward
-                Operation::JumpAlways => jump!(1, (word as i32 >> 8) as isize),
-                Operation::JumpIfNil => jump_if!(1, get!(a!()).is_nil(), signed_d!()),
-                Operation::JumpIfNotNil => jump_if!(1, get!(a!()).is_true(), signed_d!()),
-                Operation::JumpIfCons => jump_if!(1, get!(a!()).is_cons(), signed_d!()),
-                Operation::JumpIfNotCons => jump_if!(1, !get!(a!()).is_cons(), signed_d!()),
-                Operation::JumpIfSupplied => jump_if!(1, get!(a!()) != Value::UNSUPPLIED, signed_d!()),
-                Operation::JumpEq => jump_if!(2, get!(a!()) == get!(b!()), aux!() as i32 as isize),
-                Operation::JumpNotEq => jump_if!(2, get!(a!()) != get!(b!()), aux!() as i32 as isize),
+                Operation::JumpAlways => jump!(1, word.signed_e() as isize),
+                Operation::JumpIfNil => jump_if!(1, get!(word.a()).is_nil(), word.signed_d() as isize),
+                Operation::JumpIfNotNil => jump_if!(1, get!(word.a()).is_true(), word.signed_d() as isize),
+                Operation::JumpIfCons => jump_if!(1, get!(word.a()).is_cons(), word.signed_d() as isize),
+                Operation::JumpIfNotCons => jump_if!(1, !get!(word.a()).is_cons(), word.signed_d() as isize),
+                Operation::JumpIfSupplied => {
+                    jump_if!(1, get!(word.a()) != Value::UNSUPPLIED, word.signed_d() as isize)
+                }
+                Operation::JumpEq => jump_if!(2, get!(word.a()) == get!(word.b()), aux!() as i32 as isize),
+                Operation::JumpNotEq => jump_if!(2, get!(word.a()) != get!(word.b()), aux!() as i32 as isize),
                 Operation::JumpEql => {
-                    jump_if!(2, cold::eql(vm, get!(a!()), get!(b!())), aux!() as i32 as isize)
+                    jump_if!(2, cold::eql(vm, get!(word.a()), get!(word.b())), aux!() as i32 as isize)
                 }
                 Operation::JumpNotEql => {
-                    jump_if!(2, !cold::eql(vm, get!(a!()), get!(b!())), aux!() as i32 as isize)
+                    jump_if!(2, !cold::eql(vm, get!(word.a()), get!(word.b())), aux!() as i32 as isize)
                 }
                 Operation::JumpEqlConst => {
-                    jump_if!(2, cold::eql(vm, get!(a!()), *k.add(d!())), aux!() as i32 as isize)
+                    jump_if!(2, cold::eql(vm, get!(word.a()), *k.add(word.d())), aux!() as i32 as isize)
                 }
                 Operation::JumpNotEqlConst => {
-                    jump_if!(2, !cold::eql(vm, get!(a!()), *k.add(d!())), aux!() as i32 as isize)
+                    jump_if!(2, !cold::eql(vm, get!(word.a()), *k.add(word.d())), aux!() as i32 as isize)
                 }
                 Operation::JumpIfType => {
-                    jump_if!(2, cold::is_type(vm, get!(a!()), b!() as u8), aux!() as i32 as isize)
+                    jump_if!(2, cold::is_type(vm, get!(word.a()), word.b() as u8), aux!() as i32 as isize)
                 }
                 Operation::JumpIfNotType => {
-                    jump_if!(2, !cold::is_type(vm, get!(a!()), b!() as u8), aux!() as i32 as isize)
+                    jump_if!(2, !cold::is_type(vm, get!(word.a()), word.b() as u8), aux!() as i32 as isize)
                 }
                 Operation::JumpNumEq => jump_compare!(==, true),
                 Operation::JumpNotNumEq => jump_compare!(==, false),
@@ -722,26 +763,26 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 // ---- loops
                 Operation::Loop => {
                     tick!();
-                    jump!(1, (word as i32 >> 8) as isize)
+                    jump!(1, word.signed_e() as isize)
                 }
                 Operation::LoopIfNil => {
-                    if get!(a!()).is_nil() {
+                    if get!(word.a()).is_nil() {
                         tick!();
-                        jump!(1, signed_d!());
+                        jump!(1, word.signed_d() as isize);
                     }
                     next!(1)
                 }
                 Operation::LoopIfNotNil => {
-                    if get!(a!()).is_true() {
+                    if get!(word.a()).is_true() {
                         tick!();
-                        jump!(1, signed_d!());
+                        jump!(1, word.signed_d() as isize);
                     }
                     next!(1)
                 }
                 Operation::LoopIfCons => {
-                    if get!(a!()).is_cons() {
+                    if get!(word.a()).is_cons() {
                         tick!();
-                        jump!(1, signed_d!());
+                        jump!(1, word.signed_d() as isize);
                     }
                     next!(1)
                 }
@@ -755,12 +796,12 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 }
                 Operation::LoopCount => {
                     tick!();
-                    let (x, limit) = (get!(a!()), get!(b!()));
-                    let step = i64::from(word as i32 >> 24) << 2;
+                    let (x, limit) = (get!(word.a()), get!(word.b()));
+                    let step = i64::from(word.signed_c()) << 2;
                     if Value::both_fixnums(x, limit) {
                         let (sum, overflow) = (x.bits() as i64).overflowing_add(step);
                         if !overflow {
-                            set!(a!(), Value::from_bits(sum as u64));
+                            set!(word.a(), Value::from_bits(sum as u64));
                             jump_if!(2, sum < limit.bits() as i64, aux!() as i32 as isize);
                         }
                     }
@@ -769,62 +810,62 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
 
                 // ---- lists
                 Operation::Cons => {
-                    if let Some(v) = vm.heap.cons_in_hole(get!(b!()), get!(c!())) {
-                        set!(a!(), v);
+                    if let Some(v) = vm.heap.cons_in_hole(get!(word.b()), get!(word.c())) {
+                        set!(word.a(), v);
                         next!(1);
                     }
                     cold!(1, cold::cons)
                 }
                 Operation::Car => {
-                    let list = get!(b!());
+                    let list = get!(word.b());
                     if list.is_cons() {
-                        set!(a!(), (*list.cons_ptr()).car);
+                        set!(word.a(), (*list.cons_ptr()).car);
                         next!(1);
                     }
                     cold!(1, cold::list_part)
                 }
                 Operation::Cdr => {
-                    let list = get!(b!());
+                    let list = get!(word.b());
                     if list.is_cons() {
-                        set!(a!(), (*list.cons_ptr()).cdr);
+                        set!(word.a(), (*list.cons_ptr()).cdr);
                         next!(1);
                     }
                     cold!(1, cold::list_part)
                 }
                 Operation::Cadr => {
-                    let list = get!(b!());
+                    let list = get!(word.b());
                     if list.is_cons() {
                         let rest = (*list.cons_ptr()).cdr;
                         if rest.is_cons() {
-                            set!(a!(), (*rest.cons_ptr()).car);
+                            set!(word.a(), (*rest.cons_ptr()).car);
                             next!(1);
                         }
                     }
                     cold!(1, cold::list_part)
                 }
                 Operation::Cddr => {
-                    let list = get!(b!());
+                    let list = get!(word.b());
                     if list.is_cons() {
                         let rest = (*list.cons_ptr()).cdr;
                         if rest.is_cons() {
-                            set!(a!(), (*rest.cons_ptr()).cdr);
+                            set!(word.a(), (*rest.cons_ptr()).cdr);
                             next!(1);
                         }
                     }
                     cold!(1, cold::list_part)
                 }
                 Operation::SetCar => {
-                    let pair = get!(a!());
+                    let pair = get!(word.a());
                     if pair.is_cons() {
-                        vm.heap.store(&raw mut (*pair.cons_ptr()).car, get!(b!()));
+                        vm.heap.store(&raw mut (*pair.cons_ptr()).car, get!(word.b()));
                         next!(1);
                     }
                     cold!(1, cold::list_part)
                 }
                 Operation::SetCdr => {
-                    let pair = get!(a!());
+                    let pair = get!(word.a());
                     if pair.is_cons() {
-                        vm.heap.store(&raw mut (*pair.cons_ptr()).cdr, get!(b!()));
+                        vm.heap.store(&raw mut (*pair.cons_ptr()).cdr, get!(word.b()));
                         next!(1);
                     }
                     cold!(1, cold::list_part)
@@ -833,36 +874,36 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
 
                 // ---- vectors and structures
                 Operation::VectorRef | Operation::ArrayRef => {
-                    let (vector, index) = (get!(b!()), get!(c!()));
+                    let (vector, index) = (get!(word.b()), get!(word.c()));
                     if is_simple_vector(vector)
                         && index.is_fixnum()
                         && index.bits() >> 2 < u64::from((*vector.object_ptr()).len)
                     {
-                        set!(a!(), *element(vector, (index.bits() >> 2) as usize));
+                        set!(word.a(), *element(vector, (index.bits() >> 2) as usize));
                         next!(1);
                     }
                     cold!(1, cold::array)
                 }
                 Operation::VectorSet | Operation::ArraySet => {
-                    let (vector, index) = (get!(a!()), get!(b!()));
+                    let (vector, index) = (get!(word.a()), get!(word.b()));
                     if is_simple_vector(vector)
                         && index.is_fixnum()
                         && index.bits() >> 2 < u64::from((*vector.object_ptr()).len)
                     {
-                        vm.heap.store(element(vector, (index.bits() >> 2) as usize), get!(c!()));
+                        vm.heap.store(element(vector, (index.bits() >> 2) as usize), get!(word.c()));
                         next!(1);
                     }
                     cold!(1, cold::array)
                 }
                 Operation::CharRef => {
-                    let (string, index) = (get!(b!()), get!(c!()));
+                    let (string, index) = (get!(word.b()), get!(word.c()));
                     if string.is_object() && index.is_fixnum() {
                         let header = string.object_ptr();
                         let at = index.bits() >> 2;
                         if (*header).kind == Kind::String && at < u64::from((*header).len) {
                             let code = *header.add(1).cast::<u32>().add(at as usize);
                             if let Some(v) = Value::character(code) {
-                                set!(a!(), v);
+                                set!(word.a(), v);
                                 next!(1);
                             }
                         }
@@ -870,33 +911,33 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     cold!(1, cold::arithmetic)
                 }
                 Operation::Slot => {
-                    let instance = get!(b!());
+                    let instance = get!(word.b());
                     if is_instance_of_exactly(instance, *k.add(aux!() as usize)) {
                         // The class has the slot: the compiler took its number from it, and `cold::slot` checked it when
                         // this place met the class first. Instances of a class never change in length.
-                        let slot = c!() + 1;
+                        let slot = word.c() + 1;
                         if slot < (*instance.object_ptr()).len as usize {
-                            set!(a!(), *element(instance, slot));
+                            set!(word.a(), *element(instance, slot));
                             next!(2);
                         }
                     }
                     cold!(2, cold::slot)
                 }
                 Operation::SetSlot => {
-                    let instance = get!(a!());
+                    let instance = get!(word.a());
                     if is_instance_of_exactly(instance, *k.add(aux!() as usize)) {
-                        let slot = b!() + 1;
+                        let slot = word.b() + 1;
                         if slot < (*instance.object_ptr()).len as usize {
-                            vm.heap.store(element(instance, slot), get!(c!()));
+                            vm.heap.store(element(instance, slot), get!(word.c()));
                             next!(2);
                         }
                     }
                     cold!(2, cold::slot)
                 }
                 Operation::JumpIfNotInstance => {
-                    let value = get!(a!());
-                    let holds = is_instance_of_exactly(value, *k.add(d!()))
-                        || (value.is_object() && cold::is_instance(vm, base, value, d!()));
+                    let value = get!(word.a());
+                    let holds = is_instance_of_exactly(value, *k.add(word.d()))
+                        || (value.is_object() && cold::is_instance(vm, base, value, word.d()));
                     jump_if!(2, !holds, aux!() as i32 as isize)
                 }
 
@@ -904,75 +945,75 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 Operation::MakeBox => cold!(1, cold::make_box),
                 Operation::BoxRef => {
                     // SAFETY: V7 makes this a box, and likewise in the three arms below that deal with boxes.
-                    set!(a!(), (*get!(b!()).object_ptr().cast::<Boxed>()).value);
+                    set!(word.a(), (*get!(word.b()).object_ptr().cast::<Boxed>()).value);
                     next!(1)
                 }
                 Operation::BoxSet => {
-                    let cell = get!(a!()).object_ptr().cast::<Boxed>();
-                    vm.heap.store(&raw mut (*cell).value, get!(b!()));
+                    let cell = get!(word.a()).object_ptr().cast::<Boxed>();
+                    vm.heap.store(&raw mut (*cell).value, get!(word.b()));
                     next!(1)
                 }
                 Operation::MakeClosure => {
-                    let function = *k.add(d!());
+                    let function = *k.add(word.d());
                     // Functions without captures are made when their code is loaded.
                     if (*function.object_ptr()).kind == Kind::Function {
-                        set!(a!(), function);
+                        set!(word.a(), function);
                         next!(1);
                     }
                     cold!(1, cold::make_closure)
                 }
                 Operation::PatchCapture => {
                     // SAFETY: V8: a closure with such a capture.
-                    vm.heap.store(element(get!(a!()), 1 + b!()), get!(c!()));
+                    vm.heap.store(element(get!(word.a()), 1 + word.b()), get!(word.c()));
                     next!(1)
                 }
                 Operation::CaptureRef => {
                     // SAFETY: V8: the running function has such a capture.
-                    set!(a!(), *element(*base.sub(2), 1 + b!()));
+                    set!(word.a(), *element(*base.sub(2), 1 + word.b()));
                     next!(1)
                 }
                 Operation::CaptureBoxRef => {
-                    let cell = *element(*base.sub(2), 1 + b!());
-                    set!(a!(), (*cell.object_ptr().cast::<Boxed>()).value);
+                    let cell = *element(*base.sub(2), 1 + word.b());
+                    set!(word.a(), (*cell.object_ptr().cast::<Boxed>()).value);
                     next!(1)
                 }
                 Operation::CaptureBoxSet => {
-                    let cell = *element(*base.sub(2), 1 + b!());
-                    vm.heap.store(&raw mut (*cell.object_ptr().cast::<Boxed>()).value, get!(a!()));
+                    let cell = *element(*base.sub(2), 1 + word.b());
+                    vm.heap.store(&raw mut (*cell.object_ptr().cast::<Boxed>()).value, get!(word.a()));
                     next!(1)
                 }
                 Operation::SymbolValue => {
                     // SAFETY: V4: the constant is a symbol.
-                    let symbol = (*k.add(d!())).object_ptr().cast::<Symbol>();
+                    let symbol = (*k.add(word.d())).object_ptr().cast::<Symbol>();
                     let value = (*symbol).value;
                     if (*symbol).header.flags & Symbol::EVER_BOUND == 0 && value != Value::UNBOUND {
-                        set!(a!(), value);
+                        set!(word.a(), value);
                         next!(1);
                     }
-                    cold!(1, cold::symbol_value)
+                    cold!(1, variable::symbol_value)
                 }
                 Operation::SetSymbolValue => {
                     // SAFETY: V4: the constant is a symbol.
-                    let symbol = (*k.add(d!())).object_ptr().cast::<Symbol>();
+                    let symbol = (*k.add(word.d())).object_ptr().cast::<Symbol>();
                     if (*symbol).header.flags & (Symbol::EVER_BOUND | Symbol::CONSTANT) == 0 {
-                        vm.heap.store(&raw mut (*symbol).value, get!(a!()));
+                        vm.heap.store(&raw mut (*symbol).value, get!(word.a()));
                         next!(1);
                     }
-                    cold!(1, cold::set_symbol_value)
+                    cold!(1, variable::set_symbol_value)
                 }
-                Operation::Bind => cold!(1, cold::bind),
-                Operation::Unbind => cold!(1, cold::unbind),
-                Operation::BindList => cold!(1, control::bind_list),
-                Operation::FunctionRef => cold!(1, cold::function_ref),
+                Operation::Bind => cold!(1, variable::bind),
+                Operation::Unbind => cold!(1, variable::unbind),
+                Operation::BindList => cold!(1, unwind::bind_list),
+                Operation::FunctionRef => cold!(1, variable::function_ref),
 
                 // ---- calls
                 Operation::Call => {
                     tick!();
-                    let window = base.add(a!());
+                    let window = base.add(word.a());
                     let function = *window;
                     if function.is_object() && (*function.object_ptr()).kind == Kind::Function {
                         let code = code_of(function);
-                        if (*code).arity == b!() as u32 {
+                        if (*code).arity == word.b() as u32 {
                             enter!(window, function, code, pc.add(2));
                         }
                     }
@@ -984,8 +1025,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     let symbol = (*k.add(aux!() as usize)).object_ptr().cast::<Symbol>();
                     let function = (*symbol).function;
                     let code = code_of(function);
-                    if (*code).arity == b!() as u32 {
-                        enter!(base.add(a!()), function, code, pc.add(2));
+                    if (*code).arity == word.b() as u32 {
+                        enter!(base.add(word.a()), function, code, pc.add(2));
                     }
                     break Signal::Call;
                 }
@@ -993,17 +1034,17 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     tick!();
                     // SAFETY: V5: the running function takes exactly these arguments.
                     let code = k.byte_sub(Code::CONSTANTS_OFFSET).cast::<Code>().cast_mut();
-                    enter!(base.add(a!()), *base.sub(2), code, pc.add(2));
+                    enter!(base.add(word.a()), *base.sub(2), code, pc.add(2));
                 }
                 Operation::CallBuiltin => {
                     tick!();
-                    let window = base.add(a!());
-                    let arguments = std::slice::from_raw_parts(window.add(2), b!());
+                    let window = base.add(word.a());
+                    let arguments = std::slice::from_raw_parts(window.add(2), word.b());
                     // SAFETY: V5: the number is in the table, the number of arguments right.
                     let native = *NATIVES.get_unchecked(aux!() as usize);
-                    (vm.cpu.pc, vm.cpu.base, vm.cpu.wants_one) = (pc, base, c!() == 0);
+                    (vm.cpu.pc, vm.cpu.base, vm.cpu.wants_one) = (pc, base, word.c() == 0);
                     match native(vm, arguments) {
-                        Ok(value) if c!() == 0 => {
+                        Ok(value) if word.c() == 0 => {
                             *window = value;
                             if vm.wants_attention() {
                                 ticks = vm.attend(ticks);
@@ -1013,11 +1054,11 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         Ok(value) => {
                             vm.values.clear();
                             vm.values.push(value);
-                            call::deliver(vm, window, c!());
+                            substitute::deliver(vm, window, word.c());
                             next!(2)
                         }
                         Err(Exit::Values) => {
-                            call::deliver(vm, window, c!());
+                            substitute::deliver(vm, window, word.c());
                             if vm.wants_attention() {
                                 ticks = vm.attend(ticks);
                             }
@@ -1034,14 +1075,14 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 }
                 Operation::TailCall => {
                     tick!();
-                    let window = base.add(a!());
+                    let window = base.add(word.a());
                     let function = *window;
                     if function.is_object() && (*function.object_ptr()).kind == Kind::Function {
                         let code = code_of(function);
-                        if (*code).arity == b!() as u32
+                        if (*code).arity == word.b() as u32
                             && base.add((*code).nregs as usize) <= vm.cpu.stack_end
                         {
-                            for i in 0..b!() {
+                            for i in 0..word.b() {
                                 *base.add(i) = *window.add(2 + i);
                             }
                             *base.sub(2) = function;
@@ -1057,9 +1098,11 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     let symbol = (*k.add(aux!() as usize)).object_ptr().cast::<Symbol>();
                     let function = (*symbol).function;
                     let code = code_of(function);
-                    if (*code).arity == b!() as u32 && base.add((*code).nregs as usize) <= vm.cpu.stack_end {
-                        let window = base.add(a!());
-                        for i in 0..b!() {
+                    if (*code).arity == word.b() as u32
+                        && base.add((*code).nregs as usize) <= vm.cpu.stack_end
+                    {
+                        let window = base.add(word.a());
+                        for i in 0..word.b() {
                             *base.add(i) = *window.add(2 + i);
                         }
                         *base.sub(2) = function;
@@ -1071,7 +1114,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 }
                 Operation::TailCallBuiltin => {
                     tick!();
-                    let arguments = std::slice::from_raw_parts(base.add(a!() + 2), b!());
+                    let arguments = std::slice::from_raw_parts(base.add(word.a() + 2), word.b());
                     let native = *NATIVES.get_unchecked(aux!() as usize);
                     (vm.cpu.pc, vm.cpu.base, vm.cpu.wants_one) = (pc, base, false);
                     match native(vm, arguments) {
@@ -1092,10 +1135,10 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         }
                     }
                 }
-                Operation::Return => return_value!(get!(a!())),
+                Operation::Return => return_value!(get!(word.a())),
                 Operation::ReturnValues => {
-                    if b!() == 1 {
-                        return_value!(get!(a!()))
+                    if word.b() == 1 {
+                        return_value!(get!(word.a()))
                     }
                     cold::set_values(vm, pc, base);
                     break Signal::ReturnAll;
@@ -1109,29 +1152,29 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 Operation::ListToValues => cold!(1, cold::list_to_values),
 
                 // ---- the control stack
-                Operation::NewTag => cold!(1, control::new_tag),
-                Operation::PushCatch => cold!(2, control::push),
-                Operation::PushCleanup => cold!(2, control::push),
-                Operation::PushHandlerCase => cold!(2, control::push),
-                Operation::PushRecovery => cold!(2, control::push),
-                Operation::PushFailureCleanup => cold!(2, control::push),
-                Operation::PushHandlers => cold!(1, control::push),
-                Operation::PushMask => cold!(1, control::push),
-                Operation::PushScope => cold!(1, control::push),
-                Operation::PopControl => cold!(1, control::pop),
-                Operation::EnterCleanup => cold!(1, control::enter_cleanup),
-                Operation::EndCleanup => cold!(1, control::end_cleanup),
-                Operation::Throw => match control::throw(vm, pc, base) {
+                Operation::NewTag => cold!(1, unwind::new_tag),
+                Operation::PushCatch => cold!(2, unwind::push_catch),
+                Operation::PushCleanup => cold!(2, unwind::push_cleanup),
+                Operation::PushHandlerCase => cold!(2, unwind::push_handler_case),
+                Operation::PushRecovery => cold!(2, unwind::push_recovery),
+                Operation::PushFailureCleanup => cold!(2, unwind::push_failure_cleanup),
+                Operation::PushHandlers => cold!(1, unwind::push_handlers),
+                Operation::PushMask => cold!(1, unwind::push_mask),
+                Operation::PushScope => cold!(1, unwind::push_scope),
+                Operation::PopControl => cold!(1, unwind::pop),
+                Operation::EnterCleanup => cold!(1, unwind::enter_cleanup),
+                Operation::EndCleanup => cold!(1, unwind::end_cleanup),
+                Operation::Throw => match unwind::throw(vm, pc, base) {
                     Signal::Next => next!(1),
                     signal => break signal,
                 },
 
                 // ---- stubs
                 Operation::ErrorReturn | Operation::InterruptReturn => {
-                    let signal = if word as u8 == crate::stub::ERROR_RETURN {
-                        raise::error_return(vm, pc, base)
+                    let signal = if word.number() == stubs::ERROR_RETURN {
+                        substitute::error_return(vm, base)
                     } else {
-                        raise::interrupt_return(vm, pc, base)
+                        interrupt::interrupt_return(vm, base)
                     };
                     // It has found the place to go on at.
                     pc = vm.cpu.pc;

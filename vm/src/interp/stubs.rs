@@ -1,13 +1,35 @@
-//! Code that no module contains: where a task's first function returns to, where the function returns to that took
-//! the place of a failed instruction, and the one that ran where its task was interrupted.
+//! Operations that only the virtual machine makes, and the code that consists of them: where a task's first function
+//! returns to, where the function returns to that took the place of a failed instruction, and the one that ran where
+//! its task was interrupted.
+//!
+//! Opcode 0 and those from `0xC0` on are refused in files, so whoever meets one of these knows that the machine has put
+//! it there. (Because there is a 0, the loop's table of jumps begins there, and the opcode is its index as it is.)
 //!
 //! A return reads the call word two words before the return address, so each stub is a call word, its aux word, and
 //! then the operation that goes on.
 
+use esl_bytecode::builtin::Builtin;
 use esl_bytecode::opcode::Opcode;
 use esl_bytecode::operand::Want;
+use esl_bytecode::word::Word;
 
-use crate::stub;
+/// Number of the operation at the end of a task.
+pub(super) const TASK_EXIT: u8 = 0;
+/// Number of the operation after a function that took the place of an instruction.
+pub(super) const ERROR_RETURN: u8 = 0xC3;
+/// Number of the operation after a function that ran where its task was interrupted.
+pub(super) const INTERRUPT_RETURN: u8 = 0xC4;
+
+/// The code of a symbol without a function; the symbol is capture 0 of the function. The interpreter goes by the shape
+/// and never comes here, nor to the next two.
+pub(crate) const UNDEFINED_WORD: u32 = 0xC1;
+/// The code of a function that nobody has called yet: the loader puts its real code in place of this.
+pub(crate) const LAZY_WORD: u32 = 0xC2;
+
+/// Returns the code of a builtin, its number above the operation.
+pub(crate) const fn native_word(builtin: Builtin) -> u32 {
+    0xC0 | (builtin as u32) << 16
+}
 
 /// A call word whose window is register `window` and that wants all values.
 const fn call_word(window: u8) -> u32 {
@@ -15,48 +37,48 @@ const fn call_word(window: u8) -> u32 {
 }
 
 /// Return to the end of the task.
-static TASK_EXIT: [u32; 3] = [call_word(0), 0, stub::word(stub::TASK_EXIT, 0)];
+static TASK_EXIT_CODE: [u32; 3] = [call_word(0), 0, TASK_EXIT as u32];
 
 /// For each window, return to this operation.
 const fn returns_to(operation: u8) -> [[u32; 3]; 256] {
     let mut table = [[0; 3]; 256];
     let mut window = 0;
     while window < 256 {
-        table[window] = [call_word(window as u8), 0, stub::word(operation, 0)];
+        table[window] = [call_word(window as u8), 0, operation as u32];
         window += 1;
     }
     table
 }
 
 /// For each window, return to a failed instruction.
-static ERROR_RETURN: [[u32; 3]; 256] = returns_to(stub::ERROR_RETURN);
+static ERROR_RETURN_CODE: [[u32; 3]; 256] = returns_to(ERROR_RETURN);
 
 /// For each window, return to an instruction before which the task was interrupted.
-static INTERRUPT_RETURN: [[u32; 3]; 256] = returns_to(stub::INTERRUPT_RETURN);
+static INTERRUPT_RETURN_CODE: [[u32; 3]; 256] = returns_to(INTERRUPT_RETURN);
 
 /// Return address of a task's first function.
 pub(crate) fn task_exit() -> *const u32 {
-    &raw const TASK_EXIT[2]
+    &raw const TASK_EXIT_CODE[2]
 }
 
 /// Return address of a function whose window is register `window` of the frame with the failed instruction.
 pub(crate) fn error_return(window: u8) -> *const u32 {
-    &raw const ERROR_RETURN[usize::from(window)][2]
+    &raw const ERROR_RETURN_CODE[usize::from(window)][2]
 }
 
 /// Return address of a function that runs in an interrupted frame, whose window is this register of the frame.
 pub(crate) fn interrupt_return(window: u8) -> *const u32 {
-    &raw const INTERRUPT_RETURN[usize::from(window)][2]
+    &raw const INTERRUPT_RETURN_CODE[usize::from(window)][2]
 }
 
 /// Whether a return address is one of [`error_return`] or [`interrupt_return`]: the frame has its pc behind its registers.
 pub(crate) fn is_return_above(pc: *const u32) -> bool {
-    is_in(&ERROR_RETURN, pc) || is_in(&INTERRUPT_RETURN, pc)
+    is_in(&ERROR_RETURN_CODE, pc) || is_in(&INTERRUPT_RETURN_CODE, pc)
 }
 
 /// Whether a return address is one of [`error_return`].
 pub(crate) fn is_error_return(pc: *const u32) -> bool {
-    is_in(&ERROR_RETURN, pc)
+    is_in(&ERROR_RETURN_CODE, pc)
 }
 
 fn is_in(table: &'static [[u32; 3]; 256], pc: *const u32) -> bool {
@@ -65,6 +87,6 @@ fn is_in(table: &'static [[u32; 3]; 256], pc: *const u32) -> bool {
 }
 
 /// Length in words of the instruction that begins with `word`.
-pub(crate) fn length(word: u32) -> usize {
-    Opcode::from_number(word as u8).map_or(1, Opcode::words)
+pub(super) fn length(word: Word) -> usize {
+    word.opcode().map_or(1, Opcode::words)
 }

@@ -18,10 +18,10 @@ use esl_bytecode::symbol::Symbol;
 use super::definitions::{Definitions, ImageDefinition, name_of};
 use super::{FunctionParts, LoadError, character, data, debug, integer, make_code, own_constants, ratio};
 use crate::heap::{AllocError, Heap};
+use crate::interp::stubs::LAZY_WORD;
 use crate::interp::trust::{self, Verified};
 use crate::raise::Exit;
 use crate::shape::{Shape, Sort};
-use crate::stub;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::World;
@@ -106,14 +106,13 @@ pub(crate) fn open(heap: &mut Heap, world: &mut World, module: Arc<ModuleImage>)
     let number = world.images.0.len();
     let packages = module.packages()?.into_iter().map(Arc::from).collect();
     let shape = Shape::other(Sort::Lazy, 0);
-    let word = stub::word(stub::LAZY, 0);
     let image = Image {
         packages,
         definitions: Definitions::of(&module)?,
         symbols: heap.alloc_vector_filled(module.symbol_count(), Value::UNSUPPLIED)?,
         pool: heap.alloc_vector_filled(module.constant_count(), Value::UNSUPPLIED)?,
         functions: heap.alloc_vector_filled(module.function_count(), Value::UNSUPPLIED)?,
-        lazy: trust::alloc_stub(heap, Value::NIL, Value::index(number), shape, 1, word)?,
+        lazy: trust::alloc_stub(heap, Value::NIL, Value::index(number), shape, 1, LAZY_WORD)?,
         module: module.clone(),
     };
     world.images.0.push(image);

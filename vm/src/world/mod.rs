@@ -21,10 +21,9 @@ use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 use crate::datum::Unit;
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{AllocError, Heap, Kind};
-use crate::interp::trust;
+use crate::interp::{stubs, trust};
 use crate::load::Images;
 use crate::shape::{Shape, Sort};
-use crate::stub;
 use crate::value::Value;
 
 pub(crate) mod class;
@@ -107,8 +106,7 @@ impl World {
     /// [`AllocError`] when the heap is too small for it.
     pub(crate) fn new(heap: &mut Heap) -> Result<World, AllocError> {
         let shape = Shape::other(Sort::Undefined, 0);
-        let undefined =
-            trust::alloc_stub(heap, Value::NIL, Value::NIL, shape, 1, stub::word(stub::UNDEFINED, 0))?;
+        let undefined = trust::alloc_stub(heap, Value::NIL, Value::NIL, shape, 1, stubs::UNDEFINED_WORD)?;
         let mut world = World {
             known: Known::NONE,
             is_open: true,
@@ -258,7 +256,7 @@ impl World {
     fn make_builtin(&mut self, heap: &mut Heap, builtin: Builtin, name: Value) -> Result<Value, AllocError> {
         let number = builtin.number();
         let shape = Shape::other(Sort::Native, number as u16);
-        let code = trust::alloc_stub(heap, name, Value::NIL, shape, 0, stub::native_word(builtin))?;
+        let code = trust::alloc_stub(heap, name, Value::NIL, shape, 0, stubs::native_word(builtin))?;
         heap.alloc_function(code, &[])
     }
 

@@ -1,8 +1,13 @@
 //! Instructions on the control stack, and unwinding.
+//!
+//! Every instruction here has the contract of [`super::settle`]: `pc` is at an instruction of the row it serves, `base`
+//! is the running frame's, and what the verifier proved holds (V1 to V13).
 
 use esl_bytecode::opcode::Opcode;
+use esl_bytecode::word::Word;
 
-use super::{Signal, call, code_of, cold, constants_of};
+use super::substitute::deliver;
+use super::{Signal, aux_at, cold, constant, failure, word_at};
 use crate::control::{End, Entry, EntryKind, Running, Target, Unwinding};
 use crate::heap::layout::Kind;
 use crate::raise::{Exit, Raised};
@@ -15,46 +20,121 @@ pub(super) unsafe fn new_tag(vm: &mut Vm, pc: *const u32, base: *mut Value) -> S
     match vm.heap.alloc_tag(Value::NIL) {
         Ok(tag) => {
             // SAFETY: V3: a register of the frame.
-            unsafe { *base.add((*pc >> 8 & 0xff) as usize) = tag };
+            unsafe { *base.add(word_at(pc).a()) = tag };
             Signal::Next
         }
         Err(error) => Signal::Exit(error.into()),
     }
 }
 
-/// The instructions that push an entry.
+/// The entry that the instruction with this word pushes, as far as all kinds have it in common.
+fn entry(kind: EntryKind, word: Word) -> Entry {
+    let window = word.a() as u8;
+    Entry { data: Value::NIL, pc: std::ptr::null(), base: 0, bindings: 0, window, want: 0, kind }
+}
+
+/// Where the entry lands that the instruction at `pc` pushes.
+///
+/// # Safety
+/// `pc` is at an instruction with an aux word.
+unsafe fn landing(pc: *const u32) -> *const u32 {
+    // SAFETY: V1 and V2: the instruction jumps inside the function.
+    unsafe { pc.add(2).offset(aux_at(pc) as i32 as isize) }
+}
+
+/// Pushes an entry of the frame at `base`.
+fn push(vm: &mut Vm, base: *mut Value, entry: Entry) -> Signal {
+    let limit = vm.config.stack;
+    let base = vm.offset_of(base) as u32;
+    let control = &mut vm.task_mut().control;
+    if control.entries.len() >= limit {
+        return failure(vm, Raised::StackExhausted);
+    }
+    let bindings = control.bindings.len() as u32;
+    control.entries.push(Entry { base, bindings, ..entry });
+    Signal::Next
+}
+
+/// `push-catch`.
 #[inline(never)]
-pub(super) unsafe fn push(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: V1 and V2: the instruction has its aux word and jumps inside the function; V3, V4: registers and constants
-    // are there.
+pub(super) unsafe fn push_catch(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
     unsafe {
-        let word = *pc;
-        let window = (word >> 8) as u8;
-        let register = |index: u32| *base.add((index & 0xff) as usize);
-        let to = || pc.add(2).offset(*pc.add(1) as i32 as isize);
-        let (kind, data, want, to) = match Opcode::from_number(word as u8) {
-            Some(Opcode::PushCatch) => (EntryKind::Catch, register(word >> 16), (word >> 24) as u8, to()),
-            Some(Opcode::PushCleanup) => (EntryKind::Cleanup, Value::NIL, 0, to()),
-            Some(Opcode::PushHandlerCase) => {
-                let types = *constants_of(code_of(*base.sub(2))).add((word >> 16) as usize);
-                (EntryKind::HandlerCase, types, 2, to())
-            }
-            Some(Opcode::PushRecovery) => (EntryKind::Recovery, register(word >> 16), 2, to()),
-            Some(Opcode::PushFailureCleanup) => (EntryKind::FailureCleanup, Value::NIL, 0, to()),
-            Some(Opcode::PushHandlers) => (EntryKind::Handlers, register(word >> 16), 0, std::ptr::null()),
-            Some(Opcode::PushMask) => (EntryKind::Mask, register(word >> 16), 0, std::ptr::null()),
-            _ => (EntryKind::Scope, Value::NIL, 0, std::ptr::null()),
-        };
-        let limit = vm.config.stack;
-        let offset = vm.offset_of(base);
-        let task = vm.task_mut();
-        let control = &mut task.control;
-        if control.entries.len() >= limit {
-            return Signal::Exit(vm.raise::<()>(Raised::StackExhausted).unwrap_err());
-        }
-        let bindings = control.bindings.len() as u32;
-        control.entries.push(Entry { data, pc: to, base: offset as u32, bindings, window, want, kind });
-        Signal::Next
+        let word = word_at(pc);
+        let (data, want) = (*base.add(word.b()), word.c() as u8);
+        push(vm, base, Entry { data, want, pc: landing(pc), ..entry(EntryKind::Catch, word) })
+    }
+}
+
+/// `push-cleanup`.
+#[inline(never)]
+pub(super) unsafe fn push_cleanup(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = word_at(pc);
+        push(vm, base, Entry { pc: landing(pc), ..entry(EntryKind::Cleanup, word) })
+    }
+}
+
+/// `push-failure-cleanup`.
+#[inline(never)]
+pub(super) unsafe fn push_failure_cleanup(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = word_at(pc);
+        push(vm, base, Entry { pc: landing(pc), ..entry(EntryKind::FailureCleanup, word) })
+    }
+}
+
+/// `push-handler-case`.
+#[inline(never)]
+pub(super) unsafe fn push_handler_case(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = word_at(pc);
+        let data = constant(base, word.d());
+        push(vm, base, Entry { data, want: 2, pc: landing(pc), ..entry(EntryKind::HandlerCase, word) })
+    }
+}
+
+/// `push-recovery`.
+#[inline(never)]
+pub(super) unsafe fn push_recovery(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = word_at(pc);
+        let data = *base.add(word.b());
+        push(vm, base, Entry { data, want: 2, pc: landing(pc), ..entry(EntryKind::Recovery, word) })
+    }
+}
+
+/// `push-handlers`.
+#[inline(never)]
+pub(super) unsafe fn push_handlers(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = word_at(pc);
+        push(vm, base, Entry { data: *base.add(word.b()), ..entry(EntryKind::Handlers, word) })
+    }
+}
+
+/// `push-mask`.
+#[inline(never)]
+pub(super) unsafe fn push_mask(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = word_at(pc);
+        push(vm, base, Entry { data: *base.add(word.b()), ..entry(EntryKind::Mask, word) })
+    }
+}
+
+/// `push-scope`.
+#[inline(never)]
+pub(super) unsafe fn push_scope(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = word_at(pc);
+        push(vm, base, entry(EntryKind::Scope, word))
     }
 }
 
@@ -62,7 +142,7 @@ pub(super) unsafe fn push(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
 #[inline(never)]
 pub(super) unsafe fn pop(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Signal {
     // SAFETY: V1.
-    let count = unsafe { *pc >> 8 & 0xff };
+    let count = unsafe { word_at(pc) }.a();
     let control = &mut vm.task_mut().control;
     let mut limits = 0;
     for _ in 0..count {
@@ -81,8 +161,10 @@ pub(super) unsafe fn pop(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Sign
 #[inline(never)]
 pub(super) unsafe fn bind_list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: V3: registers of the frame.
-    let (symbols, values) =
-        unsafe { (*base.add((*pc >> 8 & 0xff) as usize), *base.add((*pc >> 16 & 0xff) as usize)) };
+    let (symbols, values) = unsafe {
+        let word = word_at(pc);
+        (*base.add(word.a()), *base.add(word.b()))
+    };
     let height = vm.task().control.bindings.len();
     let offset = vm.offset_of(base) as u32;
     match vm.bind_list(symbols, values, offset) {
@@ -125,7 +207,10 @@ pub(super) unsafe fn end_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value
 #[inline(never)]
 pub(super) unsafe fn throw(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: V3: a register of the frame.
-    let (tag, kind) = unsafe { (*base.add((*pc >> 8 & 0xff) as usize), *pc >> 16 & 0xff) };
+    let (tag, kind) = unsafe {
+        let word = word_at(pc);
+        (*base.add(word.a()), word.b())
+    };
     match vm.task().control.find_catch(tag) {
         Some(index) => {
             let values = std::mem::take(&mut vm.values);
@@ -143,7 +228,7 @@ pub(super) unsafe fn throw(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sig
                 1 => "the block of this RETURN-FROM has been left",
                 _ => "the tagbody of this GO has been left",
             };
-            Signal::Exit(vm.raise::<()>(Raised::Control(text.into())).unwrap_err())
+            failure(vm, Raised::Control(text.into()))
         }
     }
 }
@@ -247,7 +332,7 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
     unsafe {
         vm.resume_at(&entry);
         let window = vm.cpu.base.add(usize::from(entry.window));
-        call::deliver(vm, window, usize::from(entry.want));
+        deliver(vm, window, usize::from(entry.want));
     }
     vm.close_reserves();
     Signal::Reload
@@ -265,10 +350,10 @@ impl Vm {
         // that this may do what that instruction does as long as the entry stands.
         unsafe {
             let base = self.task().stack.start().add(entry.base as usize);
-            let word = *entry.pc;
-            match Opcode::from_number(word as u8) {
+            let word = word_at(entry.pc);
+            match word.opcode() {
                 Some(Opcode::MakeClosure | Opcode::LoadConst) => {
-                    let constant = *constants_of(code_of(*base.sub(2))).add((word >> 16) as usize);
+                    let constant = constant(base, word.d());
                     if constant.is_object() && (*constant.object_ptr()).kind == Kind::Code {
                         return cold::closure(self, constant, base).map(Some);
                     }
@@ -305,18 +390,6 @@ impl Vm {
             symbols = pair.cdr;
         }
         if symbols.is_true() { self.type_error(symbols, "LIST") } else { Ok(()) }
-    }
-
-    /// The reserve is used up that was for handling the exhaustion of stack or heap: leaves what has handled it, which
-    /// the library has put into a catch, so that the failure goes on outward. Without that, the task ends with `cause`.
-    pub(crate) fn leave_reserve(&mut self, cause: Value) {
-        match self.task().control.find_catch(self.world.known.reserve) {
-            Some(index) => {
-                let unwinding = Unwinding { target: Target::Entry(index), values: Vec::new() };
-                self.task_mut().control.unwinding = Some(unwinding);
-            }
-            None => self.begin_end(End::Failed(cause)),
-        }
     }
 
     /// Begins to unwind the running task to its root, which ends it.

@@ -1,0 +1,130 @@
+//! The arguments of a call: the list of an application spread, and arguments put in the order of the parameters.
+
+use smallvec::SmallVec;
+
+use super::constants_of;
+use crate::heap::layout::Code;
+use crate::raise::Exit;
+use crate::shape::Shape;
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// The largest number of arguments that `apply` spreads.
+pub(crate) const MAX_SPREAD: usize = 4096;
+
+/// Arguments of a call.
+pub(crate) type Arguments = SmallVec<[Value; 16]>;
+
+/// Replaces the last argument, a list, by its items.
+pub(super) fn spread(vm: &mut Vm, arguments: &mut Arguments) -> Result<(), Exit> {
+    let Some(list) = arguments.pop() else { return Ok(()) };
+    let mut rest = list;
+    while let Some(pair) = vm.heap.as_cons(rest) {
+        if arguments.len() == MAX_SPREAD {
+            return vm.program_error(format!("more than {MAX_SPREAD} arguments"));
+        }
+        arguments.push(pair.car);
+        rest = pair.cdr;
+    }
+    vm.charge(arguments.len());
+    if rest.is_true() { vm.type_error(list, "LIST") } else { Ok(()) }
+}
+
+/// Puts arguments in the order of the parameter registers into `arranged`, which is empty: missing ones unsupplied, the rest as a list, keys by name.
+///
+/// # Safety
+/// `code` is the Code of `function`, of the given shape, with bytecode.
+pub(super) unsafe fn arrange(
+    vm: &mut Vm,
+    function: Value,
+    code: *mut Code,
+    shape: Shape,
+    arguments: &[Value],
+    arranged: &mut Arguments,
+) -> Result<(), Exit> {
+    let required = usize::from(shape.required);
+    let positional = required + usize::from(shape.optional);
+    let count = arguments.len();
+    let takes_more = shape.rest || shape.takes_keys;
+    if count < required || (count > positional && !takes_more) {
+        let name = vm.name_of_function(function);
+        let max = if takes_more { None } else { Some(positional as u32) };
+        let given = count_of_arguments(count);
+        return vm.program_error(format!(
+            "{name} was called with {given}; it takes {}",
+            describe_arity(required, max)
+        ));
+    }
+    arranged.extend_from_slice(&arguments[..count.min(positional)]);
+    arranged.resize(positional, Value::UNSUPPLIED);
+    let rest = &arguments[count.min(positional)..];
+    if shape.rest {
+        vm.charge(rest.len());
+        arranged.push(vm.heap.list(rest)?);
+    }
+    if shape.takes_keys {
+        let keys = usize::from(shape.number);
+        let first = arranged.len();
+        arranged.resize(first + keys, Value::UNSUPPLIED);
+        // SAFETY: by the contract, the names of the keys are the last constants (`shape`).
+        // Code does not move, and the frame or its caller's holds on to it.
+        let names = unsafe {
+            let names = constants_of(code).add((*code).nconsts as usize - keys);
+            std::slice::from_raw_parts(names, keys)
+        };
+        take_keys(vm, function, shape, names, rest, &mut arranged[first..])?;
+    }
+    Ok(())
+}
+
+/// Sorts key arguments into the registers of their parameters; of a repeated key the first counts.
+fn take_keys(
+    vm: &mut Vm,
+    function: Value,
+    shape: Shape,
+    names: &[Value],
+    rest: &[Value],
+    registers: &mut [Value],
+) -> Result<(), Exit> {
+    if !rest.len().is_multiple_of(2) {
+        let name = vm.name_of_function(function);
+        return vm.program_error(format!("{name} was called with an odd number of key arguments"));
+    }
+    vm.charge(rest.len() * (1 + names.len() / 8));
+    let allow_other_keys = vm.world.known.allow_other_keys;
+    let mut unknown = None;
+    let mut allows = None;
+    for pair in rest.chunks_exact(2) {
+        let (key, value) = (pair[0], pair[1]);
+        if key == allow_other_keys && allows.is_none() {
+            allows = Some(value.is_true());
+        }
+        match names.iter().position(|&name| name == key) {
+            Some(index) if registers[index] == Value::UNSUPPLIED => registers[index] = value,
+            Some(_) => {}
+            None if key == allow_other_keys => {}
+            None => unknown = unknown.or(Some(key)),
+        }
+    }
+    match unknown {
+        Some(key) if !shape.allow_other_keys && allows != Some(true) => {
+            let name = vm.name_of_function(function);
+            let key = vm.describe(key);
+            let known: Vec<String> = names.iter().map(|&name| vm.describe(name)).collect();
+            vm.program_error(format!("{name} has no key {key}; its keys are {}", known.join(" ")))
+        }
+        _ => Ok(()),
+    }
+}
+
+pub(super) fn count_of_arguments(count: usize) -> String {
+    if count == 1 { "1 argument".into() } else { format!("{count} arguments") }
+}
+
+pub(super) fn describe_arity(min: usize, max: Option<u32>) -> String {
+    match max {
+        Some(max) if max as usize == min => min.to_string(),
+        Some(max) => format!("{min} to {max}"),
+        None => format!("at least {min}"),
+    }
+}

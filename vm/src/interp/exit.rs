@@ -1,0 +1,104 @@
+//! Instructions and builtins that gave no value: each [`Exit`] dealt with.
+//!
+//! A failure becomes a call of the library's `%raise` above the failed instruction; nothing has been unwound.
+
+use esl_bytecode::builtin::BUILTINS;
+
+use super::call::{FramePlace, call};
+use super::{Signal, aux_at, failure, word_at};
+use crate::control::End;
+use crate::raise::{Exit, Raised};
+use crate::vm::Vm;
+
+/// Deals with a builtin or an instruction that gave no value.
+///
+/// # Safety
+/// The contract of [`super::settle`].
+pub(super) unsafe fn exit(vm: &mut Vm, exit: Exit) -> Signal {
+    // SAFETY: each of these has the contract of this function.
+    unsafe {
+        match exit {
+            Exit::Values => Signal::ReturnAll,
+            Exit::Raise => raise(vm),
+            Exit::Collect => collect(vm),
+            Exit::Unwind => Signal::Unwind,
+            Exit::Slowly => take_over(vm),
+            Exit::Call => {
+                let (function, arguments) = vm.take_requested_call();
+                let place = FramePlace::for_instruction(word_at(vm.cpu.pc));
+                call(vm, function, &arguments, place)
+            }
+            Exit::Park => Signal::Park,
+            Exit::Again => Signal::Again,
+        }
+    }
+}
+
+/// Has the library function that is named in the builtin's row do the work.
+///
+/// # Safety
+/// The contract of [`super::settle`], at `call-builtin` or `tail-call-builtin`. No other instruction gives
+/// [`Exit::Slowly`]: as a function a builtin is called in `call`, which deals with it.
+unsafe fn take_over(vm: &mut Vm) -> Signal {
+    // SAFETY: V1, V3 and V5: the aux word is the builtin, and the arguments are registers of the frame.
+    unsafe {
+        let word = word_at(vm.cpu.pc);
+        let function = match vm.twin_of(&BUILTINS[aux_at(vm.cpu.pc) as usize]) {
+            Ok(function) => function,
+            Err(exit) => return Signal::Exit(exit),
+        };
+        let given = std::slice::from_raw_parts(vm.cpu.base.add(word.a() + 2), word.b());
+        call(vm, function, given, FramePlace::for_instruction(word))
+    }
+}
+
+/// Calls `%raise` with the failure that is noted.
+///
+/// # Safety
+/// The contract of [`super::settle`].
+unsafe fn raise(vm: &mut Vm) -> Signal {
+    let arguments = match vm.raised_arguments() {
+        Ok(arguments) => arguments,
+        Err(exit) => return Signal::Exit(exit),
+    };
+    let function = vm.world.known.raise;
+    if !vm.is_defined(function) {
+        // Without a library nobody can handle it.
+        let text = vm.describe_failure(&arguments);
+        vm.last_words = Some(text);
+        vm.begin_end(End::Failed(arguments[0]));
+        return Signal::Unwind;
+    }
+    // SAFETY: by the contract.
+    unsafe { call(vm, function, &arguments, FramePlace::Above) }
+}
+
+/// Collects, so that the instruction at `vm.cpu.pc` is done again with more room; if that did not help the last time, the
+/// heap is exhausted.
+///
+/// # Safety
+/// The contract of [`super::settle`].
+unsafe fn collect(vm: &mut Vm) -> Signal {
+    // SAFETY: V1.
+    let word = unsafe { word_at(vm.cpu.pc) };
+    let is_call = FramePlace::for_instruction(word) != FramePlace::Above;
+    if is_call {
+        // Its tick will be taken again.
+        vm.cpu.ticks += 1;
+    }
+    let place = (vm.cpu.pc, vm.task().ticks, vm.cpu.ticks);
+    if vm.collected_at == Some(place) {
+        vm.collected_at = None;
+        if is_call {
+            vm.cpu.ticks -= 1;
+        }
+        if !vm.heap.open_reserve() {
+            vm.leave_reserve(vm.world.known.heap_exhausted);
+            return Signal::Unwind;
+        }
+        return failure(vm, Raised::HeapExhausted);
+    }
+    vm.collected_at = Some(place);
+    vm.collect_fully();
+    Signal::Reload
+}

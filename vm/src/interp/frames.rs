@@ -1,0 +1,178 @@
+//! Walks over the frames of a task's stack: for backtraces, for reports, for what recovers from a failure, for a
+//! fingerprint of the task's state.
+
+use std::marker::PhantomData;
+
+use super::{code_of, pc_from_value, stubs, word_at};
+use crate::control::Entry;
+use crate::heap::layout::Code;
+use crate::task::Task;
+use crate::value::Value;
+use crate::vm::Vm;
+use esl_bytecode::opcode::Opcode;
+
+/// Words below the first register of a task's outermost frame: the frame of the stub at the task's end has nothing but
+/// its link, and no code of a program stands there.
+const BELOW_FRAMES: usize = 4;
+
+/// One frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frame<'a> {
+    /// The function.
+    pub function: Value,
+    /// Word of its code at which it stands: at the instruction, or for a caller behind the call.
+    pub word: usize,
+    /// Whether `word` is that of the instruction itself, because it is the one that runs, or one that failed.
+    pub is_exact: bool,
+    /// First register.
+    base: *mut Value,
+    /// Number of registers, up to the frame above it.
+    registers: usize,
+    stack: PhantomData<&'a [Value]>,
+}
+
+impl<'a> Frame<'a> {
+    /// Returns its registers, up to the frame above it.
+    pub(crate) fn registers(&self) -> &'a [Value] {
+        // SAFETY: so many registers of the frame lie in the stack, whose words are all initialised; `Frames` borrows it.
+        unsafe { std::slice::from_raw_parts(self.base, self.registers) }
+    }
+
+    /// Returns the address at which its function returns, that of a stub for the outermost frame.
+    fn return_address(&self) -> *const u32 {
+        // SAFETY: below the registers of a frame is its link.
+        unsafe { pc_from_value(*self.base.sub(1)) }
+    }
+
+    /// Whether its function was called by name, or by the machine in the place of an instruction, and not as a value that
+    /// the caller was given.
+    fn is_called_by_name(&self) -> bool {
+        let return_to = self.return_address();
+        // SAFETY: two words before a return address is the word of the call.
+        let call = unsafe { word_at(return_to.sub(2)) };
+        stubs::is_error_return(return_to)
+            || matches!(call.opcode(), Some(Opcode::CallGlobal | Opcode::CallSelf))
+    }
+
+    /// Whether its function is one of the library.
+    fn is_of_library(&self) -> bool {
+        // SAFETY: the function of a frame is a Function.
+        unsafe { (*code_of(self.function)).owner.is_fixnum() }
+    }
+}
+
+/// The frames of a stack, innermost first.
+pub(crate) struct Frames<'a> {
+    /// First word of the stack.
+    bottom: *mut Value,
+    /// Place of the next frame; `None` behind the outermost.
+    next: Option<(*const u32, *mut Value)>,
+    is_exact: bool,
+    /// Registers of the next frame that no frame covers.
+    uncovered: usize,
+    stack: PhantomData<&'a [Value]>,
+}
+
+impl<'a> Frames<'a> {
+    /// # Safety
+    /// The task to which `stack` belongs stands at `pc` in the frame with the registers at `base`, for `'a`.
+    unsafe fn new(bottom: *mut Value, pc: *const u32, base: *mut Value) -> Frames<'a> {
+        let next = Some((pc, base));
+        Frames { bottom, next, is_exact: true, uncovered: usize::MAX, stack: PhantomData }
+    }
+
+    /// Returns the frames of a task that does not run.
+    pub(crate) fn of_task(task: &'a Task) -> Frames<'a> {
+        let bottom = task.stack.start();
+        // SAFETY: the task stands where it was noted at the switch.
+        unsafe { Frames::new(bottom, task.pc, bottom.add(task.base as usize)) }
+    }
+}
+
+impl<'a> Iterator for Frames<'a> {
+    type Item = Frame<'a>;
+
+    fn next(&mut self) -> Option<Frame<'a>> {
+        let (pc, base) = self.next.take()?;
+        if base.addr() < self.bottom.addr() + BELOW_FRAMES * size_of::<Value>() {
+            return None;
+        }
+        // SAFETY: frames are linked as `call` and the loop link them, down to the outermost, whose link is a stub's.
+        unsafe {
+            let function = *base.sub(2);
+            let code = code_of(function);
+            let registers = ((*code).nregs as usize).min(self.uncovered);
+            let word = word_in(code, pc);
+            let frame =
+                Frame { function, word, is_exact: self.is_exact, base, registers, stack: PhantomData };
+            let return_to = frame.return_address();
+            if return_to != stubs::task_exit() {
+                self.uncovered = word_at(return_to.sub(2)).a();
+                let caller = base.sub(2 + self.uncovered);
+                self.is_exact = stubs::is_return_above(return_to);
+                let nregs = (*code_of(*caller.sub(2))).nregs as usize;
+                let pc = if self.is_exact { pc_from_value(*caller.add(nregs)) } else { return_to };
+                self.next = Some((pc, caller));
+            }
+            Some(frame)
+        }
+    }
+}
+
+/// Position of `pc` in the words of `code`.
+///
+/// # Safety
+/// `code` points to a Code.
+unsafe fn word_in(code: *mut Code, pc: *const u32) -> usize {
+    // SAFETY: the words are at this offset inside the object.
+    let start = unsafe { code.byte_add((*code).words_offset()) };
+    pc.addr().wrapping_sub(start.addr()) / size_of::<u32>()
+}
+
+/// The word of the code of its frame at which an entry of a task that does not run lands, if it has one.
+pub(crate) fn entry_word(task: &Task, entry: &Entry) -> Option<usize> {
+    if entry.pc.is_null() {
+        return None;
+    }
+    // SAFETY: the frame of an entry is live.
+    unsafe {
+        let code = code_of(*task.stack.start().add(entry.base as usize).sub(2));
+        Some(word_in(code, entry.pc))
+    }
+}
+
+impl Vm {
+    /// Returns the frames of the running task. `vm.cpu` is in order when a builtin that the interpreter called asks for
+    /// them only up to its innermost frame's pc, so that one is given as it was saved.
+    pub(crate) fn frames(&self) -> impl Iterator<Item = Frame<'_>> {
+        let task = self.running.as_ref();
+        // SAFETY: `vm.cpu` describes the running task.
+        task.map(|task| unsafe { Frames::new(task.stack.start(), self.cpu.pc, self.cpu.base) })
+            .into_iter()
+            .flatten()
+    }
+
+    /// Returns the base of the outermost frame of the library around a failure, inside the frame whose base is `around`:
+    /// the recovery's values become what that frame returns. `None` if the program itself has failed. To be asked by a
+    /// builtin that was called by the function that deals with the failure.
+    pub(crate) fn frame_of_operation(&mut self, around: u32) -> Option<u32> {
+        let (mut found, mut looked_at) = (None, 0);
+        let mut frames = self.frames();
+        let mut callee = frames.next()?;
+        for caller in frames {
+            // A caller that was given its callee as a value may be the program's, which has called on by a tail call.
+            if found.is_some() && !callee.is_called_by_name() {
+                break;
+            }
+            let offset = self.offset_of(caller.base) as u32;
+            if offset <= around || !caller.is_of_library() {
+                break;
+            }
+            found = Some(offset);
+            looked_at += 1;
+            callee = caller;
+        }
+        self.charge(looked_at);
+        found
+    }
+}

@@ -1,0 +1,128 @@
+//! Results: where the values go that a call returns, and those that stand for the result of a failed instruction.
+//!
+//! Values arrive in the value list. A call's go to its window. A substitute goes where the row of the failed
+//! instruction in the opcode table says, and control goes on behind the instruction. What computes the substitute runs
+//! in a frame above the failed instruction, whose pc is saved between the two:
+//!
+//! ```text
+//! registers of the frame with the failed instruction | its pc | %raise | return pc, a stub | arguments ...
+//! ```
+//!
+//! The stub's `error-return` finds the instruction by the saved pc. The same way serves an instruction whose work a
+//! function of the library takes over, and one that asks for a call.
+
+use esl_bytecode::opcode::{Opcode, Substitute};
+use esl_bytecode::word::Word;
+
+use super::{Operation, Signal, aux_at, code_of, operation, pc_from_value, stubs, word_at};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// Delivers the value list to a call window.
+///
+/// # Safety
+/// The window is in the running frame, with as many registers as `want` says (V3).
+pub(super) unsafe fn deliver(vm: &mut Vm, window: *mut Value, want: usize) {
+    let count = if want == 0 || want == 255 { 1 } else { want };
+    for i in 0..count {
+        // SAFETY: by the contract.
+        unsafe { *window.add(i) = vm.values.get(i).copied().unwrap_or(Value::NIL) };
+    }
+}
+
+/// Returns the value list from the running frame.
+///
+/// # Safety
+/// The contract of [`super::settle`].
+pub(super) unsafe fn return_all(vm: &mut Vm) -> Signal {
+    // SAFETY: the link of a frame is its function and the address after a call, or of a stub; the call's window is where
+    // the link begins.
+    unsafe {
+        let base = vm.cpu.base;
+        let return_to = pc_from_value(*base.sub(1));
+        let call = word_at(return_to.sub(2));
+        let window = base.sub(2);
+        vm.cpu.base = window.sub(call.a());
+        vm.cpu.pc = return_to;
+        // A return to a wanted number of values may be to fewer registers than there are values.
+        deliver(vm, window, call.c());
+    }
+    Signal::Reload
+}
+
+/// Puts the value list in the place of the result of the instruction at `vm.cpu.pc`, and goes on behind it.
+///
+/// # Safety
+/// The contract of [`super::settle`], at an instruction.
+pub(super) unsafe fn substitute(vm: &mut Vm) -> Signal {
+    // SAFETY: V1 to V3: what the row of the opcode says is there.
+    unsafe {
+        let (pc, base) = (vm.cpu.pc, vm.cpu.base);
+        let word = word_at(pc);
+        let value = vm.values.first().copied().unwrap_or(Value::NIL);
+        let Some(opcode) = word.opcode() else { return Signal::Next };
+        match opcode.substitute() {
+            Substitute::Value => *base.add(word.a()) = value,
+            Substitute::Effect | Substitute::Silent => {}
+            // Nothing can stand for what the instruction was to do: it is tried again.
+            Substitute::Never => return Signal::Reload,
+            Substitute::Test => {
+                if vm.values.first().is_some_and(|v| v.is_true()) == jumps_when(word) {
+                    vm.cpu.pc = pc.add(2).offset(aux_at(pc) as i32 as isize);
+                    return Signal::Reload;
+                }
+            }
+            Substitute::Call => match opcode {
+                Opcode::TailCall | Opcode::TailCallGlobal | Opcode::TailCallBuiltin | Opcode::TailApply => {
+                    return Signal::ReturnAll;
+                }
+                _ => deliver(vm, base.add(word.a()), word.c()),
+            },
+        }
+        vm.cpu.pc = pc.add(stubs::length(word));
+        Signal::Reload
+    }
+}
+
+/// Whether a comparison that holds makes the instruction jump.
+///
+/// # Safety
+/// The word is one of code that has passed the verifier.
+unsafe fn jumps_when(word: Word) -> bool {
+    !matches!(
+        // SAFETY: by the contract.
+        unsafe { operation(word) },
+        Operation::JumpNotNumEq
+            | Operation::JumpNotLess
+            | Operation::JumpNotLessEq
+            | Operation::JumpNotNumEqInt
+            | Operation::JumpNotLessInt
+            | Operation::JumpNotGreaterInt
+            | Operation::LoopNotLess
+    )
+}
+
+/// `error-return`: the value list holds what the function above the frame has returned.
+///
+/// # Safety
+/// The contract of [`super::settle`], at the stub.
+pub(super) unsafe fn error_return(vm: &mut Vm, base: *mut Value) -> Signal {
+    // SAFETY: the frame is one above which `call` has put a function.
+    unsafe {
+        resume_below(vm, base);
+        substitute(vm)
+    }
+}
+
+/// Makes the frame at `base`, above which a function has run, the running one, at its saved pc.
+///
+/// # Safety
+/// `base` is that of a frame above which `call` has put a function: its pc is saved behind its registers.
+pub(super) unsafe fn resume_below(vm: &mut Vm, base: *mut Value) {
+    // SAFETY: by the contract.
+    unsafe {
+        let registers = (*code_of(*base.sub(2))).nregs as usize;
+        vm.cpu.base = base;
+        vm.cpu.pc = pc_from_value(*base.add(registers));
+    }
+}

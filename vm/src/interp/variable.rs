@@ -1,0 +1,146 @@
+//! Special variables and global functions: the slow parts of their instructions.
+//!
+//! Every instruction here has the contract of [`super::settle`]: `pc` is at an instruction of the row it serves, `base`
+//! is the running frame's, and what the verifier proved holds (V1 to V13).
+
+use super::{Signal, code_of, constant, failure, word_at};
+use crate::binding::Binding;
+use crate::heap::layout::{Kind, Symbol};
+use crate::raise::{Exit, Raised};
+use crate::shape::{Shape, Sort};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// `symbol-value` of a symbol that some task has bound, or that has no value.
+#[inline(never)]
+pub(super) unsafe fn symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = word_at(pc);
+        let symbol = constant(base, word.d());
+        match vm.symbol_value(symbol) {
+            Some(value) => {
+                *base.add(word.a()) = value;
+                Signal::Next
+            }
+            None => failure(vm, Raised::UnboundVariable(symbol)),
+        }
+    }
+}
+
+/// `set-symbol-value`.
+#[inline(never)]
+pub(super) unsafe fn set_symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = word_at(pc);
+        let symbol = constant(base, word.d());
+        let value = *base.add(word.a());
+        match vm.set_symbol_value(symbol, value) {
+            Ok(()) => Signal::Next,
+            Err(exit) => Signal::Exit(exit),
+        }
+    }
+}
+
+/// `bind`.
+#[inline(never)]
+pub(super) unsafe fn bind(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = word_at(pc);
+        let symbol = constant(base, word.d());
+        let value = *base.add(word.a());
+        let offset = vm.offset_of(base) as u32;
+        match vm.bind(symbol, value, offset) {
+            Ok(()) => Signal::Next,
+            Err(exit) => Signal::Exit(exit),
+        }
+    }
+}
+
+/// `unbind`.
+#[inline(never)]
+pub(super) unsafe fn unbind(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    let count = unsafe { word_at(pc) }.a();
+    let bindings = &mut vm.task_mut().control.bindings;
+    bindings.truncate(bindings.len().saturating_sub(count));
+    Signal::Next
+}
+
+/// `function-ref`.
+#[inline(never)]
+pub(super) unsafe fn function_ref(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: see the module's header.
+    unsafe {
+        let word = word_at(pc);
+        let symbol = constant(base, word.d());
+        let function = (*symbol.object_ptr().cast::<Symbol>()).function;
+        if Shape::unpack((*code_of(function)).spare[0]).sort == Sort::Undefined {
+            return failure(vm, Raised::UndefinedFunction(symbol));
+        }
+        *base.add(word.a()) = function;
+        Signal::Next
+    }
+}
+
+impl Vm {
+    /// The value of a special variable in the running task; `None` if it has none.
+    pub(crate) fn symbol_value(&self, symbol: Value) -> Option<Value> {
+        let cell = self.heap.symbol(symbol)?;
+        let value = if cell.header.flags & Symbol::EVER_BOUND == 0 {
+            cell.value
+        } else {
+            self.running
+                .as_ref()
+                .map_or(cell.value, |task| task.control.bindings.get(symbol).unwrap_or(cell.value))
+        };
+        (value != Value::UNBOUND).then_some(value)
+    }
+
+    /// Sets a special variable in the running task: its binding, or else the global value.
+    ///
+    /// # Errors
+    /// A failure if it is a constant.
+    pub(crate) fn set_symbol_value(&mut self, symbol: Value, value: Value) -> Result<(), Exit> {
+        let Some(cell) = self.heap.symbol(symbol) else { return self.type_error(symbol, "SYMBOL") };
+        let flags = cell.header.flags;
+        if flags & Symbol::CONSTANT != 0 {
+            let name = self.heap.string_text(cell.name).unwrap_or_default();
+            return self.program_error(format!("{name} is a constant and cannot be set"));
+        }
+        if flags & Symbol::EVER_BOUND != 0
+            && let Some(task) = self.running.as_mut()
+            && let Some(place) = task.control.bindings.get_mut(symbol)
+        {
+            *place = value;
+            return Ok(());
+        }
+        self.heap.symbol_set_value(symbol, value);
+        Ok(())
+    }
+
+    /// Binds a special variable in the running task.
+    ///
+    /// # Errors
+    /// A failure if it is a constant, or if there are too many bindings.
+    pub(crate) fn bind(&mut self, symbol: Value, value: Value, base: u32) -> Result<(), Exit> {
+        let Some(cell) = self.heap.symbol(symbol) else { return self.type_error(symbol, "SYMBOL") };
+        let flags = cell.header.flags;
+        if flags & Symbol::CONSTANT != 0 {
+            let name = self.heap.string_text(cell.name).unwrap_or_default();
+            return self.program_error(format!("{name} is a constant and cannot be bound"));
+        }
+        if flags & Symbol::EVER_BOUND == 0 {
+            self.heap.set_flags(symbol, Kind::Symbol, flags | Symbol::EVER_BOUND);
+        }
+        let limit = self.config.stack;
+        let bindings = &mut self.task_mut().control.bindings;
+        if bindings.len() >= limit {
+            return self.raise(Raised::StackExhausted);
+        }
+        bindings.push(Binding { symbol, value, base });
+        Ok(())
+    }
+}
