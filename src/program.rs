@@ -10,7 +10,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_bytecode::verify::verify;
 use esl_bytecode::{disasm, file};
-use esl_compiler::diagnostic::Sources;
+use esl_compiler::diagnostic::{Sources, code};
 use esl_compiler::session::Compiler;
 use esl_vm::host::{FileAccess, Host, RealHost};
 use esl_vm::run::RunOutcome;
@@ -91,7 +91,7 @@ pub fn compile_with(sources: &[Source], library: &Library, modules: Modules) -> 
     let mut machine = match compile_time_machine(library) {
         Ok(machine) => machine,
         Err(text) => {
-            let diagnostic = Diagnostic::error("macro-failed", text, Default::default());
+            let diagnostic = code::COMPILE_TIME_FAILURE.at(Span::default(), text);
             return Compiled {
                 program: None,
                 diagnostics: vec![diagnostic],
@@ -147,7 +147,7 @@ pub fn expand(source: &Source, library: &Library) -> (String, Compiled) {
             (expansion.expansion().to_string(), Compiled { program: None, diagnostics, sources })
         }
         Err(text) => {
-            let diagnostic = Diagnostic::error("macro-failed", text, Default::default());
+            let diagnostic = code::COMPILE_TIME_FAILURE.at(Span::default(), text);
             let sources = expansion.sources().clone();
             (String::new(), Compiled { program: None, diagnostics: vec![diagnostic], sources })
         }

@@ -38,21 +38,17 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
-    /// An error at `span`.
-    pub fn error(code: &'static str, message: impl Into<String>, span: Span) -> Diagnostic {
+    /// Creates a diagnostic at `span`. The compiler calls this in one place only, `Code::at`, so that every code it
+    /// reports is in its table.
+    pub fn new(code: &'static str, severity: Severity, message: impl Into<String>, span: Span) -> Diagnostic {
         Diagnostic {
             code,
-            severity: Severity::Error,
+            severity,
             message: message.into(),
             primary: Label { span, text: String::new() },
             secondary: Vec::new(),
             help: None,
         }
-    }
-
-    /// A warning at `span`.
-    pub fn warning(code: &'static str, message: impl Into<String>, span: Span) -> Diagnostic {
-        Diagnostic { severity: Severity::Warning, ..Diagnostic::error(code, message, span) }
     }
 
     /// Sets the text at the primary place.

@@ -1,8 +1,9 @@
 //! The table of diagnostic codes: each with its severity, what it means, a program that has it and the same program
 //! repaired.
 //!
-//! A row makes a constant, through which diagnostics are made ([`Code::at`]), so that no code is reported that is not
-//! in the table. `docs/diagnostics.md` is generated from it. To add a code, add a row at the end of its stage, run
+//! Each row defines a constant. Every diagnostic is made by [`Code::at`] of such a constant, so no code is reported
+//! that the table lacks; a test in `tests/diagnostics/table.rs` looks through the sources for other ways.
+//! `docs/diagnostics.md` is generated from the table. To add a code, add a row, run
 //! `ESL_BLESS=1 cargo test -p esl-compiler --test diagnostics`, and look at the difference.
 //!
 //! The programs are complete files. Where no short program shows the fault, they are empty.
@@ -30,10 +31,7 @@ pub struct Code {
 impl Code {
     /// A diagnostic of this code and its severity at `span`.
     pub fn at(&self, span: Span, message: impl Into<String>) -> Diagnostic {
-        match self.severity {
-            Severity::Error => Diagnostic::error(self.name, message, span),
-            Severity::Warning => Diagnostic::warning(self.name, message, span),
-        }
+        Diagnostic::new(self.name, self.severity, message, span)
     }
 }
 
@@ -221,7 +219,7 @@ NOT_EXTERNAL = "not-external" Error
     repaired: "(print (cl:list 1 2))\n"
 
 NOT_IN_SUBSET = "not-in-subset" Error
-    /// Something of Common Lisp that ESL leaves out.
+    /// Syntax of Common Lisp that ESL leaves out.
     fails: "(print #c(1 2))\n"
     repaired: "(print '(1 2))\n"
 
@@ -257,6 +255,11 @@ UNDEFINED_FUNCTION = "undefined-function" Warning
     /// A call of a function that is defined nowhere so far. It may be defined by the time the call is made.
     fails: "(print (squar 3))\n"
     repaired: "(defun square (x)\n  (* x x))\n(print (square 3))\n"
+
+NAME_NOT_IN_SUBSET = "name-not-in-subset" Warning
+    /// A function, macro or variable of Common Lisp that ESL leaves out.
+    fails: "(defun point (x y)\n  (complex x y))\n(print (point 3 4))\n"
+    repaired: "(defun point (x y)\n  (list x y))\n(print (point 3 4))\n"
 
 UNDEFINED_VARIABLE = "undefined-variable" Warning
     /// A variable that is bound or defined nowhere so far.

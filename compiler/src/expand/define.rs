@@ -227,7 +227,7 @@ pub(super) fn compiler_warning(
         return Err(form.malformed(&format!("knows no code {named}")));
     };
     let span = form.at(place.span());
-    machine.report(Diagnostic::warning(code.name, message.to_string(), span), None);
+    machine.report(code.at(span, message.to_string()), None);
     let jobs = machine.body(body.to_vec(), to);
     machine.schedule(jobs);
     Ok(())

@@ -192,7 +192,7 @@ impl Unit {
                 if let Some(instead) = similar.environment.global(&symbol).instead {
                     let message =
                         format!("{} is not in the subset of Common Lisp that ESL has", name(&symbol));
-                    return Diagnostic::warning(code::NOT_IN_SUBSET.name, message, spans[0]).help(instead);
+                    return code::NAME_NOT_IN_SUBSET.at(spans[0], message).help(instead);
                 }
                 let message = format!("no variable is called {}", name(&symbol));
                 let diagnostic = with_uses(code::UNDEFINED_VARIABLE.at(spans[0], message), &spans[1..]);
@@ -223,7 +223,7 @@ impl Similar<'_> {
             && let Some(instead) = self.environment.global(&function.symbol).instead
         {
             let message = format!("{} is not in the subset of Common Lisp that ESL has", function.shown());
-            return Diagnostic::warning(code::NOT_IN_SUBSET.name, message, uses[0]).help(instead);
+            return code::NAME_NOT_IN_SUBSET.at(uses[0], message).help(instead);
         }
         let message = format!("no function is called {}", function.shown());
         let diagnostic = with_uses(code::UNDEFINED_FUNCTION.at(uses[0], message), &uses[1..]);

@@ -1,7 +1,6 @@
 //! One function while it is lowered: its state, its entry, and the dispatch over kinds of forms.
 
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::module::{Function, MAX_CONTROL, Parameters, PoolIdx};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
@@ -19,6 +18,7 @@ use super::regalloc::Registers;
 use super::spill::Spill;
 use super::{Builder, Excess};
 use crate::core::*;
+use crate::diagnostic::code;
 
 /// Native stack that one form may take before [`Frame::form`] is called again.
 const RED_ZONE: usize = 96 * 1024;
@@ -108,7 +108,8 @@ pub(super) fn function(builder: &mut Builder<'_>, lambda: LambdaId) -> Function 
     });
     let (registers, constants, excess) = (frame.registers.used(), frame.constants, frame.excess);
     if let Some(what) = excess {
-        let diagnostic = Diagnostic::error("function-too-large", "this function is too large", text.span)
+        let diagnostic = code::FUNCTION_TOO_LARGE
+            .at(text.span, "this function is too large")
             .label(format!("has too many {what}"))
             .help("divide it into several functions");
         builder.excesses.push(Excess { lambda, diagnostic });

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use esl_bytecode::span::SourceId;
 use esl_compiler::diagnostic::{Stage, code, document};
@@ -41,6 +41,30 @@ fn the_programs_of_the_reader_s_codes_have_them_and_the_repaired_ones_do_not() {
         assert_eq!(reported(code.failing), expected, "{}", code.failing);
         assert_eq!(reported(code.repaired), [""; 0], "{}", code.repaired);
     }
+}
+
+/// The files below `folder`, with their texts.
+fn rust_files(folder: &Path, files: &mut Vec<(PathBuf, String)>) {
+    for entry in fs::read_dir(folder).expect("the folder is there") {
+        let path = entry.expect("the folder can be read").path();
+        if path.is_dir() {
+            rust_files(&path, files);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            let text = fs::read_to_string(&path).expect("the file is text");
+            files.push((path, text));
+        }
+    }
+}
+
+#[test]
+fn only_the_table_makes_diagnostics() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    rust_files(&root.join("src"), &mut files);
+    rust_files(&root.join("../src"), &mut files);
+    let makers = files.iter().filter(|(_, text)| text.contains("Diagnostic::new("));
+    let makers: Vec<_> = makers.map(|(path, _)| path.strip_prefix(root).unwrap_or(path)).collect();
+    assert_eq!(makers, [Path::new("src/diagnostic/code.rs")]);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use esl_bytecode::compile::{
     Answer, Compilation, Compile, CompileTimeHost, LocalDefinition, MacroCall, MacroRef, Part, Step,
 };
 use esl_bytecode::datum::DatumKind;
-use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::file::{ImageBytes, ModuleImage, write};
 use esl_bytecode::module::{Constant, Function, FunctionNumber, Module, PoolIdx};
 
@@ -177,7 +177,10 @@ impl Compilation for ToyCompilation {
             (_, Answer::Expansion(expansion)) => {
                 let DatumKind::Object(id) = expansion.kind() else {
                     let message = format!("{expansion} is no object");
-                    return Step::Done(None, vec![Diagnostic::error("no-object", message, span())]);
+                    return Step::Done(
+                        None,
+                        vec![Diagnostic::new("no-object", Severity::Error, message, span())],
+                    );
                 };
                 Step::Done(Some(call(Builtin::Identity, vec![Constant::Object(*id)])), Vec::new())
             }
@@ -210,7 +213,7 @@ impl Compile for Toy {
         let skipped = rest.len() - rest.trim_start().len();
         let Some(word) = rest.split_whitespace().next() else { return Ok((None, text.len())) };
         if word == "(" {
-            return Err(Box::new(Diagnostic::error("unclosed-list", "", span())));
+            return Err(Box::new(Diagnostic::new("unclosed-list", Severity::Error, "", span())));
         }
         let name = environment.intern(None, word, false).unwrap();
         Ok((Some(Datum::list([Datum::symbol(name, span())], span())), start + skipped + word.len()))
