@@ -1,5 +1,8 @@
 //! What an embedder does with a machine beside running it: data in and out, and functions of its own.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 
@@ -12,14 +15,30 @@ use crate::task::TaskId;
 use crate::value::Value;
 use crate::vm::{Config, Vm};
 
-/// A function that the embedder gives to programs. It gets and gives data, and cannot call back.
-pub type HostFunction = Box<dyn FnMut(&[Datum]) -> Result<Datum, String> + Send>;
+pub use crate::outside::HostFunction;
+
+/// What the embedder holds on to, and its requests.
+#[derive(Default)]
+pub(crate) struct Embedder {
+    /// Values that are kept from being collected.
+    pub(crate) pinned: Vec<Value>,
+    /// Set from outside to abort the task named in `interruptible`.
+    pub(crate) interrupt: Arc<AtomicBool>,
+    /// Set from outside to have a run come back.
+    pub(crate) stop: Arc<AtomicBool>,
+    /// The task that an interrupt aborts.
+    pub(crate) interruptible: Option<TaskId>,
+    /// Whether an interrupt has aborted one.
+    pub(crate) was_interrupted: bool,
+    /// Text of a failure that ended a task while there was no library to deal with it.
+    pub(crate) last_words: Option<String>,
+}
 
 impl Vm {
     /// Takes in a function of the embedder: its number, for `%call-host`.
     pub fn add_host_function(&mut self, function: HostFunction) -> usize {
-        self.host_functions.push(function);
-        self.host_functions.len() - 1
+        self.outside.functions.push(function);
+        self.outside.functions.len() - 1
     }
 
     /// A value as data. Objects that no data stands for, such as functions and hash tables, come out as a string that
@@ -32,7 +51,7 @@ impl Vm {
         let datum = unit
             .datum_of(&self.heap, &self.world, value, Span::default())
             .map_err(|error| error.to_string())?;
-        self.charge(unit.take_work() as usize);
+        self.exchange.charge(unit.take_work() as usize);
         Ok(datum)
     }
 
@@ -43,36 +62,38 @@ impl Vm {
     pub fn import(&mut self, datum: &Datum) -> Result<Value, Exit> {
         let mut unit = Unit::default();
         let value = unit.value_of(&mut self.heap, &mut self.world, datum)?;
-        self.charge(unit.take_work() as usize);
+        self.exchange.charge(unit.take_work() as usize);
         Ok(value)
     }
 }
 
 /// `(%call-host number &rest arguments)`
 pub(crate) fn call_host(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let number = arguments[0].as_index().filter(|&number| number < vm.host_functions.len());
-    let Some(number) = number else { return vm.index_error(arguments[0], vm.host_functions.len()) };
+    let number = arguments[0].as_index().filter(|&number| number < vm.outside.functions.len());
+    let Some(number) = number else {
+        return vm.exchange.index_error(arguments[0], vm.outside.functions.len());
+    };
     let mut data = Vec::with_capacity(arguments.len());
     for &argument in &arguments[1..] {
         match vm.export(argument) {
             Ok(datum) => data.push(datum),
-            Err(text) => return vm.raise(Raised::Simple(text)),
+            Err(text) => return vm.exchange.raise(Raised::Simple(text)),
         }
     }
     // The function has effects that cannot be done twice, so what it gives is kept until there is room for it.
-    let answer = match vm.host_answer.take() {
+    let answer = match vm.outside.answer.take() {
         Some(answer) => answer,
-        None => (vm.host_functions[number])(&data),
+        None => (vm.outside.functions[number])(&data),
     };
     match answer {
         Ok(datum) => match vm.import(&datum) {
             Ok(value) => Ok(value),
             Err(exit) => {
-                vm.host_answer = Some(Ok(datum));
+                vm.outside.answer = Some(Ok(datum));
                 Err(exit)
             }
         },
-        Err(text) => vm.raise(Raised::Simple(text)),
+        Err(text) => vm.exchange.raise(Raised::Simple(text)),
     }
 }
 
@@ -99,30 +120,30 @@ impl Vm {
     /// Settings that count from here on; ticks are counted anew.
     pub fn begin_program(&mut self, config: Config) {
         self.config = Config { memory: self.config.memory, ..config };
-        self.choices = Choices::seeded(self.config.seed);
-        self.spent = 0;
-        (self.looked_at, self.moved_at, self.made, self.turns, self.switches) = (0, 0, 0, 0, 0);
+        self.scheduler.choices = Choices::seeded(self.config.seed);
+        self.scheduler.spent = 0;
+        (
+            self.scheduler.clock.looked_at,
+            self.scheduler.clock.moved_at,
+            self.scheduler.counts.made,
+            self.scheduler.counts.turns,
+            self.scheduler.counts.switches,
+        ) = (0, 0, 0, 0, 0);
     }
 
     /// Writes what the program has printed and is still in a buffer.
     pub fn flush(&mut self) {
-        self.flush_output();
+        self.outside.flush();
     }
 
     /// Writes reports from here on to this stream, in place of the standard error output.
     pub fn complain_to(&mut self, output: Output) {
-        self.complaints = output;
+        self.outside.complaints = output;
     }
 
     /// Writes a report, on lines of its own.
     pub fn complain(&mut self, text: &str) {
-        let mut characters: Vec<u32> = text.chars().map(u32::from).collect();
-        if self.console.column(self.complaints) > 0 {
-            characters.insert(0, u32::from('\n'));
-        }
-        self.flush_output();
-        self.console.write(&mut *self.host, self.complaints, &characters);
-        self.flush_output();
+        self.outside.complain(text);
     }
 
     /// Whether a condition that ended a task says that the memory is exhausted.

@@ -333,7 +333,7 @@ impl Vm {
             return self.loaded(texts);
         }
         let code = self.heap.function_code(function).and_then(|code| self.heap.code(code)).copied();
-        let Some(code) = code else { return self.type_error(function, "FUNCTION") };
+        let Some(code) = code else { return self.exchange.type_error(function, "FUNCTION") };
         let shape = Shape::unpack(code.spare[0]);
         if shape.sort == Sort::Native
             && let Some(info) = BUILTINS.get(usize::from(shape.number))
@@ -357,7 +357,7 @@ impl Vm {
         match result {
             Ok(value) => Ok(value),
             Err(LoadError::Alloc(error)) => Err(error.into()),
-            Err(error) => self.raise(error.into()),
+            Err(error) => self.exchange.raise(error.into()),
         }
     }
 }

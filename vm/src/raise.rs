@@ -102,40 +102,13 @@ impl From<AllocError> for Exit {
 }
 
 impl Vm {
-    /// Notes a failure; give the result back to the caller.
-    #[cold]
-    pub fn raise<T>(&mut self, raised: Raised) -> Result<T, Exit> {
-        self.raised = Some(raised);
-        Err(Exit::Raise)
-    }
-
-    /// Notes that `datum` is not of the type with this name in `COMMON-LISP`.
-    #[cold]
-    pub fn type_error<T>(&mut self, datum: Value, expected: &'static str) -> Result<T, Exit> {
-        self.raise(Raised::Type(datum, Expected::Type(expected)))
-    }
-
-    /// Notes that `datum` is not an index below `limit`.
-    #[cold]
-    pub fn index_error<T>(&mut self, datum: Value, limit: usize) -> Result<T, Exit> {
-        self.raise(Raised::Type(datum, Expected::Index(limit)))
-    }
-
-    /// Notes a wrong call or form.
-    #[cold]
-    pub fn program_error<T>(&mut self, text: impl Into<String>) -> Result<T, Exit> {
-        self.raise(Raised::Program(text.into()))
-    }
-}
-
-impl Vm {
     /// The arguments of `%raise` for the failure that is noted: a keyword, and what goes with it.
     ///
     /// # Errors
     /// [`Exit::Collect`] if there is no room for a text.
     pub(crate) fn raised_arguments(&mut self) -> Result<SmallVec<[Value; 16]>, Exit> {
         // It stays noted until it has been put into words, since that may have to be done again.
-        let raised = self.raised.clone().unwrap_or(Raised::Simple("an operation failed".into()));
+        let raised = self.exchange.raised.clone().unwrap_or(Raised::Simple("an operation failed".into()));
         let arguments: SmallVec<[Value; 16]> = match raised {
             Raised::Type(datum, expected) => {
                 let expected = self.specifier(expected)?;
@@ -181,7 +154,7 @@ impl Vm {
             Raised::StackExhausted => smallvec![self.keyword("STACK-EXHAUSTED")?],
             Raised::HeapExhausted => smallvec![self.keyword("HEAP-EXHAUSTED")?],
         };
-        self.raised = None;
+        self.exchange.raised = None;
         Ok(arguments)
     }
 

@@ -124,7 +124,7 @@ impl Vm {
     /// What may be put in an array over `data`: the code or byte of `value` where it is not any value.
     pub(crate) fn check_element(&mut self, data: Value, value: Value) -> Result<(), Exit> {
         match self.heap.kind(data) {
-            Some(Kind::String) if !value.is_character() => self.type_error(value, "CHARACTER"),
+            Some(Kind::String) if !value.is_character() => self.exchange.type_error(value, "CHARACTER"),
             Some(Kind::Bytes) if value.as_index().is_none_or(|byte| byte > 255) => {
                 self.specifier_error(value, "(UNSIGNED-BYTE 8)")
             }
@@ -151,10 +151,10 @@ impl Vm {
     /// Where the subscripts point, in row-major order.
     fn row_major_index(&mut self, array: Value, subscripts: &[Value]) -> Result<usize, Exit> {
         let Some(dimensions) = dimensions(&self.heap, array) else {
-            return self.type_error(array, "ARRAY");
+            return self.exchange.type_error(array, "ARRAY");
         };
         if dimensions.len() != subscripts.len() {
-            return self.raise(Raised::Simple(format!(
+            return self.exchange.raise(Raised::Simple(format!(
                 "wrong number of subscripts, {}, for an array of rank {}",
                 subscripts.len(),
                 dimensions.len()
@@ -170,12 +170,14 @@ impl Vm {
     fn element(&mut self, array: Value, index: usize) -> Outcome {
         match all_elements(&self.heap, array).and_then(|elements| elements.get(index)) {
             Some(value) => Ok(value),
-            None => self.index_error(Value::index(index), total_size(&self.heap, array).unwrap_or(0)),
+            None => {
+                self.exchange.index_error(Value::index(index), total_size(&self.heap, array).unwrap_or(0))
+            }
         }
     }
 
     fn set_element(&mut self, array: Value, index: usize, value: Value) -> Outcome {
-        let Some(data) = data_of(&self.heap, array) else { return self.type_error(array, "ARRAY") };
+        let Some(data) = data_of(&self.heap, array) else { return self.exchange.type_error(array, "ARRAY") };
         self.check_element(data, value)?;
         self.store_element(data, index, value);
         Ok(value)
@@ -192,20 +194,20 @@ impl Vm {
 
 /// `vector`
 pub(super) fn vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.charge_elements(arguments.len());
+    vm.exchange.charge_elements(arguments.len());
     Ok(vm.heap.alloc_vector(arguments)?)
 }
 
 /// `svref`
 pub(super) fn svref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(elements) = vm.heap.vector(arguments[0]) else {
-        return vm.type_error(arguments[0], "SIMPLE-VECTOR");
+        return vm.exchange.type_error(arguments[0], "SIMPLE-VECTOR");
     };
     match arguments[1].as_index().and_then(|index| elements.get(index)) {
         Some(&value) => Ok(value),
         None => {
             let length = elements.len();
-            vm.index_error(arguments[1], length)
+            vm.exchange.index_error(arguments[1], length)
         }
     }
 }
@@ -214,7 +216,7 @@ pub(super) fn svref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn set_svref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[vector, index, value] = arguments else { unreachable!("the table says three") };
     let Some(length) = vm.heap.vector(vector).map(<[Value]>::len) else {
-        return vm.type_error(vector, "SIMPLE-VECTOR");
+        return vm.exchange.type_error(vector, "SIMPLE-VECTOR");
     };
     let index = vm.index_below(index, length)?;
     vm.heap.vector_set(vector, index, value);
@@ -237,7 +239,7 @@ pub(super) fn aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `%set-aref`
 pub(super) fn set_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [array, subscripts @ .., value] = arguments else {
-        return vm.program_error("a value and subscripts are expected");
+        return vm.exchange.program_error("a value and subscripts are expected");
     };
     let index = vm.row_major_index(*array, subscripts)?;
     vm.set_element(*array, index, *value)
@@ -265,7 +267,7 @@ pub(super) fn array_row_major_index(vm: &mut Vm, arguments: &[Value]) -> Outcome
 /// `array-in-bounds-p`
 pub(super) fn array_in_bounds_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(dimensions) = dimensions(&vm.heap, arguments[0]) else {
-        return vm.type_error(arguments[0], "ARRAY");
+        return vm.exchange.type_error(arguments[0], "ARRAY");
     };
     let subscripts = &arguments[1..];
     if dimensions.len() != subscripts.len() {
@@ -281,7 +283,7 @@ pub(super) fn array_in_bounds_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 fn array_size(vm: &mut Vm, array: Value) -> Result<usize, Exit> {
     match total_size(&vm.heap, array) {
         Some(size) => Ok(size),
-        None => vm.type_error(array, "ARRAY"),
+        None => vm.exchange.type_error(array, "ARRAY"),
     }
 }
 
@@ -294,7 +296,7 @@ pub(super) fn array_total_size(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn array_rank(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match dimensions(&vm.heap, arguments[0]) {
         Some(dimensions) => Ok(Value::index(dimensions.len())),
-        None => vm.type_error(arguments[0], "ARRAY"),
+        None => vm.exchange.type_error(arguments[0], "ARRAY"),
     }
 }
 
@@ -305,7 +307,7 @@ pub(super) fn array_dimensions(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             let dimensions: Vec<Value> = dimensions.into_iter().map(Value::index).collect();
             Ok(vm.heap.list(&dimensions)?)
         }
-        None => vm.type_error(arguments[0], "ARRAY"),
+        None => vm.exchange.type_error(arguments[0], "ARRAY"),
     }
 }
 
@@ -316,7 +318,7 @@ pub(super) fn array_dimension(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             let axis = vm.index_below(arguments[1], dimensions.len())?;
             Ok(Value::index(dimensions[axis]))
         }
-        None => vm.type_error(arguments[0], "ARRAY"),
+        None => vm.exchange.type_error(arguments[0], "ARRAY"),
     }
 }
 
@@ -337,7 +339,7 @@ pub(super) fn adjustable_array_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn array_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match data_of(&vm.heap, arguments[0]) {
         Some(data) => Ok(data),
-        None => vm.type_error(arguments[0], "ARRAY"),
+        None => vm.exchange.type_error(arguments[0], "ARRAY"),
     }
 }
 
@@ -404,7 +406,7 @@ fn extended(vm: &mut Vm, data: Value, size: usize) -> Outcome {
         Some(Kind::Bytes) => vm.heap.alloc_bytes_filled(size, 0)?,
         _ => vm.heap.alloc_vector_filled(size, Value::small(0))?,
     };
-    vm.charge_elements(size);
+    vm.exchange.charge_elements(size);
     vm.copy_elements(data, 0, new, 0, length)?;
     Ok(new)
 }
@@ -413,7 +415,7 @@ fn extended(vm: &mut Vm, data: Value, size: usize) -> Outcome {
 pub(super) fn vector_pop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (_, fill) = vm.with_fill_pointer(arguments[0])?;
     let Some(last) = fill.checked_sub(1) else {
-        return vm.raise(Raised::Simple("there is nothing left to pop".into()));
+        return vm.exchange.raise(Raised::Simple("there is nothing left to pop".into()));
     };
     let value = vm.element(arguments[0], last)?;
     vm.heap.array_set_fill(arguments[0], Value::index(last));
@@ -427,7 +429,7 @@ pub(super) fn make_vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return Err(Exit::Slowly);
     }
     let vector = vm.heap.alloc_vector_filled(size, arguments[1])?;
-    vm.charge_elements(size);
+    vm.exchange.charge_elements(size);
     Ok(vector)
 }
 
@@ -439,10 +441,10 @@ pub(super) fn begin_vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `%fill-more`
 pub(super) fn fill_more(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.charge_elements(FILLED_AT_ONCE);
+    vm.exchange.charge_elements(FILLED_AT_ONCE);
     match vm.heap.fill_more(arguments[0], arguments[1], FILLED_AT_ONCE) {
         Some(is_finished) => Ok(Value::boolean(is_finished)),
-        None => vm.type_error(arguments[0], "VECTOR"),
+        None => vm.exchange.type_error(arguments[0], "VECTOR"),
     }
 }
 
@@ -461,11 +463,13 @@ pub(super) fn make_array(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn adjust_array(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[array, dimensions, data, fill] = arguments else { unreachable!("the table says four") };
     let Some(rank) = vm.heap.array_dimensions(array).map(<[Value]>::len) else {
-        return vm.type_error(array, "ARRAY");
+        return vm.exchange.type_error(array, "ARRAY");
     };
     let (sizes, fill) = shape(vm, dimensions, data, fill)?;
     if sizes.len() != rank {
-        return vm.raise(Raised::Simple(format!("the array has {rank} dimensions, not {}", sizes.len())));
+        return vm
+            .exchange
+            .raise(Raised::Simple(format!("the array has {rank} dimensions, not {}", sizes.len())));
     }
     vm.heap.array_set_data(array, data);
     for (axis, &size) in sizes.iter().enumerate() {
@@ -478,11 +482,11 @@ pub(super) fn adjust_array(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// Dimensions and fill pointer that suit the data.
 fn shape(vm: &mut Vm, dimensions: Value, data: Value, fill: Value) -> Result<(Vec<Value>, Value), Exit> {
     let Some(room) = Elements::of_data(&vm.heap, data).map(Elements::len) else {
-        return vm.type_error(data, "VECTOR");
+        return vm.exchange.type_error(data, "VECTOR");
     };
     let sizes = match vm.list_items(dimensions, MAX_RANK) {
         Err(Exit::Slowly) => {
-            return vm.raise(Raised::Simple(format!("an array has at most {MAX_RANK} dimensions")));
+            return vm.exchange.raise(Raised::Simple(format!("an array has at most {MAX_RANK} dimensions")));
         }
         sizes => sizes?,
     };
@@ -491,13 +495,13 @@ fn shape(vm: &mut Vm, dimensions: Value, data: Value, fill: Value) -> Result<(Ve
         total = total.zip(Some(vm.count(size)?)).and_then(|(total, size)| total.checked_mul(size));
     }
     if total.is_none_or(|total| total > room) {
-        return vm.raise(Raised::Simple("the dimensions do not suit the number of elements".into()));
+        return vm.exchange.raise(Raised::Simple("the dimensions do not suit the number of elements".into()));
     }
     if fill.is_nil() {
         return Ok((sizes, fill));
     }
     if sizes.len() != 1 {
-        return vm.raise(Raised::Simple("only vectors can have fill pointers".into()));
+        return vm.exchange.raise(Raised::Simple("only vectors can have fill pointers".into()));
     }
     let size = sizes[0].as_index().unwrap_or(0);
     let fill = if fill == Value::T { size } else { vm.index_below(fill, size + 1)? };

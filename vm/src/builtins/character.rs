@@ -12,7 +12,7 @@ use super::types::is_string;
 fn code(vm: &mut Vm, v: Value) -> Result<u32, Exit> {
     match v.as_character() {
         Some(code) => Ok(code),
-        None => vm.type_error(v, "CHARACTER"),
+        None => vm.exchange.type_error(v, "CHARACTER"),
     }
 }
 
@@ -30,7 +30,7 @@ pub(super) fn code_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let character = arguments[0].as_index().and_then(|code| Value::character(u32::try_from(code).ok()?));
     match character {
         Some(character) => Ok(character),
-        None => vm.index_error(arguments[0], Value::CHARACTER_LIMIT as usize),
+        None => vm.exchange.index_error(arguments[0], Value::CHARACTER_LIMIT as usize),
     }
 }
 
@@ -91,7 +91,7 @@ pub(super) fn digit_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let radix = radix_argument(vm, arguments)?;
     let weight = vm.integer(arguments[0])?;
     if weight.is_negative() {
-        return vm.type_error(arguments[0], "UNSIGNED-BYTE");
+        return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
     }
     let weight = arguments[0].as_index().and_then(|weight| u32::try_from(weight).ok());
     let digit = weight.and_then(|weight| char::from_digit(weight, radix));
@@ -133,7 +133,7 @@ fn chain(vm: &mut Vm, arguments: &[Value], fold: bool, holds: impl Fn(u32, u32) 
         let code = code(vm, v)?;
         codes.push(if fold { character::fold(code) } else { code });
     }
-    vm.charge(codes.len());
+    vm.exchange.charge(codes.len());
     Ok(codes.windows(2).all(|pair| holds(pair[0], pair[1])).into())
 }
 

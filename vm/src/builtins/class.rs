@@ -20,16 +20,16 @@ impl Vm {
             return Ok(class);
         }
         if !self.world.is_symbol(&self.heap, v) {
-            return self.type_error(v, "CLASS");
+            return self.exchange.type_error(v, "CLASS");
         }
         let name = self.describe(v);
-        self.program_error(format!("there is no structure or condition type {name}"))
+        self.exchange.program_error(format!("there is no structure or condition type {name}"))
     }
 
     /// Notes that `datum` is no instance of `class`.
     fn instance_error<T>(&mut self, datum: Value, class: Value) -> Result<T, Exit> {
         let name = if self.heap.is(class, Kind::Class) { self.class_name(class) } else { class };
-        self.raise(Raised::Type(datum, Expected::Specifier(name)))
+        self.exchange.raise(Raised::Type(datum, Expected::Specifier(name)))
     }
 
     fn index_in(&mut self, instance: Value, index: Value) -> Result<usize, Exit> {
@@ -49,11 +49,13 @@ impl Vm {
 pub(super) fn make_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[name, supers, slots, data] = arguments else { unreachable!("the table says four") };
     if !vm.heap.is(name, Kind::Symbol) {
-        return vm.type_error(name, "SYMBOL");
+        return vm.exchange.type_error(name, "SYMBOL");
     }
     if vm.world.is_locked(&vm.heap, name) {
         let name = vm.describe(name);
-        return vm.program_error(format!("{name} belongs to the language and cannot be redefined as a type"));
+        return vm
+            .exchange
+            .program_error(format!("{name} belongs to the language and cannot be redefined as a type"));
     }
     let mut classes = Vec::new();
     for class in vm.list_items(supers, LIMIT)? {
@@ -64,7 +66,9 @@ pub(super) fn make_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         class_slot(&vm.heap, class, slot::DEPTH).as_index().is_some_and(|depth| depth >= MAX_DEPTH)
     });
     if is_too_deep {
-        return vm.program_error(format!("types include each other more than {MAX_DEPTH} levels deep"));
+        return vm
+            .exchange
+            .program_error(format!("types include each other more than {MAX_DEPTH} levels deep"));
     }
     Ok(vm.world.define_class(&mut vm.heap, name, &classes, &slots, data)?)
 }
@@ -134,7 +138,7 @@ pub(super) fn make_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         let name = vm.class_name(class);
         let name = vm.describe(name);
         let given = values.len();
-        return vm.program_error(format!("{name} has {count} slots, but {given} values were given"));
+        return vm.exchange.program_error(format!("{name} has {count} slots, but {given} values were given"));
     }
     let mut slots = values.to_vec();
     slots.resize(count, Value::NIL);
@@ -149,7 +153,7 @@ pub(super) fn copy_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return vm.instance_error(arguments[0], vm.world.known.structure_object);
     };
     let slots = slots.to_vec();
-    vm.charge(slots.len());
+    vm.exchange.charge(slots.len());
     Ok(vm.heap.alloc_structure(class, &slots)?)
 }
 
@@ -176,7 +180,7 @@ pub(super) fn define_accessor(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[name, class, index, read_only] = arguments else { unreachable!("the table says four") };
     vm.definable(name, "function")?;
     if !vm.heap.is(class, Kind::Symbol) {
-        return vm.type_error(class, "SYMBOL");
+        return vm.exchange.type_error(class, "SYMBOL");
     }
     vm.index_below(index, usize::from(u16::MAX))?;
     let record = vm.heap.cons(index, read_only)?;

@@ -3,16 +3,16 @@
 
 use smallvec::SmallVec;
 
-use crate::control::{End, EntryKind, Target, Unwinding};
 use crate::interp::arguments::MAX_SPREAD;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::task::FailureReport;
+use crate::task::{End, EntryKind, Target, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 
 /// `(funcall function &rest arguments)`
 pub(super) fn funcall(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.request_call(arguments[0], &arguments[1..]);
+    vm.exchange.request_call(arguments[0], &arguments[1..]);
     Err(Exit::Call)
 }
 
@@ -23,41 +23,41 @@ pub(super) fn apply(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut rest = list;
     while let Some(pair) = vm.heap.as_cons(rest) {
         if spread.len() == MAX_SPREAD {
-            return vm.program_error(format!("more than {MAX_SPREAD} arguments"));
+            return vm.exchange.program_error(format!("more than {MAX_SPREAD} arguments"));
         }
         spread.push(pair.car);
         rest = pair.cdr;
     }
     if rest.is_true() {
-        return vm.type_error(list, "LIST");
+        return vm.exchange.type_error(list, "LIST");
     }
-    vm.charge(spread.len());
-    vm.request_call(arguments[0], &spread);
+    vm.exchange.charge(spread.len());
+    vm.exchange.request_call(arguments[0], &spread);
     Err(Exit::Call)
 }
 
 /// `(values &rest values)`
 pub(super) fn values(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.values.clear();
-    vm.values.extend_from_slice(arguments);
+    vm.exchange.values.clear();
+    vm.exchange.values.extend_from_slice(arguments);
     Err(Exit::Values)
 }
 
 /// `(values-list list)`
 pub(super) fn values_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut rest = arguments[0];
-    vm.values.clear();
+    vm.exchange.values.clear();
     while let Some(pair) = vm.heap.as_cons(rest) {
-        if vm.values.len() == MAX_SPREAD {
-            return vm.program_error(format!("more than {MAX_SPREAD} values"));
+        if vm.exchange.values.len() == MAX_SPREAD {
+            return vm.exchange.program_error(format!("more than {MAX_SPREAD} values"));
         }
-        vm.values.push(pair.car);
+        vm.exchange.values.push(pair.car);
         rest = pair.cdr;
     }
     if rest.is_true() {
-        return vm.type_error(arguments[0], "LIST");
+        return vm.exchange.type_error(arguments[0], "LIST");
     }
-    vm.charge(vm.values.len());
+    vm.exchange.charge(vm.exchange.values.len());
     Err(Exit::Values)
 }
 
@@ -66,24 +66,24 @@ pub(super) fn next_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let height = match arguments[0].as_index() {
         Some(height) => height,
         None if arguments[0].is_nil() => usize::MAX,
-        None => return vm.type_error(arguments[0], "UNSIGNED-BYTE"),
+        None => return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE"),
     };
     let is_failure = arguments[1].is_true();
-    if vm.is_watched && is_failure && arguments[0].is_nil() {
+    if vm.watch.is_watched && is_failure && arguments[0].is_nil() {
         vm.tell_of_failure(arguments[1], false);
     }
     let mut steps = 0;
-    let found = vm.task().control.find_handlers(height, is_failure, &mut steps);
-    vm.charge(steps);
+    let found = vm.scheduler.task().control.find_handlers(height, is_failure, &mut steps);
+    vm.exchange.charge(steps);
     let Some(found) = found else { return Ok(Value::NIL) };
-    vm.values.clear();
+    vm.exchange.values.clear();
     let kind = match found.kind {
         EntryKind::HandlerCase => 1,
         EntryKind::Recovery => 2,
         EntryKind::FailureCleanup => 3,
         _ => 0,
     };
-    vm.values.extend([Value::index(found.index), Value::small(kind), found.data]);
+    vm.exchange.values.extend([Value::index(found.index), Value::small(kind), found.data]);
     Err(Exit::Values)
 }
 
@@ -98,19 +98,20 @@ pub(super) fn begin_recovery(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         let index = arguments[0].as_index().unwrap_or(usize::MAX);
         let Some(function) = vm.recovery_function(index)? else {
             return vm
+                .exchange
                 .raise(Raised::Control("the recovery procedures of a failure are no longer there".into()));
         };
         if let Some(first) = items.first_mut() {
             *first = function;
         }
         let state = vm.heap.alloc_vector(&items)?;
-        vm.charge(items.len());
-        if let Some(entry) = vm.task_mut().control.entries.get_mut(index) {
+        vm.exchange.charge(items.len());
+        if let Some(entry) = vm.scheduler.task_mut().control.entries.get_mut(index) {
             entry.data = state;
         }
         state
     };
-    if vm.is_watched {
+    if vm.watch.is_watched {
         vm.tell_of_failure(arguments[2], true);
     }
     Ok(state)
@@ -119,7 +120,7 @@ pub(super) fn begin_recovery(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(%stand-in index values)`
 pub(super) fn stand_in(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let index = arguments[0].as_index().unwrap_or(usize::MAX);
-    let control = &vm.task().control;
+    let control = &vm.scheduler.task().control;
     let Some(handler) = control.entries.get(index) else { return Ok(Value::NIL) };
     // A cleanup of the library goes on to its end, and so does what it has interrupted.
     let cleanup = control.innermost_cleanup().and_then(|index| control.entries.get(index));
@@ -130,9 +131,9 @@ pub(super) fn stand_in(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         values.push(pair.car);
         rest = pair.cdr;
     }
-    vm.charge(values.len());
+    vm.exchange.charge(values.len());
     let Some(base) = vm.frame_of_operation(around) else { return vm.give_values(&values) };
-    let control = &mut vm.task_mut().control;
+    let control = &mut vm.scheduler.task_mut().control;
     let entries = control.entries.partition_point(|entry| entry.base < base);
     control.unwinding = Some(Unwinding { target: Target::Return { entries, base }, values });
     Err(Exit::Unwind)
@@ -140,54 +141,60 @@ pub(super) fn stand_in(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%unwind-to-cleanup index failure)`
 pub(super) fn unwind_to_cleanup(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(index) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
-    let control = &mut vm.task_mut().control;
+    let Some(index) = arguments[0].as_index() else {
+        return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
+    };
+    let control = &mut vm.scheduler.task_mut().control;
     match control.entries.get(index) {
         Some(entry) if entry.kind == EntryKind::FailureCleanup => {
             let values = vec![arguments[1]];
             control.unwinding = Some(Unwinding { target: Target::Entry(index), values });
             Err(Exit::Unwind)
         }
-        _ => vm.raise(Raised::Control("the cleanup for a failure is no longer there".into())),
+        _ => vm.exchange.raise(Raised::Control("the cleanup for a failure is no longer there".into())),
     }
 }
 
 /// `(%cleaning-up)`
 pub(super) fn cleaning_up(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
-    let running = vm.task().control.running.last().filter(|running| running.pending.is_none());
+    let running = vm.scheduler.task().control.running.last().filter(|running| running.pending.is_none());
     Ok(running.and_then(|running| running.values.first().copied()).unwrap_or(Value::NIL))
 }
 
 /// `(%take-case index case condition)`
 pub(super) fn take_case(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(index) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
-    let control = &mut vm.task_mut().control;
+    let Some(index) = arguments[0].as_index() else {
+        return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
+    };
+    let control = &mut vm.scheduler.task_mut().control;
     match control.entries.get(index) {
         Some(entry) if entry.kind == EntryKind::HandlerCase => {
             let values = arguments[1..].to_vec();
             control.unwinding = Some(Unwinding { target: Target::Entry(index), values });
             Err(Exit::Unwind)
         }
-        _ => vm.raise(Raised::Control("the handlers to take a condition are no longer there".into())),
+        _ => {
+            vm.exchange.raise(Raised::Control("the handlers to take a condition are no longer there".into()))
+        }
     }
 }
 
 /// `(%end-task condition text story ending)`
 pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [story, ending] = [2, 3].map(|index| vm.heap.string_text(arguments[index]).unwrap_or_default());
-    match vm.task().control.final_unwinding() {
+    match vm.scheduler.task().control.final_unwinding() {
         Some(Target::Root(End::Failed(_))) => {
-            if let Some(report) = &mut vm.task_mut().extra_mut().report {
+            if let Some(report) = &mut vm.scheduler.task_mut().extra_mut().report {
                 report.add_cleanup(&story);
             }
         }
         Some(_) => {
-            let label = vm.task_label(vm.task().object);
-            vm.complain(&format!("In a cleanup of {label}:\n{story}{ending}"));
+            let label = vm.task_label(vm.scheduler.task().object);
+            vm.outside.complain(&format!("In a cleanup of {label}:\n{story}{ending}"));
         }
         None => {
-            vm.last_words = vm.heap.string_text(arguments[1]);
-            vm.task_mut().extra_mut().report = Some(FailureReport { story, ending });
+            vm.embedder.last_words = vm.heap.string_text(arguments[1]);
+            vm.scheduler.task_mut().extra_mut().report = Some(FailureReport { story, ending });
         }
     }
     vm.begin_end(End::Failed(arguments[0]));
@@ -197,8 +204,8 @@ pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(%exit status)`
 pub(super) fn exit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let status = arguments[0].as_index().and_then(|status| u8::try_from(status).ok());
-    let Some(status) = status else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
-    vm.exit_status = Some(status);
+    let Some(status) = status else { return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE") };
+    vm.outside.exit_status = Some(status);
     vm.abort_others();
     vm.begin_end(End::Aborted);
     Err(Exit::Unwind)
@@ -229,6 +236,6 @@ pub(super) fn backtrace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         };
         rows.push(row);
     }
-    vm.charge(rows.len() * 64);
+    vm.exchange.charge(rows.len() * 64);
     Ok(vm.heap.list(&rows)?)
 }

@@ -29,7 +29,7 @@ fn checked<T>(vm: &mut Vm, outcome: Result<T, FormulaError>) -> Result<T, Exit> 
         }
         Err(FormulaError::Malformed(v, expected)) => {
             let found = vm.describe(v);
-            vm.program_error(format!("expected {expected}, found {found}"))
+            vm.exchange.program_error(format!("expected {expected}, found {found}"))
         }
     }
 }
@@ -48,7 +48,7 @@ pub(super) fn assert_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     prepare(vm)?;
     let mut work = 0;
     let outcome = vm.database.assert(&mut vm.heap, arguments[0], &mut work);
-    vm.charge(4 * work);
+    vm.exchange.charge(4 * work);
     checked(vm, outcome)
 }
 
@@ -57,12 +57,12 @@ pub(super) fn make_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point()?;
     prepare(vm)?;
     if !vm.world.is_symbol(&vm.heap, arguments[0]) {
-        return vm.type_error(arguments[0], "SYMBOL");
+        return vm.exchange.type_error(arguments[0], "SYMBOL");
     }
     let width = vm.count(arguments[1])?;
     let mut work = 0;
     let made = vm.database.define_property(&mut vm.heap, arguments[0], width, &mut work)?;
-    vm.charge(4 * work);
+    vm.exchange.charge(4 * work);
     Ok(made.into())
 }
 
@@ -72,7 +72,7 @@ pub(super) fn property_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     prepare(vm)?;
     let mut work = 0;
     let outcome = vm.database.property_value(&mut vm.heap, arguments[0], &mut work);
-    vm.charge(4 * work);
+    vm.exchange.charge(4 * work);
     let value = checked(vm, outcome)?;
     if value == Value::UNBOUND {
         vm.give_values(&[Value::NIL, Value::NIL])
@@ -90,7 +90,7 @@ pub(super) fn retract_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     prepare(vm)?;
     let mut work = 0;
     let outcome = vm.database.retract(&mut vm.heap, arguments[0], &mut work);
-    vm.charge(4 * work);
+    vm.exchange.charge(4 * work);
     match outcome {
         Err(FormulaError::Variable(_)) => Ok(Value::small(0)),
         outcome => Ok(checked(vm, outcome)?.into()),
@@ -104,7 +104,7 @@ pub(super) fn define_rule(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[head, body, source] = arguments else { unreachable!("the table says three") };
     let mut work = 0;
     let outcome = vm.database.define_rule(&mut vm.heap, [head, body, source], &mut work);
-    vm.charge(4 * work);
+    vm.exchange.charge(4 * work);
     checked(vm, outcome)?;
     Ok(Value::T)
 }
@@ -116,7 +116,7 @@ pub(super) fn open_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[query, bindings, facts] = arguments else { unreachable!("the table says three") };
     let mut work = 0;
     let outcome = vm.database.open(&mut vm.heap, query, bindings, facts.is_true(), &mut work);
-    vm.charge(4 * work);
+    vm.exchange.charge(4 * work);
     Ok(Value::index(checked(vm, outcome)? as usize))
 }
 
@@ -129,7 +129,7 @@ fn query(vm: &mut Vm, v: Value) -> Result<u64, Exit> {
 fn open<T>(vm: &mut Vm, found: Option<T>) -> Result<T, Exit> {
     match found {
         Some(value) => Ok(value),
-        None => vm.raise(Raised::Control("the query is no longer open".into())),
+        None => vm.exchange.raise(Raised::Control("the query is no longer open".into())),
     }
 }
 
@@ -138,7 +138,7 @@ pub(super) fn query_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let key = query(vm, arguments[0])?;
     let mut work = STEP;
     let progress = vm.database.step(key, &mut work);
-    vm.charge(8 * (STEP - work));
+    vm.exchange.charge(8 * (STEP - work));
     // If there is no room, the step is done again and goes on from here.
     vm.database.check_room(&mut vm.heap)?;
     match open(vm, progress)? {
@@ -165,13 +165,13 @@ fn raise_query_error(vm: &mut Vm, error: QueryError) -> Outcome {
     match error {
         QueryError::Circular(functor) => {
             let functor = vm.database.value(&mut vm.heap, functor)?;
-            vm.raise(Raised::Cause("UNSTRATIFIED-RULES", functor))
+            vm.exchange.raise(Raised::Cause("UNSTRATIFIED-RULES", functor))
         }
         QueryError::Unbound(functor) => {
             let functor = vm.database.value(&mut vm.heap, functor)?;
-            vm.raise(Raised::Cause("UNBOUND-LOGICAL-VARIABLE", functor))
+            vm.exchange.raise(Raised::Cause("UNBOUND-LOGICAL-VARIABLE", functor))
         }
-        QueryError::TooLarge => vm.program_error("a rule builds too large a term"),
+        QueryError::TooLarge => vm.exchange.program_error("a rule builds too large a term"),
     }
 }
 
@@ -185,12 +185,12 @@ pub(super) fn begin_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let key = checked(vm, opened)?;
     let mut left = STEP;
     let progress = vm.database.step(key, &mut left);
-    vm.charge(4 * work + 8 * (STEP - left.min(STEP)));
+    vm.exchange.charge(4 * work + 8 * (STEP - left.min(STEP)));
     match progress {
         Some(Ok(Progress::Done)) => {
             let mut work = 0;
             let answers = vm.database.answers(&mut vm.heap, key, &mut work);
-            vm.charge(4 * work);
+            vm.exchange.charge(4 * work);
             if let Some(Ok(list)) = answers
                 && !vm.database.has_all_given(key)
             {
@@ -227,7 +227,7 @@ pub(super) fn query_answers(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let key = query(vm, arguments[0])?;
     let mut work = 0;
     let answers = vm.database.answers(&mut vm.heap, key, &mut work);
-    vm.charge(4 * work);
+    vm.exchange.charge(4 * work);
     Ok(open(vm, answers)??)
 }
 
@@ -240,7 +240,7 @@ pub(super) fn retract_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let key = query(vm, arguments[0])?;
     let mut work = 0;
     let fact = vm.database.retract_next(&mut vm.heap, key, &mut work);
-    vm.charge(4 * work);
+    vm.exchange.charge(4 * work);
     Ok(open(vm, fact)??)
 }
 

@@ -12,7 +12,7 @@ pub(crate) fn set_function(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[name, function] = arguments else { unreachable!("the table says two") };
     let symbol = vm.definable(name, "function")?;
     if !vm.heap.is(function, Kind::Function) {
-        return vm.type_error(function, "FUNCTION");
+        return vm.exchange.type_error(function, "FUNCTION");
     }
     vm.heap.symbol_set_function(symbol, function);
     vm.heap.symbol_set_macro_function(symbol, Value::NIL);
@@ -29,7 +29,7 @@ pub(crate) fn set_macro(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[name, function] = arguments else { unreachable!("the table says two") };
     let symbol = vm.definable(name, "macro")?;
     if !vm.heap.is(function, Kind::Function) {
-        return vm.type_error(function, "FUNCTION");
+        return vm.exchange.type_error(function, "FUNCTION");
     }
     vm.world.remove_function(&mut vm.heap, name)?;
     vm.heap.symbol_set_macro_function(symbol, function);
@@ -43,7 +43,7 @@ pub(crate) fn proclaim_special(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let flags = vm.heap.flags(symbol, Kind::Symbol).unwrap_or(0);
     if flags & Symbol::CONSTANT != 0 {
         let name = vm.describe(name);
-        return vm.program_error(format!("{name} is a constant and cannot be made a variable"));
+        return vm.exchange.program_error(format!("{name} is a constant and cannot be made a variable"));
     }
     vm.heap.set_flags(symbol, Kind::Symbol, flags | Symbol::SPECIAL);
     Ok(name)
@@ -60,11 +60,11 @@ pub(crate) fn define_constant(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             return Ok(name);
         }
         let (name, old) = (vm.describe(name), vm.describe(old));
-        return vm.program_error(format!("{name} is a constant already, with the value {old}"));
+        return vm.exchange.program_error(format!("{name} is a constant already, with the value {old}"));
     }
     if vm.world.is_locked(&vm.heap, name) || flags & Symbol::SPECIAL != 0 {
         let name = vm.describe(name);
-        return vm.program_error(format!("{name} is a variable and cannot be made a constant"));
+        return vm.exchange.program_error(format!("{name} is a variable and cannot be made a constant"));
     }
     vm.heap.symbol_set_value(symbol, value);
     vm.heap.set_flags(symbol, Kind::Symbol, flags | Symbol::CONSTANT);
@@ -79,7 +79,7 @@ impl Vm {
     pub(crate) fn symbol_object(&mut self, v: Value) -> Result<Value, Exit> {
         match self.world.object_of(&self.heap, v) {
             Some(object) => Ok(object),
-            None => self.type_error(v, "SYMBOL"),
+            None => self.exchange.type_error(v, "SYMBOL"),
         }
     }
 
@@ -91,7 +91,7 @@ impl Vm {
         let object = self.symbol_object(v)?;
         if self.world.is_locked(&self.heap, v) {
             let name = self.describe(v);
-            return self.program_error(format!(
+            return self.exchange.program_error(format!(
                 "{name} belongs to the language and cannot be redefined as a {what}"
             ));
         }

@@ -12,7 +12,7 @@ fn compare(vm: &mut Vm, test: Test, arguments: &[Value]) -> Outcome {
     let result = equality::same(&vm.heap, test, arguments[0], arguments[1], &mut work);
     match result {
         Some(result) => {
-            vm.charge_elements(LIMIT - work);
+            vm.exchange.charge_elements(LIMIT - work);
             Ok(result.into())
         }
         None => Err(Exit::Slowly),

@@ -47,17 +47,17 @@ impl Vm {
     fn take_job(&mut self, handle: Value) -> Result<(JobId, CompilerJob), Exit> {
         match self.compiler.take(handle) {
             Some(taken) => Ok(taken),
-            None => self.program_error("this compilation is over"),
+            None => self.exchange.program_error("this compilation is over"),
         }
     }
 
     /// `value` as data of a compilation.
     fn as_form(&mut self, unit: &mut Unit, value: Value, span: Span) -> Result<Datum, Exit> {
         let datum = unit.datum_of(&self.heap, &self.world, value, span);
-        self.charge(unit.take_work() as usize);
+        self.exchange.charge(unit.take_work() as usize);
         match datum {
             Ok(datum) => Ok(datum),
-            Err(error) => self.program_error(error.to_string()),
+            Err(error) => self.exchange.program_error(error.to_string()),
         }
     }
 
@@ -79,7 +79,7 @@ impl Vm {
             "LOADED" if running.keeps => Answer::Object(unit.pin(outcome)),
             "LOADED" => Answer::Loaded,
             "FAILED" => Answer::Failed(self.designated_text(outcome)?),
-            _ => return self.program_error(format!("{kind} is no outcome of a step")),
+            _ => return self.exchange.program_error(format!("{kind} is no outcome of a step")),
         })
     }
 
@@ -91,7 +91,7 @@ impl Vm {
                 let prepared = self.macro_call(call);
                 match self.loaded(prepared)? {
                     Some(call) => results[1..].copy_from_slice(&call),
-                    None => return self.program_error("the macro is not defined any more"),
+                    None => return self.exchange.program_error("the macro is not defined any more"),
                 }
                 "EXPAND"
             }
@@ -122,7 +122,7 @@ impl Vm {
         let mut list = Value::NIL;
         for diagnostic in diagnostics.iter().rev() {
             let text = compilation.render(diagnostic);
-            self.charge(text.len());
+            self.exchange.charge(text.len());
             let severity = match diagnostic.severity {
                 Severity::Warning => "WARNING",
                 Severity::Error => "ERROR",
@@ -145,12 +145,12 @@ impl Vm {
             })
         })?;
         let end = read.as_ref().map_or(text.len(), |&(_, end)| end);
-        self.charge(end.saturating_sub(start));
+        self.exchange.charge(end.saturating_sub(start));
         match read {
             Ok((Some(datum), end)) => Ok(Read::Datum(datum, end)),
             Ok((None, _)) => Ok(Read::End),
             Err((true, text)) => Ok(Read::Unfinished(text)),
-            Err((false, text)) => self.raise(Raised::Reader(text)),
+            Err((false, text)) => self.exchange.raise(Raised::Reader(text)),
         }
     }
 
@@ -158,7 +158,7 @@ impl Vm {
     fn read_object(&mut self, datum: &Datum) -> Outcome {
         let mut unit = Unit::default();
         let value = unit.value_of(&mut self.heap, &mut self.world, datum);
-        self.charge(unit.take_work() as usize);
+        self.exchange.charge(unit.take_work() as usize);
         Ok(value?)
     }
 }
@@ -184,20 +184,20 @@ pub(super) fn begin_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(%begin-file name text)`: the compilation of a whole text.
 pub(super) fn begin_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let name = vm.designated_text(arguments[0])?;
-    let Some(text) = vm.text_of(arguments[1]) else { return vm.type_error(arguments[1], "STRING") };
-    vm.charge(text.len());
+    let Some(text) = vm.text_of(arguments[1]) else { return vm.exchange.type_error(arguments[1], "STRING") };
+    vm.exchange.charge(text.len());
     let compilation = vm.with_compiler(|_, compiler| compiler.compile_text(&name, &text))?;
     Ok(vm.begin(compilation, Unit::default()))
 }
 
 /// `(%compiled-file path)`: the functions that run the top-level forms of a compiled file, in order, as a list.
 pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
-    let bytes = match vm.host.read_file(&path) {
+    let Some(path) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
+    let bytes = match vm.outside.host.read_file(&path) {
         Ok(bytes) => bytes,
         Err(error) => return vm.file_error("read", &path, &error),
     };
-    vm.charge(bytes.len() * 4);
+    vm.exchange.charge(bytes.len() * 4);
     let sound = file::read(&bytes).map_err(|error| error.to_string());
     let sound = sound.and_then(|module| verify(&module).map(|()| module).map_err(|error| error.to_string()));
     match sound {
@@ -205,14 +205,14 @@ pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             let functions = load(&mut vm.heap, &mut vm.world, &module, &mut Alone::default());
             vm.loaded(functions)
         }
-        Err(reason) => vm.raise(Raised::File(path, format!("it is no sound program: {reason}"))),
+        Err(reason) => vm.exchange.raise(Raised::File(path, format!("it is no sound program: {reason}"))),
     }
 }
 
 /// `(%open-text text &optional name)`
 pub(super) fn open_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(text) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
-    vm.charge(text.len());
+    let Some(text) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
+    vm.exchange.charge(text.len());
     let name = match optional(arguments, 1) {
         name if name.is_nil() => None,
         name => Some(vm.designated_text(name)?),
@@ -226,7 +226,7 @@ pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (id, mut job) = vm.take_job(arguments[0])?;
     let next = match &mut job {
         CompilerJob::Text(text) => begin_form(vm, text),
-        _ => vm.program_error("there are no forms in a compilation"),
+        _ => vm.exchange.program_error("there are no forms in a compilation"),
     };
     vm.compiler.put_back(id, job);
     next
@@ -235,7 +235,7 @@ pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 fn begin_form(vm: &mut Vm, text: &mut FormText) -> Outcome {
     match vm.read_datum(&text.text, text.position, text.name.as_deref())? {
         Read::End => Ok(Value::NIL),
-        Read::Unfinished(what) => vm.raise(Raised::Reader(what)),
+        Read::Unfinished(what) => vm.exchange.raise(Raised::Reader(what)),
         Read::Datum(datum, end) => {
             let part = text.part(end);
             let compilation = vm.with_compiler(|_, compiler| compiler.compile_form(datum, part))?;
@@ -250,7 +250,7 @@ pub(super) fn compilation_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (id, mut job) = vm.take_job(arguments[0])?;
     let told = match &mut job {
         CompilerJob::Compilation(running) => step(vm, running, arguments[1], arguments[2]),
-        _ => vm.program_error("a text is no compilation"),
+        _ => vm.exchange.program_error("a text is no compilation"),
     };
     vm.compiler.put_back(id, job);
     told
@@ -266,7 +266,7 @@ fn step(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Valu
             let step = running.compilation.step(vm, answer, &mut |more| nodes += more);
             running.unit = vm.world.unit.replace(outer);
             // A node is worth more than a cell of a list.
-            vm.charge(nodes as usize * 16);
+            vm.exchange.charge(nodes as usize * 16);
             step
         }
     };
@@ -274,7 +274,7 @@ fn step(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Valu
     let told = vm.tell(&*running.compilation, &step);
     running.unit = vm.world.unit.replace(outer);
     let work = running.unit.take_work();
-    vm.charge(work as usize);
+    vm.exchange.charge(work as usize);
     running.keeps = matches!(step, Step::Load { keep: true, .. });
     if told == Err(Exit::Collect) {
         running.step = Some(step);

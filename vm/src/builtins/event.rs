@@ -51,7 +51,7 @@ impl Vm {
         match count.as_fixnum() {
             Some(count) => Ok(self.count_of_events(events)? != count),
             None if count.is_nil() => Ok(false),
-            None => self.type_error(count, "INTEGER"),
+            None => self.exchange.type_error(count, "INTEGER"),
         }
     }
 
@@ -62,9 +62,9 @@ impl Vm {
         {
             return Ok(pair.car);
         }
-        self.values.clear();
+        self.exchange.values.clear();
         while let Some(pair) = self.heap.as_cons(rest) {
-            self.values.push(pair.car);
+            self.exchange.values.push(pair.car);
             rest = pair.cdr;
         }
         Err(Exit::Values)
@@ -118,12 +118,12 @@ pub(super) fn eventp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%any-event)`
 pub(super) fn any_event(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
-    Ok(vm.any_event)
+    Ok(vm.scheduler.any_event)
 }
 
 /// Parks the running task until `events` are signalled: at the wait where it was parked, or at a new one.
 pub(super) fn take_or_park(vm: &mut Vm, events: Value, options: WaitOptions) -> Outcome {
-    let wait = vm.task().wait;
+    let wait = vm.scheduler.task().wait;
     if wait.is_true() && vm.take_signalled(wait).is_none() {
         return vm.park(wait, None);
     }
@@ -133,7 +133,7 @@ pub(super) fn take_or_park(vm: &mut Vm, events: Value, options: WaitOptions) -> 
 
 /// Waits for a signal of `events` that comes after they were counted, if `count` is not `NIL`, and gives its arguments.
 fn wait_for_signal(vm: &mut Vm, events: Value, count: Value, what: Value) -> Outcome {
-    let wait = vm.task().wait;
+    let wait = vm.scheduler.task().wait;
     if wait.is_true() {
         return match vm.take_signalled(wait) {
             Some(arguments) => {
@@ -184,9 +184,9 @@ pub(super) fn open_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn take_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let wait = arguments[0];
     if !vm.heap.is(wait, Kind::Wait) {
-        return vm.type_error(wait, "ATOM");
+        return vm.exchange.type_error(wait, "ATOM");
     }
-    vm.task_mut().wait = Value::NIL;
+    vm.scheduler.task_mut().wait = Value::NIL;
     if let Some(arguments) = vm.take_kept(wait) {
         return Ok(arguments);
     }
@@ -213,14 +213,16 @@ pub(super) fn deadline(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%sleep-until deadline)`
 pub(super) fn sleep_until(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(deadline) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
+    let Some(deadline) = arguments[0].as_index() else {
+        return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
+    };
     let now = vm.time();
     if now >= deadline as u64 { Ok(Value::NIL) } else { vm.park(Value::NIL, Some(deadline as u64)) }
 }
 
 /// `(%pass-turn)`: done again when the others have had theirs.
 pub(super) fn pass_turn(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
-    vm.passes_turn = true;
+    vm.scheduler.turn.passes_turn = true;
     vm.end_slice_here();
     Ok(Value::NIL)
 }

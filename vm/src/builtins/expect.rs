@@ -10,7 +10,7 @@ impl Vm {
     #[cold]
     pub(crate) fn specifier_error<T>(&mut self, datum: Value, specifier: &str) -> Result<T, Exit> {
         let specifier = self.read_specifier(specifier)?;
-        self.raise(Raised::Type(datum, Expected::Specifier(specifier)))
+        self.exchange.raise(Raised::Type(datum, Expected::Specifier(specifier)))
     }
 
     fn read_specifier(&mut self, text: &str) -> Result<Value, AllocError> {
@@ -61,7 +61,7 @@ impl Vm {
     pub(crate) fn index_below(&mut self, v: Value, length: usize) -> Result<usize, Exit> {
         match v.as_index() {
             Some(index) if index < length => Ok(index),
-            _ => self.index_error(v, length),
+            _ => self.exchange.index_error(v, length),
         }
     }
 
@@ -69,7 +69,7 @@ impl Vm {
     pub(crate) fn count(&mut self, v: Value) -> Result<usize, Exit> {
         match v.as_index() {
             Some(count) => Ok(count),
-            None => self.type_error(v, "UNSIGNED-BYTE"),
+            None => self.exchange.type_error(v, "UNSIGNED-BYTE"),
         }
     }
 }

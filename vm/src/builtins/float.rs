@@ -86,7 +86,7 @@ fn part(vm: &mut Vm, v: Value, part: impl Fn((Value, Value)) -> Value, of_intege
     match vm.heap.ratio(v) {
         Some(parts) => Ok(part(parts)),
         None if crate::number::is_integer(&vm.heap, v) => Ok(of_integer),
-        None => vm.type_error(v, "RATIONAL"),
+        None => vm.exchange.type_error(v, "RATIONAL"),
     }
 }
 
@@ -103,9 +103,9 @@ pub(super) fn rationalize(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 fn convert(vm: &mut Vm, op: &'static str, v: Value, from_float: fn(f64) -> Ratio) -> Outcome {
     match vm.heap.as_double(v) {
         Some(x) if x.is_finite() => vm.ratio_value(op, &from_float(x)),
-        Some(_) => vm.raise(Raised::Arithmetic(op, "the float is not a finite number".into())),
+        Some(_) => vm.exchange.raise(Raised::Arithmetic(op, "the float is not a finite number".into())),
         None if crate::number::is_rational(&vm.heap, v) => Ok(v),
-        None => vm.type_error(v, "REAL"),
+        None => vm.exchange.type_error(v, "REAL"),
     }
 }
 
@@ -125,7 +125,7 @@ pub(super) fn to_float(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 fn the_float(vm: &mut Vm, v: Value) -> Result<f64, Exit> {
     match vm.heap.as_double(v) {
         Some(x) => Ok(x),
-        None => vm.type_error(v, "FLOAT"),
+        None => vm.exchange.type_error(v, "FLOAT"),
     }
 }
 
@@ -135,7 +135,7 @@ fn finite_float(vm: &mut Vm, op: &'static str, v: Value) -> Result<f64, Exit> {
     if x.is_finite() {
         return Ok(x);
     }
-    vm.raise(Raised::Arithmetic(op, "the float is not a finite number".into()))
+    vm.exchange.raise(Raised::Arithmetic(op, "the float is not a finite number".into()))
 }
 
 /// `decode-float`
@@ -208,10 +208,10 @@ pub(super) fn decimal_digits(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         Some(&v) => match v.as_fixnum() {
             // Below the last digit of the least double, and above the first of the greatest, nothing changes.
             Some(position) => Some(position.clamp(-1100, 400) as i32),
-            None => return vm.type_error(v, "FIXNUM"),
+            None => return vm.exchange.type_error(v, "FIXNUM"),
         },
     };
-    vm.charge(4096);
+    vm.exchange.charge(4096);
     let (point, digits) = text::float_digits(x.abs(), position);
     let digits = vm.heap.alloc_str(&digits)?;
     vm.give_values(&[Value::small(point), digits])

@@ -15,10 +15,10 @@ fn fold(vm: &mut Vm, operation: BitOperation, identity: i32, integers: &[Value])
         [] => Ok(Value::small(identity)),
         [only] => vm.integer(only).map(|_| only),
         [first, ref rest @ ..] => {
-            let ceiling = vm.charged + limit::WORK_LIMIT as u64 / 64;
+            let ceiling = vm.exchange.charged + limit::WORK_LIMIT as u64 / 64;
             let mut result = first;
             for &integer in rest {
-                if vm.charged > ceiling {
+                if vm.exchange.charged > ceiling {
                     return Err(Exit::Slowly);
                 }
                 result = bits::join(vm, operation, result, integer)?;
@@ -55,7 +55,7 @@ fn joined(vm: &mut Vm, arguments: &[Value], operation: BitOperation, turned: [bo
     let turn = |n: Int, turn: bool| if turn { n.complement() } else { n };
     let a = turn(vm.integer(arguments[0])?, turned[0]);
     let b = turn(vm.integer(arguments[1])?, turned[1]);
-    vm.charge(a.len() + b.len());
+    vm.exchange.charge(a.len() + b.len());
     let result = turn(a.joined(operation, &b), turned[2]);
     vm.integer_value("LOGAND", &result)
 }
@@ -109,7 +109,7 @@ pub(super) fn logbitp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `logcount`
 pub(super) fn logcount(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let n = vm.integer(arguments[0])?;
-    vm.charge(n.len());
+    vm.exchange.charge(n.len());
     Ok(Value::index(n.count_bits() as usize))
 }
 
@@ -139,7 +139,7 @@ fn is_odd(vm: &mut Vm, v: Value) -> Result<bool, Exit> {
         Some(n) => Ok(n & 1 == 1),
         None => match vm.heap.bignum(v) {
             Some(big) => Ok(big.limbs.first().is_some_and(|limb| limb & 1 == 1)),
-            None => vm.type_error(v, "INTEGER"),
+            None => vm.exchange.type_error(v, "INTEGER"),
         },
     }
 }
@@ -148,7 +148,7 @@ fn is_odd(vm: &mut Vm, v: Value) -> Result<bool, Exit> {
 fn field(vm: &mut Vm, size: Value, position: Value) -> Result<(u64, u64), Exit> {
     let mut count = |v: Value| match v.as_index() {
         Some(n) => Ok(n as u64),
-        None => vm.type_error(v, "UNSIGNED-BYTE"),
+        None => vm.exchange.type_error(v, "UNSIGNED-BYTE"),
     };
     Ok((count(size)?, count(position)?))
 }
@@ -186,7 +186,7 @@ pub(super) fn gcd_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (long, short) = (a.len().max(b.len()), a.len().min(b.len()));
     vm.check_work(2 * (long - short + 1), short)?;
     let steps = gcd::steps_within_limit(long);
-    vm.charge(8 * long * steps);
+    vm.exchange.charge(8 * long * steps);
     let (a, b) = gcd::reduced(&a, &b, steps);
     let (a, b) = (vm.integer_value("GCD", &a)?, vm.integer_value("GCD", &b)?);
     vm.give_values(&[a, b])
@@ -237,7 +237,7 @@ pub(super) fn parse_integer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     };
     let radix = radix(vm, radix_value)?;
     let Some(length) = characters_of(&vm.heap, string).map(<[u32]>::len) else {
-        return vm.type_error(string, "STRING");
+        return vm.exchange.type_error(string, "STRING");
     };
     let (start, end) = vm.bounds(start, end, length)?;
     if end - start > COPY_LIMIT {
@@ -257,10 +257,10 @@ pub(super) fn parse_integer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         let shown = characters[start..end.min(start + 80)].iter();
         let shown: String =
             shown.map(|&code| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
-        return vm.raise(Raised::Parse(format!("{problem} \"{shown}\"")));
+        return vm.exchange.raise(Raised::Parse(format!("{problem} \"{shown}\"")));
     }
     let digits = (end - start).min(limit::PARSED_DIGITS);
-    vm.charge(end - start + digits * digits / 64);
+    vm.exchange.charge(end - start + digits * digits / 64);
     let (value, at) = match parsed {
         text::Parsed::Integer(n, at) => {
             let at = if junk_allowed.is_true() { at } else { end };

@@ -23,9 +23,9 @@ impl Vm {
             rest = pair.cdr;
         }
         if !rest.is_nil() {
-            return self.type_error(rest, "LIST");
+            return self.exchange.type_error(rest, "LIST");
         }
-        self.charge_elements(items.len());
+        self.exchange.charge_elements(items.len());
         Ok(items)
     }
 
@@ -35,9 +35,9 @@ impl Vm {
         for length in 0..=LIMIT {
             match self.heap.as_cons(rest) {
                 Some(pair) => rest = pair.cdr,
-                None if length == 0 && !rest.is_nil() => return self.type_error(rest, "LIST"),
+                None if length == 0 && !rest.is_nil() => return self.exchange.type_error(rest, "LIST"),
                 None => {
-                    self.charge_elements(length);
+                    self.exchange.charge_elements(length);
                     return Ok((length, rest));
                 }
             }
@@ -65,10 +65,10 @@ impl Vm {
             rest = match self.heap.as_cons(rest) {
                 Some(pair) => pair.cdr,
                 None if rest.is_nil() => return Ok(rest),
-                None => return self.type_error(rest, "LIST"),
+                None => return self.exchange.type_error(rest, "LIST"),
             };
         }
-        self.charge_elements(count);
+        self.exchange.charge_elements(count);
         Ok(rest)
     }
 
@@ -76,7 +76,7 @@ impl Vm {
         let part = if step == b'a' { self.heap.car(v) } else { self.heap.cdr(v) };
         match part {
             Some(part) => Ok(part),
-            None => self.type_error(v, "LIST"),
+            None => self.exchange.type_error(v, "LIST"),
         }
     }
 }
@@ -127,7 +127,7 @@ pub(super) fn cons(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 fn check_pair(vm: &mut Vm, v: Value) -> Result<(), Exit> {
-    if v.is_cons() { Ok(()) } else { vm.type_error(v, "CONS") }
+    if v.is_cons() { Ok(()) } else { vm.exchange.type_error(v, "CONS") }
 }
 
 /// `(rplaca pair object)`
@@ -161,7 +161,7 @@ pub(super) fn endp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if arguments[0].is_list() {
         Ok(arguments[0].is_nil().into())
     } else {
-        vm.type_error(arguments[0], "LIST")
+        vm.exchange.type_error(arguments[0], "LIST")
     }
 }
 
@@ -175,7 +175,7 @@ pub(super) fn nth(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn nthcdr(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let count = vm.integer(arguments[0])?;
     if count.is_negative() {
-        return vm.type_error(arguments[0], "UNSIGNED-BYTE");
+        return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
     }
     let count = arguments[0].as_index().unwrap_or(usize::MAX);
     if count <= LIMIT {
@@ -184,7 +184,7 @@ pub(super) fn nthcdr(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     // A long way down a short list is short.
     match vm.measure(arguments[1])? {
         (_, end) if end.is_nil() => Ok(end),
-        (_, end) => vm.type_error(end, "LIST"),
+        (_, end) => vm.exchange.type_error(end, "LIST"),
     }
 }
 
@@ -192,19 +192,19 @@ pub(super) fn nthcdr(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn list_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match vm.measure(arguments[0])? {
         (length, end) if end.is_nil() => Ok(Value::index(length)),
-        (_, end) => vm.type_error(end, "LIST"),
+        (_, end) => vm.exchange.type_error(end, "LIST"),
     }
 }
 
 /// `(list &rest objects)`
 pub(super) fn list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.charge_elements(arguments.len());
+    vm.exchange.charge_elements(arguments.len());
     Ok(vm.heap.list(arguments)?)
 }
 
 /// `(list* object &rest objects)`
 pub(super) fn list_star(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.charge_elements(arguments.len());
+    vm.exchange.charge_elements(arguments.len());
     match arguments.split_last() {
         Some((&last, items)) => Ok(vm.heap.list_with_tail(items, last)?),
         None => Ok(Value::NIL),
@@ -217,7 +217,7 @@ pub(super) fn make_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if size > LIMIT {
         return Err(Exit::Slowly);
     }
-    vm.charge_elements(size);
+    vm.exchange.charge_elements(size);
     let mut list = Value::NIL;
     for _ in 0..size {
         list = vm.heap.cons(arguments[1], list)?;
@@ -267,7 +267,7 @@ fn count_of(vm: &mut Vm, arguments: &[Value]) -> Result<usize, Exit> {
         Some(&count) => {
             let n = vm.integer(count)?;
             if n.is_negative() {
-                return vm.type_error(count, "UNSIGNED-BYTE");
+                return vm.exchange.type_error(count, "UNSIGNED-BYTE");
             }
             Ok(count.as_index().unwrap_or(usize::MAX))
         }
@@ -319,7 +319,7 @@ pub(super) fn revappend(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn nreconc(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (_, end) = vm.measure(arguments[0])?;
     if !end.is_nil() {
-        return vm.type_error(end, "LIST");
+        return vm.exchange.type_error(end, "LIST");
     }
     Ok(reverse_in_place(vm, arguments[0], arguments[1]))
 }
@@ -376,7 +376,7 @@ pub(super) fn copy_tree(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             open.push(half);
         }
     }
-    vm.charge_elements(visited);
+    vm.exchange.charge_elements(visited);
     Ok(copy)
 }
 
@@ -418,7 +418,9 @@ pub(super) fn pairlis(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let keys = vm.list_items(arguments[0], LIMIT)?;
     let data = vm.list_items(arguments[1], LIMIT)?;
     if keys.len() != data.len() {
-        return vm.raise(crate::raise::Raised::Simple("the lists of keys and data differ in length".into()));
+        return vm
+            .exchange
+            .raise(crate::raise::Raised::Simple("the lists of keys and data differ in length".into()));
     }
     let mut alist = optional(arguments, 2);
     for (&key, &datum) in keys.iter().zip(&data) {

@@ -19,11 +19,11 @@ fn find_pair(
     let mut rest = list;
     for visited in 0..LIMIT {
         let Some(pair) = vm.heap.as_cons(rest) else {
-            vm.charge_elements(visited);
-            return if rest.is_nil() { Ok(rest) } else { vm.type_error(rest, "LIST") };
+            vm.exchange.charge_elements(visited);
+            return if rest.is_nil() { Ok(rest) } else { vm.exchange.type_error(rest, "LIST") };
         };
         if wanted(vm, pair.car)? {
-            vm.charge_elements(visited);
+            vm.exchange.charge_elements(visited);
             return Ok(rest);
         }
         rest = pair.cdr;
@@ -49,7 +49,7 @@ fn assoc(vm: &mut Vm, test: Test, arguments: &[Value], by_value: bool) -> Outcom
     let found = find_pair(vm, arguments[1], |vm, entry| match vm.heap.as_cons(entry) {
         Some(pair) => same(vm, test, item, if by_value { pair.cdr } else { pair.car }, &mut work),
         None if entry.is_nil() => Ok(false),
-        None => vm.type_error(entry, "LIST"),
+        None => vm.exchange.type_error(entry, "LIST"),
     })?;
     Ok(vm.heap.car(found).unwrap_or(Value::NIL))
 }
@@ -94,12 +94,12 @@ fn find_property(vm: &mut Vm, plist: Value, indicator: Value) -> Result<Option<[
     let (mut before, mut rest) = (Value::NIL, plist);
     for visited in 0..LIMIT {
         let Some(pair) = vm.heap.as_cons(rest) else {
-            vm.charge_elements(visited);
-            return if rest.is_nil() { Ok(None) } else { vm.type_error(rest, "LIST") };
+            vm.exchange.charge_elements(visited);
+            return if rest.is_nil() { Ok(None) } else { vm.exchange.type_error(rest, "LIST") };
         };
-        let Some(value) = vm.heap.as_cons(pair.cdr) else { return vm.type_error(pair.cdr, "CONS") };
+        let Some(value) = vm.heap.as_cons(pair.cdr) else { return vm.exchange.type_error(pair.cdr, "CONS") };
         if pair.car == indicator {
-            vm.charge_elements(visited);
+            vm.exchange.charge_elements(visited);
             return Ok(Some([before, rest, pair.cdr]));
         }
         (before, rest) = (pair.cdr, value.cdr);
@@ -160,15 +160,15 @@ pub(super) fn get_properties(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         if work > LIMIT {
             return Err(Exit::Slowly);
         }
-        let Some(value) = vm.heap.as_cons(pair.cdr) else { return vm.type_error(pair.cdr, "CONS") };
+        let Some(value) = vm.heap.as_cons(pair.cdr) else { return vm.exchange.type_error(pair.cdr, "CONS") };
         if indicators.contains(&pair.car) {
             return vm.give_values(&[pair.car, value.car, rest]);
         }
         rest = value.cdr;
     }
     if !rest.is_nil() {
-        return vm.type_error(rest, "LIST");
+        return vm.exchange.type_error(rest, "LIST");
     }
-    vm.charge_elements(work);
+    vm.exchange.charge_elements(work);
     vm.give_values(&[Value::NIL; 3])
 }

@@ -7,7 +7,7 @@ use smallvec::{SmallVec, smallvec};
 use crate::builtins::LIMIT;
 use crate::heap::Kind;
 use crate::raise::{Exit, Outcome};
-use crate::spawn::SpawnOptions;
+use crate::run::SpawnOptions;
 use crate::task::TaskId;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -21,7 +21,7 @@ impl Vm {
     fn wait_of_net(&mut self, net: Value) -> Result<Value, Exit> {
         match self.heap.as_cons(net) {
             Some(pair) if self.heap.is(pair.car, Kind::Wait) => Ok(pair.car),
-            _ => self.type_error(net, "LIST"),
+            _ => self.exchange.type_error(net, "LIST"),
         }
     }
 
@@ -46,7 +46,7 @@ impl Vm {
 /// `(%spawn-net what names &rest functions)`
 pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (what, mut names, functions) = (arguments[0], arguments[1], &arguments[2..]);
-    let priority = vm.task().priority;
+    let priority = vm.scheduler.task().priority;
     let wait = vm.open_wait(Value::NIL, WaitOptions { keeps: true, what, ..WaitOptions::default() })?;
     let mut made: SmallVec<[TaskId; 8]> = SmallVec::new();
     // The first value is the net.
@@ -59,7 +59,7 @@ pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             let function = vm.callable(function)?;
             let id = vm.make_task(function, Value::NIL, options)?;
             made.push(id);
-            values.push(vm.tasks.get(id).map_or(Value::NIL, |task| task.object));
+            values.push(vm.scheduler.tasks.get(id).map_or(Value::NIL, |task| task.object));
         }
         let tasks = vm.heap.list(&values[1..])?;
         Ok(vm.heap.cons(wait, tasks)?)
@@ -72,7 +72,7 @@ pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             return Err(exit);
         }
     }
-    vm.charge(64 * functions.len());
+    vm.exchange.charge(64 * functions.len());
     vm.give_values(&values)
 }
 
@@ -80,9 +80,9 @@ pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn await_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[net, status] = arguments else { unreachable!("the table says two") };
     let wait = vm.wait_of_net(net)?;
-    vm.task_mut().wait = Value::NIL;
+    vm.scheduler.task_mut().wait = Value::NIL;
     while let Some(task) = vm.take_kept(wait) {
-        vm.charge(1);
+        vm.exchange.charge(1);
         if vm.slot(task, event::STATE) == status {
             return Ok(task);
         }

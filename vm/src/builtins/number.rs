@@ -17,10 +17,10 @@ fn fold(
     rest: &[Value],
     step: impl Fn(&mut Vm, Value, Value) -> Outcome,
 ) -> Outcome {
-    let ceiling = vm.charged + WORK_LIMIT as u64 / 64;
+    let ceiling = vm.exchange.charged + WORK_LIMIT as u64 / 64;
     let mut result = first;
     for &number in rest {
-        if vm.charged > ceiling {
+        if vm.exchange.charged > ceiling {
             return Err(Exit::Slowly);
         }
         result = step(vm, result, number)?;
@@ -80,7 +80,7 @@ fn chain(
     holds: impl Fn(&mut Vm, Value, Value) -> Result<bool, Exit>,
 ) -> Outcome {
     if let Some(&wrong) = numbers.iter().find(|&&v| !number::is_number(&vm.heap, v)) {
-        return vm.type_error(wrong, expected);
+        return vm.exchange.type_error(wrong, expected);
     }
     for pair in numbers.windows(2) {
         if !holds(vm, pair[0], pair[1])? {

@@ -24,7 +24,7 @@ impl Vm {
             Some(package) => Ok(package),
             None => {
                 let text = format!("there is no package {name}");
-                self.raise(Raised::Package(name, text))
+                self.exchange.raise(Raised::Package(name, text))
             }
         }
     }
@@ -55,9 +55,9 @@ impl Vm {
                 Some(symbol) => symbols.push(symbol),
                 None if self.world.is_symbol(&self.heap, item) => {
                     let name = self.describe(item);
-                    return self.program_error(format!("the symbol {name} belongs to no package"));
+                    return self.exchange.program_error(format!("the symbol {name} belongs to no package"));
                 }
-                None => return self.type_error(item, "SYMBOL"),
+                None => return self.exchange.type_error(item, "SYMBOL"),
             }
         }
         Ok(symbols)
@@ -66,7 +66,7 @@ impl Vm {
     fn changed<T>(&mut self, result: Result<T, PackageError>) -> Result<T, Exit> {
         match result {
             Ok(value) => Ok(value),
-            Err(error) => self.program_error(error.to_string()),
+            Err(error) => self.exchange.program_error(error.to_string()),
         }
     }
 
@@ -192,7 +192,7 @@ pub(super) fn use_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn export(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let symbols = vm.named_symbols(arguments[0])?;
     let package = vm.package_or_current(optional(arguments, 1))?;
-    vm.charge(symbols.len() * 16);
+    vm.exchange.charge(symbols.len() * 16);
     for symbol in symbols {
         let changed = vm.world.packages_mut().export(package, &symbol);
         vm.changed(changed)?;
@@ -204,7 +204,7 @@ pub(super) fn export(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn import(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let symbols = vm.named_symbols(arguments[0])?;
     let package = vm.package_or_current(optional(arguments, 1))?;
-    vm.charge(symbols.len() * 16);
+    vm.exchange.charge(symbols.len() * 16);
     for symbol in symbols {
         let changed = vm.world.packages_mut().import(package, &symbol);
         vm.changed(changed)?;
@@ -216,7 +216,7 @@ pub(super) fn import(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn shadow(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let names = vm.designated_names(arguments[0])?;
     let package = vm.package_or_current(optional(arguments, 1))?;
-    vm.charge(names.len() * 16);
+    vm.exchange.charge(names.len() * 16);
     for name in names {
         let changed = vm.world.packages_mut().shadow(package, &name);
         vm.changed(changed)?;
@@ -226,9 +226,9 @@ pub(super) fn shadow(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(intern name &optional package)`
 pub(super) fn intern(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(name) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
+    let Some(name) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
     let package = vm.package_or_current(optional(arguments, 1))?;
-    vm.charge(name.len());
+    vm.exchange.charge(name.len());
     let (symbol, status) = vm.world.packages_mut().intern(package, &name);
     let value = vm.world.intern(&mut vm.heap, &symbol)?;
     let status = vm.status(status);
@@ -237,9 +237,9 @@ pub(super) fn intern(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(find-symbol name &optional package)`
 pub(super) fn find_symbol(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(name) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
+    let Some(name) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
     let package = vm.package_or_current(optional(arguments, 1))?;
-    vm.charge(name.len());
+    vm.exchange.charge(name.len());
     match vm.world.packages().find(package, &name) {
         Some((symbol, status)) => {
             let value = vm.world.intern(&mut vm.heap, &symbol)?;
@@ -257,7 +257,7 @@ pub(super) fn external_symbols(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let names = packages.external_names(package);
     let symbols: Vec<Symbol> =
         names.iter().filter_map(|name| packages.find(package, name)).map(|(symbol, _)| symbol).collect();
-    vm.charge(symbols.len() * 16);
+    vm.exchange.charge(symbols.len() * 16);
     let mut values = Vec::with_capacity(symbols.len());
     for symbol in &symbols {
         values.push(vm.world.intern(&mut vm.heap, symbol)?);
@@ -268,7 +268,7 @@ pub(super) fn external_symbols(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(%symbol-qualifier symbol)`
 pub(super) fn symbol_qualifier(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match vm.qualifier(arguments[0]) {
-        None => vm.type_error(arguments[0], "SYMBOL"),
+        None => vm.exchange.type_error(arguments[0], "SYMBOL"),
         Some(Qualifier::None) => Ok(Value::NIL),
         Some(qualifier) => Ok(vm.heap.alloc_str(&qualifier.to_string())?),
     }

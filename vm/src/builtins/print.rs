@@ -13,7 +13,7 @@ use super::COPY_LIMIT;
 /// `(%string-escaped string)`: in quotes, with `\` before `"` and `\`.
 pub(super) fn string_escaped(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(characters) = characters_of(&vm.heap, arguments[0]) else {
-        return vm.type_error(arguments[0], "STRING");
+        return vm.exchange.type_error(arguments[0], "STRING");
     };
     if characters.len() > COPY_LIMIT {
         return Err(Exit::Slowly);
@@ -27,13 +27,15 @@ pub(super) fn string_escaped(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         written.push(code);
     }
     written.push('"' as u32);
-    vm.charge(written.len());
+    vm.exchange.charge(written.len());
     Ok(vm.heap.alloc_string(&written)?)
 }
 
 /// `(%character-escaped character)`: `#\` and the character or its name.
 pub(super) fn character_escaped(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(code) = arguments[0].as_character() else { return vm.type_error(arguments[0], "CHARACTER") };
+    let Some(code) = arguments[0].as_character() else {
+        return vm.exchange.type_error(arguments[0], "CHARACTER");
+    };
     let mut written = vec!['#' as u32, '\\' as u32];
     match character::name(code) {
         // The printer shows a blank as itself.
@@ -47,7 +49,9 @@ pub(super) fn character_escaped(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `:upcase`, 1 for `:downcase`, 2 for `:capitalize`; with `escape`, what would not read back goes between bars.
 pub(super) fn symbol_name_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[name, case, escape] = arguments else { unreachable!("the table says three") };
-    let Some(characters) = characters_of(&vm.heap, name) else { return vm.type_error(name, "STRING") };
+    let Some(characters) = characters_of(&vm.heap, name) else {
+        return vm.exchange.type_error(name, "STRING");
+    };
     if characters.len() > COPY_LIMIT {
         return Err(Exit::Slowly);
     }
@@ -56,7 +60,7 @@ pub(super) fn symbol_name_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     } else {
         in_case(characters, case)
     };
-    vm.charge(written.len());
+    vm.exchange.charge(written.len());
     Ok(vm.heap.alloc_string(&written)?)
 }
 

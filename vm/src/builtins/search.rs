@@ -21,7 +21,7 @@ fn position(vm: &mut Vm, test: Test, arguments: &[Value]) -> Outcome {
         return Ok(found.map_or(Value::NIL, Value::index));
     }
     if !sequence.is_list() {
-        return vm.type_error(sequence, "SEQUENCE");
+        return vm.exchange.type_error(sequence, "SEQUENCE");
     }
     let items = vm.list_items(sequence, LIMIT)?;
     let (start, end) = vm.bounds(start, end, items.len())?;
@@ -87,7 +87,7 @@ fn in_vector(
             found
         }
     };
-    vm.charge_elements(match &found {
+    vm.exchange.charge_elements(match &found {
         Ok(Some(index)) if from_end => range.len() - index,
         Ok(Some(index)) => *index,
         _ => range.len(),
@@ -118,7 +118,7 @@ pub(super) fn count_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         if end - start > COPY_LIMIT {
             return Err(Exit::Slowly);
         }
-        vm.charge_elements(end - start);
+        vm.exchange.charge_elements(end - start);
         let heap = &vm.heap;
         let is_it = |index: &usize| {
             vector_elements(heap, sequence)
@@ -128,7 +128,7 @@ pub(super) fn count_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return Ok(Value::index((start..end).filter(is_it).count()));
     }
     if !sequence.is_list() {
-        return vm.type_error(sequence, "SEQUENCE");
+        return vm.exchange.type_error(sequence, "SEQUENCE");
     }
     let items = vm.list_items(sequence, LIMIT)?;
     let (start, end) = vm.bounds(start, end, items.len())?;

@@ -28,7 +28,7 @@ impl Vm {
         to_start: usize,
         count: usize,
     ) -> Result<(), Exit> {
-        self.charge_elements(count);
+        self.exchange.charge_elements(count);
         if self.heap.vector_copy(from, from_start, to, to_start, count).is_some() {
             return Ok(());
         }
@@ -57,7 +57,7 @@ impl Vm {
     pub(crate) fn vector_length(&mut self, v: Value) -> Result<usize, Exit> {
         match vector_length(&self.heap, v) {
             Some(length) => Ok(length),
-            None => self.type_error(v, "VECTOR"),
+            None => self.exchange.type_error(v, "VECTOR"),
         }
     }
 }
@@ -111,7 +111,7 @@ pub(super) fn length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return Ok(Value::index(length));
     }
     if !sequence.is_list() {
-        return vm.type_error(sequence, "SEQUENCE");
+        return vm.exchange.type_error(sequence, "SEQUENCE");
     }
     super::list::list_length(vm, arguments)
 }
@@ -123,7 +123,7 @@ pub(super) fn elt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         let length = elements.len();
         return match index.as_index().and_then(|index| elements.get(index)) {
             Some(value) => Ok(value),
-            None => vm.index_error(index, length),
+            None => vm.exchange.index_error(index, length),
         };
     }
     let pair = list_element(vm, sequence, index)?;
@@ -148,19 +148,19 @@ pub(super) fn set_elt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// The pair of a list that has its element `index`.
 fn list_element(vm: &mut Vm, list: Value, index: Value) -> Outcome {
     if !list.is_list() {
-        return vm.type_error(list, "SEQUENCE");
+        return vm.exchange.type_error(list, "SEQUENCE");
     }
-    let Some(wanted) = index.as_index() else { return vm.type_error(index, "UNSIGNED-BYTE") };
+    let Some(wanted) = index.as_index() else { return vm.exchange.type_error(index, "UNSIGNED-BYTE") };
     let mut rest = list;
     for at in 0..=wanted.min(LIMIT) {
         match vm.heap.as_cons(rest) {
             Some(_) if at == wanted => {
-                vm.charge_elements(at);
+                vm.exchange.charge_elements(at);
                 return Ok(rest);
             }
             Some(pair) => rest = pair.cdr,
-            None if rest.is_nil() => return vm.index_error(index, at),
-            None => return vm.type_error(rest, "LIST"),
+            None if rest.is_nil() => return vm.exchange.index_error(index, at),
+            None => return vm.exchange.type_error(rest, "LIST"),
         }
     }
     Err(Exit::Slowly)
@@ -175,7 +175,7 @@ pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         if end - start > COPY_LIMIT {
             return Err(Exit::Slowly);
         }
-        vm.charge_elements(end - start);
+        vm.exchange.charge_elements(end - start);
         if let Some(characters) = vm.heap.string(sequence) {
             let part: SmallVec<[u32; 64]> = SmallVec::from_slice(&characters[start..end]);
             return Ok(vm.heap.alloc_string(&part)?);
@@ -184,7 +184,7 @@ pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return part.map_or(Ok(Value::NIL), |part| new_vector(vm, &part));
     }
     if !sequence.is_list() {
-        return vm.type_error(sequence, "SEQUENCE");
+        return vm.exchange.type_error(sequence, "SEQUENCE");
     }
     if end.is_nil() || end.as_index().is_none_or(|end| end > LIMIT) {
         let items = vm.list_items(sequence, LIMIT)?;
@@ -202,10 +202,10 @@ pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
                 rest = pair.cdr;
             }
             None if rest.is_nil() => return vm.bounds_error(start, end, items.len()),
-            None => return vm.type_error(rest, "LIST"),
+            None => return vm.exchange.type_error(rest, "LIST"),
         }
     }
-    vm.charge_elements(wanted);
+    vm.exchange.charge_elements(wanted);
     if start.as_index().is_none_or(|start| start > wanted) {
         // The failure tells how long the list is.
         let length = vm.list_items(sequence, LIMIT)?.len();
@@ -229,12 +229,12 @@ pub(super) fn reverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             return Err(Exit::Slowly);
         }
         let mut reversed = Owned::of(elements);
-        vm.charge_elements(length);
+        vm.exchange.charge_elements(length);
         reversed.reverse();
         return new_vector(vm, &reversed);
     }
     if !sequence.is_list() {
-        return vm.type_error(sequence, "SEQUENCE");
+        return vm.exchange.type_error(sequence, "SEQUENCE");
     }
     let mut items = vm.list_items(sequence, LIMIT)?;
     items.reverse();
@@ -249,7 +249,7 @@ pub(super) fn nreverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         if length > COPY_LIMIT {
             return Err(Exit::Slowly);
         }
-        vm.charge_elements(length);
+        vm.exchange.charge_elements(length);
         if let Some(characters) = vm.heap.string_mut(data) {
             characters[..length].reverse();
             return Ok(sequence);
@@ -264,7 +264,7 @@ pub(super) fn nreverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return Ok(sequence);
     }
     if !sequence.is_list() {
-        return vm.type_error(sequence, "SEQUENCE");
+        return vm.exchange.type_error(sequence, "SEQUENCE");
     }
     // The walk comes first, so that nothing has changed where it ends badly.
     super::list::list_length(vm, arguments)?;
@@ -281,7 +281,7 @@ pub(super) fn fill(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
     let data = data_of(&vm.heap, vector).unwrap_or(vector);
     vm.check_element(data, item)?;
-    vm.charge_elements(end - start);
+    vm.exchange.charge_elements(end - start);
     if let Some(code) = item.as_character()
         && let Some(characters) = vm.heap.string_mut(data)
     {
@@ -326,7 +326,7 @@ pub(super) fn list_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     for item in items {
         match item.as_character() {
             Some(code) => characters.push(code),
-            None => return vm.type_error(item, "CHARACTER"),
+            None => return vm.exchange.type_error(item, "CHARACTER"),
         }
     }
     Ok(vm.heap.alloc_string(&characters)?)
@@ -340,7 +340,7 @@ pub(super) fn vector_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if end - start > LIMIT {
         return Err(Exit::Slowly);
     }
-    vm.charge_elements(end - start);
+    vm.exchange.charge_elements(end - start);
     let mut list = Value::NIL;
     for index in (start..end).rev() {
         let item = vector_elements(&vm.heap, vector).and_then(|elements| elements.get(index));

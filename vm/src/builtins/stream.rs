@@ -8,11 +8,11 @@ use smallvec::SmallVec;
 
 use crate::builtins::expect::optional;
 use crate::builtins::{COPY_LIMIT, LIMIT};
-use crate::control::End;
 use crate::equality::characters_of;
 use crate::heap::Kind;
 use crate::host::{HostError, Output, Taken, WriteMode, column_after, encode};
 use crate::raise::{Exit, Expected, Outcome, Raised};
+use crate::task::End;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::stream::{StreamKind, make_stream, slot};
@@ -46,11 +46,6 @@ pub(crate) enum Source {
 }
 
 impl Vm {
-    /// Writes what standard output has gathered.
-    pub(crate) fn flush_output(&mut self) {
-        self.console.flush(&mut *self.host);
-    }
-
     fn stream_slot(&self, stream: Value, index: usize) -> Value {
         self.heap.record(stream, Kind::Stream).map_or(Value::NIL, |slots| slots[index])
     }
@@ -76,17 +71,17 @@ impl Vm {
         };
         let Some(kind) = StreamKind::of(&self.heap, stream) else {
             let expected = Expected::Type("STREAM");
-            return self.raise(match v {
+            return self.exchange.raise(match v {
                 Value::NIL => Raised::Variable(variable, stream, expected),
                 _ => Raised::Type(stream, expected),
             });
         };
         if kind.is_input() != is_input {
             let text = if is_input { "it is not open for reading" } else { "it is not open for writing" };
-            return self.raise(Raised::Stream(stream, text.into()));
+            return self.exchange.raise(Raised::Stream(stream, text.into()));
         }
         if self.stream_slot(stream, slot::OPEN).is_nil() {
-            return self.raise(Raised::Stream(stream, "it is closed".into()));
+            return self.exchange.raise(Raised::Stream(stream, "it is closed".into()));
         }
         Ok((stream, kind))
     }
@@ -100,14 +95,14 @@ impl Vm {
             Taken::WouldBlock => Err(Exit::Park),
             Taken::Failed(error) => {
                 let stream = self.world.streams[0];
-                self.raise(Raised::Stream(stream, format!("it cannot be read: {error}")))
+                self.exchange.raise(Raised::Stream(stream, format!("it cannot be read: {error}")))
             }
         }
     }
 
     fn next_character(&mut self, stream: Value, kind: StreamKind) -> Result<Option<u32>, Exit> {
         if kind == StreamKind::StandardInput {
-            let taken = self.console.read(&mut *self.host);
+            let taken = self.outside.console.read(&mut *self.outside.host);
             return self.taken(taken);
         }
         let position = self.stream_index(stream, slot::POSITION);
@@ -122,7 +117,7 @@ impl Vm {
 
     fn give_back(&mut self, stream: Value, kind: StreamKind, character: u32) {
         if kind == StreamKind::StandardInput {
-            self.console.unread(character);
+            self.outside.console.unread(character);
             return;
         }
         let position = self.stream_index(stream, slot::POSITION);
@@ -132,19 +127,23 @@ impl Vm {
     /// What reading gives at the end: a failure, or the value given for it.
     fn at_end(&mut self, stream: Value, arguments: &[Value], first: usize) -> Outcome {
         let is_error = arguments.get(first).is_none_or(|v| v.is_true());
-        if is_error { self.raise(Raised::EndOfFile(stream)) } else { Ok(optional(arguments, first + 1)) }
+        if is_error {
+            self.exchange.raise(Raised::EndOfFile(stream))
+        } else {
+            Ok(optional(arguments, first + 1))
+        }
     }
 
     /// Writes characters to an open output stream.
     fn write_characters(&mut self, stream: Value, kind: StreamKind, characters: &[u32]) -> Result<(), Exit> {
-        self.charge_elements(characters.len());
+        self.exchange.charge_elements(characters.len());
         match kind {
             StreamKind::StandardOutput => {
-                self.console.write(&mut *self.host, Output::Standard, characters);
+                self.outside.console.write(&mut *self.outside.host, Output::Standard, characters);
                 self.check_output()
             }
             StreamKind::StandardError => {
-                self.console.write(&mut *self.host, Output::Error, characters);
+                self.outside.console.write(&mut *self.outside.host, Output::Error, characters);
                 Ok(())
             }
             _ => {
@@ -184,7 +183,7 @@ impl Vm {
             self.set_stream_slot(stream, slot::BUFFER, next);
             self.set_stream_slot(stream, slot::FULL, full);
             self.set_stream_slot(stream, slot::BEFORE, Value::index(before));
-            self.charge_elements(GATHERED);
+            self.exchange.charge_elements(GATHERED);
             return Ok(rest.len());
         }
         let larger = self.heap.alloc_string_filled(end.max(capacity * 2).max(FIRST_BUFFER), 0)?;
@@ -194,7 +193,7 @@ impl Vm {
             room[position..end].copy_from_slice(characters);
         }
         self.set_stream_slot(stream, slot::BUFFER, larger);
-        self.charge_elements(position);
+        self.exchange.charge_elements(position);
         Ok(end)
     }
 
@@ -209,38 +208,40 @@ impl Vm {
         // What cannot be written is not tried again: the next block would fail too, and closing has to succeed.
         self.set_stream_slot(stream, slot::POSITION, Value::small(0));
         self.set_stream_slot(stream, slot::MODE, Value::small(1));
-        match self.host.write_file(&name, &bytes, mode) {
+        match self.outside.host.write_file(&name, &bytes, mode) {
             Ok(()) => Ok(()),
-            Err(error) => self.raise(Raised::Stream(stream, format!("it cannot be written: {error}"))),
+            Err(error) => {
+                self.exchange.raise(Raised::Stream(stream, format!("it cannot be written: {error}")))
+            }
         }
     }
 
     /// What becomes of a program whose standard output could not be written: it fails, or if nobody reads it any more,
     /// the run ends.
     fn check_output(&mut self) -> Result<(), Exit> {
-        if self.console.is_broken() {
-            if self.exit_status.is_some() {
+        if self.outside.console.is_broken() {
+            if self.outside.exit_status.is_some() {
                 // The run ends already; its cleanups may go on writing.
                 return Ok(());
             }
-            self.exit_status = Some(self.host.broken_output_status());
+            self.outside.exit_status = Some(self.outside.host.broken_output_status());
             self.abort_others();
             self.begin_end(End::Aborted);
             return Err(Exit::Unwind);
         }
-        match self.console.take_failure() {
+        match self.outside.console.take_failure() {
             None => Ok(()),
             Some(error) => {
                 let stream = self.world.streams[1];
-                self.raise(Raised::Stream(stream, format!("it cannot be written: {error}")))
+                self.exchange.raise(Raised::Stream(stream, format!("it cannot be written: {error}")))
             }
         }
     }
 
     fn column_of(&self, stream: Value, kind: StreamKind) -> usize {
         match kind {
-            StreamKind::StandardOutput => self.console.column(Output::Standard),
-            StreamKind::StandardError => self.console.column(Output::Error),
+            StreamKind::StandardOutput => self.outside.console.column(Output::Standard),
+            StreamKind::StandardError => self.outside.console.column(Output::Error),
             _ => self.stream_index(stream, slot::COLUMN),
         }
     }
@@ -260,7 +261,7 @@ impl Vm {
     /// The characters of a string, also of one with a fill pointer, from `start` to before `end`.
     pub(crate) fn characters(&mut self, v: Value, start: Value, end: Value) -> Result<Vec<u32>, Exit> {
         let Some(length) = characters_of(&self.heap, v).map(<[u32]>::len) else {
-            return self.type_error(v, "STRING");
+            return self.exchange.type_error(v, "STRING");
         };
         let (start, end) = self.bounds(start, end, length)?;
         Ok(characters_of(&self.heap, v).map_or(Vec::new(), |characters| characters[start..end].to_vec()))
@@ -273,7 +274,10 @@ impl Vm {
     pub(crate) fn source(&mut self, stream: Value) -> Result<Source, Exit> {
         let (stream, kind) = self.designated_stream(stream, true)?;
         if kind == StreamKind::StandardInput {
-            return Ok(Source::Console { text: self.console.pending(), is_at_end: self.console.is_at_end() });
+            return Ok(Source::Console {
+                text: self.outside.console.pending(),
+                is_at_end: self.outside.console.is_at_end(),
+            });
         }
         let (start, end) = (self.stream_index(stream, slot::POSITION), self.stream_index(stream, slot::END));
         let buffer = self.stream_slot(stream, slot::BUFFER);
@@ -285,7 +289,7 @@ impl Vm {
     /// Takes so many characters from a stream of which `source` was the rest.
     pub(crate) fn skip_source(&mut self, stream: Value, source: &Source, characters: usize) {
         if matches!(source, Source::Console { .. }) {
-            self.console.skip(characters);
+            self.outside.console.skip(characters);
         } else if let Ok((stream, _)) = self.designated_stream(stream, true) {
             let position = self.stream_index(stream, slot::POSITION) + characters;
             self.set_stream_slot(stream, slot::POSITION, Value::index(position));
@@ -297,12 +301,12 @@ impl Vm {
     /// # Errors
     /// [`Exit::Park`] if there is none yet, or a failure.
     pub(crate) fn more_input(&mut self) -> Result<(), Exit> {
-        let taken = self.console.fill(&mut *self.host);
+        let taken = self.outside.console.fill(&mut *self.outside.host);
         self.taken(taken).map(|_| ())
     }
 
     pub(super) fn file_error<T>(&mut self, what: &str, path: &str, error: &HostError) -> Result<T, Exit> {
-        self.raise(Raised::File(path.into(), format!("it cannot be {what}: {error}")))
+        self.exchange.raise(Raised::File(path.into(), format!("it cannot be {what}: {error}")))
     }
 }
 
@@ -317,7 +321,7 @@ pub(super) fn standard_stream(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(%make-string-input string start end)`
 pub(super) fn make_string_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let characters = vm.few_characters(arguments[0], arguments[1], arguments[2])?;
-    vm.charge_elements(characters.len());
+    vm.exchange.charge_elements(characters.len());
     let buffer = vm.heap.alloc_string(&characters)?;
     Ok(make_stream(&mut vm.heap, StreamKind::StringInput, buffer, 0, characters.len())?)
 }
@@ -325,7 +329,7 @@ pub(super) fn make_string_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(%read-from-copy string)`
 pub(super) fn read_from_copy(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(length) = vm.heap.string(arguments[0]).map(<[u32]>::len) else {
-        return vm.type_error(arguments[0], "SIMPLE-STRING");
+        return vm.exchange.type_error(arguments[0], "SIMPLE-STRING");
     };
     Ok(make_stream(&mut vm.heap, StreamKind::StringInput, arguments[0], 0, length)?)
 }
@@ -346,7 +350,7 @@ pub(super) fn make_string_output(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
 pub(super) fn get_output_stream_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = arguments[0];
     if StreamKind::of(&vm.heap, stream) != Some(StreamKind::StringOutput) {
-        return vm.type_error(stream, "STRING-STREAM");
+        return vm.exchange.type_error(stream, "STRING-STREAM");
     }
     let position = vm.stream_index(stream, slot::POSITION);
     let length = vm.stream_index(stream, slot::BEFORE) + position;
@@ -360,7 +364,7 @@ pub(super) fn get_output_stream_string(vm: &mut Vm, arguments: &[Value]) -> Outc
     }
     let buffer = vm.stream_slot(stream, slot::BUFFER);
     gathered.extend_from_slice(vm.heap.string(buffer).map_or(&[], |all| &all[..position]));
-    vm.charge_elements(length);
+    vm.exchange.charge_elements(length);
     let text = vm.heap.alloc_string(&gathered)?;
     vm.set_stream_slot(stream, slot::POSITION, Value::small(0));
     vm.set_stream_slot(stream, slot::FULL, Value::NIL);
@@ -372,7 +376,7 @@ pub(super) fn get_output_stream_string(vm: &mut Vm, arguments: &[Value]) -> Outc
 pub(super) fn gathered_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = arguments[0];
     if StreamKind::of(&vm.heap, stream) != Some(StreamKind::StringOutput) {
-        return vm.type_error(stream, "STRING-STREAM");
+        return vm.exchange.type_error(stream, "STRING-STREAM");
     }
     Ok(Value::index(vm.stream_index(stream, slot::BEFORE) + vm.stream_index(stream, slot::POSITION)))
 }
@@ -395,7 +399,7 @@ pub(super) fn take_gathered(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%open-input path)`
 pub(super) fn open_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
+    let Some(path) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
     let buffer = file_text(vm, arguments)?;
     let length = vm.heap.string(buffer).map_or(0, <[u32]>::len);
     let stream = make_stream(&mut vm.heap, StreamKind::StringInput, buffer, 0, length)?;
@@ -406,14 +410,14 @@ pub(super) fn open_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%open-output path mode)`: 0 replaces the file, 1 appends, 2 makes it and fails if there is one.
 pub(super) fn open_output(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
+    let Some(path) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
     let mode = vm.index_below(arguments[1], 3)?;
     let buffer = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
     let stream = make_stream(&mut vm.heap, StreamKind::FileOutput, buffer, 0, 0)?;
     let name = vm.heap.alloc_str(&path)?;
     vm.set_stream_slot(stream, slot::NAME, name);
     // Nothing is written at once, so that a file that cannot be made fails here.
-    match vm.host.write_file(&path, &[], write_mode(mode)) {
+    match vm.outside.host.write_file(&path, &[], write_mode(mode)) {
         Ok(()) => {
             vm.set_stream_slot(stream, slot::MODE, Value::small(1));
             Ok(stream)
@@ -434,13 +438,15 @@ fn write_mode(mode: usize) -> WriteMode {
 /// `(%close stream abort)`
 pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = arguments[0];
-    let Some(kind) = StreamKind::of(&vm.heap, stream) else { return vm.type_error(stream, "STREAM") };
+    let Some(kind) = StreamKind::of(&vm.heap, stream) else {
+        return vm.exchange.type_error(stream, "STREAM");
+    };
     if vm.stream_slot(stream, slot::OPEN).is_nil() {
         return Ok(Value::NIL);
     }
     match kind {
         StreamKind::StandardInput | StreamKind::StandardOutput | StreamKind::StandardError => {
-            vm.flush_output();
+            vm.outside.flush();
             return Ok(Value::T);
         }
         StreamKind::FileOutput if arguments[1].is_nil() => {
@@ -454,10 +460,10 @@ pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%file-text path)`
 pub(super) fn file_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
-    match vm.host.read_file(&path) {
+    let Some(path) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
+    match vm.outside.host.read_file(&path) {
         Ok(bytes) => {
-            vm.charge_elements(bytes.len());
+            vm.exchange.charge_elements(bytes.len());
             Ok(vm.heap.alloc_str(&String::from_utf8_lossy(&bytes))?)
         }
         Err(error) => vm.file_error("read", &path, &error),
@@ -466,14 +472,14 @@ pub(super) fn file_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%file-exists-p path)`
 pub(super) fn file_exists_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
-    Ok(Value::boolean(vm.host.file_exists(&path)))
+    let Some(path) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
+    Ok(Value::boolean(vm.outside.host.file_exists(&path)))
 }
 
 /// `(%delete-file path)`
 pub(super) fn delete_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
-    match vm.host.delete_file(&path) {
+    let Some(path) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
+    match vm.outside.host.delete_file(&path) {
         Ok(()) => Ok(Value::T),
         Err(error) => vm.file_error("deleted", &path, &error),
     }
@@ -490,7 +496,7 @@ pub(super) fn streamp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn input_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match StreamKind::of(&vm.heap, arguments[0]) {
         Some(kind) => Ok(Value::boolean(kind.is_input())),
-        None => vm.type_error(arguments[0], "STREAM"),
+        None => vm.exchange.type_error(arguments[0], "STREAM"),
     }
 }
 
@@ -498,7 +504,7 @@ pub(super) fn input_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn output_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match StreamKind::of(&vm.heap, arguments[0]) {
         Some(kind) => Ok(Value::boolean(!kind.is_input())),
-        None => vm.type_error(arguments[0], "STREAM"),
+        None => vm.exchange.type_error(arguments[0], "STREAM"),
     }
 }
 
@@ -506,14 +512,14 @@ pub(super) fn output_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn open_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match StreamKind::of(&vm.heap, arguments[0]) {
         Some(_) => Ok(vm.stream_slot(arguments[0], slot::OPEN)),
-        None => vm.type_error(arguments[0], "STREAM"),
+        None => vm.exchange.type_error(arguments[0], "STREAM"),
     }
 }
 
 /// `(%stream-kind stream)`: a keyword, and the name of its file.
 pub(super) fn stream_sort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(kind) = StreamKind::of(&vm.heap, arguments[0]) else {
-        return vm.type_error(arguments[0], "STREAM");
+        return vm.exchange.type_error(arguments[0], "STREAM");
     };
     let name = vm.stream_slot(arguments[0], slot::NAME);
     let kind = match kind {

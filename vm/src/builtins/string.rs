@@ -43,7 +43,7 @@ impl Vm {
         if end - start > COPY_LIMIT {
             return Err(Exit::Slowly);
         }
-        self.charge_elements(end - start);
+        self.exchange.charge_elements(end - start);
         Ok((string, start, end))
     }
 }
@@ -61,7 +61,7 @@ pub(super) fn string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// The string and the index that `char` and its like are given.
 fn string_and_index(vm: &mut Vm, string: Value, index: Value) -> Result<usize, Exit> {
     if !is_string(vm, string) {
-        return vm.type_error(string, "STRING");
+        return vm.exchange.type_error(string, "STRING");
     }
     // Like `aref`, it sees the characters behind a fill pointer.
     let size = all_elements(&vm.heap, string).map_or(0, |elements| elements.len());
@@ -92,12 +92,14 @@ pub(super) fn set_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(%make-string size character)`
 pub(super) fn make_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let size = vm.count(arguments[0])?;
-    let Some(code) = arguments[1].as_character() else { return vm.type_error(arguments[1], "CHARACTER") };
+    let Some(code) = arguments[1].as_character() else {
+        return vm.exchange.type_error(arguments[1], "CHARACTER");
+    };
     if size > COPY_LIMIT {
         return Err(Exit::Slowly);
     }
     let string = vm.heap.alloc_string_filled(size, code)?;
-    vm.charge_elements(size);
+    vm.exchange.charge_elements(size);
     Ok(string)
 }
 
@@ -180,7 +182,7 @@ fn converted(vm: &mut Vm, arguments: &[Value], case: Case) -> Outcome {
 /// The string itself, a part of it changed.
 fn converted_in_place(vm: &mut Vm, arguments: &[Value], case: Case) -> Outcome {
     if !is_string(vm, arguments[0]) {
-        return vm.type_error(arguments[0], "STRING");
+        return vm.exchange.type_error(arguments[0], "STRING");
     }
     let (string, start, end) = vm.designated_part(arguments[0], arguments[1], arguments[2])?;
     let data = data_of(&vm.heap, string).unwrap_or(string);
@@ -227,7 +229,7 @@ fn trimmed(vm: &mut Vm, arguments: &[Value], left: bool, right: bool) -> Outcome
             (0..elements.len().min(COPY_LIMIT)).filter_map(|index| elements.get(index)).collect()
         }
         None if arguments[0].is_list() => vm.list_items(arguments[0], COPY_LIMIT)?,
-        None => return vm.type_error(arguments[0], "SEQUENCE"),
+        None => return vm.exchange.type_error(arguments[0], "SEQUENCE"),
     };
     let (string, start, end) = vm.designated_part(arguments[1], Value::NIL, Value::NIL)?;
     let characters = &text(vm, string)[start..end];
@@ -238,7 +240,7 @@ fn trimmed(vm: &mut Vm, arguments: &[Value], left: bool, right: bool) -> Outcome
         if right { characters.iter().rposition(is_kept).map_or(from, |at| at + 1) } else { characters.len() };
     let kept = characters[from..to.max(from)].to_vec();
     let removed = end - start - kept.len();
-    vm.charge_elements(bag.len().saturating_mul(removed));
+    vm.exchange.charge_elements(bag.len().saturating_mul(removed));
     Ok(vm.heap.alloc_string(&kept)?)
 }
 
@@ -261,13 +263,15 @@ pub(super) fn right_trim(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn concat(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut characters: SmallVec<[u32; 64]> = SmallVec::new();
     for &string in arguments {
-        let Some(more) = characters_of(&vm.heap, string) else { return vm.type_error(string, "STRING") };
+        let Some(more) = characters_of(&vm.heap, string) else {
+            return vm.exchange.type_error(string, "STRING");
+        };
         if characters.len() + more.len() > COPY_LIMIT {
             return Err(Exit::Slowly);
         }
         characters.extend_from_slice(more);
     }
-    vm.charge_elements(characters.len());
+    vm.exchange.charge_elements(characters.len());
     Ok(vm.heap.alloc_string(&characters)?)
 }
 
@@ -276,7 +280,7 @@ pub(super) fn search(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[pattern, string, start, end, from_end] = arguments else { unreachable!("the table says five") };
     for v in [pattern, string] {
         if !is_string(vm, v) {
-            return vm.type_error(v, "STRING");
+            return vm.exchange.type_error(v, "STRING");
         }
     }
     let (start, end) = vm.bounds(start, end, text(vm, string).len())?;
@@ -313,7 +317,7 @@ pub(super) fn search(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         Some(at) => at,
         None => starts.len(),
     };
-    vm.charge_elements(passed / 4 + compared);
+    vm.exchange.charge_elements(passed / 4 + compared);
     match found {
         Some(at) => Ok(Value::index(start + at)),
         None if is_partial => Err(Exit::Slowly),

@@ -12,7 +12,7 @@ fn check(vm: &mut Vm, name: Value, index: Value, instance: Value) -> Result<usiz
         (Some(class), Some(slots), Some(index)) if index < slots && vm.is_instance(instance, class) => {
             Ok(index)
         }
-        _ => vm.raise(Raised::Type(instance, Expected::Specifier(name))),
+        _ => vm.exchange.raise(Raised::Type(instance, Expected::Specifier(name))),
     }
 }
 

@@ -17,7 +17,7 @@ impl Vm {
         let object = self.symbol_object(v)?;
         match self.heap.symbol(object) {
             Some(cell) => Ok(*cell),
-            None => self.type_error(v, "SYMBOL"),
+            None => self.exchange.type_error(v, "SYMBOL"),
         }
     }
 
@@ -57,10 +57,10 @@ impl Vm {
                 let rest = self.heap.as_cons(pair.cdr);
                 match rest.and_then(|rest| self.world.name_of(&self.heap, rest.car)) {
                     Some(symbol) => Ok(self.world.intern(&mut self.heap, &setf_cell(&symbol))?),
-                    None => self.type_error(name, "SYMBOL"),
+                    None => self.exchange.type_error(name, "SYMBOL"),
                 }
             }
-            _ => self.type_error(name, "SYMBOL"),
+            _ => self.exchange.type_error(name, "SYMBOL"),
         }
     }
 }
@@ -84,7 +84,7 @@ pub(super) fn symbol_plist(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn set_symbol_plist(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let &[symbol, plist] = arguments else { unreachable!("the table says two") };
     if !plist.is_list() {
-        return vm.type_error(plist, "LIST");
+        return vm.exchange.type_error(plist, "LIST");
     }
     let object = vm.symbol_object(symbol)?;
     vm.heap.symbol_set_plist(object, plist);
@@ -122,7 +122,7 @@ pub(super) fn symbol_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let object = vm.symbol_object(arguments[0])?;
     match vm.symbol_value(object) {
         Some(value) => Ok(value),
-        None => vm.raise(Raised::UnboundVariable(arguments[0])),
+        None => vm.exchange.raise(Raised::UnboundVariable(arguments[0])),
     }
 }
 
@@ -160,7 +160,7 @@ pub(super) fn fdefinition(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let symbol = vm.function_cell(arguments[0])?;
     match vm.world.function_of(&vm.heap, symbol).or(vm.world.macro_function_of(&vm.heap, symbol)) {
         Some(function) => Ok(function),
-        None => vm.raise(Raised::UndefinedFunction(arguments[0])),
+        None => vm.exchange.raise(Raised::UndefinedFunction(arguments[0])),
     }
 }
 
@@ -213,8 +213,8 @@ pub(super) fn locked_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(make-symbol name)`
 pub(super) fn make_symbol(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(text) = vm.text_of(arguments[0]) else { return vm.type_error(arguments[0], "STRING") };
-    vm.charge(text.len());
+    let Some(text) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
+    vm.exchange.charge(text.len());
     let name = vm.heap.alloc_str(&text)?;
     Ok(vm.world.make_symbol(&mut vm.heap, name, Value::NIL, 0)?)
 }
@@ -236,7 +236,7 @@ pub(super) fn gensym(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let number = match vm.symbol_value(counter) {
         None => Value::small(1),
         Some(value) if value.as_index().is_some() => value,
-        Some(other) => return vm.type_error(other, "UNSIGNED-BYTE"),
+        Some(other) => return vm.exchange.type_error(other, "UNSIGNED-BYTE"),
     };
     let symbol = named_symbol(vm, &prefix, number)?;
     let next = number.as_fixnum().and_then(|n| Value::fixnum(n + 1)).unwrap_or(Value::small(0));
@@ -282,7 +282,7 @@ impl Vm {
     /// The code of a function, loaded if it was a stub.
     fn code_of_function(&mut self, v: Value) -> Result<Value, Exit> {
         if !self.heap.is(v, Kind::Function) {
-            return self.type_error(v, "FUNCTION");
+            return self.exchange.type_error(v, "FUNCTION");
         }
         self.make_ready(v)?;
         Ok(self.heap.function_code(v).unwrap_or(Value::NIL))

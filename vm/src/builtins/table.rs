@@ -27,7 +27,7 @@ impl From<Trouble> for Exit {
 fn table(vm: &mut Vm, v: Value) -> Result<Table, Exit> {
     match Table::of(&vm.heap, v) {
         Some(table) => Ok(table),
-        None => vm.type_error(v, "HASH-TABLE"),
+        None => vm.exchange.type_error(v, "HASH-TABLE"),
     }
 }
 
@@ -37,7 +37,7 @@ fn table(vm: &mut Vm, v: Value) -> Result<Table, Exit> {
 #[inline(always)]
 fn find(vm: &mut Vm, table: Table, key: Value) -> Result<Place, Exit> {
     let Comparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
-    let (last_key, last_entry) = vm.last_lookup;
+    let (last_key, last_entry) = vm.exchange.last_lookup;
     if last_key == key
         && let Some(value) = table.value_of(&vm.heap, last_entry, key)
     {
@@ -62,11 +62,11 @@ fn search(vm: &mut Vm, table: Table, test: Test, key: Value, hash: u32) -> Resul
     let mut work = LIMIT;
     let found = table.find(&vm.heap, test, key, hash, &mut work)?;
     if work != LIMIT {
-        vm.charge_elements(LIMIT - work);
+        vm.exchange.charge_elements(LIMIT - work);
     }
     Ok(match found {
         Some((entry, value)) => {
-            vm.last_lookup = (key, entry);
+            vm.exchange.last_lookup = (key, entry);
             Place::Entry(entry, value)
         }
         None => Place::None(hash),
@@ -90,11 +90,11 @@ pub(super) fn make_hash_table(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         Some(2) => Comparison::Native(Test::Equal),
         Some(3) => Comparison::Native(Test::Equalp),
         Some(4) => Comparison::Program,
-        _ => return vm.index_error(test, 5),
+        _ => return vm.exchange.index_error(test, 5),
     };
     let size = vm.count(size)?;
     let table = Table::make(&mut vm.heap, comparison, size, [test_function, hash_function])?;
-    vm.charge_elements(size.min(LIMIT));
+    vm.exchange.charge_elements(size.min(LIMIT));
     Ok(table)
 }
 
@@ -144,7 +144,7 @@ fn add(vm: &mut Vm, table: Table, hash: u32, key: Value, value: Value) -> Result
     let room = table.room(&vm.heap);
     table.add(&mut vm.heap, hash, key, value)?;
     let grown = table.room(&vm.heap) - room;
-    vm.charge(4 * grown);
+    vm.exchange.charge(4 * grown);
     Ok(())
 }
 
@@ -155,7 +155,7 @@ pub(super) fn remhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let hash = equality::hash(&vm.heap, test, arguments[0]);
     let mut work = LIMIT;
     let found = table.find(&vm.heap, test, arguments[0], hash, &mut work)?;
-    vm.charge_elements(LIMIT - work);
+    vm.exchange.charge_elements(LIMIT - work);
     Ok(found.is_some_and(|(entry, _)| table.delete(&mut vm.heap, entry, hash)).into())
 }
 
@@ -199,7 +199,7 @@ pub(super) fn table_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let used = table.used(&vm.heap);
     for at in position..used.min(position.saturating_add(LIMIT)) {
         if let Some((key, value)) = table.entry(&vm.heap, at) {
-            vm.charge_elements(at - position);
+            vm.exchange.charge_elements(at - position);
             return vm.give_values(&[Value::index(at + 1), key, value]);
         }
     }
@@ -214,7 +214,7 @@ pub(super) fn table_skip(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
     let position = vm.count(arguments[1])?;
     let end = table.used(&vm.heap).min(position.saturating_add(LIMIT)).max(position);
-    vm.charge_elements(end - position);
+    vm.exchange.charge_elements(end - position);
     let next = (position..end).find(|&at| table.entry(&vm.heap, at).is_some());
     Ok(Value::index(next.unwrap_or(end)))
 }
@@ -242,7 +242,7 @@ pub(super) fn table_candidates(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
     let hash = hash_argument(vm, arguments[1])?;
     let candidates = table.candidates(&vm.heap, hash);
-    vm.charge_elements(candidates.len());
+    vm.exchange.charge_elements(candidates.len());
     let mut list = Value::NIL;
     for (entry, key) in candidates {
         let pair = vm.heap.cons(Value::index(entry), key)?;

@@ -2,11 +2,11 @@
 
 use crate::builtins::LIMIT;
 use crate::builtins::event::take_or_park;
-use crate::control::End;
 use crate::heap::Kind;
-use crate::limit::guard;
 use crate::raise::{Exit, Outcome};
-use crate::spawn::SpawnOptions;
+use crate::run::SpawnOptions;
+use crate::task::End;
+use crate::task::guard;
 use crate::task::{DEFAULT_PRIORITY, PRIORITIES, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -31,7 +31,7 @@ impl Vm {
         match v.as_index() {
             Some(ticks) => Ok(ticks as u64),
             None if self.heap.is(v, Kind::Bignum) => Ok(i64::MAX as u64),
-            None => self.type_error(v, "UNSIGNED-BYTE"),
+            None => self.exchange.type_error(v, "UNSIGNED-BYTE"),
         }
     }
 
@@ -50,9 +50,9 @@ impl Vm {
 impl Vm {
     /// Number and object of the task at a place, if it is one that is listed.
     fn listed_task(&self, place: usize, shows_hidden: bool) -> Option<(u64, Value)> {
-        let is_running = self.running_index as usize == place;
-        let task = if is_running { self.running.as_deref() } else { None };
-        let task = task.or_else(|| self.tasks.at(place as u32))?;
+        let is_running = self.scheduler.turn.index as usize == place;
+        let task = if is_running { self.scheduler.running.as_deref() } else { None };
+        let task = task.or_else(|| self.scheduler.tasks.at(place as u32))?;
         let is_listed = task.state != TaskState::Ended && (shows_hidden || !task.flags.hidden());
         is_listed.then_some((task.number, task.object))
     }
@@ -83,12 +83,12 @@ pub(super) fn spawn(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         notify: argument(5),
     };
     let id = vm.make_task(function, Value::NIL, options)?;
-    Ok(vm.tasks.get(id).map_or(Value::NIL, |task| task.object))
+    Ok(vm.scheduler.tasks.get(id).map_or(Value::NIL, |task| task.object))
 }
 
 /// `(current-task)`
 pub(super) fn current_task(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
-    Ok(vm.task().object)
+    Ok(vm.scheduler.task().object)
 }
 
 /// `(%taskp object)`
@@ -103,7 +103,7 @@ pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let state = vm.slot(task, event::STATE);
     let Some(index) = state.as_index() else { return Ok(state) };
     let known = &vm.world.known;
-    Ok(match vm.tasks.at(index as u32).map(|task| task.state) {
+    Ok(match vm.scheduler.tasks.at(index as u32).map(|task| task.state) {
         Some(TaskState::Waiting | TaskState::Reading) => known.waiting,
         _ => known.running,
     })
@@ -113,9 +113,9 @@ pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn task_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = vm.expect_task(arguments[0])?;
     let Some(index) = vm.slot(task, event::STATE).as_index() else { return Ok(Value::NIL) };
-    let number = match vm.tasks.at(index as u32) {
+    let number = match vm.scheduler.tasks.at(index as u32) {
         Some(task) => task.number,
-        None => vm.task().number,
+        None => vm.scheduler.task().number,
     };
     let parent = vm.slot(task, event::RESULT);
     vm.give_values(&[Value::index(number as usize), parent])
@@ -125,7 +125,7 @@ pub(super) fn task_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn task_ticks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = vm.expect_task(arguments[0])?;
     let Some(index) = vm.slot(task, event::STATE).as_index() else { return Ok(Value::NIL) };
-    let ticks = vm.tasks.at(index as u32).map_or(vm.task().ticks, |task| task.ticks);
+    let ticks = vm.scheduler.tasks.at(index as u32).map_or(vm.scheduler.task().ticks, |task| task.ticks);
     Ok(Value::index(ticks as usize))
 }
 
@@ -140,14 +140,14 @@ pub(super) fn task_end(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 fn give_end(vm: &mut Vm, task: Value) -> Outcome {
     let (status, result) = (vm.slot(task, event::STATE), vm.slot(task, event::RESULT));
     let has_one_value = vm.heap.header(task).is_some_and(|header| header.aux == 1);
-    vm.values.clear();
-    vm.values.push(status);
+    vm.exchange.values.clear();
+    vm.exchange.values.push(status);
     if status == vm.world.known.failed || has_one_value {
-        vm.values.push(result);
+        vm.exchange.values.push(result);
     } else {
         let mut rest = result;
         while let Some(pair) = vm.heap.as_cons(rest) {
-            vm.values.push(pair.car);
+            vm.exchange.values.push(pair.car);
             rest = pair.cdr;
         }
     }
@@ -167,36 +167,38 @@ pub(super) fn task_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `(%all-tasks hidden)`
 pub(super) fn all_tasks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    if vm.tasks.places() > LIMIT {
+    if vm.scheduler.tasks.places() > LIMIT {
         return Err(Exit::Slowly);
     }
     let mut tasks: Vec<(u64, Value)> = Vec::new();
-    for index in 0..vm.tasks.places() {
+    for index in 0..vm.scheduler.tasks.places() {
         tasks.extend(vm.listed_task(index, arguments[0].is_true()));
     }
     tasks.sort_unstable_by_key(|&(number, _)| number);
-    vm.charge(64 * tasks.len());
+    vm.exchange.charge(64 * tasks.len());
     let objects: Vec<Value> = tasks.into_iter().map(|(_, object)| object).collect();
     Ok(vm.heap.list(&objects)?)
 }
 
 /// `(%tasks-from place hidden)`
 pub(super) fn tasks_from(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(place) = arguments[0].as_index() else { return vm.type_error(arguments[0], "UNSIGNED-BYTE") };
-    let end = vm.tasks.places().min(place.saturating_add(LIMIT));
+    let Some(place) = arguments[0].as_index() else {
+        return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
+    };
+    let end = vm.scheduler.tasks.places().min(place.saturating_add(LIMIT));
     let mut objects = Vec::new();
     for index in place..end {
         objects.extend(vm.listed_task(index, arguments[1].is_true()).map(|(_, object)| object));
     }
     let list = vm.heap.list(&objects)?;
-    vm.charge(LIMIT + 8 * objects.len());
-    let next = if end < vm.tasks.places() { Value::index(end) } else { Value::NIL };
+    vm.exchange.charge(LIMIT + 8 * objects.len());
+    let next = if end < vm.scheduler.tasks.places() { Value::index(end) } else { Value::NIL };
     vm.give_values(&[list, next])
 }
 
 /// `(%join task child)`
 pub(super) fn join(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    if vm.task().wait.is_nil() {
+    if vm.scheduler.task().wait.is_nil() {
         vm.point()?;
     }
     let task = vm.expect_task(arguments[0])?;
@@ -211,7 +213,7 @@ pub(super) fn request_abort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point()?;
     let task = vm.expect_task(arguments[0])?;
     if let Some(index) = vm.slot(task, event::STATE).as_index()
-        && let Some(id) = vm.tasks.id_at(index as u32)
+        && let Some(id) = vm.scheduler.tasks.id_at(index as u32)
     {
         vm.abort(id);
     }
@@ -221,18 +223,19 @@ pub(super) fn request_abort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(abort-task task)`
 pub(super) fn abort_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = vm.expect_task(arguments[0])?;
-    if vm.task().wait.is_nil() {
-        if task == vm.task().object {
-            let in_cleanup = vm.task().control.get().is_some_and(|control| !control.running.is_empty());
-            if in_cleanup || vm.task().critical > 0 {
+    if vm.scheduler.task().wait.is_nil() {
+        if task == vm.scheduler.task().object {
+            let in_cleanup =
+                vm.scheduler.task().control.get().is_some_and(|control| !control.running.is_empty());
+            if in_cleanup || vm.scheduler.task().critical > 0 {
                 return request_abort(vm, arguments);
             }
-            vm.task_mut().flags.set_urgent(true);
+            vm.scheduler.task_mut().flags.set_urgent(true);
             vm.begin_end(End::Aborted);
             return Err(Exit::Unwind);
         }
         request_abort(vm, arguments)?;
-        if vm.task().critical > 0 {
+        if vm.scheduler.task().critical > 0 {
             return Ok(Value::NIL);
         }
     }
@@ -243,7 +246,7 @@ pub(super) fn abort_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn add_checkpoint(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point()?;
     vm.wait_for_deliveries()?;
-    let task = vm.task().object;
+    let task = vm.scheduler.task().object;
     let list = vm.heap.cons(arguments[0], vm.slot(task, event::CHECKPOINTS))?;
     vm.signal_event(task, arguments)?;
     vm.set_slot(task, event::CHECKPOINTS, list);
@@ -260,9 +263,9 @@ pub(super) fn checkpoints(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(%make-guard function)`
 pub(super) fn make_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let function = vm.callable(arguments[0])?;
-    let height = vm.task().control.get().map_or(0, |control| control.entries.len());
+    let height = vm.scheduler.task().control.get().map_or(0, |control| control.entries.len());
     let mut slots = [Value::NIL; 4];
-    slots[guard::TASK] = vm.task().object;
+    slots[guard::TASK] = vm.scheduler.task().object;
     slots[guard::FUNCTION] = function;
     slots[guard::IS_OPEN] = Value::T;
     slots[guard::HEIGHT] = Value::index(height);
@@ -272,7 +275,7 @@ pub(super) fn make_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(%interrupt-by guard)`
 pub(super) fn interrupt_by(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point()?;
-    if vm.is_guard(arguments[0]) {
+    if guard::is_guard(&vm.heap, arguments[0]) {
         vm.set_slot(arguments[0], guard::IS_OPEN, Value::T);
         vm.interrupt_by(arguments[0]);
     }
@@ -282,7 +285,7 @@ pub(super) fn interrupt_by(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(%close-guard guard)`
 pub(super) fn close_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point()?;
-    if vm.is_guard(arguments[0]) {
+    if guard::is_guard(&vm.heap, arguments[0]) {
         vm.set_slot(arguments[0], guard::IS_OPEN, Value::NIL);
     }
     Ok(Value::NIL)
@@ -300,12 +303,12 @@ pub(super) fn open_limit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn begin_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     vm.point()?;
     let ticks = i64::from(vm.config.critical_ticks);
-    let task = vm.task_mut();
+    let task = vm.scheduler.task_mut();
     if task.critical == 0 {
         // The ticks of the slice so far are taken off at its end.
         task.critical = 1;
-        vm.critical_left = ticks;
-        vm.critical_is_new = true;
+        vm.scheduler.turn.critical_left = ticks;
+        vm.scheduler.turn.critical_is_new = true;
         vm.end_slice_here();
     } else {
         task.critical = task.critical.saturating_add(1);
@@ -315,7 +318,7 @@ pub(super) fn begin_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
 
 /// `(%end-critical)`
 pub(super) fn end_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
-    let task = vm.task_mut();
+    let task = vm.scheduler.task_mut();
     task.critical = task.critical.saturating_sub(1);
     if task.critical == 0 && task.flags.attention() {
         vm.end_slice_here();

@@ -142,7 +142,7 @@ impl Vm {
         work: impl FnOnce(&mut Vm, &dyn Compile) -> T,
     ) -> Result<T, Exit> {
         let Some(compiler) = self.compiler.compiler.take() else {
-            return self.program_error("this machine has no compiler");
+            return self.exchange.program_error("this machine has no compiler");
         };
         let result = work(self, &*compiler);
         self.compiler.compiler = Some(compiler);

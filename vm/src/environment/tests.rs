@@ -227,8 +227,8 @@ impl Compile for Toy {
 fn native(vm: &mut Vm, builtin: Builtin, arguments: &[Value]) -> Vec<Value> {
     match crate::builtins::native(builtin)(vm, arguments) {
         Ok(value) => vec![value],
-        Err(crate::raise::Exit::Values) => vm.values.clone(),
-        Err(exit) => panic!("{builtin:?}: {exit:?} {:?}", vm.raised),
+        Err(crate::raise::Exit::Values) => vm.exchange.values.clone(),
+        Err(exit) => panic!("{builtin:?}: {exit:?} {:?}", vm.exchange.raised),
     }
 }
 

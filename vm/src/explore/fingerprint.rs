@@ -12,15 +12,15 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::live::Live;
-use crate::control::{Control, End, Entry, Target, Unwinding};
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{Heap, Kind};
 use crate::interp::frames::{Frames, entry_word};
 use crate::load::image_origin;
+use crate::schedule::Due;
 use crate::shape::{Shape, Sort};
 use crate::table::Table;
+use crate::task::{Control, End, Entry, Target, Unwinding};
 use crate::task::{Task, TaskState};
-use crate::timer::Due;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{event, link};
@@ -150,7 +150,8 @@ impl Walk<'_> {
     /// Everything from which the rest is reached.
     fn machine(&mut self) {
         let vm = self.vm;
-        let mut tasks: Vec<&Task> = vm.tasks.iter().filter(|task| task.state != TaskState::Ended).collect();
+        let mut tasks: Vec<&Task> =
+            vm.scheduler.tasks.iter().filter(|task| task.state != TaskState::Ended).collect();
         tasks.sort_unstable_by_key(|task| task.number);
         self.word(tasks.len() as u64);
         for task in &tasks {
@@ -163,8 +164,8 @@ impl Walk<'_> {
         self.timers();
         self.symbols();
         self.facts();
-        self.word(vm.exit_status.map_or(0, |status| 1 + u64::from(status)));
-        self.word(vm.console.noted());
+        self.word(vm.outside.exit_status.map_or(0, |status| 1 + u64::from(status)));
+        self.word(vm.outside.console.noted());
     }
 
     fn task(&mut self, task: &Task) {
@@ -177,13 +178,13 @@ impl Walk<'_> {
             self.control(task, control);
         }
         let mut words = Vec::new();
-        self.vm.accounts.visit_left(task.account, &mut |left| words.push(left));
+        self.vm.scheduler.accounts.visit_left(task.account, &mut |left| words.push(left));
         self.digest.add_all(words.into_iter());
         if let Some(extra) = &task.extra {
             self.word(extra.limits.len() as u64);
             for limit in &extra.limits {
-                self.word(limit.entry() as u64);
-                self.value(limit.expired().unwrap_or(Value::NIL));
+                self.word(limit.entry as u64);
+                self.value(limit.expired.unwrap_or(Value::NIL));
             }
             self.values(&extra.interrupts);
         }
@@ -258,9 +259,9 @@ impl Walk<'_> {
 
     /// What is to happen, in order: when, to whom, and what.
     fn timers(&mut self) {
-        for (time, _, index, due) in self.vm.timers.in_order() {
-            let Some(task) = self.vm.tasks.at(index) else { continue };
-            if !crate::clock::is_wanted(Some(task), due) {
+        for (time, _, index, due) in self.vm.scheduler.timers.in_order() {
+            let Some(task) = self.vm.scheduler.tasks.at(index) else { continue };
+            if !crate::run::is_wanted(Some(task), due) {
                 continue;
             }
             self.time(time);
@@ -270,7 +271,7 @@ impl Walk<'_> {
                 Due::Cleanup => self.word(1),
                 Due::Limit(number) => {
                     let limits = task.extra.iter().flat_map(|extra| &extra.limits);
-                    let position = limits.take_while(|limit| limit.number() != number).count();
+                    let position = limits.take_while(|limit| limit.number != number).count();
                     self.word(2 + position as u64);
                 }
             }
@@ -308,8 +309,8 @@ impl Walk<'_> {
         let vm = self.vm;
         if !vm.database.is_quiet() {
             // Where a query stands is not looked into: no other state is like this one.
-            self.word(vm.serial);
-            self.word(vm.spent);
+            self.word(vm.scheduler.serial);
+            self.word(vm.scheduler.spent);
         }
         vm.database.visit_state(&mut |item| match item {
             Ok(word) => self.word(word),

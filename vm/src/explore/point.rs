@@ -4,11 +4,11 @@
 //! goes on the builtin is done again and let through. Unless schedules are explored that costs a test.
 
 use super::{Grain, Settings};
-use crate::control::{End, Target, Unwinding};
 use crate::raise::Exit;
 use crate::run::RunOutcome;
 use crate::schedule::Choices;
 use crate::task::TaskState;
+use crate::task::{End, Target, Unwinding};
 use crate::vm::Vm;
 
 /// What the machine knows of points.
@@ -51,11 +51,11 @@ impl Vm {
     /// Whether the running task stops at the point that it has come to.
     #[cold]
     fn stops_here(&mut self) -> bool {
-        if self.task().critical > 0 || std::mem::take(&mut self.points.is_open) {
+        if self.scheduler.task().critical > 0 || std::mem::take(&mut self.points.is_open) {
             return false;
         }
-        self.task_mut().flags.set_at_point(true);
-        self.passes_turn = true;
+        self.scheduler.task_mut().flags.set_at_point(true);
+        self.scheduler.turn.passes_turn = true;
         true
     }
 
@@ -70,9 +70,9 @@ impl Vm {
         if self.points.grain.is_none() || !self.stops_here() {
             return false;
         }
-        let target = Target::Root(self.ending.take().unwrap_or(End::Succeeded));
-        let values = std::mem::take(&mut self.values);
-        self.task_mut().control.unwinding = Some(Unwinding { target, values });
+        let target = Target::Root(self.scheduler.turn.ending.take().unwrap_or(End::Succeeded));
+        let values = std::mem::take(&mut self.exchange.values);
+        self.scheduler.task_mut().control.unwinding = Some(Unwinding { target, values });
         true
     }
 
@@ -80,8 +80,8 @@ impl Vm {
     pub(super) fn explore_by(&mut self, settings: &Settings) {
         self.points.grain = Some(settings.grain);
         self.config.slice = settings.turn;
-        self.choices = Choices::first();
-        self.console.note_all(settings.output);
+        self.scheduler.choices = Choices::first();
+        self.outside.console.note_all(settings.output);
     }
 
     /// Runs the program from point to point along a list of choices that [`super::explore`] has found with the same settings; beyond its end
@@ -105,18 +105,19 @@ impl Vm {
             if self.is_budget_spent() {
                 return Some(RunOutcome::BudgetSpent);
             }
-            while !self.deliveries.is_empty() {
+            while !self.scheduler.deliveries.is_empty() {
                 self.deliver_some();
             }
-            let mut runnable: Vec<(bool, u64, u32)> = (self.tasks.ids().into_iter())
+            let mut runnable: Vec<(bool, u64, u32)> = (self.scheduler.tasks.ids().into_iter())
                 .filter_map(|id| {
-                    let task = self.tasks.get(id).filter(|task| task.state == TaskState::Runnable)?;
+                    let task =
+                        self.scheduler.tasks.get(id).filter(|task| task.state == TaskState::Runnable)?;
                     Some((task.number != last, task.number, id.index))
                 })
                 .collect();
             runnable.sort_unstable();
             let Some(&(is_other, ..)) = runnable.first() else {
-                if self.alive == 0 {
+                if self.scheduler.counts.alive == 0 {
                     return Some(RunOutcome::Done);
                 }
                 if !self.idle() {
@@ -128,7 +129,7 @@ impl Vm {
             let choice = choose(self, Runnable { count, has_last: !is_other })?;
             let (_, number, index) = runnable[(choice % count) as usize];
             last = number;
-            if let Some(task) = self.tasks.at_mut(index) {
+            if let Some(task) = self.scheduler.tasks.at_mut(index) {
                 self.points.is_open = task.flags.at_point();
                 task.flags.set_at_point(false);
             }

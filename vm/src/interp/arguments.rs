@@ -1,8 +1,7 @@
 //! The arguments of a call: the list of an application spread, and arguments put in the order of the parameters.
 
-use smallvec::SmallVec;
-
 use super::constants_of;
+use crate::exchange::Arguments;
 use crate::heap::layout::Code;
 use crate::raise::Exit;
 use crate::shape::Shape;
@@ -12,22 +11,19 @@ use crate::vm::Vm;
 /// The largest number of arguments that `apply` spreads.
 pub(crate) const MAX_SPREAD: usize = 4096;
 
-/// Arguments of a call.
-pub(crate) type Arguments = SmallVec<[Value; 16]>;
-
 /// Replaces the last argument, a list, by its items.
 pub(super) fn spread(vm: &mut Vm, arguments: &mut Arguments) -> Result<(), Exit> {
     let Some(list) = arguments.pop() else { return Ok(()) };
     let mut rest = list;
     while let Some(pair) = vm.heap.as_cons(rest) {
         if arguments.len() == MAX_SPREAD {
-            return vm.program_error(format!("more than {MAX_SPREAD} arguments"));
+            return vm.exchange.program_error(format!("more than {MAX_SPREAD} arguments"));
         }
         arguments.push(pair.car);
         rest = pair.cdr;
     }
-    vm.charge(arguments.len());
-    if rest.is_true() { vm.type_error(list, "LIST") } else { Ok(()) }
+    vm.exchange.charge(arguments.len());
+    if rest.is_true() { vm.exchange.type_error(list, "LIST") } else { Ok(()) }
 }
 
 /// Puts arguments in the order of the parameter registers into `arranged`, which is empty: missing ones unsupplied, the rest as a list, keys by name.
@@ -50,7 +46,7 @@ pub(super) unsafe fn arrange(
         let name = vm.name_of_function(function);
         let max = if takes_more { None } else { Some(positional as u32) };
         let given = count_of_arguments(count);
-        return vm.program_error(format!(
+        return vm.exchange.program_error(format!(
             "{name} was called with {given}; it takes {}",
             describe_arity(required, max)
         ));
@@ -59,7 +55,7 @@ pub(super) unsafe fn arrange(
     arranged.resize(positional, Value::UNSUPPLIED);
     let rest = &arguments[count.min(positional)..];
     if shape.rest {
-        vm.charge(rest.len());
+        vm.exchange.charge(rest.len());
         arranged.push(vm.heap.list(rest)?);
     }
     if shape.takes_keys {
@@ -88,9 +84,9 @@ fn take_keys(
 ) -> Result<(), Exit> {
     if !rest.len().is_multiple_of(2) {
         let name = vm.name_of_function(function);
-        return vm.program_error(format!("{name} was called with an odd number of key arguments"));
+        return vm.exchange.program_error(format!("{name} was called with an odd number of key arguments"));
     }
-    vm.charge(rest.len() * (1 + names.len() / 8));
+    vm.exchange.charge(rest.len() * (1 + names.len() / 8));
     let allow_other_keys = vm.world.known.allow_other_keys;
     let mut unknown = None;
     let mut allows = None;
@@ -111,7 +107,7 @@ fn take_keys(
             let name = vm.name_of_function(function);
             let key = vm.describe(key);
             let known: Vec<String> = names.iter().map(|&name| vm.describe(name)).collect();
-            vm.program_error(format!("{name} has no key {key}; its keys are {}", known.join(" ")))
+            vm.exchange.program_error(format!("{name} has no key {key}; its keys are {}", known.join(" ")))
         }
         _ => Ok(()),
     }

@@ -7,12 +7,13 @@ use esl_bytecode::builtin::{BUILTINS, BuiltinInfo};
 use esl_bytecode::opcode::{Opcode, Substitute};
 use esl_bytecode::word::Word;
 
-use super::arguments::{Arguments, arrange, count_of_arguments, describe_arity, spread};
+use super::arguments::{arrange, count_of_arguments, describe_arity, spread};
 use super::substitute::{deliver, return_all, substitute};
 use super::{
     Operation, Signal, aux_at, code_of, constants_of, failure, operation, pc_as_value, stubs, word_at,
 };
 use crate::builtins::NATIVES;
+use crate::exchange::Arguments;
 use crate::heap::layout::{Kind, Symbol};
 use crate::raise::{Exit, Raised};
 use crate::shape::{Shape, Sort};
@@ -152,8 +153,8 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Fram
     }
     match NATIVES[usize::from(number)](vm, arguments) {
         Ok(value) => {
-            vm.values.clear();
-            vm.values.push(value);
+            vm.exchange.values.clear();
+            vm.exchange.values.push(value);
         }
         Err(Exit::Values) => {}
         Err(Exit::Slowly) => {
@@ -164,7 +165,7 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Fram
             };
         }
         Err(Exit::Call) => {
-            let (function, arguments) = vm.take_requested_call();
+            let (function, arguments) = vm.exchange.take_requested_call();
             // SAFETY: by the contract. A builtin that asks for itself would go on for ever, and none does.
             return unsafe { call(vm, function, &arguments, place) };
         }
@@ -200,14 +201,14 @@ impl Vm {
             Some(Kind::Function) => callee,
             Some(Kind::Symbol) => self.heap.symbol(callee).map_or(Value::NIL, |cell: &Symbol| cell.function),
             _ if callee == Value::NIL || callee == Value::T => {
-                return self.raise(Raised::UndefinedFunction(callee));
+                return self.exchange.raise(Raised::UndefinedFunction(callee));
             }
-            _ => return self.type_error(callee, "FUNCTION"),
+            _ => return self.exchange.type_error(callee, "FUNCTION"),
         };
         // SAFETY: a Function, by its kind or because the function of a symbol is one.
         let sort = unsafe { Shape::unpack((*code_of(function)).spare[0]).sort };
         match sort {
-            Sort::Undefined => self.raise(Raised::UndefinedFunction(callee)),
+            Sort::Undefined => self.exchange.raise(Raised::UndefinedFunction(callee)),
             Sort::Lazy => {
                 self.make_ready(function)?;
                 Ok(function)
@@ -227,6 +228,6 @@ impl Vm {
         {
             return Ok(symbol);
         }
-        self.program_error(format!("{} has too much to do at once", builtin.name))
+        self.exchange.program_error(format!("{} has too much to do at once", builtin.name))
     }
 }

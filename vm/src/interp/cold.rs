@@ -64,7 +64,7 @@ fn native(operation: Operation) -> Native {
 #[cold]
 fn ask_twin(vm: &mut Vm, builtin: Builtin, arguments: &[Value]) -> Outcome {
     let function = vm.twin_of(builtin.info())?;
-    vm.request_call(function, arguments);
+    vm.exchange.request_call(function, arguments);
     Err(Exit::Call)
 }
 
@@ -94,7 +94,7 @@ pub(super) unsafe fn arithmetic(vm: &mut Vm, pc: *const u32, base: *mut Value) -
         };
         let outcome = match outcome {
             // Of quotient and remainder the instruction wants the first.
-            Err(Exit::Values) => Ok(vm.values.first().copied().unwrap_or(Value::NIL)),
+            Err(Exit::Values) => Ok(vm.exchange.values.first().copied().unwrap_or(Value::NIL)),
             Err(Exit::Slowly) => ask_twin(vm, builtin(operation(word)), &[left, right]),
             outcome => outcome,
         };
@@ -213,12 +213,12 @@ pub(super) unsafe fn list_part(vm: &mut Vm, pc: *const u32, base: *mut Value) ->
                 let rest = if list.is_nil() { Some(list) } else { vm.heap.cdr(list) };
                 match rest {
                     Some(rest) if rest.is_nil() => Ok(rest),
-                    Some(rest) => vm.type_error(rest, "LIST"),
-                    None => vm.type_error(list, "LIST"),
+                    Some(rest) => vm.exchange.type_error(rest, "LIST"),
+                    None => vm.exchange.type_error(list, "LIST"),
                 }
             }
             _ if (*base.add(b)).is_nil() => Ok(Value::NIL),
-            _ => vm.type_error(*base.add(b), "LIST"),
+            _ => vm.exchange.type_error(*base.add(b), "LIST"),
         };
         finish(base, a, part)
     }
@@ -367,8 +367,8 @@ pub(super) unsafe fn set_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -
     unsafe {
         let word = word_at(pc);
         let (first, count) = (word.a(), word.b());
-        vm.values.clear();
-        vm.values.extend_from_slice(std::slice::from_raw_parts(base.add(first), count));
+        vm.exchange.values.clear();
+        vm.exchange.values.extend_from_slice(std::slice::from_raw_parts(base.add(first), count));
     }
     Signal::Next
 }
@@ -381,7 +381,7 @@ pub(super) unsafe fn get_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -
         let word = word_at(pc);
         let (first, count) = (word.a(), word.b());
         for i in 0..count {
-            *base.add(first + i) = vm.values.get(i).copied().unwrap_or(Value::NIL);
+            *base.add(first + i) = vm.exchange.values.get(i).copied().unwrap_or(Value::NIL);
         }
     }
     Signal::Next
@@ -390,8 +390,8 @@ pub(super) unsafe fn get_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -
 /// `values-to-list`.
 #[inline(never)]
 pub(super) unsafe fn values_to_list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    vm.charge(vm.values.len());
-    let outcome = vm.heap.list(&vm.values).map_err(Exit::from);
+    vm.exchange.charge(vm.exchange.values.len());
+    let outcome = vm.heap.list(&vm.exchange.values).map_err(Exit::from);
     // SAFETY: see the module's header.
     unsafe { finish(base, word_at(pc).a(), outcome) }
 }
@@ -401,17 +401,17 @@ pub(super) unsafe fn values_to_list(vm: &mut Vm, pc: *const u32, base: *mut Valu
 pub(super) unsafe fn list_to_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: see the module's header.
     let list = unsafe { *base.add(word_at(pc).a()) };
-    vm.values.clear();
+    vm.exchange.values.clear();
     let mut rest = list;
     while rest.is_cons() {
-        if vm.values.len() == MAX_SPREAD {
+        if vm.exchange.values.len() == MAX_SPREAD {
             let text = format!("more than {} values", MAX_SPREAD);
             return failure(vm, Raised::Program(text));
         }
-        vm.values.push(vm.heap.car(rest).unwrap_or(Value::NIL));
+        vm.exchange.values.push(vm.heap.car(rest).unwrap_or(Value::NIL));
         rest = vm.heap.cdr(rest).unwrap_or(Value::NIL);
     }
-    vm.charge(vm.values.len());
+    vm.exchange.charge(vm.exchange.values.len());
     if rest.is_true() {
         return failure(vm, Raised::Type(list, Expected::Type("LIST")));
     }

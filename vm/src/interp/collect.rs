@@ -5,11 +5,11 @@
 //! the marker gets to it or just before the task runs, whichever is first.
 
 use super::{Leave, code_of};
-use crate::control::End;
 use crate::environment::Compiler;
+use crate::exchange::Exchange;
 use crate::heap::{Heap, Phase, SLICE_VISITS, SliceOutcome};
-use crate::limit;
 use crate::raise::{Expected, Raised};
+use crate::schedule::Scheduler;
 use crate::task::Task;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -56,12 +56,8 @@ unsafe fn scan(heap: &mut Heap, task: &mut Task) -> usize {
     for value in [task.object, task.wait, task.notify] {
         heap.mark(value);
     }
-    limit::visit(task, &mut |value| heap.mark(value));
     if let Some(extra) = &task.extra {
-        heap.mark_slice(&extra.values);
-        if let Some(End::Failed(condition)) = extra.end {
-            heap.mark(condition);
-        }
+        extra.visit(&mut |value| heap.mark(value));
     }
     task.scanned = heap.cycle_id();
     let Some(control) = task.control.get() else { return top };
@@ -126,7 +122,7 @@ impl Vm {
     /// Whether a builtin or an allocation has left something to be seen to.
     #[inline(always)]
     pub(super) fn wants_attention(&self) -> bool {
-        self.charged != 0 || self.heap.gc_due()
+        self.exchange.charged != 0 || self.heap.gc_due()
     }
 
     /// Takes what was charged from the ticks that are left, and sees to it that the collector has its turn at the next
@@ -135,14 +131,14 @@ impl Vm {
     #[inline(never)]
     pub(super) fn attend(&mut self, ticks: i32) -> i32 {
         // A task that owes more than this has had its slice many times over.
-        let charged = std::mem::take(&mut self.charged);
+        let charged = std::mem::take(&mut self.exchange.charged);
         let mut ticks = ticks.saturating_sub((charged % END_OF_SLICE).min(1 << 29) as i32);
         if charged >= END_OF_SLICE {
             let left = ticks + self.cpu.reserve;
             self.cpu.granted -= left.max(0);
             self.cpu.reserve = 0;
             ticks = left.min(0);
-            self.slice_is_cut = true;
+            self.scheduler.turn.slice_is_cut = true;
         }
         if self.heap.gc_due() && self.cpu.reserve == 0 && ticks > 0 {
             self.cpu.reserve = ticks;
@@ -153,45 +149,35 @@ impl Vm {
 
     /// Has the slice of the running task end at the next tick, to go on with another one: what the slice may take has changed.
     pub(crate) fn end_slice_here(&mut self) {
-        self.charged |= END_OF_SLICE;
-    }
-
-    /// Ticks that were charged since the last instruction that saw to it.
-    pub(crate) fn take_charged(&mut self) -> u64 {
-        std::mem::take(&mut self.charged) % END_OF_SLICE
+        self.exchange.charged |= END_OF_SLICE;
     }
 
     /// Notes where the running task stands, for a scan or a switch.
     pub(crate) fn save_cpu(&mut self) {
         let offset = self.offset_of(self.cpu.base);
         let pc = self.cpu.pc;
-        let task = self.task_mut();
+        let task = self.scheduler.task_mut();
         task.base = offset as u32;
         task.pc = pc;
     }
 
     /// A whole cycle at once: because there is no room, or because every safepoint is to be one.
     pub(crate) fn collect_fully(&mut self) {
-        if self.is_watched { self.watched_pause(Vm::collect_fully_now) } else { self.collect_fully_now() }
+        if self.watch.is_watched {
+            self.watched_pause(Vm::collect_fully_now)
+        } else {
+            self.collect_fully_now()
+        }
     }
 
     fn collect_fully_now(&mut self) {
-        if self.running.is_some() {
+        if self.scheduler.running.is_some() {
             self.save_cpu();
         }
-        let Vm {
-            heap,
-            world,
-            compiler,
-            values,
-            requested_call,
-            pinned,
-            raised,
-            running,
-            tasks,
-            deliveries,
-            ..
-        } = self;
+        let Vm { heap, world, compiler, scheduler, exchange, embedder, .. } = self;
+        let Scheduler { running, tasks, deliveries, .. } = scheduler;
+        let Exchange { values, requested_call, raised, .. } = exchange;
+        let pinned = &mut embedder.pinned;
         // SAFETY: all roots and all tasks are marked; `save_cpu` has noted the running frame of the running task, those
         // of the others were noted at the switch.
         unsafe {
@@ -207,26 +193,21 @@ impl Vm {
 
     /// The collector's turn.
     pub(crate) fn collect_slice(&mut self) {
-        if self.is_watched { self.watched_pause(Vm::collect_slice_now) } else { self.collect_slice_now() }
+        if self.watch.is_watched {
+            self.watched_pause(Vm::collect_slice_now)
+        } else {
+            self.collect_slice_now()
+        }
     }
 
     fn collect_slice_now(&mut self) {
-        if self.running.is_some() {
+        if self.scheduler.running.is_some() {
             self.save_cpu();
         }
-        let Vm {
-            heap,
-            world,
-            compiler,
-            values,
-            requested_call,
-            pinned,
-            raised,
-            running,
-            tasks,
-            deliveries,
-            ..
-        } = self;
+        let Vm { heap, world, compiler, scheduler, exchange, embedder, .. } = self;
+        let Scheduler { running, tasks, deliveries, .. } = scheduler;
+        let Exchange { values, requested_call, raised, .. } = exchange;
+        let pinned = &mut embedder.pinned;
         match heap.phase() {
             Phase::Marking => {
                 let SliceOutcome::Drained { left } = heap.slice(SLICE_VISITS) else { return };
@@ -272,7 +253,7 @@ impl Vm {
             return;
         }
         let cycle = self.heap.cycle_id();
-        if let Some(task) = &mut self.running
+        if let Some(task) = &mut self.scheduler.running
             && task.scanned != cycle
         {
             // SAFETY: the task has not run since its frame was noted.

@@ -6,8 +6,8 @@ use esl_bytecode::builtin::BUILTINS;
 
 use super::call::{FramePlace, call};
 use super::{Signal, aux_at, failure, word_at};
-use crate::control::End;
 use crate::raise::{Exit, Raised};
+use crate::task::End;
 use crate::vm::Vm;
 
 /// Deals with a builtin or an instruction that gave no value.
@@ -24,7 +24,7 @@ pub(super) unsafe fn exit(vm: &mut Vm, exit: Exit) -> Signal {
             Exit::Unwind => Signal::Unwind,
             Exit::Slowly => take_over(vm),
             Exit::Call => {
-                let (function, arguments) = vm.take_requested_call();
+                let (function, arguments) = vm.exchange.take_requested_call();
                 let place = FramePlace::for_instruction(word_at(vm.cpu.pc));
                 call(vm, function, &arguments, place)
             }
@@ -65,7 +65,7 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
     if !vm.is_defined(function) {
         // Without a library nobody can handle it.
         let text = vm.describe_failure(&arguments);
-        vm.last_words = Some(text);
+        vm.embedder.last_words = Some(text);
         vm.begin_end(End::Failed(arguments[0]));
         return Signal::Unwind;
     }
@@ -86,9 +86,9 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
         // Its tick will be taken again.
         vm.cpu.ticks += 1;
     }
-    let place = (vm.cpu.pc, vm.task().ticks, vm.cpu.ticks);
-    if vm.collected_at == Some(place) {
-        vm.collected_at = None;
+    let place = (vm.cpu.pc, vm.scheduler.task().ticks, vm.cpu.ticks);
+    if vm.exchange.collected_at == Some(place) {
+        vm.exchange.collected_at = None;
         if is_call {
             vm.cpu.ticks -= 1;
         }
@@ -98,7 +98,7 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
         }
         return failure(vm, Raised::HeapExhausted);
     }
-    vm.collected_at = Some(place);
+    vm.exchange.collected_at = Some(place);
     vm.collect_fully();
     Signal::Reload
 }

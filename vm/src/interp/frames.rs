@@ -4,8 +4,8 @@
 use std::marker::PhantomData;
 
 use super::{code_of, pc_from_value, stubs, word_at};
-use crate::control::Entry;
 use crate::heap::layout::Code;
+use crate::task::Entry;
 use crate::task::Task;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -145,7 +145,7 @@ impl Vm {
     /// Returns the frames of the running task. `vm.cpu` is in order when a builtin that the interpreter called asks for
     /// them only up to its innermost frame's pc, so that one is given as it was saved.
     pub(crate) fn frames(&self) -> impl Iterator<Item = Frame<'_>> {
-        let task = self.running.as_ref();
+        let task = self.scheduler.running.as_ref();
         // SAFETY: `vm.cpu` describes the running task.
         task.map(|task| unsafe { Frames::new(task.stack.start(), self.cpu.pc, self.cpu.base) })
             .into_iter()
@@ -172,7 +172,7 @@ impl Vm {
             looked_at += 1;
             callee = caller;
         }
-        self.charge(looked_at);
+        self.exchange.charge(looked_at);
         found
     }
 }

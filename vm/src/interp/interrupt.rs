@@ -4,7 +4,7 @@
 use super::Signal;
 use super::call::{FramePlace, call};
 use super::substitute::resume_below;
-use crate::control::{Entry, EntryKind};
+use crate::task::{Entry, EntryKind};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -14,7 +14,7 @@ use crate::vm::Vm;
 /// The contract of [`super::settle`], at an instruction that has had no effect yet.
 pub(super) unsafe fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]) -> Signal {
     let base = vm.offset_of(vm.cpu.base) as u32;
-    let task = vm.task_mut();
+    let task = vm.scheduler.task_mut();
     let wait = std::mem::replace(&mut task.wait, Value::NIL);
     let bindings = task.control.bindings.len() as u32;
     let kind = EntryKind::Interrupt;
@@ -39,7 +39,7 @@ pub(super) unsafe fn interrupt_return(vm: &mut Vm, base: *mut Value) -> Signal {
 impl Vm {
     /// Ends an interrupt of the running task: it is at the wait at which it was parked again.
     pub(super) fn restore_wait(&mut self) {
-        let task = self.task_mut();
+        let task = self.scheduler.task_mut();
         if let Some(entry) = task.control.entries.pop() {
             debug_assert_eq!(entry.kind, EntryKind::Interrupt);
             task.wait = entry.data;

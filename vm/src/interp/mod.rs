@@ -211,7 +211,7 @@ fn pc_from_value(word: Value) -> *const u32 {
 
 /// Notes a failure of the instruction that is worked on.
 fn failure(vm: &mut Vm, raised: Raised) -> Signal {
-    vm.raised = Some(raised);
+    vm.exchange.raised = Some(raised);
     Signal::Exit(Exit::Raise)
 }
 
@@ -231,9 +231,9 @@ fn is_simple_vector(v: Value) -> bool {
     v.is_object() && unsafe { (*v.object_ptr()).kind == Kind::SimpleVector }
 }
 
-/// Makes the task in `vm.running` the one whose registers are in `vm.cpu`, with so many ticks.
+/// Makes the task in `vm.scheduler.running` the one whose registers are in `vm.cpu`, with so many ticks.
 pub(crate) fn load(vm: &mut Vm, ticks: i32) {
-    let task = vm.task();
+    let task = vm.scheduler.task();
     let pc = task.pc;
     // SAFETY: the base of a task lies in its stack.
     let base = unsafe { task.stack.start().add(task.base as usize) };
@@ -242,12 +242,12 @@ pub(crate) fn load(vm: &mut Vm, ticks: i32) {
     vm.arm();
 }
 
-/// Sees to what was noted of the task in `vm.running`, which is loaded: it may begin to unwind, or find itself in another
+/// Sees to what was noted of the task in `vm.scheduler.running`, which is loaded: it may begin to unwind, or find itself in another
 /// function.
 pub(crate) fn see_to_attention(vm: &mut Vm) -> Result<(), Leave> {
-    let was_unwinding = vm.task().control.is_unwinding();
+    let was_unwinding = vm.scheduler.task().control.is_unwinding();
     let function = vm.see_to_running_task();
-    if function.is_some() || vm.task().control.is_unwinding() != was_unwinding {
+    if function.is_some() || vm.scheduler.task().control.is_unwinding() != was_unwinding {
         vm.close_point();
     }
     match function {
@@ -256,7 +256,7 @@ pub(crate) fn see_to_attention(vm: &mut Vm) -> Result<(), Leave> {
     }
 }
 
-/// Calls `function` where the task in `vm.running`, which is loaded, stands.
+/// Calls `function` where the task in `vm.scheduler.running`, which is loaded, stands.
 pub(crate) fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]) -> Result<(), Leave> {
     // SAFETY: as for `run`; a task that does not run stands before an instruction that has had no effect yet.
     unsafe {
@@ -265,9 +265,9 @@ pub(crate) fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]) -> Re
     }
 }
 
-/// Runs the task in `vm.running` from `vm.cpu` until it leaves the processor.
+/// Runs the task in `vm.scheduler.running` from `vm.cpu` until it leaves the processor.
 pub(crate) fn run(vm: &mut Vm) -> Leave {
-    if vm.task().control.is_unwinding() {
+    if vm.scheduler.task().control.is_unwinding() {
         // SAFETY: as below.
         if let Err(leave) = unsafe { settle(vm, Signal::Unwind) } {
             return leave;
@@ -277,7 +277,7 @@ pub(crate) fn run(vm: &mut Vm) -> Leave {
         // SAFETY: `vm.cpu` describes the running task: its pc lies in code that its innermost frame keeps alive and that
         // has passed the verifier, its base in its stack, with room for the registers of that code.
         let signal = unsafe { dispatch(vm) };
-        if signal == Signal::Exit(Exit::Park) && vm.task().critical == 0 {
+        if signal == Signal::Exit(Exit::Park) && vm.scheduler.task().critical == 0 {
             return Leave::Parked;
         }
         // SAFETY: `dispatch` has put its registers back.
@@ -305,10 +305,10 @@ unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
                 }
                 Signal::Tick => match vm.safepoint() {
                     Some(leave) => return Err(leave),
-                    None if vm.task().control.is_unwinding() => Signal::Unwind,
+                    None if vm.scheduler.task().control.is_unwinding() => Signal::Unwind,
                     None => return Ok(()),
                 },
-                Signal::Park if vm.task().critical > 0 => {
+                Signal::Park if vm.scheduler.task().critical > 0 => {
                     vm.cancel_wait();
                     failure(vm, Raised::Failure("WOULD-BLOCK"))
                 }
@@ -531,8 +531,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     let return_to = pc_from_value(*base.sub(1));
                     let call = word_at(return_to.sub(2));
                     if call.c() != 0 {
-                        vm.values.clear();
-                        vm.values.push(value);
+                        vm.exchange.values.clear();
+                        vm.exchange.values.push(value);
                         break Signal::ReturnAll;
                     }
                     *base.sub(2) = value;
@@ -1052,8 +1052,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(2)
                         }
                         Ok(value) => {
-                            vm.values.clear();
-                            vm.values.push(value);
+                            vm.exchange.values.clear();
+                            vm.exchange.values.push(value);
                             substitute::deliver(vm, window, word.c());
                             next!(2)
                         }

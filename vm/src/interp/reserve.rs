@@ -1,7 +1,7 @@
 //! Room on the running task's stack, and the reserves that are for handling the exhaustion of stack and heap.
 
-use crate::control::{End, Target, Unwinding};
 use crate::raise::{Exit, Raised};
+use crate::task::{End, Target, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -11,17 +11,17 @@ const RESERVE: usize = 8192;
 impl Vm {
     /// Offset of an address in the running task's stack.
     pub(crate) fn offset_of(&self, base: *mut Value) -> usize {
-        (base.addr() - self.task().stack.start().addr()) / size_of::<Value>()
+        (base.addr() - self.scheduler.task().stack.start().addr()) / size_of::<Value>()
     }
 
     /// Words that the running task's stack may have now.
     fn stack_limit(&self) -> usize {
-        self.config.stack + if self.task().flags.uses_reserve() { RESERVE } else { 0 }
+        self.config.stack + if self.scheduler.task().flags.uses_reserve() { RESERVE } else { 0 }
     }
 
     /// Address up to which the running task's stack may be used: its end, or its limit if that comes first.
     pub(super) fn stack_end(&self) -> *mut Value {
-        let stack = &self.task().stack;
+        let stack = &self.scheduler.task().stack;
         // SAFETY: not behind the end of the segment.
         unsafe { stack.start().add(stack.capacity().min(self.stack_limit())) }
     }
@@ -32,21 +32,21 @@ impl Vm {
     /// `:stack-exhausted` at the limit. Handling that has a reserve; see [`Vm::leave_reserve`].
     pub(super) fn reserve_stack(&mut self, words: usize) -> Result<(), Exit> {
         if words > self.stack_limit() {
-            if self.task().flags.uses_reserve() {
+            if self.scheduler.task().flags.uses_reserve() {
                 self.leave_reserve(self.world.known.stack_exhausted);
                 return Err(Exit::Unwind);
             }
-            self.task_mut().flags.set_uses_reserve(true);
+            self.scheduler.task_mut().flags.set_uses_reserve(true);
             self.cpu.stack_end = self.stack_end();
-            return self.raise(Raised::StackExhausted);
+            return self.exchange.raise(Raised::StackExhausted);
         }
-        if words <= self.task().stack.capacity() {
+        if words <= self.scheduler.task().stack.capacity() {
             return Ok(());
         }
         let offset = self.offset_of(self.cpu.base);
-        self.task_mut().stack.grow(words);
+        self.scheduler.task_mut().stack.grow(words);
         // SAFETY: the offset was inside the old stack, and the new one is larger.
-        self.cpu.base = unsafe { self.task().stack.start().add(offset) };
+        self.cpu.base = unsafe { self.scheduler.task().stack.start().add(offset) };
         self.cpu.stack_end = self.stack_end();
         Ok(())
     }
@@ -54,8 +54,9 @@ impl Vm {
     /// Closes the reserves of stack and heap once the handling of their exhaustion is over: an unwinding has landed.
     pub(super) fn close_reserves(&mut self) {
         self.heap.close_reserve();
-        if self.task().flags.uses_reserve() && self.offset_of(self.cpu.base) < self.config.stack / 2 {
-            self.task_mut().flags.set_uses_reserve(false);
+        if self.scheduler.task().flags.uses_reserve() && self.offset_of(self.cpu.base) < self.config.stack / 2
+        {
+            self.scheduler.task_mut().flags.set_uses_reserve(false);
             self.cpu.stack_end = self.stack_end();
         }
     }
@@ -63,10 +64,10 @@ impl Vm {
     /// The reserve is used up that was for handling the exhaustion of stack or heap: leaves what has handled it, which
     /// the library has put into a catch, so that the failure goes on outward. Without that, the task ends with `cause`.
     pub(crate) fn leave_reserve(&mut self, cause: Value) {
-        match self.task().control.find_catch(self.world.known.reserve) {
+        match self.scheduler.task().control.find_catch(self.world.known.reserve) {
             Some(index) => {
                 let unwinding = Unwinding { target: Target::Entry(index), values: Vec::new() };
-                self.task_mut().control.unwinding = Some(unwinding);
+                self.scheduler.task_mut().control.unwinding = Some(unwinding);
             }
             None => self.begin_end(End::Failed(cause)),
         }

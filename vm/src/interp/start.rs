@@ -5,10 +5,10 @@ use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::{Base, Count, Pad};
 
 use super::{code_of, stubs};
-use crate::control::LazyControl;
 use crate::heap::layout::Code;
 use crate::heap::{AllocError, CodeParts, Heap};
 use crate::shape::{Shape, Sort};
+use crate::task::LazyControl;
 use crate::task::Task;
 use crate::value::Value;
 

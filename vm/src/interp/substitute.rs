@@ -26,7 +26,7 @@ pub(super) unsafe fn deliver(vm: &mut Vm, window: *mut Value, want: usize) {
     let count = if want == 0 || want == 255 { 1 } else { want };
     for i in 0..count {
         // SAFETY: by the contract.
-        unsafe { *window.add(i) = vm.values.get(i).copied().unwrap_or(Value::NIL) };
+        unsafe { *window.add(i) = vm.exchange.values.get(i).copied().unwrap_or(Value::NIL) };
     }
 }
 
@@ -59,7 +59,7 @@ pub(super) unsafe fn substitute(vm: &mut Vm) -> Signal {
     unsafe {
         let (pc, base) = (vm.cpu.pc, vm.cpu.base);
         let word = word_at(pc);
-        let value = vm.values.first().copied().unwrap_or(Value::NIL);
+        let value = vm.exchange.values.first().copied().unwrap_or(Value::NIL);
         let Some(opcode) = word.opcode() else { return Signal::Next };
         match opcode.substitute() {
             Substitute::Value => *base.add(word.a()) = value,
@@ -67,7 +67,7 @@ pub(super) unsafe fn substitute(vm: &mut Vm) -> Signal {
             // Nothing can stand for what the instruction was to do: it is tried again.
             Substitute::Never => return Signal::Reload,
             Substitute::Test => {
-                if vm.values.first().is_some_and(|v| v.is_true()) == jumps_when(word) {
+                if vm.exchange.values.first().is_some_and(|v| v.is_true()) == jumps_when(word) {
                     vm.cpu.pc = pc.add(2).offset(aux_at(pc) as i32 as isize);
                     return Signal::Reload;
                 }

@@ -8,9 +8,9 @@ use esl_bytecode::word::Word;
 
 use super::substitute::deliver;
 use super::{Signal, aux_at, cold, constant, failure, word_at};
-use crate::control::{End, Entry, EntryKind, Running, Target, Unwinding};
 use crate::heap::layout::Kind;
 use crate::raise::{Exit, Raised};
+use crate::task::{End, Entry, EntryKind, Running, Target, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -46,7 +46,7 @@ unsafe fn landing(pc: *const u32) -> *const u32 {
 fn push(vm: &mut Vm, base: *mut Value, entry: Entry) -> Signal {
     let limit = vm.config.stack;
     let base = vm.offset_of(base) as u32;
-    let control = &mut vm.task_mut().control;
+    let control = &mut vm.scheduler.task_mut().control;
     if control.entries.len() >= limit {
         return failure(vm, Raised::StackExhausted);
     }
@@ -143,7 +143,7 @@ pub(super) unsafe fn push_scope(vm: &mut Vm, pc: *const u32, base: *mut Value) -
 pub(super) unsafe fn pop(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Signal {
     // SAFETY: V1.
     let count = unsafe { word_at(pc) }.a();
-    let control = &mut vm.task_mut().control;
+    let control = &mut vm.scheduler.task_mut().control;
     let mut limits = 0;
     for _ in 0..count {
         if let Some(entry) = control.entries.pop() {
@@ -165,12 +165,12 @@ pub(super) unsafe fn bind_list(vm: &mut Vm, pc: *const u32, base: *mut Value) ->
         let word = word_at(pc);
         (*base.add(word.a()), *base.add(word.b()))
     };
-    let height = vm.task().control.bindings.len();
+    let height = vm.scheduler.task().control.bindings.len();
     let offset = vm.offset_of(base) as u32;
     match vm.bind_list(symbols, values, offset) {
         Ok(()) => Signal::Next,
         Err(exit) => {
-            vm.task_mut().control.bindings.truncate(height);
+            vm.scheduler.task_mut().control.bindings.truncate(height);
             Signal::Exit(exit)
         }
     }
@@ -179,8 +179,8 @@ pub(super) unsafe fn bind_list(vm: &mut Vm, pc: *const u32, base: *mut Value) ->
 /// `enter-cleanup`.
 #[inline(never)]
 pub(super) unsafe fn enter_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value) -> Signal {
-    let values = std::mem::take(&mut vm.values);
-    let control = &mut vm.task_mut().control;
+    let values = std::mem::take(&mut vm.exchange.values);
+    let control = &mut vm.scheduler.task_mut().control;
     if let Some(entry) = control.entries.pop() {
         control.run_cleanup(entry, Running { values, ..Running::default() });
     }
@@ -190,13 +190,13 @@ pub(super) unsafe fn enter_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Val
 /// `end-cleanup`.
 #[inline(never)]
 pub(super) unsafe fn end_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value) -> Signal {
-    let control = &mut vm.task_mut().control;
+    let control = &mut vm.scheduler.task_mut().control;
     control.entries.pop();
     let Running { pending, values, .. } = control.running.pop().unwrap_or_default();
     control.unwinding = pending;
     let unwinds = control.unwinding.is_some();
-    vm.values = values;
-    if vm.task().flags.attention() {
+    vm.exchange.values = values;
+    if vm.scheduler.task().flags.attention() {
         // What waited for the end of the cleanup waits no longer.
         vm.end_slice_here();
     }
@@ -211,10 +211,11 @@ pub(super) unsafe fn throw(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sig
         let word = word_at(pc);
         (*base.add(word.a()), word.b())
     };
-    match vm.task().control.find_catch(tag) {
+    match vm.scheduler.task().control.find_catch(tag) {
         Some(index) => {
-            let values = std::mem::take(&mut vm.values);
-            vm.task_mut().control.unwinding = Some(Unwinding { target: Target::Entry(index), values });
+            let values = std::mem::take(&mut vm.exchange.values);
+            vm.scheduler.task_mut().control.unwinding =
+                Some(Unwinding { target: Target::Entry(index), values });
             Signal::Unwind
         }
         None => {
@@ -239,7 +240,7 @@ pub(super) unsafe fn throw(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sig
 /// As [`super::settle`].
 pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
     loop {
-        let task = vm.task_mut();
+        let task = vm.scheduler.task_mut();
         let Some(unwinding) = task.control.unwinding.take() else { return Signal::Reload };
         let height = task.control.entries.len();
         match unwinding.target {
@@ -249,16 +250,16 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
             }
             Target::Return { entries, base } if height <= entries => {
                 task.control.bindings.truncate_from(base);
-                vm.values = unwinding.values;
+                vm.exchange.values = unwinding.values;
                 // SAFETY: the frame is live: it lies inside those of the entries that are left, and nothing has left it.
-                vm.cpu.base = unsafe { vm.task().stack.start().add(base as usize) };
+                vm.cpu.base = unsafe { vm.scheduler.task().stack.start().add(base as usize) };
                 vm.close_reserves();
                 return Signal::ReturnAll;
             }
             Target::Root(end) if height == 0 => {
                 task.control.bindings.truncate(0);
-                vm.values = unwinding.values;
-                vm.ending = Some(end);
+                vm.exchange.values = unwinding.values;
+                vm.scheduler.turn.ending = Some(end);
                 return Signal::TaskExit;
             }
             _ => {}
@@ -273,7 +274,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
                 let is_forced = unwinding.target.is_forced();
                 let allowance = if is_forced { Some(vm.new_allowance()) } else { None };
                 let running = Running { pending: Some(unwinding), allowance, ..Running::default() };
-                vm.task_mut().control.run_cleanup(entry, running);
+                vm.scheduler.task_mut().control.run_cleanup(entry, running);
                 // SAFETY: as above; the entry's pc is the cleanup's first instruction.
                 unsafe { vm.resume_at(&entry) };
                 return Signal::Reload;
@@ -285,7 +286,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
                 } else {
                     Some(unwinding.or_interrupted(interrupted))
                 };
-                vm.task_mut().control.unwinding = next;
+                vm.scheduler.task_mut().control.unwinding = next;
             }
             EntryKind::Limit => {
                 task.control.unwinding = Some(unwinding);
@@ -312,13 +313,13 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
 /// # Safety
 /// As [`unwind`].
 unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
-    let control = &mut vm.task_mut().control;
+    let control = &mut vm.scheduler.task_mut().control;
     let Some(entry) = control.entries.pop() else { return Signal::Reload };
     control.bindings.truncate(entry.bindings as usize);
     if entry.kind == EntryKind::FailureCleanup {
         // The failure waits for the end of the cleanup as the values of a protected form do.
         control.run_cleanup(entry, Running { values, ..Running::default() });
-        vm.values.clear();
+        vm.exchange.values.clear();
         // SAFETY: as below; the entry's pc is the cleanup's first instruction.
         unsafe { vm.resume_at(&entry) };
         vm.close_reserves();
@@ -327,7 +328,7 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
     if entry.kind == EntryKind::Limit {
         vm.close_limit();
     }
-    vm.values = values;
+    vm.exchange.values = values;
     // SAFETY: the entry's frame is live, and V10: its landing asks for no more than the registers below the window.
     unsafe {
         vm.resume_at(&entry);
@@ -342,14 +343,14 @@ impl Vm {
     /// The function that runs the clauses of the recovery procedures of an entry, made as the first instruction at its
     /// landing says; `None` if there is no such entry or instruction.
     pub(crate) fn recovery_function(&mut self, index: usize) -> Result<Option<Value>, Exit> {
-        let Some(entry) = self.task().control.entries.get(index).copied() else { return Ok(None) };
+        let Some(entry) = self.scheduler.task().control.entries.get(index).copied() else { return Ok(None) };
         if entry.kind != EntryKind::Recovery {
             return Ok(None);
         }
         // SAFETY: the entry's frame is live and its pc that of an instruction of the frame's function (V1, V2); V10 says
         // that this may do what that instruction does as long as the entry stands.
         unsafe {
-            let base = self.task().stack.start().add(entry.base as usize);
+            let base = self.scheduler.task().stack.start().add(entry.base as usize);
             let word = word_at(entry.pc);
             match word.opcode() {
                 Some(Opcode::MakeClosure | Opcode::LoadConst) => {
@@ -371,7 +372,7 @@ impl Vm {
     unsafe fn resume_at(&mut self, entry: &Entry) {
         self.cpu.pc = entry.pc;
         // SAFETY: by the contract, the offset lies in the stack.
-        self.cpu.base = unsafe { self.task().stack.start().add(entry.base as usize) };
+        self.cpu.base = unsafe { self.scheduler.task().stack.start().add(entry.base as usize) };
     }
 
     /// Binds the symbols of a list to the items of another, for the frame with this base.
@@ -385,15 +386,16 @@ impl Vm {
                 }
                 None => Value::UNBOUND,
             };
-            self.charge(64);
+            self.exchange.charge(64);
             self.bind(pair.car, value, base)?;
             symbols = pair.cdr;
         }
-        if symbols.is_true() { self.type_error(symbols, "LIST") } else { Ok(()) }
+        if symbols.is_true() { self.exchange.type_error(symbols, "LIST") } else { Ok(()) }
     }
 
     /// Begins to unwind the running task to its root, which ends it.
     pub(crate) fn begin_end(&mut self, end: End) {
-        self.task_mut().control.unwinding = Some(Unwinding { target: Target::Root(end), values: Vec::new() });
+        self.scheduler.task_mut().control.unwinding =
+            Some(Unwinding { target: Target::Root(end), values: Vec::new() });
     }
 }

@@ -4,10 +4,10 @@
 //! is the running frame's, and what the verifier proved holds (V1 to V13).
 
 use super::{Signal, code_of, constant, failure, word_at};
-use crate::binding::Binding;
 use crate::heap::layout::{Kind, Symbol};
 use crate::raise::{Exit, Raised};
 use crate::shape::{Shape, Sort};
+use crate::task::Binding;
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -64,7 +64,7 @@ pub(super) unsafe fn bind(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
 pub(super) unsafe fn unbind(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Signal {
     // SAFETY: see the module's header.
     let count = unsafe { word_at(pc) }.a();
-    let bindings = &mut vm.task_mut().control.bindings;
+    let bindings = &mut vm.scheduler.task_mut().control.bindings;
     bindings.truncate(bindings.len().saturating_sub(count));
     Signal::Next
 }
@@ -92,7 +92,8 @@ impl Vm {
         let value = if cell.header.flags & Symbol::EVER_BOUND == 0 {
             cell.value
         } else {
-            self.running
+            self.scheduler
+                .running
                 .as_ref()
                 .map_or(cell.value, |task| task.control.bindings.get(symbol).unwrap_or(cell.value))
         };
@@ -104,14 +105,14 @@ impl Vm {
     /// # Errors
     /// A failure if it is a constant.
     pub(crate) fn set_symbol_value(&mut self, symbol: Value, value: Value) -> Result<(), Exit> {
-        let Some(cell) = self.heap.symbol(symbol) else { return self.type_error(symbol, "SYMBOL") };
+        let Some(cell) = self.heap.symbol(symbol) else { return self.exchange.type_error(symbol, "SYMBOL") };
         let flags = cell.header.flags;
         if flags & Symbol::CONSTANT != 0 {
             let name = self.heap.string_text(cell.name).unwrap_or_default();
-            return self.program_error(format!("{name} is a constant and cannot be set"));
+            return self.exchange.program_error(format!("{name} is a constant and cannot be set"));
         }
         if flags & Symbol::EVER_BOUND != 0
-            && let Some(task) = self.running.as_mut()
+            && let Some(task) = self.scheduler.running.as_mut()
             && let Some(place) = task.control.bindings.get_mut(symbol)
         {
             *place = value;
@@ -126,19 +127,19 @@ impl Vm {
     /// # Errors
     /// A failure if it is a constant, or if there are too many bindings.
     pub(crate) fn bind(&mut self, symbol: Value, value: Value, base: u32) -> Result<(), Exit> {
-        let Some(cell) = self.heap.symbol(symbol) else { return self.type_error(symbol, "SYMBOL") };
+        let Some(cell) = self.heap.symbol(symbol) else { return self.exchange.type_error(symbol, "SYMBOL") };
         let flags = cell.header.flags;
         if flags & Symbol::CONSTANT != 0 {
             let name = self.heap.string_text(cell.name).unwrap_or_default();
-            return self.program_error(format!("{name} is a constant and cannot be bound"));
+            return self.exchange.program_error(format!("{name} is a constant and cannot be bound"));
         }
         if flags & Symbol::EVER_BOUND == 0 {
             self.heap.set_flags(symbol, Kind::Symbol, flags | Symbol::EVER_BOUND);
         }
         let limit = self.config.stack;
-        let bindings = &mut self.task_mut().control.bindings;
+        let bindings = &mut self.scheduler.task_mut().control.bindings;
         if bindings.len() >= limit {
-            return self.raise(Raised::StackExhausted);
+            return self.exchange.raise(Raised::StackExhausted);
         }
         bindings.push(Binding { symbol, value, base });
         Ok(())

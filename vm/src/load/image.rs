@@ -375,7 +375,7 @@ impl Vm {
         let code = loader.code(FunctionNumber(number));
         let code = self.loaded(code)?;
         trust::replace_stub(&mut self.heap, function, code);
-        self.charge(self.heap.code_words(code).map_or(0, <[u32]>::len));
+        self.exchange.charge(self.heap.code_words(code).map_or(0, <[u32]>::len));
         Ok(())
     }
 }

@@ -19,7 +19,7 @@ pub(crate) fn add(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     if let (Some(x), Some(y)) = (BigOperand::of(&vm.heap, a, &mut [0]), BigOperand::of(&vm.heap, b, &mut [0]))
     {
         let (negative, limbs) = x.plus(&y);
-        vm.charge(limbs.len());
+        vm.exchange.charge(limbs.len());
         return vm.limbs_value("+", negative, &limbs);
     }
     match operands(vm, "+", a, b)? {
@@ -45,7 +45,7 @@ pub(crate) fn subtract(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     if let (Some(x), Some(y)) = (BigOperand::of(&vm.heap, a, &mut [0]), BigOperand::of(&vm.heap, b, &mut [0]))
     {
         let (negative, limbs) = x.plus(&y.negated());
-        vm.charge(limbs.len());
+        vm.exchange.charge(limbs.len());
         return vm.limbs_value("-", negative, &limbs);
     }
     match operands(vm, "-", a, b)? {
@@ -62,11 +62,11 @@ pub(crate) fn subtract(vm: &mut Vm, a: Value, b: Value) -> Outcome {
 pub(crate) fn negate(vm: &mut Vm, a: Value) -> Outcome {
     match vm.number(a, "NUMBER")? {
         Number::Int(n) => {
-            vm.charge(n.len());
+            vm.exchange.charge(n.len());
             vm.integer_value("-", &n.negated())
         }
         Number::Ratio(r) => {
-            vm.charge(r.len());
+            vm.exchange.charge(r.len());
             vm.ratio_value("-", &r.negated())
         }
         Number::Float(x) => Ok(vm.heap.float(-x)?),
@@ -107,7 +107,7 @@ pub(crate) fn divide(vm: &mut Vm, a: Value, b: Value) -> Outcome {
         return float_quotient(vm, "/", [a, b], x, y);
     }
     match operands(vm, "/", a, b)? {
-        Pair::Ints(_, y) if y.is_zero() => vm.raise(Raised::DivisionByZero("/", [a, b])),
+        Pair::Ints(_, y) if y.is_zero() => vm.exchange.raise(Raised::DivisionByZero("/", [a, b])),
         Pair::Ints(Int::Small(x), Int::Small(y)) if x.checked_rem(y) == Some(0) => {
             vm.integer_value("/", &Int::Small(x / y))
         }
@@ -115,7 +115,7 @@ pub(crate) fn divide(vm: &mut Vm, a: Value, b: Value) -> Outcome {
             check_gcd(vm, x.len(), y.len())?;
             vm.ratio_value("/", &Ratio::reduced(&x, &y))
         }
-        Pair::Ratios(_, y) if y.numerator.is_zero() => vm.raise(Raised::DivisionByZero("/", [a, b])),
+        Pair::Ratios(_, y) if y.numerator.is_zero() => vm.exchange.raise(Raised::DivisionByZero("/", [a, b])),
         Pair::Ratios(x, y) => {
             check_ratios(vm, &x, &y)?;
             vm.ratio_value("/", &x.times(&y.inverted()))
@@ -128,7 +128,7 @@ pub(crate) fn divide(vm: &mut Vm, a: Value, b: Value) -> Outcome {
 /// failure.
 pub(crate) fn float_quotient(vm: &mut Vm, op: &'static str, operands: [Value; 2], x: f64, y: f64) -> Outcome {
     if y == 0.0 && x != 0.0 {
-        return vm.raise(Raised::DivisionByZero(op, operands));
+        return vm.exchange.raise(Raised::DivisionByZero(op, operands));
     }
     vm.float_value(op, x / y)
 }
@@ -204,7 +204,7 @@ pub(crate) fn check_gcd(vm: &mut Vm, a: usize, b: usize) -> Result<(), Exit> {
     }
     if long > 2 {
         // One division brings both to the size of the shorter; then every limb takes two passes over both.
-        vm.charge((long + 4 * short) * short);
+        vm.exchange.charge((long + 4 * short) * short);
     }
     Ok(())
 }

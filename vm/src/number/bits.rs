@@ -31,21 +31,21 @@ pub(crate) fn join(vm: &mut Vm, operation: BitOperation, a: Value, b: Value) -> 
         return Ok(Value::fixnum(joined).unwrap_or(Value::NIL));
     }
     let (a, b) = (vm.integer(a)?, vm.integer(b)?);
-    vm.charge(a.len() + b.len());
+    vm.exchange.charge(a.len() + b.len());
     vm.integer_value("LOGAND", &a.joined(operation, &b))
 }
 
 /// Implements `(lognot a)`.
 pub(crate) fn complement(vm: &mut Vm, a: Value) -> Outcome {
     let a = vm.integer(a)?;
-    vm.charge(a.len());
+    vm.exchange.charge(a.len());
     vm.integer_value("LOGNOT", &a.complement())
 }
 
 /// Implements `(ash a count)`.
 pub(crate) fn shift(vm: &mut Vm, a: Value, count: Value) -> Outcome {
     let (n, count) = (vm.integer(a)?, vm.integer(count)?);
-    vm.charge(n.len());
+    vm.exchange.charge(n.len());
     if n.is_zero() {
         return Ok(a);
     }
@@ -56,7 +56,7 @@ pub(crate) fn shift(vm: &mut Vm, a: Value, count: Value) -> Outcome {
     // A count beyond 64 bits exceeds the limit in any case.
     let shift = u64::try_from(count.to_big()).unwrap_or(u64::MAX >> 1).min(u64::MAX >> 1);
     vm.check_bits("ASH", n.bits() + shift)?;
-    vm.charge(shift as usize / 64);
+    vm.exchange.charge(shift as usize / 64);
     vm.integer_value("ASH", &n.shifted_left(shift))
 }
 
@@ -68,13 +68,13 @@ pub(crate) fn bit(vm: &mut Vm, index: Value, a: Value) -> Result<bool, Exit> {
             Ok(index) => n.bit(index),
             Err(_) => n.is_negative(),
         }),
-        _ => vm.type_error(index, "UNSIGNED-BYTE"),
+        _ => vm.exchange.type_error(index, "UNSIGNED-BYTE"),
     }
 }
 
 /// Returns `size` bits of `a` from bit `position` up, as an integer that is not negative.
 pub(crate) fn field(vm: &mut Vm, size: u64, position: u64, a: &Int) -> Result<Int, Exit> {
-    vm.charge(a.len());
+    vm.exchange.charge(a.len());
     let shifted = a.shifted_right(position);
     // A number that is not negative has only zeros above its length.
     let size = if shifted.is_negative() { size } else { size.min(shifted.bits()) };
@@ -88,7 +88,7 @@ pub(crate) fn deposit(vm: &mut Vm, new: &Int, size: u64, position: u64, a: &Int)
         return Ok(a.clone());
     }
     vm.check_bits("DPB", size.saturating_add(position))?;
-    vm.charge(a.len() + (size + position) as usize / 64);
+    vm.exchange.charge(a.len() + (size + position) as usize / 64);
     let mask = mask(size);
     let kept = a.joined(BitOperation::And, &mask.shifted_left(position).complement());
     let placed = new.joined(BitOperation::And, &mask).shifted_left(position);

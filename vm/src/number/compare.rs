@@ -27,7 +27,7 @@ pub(crate) fn num_equal(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
     }
     for v in [a, b] {
         if !super::is_number(&vm.heap, v) {
-            return vm.type_error(v, "NUMBER");
+            return vm.exchange.type_error(v, "NUMBER");
         }
     }
     Ok(same_value(&vm.heap, a, b))
@@ -68,7 +68,7 @@ pub(crate) fn less_or_equal(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exi
 pub(crate) fn sign(vm: &mut Vm, a: Value, expected: &'static str) -> Result<i32, Exit> {
     match sign_of(&vm.heap, a) {
         Some(sign) => Ok(sign),
-        None => vm.type_error(a, expected),
+        None => vm.exchange.type_error(a, expected),
     }
 }
 
@@ -104,7 +104,7 @@ fn compare(
     if let (Some(x), Some(y)) = (BigOperand::of(&vm.heap, a, &mut [0]), BigOperand::of(&vm.heap, b, &mut [0]))
     {
         let (order, work) = (x.compare(&y), x.len().min(y.len()));
-        vm.charge(work);
+        vm.exchange.charge(work);
         return Ok(Some(order));
     }
     let (x, y) = (vm.number(a, expected)?, vm.number(b, expected)?);

@@ -55,11 +55,13 @@ impl Elementary {
     pub(crate) fn apply(&self, vm: &mut Vm, a: Value) -> Outcome {
         let x = vm.double_of(self.name, a, "NUMBER")?;
         if !(self.domain)(x) {
-            return vm.raise(Raised::Arithmetic(self.name, "the result would be a complex number".into()));
+            return vm
+                .exchange
+                .raise(Raised::Arithmetic(self.name, "the result would be a complex number".into()));
         }
         let y = (self.function)(x);
         if y.is_infinite() && x.abs() == 1.0 {
-            return vm.raise(Raised::DivisionByZero(self.name, [a, Value::small(0)]));
+            return vm.exchange.raise(Raised::DivisionByZero(self.name, [a, Value::small(0)]));
         }
         vm.float_value(self.name, y)
     }

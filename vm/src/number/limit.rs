@@ -39,7 +39,7 @@ impl Vm {
         if bits <= BIT_LIMIT {
             return Ok(());
         }
-        self.raise(Raised::Arithmetic(
+        self.exchange.raise(Raised::Arithmetic(
             op,
             format!("the result would have {bits} bits, the limit is {BIT_LIMIT}"),
         ))
@@ -54,7 +54,7 @@ impl Vm {
         if work > WORK_LIMIT {
             return Err(Exit::Slowly);
         }
-        self.charge(work);
+        self.exchange.charge(work);
         Ok(())
     }
 }

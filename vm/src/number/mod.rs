@@ -102,14 +102,14 @@ impl Vm {
     pub(crate) fn number(&mut self, v: Value, expected: &'static str) -> Result<Number, Exit> {
         match Number::of(&self.heap, v) {
             Some(number) => {
-                self.charge(match &number {
+                self.exchange.charge(match &number {
                     Number::Int(n) => 2 * n.len(),
                     Number::Ratio(r) => 4 * r.len(),
                     Number::Float(_) => 0,
                 });
                 Ok(number)
             }
-            None => self.type_error(v, expected),
+            None => self.exchange.type_error(v, expected),
         }
     }
 
@@ -117,10 +117,10 @@ impl Vm {
     pub(crate) fn integer(&mut self, v: Value) -> Result<Int, Exit> {
         match Int::of(&self.heap, v) {
             Some(n) => {
-                self.charge(2 * n.len());
+                self.exchange.charge(2 * n.len());
                 Ok(n)
             }
-            None => self.type_error(v, "INTEGER"),
+            None => self.exchange.type_error(v, "INTEGER"),
         }
     }
 
@@ -143,7 +143,7 @@ impl Vm {
             Number::Int(n) => n.to_f64(),
             Number::Ratio(r) => r.to_f64(),
         };
-        if x.is_finite() { Ok(x) } else { self.raise(Raised::FloatOverflow(op)) }
+        if x.is_finite() { Ok(x) } else { self.exchange.raise(Raised::FloatOverflow(op)) }
     }
 
     /// Returns the integer `n` as a value. Fails as operation `op` if it has too many bits.
@@ -176,9 +176,9 @@ impl Vm {
     #[cold]
     fn float_trap(&mut self, op: &'static str, x: f64) -> Outcome {
         if x.is_nan() {
-            self.raise(Raised::Arithmetic(op, "the result is not a number".into()))
+            self.exchange.raise(Raised::Arithmetic(op, "the result is not a number".into()))
         } else {
-            self.raise(Raised::FloatOverflow(op))
+            self.exchange.raise(Raised::FloatOverflow(op))
         }
     }
 
@@ -188,8 +188,8 @@ impl Vm {
         if self.cpu.wants_one {
             return Ok(values.first().copied().unwrap_or(Value::NIL));
         }
-        self.values.clear();
-        self.values.extend_from_slice(values);
+        self.exchange.values.clear();
+        self.exchange.values.extend_from_slice(values);
         Err(Exit::Values)
     }
 }

@@ -21,7 +21,7 @@ pub(crate) fn expt(vm: &mut Vm, base: Value, power: Value) -> Outcome {
         },
         (Number::Int(x), Number::Int(y)) => {
             if x.is_zero() && y.is_negative() {
-                return vm.raise(Raised::DivisionByZero("EXPT", [base, power]));
+                return vm.exchange.raise(Raised::DivisionByZero("EXPT", [base, power]));
             }
             let result = int_power(vm, &x, &y.abs())?;
             let result = Ratio::integer(result);
@@ -76,19 +76,21 @@ fn int_power(vm: &mut Vm, base: &Int, exponent: &Int) -> Result<Int, Exit> {
     };
     let shift = zeros * exponent;
     vm.check_bits("EXPT", power.bits() + shift)?;
-    vm.charge(shift as usize / 64);
+    vm.exchange.charge(shift as usize / 64);
     Ok(power.shifted_left(shift))
 }
 
 fn real_power(vm: &mut Vm, operands: [Value; 2], is_float: bool, x: f64, y: f64) -> Outcome {
     if x == 0.0 && y == 0.0 && is_float {
-        return vm.raise(Raised::Arithmetic("EXPT", "zero to the power of a zero float has no value".into()));
+        return vm
+            .exchange
+            .raise(Raised::Arithmetic("EXPT", "zero to the power of a zero float has no value".into()));
     }
     if x == 0.0 && y < 0.0 {
-        return vm.raise(Raised::DivisionByZero("EXPT", operands));
+        return vm.exchange.raise(Raised::DivisionByZero("EXPT", operands));
     }
     if x < 0.0 && y.fract() != 0.0 {
-        return vm.raise(Raised::Arithmetic("EXPT", "the result would be a complex number".into()));
+        return vm.exchange.raise(Raised::Arithmetic("EXPT", "the result would be a complex number".into()));
     }
     vm.float_value("EXPT", transcendental::pow(x, y))
 }
@@ -98,6 +100,7 @@ pub(crate) fn sqrt(vm: &mut Vm, a: Value) -> Outcome {
     let x = vm.double_of("SQRT", a, "NUMBER")?;
     if x < 0.0 {
         return vm
+            .exchange
             .raise(Raised::Arithmetic("SQRT", "the square root of a negative number is complex".into()));
     }
     vm.float_value("SQRT", x.sqrt())
@@ -110,14 +113,14 @@ pub(crate) fn isqrt(vm: &mut Vm, a: Value) -> Outcome {
             if n.len() > limit::ROOT_LIMBS {
                 return Err(Exit::Slowly);
             }
-            vm.charge(4 * n.len() * n.len());
+            vm.exchange.charge(4 * n.len() * n.len());
             let root = match n {
                 Int::Small(n) => Int::from_unsigned(n.unsigned_abs().isqrt()),
                 Int::Big(n) => Int::from_big(n.sqrt()),
             };
             vm.integer_value("ISQRT", &root)
         }
-        _ => vm.type_error(a, "UNSIGNED-BYTE"),
+        _ => vm.exchange.type_error(a, "UNSIGNED-BYTE"),
     }
 }
 
@@ -156,7 +159,7 @@ pub(crate) fn log_in_base(vm: &mut Vm, a: Value, base: Value) -> Outcome {
     }
     let (numerator, denominator) = (natural_log(a_bits, x), natural_log(base_bits, y));
     if denominator == 0.0 {
-        return vm.raise(Raised::DivisionByZero("LOG", [a, base]));
+        return vm.exchange.raise(Raised::DivisionByZero("LOG", [a, base]));
     }
     vm.float_value("LOG", numerator / denominator)
 }
@@ -171,10 +174,12 @@ fn log_parts(vm: &mut Vm, a: Value) -> Result<(f64, f64), Exit> {
         Number::Float(x) => (*x == 0.0, *x < 0.0),
     };
     if is_zero {
-        return vm.raise(Raised::DivisionByZero("LOG", [a, Value::small(0)]));
+        return vm.exchange.raise(Raised::DivisionByZero("LOG", [a, Value::small(0)]));
     }
     if is_negative {
-        return vm.raise(Raised::Arithmetic("LOG", "the logarithm of a negative number is complex".into()));
+        return vm
+            .exchange
+            .raise(Raised::Arithmetic("LOG", "the logarithm of a negative number is complex".into()));
     }
     Ok(match number {
         Number::Float(x) => (0.0, x),

@@ -108,7 +108,7 @@ proptest! {
                 }
             };
             prop_assert_eq!(rounding::both(&mut vm, rounding, x, y), Err(Exit::Values));
-            let (quotient, remainder) = (vm.values[0], vm.values[1]);
+            let (quotient, remainder) = (vm.exchange.values[0], vm.exchange.values[1]);
             prop_assert_eq!(rational_of(&vm, quotient), expected.clone());
             prop_assert_eq!(rational_of(&vm, remainder), &a - &expected * &b);
         }

@@ -47,7 +47,7 @@ fn state_of(vm: &mut Vm, words: &[u32]) -> Outcome {
 fn words_of(vm: &mut Vm, state: Value) -> Outcome {
     match vm.heap.record(state, Kind::RandomState) {
         Some(&[words]) => Ok(words),
-        _ => vm.type_error(state, "RANDOM-STATE"),
+        _ => vm.exchange.type_error(state, "RANDOM-STATE"),
     }
 }
 
@@ -63,11 +63,11 @@ pub(crate) fn random(vm: &mut Vm, limit: Value, state: Value) -> Outcome {
             }
         },
         Some(Number::Int(n)) if n.signum() > 0 => {
-            vm.charge(n.len());
+            vm.exchange.charge(n.len());
             let drawn = generator.below(&n);
             vm.integer_value("RANDOM", &drawn)?
         }
-        _ => return vm.type_error(limit, "REAL"),
+        _ => return vm.exchange.type_error(limit, "REAL"),
     };
     // The state advances only once no failure is possible.
     generator.store(vm, object);

@@ -123,9 +123,9 @@ impl Ratio {
             self.numerator.len() * other.denominator.len() + other.numerator.len() * self.denominator.len();
         if work > limit::WORK_LIMIT {
             let text = format!("ratios of {low} bits that are nearly equal are too large to be compared");
-            return vm.raise(Raised::Arithmetic(op, text));
+            return vm.exchange.raise(Raised::Arithmetic(op, text));
         }
-        vm.charge(work);
+        vm.exchange.charge(work);
         Ok(self.numerator.times(&other.denominator).compare(&other.numerator.times(&self.denominator)))
     }
 }

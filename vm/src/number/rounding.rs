@@ -137,12 +137,12 @@ fn division(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Result<Divis
         return float_division(vm, rounding, [a, b], x, y);
     }
     match typed_operands(vm, "/", a, b, "REAL")? {
-        Pair::Ints(_, y) if y.is_zero() => vm.raise(Raised::DivisionByZero("/", [a, b])),
+        Pair::Ints(_, y) if y.is_zero() => vm.exchange.raise(Raised::DivisionByZero("/", [a, b])),
         Pair::Ints(x, y) => {
             let (quotient, remainder) = int_division(vm, rounding, &x, &y)?;
             Ok(Division::Ints(quotient, remainder))
         }
-        Pair::Ratios(_, y) if y.numerator.is_zero() => vm.raise(Raised::DivisionByZero("/", [a, b])),
+        Pair::Ratios(_, y) if y.numerator.is_zero() => vm.exchange.raise(Raised::DivisionByZero("/", [a, b])),
         Pair::Ratios(x, y) => {
             check_ratios(vm, &x, &y)?;
             // x / y is the integer quotient n / d; its remainder belongs over the common denominator.
@@ -157,7 +157,7 @@ fn division(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Result<Divis
 
 fn int_division(vm: &mut Vm, rounding: Rounding, a: &Int, b: &Int) -> Result<(Int, Int), Exit> {
     vm.check_work(2 * (a.len() + 1).saturating_sub(b.len()), b.len())?;
-    vm.charge(a.len() + b.len());
+    vm.exchange.charge(a.len() + b.len());
     let (quotient, remainder) = a.div_rem(b);
     if remainder.is_zero() || rounding == Rounding::Truncate {
         return Ok((quotient, remainder));
@@ -179,7 +179,7 @@ fn float_division(
     y: f64,
 ) -> Result<Division, Exit> {
     if y == 0.0 && x != 0.0 {
-        return vm.raise(Raised::DivisionByZero("/", operands));
+        return vm.exchange.raise(Raised::DivisionByZero("/", operands));
     }
     let exact = x / y;
     if !exact.is_finite() {

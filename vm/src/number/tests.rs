@@ -39,10 +39,10 @@ fn apply(f: fn(&mut Vm, Value, Value) -> Outcome, a: &str, b: &str) -> String {
     match f(&mut vm, a, b) {
         Ok(v) => show(&vm, v),
         Err(Exit::Values) => {
-            let shown: Vec<String> = vm.values.iter().map(|&v| show(&vm, v)).collect();
+            let shown: Vec<String> = vm.exchange.values.iter().map(|&v| show(&vm, v)).collect();
             shown.join(" ")
         }
-        Err(Exit::Raise) => match vm.raised.take() {
+        Err(Exit::Raise) => match vm.exchange.raised.take() {
             Some(Raised::DivisionByZero(..)) => "division-by-zero".into(),
             Some(Raised::FloatOverflow(_)) => "overflow".into(),
             Some(Raised::Arithmetic(_, text)) => text,
@@ -302,10 +302,12 @@ fn what_is_no_number_is_named() {
         (add(&mut vm, Value::small(1), Value::T), "NUMBER"),
     ] {
         assert_eq!(result, Err(Exit::Raise));
-        assert!(matches!(vm.raised, Some(Raised::Type(Value::T, Expected::Type(t))) if t == expected));
+        assert!(
+            matches!(vm.exchange.raised, Some(Raised::Type(Value::T, Expected::Type(t))) if t == expected)
+        );
     }
     assert_eq!(less(&mut vm, Value::small(1), Value::NIL), Err(Exit::Raise));
-    assert!(matches!(vm.raised, Some(Raised::Type(Value::NIL, Expected::Type("REAL")))));
+    assert!(matches!(vm.exchange.raised, Some(Raised::Type(Value::NIL, Expected::Type("REAL")))));
 }
 
 #[test]

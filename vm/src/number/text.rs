@@ -28,9 +28,9 @@ pub(crate) fn integer_text(vm: &mut Vm, n: &Int, radix: u32) -> Result<String, E
                 if len > limit::DIGIT_LIMBS {
                     return Err(Exit::Slowly);
                 }
-                vm.charge(len * len);
+                vm.exchange.charge(len * len);
             }
-            vm.charge(64 * len);
+            vm.exchange.charge(64 * len);
             Ok(n.to_big().to_str_radix(radix).to_uppercase())
         }
     }

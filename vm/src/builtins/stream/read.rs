@@ -53,13 +53,15 @@ pub(in crate::builtins) fn peek_char(vm: &mut Vm, arguments: &[Value]) -> Outcom
         }
     }
     // What was skipped stays so: whoever takes over goes on from there.
-    vm.charge_elements(SKIP_LIMIT);
+    vm.exchange.charge_elements(SKIP_LIMIT);
     Err(Exit::Slowly)
 }
 
 /// `(unread-char character &optional stream)`
 pub(in crate::builtins) fn unread_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(code) = arguments[0].as_character() else { return vm.type_error(arguments[0], "CHARACTER") };
+    let Some(code) = arguments[0].as_character() else {
+        return vm.exchange.type_error(arguments[0], "CHARACTER");
+    };
     let (stream, kind) = vm.designated_stream(optional(arguments, 1), true)?;
     vm.give_back(stream, kind, code);
     Ok(Value::NIL)
@@ -69,14 +71,14 @@ pub(in crate::builtins) fn unread_char(vm: &mut Vm, arguments: &[Value]) -> Outc
 pub(in crate::builtins) fn read_line(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (stream, kind) = vm.designated_stream(optional(arguments, 0), true)?;
     let (line, is_cut) = if kind == StreamKind::StandardInput {
-        let taken = vm.console.read_line(&mut *vm.host);
+        let taken = vm.outside.console.read_line(&mut *vm.outside.host);
         let Some((line, is_cut)) = vm.taken(taken)? else { return end_of_line(vm, stream, arguments) };
-        vm.charge_elements(line.len());
+        vm.exchange.charge_elements(line.len());
         match vm.heap.alloc_string(&line) {
             Ok(text) => (text, is_cut),
             Err(error) => {
                 // The builtin will be done again.
-                vm.console.unread_line(&line, is_cut);
+                vm.outside.console.unread_line(&line, is_cut);
                 return Err(error.into());
             }
         }
@@ -92,7 +94,7 @@ pub(in crate::builtins) fn read_line(vm: &mut Vm, arguments: &[Value]) -> Outcom
             return Err(Exit::Slowly);
         }
         let line = rest[..length.unwrap_or(rest.len())].to_vec();
-        vm.charge_elements(line.len());
+        vm.exchange.charge_elements(line.len());
         let text = vm.heap.alloc_string(&line)?;
         let next = start + line.len() + usize::from(length.is_some());
         vm.set_stream_slot(stream, slot::POSITION, Value::index(next));

@@ -8,7 +8,9 @@ use crate::vm::Vm;
 
 /// `(write-char character &optional stream)`
 pub(in crate::builtins) fn write_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(code) = arguments[0].as_character() else { return vm.type_error(arguments[0], "CHARACTER") };
+    let Some(code) = arguments[0].as_character() else {
+        return vm.exchange.type_error(arguments[0], "CHARACTER");
+    };
     let (stream, kind) = vm.designated_stream(optional(arguments, 1), false)?;
     vm.write_characters(stream, kind, &[code])?;
     Ok(arguments[0])
@@ -45,7 +47,7 @@ pub(in crate::builtins) fn finish_output(vm: &mut Vm, arguments: &[Value]) -> Ou
     let (stream, kind) = vm.designated_stream(optional(arguments, 0), false)?;
     match kind {
         StreamKind::StandardOutput => {
-            vm.flush_output();
+            vm.outside.flush();
             vm.check_output()?;
         }
         StreamKind::FileOutput => vm.write_out(stream)?,

@@ -112,10 +112,12 @@ fn every_call_is_answered() {
                 let most = info.arity.max.unwrap_or(info.arity.min + 3);
                 let count = info.arity.min as usize + choices.below((most - info.arity.min) as usize + 1);
                 let arguments: Vec<Value> = (0..count).map(|_| all[choices.below(all.len())]).collect();
-                vm.raised = None;
+                vm.exchange.raised = None;
                 match NATIVES[info.builtin as usize](&mut vm, &arguments) {
                     Ok(_) | Err(Exit::Values | Exit::Collect) => {}
-                    Err(Exit::Raise) => assert!(vm.raised.is_some(), "{} of {arguments:?}", info.name),
+                    Err(Exit::Raise) => {
+                        assert!(vm.exchange.raised.is_some(), "{} of {arguments:?}", info.name)
+                    }
                     Err(Exit::Slowly) => assert!(info.slowly.is_some(), "{} of {arguments:?}", info.name),
                     Err(exit) => panic!("{} of {arguments:?} gives {exit:?} in round {round}", info.name),
                 }

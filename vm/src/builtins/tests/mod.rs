@@ -87,7 +87,7 @@ impl Evaluator<'_> {
         assert!(fits, "{} of {count} arguments", info.name);
         match NATIVES[info.builtin as usize](self.vm, arguments) {
             Ok(value) => Ok(vec![value]),
-            Err(Exit::Values) => Ok(self.vm.values.clone()),
+            Err(Exit::Values) => Ok(self.vm.exchange.values.clone()),
             Err(exit) => {
                 assert!(exit != Exit::Slowly || info.slowly.is_some(), "{} has no twin", info.name);
                 Err(exit)
@@ -201,7 +201,7 @@ fn show_result(vm: &mut Vm, result: &Result<Vec<Value>, Exit>) -> String {
     match result {
         Ok(values) if values.is_empty() => "no values".into(),
         Ok(values) => values.iter().map(|&v| show(vm, v)).collect::<Vec<_>>().join(" ; "),
-        Err(Exit::Raise) => match vm.raised.take() {
+        Err(Exit::Raise) => match vm.exchange.raised.take() {
             Some(Raised::Type(datum, expected)) => {
                 let expected = match expected {
                     Expected::Type(name) => name.to_string(),

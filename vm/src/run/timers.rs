@@ -3,8 +3,8 @@
 //! Virtual time stands still while tasks run. It moves when all of them wait, to the first time for which one does, and when
 //! so many ticks have run that something else must be meant to happen.
 
+use crate::schedule::Due;
 use crate::task::{Task, TaskState};
-use crate::timer::Due;
 use crate::vm::Vm;
 
 /// Ticks between two looks at the clock while tasks are running.
@@ -17,23 +17,23 @@ const AT_ONCE: usize = 1000;
 impl Vm {
     /// Reads the clock if it is time to, and does what is due.
     pub(crate) fn look_at_clock(&mut self) {
-        if self.timers.first().is_none() {
+        if self.scheduler.timers.first().is_none() {
             return;
         }
-        if self.more_is_due {
+        if self.scheduler.clock.more_is_due {
             return self.fire_timers();
         }
-        if self.host.is_virtual() {
-            if self.spent.saturating_sub(self.moved_at) < VIRTUAL_TICKS {
+        if self.outside.host.is_virtual() {
+            if self.scheduler.spent.saturating_sub(self.scheduler.clock.moved_at) < VIRTUAL_TICKS {
                 return;
             }
             let Some(first) = self.first_timer() else { return };
-            let now = self.host.monotonic();
-            self.host.advance(first.saturating_sub(now));
-        } else if self.spent.saturating_sub(self.looked_at) < CLOCK_TICKS {
+            let now = self.outside.host.monotonic();
+            self.outside.host.advance(first.saturating_sub(now));
+        } else if self.scheduler.spent.saturating_sub(self.scheduler.clock.looked_at) < CLOCK_TICKS {
             return;
         }
-        self.looked_at = self.spent;
+        self.scheduler.clock.looked_at = self.scheduler.spent;
         self.fire_timers();
     }
 
@@ -42,18 +42,18 @@ impl Vm {
         let now = self.time();
         let mut left = AT_ONCE;
         while left > 0
-            && let Some((index, due)) = self.timers.take_due(now)
+            && let Some((index, due)) = self.scheduler.timers.take_due(now)
         {
             left -= 1;
             match due {
                 Due::Wait(serial) => {
-                    if self.tasks.at(index).is_some_and(|task| is_waiting(task, serial)) {
+                    if self.scheduler.tasks.at(index).is_some_and(|task| is_waiting(task, serial)) {
                         self.make_runnable(index, false);
                     }
                 }
                 Due::Limit(number) => self.expire(index, number, self.world.known.timeout),
                 Due::Cleanup => {
-                    let task = self.tasks.at(index);
+                    let task = self.scheduler.tasks.at(index);
                     if task
                         .and_then(|task| task.control.get())
                         .is_some_and(|control| !control.running.is_empty())
@@ -63,45 +63,45 @@ impl Vm {
                 }
             }
         }
-        self.more_is_due = left == 0;
-        self.moved_at = self.spent;
-        if self.timers.wants_sweep() {
+        self.scheduler.clock.more_is_due = left == 0;
+        self.scheduler.clock.moved_at = self.scheduler.spent;
+        if self.scheduler.timers.wants_sweep() {
             self.sweep_timers();
         }
     }
 
     /// The time of the first timer that is still of use.
     fn first_timer(&mut self) -> Option<u64> {
-        while let Some((index, due)) = self.timers.peek()
-            && !is_wanted(self.tasks.at(index), due)
+        while let Some((index, due)) = self.scheduler.timers.peek()
+            && !is_wanted(self.scheduler.tasks.at(index), due)
         {
-            self.timers.take_first();
+            self.scheduler.timers.take_first();
         }
-        self.timers.first()
+        self.scheduler.timers.first()
     }
 
     fn sweep_timers(&mut self) {
-        let tasks = &self.tasks;
-        self.timers.sweep(|index, due| is_wanted(tasks.at(index), due));
+        let tasks = &self.scheduler.tasks;
+        self.scheduler.timers.sweep(|index, due| is_wanted(tasks.at(index), due));
     }
 
     /// Sleeps until something is due or comes from outside. False if nothing ever will.
     pub(crate) fn idle(&mut self) -> bool {
-        self.flush_output();
+        self.outside.flush();
         let deadline = self.first_timer();
-        let for_input = !self.readers.is_empty();
+        let for_input = !self.scheduler.readers.is_empty();
         if deadline.is_none() && !for_input {
             return false;
         }
-        self.host.wait(deadline, for_input);
+        self.outside.host.wait(deadline, for_input);
         if for_input {
-            for id in std::mem::take(&mut self.readers) {
-                if self.tasks.get(id).is_some_and(|task| task.state == TaskState::Reading) {
+            for id in std::mem::take(&mut self.scheduler.readers) {
+                if self.scheduler.tasks.get(id).is_some_and(|task| task.state == TaskState::Reading) {
                     self.make_runnable(id.index, false);
                 }
             }
         }
-        self.looked_at = self.spent;
+        self.scheduler.clock.looked_at = self.scheduler.spent;
         self.fire_timers();
         true
     }
@@ -117,7 +117,7 @@ pub(crate) fn is_wanted(task: Option<&Task>, due: Due) -> bool {
     match due {
         Due::Wait(serial) => is_waiting(task, serial),
         Due::Limit(number) => {
-            task.extra.as_ref().is_some_and(|extra| extra.limits.iter().any(|limit| limit.number() == number))
+            task.extra.as_ref().is_some_and(|extra| extra.limits.iter().any(|limit| limit.number == number))
         }
         Due::Cleanup => task.control.get().is_some_and(|control| !control.running.is_empty()),
     }

@@ -1,12 +1,13 @@
 //! The end of a task: asking for it, noting how it came, telling who waits for it, and ending the run with the last.
 
-use crate::control::End;
 use crate::heap::Kind;
 use crate::interp;
-use crate::limit::AccountId;
 use crate::raise::Exit;
+use crate::report::Happening;
+use crate::schedule::EndOfAll;
+use crate::task::AccountId;
+use crate::task::End;
 use crate::task::{TaskId, TaskState};
-use crate::trace::Happening;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
@@ -14,26 +15,16 @@ use crate::wait::event;
 /// Tasks that are asked to end in one step.
 const AT_ONCE: usize = 1000;
 
-/// All tasks are being asked to end, so many at a time.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct EndOfAll {
-    /// The place of the next one.
-    place: usize,
-    /// Those with a higher number were made afterwards.
-    made: u64,
-    /// The number of the one that wants it, or 0.
-    except: u64,
-}
-
 impl Vm {
     /// Asks for the end of a task, wherever it is. It unwinds, and runs its cleanups, within two slices; inside a cleanup
     /// or a critical section the request waits for its end.
     pub fn abort(&mut self, id: TaskId) {
-        if !self.tasks.contains(id) {
+        if !self.scheduler.tasks.contains(id) {
             return;
         }
-        let is_running = id.index == self.running_index && self.running.is_some();
-        let task = if is_running { self.running.as_deref_mut() } else { self.tasks.get_mut(id) };
+        let is_running = id.index == self.scheduler.turn.index && self.scheduler.running.is_some();
+        let task =
+            if is_running { self.scheduler.running.as_deref_mut() } else { self.scheduler.tasks.get_mut(id) };
         if let Some(task) = task
             && task.state != TaskState::Ended
         {
@@ -51,11 +42,11 @@ impl Vm {
     /// Asks for the end of every task but the running one. Where there are many, the rest are asked between turns, and only those
     /// that are being ended have turns until then.
     pub(crate) fn abort_others(&mut self) {
-        let except = self.running.as_ref().map_or(0, |task| task.number);
-        self.end_of_all = Some(EndOfAll { place: 0, made: self.made, except });
+        let except = self.scheduler.running.as_ref().map_or(0, |task| task.number);
+        self.scheduler.end_of_all = Some(EndOfAll { place: 0, made: self.scheduler.counts.made, except });
         self.abort_more();
-        if self.end_of_all.is_some()
-            && let Some(task) = &mut self.running
+        if self.scheduler.end_of_all.is_some()
+            && let Some(task) = &mut self.scheduler.running
         {
             task.flags.set_urgent(true);
         }
@@ -63,30 +54,30 @@ impl Vm {
 
     /// Asks the next tasks to end, if all are to.
     pub(crate) fn abort_more(&mut self) {
-        let Some(all) = self.end_of_all else { return };
-        let end = self.tasks.places().min(all.place + AT_ONCE);
+        let Some(all) = self.scheduler.end_of_all else { return };
+        let end = self.scheduler.tasks.places().min(all.place + AT_ONCE);
         for index in all.place..end {
             let index = index as u32;
-            if let Some(task) = self.tasks.at(index)
+            if let Some(task) = self.scheduler.tasks.at(index)
                 && task.number <= all.made
                 && task.number != all.except
-                && let Some(id) = self.tasks.id_at(index)
+                && let Some(id) = self.scheduler.tasks.id_at(index)
             {
                 self.abort(id);
             }
         }
-        let is_over = end == self.tasks.places();
-        self.end_of_all = if is_over { None } else { Some(EndOfAll { place: end, ..all }) };
+        let is_over = end == self.scheduler.tasks.places();
+        self.scheduler.end_of_all = if is_over { None } else { Some(EndOfAll { place: end, ..all }) };
     }
 
     /// Notes how the running task has ended, and tells those who want to know.
     pub(crate) fn finish_task(&mut self) {
-        let end = match self.ending.take().unwrap_or(End::Succeeded) {
+        let end = match self.scheduler.turn.ending.take().unwrap_or(End::Succeeded) {
             End::Spent => End::Failed(self.world.known.budget_exhausted),
             end => end,
         };
-        let mut values = std::mem::take(&mut self.values);
-        let object = self.task().object;
+        let mut values = std::mem::take(&mut self.exchange.values);
+        let object = self.scheduler.task().object;
         // What others are told of has to be made before; here there is nothing to go back to.
         let result = match (end, &values[..]) {
             (End::Succeeded, &[value]) => value,
@@ -104,13 +95,13 @@ impl Vm {
         };
         self.set_slot(object, event::STATE, status);
         let is_awaited = self.slot(object, event::FIRST).is_true();
-        let notify = std::mem::replace(&mut self.task_mut().notify, Value::NIL);
-        interp::start::drop_frames(self.task_mut());
-        let account = std::mem::replace(&mut self.task_mut().account, AccountId::NONE);
-        self.accounts.leave(account);
+        let notify = std::mem::replace(&mut self.scheduler.task_mut().notify, Value::NIL);
+        interp::start::drop_frames(self.scheduler.task_mut());
+        let account = std::mem::replace(&mut self.scheduler.task_mut().account, AccountId::NONE);
+        self.scheduler.accounts.leave(account);
         self.trace_end(self.slot(object, event::NAME), status);
         self.report_end(end, is_awaited || notify.is_true());
-        let task = self.task_mut();
+        let task = self.scheduler.task_mut();
         task.state = TaskState::Ended;
         if task.flags.kept() {
             let extra = task.extra_mut();
@@ -118,7 +109,7 @@ impl Vm {
             extra.values = std::mem::take(&mut values);
         }
         values.clear();
-        self.values = values;
+        self.exchange.values = values;
         // The list of arguments is made only if somebody will see it.
         let has_waiters = self.slot(object, event::FIRST).is_true();
         let arguments: &[Value] = if has_waiters { &[self.world.known.task_end] } else { &[] };
@@ -149,17 +140,19 @@ impl Vm {
 
     /// Reports the failure that has ended the running task, unless somebody waits for it or the embedder wants to.
     fn report_end(&mut self, end: End, is_awaited: bool) {
-        let task = self.task_mut();
+        let task = self.scheduler.task_mut();
         if task.flags.kept() || is_awaited {
             return;
         }
         let report = task.extra.as_mut().and_then(|extra| extra.report.take());
-        let name = self.slot(self.task().object, event::NAME);
-        let label = self.label_of(name, self.task().number);
+        let name = self.slot(self.scheduler.task().object, event::NAME);
+        let label = self.label_of(name, self.scheduler.task().number);
         match (end, report) {
-            (End::Failed(_), Some(report)) => self.complain(&format!("In {label}:\n{}", report.text())),
+            (End::Failed(_), Some(report)) => {
+                self.outside.complain(&format!("In {label}:\n{}", report.text()))
+            }
             (End::Failed(condition), None) => {
-                self.complain(&format!("In {label}:\n{}", self.report_in_short(condition)));
+                self.outside.complain(&format!("In {label}:\n{}", self.report_in_short(condition)));
             }
             _ => {}
         }
@@ -172,13 +165,13 @@ impl Vm {
 
     /// Ends the run with the running task, if it is the last that matters.
     fn end_run_if_over(&mut self, end: End) {
-        self.alive -= 1;
-        if !self.task().flags.daemon() {
-            self.foreground -= 1;
+        self.scheduler.counts.alive -= 1;
+        if !self.scheduler.task().flags.daemon() {
+            self.scheduler.counts.foreground -= 1;
         }
-        let Some(main) = self.main else { return };
-        let main_has_failed = main.index == self.running_index && (end != End::Succeeded);
-        if main_has_failed || self.foreground == 0 {
+        let Some(main) = self.scheduler.main else { return };
+        let main_has_failed = main.index == self.scheduler.turn.index && (end != End::Succeeded);
+        if main_has_failed || self.scheduler.counts.foreground == 0 {
             self.abort_others();
         }
     }

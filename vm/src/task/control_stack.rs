@@ -11,8 +11,8 @@
 use std::cell::OnceCell;
 use std::ops::{Deref, DerefMut};
 
-use crate::binding::Bindings;
-use crate::limit::Allowance;
+use crate::task::Allowance;
+use crate::task::Bindings;
 use crate::value::Value;
 
 /// What an entry is.

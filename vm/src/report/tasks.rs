@@ -72,6 +72,7 @@ impl Vm {
     /// left out.
     pub fn deadlock_report(&self) -> String {
         let mut tasks: Vec<&Task> = self
+            .scheduler
             .tasks
             .iter()
             .filter(|task| {
@@ -95,6 +96,7 @@ impl Vm {
     /// it has used.
     pub fn task_report(&self) -> String {
         let mut tasks: Vec<&Task> = self
+            .scheduler
             .tasks
             .iter()
             .filter(|task| task.state != TaskState::Ended && !task.flags.hidden() && !task.flags.kept())
@@ -156,7 +158,7 @@ impl Vm {
             return "nothing".into();
         }
         match self.slot(event, crate::wait::event::NAME) {
-            _ if event == self.any_event => "any event".into(),
+            _ if event == self.scheduler.any_event => "any event".into(),
             name if name.is_true() => format!("event {}", self.describe(name)),
             _ => "an event".into(),
         }

@@ -6,38 +6,16 @@
 //! ([`Exit::Again`]). So nobody can tell the difference: who waits when the signal is given gets it and goes on before the
 //! task that has given it, and who begins later does not.
 
-use super::{event, link};
 use crate::heap::Kind;
-use crate::limit::AccountId;
 use crate::raise::Exit;
+use crate::task::AccountId;
 use crate::task::TaskState;
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::wait::{Delivery, event, link};
 
 /// Waits that are seen to in one step.
 const AT_ONCE: usize = 1000;
-
-/// A signal that is being handed out.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Delivery {
-    /// What was signalled.
-    event: Value,
-    /// With what: a list.
-    arguments: Value,
-    /// The next wait that gets it: a link in the list of the event, or `NIL`.
-    next: Value,
-    /// Who pays for the work.
-    account: AccountId,
-    /// The number of the task that signals, or 0.
-    by: u64,
-}
-
-impl Delivery {
-    /// Calls `visit` with its values.
-    pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
-        [self.event, self.arguments, self.next].into_iter().for_each(visit);
-    }
-}
 
 impl Vm {
     /// Signals an event: everybody who waits for it becomes runnable, in the order in which they began to wait. It is as
@@ -52,10 +30,10 @@ impl Vm {
 
     /// Signals an event with a list of arguments.
     pub(crate) fn signal(&mut self, event: Value, arguments: Value) -> Result<(), Exit> {
-        let any_event = self.any_event;
+        let any_event = self.scheduler.any_event;
         let is_awaited = self.slot(event, event::FIRST).is_true();
         let any_is_awaited = self.slot(any_event, event::FIRST).is_true();
-        if self.is_watched && (is_awaited || !self.heap.is(event, Kind::Task)) {
+        if self.watch.is_watched && (is_awaited || !self.heap.is(event, Kind::Task)) {
             self.tell_of_signal(event);
         }
         if !is_awaited && !any_is_awaited {
@@ -63,7 +41,7 @@ impl Vm {
             self.count_signal(any_event);
             return Ok(());
         }
-        if self.deliveries.is_empty()
+        if self.scheduler.deliveries.is_empty()
             && let Some(keepers) = self.keepers_if_few(event)
             && let Some(others) = self.keepers_if_few(any_event)
         {
@@ -76,21 +54,21 @@ impl Vm {
             } else {
                 self.count_signal(any_event);
             }
-            self.charge(64 * woken);
+            self.exchange.charge(64 * woken);
             return Ok(());
         }
         for (event, arguments) in [(event, arguments), (any_event, Value::NIL)] {
             self.count_signal(event);
-            let task = self.running.as_ref();
+            let task = self.scheduler.running.as_ref();
             let (account, by) = task.map_or((AccountId::NONE, 0), |task| (task.account, task.number));
             let next = self.slot(event, event::FIRST);
             if next.is_true() {
-                self.accounts.enter(account);
-                self.deliveries.push_back(Delivery { event, arguments, next, account, by });
+                self.scheduler.accounts.enter(account);
+                self.scheduler.deliveries.push_back(Delivery { event, arguments, next, account, by });
             }
         }
-        if self.running.is_some() {
-            self.holds_task = true;
+        if self.scheduler.running.is_some() {
+            self.scheduler.turn.holds_task = true;
             self.end_slice_here();
         }
         Ok(())
@@ -101,10 +79,10 @@ impl Vm {
     /// # Errors
     /// [`Exit::Again`] if there are some.
     pub(crate) fn wait_for_deliveries(&mut self) -> Result<(), Exit> {
-        if self.deliveries.is_empty() || self.running.is_none() {
+        if self.scheduler.deliveries.is_empty() || self.scheduler.running.is_none() {
             return Ok(());
         }
-        self.holds_task = true;
+        self.scheduler.turn.holds_task = true;
         Err(Exit::Again)
     }
 
@@ -143,7 +121,7 @@ impl Vm {
         self.count_signal(event);
         let mut link = self.slot(event, event::FIRST);
         let mut woken = 0;
-        let by = self.running.as_ref().map_or(0, |task| task.number);
+        let by = self.scheduler.running.as_ref().map_or(0, |task| task.number);
         while link.is_true() {
             // A wait is in the list once, so ending it does not touch the next link.
             let next = self.slot(link, link::NEXT);
@@ -156,7 +134,10 @@ impl Vm {
 
     /// Works off a part of the signals that are being delivered.
     pub(crate) fn deliver_some(&mut self) {
-        let Some(&Delivery { event, arguments, next, account, by }) = self.deliveries.front() else { return };
+        let Some(&Delivery { event, arguments, next, account, by }) = self.scheduler.deliveries.front()
+        else {
+            return;
+        };
         let mut links = Vec::with_capacity(AT_ONCE);
         let (mut link, mut keepers) = (next, 0);
         while link.is_true() && links.len() < AT_ONCE {
@@ -168,14 +149,14 @@ impl Vm {
         for &link in &links {
             self.hand_over(link, (event, by), arguments, &mut cells);
         }
-        self.spent += links.len() as u64;
+        self.scheduler.spent += links.len() as u64;
         self.charge_account(account, links.len() as u64);
-        match self.deliveries.front_mut() {
+        match self.scheduler.deliveries.front_mut() {
             Some(delivery) if link.is_true() => delivery.next = link,
             _ => {
-                self.deliveries.pop_front();
-                self.accounts.leave(account);
-                if self.deliveries.is_empty() {
+                self.scheduler.deliveries.pop_front();
+                self.scheduler.accounts.leave(account);
+                if self.scheduler.deliveries.is_empty() {
                     self.release_held();
                 }
             }
@@ -184,16 +165,16 @@ impl Vm {
 
     /// Keeps a task that can run from running until the signals under way are delivered.
     pub(crate) fn hold(&mut self, index: u32) {
-        let serial = self.next_serial();
-        if let Some(task) = self.tasks.at_mut(index) {
+        let serial = self.scheduler.next_serial();
+        if let Some(task) = self.scheduler.tasks.at_mut(index) {
             task.serial = serial;
-            self.held.push((index, serial));
+            self.scheduler.held.push((index, serial));
         }
     }
 
     fn release_held(&mut self) {
-        for (index, serial) in std::mem::take(&mut self.held) {
-            if self.tasks.at(index).is_some_and(|task| task.serial == serial) {
+        for (index, serial) in std::mem::take(&mut self.scheduler.held) {
+            if self.scheduler.tasks.at(index).is_some_and(|task| task.serial == serial) {
                 self.make_runnable(index, false);
             }
         }
@@ -201,7 +182,7 @@ impl Vm {
 
     /// Notes that a link leaves its list, in front of `next`, so that no delivery goes by it.
     pub(super) fn pass_over(&mut self, link: Value, next: Value) {
-        for delivery in &mut self.deliveries {
+        for delivery in &mut self.scheduler.deliveries {
             if delivery.next == link {
                 delivery.next = next;
             }
@@ -231,7 +212,7 @@ impl Vm {
         if cell.is_cons() {
             self.enqueue(wait, cell);
         }
-        let by = self.running.as_ref().map_or(0, |task| task.number);
+        let by = self.scheduler.running.as_ref().map_or(0, |task| task.number);
         self.wake_waiter(wait, (event, by));
     }
 
@@ -250,12 +231,12 @@ impl Vm {
         let task = self.slot(wait, link::OWNER);
         let Some(index) = self.slot(task, event::STATE).as_index() else { return };
         let urgent = self.wait_flags(wait) & link::URGENT != 0;
-        if let Some(task) = self.tasks.at(index as u32)
+        if let Some(task) = self.scheduler.tasks.at(index as u32)
             && task.state == TaskState::Waiting
             && task.wait == wait
         {
             self.make_runnable(index as u32, urgent);
-            if self.is_watched {
+            if self.watch.is_watched {
                 self.tell_of_waking(event, by, index as u32);
             }
         }

@@ -6,8 +6,8 @@
 use crate::heap::Kind;
 use crate::interp;
 use crate::raise::Exit;
+use crate::report::Happening;
 use crate::task::{DEFAULT_PRIORITY, TaskId, TaskState};
-use crate::trace::Happening;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
@@ -51,15 +51,15 @@ impl Vm {
     pub fn spawn(&mut self, function: Value, arguments: &[Value]) -> Result<TaskId, Exit> {
         let id = match self.try_spawn(function, arguments) {
             Err(Exit::Collect) => {
-                self.pinned.extend_from_slice(arguments);
-                self.pinned.push(function);
+                self.embedder.pinned.extend_from_slice(arguments);
+                self.embedder.pinned.push(function);
                 self.collect_fully();
-                self.pinned.truncate(self.pinned.len() - arguments.len() - 1);
+                self.embedder.pinned.truncate(self.embedder.pinned.len() - arguments.len() - 1);
                 self.try_spawn(function, arguments)?
             }
             result => result?,
         };
-        if let Some(task) = self.tasks.get_mut(id) {
+        if let Some(task) = self.scheduler.tasks.get_mut(id) {
             task.flags.set_kept(true);
         }
         Ok(id)
@@ -80,33 +80,34 @@ impl Vm {
         arguments: Value,
         options: SpawnOptions,
     ) -> Result<TaskId, Exit> {
-        let parent = self.running.as_ref().map_or(Value::NIL, |task| Value::index(task.number as usize));
+        let parent =
+            self.scheduler.running.as_ref().map_or(Value::NIL, |task| Value::index(task.number as usize));
         let mut slots = [Value::NIL; event::TASK_LENGTH];
         slots[event::NAME] = options.name;
         slots[event::COUNT] = Value::small(0);
         slots[event::RESULT] = parent;
         let object = self.heap.alloc_record(Kind::Task, 0, 0, &slots)?;
         let words = interp::start::first_words(&self.heap, function, arguments);
-        let mut task = self.tasks.make(object, words);
-        interp::start::first_frame(&self.heap, &mut task, self.starter, function, arguments);
+        let mut task = self.scheduler.tasks.make(object, words);
+        interp::start::first_frame(&self.heap, &mut task, self.scheduler.starter, function, arguments);
         // A new task holds nothing that was not found in a cycle under way: what it is made of is in hands of a task
         // that has been scanned, or of the host.
         self.heap.log_if_marking(function);
         self.heap.log_if_marking(arguments);
         self.heap.log_if_marking(options.notify);
         task.scanned = self.heap.cycle_id();
-        self.made += 1;
-        task.number = self.made;
-        task.serial = self.next_serial();
+        self.scheduler.counts.made += 1;
+        task.number = self.scheduler.counts.made;
+        task.serial = self.scheduler.next_serial();
         task.priority = options.priority;
         task.notify = options.notify;
         task.flags.set_daemon(options.daemon);
         task.flags.set_hidden(options.hidden);
-        let bindings = self.running.as_ref().and_then(|parent| parent.control.get());
+        let bindings = self.scheduler.running.as_ref().and_then(|parent| parent.control.get());
         // They are copied.
-        self.charge(bindings.map_or(0, |control| 2 * control.bindings.len()));
-        if let Some(parent) = &self.running {
-            self.accounts.enter(parent.account);
+        self.exchange.charge(bindings.map_or(0, |control| 2 * control.bindings.len()));
+        if let Some(parent) = &self.scheduler.running {
+            self.scheduler.accounts.enter(parent.account);
             task.account = parent.account;
             if let Some(control) = parent.control.get()
                 && control.bindings.len() > 0
@@ -118,31 +119,31 @@ impl Vm {
         }
         if let Some(ticks) = options.budget {
             let parent = task.account;
-            task.account = self.accounts.open_for_task(parent, ticks);
+            task.account = self.scheduler.accounts.open_for_task(parent, ticks);
             // The account has taken the place of the task with the one above.
-            self.accounts.leave(parent);
+            self.scheduler.accounts.leave(parent);
         }
-        self.alive += 1;
-        self.foreground += usize::from(!options.daemon);
+        self.scheduler.counts.alive += 1;
+        self.scheduler.counts.foreground += usize::from(!options.daemon);
         let (serial, priority) = (task.serial, task.priority);
-        let id = self.tasks.insert(task);
+        let id = self.scheduler.tasks.insert(task);
         self.set_slot(object, event::STATE, Value::index(id.index as usize));
-        self.queues.push(id.index, serial, priority, false);
+        self.scheduler.queues.push(id.index, serial, priority, false);
         self.note(id.index, Happening::Begins);
         Ok(id)
     }
 
     /// Forgets a task that has ended; one that has not is dropped as it stands, without its cleanups.
     pub fn forget(&mut self, id: TaskId) {
-        let Some(task) = self.tasks.get(id) else { return };
+        let Some(task) = self.scheduler.tasks.get(id) else { return };
         if task.state != TaskState::Ended {
-            self.alive -= 1;
-            self.foreground -= usize::from(!task.flags.daemon());
+            self.scheduler.counts.alive -= 1;
+            self.scheduler.counts.foreground -= usize::from(!task.flags.daemon());
             let (object, wait, account) = (task.object, task.wait, task.account);
             self.close_wait(wait);
-            self.accounts.leave(account);
+            self.scheduler.accounts.leave(account);
             self.set_slot(object, event::STATE, self.world.known.aborted);
         }
-        self.tasks.remove(id);
+        self.scheduler.tasks.remove(id);
     }
 }

@@ -22,24 +22,24 @@ pub(crate) enum Happening {
 impl Vm {
     /// Has what happens to tasks written to standard error.
     pub fn trace_tasks(&mut self, on: bool) {
-        self.traces_tasks = on;
+        self.watch.traces_tasks = on;
         self.note_who_watches();
     }
 
     /// Notes what happens to the task at a place, for whoever watches.
     #[inline]
     pub(crate) fn note(&mut self, index: u32, happening: Happening) {
-        if self.is_watched {
+        if self.watch.is_watched {
             self.note_for_watchers(index, happening);
         }
     }
 
     #[cold]
     fn note_for_watchers(&mut self, index: u32, happening: Happening) {
-        if self.traces_tasks {
+        if self.watch.traces_tasks {
             self.write_trace(index, happening);
         }
-        let Some(task) = self.tasks.at(index) else { return };
+        let Some(task) = self.scheduler.tasks.at(index) else { return };
         let number = task.number;
         match happening {
             Happening::Begins => {
@@ -57,7 +57,7 @@ impl Vm {
     }
 
     fn write_trace(&mut self, index: u32, happening: Happening) {
-        let Some(task) = self.tasks.at(index).filter(|task| !task.flags.hidden()) else { return };
+        let Some(task) = self.scheduler.tasks.at(index).filter(|task| !task.flags.hidden()) else { return };
         let label = self.task_label(task.object);
         let what = match happening {
             Happening::Begins => "begins".into(),
@@ -70,8 +70,8 @@ impl Vm {
 
     /// Writes how a task has ended, if tasks are traced.
     pub(crate) fn trace_end(&mut self, name: Value, status: Value) {
-        if self.traces_tasks && !self.task().flags.hidden() {
-            let label = self.label_of(name, self.task().number);
+        if self.watch.traces_tasks && !self.scheduler.task().flags.hidden() {
+            let label = self.label_of(name, self.scheduler.task().number);
             let status = self.describe(status).trim_start_matches(':').to_lowercase();
             let what = if status == "aborted" { "was aborted".into() } else { format!("has {status}") };
             self.write_trace_line(&label, &what);
@@ -80,22 +80,22 @@ impl Vm {
 
     fn write_trace_line(&mut self, label: &str, what: &str) {
         let seconds = self.time() as f64 / 1e9;
-        self.complain(&format!("; {seconds:.6} {label} {what}\n"));
+        self.outside.complain(&format!("; {seconds:.6} {label} {what}\n"));
     }
 
     /// How reports call a task.
     pub(crate) fn task_label(&self, object: Value) -> String {
         let index = self.slot(object, event::STATE).as_index();
-        let is_running = index == Some(self.running_index as usize);
-        let task = if is_running { self.running.as_deref() } else { None };
-        let number = task.or_else(|| self.tasks.at(index? as u32)).map_or(0, |task| task.number);
+        let is_running = index == Some(self.scheduler.turn.index as usize);
+        let task = if is_running { self.scheduler.running.as_deref() } else { None };
+        let number = task.or_else(|| self.scheduler.tasks.at(index? as u32)).map_or(0, |task| task.number);
         self.label_of(self.slot(object, event::NAME), number)
     }
 
     pub(crate) fn label_of(&self, name: Value, number: u64) -> String {
         if name.is_true() {
             format!("task {}", self.describe(name))
-        } else if self.main_number == Some(number) {
+        } else if self.scheduler.main_number == Some(number) {
             "the main task".into()
         } else if number == 0 {
             "a task that has ended".into()

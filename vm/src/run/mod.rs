@@ -5,18 +5,27 @@
 //! runnable the machine sleeps in the host until the first timer, or until something comes from outside (`clock`).
 //! Not here: making tasks (`spawn`), and their ends (`finish`).
 
+mod finish;
+mod limit;
+mod signal;
+mod spawn;
+mod timers;
+mod wait;
+
+pub(crate) use spawn::SpawnOptions;
+pub(crate) use timers::is_wanted;
+
 use std::sync::atomic::Ordering::Relaxed;
 
-use crate::control::End;
 use crate::interp::{self, Leave};
-use crate::limit::AccountId;
 use crate::observe::Seen;
+use crate::report::Happening;
+use crate::schedule::{Due, Parking};
+use crate::task::AccountId;
+use crate::task::End;
 use crate::task::{Task, TaskId, TaskResult, TaskState};
-use crate::timer::Due;
-use crate::trace::Happening;
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::Parking;
 
 /// Why a run came back to the embedder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,39 +43,14 @@ pub enum RunOutcome {
 }
 
 impl Vm {
-    /// The running task.
-    ///
-    /// # Panics
-    /// If none runs: builtins and instructions are only reached from a task.
-    #[inline(always)]
-    pub(crate) fn task(&self) -> &Task {
-        self.running.as_ref().expect("a builtin is called by a task")
-    }
-
-    /// The running task.
-    ///
-    /// # Panics
-    /// If none runs: builtins and instructions are only reached from a task.
-    #[inline(always)]
-    pub(crate) fn task_mut(&mut self) -> &mut Task {
-        self.running.as_mut().expect("a builtin is called by a task")
-    }
-
-    /// A number that no state of a task had before.
-    #[inline]
-    pub(crate) fn next_serial(&mut self) -> u64 {
-        self.serial += 1;
-        self.serial
-    }
-
     /// Makes a task runnable that is parked, or moves one that is runnable to the urgent ones.
     pub(crate) fn make_runnable(&mut self, index: u32, urgent: bool) {
-        let serial = self.next_serial();
-        let Some(task) = self.tasks.at_mut(index) else { return };
+        let serial = self.scheduler.next_serial();
+        let Some(task) = self.scheduler.tasks.at_mut(index) else { return };
         let was_parked = std::mem::replace(&mut task.state, TaskState::Runnable) != TaskState::Runnable;
         task.serial = serial;
         let (priority, urgent) = (task.priority, urgent || task.flags.urgent());
-        self.queues.push(index, serial, priority, urgent);
+        self.scheduler.queues.push(index, serial, priority, urgent);
         if was_parked {
             self.note(index, Happening::GoesOn);
         }
@@ -89,41 +73,41 @@ impl Vm {
     }
 
     fn run_tasks(&mut self, id: Option<TaskId>, ticks: u64, may_wait: bool) -> RunOutcome {
-        let end = self.spent.saturating_add(ticks);
+        let end = self.scheduler.spent.saturating_add(ticks);
         loop {
             if let Some(id) = id
-                && self.tasks.get(id).is_none_or(|task| task.state == TaskState::Ended)
+                && self.scheduler.tasks.get(id).is_none_or(|task| task.state == TaskState::Ended)
             {
                 return RunOutcome::Done;
             }
             if self.is_budget_spent() {
                 return RunOutcome::BudgetSpent;
             }
-            if self.spent >= end {
+            if self.scheduler.spent >= end {
                 return RunOutcome::TicksUsed;
             }
-            if self.stop.load(Relaxed) && self.stop.swap(false, Relaxed) {
+            if self.embedder.stop.load(Relaxed) && self.embedder.stop.swap(false, Relaxed) {
                 return RunOutcome::Stopped;
             }
             if let Some(interrupted) = self.take_interrupt() {
-                self.was_interrupted = true;
+                self.embedder.was_interrupted = true;
                 self.abort(interrupted);
             }
             self.look_at_clock();
-            if !self.deliveries.is_empty() {
+            if !self.scheduler.deliveries.is_empty() {
                 self.deliver_some();
             }
-            let next = match self.end_of_all {
-                None => self.queues.next(&self.tasks, &mut self.choices),
+            let next = match self.scheduler.end_of_all {
+                None => self.scheduler.queues.next(&self.scheduler.tasks, &mut self.scheduler.choices),
                 Some(_) => self.next_while_all_end(),
             };
             match next {
                 Some(index) => self.give_turn(index, end),
                 None => {
-                    if !self.deliveries.is_empty() || self.end_of_all.is_some() {
+                    if !self.scheduler.deliveries.is_empty() || self.scheduler.end_of_all.is_some() {
                         continue;
                     }
-                    if self.alive == 0 {
+                    if self.scheduler.counts.alive == 0 {
                         return RunOutcome::Done;
                     }
                     if !may_wait || !self.idle() {
@@ -138,22 +122,23 @@ impl Vm {
     #[cold]
     fn next_while_all_end(&mut self) -> Option<u32> {
         self.abort_more();
-        self.queues.next_urgent(&self.tasks)
+        self.scheduler.queues.next_urgent(&self.scheduler.tasks)
     }
 
     /// Gives a runnable task its turn: one slice, or as many as it takes to leave a critical section.
     pub(crate) fn give_turn(&mut self, index: u32, end: u64) {
         loop {
-            let limit = end.saturating_sub(self.spent);
+            let limit = end.saturating_sub(self.scheduler.spent);
             let leave = self.run_slice(index, limit);
-            let Some(task) = self.tasks.at_mut(index) else { return };
+            let Some(task) = self.scheduler.tasks.at_mut(index) else { return };
             match leave {
                 Leave::Ended => return,
                 Leave::Slice => {
-                    let passes = std::mem::take(&mut self.passes_turn);
-                    let holds = std::mem::take(&mut self.holds_task) && !self.deliveries.is_empty();
-                    let goes_on = task.critical > 0 || self.slice_is_cut && !passes && !holds;
-                    if goes_on && self.spent < end && !self.is_budget_spent() {
+                    let passes = std::mem::take(&mut self.scheduler.turn.passes_turn);
+                    let holds = std::mem::take(&mut self.scheduler.turn.holds_task)
+                        && !self.scheduler.deliveries.is_empty();
+                    let goes_on = task.critical > 0 || self.scheduler.turn.slice_is_cut && !passes && !holds;
+                    if goes_on && self.scheduler.spent < end && !self.is_budget_spent() {
                         continue;
                     }
                     return if holds { self.hold(index) } else { self.make_runnable(index, false) };
@@ -165,33 +150,33 @@ impl Vm {
 
     /// Gives a runnable task one slice.
     fn run_slice(&mut self, index: u32, limit: u64) -> Leave {
-        if !self.deliveries.is_empty() {
+        if !self.scheduler.deliveries.is_empty() {
             self.deliver_some();
         }
-        let Some(task) = self.tasks.take(index) else { return Leave::Ended };
+        let Some(task) = self.scheduler.tasks.take(index) else { return Leave::Ended };
         let account = task.account;
-        self.running = Some(task);
-        self.switches += u64::from(index != self.running_index);
-        self.running_index = index;
-        self.turns += 1;
-        let task = self.task_mut();
+        self.scheduler.running = Some(task);
+        self.scheduler.counts.switches += u64::from(index != self.scheduler.turn.index);
+        self.scheduler.turn.index = index;
+        self.scheduler.counts.turns += 1;
+        let task = self.scheduler.task_mut();
         task.turns = task.turns.wrapping_add(1);
         let number = task.number;
-        if self.is_watched {
+        if self.watch.is_watched {
             self.show(number, Seen::Runs);
         }
-        self.slice_is_cut = false;
-        self.holds_task = false;
-        self.had_attention = self.task().flags.attention();
+        self.scheduler.turn.slice_is_cut = false;
+        self.scheduler.turn.holds_task = false;
+        self.scheduler.turn.had_attention = self.scheduler.task().flags.attention();
         self.scan_before_running();
         let slice = self.slice_of_running_task(limit);
         interp::load(self, slice as i32);
         let mut left = Ok(());
-        if self.task().flags.attention() || account != AccountId::NONE {
+        if self.scheduler.task().flags.attention() || account != AccountId::NONE {
             left = interp::see_to_attention(self);
         }
-        let is_over = self.task().critical > 0 && self.critical_left <= 0;
-        if left.is_ok() && is_over && !self.task().control.is_unwinding() {
+        let is_over = self.scheduler.task().critical > 0 && self.scheduler.turn.critical_left <= 0;
+        if left.is_ok() && is_over && !self.scheduler.task().control.is_unwinding() {
             left = self.end_critical_by_failure();
         }
         let leave = match left {
@@ -201,30 +186,30 @@ impl Vm {
         let cpu = &self.cpu;
         let used = (i64::from(cpu.granted) - i64::from(cpu.reserve) - i64::from(cpu.ticks)).max(0) as u64;
         self.cpu.reserve = 0;
-        let used = used + self.take_charged();
-        self.spent += used;
+        let used = used + self.exchange.take_charged();
+        self.scheduler.spent += used;
         if leave != Leave::Ended {
             self.save_cpu();
         }
-        let task = self.task_mut();
+        let task = self.scheduler.task_mut();
         task.ticks += used;
-        if task.critical > 0 && !std::mem::take(&mut self.critical_is_new) {
-            self.critical_left -= used as i64;
+        if task.critical > 0 && !std::mem::take(&mut self.scheduler.turn.critical_is_new) {
+            self.scheduler.turn.critical_left -= used as i64;
         }
         if account != AccountId::NONE {
             self.charge_account(account, used);
         }
-        if self.is_watched {
+        if self.watch.is_watched {
             self.tell_how_turn_ended(leave);
         }
-        let Some(task) = self.running.take() else { return Leave::Ended };
+        let Some(task) = self.scheduler.running.take() else { return Leave::Ended };
         if leave == Leave::Ended && !task.flags.kept() {
-            self.running_index = u32::MAX;
-            if let Some(id) = self.tasks.id_at(index) {
-                self.tasks.retire(id, task);
+            self.scheduler.turn.index = u32::MAX;
+            if let Some(id) = self.scheduler.tasks.id_at(index) {
+                self.scheduler.tasks.retire(id, task);
             }
         } else {
-            self.tasks.put_back(index, task);
+            self.scheduler.tasks.put_back(index, task);
         }
         leave
     }
@@ -232,13 +217,13 @@ impl Vm {
     /// Tells observers that the turn of the running task is over. Waits are told of when the task is parked.
     #[cold]
     fn tell_how_turn_ended(&mut self, leave: Leave) {
-        let number = self.task().number;
+        let number = self.scheduler.task().number;
         match leave {
             Leave::Slice => self.tell_end_of_turn(number),
             Leave::Parked => {}
             Leave::Ended => {
                 self.note_end_in_figures();
-                let how = self.end_label(self.task());
+                let how = self.end_label(self.scheduler.task());
                 self.show(number, Seen::Ends(how));
             }
         }
@@ -246,30 +231,30 @@ impl Vm {
 
     /// The length of the next slice of the running task.
     fn slice_of_running_task(&mut self, limit: u64) -> u64 {
-        let mut slice = u64::from(self.choices.slice(self.config.slice)).min(limit);
+        let mut slice = u64::from(self.scheduler.choices.slice(self.config.slice)).min(limit);
         if let Some(budget) = self.config.budget {
-            slice = slice.min(budget.saturating_sub(self.spent));
+            slice = slice.min(budget.saturating_sub(self.scheduler.spent));
         }
-        let account = self.task().account;
+        let account = self.scheduler.task().account;
         if account != AccountId::NONE {
-            slice = slice.min(self.accounts.left(account));
+            slice = slice.min(self.scheduler.accounts.left(account));
         }
-        if self.task().control.get().is_some_and(|control| !control.running.is_empty()) {
+        if self.scheduler.task().control.get().is_some_and(|control| !control.running.is_empty()) {
             let left = self.cleanup_ticks_left();
             slice = slice.min(left);
             if left == 0 {
-                self.task_mut().flags.set_attention(true);
+                self.scheduler.task_mut().flags.set_attention(true);
             }
         }
-        if self.task().critical > 0 {
-            slice = slice.min(self.critical_left.max(1) as u64);
+        if self.scheduler.task().critical > 0 {
+            slice = slice.min(self.scheduler.turn.critical_left.max(1) as u64);
         }
         slice.max(1)
     }
 
     /// Ends the critical section of the running task, which has used up its ticks, with a failure where the task stands.
     fn end_critical_by_failure(&mut self) -> Result<(), Leave> {
-        self.task_mut().critical = 0;
+        self.scheduler.task_mut().critical = 0;
         let function = self.world.known.raise;
         let cause = self.world.known.budget_exhausted;
         interp::interrupt(self, function, &[cause])
@@ -277,26 +262,28 @@ impl Vm {
 
     /// Notes that the task at a place has come to wait.
     fn park_task(&mut self, index: u32) {
-        let parking = std::mem::take(&mut self.parking);
-        let serial = self.next_serial();
-        let Some(id) = self.tasks.id_at(index) else { return };
-        let Some(task) = self.tasks.at_mut(index) else { return };
+        let parking = std::mem::take(&mut self.scheduler.turn.parking);
+        let serial = self.scheduler.next_serial();
+        let Some(id) = self.scheduler.tasks.id_at(index) else { return };
+        let Some(task) = self.scheduler.tasks.at_mut(index) else { return };
         task.serial = serial;
         trim(task);
         match parking {
             Parking::Input => {
                 task.state = TaskState::Reading;
-                self.readers.push(id);
+                self.scheduler.readers.push(id);
             }
             Parking::Wait(deadline) => {
                 task.state = TaskState::Waiting;
                 if let Some(deadline) = deadline {
-                    self.timers.push(deadline, index, Due::Wait(serial));
+                    self.scheduler.timers.push(deadline, index, Due::Wait(serial));
                 }
             }
         }
         self.note(index, Happening::Waits);
-        if !self.had_attention && self.tasks.at(index).is_some_and(|task| task.flags.attention()) {
+        if !self.scheduler.turn.had_attention
+            && self.scheduler.tasks.at(index).is_some_and(|task| task.flags.attention())
+        {
             // Something was noted while it was about to wait.
             self.make_runnable(index, true);
         }
@@ -304,7 +291,7 @@ impl Vm {
 
     /// Whether the budget of the run is spent.
     pub(crate) fn is_budget_spent(&self) -> bool {
-        self.config.budget.is_some_and(|budget| self.spent >= budget)
+        self.config.budget.is_some_and(|budget| self.scheduler.spent >= budget)
     }
 
     /// Calls a function in a task of its own and runs tasks until it has ended, at most for `ticks`.
@@ -319,7 +306,7 @@ impl Vm {
         match (result, outcome) {
             (TaskResult::Succeeded(values), _) => Ok(values),
             (TaskResult::Failed(condition), _) => {
-                Err(self.last_words.take().unwrap_or_else(|| self.describe(condition)))
+                Err(self.embedder.last_words.take().unwrap_or_else(|| self.describe(condition)))
             }
             (TaskResult::Aborted, _) => Err("it was aborted".into()),
             (_, RunOutcome::Waiting) => Err("it waits for what cannot come".into()),
@@ -330,21 +317,21 @@ impl Vm {
 
     /// Makes a program's main task the one with whose failure the run ends.
     pub fn set_main(&mut self, id: TaskId) {
-        self.main = Some(id);
-        self.main_number = self.tasks.get(id).map(|task| task.number);
-        if let Some(number) = self.main_number {
+        self.scheduler.main = Some(id);
+        self.scheduler.main_number = self.scheduler.tasks.get(id).map(|task| task.number);
+        if let Some(number) = self.scheduler.main_number {
             self.show(number, Seen::IsNamed("the main task"));
         }
     }
 
     /// What became of a task. One that was forgotten counts as running.
     pub fn result(&self, id: TaskId) -> TaskResult {
-        self.tasks.get(id).map_or(TaskResult::Running, Task::result)
+        self.scheduler.tasks.get(id).map_or(TaskResult::Running, Task::result)
     }
 
     /// What is to be said of the failure that ended a task.
     pub fn report(&self, id: TaskId) -> Option<String> {
-        let extra = self.tasks.get(id)?.extra.as_ref()?;
+        let extra = self.scheduler.tasks.get(id)?.extra.as_ref()?;
         match (&extra.report, extra.end) {
             (Some(report), _) => Some(report.text()),
             (None, Some(End::Failed(condition))) => Some(self.report_in_short(condition)),
@@ -354,18 +341,18 @@ impl Vm {
 
     /// Ticks that a task has used.
     pub fn ticks_of(&self, id: TaskId) -> u64 {
-        self.tasks.get(id).map_or(0, |task| task.ticks)
+        self.scheduler.tasks.get(id).map_or(0, |task| task.ticks)
     }
 
     /// Ticks that all tasks together have used.
     pub fn ticks(&self) -> u64 {
-        self.spent
+        self.scheduler.spent
     }
 
     /// Tasks that were made, turns that they had, and how many of these came after one of another task, since the program
     /// began.
     pub fn tasks_turns_and_switches(&self) -> (u64, u64, u64) {
-        (self.made, self.turns, self.switches)
+        (self.scheduler.counts.made, self.scheduler.counts.turns, self.scheduler.counts.switches)
     }
 }
 

@@ -1,0 +1,20 @@
+//! Slots of a guard: what a child interrupts its parent with.
+
+use crate::heap::{Heap, Kind};
+use crate::value::Value;
+
+/// The task that it guards.
+pub(crate) const TASK: usize = 0;
+/// The function that is to run there.
+pub(crate) const FUNCTION: usize = 1;
+/// Whether it still may.
+pub(crate) const IS_OPEN: usize = 2;
+/// The height of the control stack where it was made: it acts inside a cleanup only if it was made there.
+pub(crate) const HEIGHT: usize = 3;
+/// `aux` of such a record.
+pub(crate) const AUX: u16 = 1;
+
+/// Returns whether `object` is a guard.
+pub(crate) fn is_guard(heap: &Heap, object: Value) -> bool {
+    heap.is(object, Kind::Record) && heap.header(object).is_some_and(|header| header.aux == AUX)
+}

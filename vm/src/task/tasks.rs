@@ -1,0 +1,211 @@
+//! The table of a machine's tasks.
+
+use super::Task;
+use crate::value::Value;
+
+/// Names a task for as long as the machine lives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct TaskId {
+    pub(crate) index: u32,
+    generation: u32,
+}
+
+/// Records that are kept to be used again.
+const SPARE: usize = 64;
+/// The most words of stack that a record is kept with.
+const SPARE_WORDS: usize = 64;
+/// A place for a task.
+#[derive(Default)]
+struct TaskPlace {
+    /// The task; not there while it runs, nor when the place is free.
+    task: Option<Box<Task>>,
+    /// How often the place was taken.
+    generation: u32,
+    /// Whether a task has the place.
+    taken: bool,
+}
+
+/// The tasks of a machine. The running one's record is out of its place while it runs.
+#[derive(Default)]
+pub(crate) struct Tasks {
+    places: Vec<TaskPlace>,
+    free: Vec<u32>,
+    /// Records of tasks that have ended, to be used again.
+    #[allow(clippy::vec_box, reason = "the boxes are what is kept: they go into places as they are")]
+    spare: Vec<Box<Task>>,
+    /// The collector has yet to meet the tasks before this place.
+    unmet: usize,
+}
+
+impl Tasks {
+    /// A task that has yet to be given a frame, with at least so many words of stack.
+    pub(crate) fn make(&mut self, object: Value, words: usize) -> Box<Task> {
+        match self.spare.pop() {
+            Some(mut task) if task.stack.capacity() >= words => {
+                task.renew(object);
+                task
+            }
+            _ => Box::new(Task::new(object, words)),
+        }
+    }
+
+    /// Frees the place of a task that has ended, and keeps its record if few are kept.
+    pub(crate) fn retire(&mut self, id: TaskId, task: Box<Task>) {
+        self.remove(id);
+        if self.spare.len() < SPARE && task.stack.capacity() <= SPARE_WORDS {
+            self.spare.push(task);
+        }
+    }
+
+    /// Takes in a task.
+    pub(crate) fn insert(&mut self, task: Box<Task>) -> TaskId {
+        let index = self.free.pop().unwrap_or_else(|| {
+            self.places.push(TaskPlace::default());
+            (self.places.len() - 1) as u32
+        });
+        let place = &mut self.places[index as usize];
+        place.generation = place.generation.wrapping_add(1);
+        place.taken = true;
+        place.task = Some(task);
+        TaskId { index, generation: place.generation }
+    }
+
+    fn place(&self, id: TaskId) -> Option<&TaskPlace> {
+        self.places.get(id.index as usize).filter(|place| place.taken && place.generation == id.generation)
+    }
+
+    /// The name of the task at a place that is taken.
+    pub(crate) fn id_at(&self, index: u32) -> Option<TaskId> {
+        let place = self.places.get(index as usize).filter(|place| place.taken)?;
+        Some(TaskId { index, generation: place.generation })
+    }
+
+    /// Whether the task is still there.
+    pub(crate) fn contains(&self, id: TaskId) -> bool {
+        self.place(id).is_some()
+    }
+
+    /// A task that does not run.
+    pub(crate) fn get(&self, id: TaskId) -> Option<&Task> {
+        self.place(id)?.task.as_deref()
+    }
+
+    /// A task that does not run.
+    pub(crate) fn get_mut(&mut self, id: TaskId) -> Option<&mut Task> {
+        self.places
+            .get_mut(id.index as usize)
+            .filter(|place| place.taken && place.generation == id.generation)?
+            .task
+            .as_deref_mut()
+    }
+
+    /// The task at a place, if it does not run.
+    #[inline]
+    pub(crate) fn at(&self, index: u32) -> Option<&Task> {
+        self.places.get(index as usize)?.task.as_deref()
+    }
+
+    /// The task at a place, if it does not run.
+    #[inline]
+    pub(crate) fn at_mut(&mut self, index: u32) -> Option<&mut Task> {
+        self.places.get_mut(index as usize)?.task.as_deref_mut()
+    }
+
+    /// Takes a task out of its place, to be run.
+    #[inline]
+    pub(crate) fn take(&mut self, index: u32) -> Option<Box<Task>> {
+        self.places.get_mut(index as usize)?.task.take()
+    }
+
+    /// Puts a task back into its place.
+    #[inline]
+    pub(crate) fn put_back(&mut self, index: u32, task: Box<Task>) {
+        self.places[index as usize].task = Some(task);
+    }
+
+    /// Frees the place of a task.
+    pub(crate) fn remove(&mut self, id: TaskId) -> Option<Box<Task>> {
+        let place = self.places.get_mut(id.index as usize)?;
+        if !place.taken || place.generation != id.generation {
+            return None;
+        }
+        place.taken = false;
+        self.free.push(id.index);
+        place.task.take()
+    }
+
+    /// How many places there are; each task that has not ended has one.
+    pub(crate) fn places(&self) -> usize {
+        self.places.len()
+    }
+
+    /// The names of all tasks, in the order of their places.
+    pub(crate) fn ids(&self) -> Vec<TaskId> {
+        (0..self.places.len() as u32).filter_map(|index| self.id_at(index)).collect()
+    }
+
+    /// All tasks but the running one.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Task> {
+        self.places.iter().filter_map(|place| place.task.as_deref())
+    }
+
+    /// All tasks but the running one.
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = &mut Task> {
+        self.places.iter_mut().filter_map(|place| place.task.as_deref_mut())
+    }
+
+    /// Begins a cycle of the collector: all tasks are to be met. Those that begin later are born scanned.
+    pub(crate) fn begin_cycle(&mut self) {
+        self.unmet = self.places.len();
+    }
+
+    /// The next place for the collector to look at: its task, if there is one that does not run. `None` at the end.
+    pub(crate) fn next_unmet(&mut self) -> Option<Option<&mut Task>> {
+        self.unmet = self.unmet.checked_sub(1)?;
+        Some(self.places[self.unmet].task.as_deref_mut())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn task() -> Box<Task> {
+        Box::new(Task::new(Value::NIL, 1))
+    }
+
+    #[test]
+    fn a_place_that_is_taken_again_has_another_name() {
+        let mut tasks = Tasks::default();
+        let first = tasks.insert(task());
+        assert!(tasks.contains(first) && tasks.remove(first).is_some());
+        let second = tasks.insert(task());
+        assert_eq!(first.index, second.index);
+        assert!(!tasks.contains(first) && tasks.get(first).is_none() && tasks.remove(first).is_none());
+        assert_eq!(tasks.id_at(first.index), Some(second));
+    }
+
+    #[test]
+    fn a_running_task_keeps_its_place() {
+        let mut tasks = Tasks::default();
+        let id = tasks.insert(task());
+        let running = tasks.take(id.index).unwrap();
+        assert!(tasks.contains(id) && tasks.get(id).is_none());
+        tasks.put_back(id.index, running);
+        assert!(tasks.get(id).is_some());
+    }
+
+    #[test]
+    fn the_collector_meets_each_task_once() {
+        let mut tasks = Tasks::default();
+        let ids: Vec<TaskId> = (0..10).map(|_| tasks.insert(task())).collect();
+        tasks.begin_cycle();
+        let mut met = 0;
+        while let Some(task) = tasks.next_unmet() {
+            met += usize::from(task.is_some_and(|task| std::mem::replace(&mut task.scanned, 1) == 0));
+            tasks.remove(ids[3]);
+        }
+        assert!(met == 9 || met == 10);
+        assert!(tasks.iter().all(|task| task.scanned == 1));
+    }
+}
