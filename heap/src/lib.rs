@@ -5,6 +5,10 @@
 //! | [`value`] | [`Value`]: one word that is any datum |
 //! | [`heap`] | [`Heap`]: allocation, checked access, incremental collection |
 //! | [`stack`] | the register stack of one task |
+//! | [`array`] | the elements of arrays, wherever they are kept |
+//! | [`number`] | which values are numbers, and which numbers are equal |
+//! | [`equality`] | `eq`, `eql`, `equal`, `equalp`, and hashes that agree with them |
+//! | [`table`] | hash tables that keep the order of insertion |
 //! | [`character`] | case, classes and names of characters |
 //!
 //! Guarantees: safe code cannot break memory safety through this crate, however odd the caller, once the two promises of
@@ -12,9 +16,13 @@
 //!
 //! Not here: roots, the time at which to collect, and everything that a program does with its data.
 
+pub mod array;
 pub mod character;
+pub mod equality;
 pub mod heap;
+pub mod number;
 pub mod stack;
+pub mod table;
 pub mod value;
 
 pub use heap::{AllocError, Heap, HeapConfig, Kind};

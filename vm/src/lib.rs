@@ -4,7 +4,7 @@
 
 pub use esl_heap::{heap, value};
 
-pub(crate) use esl_heap::{character, stack};
+pub(crate) use esl_heap::{character, equality, stack, table};
 
 pub mod builtins;
 pub mod embed;
@@ -21,13 +21,11 @@ pub mod vm;
 mod database;
 mod datum;
 mod environment;
-mod equality;
 mod exchange;
 mod interp;
 mod number;
 mod outside;
 mod report;
 mod shape;
-mod table;
 mod wait;
 mod world;

@@ -46,7 +46,7 @@ impl Heap {
     }
 
     #[inline(always)]
-    pub(super) fn object_of(&self, v: Value, kind: Kind) -> Option<*mut Header> {
+    pub(crate) fn object_of(&self, v: Value, kind: Kind) -> Option<*mut Header> {
         let object = v.as_object_ptr()?;
         // SAFETY: an object value is the address of a live object.
         if unsafe { (*object).kind } == kind { Some(object) } else { None }

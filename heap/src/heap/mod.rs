@@ -44,7 +44,6 @@ mod mark;
 mod metadata;
 mod object;
 mod sweep;
-pub mod table;
 
 pub use access::BignumRef;
 pub use alloc::AllocError;

@@ -379,7 +379,7 @@ impl Heap {
     }
 
     /// New words of 64 bits, all 0.
-    pub(super) fn alloc_words64(&mut self, len: usize) -> Result<Value, AllocError> {
+    pub(crate) fn alloc_words64(&mut self, len: usize) -> Result<Value, AllocError> {
         self.raw_filled(Kind::Words64, len, 0u64)
     }
 
@@ -412,7 +412,7 @@ impl Heap {
     }
 
     /// A new record of a kind whose contents the heap vouches for; that they are as they should be is up to the caller.
-    pub(super) fn vouched_record(
+    pub(crate) fn vouched_record(
         &mut self,
         kind: Kind,
         aux: u16,

@@ -233,7 +233,7 @@ pub(super) fn table_hash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 fn hash_argument(vm: &mut Vm, v: Value) -> Result<u32, Exit> {
     match v.as_index().and_then(|hash| u32::try_from(hash).ok()) {
         Some(hash) => Ok(hash),
-        None => Ok(equality::given_hash(&vm.integer(v)?)),
+        None => Ok(equality::given_hash(vm.integer(v)?.limbs().1.first().copied().unwrap_or(0))),
     }
 }
 

@@ -1,10 +1,10 @@
-//! Comparison of numbers by their exact values, and `eql`.
+//! Order and equality of numbers by their exact values.
 
 use std::cmp::Ordering;
 
 use super::limbs::BigOperand;
-use super::{Int, Number, Ratio, float};
-use crate::heap::{Heap, Kind};
+use super::{Int, Number, Ratio, float, same_value};
+use crate::heap::Heap;
 use crate::raise::Exit;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -31,27 +31,6 @@ pub(crate) fn num_equal(vm: &mut Vm, a: Value, b: Value) -> Result<bool, Exit> {
         }
     }
     Ok(same_value(&vm.heap, a, b))
-}
-
-/// Returns whether both are numbers of equal value, whatever their types.
-pub(crate) fn same_value(heap: &Heap, a: Value, b: Value) -> bool {
-    if let (Some(x), Some(y)) = (heap.as_double(a), heap.as_double(b)) {
-        return x == y;
-    }
-    if eql(heap, a, b) {
-        return super::is_number(heap, a);
-    }
-    // Rationals of equal value are `eql`, so one of the two must be a double.
-    let (x, other) = match (heap.as_double(a), heap.as_double(b)) {
-        (Some(x), None) => (x, b),
-        (None, Some(x)) => (x, a),
-        _ => return false,
-    };
-    match Number::of(heap, other) {
-        Some(Number::Int(n)) => float_and_int(x, &n) == Some(Ordering::Equal),
-        Some(Number::Ratio(r)) => x.is_finite() && float::rational(x) == r,
-        _ => false,
-    }
 }
 
 /// Implements `(< a b)`.
@@ -136,29 +115,4 @@ fn float_and_int(x: f64, n: &Int) -> Option<Ordering> {
 
 fn float_and_ratio(vm: &mut Vm, op: &'static str, x: f64, r: &Ratio) -> Result<Option<Ordering>, Exit> {
     if x.is_finite() { float::rational(x).compare(vm, op, r).map(Some) } else { Ok(x.partial_cmp(&0.0)) }
-}
-
-/// Implements `(eql a b)`: the same object, or numbers of one type and value, where zeros of different sign
-/// differ.
-#[inline]
-pub(crate) fn eql(heap: &Heap, a: Value, b: Value) -> bool {
-    a == b || a.is_object() && b.is_object() && boxed_eql(heap, a, b)
-}
-
-#[cold]
-fn boxed_eql(heap: &Heap, a: Value, b: Value) -> bool {
-    let kind = heap.kind(a);
-    if kind != heap.kind(b) {
-        return false;
-    }
-    match kind {
-        Some(Kind::Float) => heap.as_double(a).map(f64::to_bits) == heap.as_double(b).map(f64::to_bits),
-        Some(Kind::Bignum) => heap.bignum(a) == heap.bignum(b),
-        Some(Kind::Ratio) => match (heap.ratio(a), heap.ratio(b)) {
-            // The parts are integers, so the recursion is one level deep.
-            (Some((a, b)), Some((c, d))) => eql(heap, a, c) && eql(heap, b, d),
-            _ => false,
-        },
-        _ => false,
-    }
 }

@@ -25,7 +25,8 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 pub(crate) use arithmetic::{add, check_gcd, divide, multiply, negate, subtract, unboxed_doubles};
-pub(crate) use compare::{eql, less, less_or_equal, num_equal, same_value, sign, sign_of};
+pub(crate) use compare::{less, less_or_equal, num_equal, sign, sign_of};
+pub(crate) use esl_heap::number::{eql, is_float, is_integer, is_number, is_rational, same_value};
 pub(crate) use integer::Int;
 pub(crate) use ratio::Ratio;
 pub(crate) use rounding::{Rounding, modulo, remainder};
@@ -73,28 +74,6 @@ impl Number {
             _ => None,
         }
     }
-}
-
-/// Returns whether `v` is an integer.
-pub(crate) fn is_integer(heap: &Heap, v: Value) -> bool {
-    v.is_fixnum() || heap.is(v, Kind::Bignum)
-}
-
-/// Returns whether `v` is an integer or a ratio.
-pub(crate) fn is_rational(heap: &Heap, v: Value) -> bool {
-    v.is_fixnum() || matches!(heap.kind(v), Some(Kind::Bignum | Kind::Ratio))
-}
-
-/// Returns whether `v` is a double.
-pub(crate) fn is_float(heap: &Heap, v: Value) -> bool {
-    v.as_double().is_some() || heap.is(v, Kind::Float)
-}
-
-/// Returns whether `v` is a number; all numbers are real.
-pub(crate) fn is_number(heap: &Heap, v: Value) -> bool {
-    v.is_fixnum()
-        || v.as_double().is_some()
-        || matches!(heap.kind(v), Some(Kind::Bignum | Kind::Ratio | Kind::Float))
 }
 
 impl Vm {

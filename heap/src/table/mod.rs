@@ -3,7 +3,7 @@
 //! A link leads to an entry: the hash of its key (32 bits), its number, one too high (28 bits; 0 leads nowhere), and whether the
 //! chain goes on behind it. The heads of the chains are links, and each entry has the link to the next of its chain. So a search knows
 //! the hash of a key before it goes there, and a key that is not there is mostly missed without a look at any entry.
-//! `esl_heap::heap::table` has how all this is stored.
+//! [`storage`] has how all this is stored.
 //!
 //! Invariant: a table has [`PER_ENTRY`] chains for each entry that was ever in use (and for one at least). So each new
 //! entry adds as many, and each of these takes its share from one other; nothing is ever rehashed at once, and no
@@ -16,9 +16,11 @@
 //! buckets, for the order.
 
 use crate::equality::{self, Test};
-use crate::heap::table::{Counter, ENTRY, MOST, PER_ENTRY, SEGMENT, Storage};
 use crate::heap::{AllocError, Heap, Kind};
 use crate::value::Value;
+use storage::{Counter, ENTRY, MOST, PER_ENTRY, SEGMENT, Storage};
+
+mod storage;
 
 /// Entries for which a new table has room.
 const LEAST: usize = 8;
@@ -79,7 +81,7 @@ fn next(storage: &Storage<'_>, link: Link) -> Link {
 
 /// How a table compares keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Comparison {
+pub enum Comparison {
     /// By a test of the machine.
     Native(Test),
     /// By a function of the program.
@@ -88,7 +90,7 @@ pub(crate) enum Comparison {
 
 /// Why an operation was not done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Trouble {
+pub enum Trouble {
     /// The comparison of keys takes too much work, or a function of the program.
     Slowly,
     /// There is no room.
@@ -103,12 +105,12 @@ impl From<AllocError> for Trouble {
 
 /// A table, checked to be one.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Table(Value);
+pub struct Table(Value);
 
 impl Table {
     /// The table that `v` is, if it is one.
     #[inline(always)]
-    pub(crate) fn of(heap: &Heap, v: Value) -> Option<Table> {
+    pub fn of(heap: &Heap, v: Value) -> Option<Table> {
         if heap.is(v, Kind::HashTable) { Some(Table(v)) } else { None }
     }
 
@@ -116,7 +118,7 @@ impl Table {
     ///
     /// # Errors
     /// As for every allocation.
-    pub(crate) fn make(
+    pub fn make(
         heap: &mut Heap,
         comparison: Comparison,
         size: usize,
@@ -134,7 +136,7 @@ impl Table {
 
     /// How it compares keys.
     #[inline(always)]
-    pub(crate) fn comparison(self, heap: &Heap) -> Comparison {
+    pub fn comparison(self, heap: &Heap) -> Comparison {
         match self.storage(heap).which_test() {
             0 => Comparison::Native(Test::Eq),
             1 => Comparison::Native(Test::Eql),
@@ -157,27 +159,27 @@ impl Table {
     }
 
     /// Number of keys.
-    pub(crate) fn count(self, heap: &Heap) -> usize {
+    pub fn count(self, heap: &Heap) -> usize {
         self.counter(heap, Counter::Count)
     }
 
     /// Number of entries that were ever in use: where iteration ends.
-    pub(crate) fn used(self, heap: &Heap) -> usize {
+    pub fn used(self, heap: &Heap) -> usize {
         self.storage(heap).used()
     }
 
     /// Entries for which there is room without more memory.
-    pub(crate) fn room(self, heap: &Heap) -> usize {
+    pub fn room(self, heap: &Heap) -> usize {
         heap.table_room(self.0).unwrap_or(0)
     }
 
     /// The functions of the program by which it compares and hashes, or `NIL`.
-    pub(crate) fn functions(self, heap: &Heap) -> [Value; 2] {
+    pub fn functions(self, heap: &Heap) -> [Value; 2] {
         heap.table_functions(self.0).unwrap_or([Value::NIL; 2])
     }
 
     /// A number that changes whenever a key comes or goes.
-    pub(crate) fn serial(self, heap: &Heap) -> usize {
+    pub fn serial(self, heap: &Heap) -> usize {
         self.counter(heap, Counter::Serial)
     }
 
@@ -188,7 +190,7 @@ impl Table {
     }
 
     /// The entries whose keys have this hash, with the keys.
-    pub(crate) fn candidates(self, heap: &Heap, hash: u32) -> Vec<(usize, Value)> {
+    pub fn candidates(self, heap: &Heap, hash: u32) -> Vec<(usize, Value)> {
         let storage = self.storage(heap);
         let mut found = Vec::new();
         let mut link = Link(storage.first(hash));
@@ -204,27 +206,27 @@ impl Table {
 
     /// Key and value of an entry; `None` for one that is free or was never used.
     #[inline]
-    pub(crate) fn entry(self, heap: &Heap, entry: usize) -> Option<(Value, Value)> {
+    pub fn entry(self, heap: &Heap, entry: usize) -> Option<(Value, Value)> {
         let [key, value, _] = self.storage(heap).entry(entry)?;
         if key == Value::UNBOUND { None } else { Some((key, value)) }
     }
 
     /// The value of an entry, if it has this very key.
     #[inline(always)]
-    pub(crate) fn value_of(self, heap: &Heap, entry: usize, key: Value) -> Option<Value> {
+    pub fn value_of(self, heap: &Heap, entry: usize, key: Value) -> Option<Value> {
         let [candidate, value, _] = self.storage(heap).entry(entry)?;
         if candidate == key && key != Value::UNBOUND { Some(value) } else { None }
     }
 
     /// Gives an entry another value.
     #[inline(always)]
-    pub(crate) fn set_value(self, heap: &mut Heap, entry: usize, value: Value) {
+    pub fn set_value(self, heap: &mut Heap, entry: usize, value: Value) {
         heap.table_set_entry(self.0, entry, 1, [value]);
     }
 
     /// The entry of `key` and its value, with a test of the machine; `hash` is the key's.
     #[inline(always)]
-    pub(crate) fn find(
+    pub fn find(
         self,
         heap: &Heap,
         test: Test,
@@ -263,7 +265,7 @@ impl Table {
     ///
     /// # Errors
     /// As for every allocation; nothing has changed then.
-    pub(crate) fn add(self, heap: &mut Heap, hash: u32, key: Value, value: Value) -> Result<(), AllocError> {
+    pub fn add(self, heap: &mut Heap, hash: u32, key: Value, value: Value) -> Result<(), AllocError> {
         let free = self.counter(heap, Counter::Free);
         let entry = if free > 0 {
             let [_, _, next] = self.storage(heap).entry(free - 1).unwrap_or(FREE);
@@ -288,7 +290,7 @@ impl Table {
     }
 
     /// Frees an entry that is in use and whose key has this hash; whether it was found in the chain of that.
-    pub(crate) fn delete(self, heap: &mut Heap, entry: usize, hash: u32) -> bool {
+    pub fn delete(self, heap: &mut Heap, entry: usize, hash: u32) -> bool {
         let storage = self.storage(heap);
         let chain = storage.head_of(hash);
         let mut link = Link(storage.head(chain));
@@ -318,7 +320,7 @@ impl Table {
     ///
     /// # Errors
     /// As for every allocation; nothing has changed then.
-    pub(crate) fn clear(self, heap: &mut Heap) -> Result<(), AllocError> {
+    pub fn clear(self, heap: &mut Heap) -> Result<(), AllocError> {
         heap.table_clear(self.0)?;
         self.advance(heap);
         Ok(())
@@ -415,47 +417,47 @@ mod tests {
     }
 
     proptest! {
-           #[test]
-           fn agrees_with_the_model(
-               range in prop_oneof![Just(4), Just(30), Just(500)],
-               operations in prop::collection::vec((0u8..10, any::<u16>(), any::<i16>()), 0..800),
-           ) {
-               let mut heap = crate::interp::trust::heap_for_tests();
-               let table = new(&mut heap, Test::Eql);
-               let mut model = Model::default();
-               for (operation, key, value) in operations {
-                   let (key, value) = (i32::from(key) % range, i32::from(value));
-                   match operation {
-                       0..6 => {
-                           put(&mut heap, table, key, value);
-                           model.put(key, value);
-                       }
-                       6..9 => {
-                           let found = find(&heap, table, key);
-                           if let Some(entry) = found {
-                               let hash = equality::hash(&heap, Test::Eql, Value::small(key));
-    assert!(table.delete(&mut heap, entry, hash));
-                           }
-                           prop_assert_eq!(found.is_some(), model.remove(key));
-                       }
-                       _ if value % 16 == 0 => {
-                           table.clear(&mut heap).unwrap();
-                           model = Model::default();
-                       }
-                       _ => prop_assert_eq!(find(&heap, table, key).is_some(), model.places.contains_key(&key)),
-                   }
-                   prop_assert_eq!(table.count(&heap), model.places.len());
-               }
-               prop_assert_eq!(entries(&heap, table), model.entries());
-               for key in model.places.keys() {
-                   prop_assert!(find(&heap, table, *key).is_some());
-               }
-           }
-       }
+        #[test]
+        fn agrees_with_the_model(
+            range in prop_oneof![Just(4), Just(30), Just(500)],
+            operations in prop::collection::vec((0u8..10, any::<u16>(), any::<i16>()), 0..800),
+        ) {
+            let mut heap = Heap::for_tests();
+            let table = new(&mut heap, Test::Eql);
+            let mut model = Model::default();
+            for (operation, key, value) in operations {
+                let (key, value) = (i32::from(key) % range, i32::from(value));
+                match operation {
+                    0..6 => {
+                        put(&mut heap, table, key, value);
+                        model.put(key, value);
+                    }
+                    6..9 => {
+                        let found = find(&heap, table, key);
+                        if let Some(entry) = found {
+                            let hash = equality::hash(&heap, Test::Eql, Value::small(key));
+                            assert!(table.delete(&mut heap, entry, hash));
+                        }
+                        prop_assert_eq!(found.is_some(), model.remove(key));
+                    }
+                    _ if value % 16 == 0 => {
+                        table.clear(&mut heap).unwrap();
+                        model = Model::default();
+                    }
+                    _ => prop_assert_eq!(find(&heap, table, key).is_some(), model.places.contains_key(&key)),
+                }
+                prop_assert_eq!(table.count(&heap), model.places.len());
+            }
+            prop_assert_eq!(entries(&heap, table), model.entries());
+            for key in model.places.keys() {
+                prop_assert!(find(&heap, table, *key).is_some());
+            }
+        }
+    }
 
     #[test]
     fn a_large_table_keeps_everything() {
-        let mut heap = crate::interp::trust::heap_for_tests();
+        let mut heap = Heap::for_tests();
         let table = new(&mut heap, Test::Eql);
         let n = 3 * SEGMENT as i32 + 17;
         for key in 0..n {
@@ -486,7 +488,7 @@ mod tests {
 
     #[test]
     fn keys_of_one_hash_are_candidates() {
-        let mut heap = crate::interp::trust::heap_for_tests();
+        let mut heap = Heap::for_tests();
         let table = new(&mut heap, Test::Eql);
         for key in 0..20 {
             table.add(&mut heap, 5 + 8 * (key as u32 % 2), Value::small(key), Value::NIL).unwrap();

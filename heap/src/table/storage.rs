@@ -13,30 +13,30 @@
 //! at most `room`, and nobody else has the directories or segments. So a number of an entry below `used` is good, and so
 //! is one of a head below [`Storage::heads`].
 //!
-//! Not here: what is in the entries and how keys are found (the machine's `table`).
+//! Not here: what is in the entries and how keys are found ([`super`]).
 
 use std::marker::PhantomData;
 
-use super::layout::{HashTable, Kind};
-use super::{AllocError, Heap};
+use crate::heap::layout::{HashTable, Kind};
+use crate::heap::{AllocError, Heap};
 use crate::value::Value;
 
 /// Entries of a segment.
-pub const SEGMENT: usize = 1 << SHIFT;
+pub(super) const SEGMENT: usize = 1 << SHIFT;
 const SHIFT: usize = if cfg!(miri) { 4 } else { 12 };
 /// Chains for each entry. With one, a search for a key that is not there meets one entry on the average; with two half of one.
-pub const PER_ENTRY: usize = 2;
+pub(super) const PER_ENTRY: usize = 2;
 /// Values of an entry in its segment: key, value, link.
-pub const ENTRY: usize = 3;
+pub(super) const ENTRY: usize = 3;
 /// Entries that a table may have; a table of as many takes 10 GB.
-pub const MOST: usize = (1 << 28) - SEGMENT;
+pub(super) const MOST: usize = (1 << 28) - SEGMENT;
 
 /// What a free entry holds for a key: no program has it.
 const FREE: Value = Value::UNBOUND;
 
 /// The storage of a table, to be read.
 #[derive(Clone, Copy)]
-pub struct Storage<'a> {
+pub(super) struct Storage<'a> {
     which_test: u16,
     used: usize,
     entries: *const Value,
@@ -47,13 +47,13 @@ pub struct Storage<'a> {
 impl Storage<'_> {
     /// Which test the table was made with.
     #[inline(always)]
-    pub fn which_test(&self) -> u16 {
+    pub(super) fn which_test(&self) -> u16 {
         self.which_test
     }
 
     /// Number of entries that were ever in use.
     #[inline(always)]
-    pub fn used(&self) -> usize {
+    pub(super) fn used(&self) -> usize {
         self.used
     }
 
@@ -65,7 +65,7 @@ impl Storage<'_> {
 
     /// The head of the chain of a hash: its low bits, one fewer where that chain is still to come.
     #[inline(always)]
-    pub fn head_of(&self, hash: u32) -> usize {
+    pub(super) fn head_of(&self, hash: u32) -> usize {
         let heads = self.heads();
         let half = 1 << heads.ilog2();
         let head = hash as usize & (2 * half - 1);
@@ -74,7 +74,7 @@ impl Storage<'_> {
 
     /// What the head of the chain of a hash holds.
     #[inline(always)]
-    pub fn first(&self, hash: u32) -> u64 {
+    pub(super) fn first(&self, hash: u32) -> u64 {
         // SAFETY: what `head_of` gives is less than `heads`: if the low bits are not, they are at least `half`, which
         // is at most `heads`, and at most `half` is left of them. So the head is in use, and lies in a segment (invariant).
         unsafe { *self.place_of_head(self.head_of(hash)) }
@@ -82,7 +82,7 @@ impl Storage<'_> {
 
     /// A head; 0 for one that is not in use.
     #[inline(always)]
-    pub fn head(&self, head: usize) -> u64 {
+    pub(super) fn head(&self, head: usize) -> u64 {
         if head >= self.heads() {
             return 0;
         }
@@ -92,7 +92,7 @@ impl Storage<'_> {
 
     /// Key, value and link of an entry; `None` if it was never in use.
     #[inline(always)]
-    pub fn entry(&self, entry: usize) -> Option<[Value; ENTRY]> {
+    pub(super) fn entry(&self, entry: usize) -> Option<[Value; ENTRY]> {
         if entry >= self.used {
             return None;
         }
@@ -130,7 +130,7 @@ unsafe fn elements<T>(object: Value) -> *mut T {
 
 /// The counters of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Counter {
+pub(super) enum Counter {
     /// Number of keys.
     Count,
     /// The entry freed last, one too high; 0 if none is free.
@@ -144,7 +144,7 @@ impl Heap {
     ///
     /// # Errors
     /// As for every allocation.
-    pub fn alloc_table(
+    pub(super) fn alloc_table(
         &mut self,
         which_test: u16,
         room: usize,
@@ -165,7 +165,7 @@ impl Heap {
 
     /// The storage of a table.
     #[inline(always)]
-    pub fn table_storage(&self, v: Value) -> Option<Storage<'_>> {
+    pub(super) fn table_storage(&self, v: Value) -> Option<Storage<'_>> {
         let table = self.table_object(v)?;
         // SAFETY: a live table, whose slots are as the invariant says.
         unsafe {
@@ -180,20 +180,20 @@ impl Heap {
     }
 
     /// Entries for which a table has room without more memory.
-    pub fn table_room(&self, v: Value) -> Option<usize> {
+    pub(super) fn table_room(&self, v: Value) -> Option<usize> {
         // SAFETY: a live table.
         self.table_object(v).and_then(|table| unsafe { (*table).room }.as_index())
     }
 
     /// The functions of the program by which a table compares and hashes, or `NIL`.
-    pub fn table_functions(&self, v: Value) -> Option<[Value; 2]> {
+    pub(super) fn table_functions(&self, v: Value) -> Option<[Value; 2]> {
         // SAFETY: a live table.
         self.table_object(v).map(|table| unsafe { [(*table).test, (*table).hash] })
     }
 
     /// A counter of a table.
     #[inline]
-    pub fn table_counter(&self, v: Value, counter: Counter) -> Option<usize> {
+    pub(super) fn table_counter(&self, v: Value, counter: Counter) -> Option<usize> {
         let table = self.table_object(v)?;
         // SAFETY: a live table.
         let value = unsafe {
@@ -208,7 +208,7 @@ impl Heap {
 
     /// Sets a counter of a table; `None` if `v` is none.
     #[inline]
-    pub fn table_set_counter(&mut self, v: Value, counter: Counter, n: usize) -> Option<()> {
+    pub(super) fn table_set_counter(&mut self, v: Value, counter: Counter, n: usize) -> Option<()> {
         let table = self.table_object(v)?;
         // SAFETY: a live table; nothing relies on these counters. No address is overwritten, so the barrier has no work.
         unsafe {
@@ -223,7 +223,7 @@ impl Heap {
 
     /// Sets what an entry holds, from value number `first` of it on; `None` if it was never in use.
     #[inline(always)]
-    pub fn table_set_entry<const N: usize>(
+    pub(super) fn table_set_entry<const N: usize>(
         &mut self,
         v: Value,
         entry: usize,
@@ -246,7 +246,7 @@ impl Heap {
 
     /// Sets a head; `None` if it is not in use.
     #[inline]
-    pub fn table_set_head(&mut self, v: Value, head: usize, link: u64) -> Option<()> {
+    pub(super) fn table_set_head(&mut self, v: Value, head: usize, link: u64) -> Option<()> {
         let storage = self.table_storage(v)?;
         if head >= storage.heads() {
             return None;
@@ -260,7 +260,7 @@ impl Heap {
     ///
     /// # Errors
     /// As for every allocation; nothing has changed then.
-    pub fn table_extend(&mut self, v: Value) -> Result<usize, AllocError> {
+    pub(super) fn table_extend(&mut self, v: Value) -> Result<usize, AllocError> {
         let Some(table) = self.table_object(v) else { unreachable!("the caller has a table") };
         // SAFETY: a live table.
         let (used, room) =
@@ -277,7 +277,7 @@ impl Heap {
     ///
     /// # Errors
     /// As for every allocation; nothing has changed then.
-    pub fn table_clear(&mut self, v: Value) -> Result<(), AllocError> {
+    pub(super) fn table_clear(&mut self, v: Value) -> Result<(), AllocError> {
         let Some(table) = self.table_object(v) else { unreachable!("the caller has a table") };
         // SAFETY: a live table.
         let room = unsafe { (*table).room }.as_index().unwrap_or(0).min(SEGMENT);

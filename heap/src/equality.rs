@@ -8,15 +8,15 @@
 
 use smallvec::{SmallVec, smallvec};
 
-use crate::builtins::array::{Elements, all_elements, vector_elements};
+use crate::array::{Elements, all_elements, vector_elements};
 use crate::character;
 use crate::heap::{Heap, Kind};
-use crate::number::{self, Int, Number};
+use crate::number;
 use crate::value::Value;
 
 /// The tests that the machine knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Test {
+pub enum Test {
     /// One object.
     Eq,
     /// One object, or numbers of one type and value.
@@ -30,7 +30,7 @@ pub(crate) enum Test {
 /// Whether `a` and `b` are the same by `test`. `None` when that takes more than `work`, from which what was done is
 /// taken, or when only ESL can tell.
 #[inline]
-pub(crate) fn same(heap: &Heap, test: Test, a: Value, b: Value, work: &mut usize) -> Option<bool> {
+pub fn same(heap: &Heap, test: Test, a: Value, b: Value, work: &mut usize) -> Option<bool> {
     if a == b {
         return Some(true);
     }
@@ -69,7 +69,7 @@ fn walk(heap: &Heap, loosely: bool, a: Value, b: Value, work: &mut usize) -> Opt
 }
 
 /// The characters of a string, up to its fill pointer.
-pub(crate) fn characters_of(heap: &Heap, v: Value) -> Option<&[u32]> {
+pub fn characters_of(heap: &Heap, v: Value) -> Option<&[u32]> {
     if let Some(characters) = heap.string(v) {
         return Some(characters);
     }
@@ -165,14 +165,14 @@ fn finish(hash: u64) -> u32 {
 /// table then finds them in one place of memory. Their order there is mixed as well, so that no step between keys makes hashes
 /// that share their low bits.
 #[inline]
-pub(crate) fn fixnum_hash(n: i64) -> u32 {
+pub fn fixnum_hash(n: i64) -> u32 {
     let group = finish(mix(0, (n >> 4) as u64));
     group << 4 | (n as u32 ^ group >> 28) & 15
 }
 
 /// A hash of `v` that agrees with `test`.
 #[inline(always)]
-pub(crate) fn hash(heap: &Heap, test: Test, v: Value) -> u32 {
+pub fn hash(heap: &Heap, test: Test, v: Value) -> u32 {
     match v.as_fixnum() {
         Some(n) if test != Test::Equalp => fixnum_hash(n),
         _ => other_hash(heap, test, v),
@@ -199,7 +199,7 @@ fn other_hash(heap: &Heap, test: Test, v: Value) -> u32 {
 }
 
 /// What `sxhash` gives: as the hash of `equal`, and the same for a symbol of the same name in another run.
-pub(crate) fn sxhash(heap: &Heap, v: Value) -> u32 {
+pub fn sxhash(heap: &Heap, v: Value) -> u32 {
     match heap.symbol(v).and_then(|symbol| heap.string(symbol.name)) {
         Some(name) => finish(characters_hash(name, false)),
         None => hash(heap, Test::Equal, v),
@@ -220,21 +220,13 @@ fn number_hash(heap: &Heap, v: Value) -> Option<u64> {
     }
 }
 
-/// A number that numbers of equal value share, whatever their type: a rational that equals a double is the one that
-/// the double rounds to.
-fn value_hash(n: &Number) -> u64 {
-    let x = match n {
-        Number::Float(x) => *x,
-        Number::Int(n) => n.to_f64(),
-        Number::Ratio(r) => r.to_f64(),
-    };
-    if x.is_infinite()
-        && let Number::Int(n) = n
-    {
-        return n.limbs().1.iter().fold(3, |hash, &limb| mix(hash, limb));
+/// A number that numbers of equal value share, whatever their type.
+fn value_hash(heap: &Heap, v: Value) -> u64 {
+    match number::exact_double(heap, v) {
+        // Minus zero is zero.
+        Some(x) => (x + 0.0).to_bits(),
+        None => number_hash(heap, v).unwrap_or_else(|| mix(1, v.bits())),
     }
-    // Minus zero is zero.
-    (x + 0.0).to_bits()
 }
 
 fn characters_hash(characters: &[u32], loosely: bool) -> u64 {
@@ -283,8 +275,8 @@ fn loose_hash(heap: &Heap, v: Value, hash: u64, open: &mut SmallVec<[Value; 16]>
     if let Some(code) = v.as_character() {
         return mix(hash, u64::from(character::fold(code)));
     }
-    if let Some(n) = Number::of(heap, v) {
-        return mix(hash, value_hash(&n));
+    if number::is_number(heap, v) {
+        return mix(hash, value_hash(heap, v));
     }
     if let Some(elements) = vector_elements(heap, v).or_else(|| all_elements(heap, v)) {
         // A string and a vector of the same characters are the same: elements are hashed one by one.
@@ -303,8 +295,7 @@ fn loose_hash(heap: &Heap, v: Value, hash: u64, open: &mut SmallVec<[Value; 16]>
     }
 }
 
-/// The bits of an integer that a hash given by a program may have.
-pub(crate) fn given_hash(n: &Int) -> u32 {
-    let limbs = n.limbs().1;
-    finish(mix(0, limbs.first().copied().unwrap_or(0)))
+/// The hash that a program has given: `low` is the lowest limb of the magnitude of an integer.
+pub fn given_hash(low: u64) -> u32 {
+    finish(mix(0, low))
 }
