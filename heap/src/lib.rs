@@ -5,6 +5,7 @@
 //! | [`value`] | [`Value`]: one word that is any datum |
 //! | [`heap`] | [`Heap`]: allocation, checked access, incremental collection |
 //! | [`stack`] | the register stack of one task |
+//! | [`saved_pc`] | the address at which a task goes on |
 //! | [`array`] | the elements of arrays, wherever they are kept |
 //! | [`number`] | which values are numbers, and which numbers are equal |
 //! | [`equality`] | `eq`, `eql`, `equal`, `equalp`, and hashes that agree with them |
@@ -21,6 +22,7 @@ pub mod character;
 pub mod equality;
 pub mod heap;
 pub mod number;
+pub mod saved_pc;
 pub mod stack;
 pub mod table;
 pub mod value;

@@ -14,6 +14,8 @@
 //! 2. Words that may hold an address of a dead object are above the top of the running frame; [`Stack::wipe`] clears
 //!    them before each scan.
 
+#![allow(unsafe_code)]
+
 use std::alloc::{Layout, alloc, dealloc, handle_alloc_error};
 use std::ptr::NonNull;
 

@@ -30,6 +30,8 @@
 //! Source: the float encoding is the one-range member of the family in Melançon, Serrano and Feeley 2024
 //! (arXiv 2411.16544), as in CRuby's flonums; the tags follow the measurements in the design notes.
 
+#![allow(unsafe_code)]
+
 use crate::heap::layout::{Cons, Header};
 use std::fmt;
 

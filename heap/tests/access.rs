@@ -1,5 +1,7 @@
 //! Access to objects from safe code: what goes in comes out, and what does not fit is refused.
 
+#![allow(unsafe_code, reason = "tests keep the promises that the heap asks of its owner")]
+
 use esl_heap::heap::layout::{Array, Code, Header, KINDS, Symbol};
 use esl_heap::heap::{AllocError, CodeParts, Heap, HeapConfig, Kind};
 use esl_heap::value::Value;

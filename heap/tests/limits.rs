@@ -1,5 +1,7 @@
 //! Allocation and collection at large: limits, pacing, what goes back to the system, and structures of great depth.
 
+#![allow(unsafe_code, reason = "tests keep the promises that the heap asks of its owner")]
+
 use esl_heap::heap::{
     AllocError, Heap, HeapConfig, HeapStats, Kind, Phase, RESERVE, SLICE_VISITS, SliceOutcome,
 };

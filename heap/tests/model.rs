@@ -6,6 +6,8 @@
 //! all the time: every object that the program meets holds what the shadow says. The stacks follow the rule that the
 //! collector is built on: a stack is scanned before its task runs in a cycle, otherwise any time, once.
 
+#![allow(unsafe_code, reason = "tests keep the promises that the heap asks of its owner")]
+
 use esl_heap::heap::layout::Code;
 use esl_heap::heap::{AllocError, CodeParts, Heap, HeapConfig, Kind, Phase, SliceOutcome};
 use esl_heap::value::Value;

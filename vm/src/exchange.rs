@@ -7,6 +7,7 @@
 use smallvec::SmallVec;
 
 use crate::raise::{Exit, Expected, Raised};
+use crate::saved_pc::SavedPc;
 use crate::value::Value;
 
 /// Charged by whoever wants the slice to end at the next tick; the task goes on with the next slice.
@@ -28,7 +29,7 @@ pub(crate) struct Exchange {
     /// Ticks charged by builtins beside those of their calls, until the interpreter takes them.
     pub(crate) charged: u64,
     /// Place and time of the last collection for want of room; a second one there would not help.
-    pub(crate) collected_at: Option<(*const u32, u64, i32)>,
+    pub(crate) collected_at: Option<(SavedPc, u64, i32)>,
 }
 
 impl Exchange {

@@ -4,7 +4,7 @@
 
 pub use esl_heap::{heap, value};
 
-pub(crate) use esl_heap::{character, equality, stack, table};
+pub(crate) use esl_heap::{character, equality, saved_pc, stack, table};
 
 pub mod builtins;
 pub mod embed;

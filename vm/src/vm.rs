@@ -99,10 +99,6 @@ pub struct Vm {
     pub(crate) config: Config,
 }
 
-// SAFETY: the raw pointers of a machine point into what the machine owns, or into static tables.
-#[allow(unsafe_code, reason = "the machine owns what its pointers point to")]
-unsafe impl Send for Vm {}
-
 impl Vm {
     /// A machine without a library.
     ///

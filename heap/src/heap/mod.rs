@@ -34,6 +34,8 @@
 //!
 //! Not here: which roots there are, when to run a slice, weak references.
 
+#![allow(unsafe_code)]
+
 pub mod layout;
 
 mod access;

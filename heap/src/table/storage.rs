@@ -15,6 +15,8 @@
 //!
 //! Not here: what is in the entries and how keys are found ([`super`]).
 
+#![allow(unsafe_code)]
+
 use std::marker::PhantomData;
 
 use crate::heap::layout::{HashTable, Kind};

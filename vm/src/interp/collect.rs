@@ -9,6 +9,7 @@ use crate::environment::Compiler;
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Phase, SLICE_VISITS, SliceOutcome};
 use crate::raise::{Expected, Raised};
+use crate::saved_pc::SavedPc;
 use crate::schedule::Scheduler;
 use crate::task::Task;
 use crate::value::Value;
@@ -155,7 +156,7 @@ impl Vm {
     /// Notes where the running task stands, for a scan or a switch.
     pub(crate) fn save_cpu(&mut self) {
         let offset = self.offset_of(self.cpu.base);
-        let pc = self.cpu.pc;
+        let pc = SavedPc::new(self.cpu.pc);
         let task = self.scheduler.task_mut();
         task.base = offset as u32;
         task.pc = pc;

@@ -7,6 +7,7 @@ use esl_bytecode::builtin::BUILTINS;
 use super::call::{FramePlace, call};
 use super::{Signal, aux_at, failure, word_at};
 use crate::raise::{Exit, Raised};
+use crate::saved_pc::SavedPc;
 use crate::task::End;
 use crate::vm::Vm;
 
@@ -86,7 +87,7 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
         // Its tick will be taken again.
         vm.cpu.ticks += 1;
     }
-    let place = (vm.cpu.pc, vm.scheduler.task().ticks, vm.cpu.ticks);
+    let place = (SavedPc::new(vm.cpu.pc), vm.scheduler.task().ticks, vm.cpu.ticks);
     if vm.exchange.collected_at == Some(place) {
         vm.exchange.collected_at = None;
         if is_call {

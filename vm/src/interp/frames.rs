@@ -85,7 +85,7 @@ impl<'a> Frames<'a> {
     pub(crate) fn of_task(task: &'a Task) -> Frames<'a> {
         let bottom = task.stack.start();
         // SAFETY: the task stands where it was noted at the switch.
-        unsafe { Frames::new(bottom, task.pc, bottom.add(task.base as usize)) }
+        unsafe { Frames::new(bottom, task.pc.get(), bottom.add(task.base as usize)) }
     }
 }
 
@@ -131,13 +131,13 @@ unsafe fn word_in(code: *mut Code, pc: *const u32) -> usize {
 
 /// The word of the code of its frame at which an entry of a task that does not run lands, if it has one.
 pub(crate) fn entry_word(task: &Task, entry: &Entry) -> Option<usize> {
-    if entry.pc.is_null() {
+    if entry.pc.is_none() {
         return None;
     }
     // SAFETY: the frame of an entry is live.
     unsafe {
         let code = code_of(*task.stack.start().add(entry.base as usize).sub(2));
-        Some(word_in(code, entry.pc))
+        Some(word_in(code, entry.pc.get()))
     }
 }
 

@@ -4,6 +4,7 @@
 use super::Signal;
 use super::call::{FramePlace, call};
 use super::substitute::resume_below;
+use crate::saved_pc::SavedPc;
 use crate::task::{Entry, EntryKind};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -18,7 +19,7 @@ pub(super) unsafe fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]
     let wait = std::mem::replace(&mut task.wait, Value::NIL);
     let bindings = task.control.bindings.len() as u32;
     let kind = EntryKind::Interrupt;
-    let entry = Entry { data: wait, pc: std::ptr::null(), base, bindings, window: 0, want: 0, kind };
+    let entry = Entry { data: wait, pc: SavedPc::NONE, base, bindings, window: 0, want: 0, kind };
     task.control.entries.push(entry);
     // SAFETY: by the contract.
     unsafe { call(vm, function, arguments, FramePlace::Interrupt) }

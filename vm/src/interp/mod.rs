@@ -101,11 +101,11 @@ pub(crate) enum Leave {
 /// The machine's registers while the loop is left.
 pub(crate) struct Cpu {
     /// The next instruction, or the one that was given up.
-    pub pc: *const u32,
+    pc: *const u32,
     /// First register of the running frame.
-    pub base: *mut Value,
+    base: *mut Value,
     /// End of the running task's stack.
-    pub stack_end: *mut Value,
+    stack_end: *mut Value,
     /// Whether the call of the builtin that runs wants its first value only.
     pub wants_one: bool,
     /// Ticks left until the next safepoint.
@@ -234,7 +234,7 @@ fn is_simple_vector(v: Value) -> bool {
 /// Makes the task in `vm.scheduler.running` the one whose registers are in `vm.cpu`, with so many ticks.
 pub(crate) fn load(vm: &mut Vm, ticks: i32) {
     let task = vm.scheduler.task();
-    let pc = task.pc;
+    let pc = task.pc.get();
     // SAFETY: the base of a task lies in its stack.
     let base = unsafe { task.stack.start().add(task.base as usize) };
     let stack_end = vm.stack_end();

@@ -7,6 +7,7 @@ use esl_bytecode::operand::{Base, Count, Pad};
 use super::{code_of, stubs};
 use crate::heap::layout::Code;
 use crate::heap::{AllocError, CodeParts, Heap};
+use crate::saved_pc::SavedPc;
 use crate::shape::{Shape, Sort};
 use crate::task::LazyControl;
 use crate::task::Task;
@@ -36,7 +37,7 @@ pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function
             *start.add(2) = function;
             *start.add(3) = Value::from_bits(stub.expose_provenance() as u64);
         }
-        task.pc = code.entry;
+        task.pc = SavedPc::new(code.entry);
         task.base = 4;
         return;
     }
@@ -50,7 +51,7 @@ pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function
         *start.add(3) = Value::from_bits(stub.expose_provenance() as u64);
         *start.add(4) = function;
         *start.add(6) = arguments;
-        task.pc = (*code_of(starter)).entry;
+        task.pc = SavedPc::new((*code_of(starter)).entry);
     }
     task.base = 4;
 }

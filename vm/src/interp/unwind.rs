@@ -10,6 +10,7 @@ use super::substitute::deliver;
 use super::{Signal, aux_at, cold, constant, failure, word_at};
 use crate::heap::layout::Kind;
 use crate::raise::{Exit, Raised};
+use crate::saved_pc::SavedPc;
 use crate::task::{End, Entry, EntryKind, Running, Target, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -30,16 +31,16 @@ pub(super) unsafe fn new_tag(vm: &mut Vm, pc: *const u32, base: *mut Value) -> S
 /// The entry that the instruction with this word pushes, as far as all kinds have it in common.
 fn entry(kind: EntryKind, word: Word) -> Entry {
     let window = word.a() as u8;
-    Entry { data: Value::NIL, pc: std::ptr::null(), base: 0, bindings: 0, window, want: 0, kind }
+    Entry { data: Value::NIL, pc: SavedPc::NONE, base: 0, bindings: 0, window, want: 0, kind }
 }
 
 /// Where the entry lands that the instruction at `pc` pushes.
 ///
 /// # Safety
 /// `pc` is at an instruction with an aux word.
-unsafe fn landing(pc: *const u32) -> *const u32 {
+unsafe fn landing(pc: *const u32) -> SavedPc {
     // SAFETY: V1 and V2: the instruction jumps inside the function.
-    unsafe { pc.add(2).offset(aux_at(pc) as i32 as isize) }
+    SavedPc::new(unsafe { pc.add(2).offset(aux_at(pc) as i32 as isize) })
 }
 
 /// Pushes an entry of the frame at `base`.
@@ -351,7 +352,7 @@ impl Vm {
         // that this may do what that instruction does as long as the entry stands.
         unsafe {
             let base = self.scheduler.task().stack.start().add(entry.base as usize);
-            let word = word_at(entry.pc);
+            let word = word_at(entry.pc.get());
             match word.opcode() {
                 Some(Opcode::MakeClosure | Opcode::LoadConst) => {
                     let constant = constant(base, word.d());
@@ -370,7 +371,7 @@ impl Vm {
     /// # Safety
     /// The entry belongs to the running task, and its frame is live.
     unsafe fn resume_at(&mut self, entry: &Entry) {
-        self.cpu.pc = entry.pc;
+        self.cpu.pc = entry.pc.get();
         // SAFETY: by the contract, the offset lies in the stack.
         self.cpu.base = unsafe { self.scheduler.task().stack.start().add(entry.base as usize) };
     }

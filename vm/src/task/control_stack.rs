@@ -11,6 +11,7 @@
 use std::cell::OnceCell;
 use std::ops::{Deref, DerefMut};
 
+use crate::saved_pc::SavedPc;
 use crate::task::Allowance;
 use crate::task::Bindings;
 use crate::value::Value;
@@ -48,7 +49,7 @@ pub(crate) struct Entry {
     /// What goes with the kind.
     pub data: Value,
     /// Where control goes when an unwinding ends, or a cleanup begins, here.
-    pub pc: *const u32,
+    pub pc: SavedPc,
     /// Offset of the frame's base in the stack.
     pub base: u32,
     /// Number of bindings when the entry was pushed.
@@ -302,7 +303,7 @@ mod tests {
 
     fn entry(kind: EntryKind, data: i32) -> Entry {
         let data = Value::small(data);
-        Entry { data, pc: std::ptr::null(), base: 0, bindings: 0, window: 0, want: 0, kind }
+        Entry { data, pc: SavedPc::NONE, base: 0, bindings: 0, window: 0, want: 0, kind }
     }
 
     #[test]

@@ -18,6 +18,7 @@ pub(crate) use limit::{AccountId, Allowance, Limit};
 pub use tasks::TaskId;
 pub(crate) use tasks::Tasks;
 
+use crate::saved_pc::SavedPc;
 use crate::stack::Stack;
 use crate::value::Value;
 
@@ -40,7 +41,7 @@ pub(crate) struct Task {
     /// Its registers.
     pub stack: Stack,
     /// The next instruction, while it does not run.
-    pub pc: *const u32,
+    pub pc: SavedPc,
     /// Its control stack and bindings.
     pub control: LazyControl,
     /// What few tasks need.
@@ -173,10 +174,6 @@ impl Extra {
     }
 }
 
-// SAFETY: `pc` points into a Code in the heap of the machine that owns the task, or into a static table.
-#[allow(unsafe_code, reason = "the one raw pointer of a task moves with its machine")]
-unsafe impl Send for Task {}
-
 /// What became of a task, for the embedder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TaskResult {
@@ -199,7 +196,7 @@ impl Task {
     fn with_stack(object: Value, stack: Stack) -> Task {
         Task {
             stack,
-            pc: std::ptr::null(),
+            pc: SavedPc::NONE,
             control: LazyControl::default(),
             extra: None,
             object,

@@ -1,0 +1,33 @@
+//! Addresses of instructions, kept for the time when their task runs again.
+
+#![allow(unsafe_code)]
+
+/// Address of an instruction in code or in a stub, or no address.
+///
+/// To follow one is up to whoever runs the code, and unsafe; anybody may store and compare them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SavedPc(*const u32);
+
+// SAFETY: a saved address gives no access to what is there: to follow it is unsafe, and whoever does so shows that the code
+// belongs to the machine in hand.
+unsafe impl Send for SavedPc {}
+
+impl SavedPc {
+    /// No address.
+    pub const NONE: SavedPc = SavedPc(std::ptr::null());
+
+    /// Saves the address of an instruction.
+    pub const fn new(pc: *const u32) -> SavedPc {
+        SavedPc(pc)
+    }
+
+    /// Returns the address.
+    pub const fn get(self) -> *const u32 {
+        self.0
+    }
+
+    /// Returns whether there is no address.
+    pub const fn is_none(self) -> bool {
+        self.0.is_null()
+    }
+}
