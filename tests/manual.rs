@@ -1,12 +1,12 @@
-//! The examples of the manual, `docs/manual/*.md`, and of `README.md`, run by the commands. `conformance/src/chapter.rs` says how they are
-//! written.
+//! The examples of the manual, `docs/manual/*.md`, and of `README.md`, run by the commands; `conformance/src/chapter.rs`
+//! describes their form.
 
-use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use esl_conformance::chapter::{Example, examples};
-use esl_conformance::session::{Session, compare};
+use esl_conformance::process;
+use esl_conformance::transcript::{Transcript, compare};
 use libtest_mimic::{Arguments, Failed, Trial};
 
 /// Printed before each piece of a program, with its number.
@@ -40,7 +40,7 @@ fn check(markdown: &str) -> Result<(), Failed> {
                 outputs.push((line, output));
             }
             Example::Session(text) => {
-                let session = Session::parse(&text);
+                let session = Transcript::parse(&text);
                 // The pieces so far, then a mark behind which the session's own output begins.
                 let number = outputs.len();
                 let begin = format!("(progn (format t \"~&{MARK}{number}~%\") (values))\n");
@@ -67,24 +67,9 @@ fn check(markdown: &str) -> Result<(), Failed> {
     Ok(())
 }
 
-/// What a command writes, errors included, with `input` typed.
+/// Returns what a command writes when `input` is typed.
 fn eslvm(arguments: &[&str], input: &str) -> Result<String, Failed> {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_eslvm"))
-        .args(arguments)
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .env("ESL_LIBRARY", "examples/library")
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()?;
-    let mut stdin = child.stdin.take().ok_or("no standard input")?;
-    let input = input.to_string();
-    let writer = std::thread::spawn(move || stdin.write_all(input.as_bytes()));
-    let output = child.wait_with_output()?;
-    _ = writer.join();
-    let errors = String::from_utf8(output.stderr)?;
-    if !errors.is_empty() {
-        return Err(format!("{arguments:?} wrote to standard error:\n{errors}").into());
-    }
-    Ok(String::from_utf8(output.stdout)?)
+    let mut command = Command::new(env!("CARGO_BIN_EXE_eslvm"));
+    command.args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).env("ESL_LIBRARY", "examples/library");
+    Ok(process::run(&mut command, input).quiet_output().map_err(|text| format!("{arguments:?}: {text}"))?)
 }

@@ -1,7 +1,7 @@
 //! The examples of a chapter of the manual.
 //!
 //! A fenced block of `lisp` is a piece of program; the pieces of a chapter are one program, in order. A block without a
-//! language right behind it is what that piece prints. A block of `repl` is a session (see [`crate::session`]) in which the
+//! language right behind it is what that piece prints. A block of `repl` is a session (see [`crate::transcript`]) in which the
 //! pieces before it are loaded. Blocks of other languages are not looked at.
 
 /// An example.

@@ -2,6 +2,10 @@
 #![forbid(unsafe_code)]
 
 pub mod anything;
+pub mod chapter;
+pub mod differential;
+pub mod process;
+pub mod transcript;
 
 /// Under which conditions a program runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,10 +118,6 @@ impl Expectations {
         })
     }
 }
-
-pub mod chapter;
-pub mod differential;
-pub mod session;
 
 #[cfg(test)]
 mod tests {

@@ -1,19 +1,11 @@
-//! What is said when no task can ever run again: every task that waits, for what, and where in the program.
+//! The report of a deadlock: every task that waits, what it waits for, and where in the program.
 
-use std::path::Path;
-use std::process::Command;
+use esl_conformance::process;
 
-/// Runs a program; its exit status, and what it has written to standard error.
-fn run(name: &str, program: &str) -> (Option<i32>, String) {
-    let source = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    std::fs::write(&source, program).expect("the program can be written");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_eslvm"));
-    let output = command.args(["run", "--clock", "virtual"]).arg(&source).output();
-    let output = output.expect("the command can be run");
-    (output.status.code(), String::from_utf8(output.stderr).expect("text"))
-}
+use crate::eslvm;
+use crate::folder::Folder;
 
-/// The lines of a report, with the name of the file alone in place of its path.
+/// Returns the lines of a report, with the file's name in place of its path.
 fn lines(name: &str, report: &str) -> Vec<String> {
     let short = |line: &str| match (line.rfind(", "), line.rfind(name)) {
         (Some(comma), Some(at)) => format!("{}, {}", &line[..comma], &line[at..]),
@@ -22,7 +14,7 @@ fn lines(name: &str, report: &str) -> Vec<String> {
     report.lines().map(|line| short(line.trim())).collect()
 }
 
-/// A tail call leaves no frame of the one who waits: then it is said where that is written with which the task began.
+/// A tail call leaves no frame of the function that waits; the report then names the form with which the task began.
 #[test]
 fn every_task_that_waits_is_named_with_its_place() {
     let program = r#"(defvar *door* (make-event 'door)) (defvar *main* (current-task))
@@ -41,10 +33,11 @@ fn every_task_that_waits_is_named_with_its_place() {
   (left (wait-for-task right))
   (right (checkpoint-wait left 'done)))
 "#;
-    let (status, report) = run("deadlock.esl", program);
-    assert_eq!(status, Some(4), "{report}");
+    let source = Folder::new("deadlock").file("deadlock.esl", program);
+    let run = process::run(&mut eslvm(&["run", "--clock", "virtual", &source]), "");
+    assert_eq!(run.status, Some(4), "{}", run.errors);
     assert_eq!(
-        lines("deadlock.esl", &report),
+        lines("deadlock.esl", &run.errors),
         [
             "Deadlock: no task can ever run again.",
             "the main task waits for its tasks, deadlock.esl:13:1",

@@ -1,23 +1,21 @@
-//! The REPL runs tasks while it waits for a line, and ends when one of them says so.
+//! The REPL runs tasks while it waits for a line, and ends when a task asks for it.
 
 use std::io::{BufRead, BufReader, Write};
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{Child, ChildStdin, ChildStdout};
 
-/// Begins a session with these options; its input, and what it writes.
-fn begin(options: &[&str]) -> (Child, ChildStdin, BufReader<std::process::ChildStdout>) {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_eslvm"))
-        .arg("repl")
-        .args(options)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("the command can be run");
-    let input = child.stdin.take().expect("it has an input");
-    let output = BufReader::new(child.stdout.take().expect("it has an output"));
+use esl_conformance::process::start;
+
+use crate::eslvm;
+
+/// Begins a session with these options; returns its input and its output, too.
+fn begin(options: &[&str]) -> (Child, ChildStdin, BufReader<ChildStdout>) {
+    let mut child = start(eslvm(&["repl"]).args(options));
+    let input = child.stdin.take().expect("standard input is a pipe");
+    let output = BufReader::new(child.stdout.take().expect("standard output is a pipe"));
     (child, input, output)
 }
 
-/// The next line with something on it; it has to come without anything being typed.
+/// Returns the next line that is not empty; it has to come without anything being typed.
 fn next_line(output: &mut impl BufRead) -> String {
     loop {
         let mut line = String::new();

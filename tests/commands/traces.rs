@@ -1,7 +1,8 @@
-//! `eslvm run --trace`: what is asked for, and nothing else, is written to standard error.
+//! `eslvm run --trace`: standard error gets the traces that are asked for, and nothing else.
 
-use std::io::Write;
-use std::process::{Command, Stdio};
+use esl_conformance::process;
+
+use crate::eslvm;
 
 const PROGRAM: &str = "
 (defvar *on* nil)
@@ -22,22 +23,10 @@ Attempting to achieve (ON-P)
 
 const FAILURES: &str = "Failure :STUCK, recovery available. (1 retry)\n";
 
-/// Runs the program with further options: the status, standard output and standard error.
+/// Runs the program with further options; returns its status, standard output and standard error.
 fn run(options: &[&str]) -> (i32, String, String) {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_eslvm"))
-        .arg("run")
-        .args(options)
-        .arg("-")
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the command is there");
-    // A command that refuses its options does not read.
-    let _ = child.stdin.take().expect("it is piped").write_all(PROGRAM.as_bytes());
-    let output = child.wait_with_output().expect("it ends");
-    let text = |bytes| String::from_utf8(bytes).expect("the command writes UTF-8");
-    (output.status.code().unwrap_or(-1), text(output.stdout), text(output.stderr))
+    let run = process::run(eslvm(&["run"]).args(options).arg("-"), PROGRAM);
+    (run.status.unwrap_or(-1), run.output, run.errors)
 }
 
 #[test]

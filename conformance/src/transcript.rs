@@ -1,4 +1,4 @@
-//! Sessions with the REPL as text: what is typed, and what has to be answered, to the letter.
+//! Transcripts of sessions with the REPL: what is typed, and what has to be answered, to the letter.
 //!
 //! ```text
 //! ; a comment, up to the first prompt
@@ -14,19 +14,19 @@
 //! A line that begins with `? ` is typed, and so are the lines after it until its parentheses are closed. What follows, up
 //! to the next such line, is the answer; blanks at the end of a line do not count, nor do empty lines at the very end.
 
-/// A session.
+/// A transcript.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Session {
-    /// All that is typed.
+pub struct Transcript {
+    /// Everything that is typed.
     pub input: String,
-    /// All that is answered.
+    /// Everything that is answered.
     pub output: String,
 }
 
-impl Session {
-    /// Reads a session.
-    pub fn parse(text: &str) -> Session {
-        let mut session = Session::default();
+impl Transcript {
+    /// Reads a transcript.
+    pub fn parse(text: &str) -> Transcript {
+        let mut transcript = Transcript::default();
         let mut is_typed = false;
         let mut form = String::new();
         let mut has_begun = false;
@@ -41,16 +41,16 @@ impl Session {
                 form.push('\n');
                 form.push_str(line);
             } else if has_begun {
-                session.output.push_str(line.trim_end());
-                session.output.push('\n');
+                transcript.output.push_str(line.trim_end());
+                transcript.output.push('\n');
             }
             if is_typed && is_whole(&form) {
                 is_typed = false;
-                session.input.push_str(&form);
-                session.input.push('\n');
+                transcript.input.push_str(&form);
+                transcript.input.push('\n');
             }
         }
-        session
+        transcript
     }
 
     /// Compares the output with what the REPL has written.
@@ -107,10 +107,10 @@ mod tests {
 
     #[test]
     fn typed_lines_and_answers_are_told_apart() {
-        let session = Session::parse("; comment\n? (list 1 ; (\n   \"(\" #\\()\n(1)\n? 5\n5\n?\n");
-        assert_eq!(session.input, "(list 1 ; (\n   \"(\" #\\()\n5\n\n");
-        assert_eq!(session.output, "(1)\n5\n");
-        assert!(session.compare("(1) \n5\n\n").is_ok());
-        assert!(session.compare("(1)\n6\n").is_err());
+        let transcript = Transcript::parse("; comment\n? (list 1 ; (\n   \"(\" #\\()\n(1)\n? 5\n5\n?\n");
+        assert_eq!(transcript.input, "(list 1 ; (\n   \"(\" #\\()\n5\n\n");
+        assert_eq!(transcript.output, "(1)\n5\n");
+        assert!(transcript.compare("(1) \n5\n\n").is_ok());
+        assert!(transcript.compare("(1)\n6\n").is_err());
     }
 }

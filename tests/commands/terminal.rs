@@ -1,14 +1,15 @@
 //! A session at a terminal: one that is a pair of files, with nobody to see it.
-#![cfg(unix)]
 
 use std::fs::File;
 use std::io::{Read, Write};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::tcgetattr;
+
+use crate::eslvm;
 
 /// What the session has written, as it comes.
 fn read_on(mut side: File) -> Receiver<String> {
@@ -45,8 +46,7 @@ fn a_task_ends_the_session_at_once() {
     let terminal = File::options().read(true).write(true).open(name).expect("it can be opened");
     let before = tcgetattr(&terminal).expect("it is a terminal");
     let stdio = || Stdio::from(terminal.try_clone().expect("it can be shared"));
-    let mut child = Command::new(env!("CARGO_BIN_EXE_eslvm"))
-        .arg("repl")
+    let mut child = eslvm(&["repl"])
         .env("TERM", "xterm")
         .env("HOME", env!("CARGO_TARGET_TMPDIR"))
         .stdin(stdio())

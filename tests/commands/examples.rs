@@ -1,7 +1,10 @@
 //! The examples come to their end, in virtual time and under several schedules.
 
 use std::path::Path;
-use std::process::{Command, Stdio};
+
+use esl_conformance::process;
+
+use crate::eslvm;
 
 #[test]
 fn examples_come_to_their_end() {
@@ -14,14 +17,9 @@ fn examples_come_to_their_end() {
         }
         count += 1;
         for (seed, slice) in [("0", "2000"), ("1", "1"), ("2", "7"), ("3", "100")] {
-            let output = Command::new(env!("CARGO_BIN_EXE_eslvm"))
-                .args(["run", "--clock", "virtual", "--seed", seed, "--slice", slice])
-                .arg(&path)
-                .stdin(Stdio::null())
-                .output()
-                .expect("the command can be run");
-            let errors = String::from_utf8_lossy(&output.stderr);
-            assert!(output.status.success(), "{}, seed {seed}, slice {slice}: {errors}", path.display());
+            let options = ["run", "--clock", "virtual", "--seed", seed, "--slice", slice];
+            let run = process::run(eslvm(&options).arg(&path), "");
+            assert_eq!(run.status, Some(0), "{path:?}, seed {seed}, slice {slice}: {}", run.errors);
         }
     }
     assert!(count >= 3, "only {count} examples");

@@ -1,97 +1,18 @@
-//! The commands with what they should not be given: each time a message and the right status, never a crash or a wait
-//! without end.
+//! Wrong command lines and damaged, endless or huge input: each ends with a message and the right status, without a crash or
+//! a wait without end.
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::io::{Read, Write};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-const ESLC: &str = env!("CARGO_BIN_EXE_eslc");
-const ESLVM: &str = env!("CARGO_BIN_EXE_eslvm");
+use esl_conformance::process::{Finished, PATIENCE, finish, run, start};
 
-/// The longest that a command may take; far more than it needs.
-const PATIENCE: Duration = Duration::from_secs(60);
-
-/// A folder of files for one test.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(test: &str) -> Folder {
-        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
-        std::fs::create_dir_all(&path).expect("a folder can be made");
-        Folder(path)
-    }
-
-    fn file(&self, name: &str, content: impl AsRef<[u8]>) -> String {
-        let path = self.0.join(name);
-        std::fs::write(&path, content).expect("a file can be written");
-        path.display().to_string()
-    }
-}
-
-/// What a command did.
-#[derive(Debug)]
-struct Done {
-    status: Option<i32>,
-    output: String,
-    errors: String,
-}
-
-fn start(command: &str, arguments: &[&str]) -> Child {
-    Command::new(command)
-        .args(arguments)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the command is there")
-}
-
-fn finish(mut child: Child) -> Done {
-    // Outputs are read while it runs, so that it never waits for a full pipe.
-    let mut read = [
-        child.stdout.take().map(|pipe| Box::new(pipe) as Box<dyn std::io::Read + Send>),
-        child.stderr.take().map(|pipe| Box::new(pipe) as Box<dyn std::io::Read + Send>),
-    ]
-    .map(|pipe| {
-        std::thread::spawn(move || {
-            let mut text = Vec::new();
-            if let Some(mut pipe) = pipe {
-                pipe.read_to_end(&mut text).expect("a pipe can be read");
-            }
-            String::from_utf8(text).expect("the commands write UTF-8")
-        })
-    })
-    .into_iter();
-    let end = Instant::now() + PATIENCE;
-    let status = loop {
-        if let Some(status) = child.try_wait().expect("a child can be waited for") {
-            break status.code();
-        }
-        if Instant::now() > end {
-            child.kill().expect("a child can be killed");
-            panic!("the command does not end");
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    };
-    let mut next = || read.next().expect("there are two").join().expect("reading does not fail");
-    Done { status, output: next(), errors: next() }
-}
-
-fn run(command: &str, arguments: &[&str], input: &[u8]) -> Done {
-    let mut child = start(command, arguments);
-    let mut pipe = child.stdin.take().expect("the input is a pipe");
-    let input = input.to_vec();
-    // The command may end without reading all of it.
-    let writer = std::thread::spawn(move || drop(pipe.write_all(&input)));
-    let done = finish(child);
-    writer.join().expect("writing does not fail");
-    done
-}
+use crate::folder::Folder;
+use crate::{ESLC, ESLVM, command, eslc, eslvm};
 
 /// Checks that a command ends with `status`, and with `message` among what it writes to standard error.
 #[track_caller]
-fn check(done: &Done, status: i32, message: &str) {
+fn check(done: &Finished, status: i32, message: &str) {
     assert_eq!(done.status, Some(status), "{done:?}");
     assert!(done.errors.contains(message), "expected `{message}` in {}", done.errors);
     assert!(!done.errors.contains("panicked"), "{}", done.errors);
@@ -102,8 +23,8 @@ fn check(done: &Done, status: i32, message: &str) {
 fn check_source(test: &str, text: impl AsRef<[u8]>, message: &str) {
     let folder = Folder::new(test);
     let path = folder.file("program.esl", text);
-    check(&run(ESLVM, &["run", &path], b""), 3, message);
-    check(&run(ESLC, &["check", &path], b""), 3, message);
+    check(&run(&mut eslvm(&["run", &path]), b""), 3, message);
+    check(&run(&mut eslc(&["check", &path]), b""), 3, message);
 }
 
 #[test]
@@ -122,7 +43,7 @@ fn tokens_of_a_megabyte() {
     check_source("number", format!("(print {})", "9".repeat(size)), "error[token-too-long]");
     let folder = Folder::new("long-string");
     let path = folder.file("program.esl", format!("(princ (length \"{}\"))", "x".repeat(size)));
-    let done = run(ESLVM, &["run", &path], b"");
+    let done = run(&mut eslvm(&["run", &path]), b"");
     assert_eq!((done.status, done.output.trim()), (Some(0), "1048576"));
 }
 
@@ -147,7 +68,7 @@ fn bytes_that_are_no_text() {
 
 #[test]
 fn a_source_without_end() {
-    let mut child = start(ESLVM, &["run", "-"]);
+    let mut child = start(&mut eslvm(&["run", "-"]));
     let mut pipe = child.stdin.take().expect("the input is a pipe");
     let piece = "(".repeat(1 << 16);
     let writer = std::thread::spawn(move || while pipe.write_all(piece.as_bytes()).is_ok() {});
@@ -158,25 +79,29 @@ fn a_source_without_end() {
 #[test]
 fn files_that_cannot_be_read() {
     let folder = Folder::new("unreadable");
-    let missing = folder.0.join("missing.esl").display().to_string();
-    let directory = folder.0.display().to_string();
+    let missing = folder.join("missing.esl");
+    let directory = folder.path().display().to_string();
     let source = folder.file("program.esl", "(print 1)");
-    for (command, action) in
+    for (program, action) in
         [(ESLVM, "run"), (ESLC, "check"), (ESLC, "compile"), (ESLC, "expand"), (ESLC, "disasm")]
     {
-        check(&run(command, &[action, &missing], b""), 2, "cannot be read: there is no such file");
-        check(&run(command, &[action, &directory], b""), 2, "it is a directory");
-        check(&run(command, &[action], b""), 2, "<FILE>");
+        check(
+            &run(&mut command(program, &[action, &missing]), b""),
+            2,
+            "cannot be read: there is no such file",
+        );
+        check(&run(&mut command(program, &[action, &directory]), b""), 2, "it is a directory");
+        check(&run(&mut command(program, &[action]), b""), 2, "<FILE>");
     }
-    let output = folder.0.join("no-folder/x.eslb").display().to_string();
-    check(&run(ESLC, &["compile", &source, "-o", &output], b""), 2, "cannot be written");
+    let output = folder.join("no-folder/x.eslb");
+    check(&run(&mut eslc(&["compile", &source, "-o", &output]), b""), 2, "cannot be written");
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
         std::fs::set_permissions(&source, std::fs::Permissions::from_mode(0o000)).expect("it is our file");
         // Whoever may read everything is not kept from it.
         if std::fs::read(&source).is_err() {
-            check(&run(ESLVM, &["run", &source], b""), 2, "it may not be read");
+            check(&run(&mut eslvm(&["run", &source]), b""), 2, "it may not be read");
         }
         std::fs::set_permissions(&source, std::fs::Permissions::from_mode(0o600)).expect("it is our file");
     }
@@ -187,7 +112,7 @@ fn files_that_a_program_cannot_make() {
     let folder = Folder::new("cannot_make");
     let text = "(handler-case (open \"no-such-folder/x\" :direction :output)
                   (file-error (condition) (print (file-error-pathname condition)) (error condition)))";
-    let done = run(ESLVM, &["run", &folder.file("main.esl", text)], b"");
+    let done = run(&mut eslvm(&["run", &folder.file("main.esl", text)]), b"");
     assert!(done.output.contains("\"no-such-folder/x\""), "{done:?}");
     check(&done, 1, "The file \"no-such-folder/x\": it cannot be written");
 }
@@ -202,35 +127,35 @@ fn wrong_command_lines() {
         (&["run", "--memory", "1", "x.esl"], "at least 4M"),
         (&["run", "--memory", "99999999999999G", "x.esl"], "more than there can be"),
     ] {
-        check(&run(ESLVM, arguments, b""), 2, message);
+        check(&run(&mut eslvm(arguments), b""), 2, message);
     }
-    check(&run(ESLC, &["compile", "-"], b"(print 1)"), 2, "say with -o");
-    assert_eq!(run(ESLVM, &["--help"], b"").status, Some(0));
-    assert_eq!(run(ESLC, &["--version"], b"").status, Some(0));
+    check(&run(&mut eslc(&["compile", "-"]), b"(print 1)"), 2, "say with -o");
+    assert_eq!(run(&mut eslvm(&["--help"]), b"").status, Some(0));
+    assert_eq!(run(&mut eslc(&["--version"]), b"").status, Some(0));
 }
 
 #[test]
 fn damaged_bytecode() {
     let folder = Folder::new("bytecode");
     let source = folder.file("program.esl", "(defun f (x) (list x \"a\" 1.5)) (princ (f 'b))");
-    let compiled = folder.0.join("program.eslb").display().to_string();
-    assert_eq!(run(ESLC, &["compile", &source, "-o", &compiled], b"").status, Some(0));
+    let compiled = folder.join("program.eslb");
+    assert_eq!(run(&mut eslc(&["compile", &source, "-o", &compiled]), b"").status, Some(0));
     let bytes = std::fs::read(&compiled).expect("it was written");
-    let done = run(ESLVM, &["run", "-"], &bytes);
+    let done = run(&mut eslvm(&["run", "-"]), &bytes);
     assert_eq!((done.status, done.output.trim()), (Some(0), "(B a 1.5)"));
-    check(&run(ESLC, &["compile", &compiled], b""), 2, "is compiled already");
+    check(&run(&mut eslc(&["compile", &compiled]), b""), 2, "is compiled already");
     for length in [0, 4, 8, 31, 100, bytes.len() / 2, bytes.len() - 1] {
         let path = folder.file("short.eslb", &bytes[..length]);
-        check(&run(ESLVM, &["run", &path], b""), 3, "short.eslb is no sound program");
+        check(&run(&mut eslvm(&["run", &path]), b""), 3, "short.eslb is no sound program");
     }
     for position in (0..bytes.len()).step_by(bytes.len() / 40) {
         let mut changed = bytes.clone();
         changed[position] ^= 1 << (position % 8);
         let path = folder.file("changed.eslb", changed);
-        check(&run(ESLVM, &["run", &path], b""), 3, "changed.eslb is no sound program");
+        check(&run(&mut eslvm(&["run", &path]), b""), 3, "changed.eslb is no sound program");
     }
     let path = folder.file("source.eslb", "(print 1)");
-    check(&run(ESLVM, &["run", &path], b""), 3, "not a compiled ESL file");
+    check(&run(&mut eslvm(&["run", &path]), b""), 3, "not a compiled ESL file");
 }
 
 #[test]
@@ -239,10 +164,10 @@ fn a_reader_that_goes_away_ends_the_program_quietly() {
         b"(unwind-protect (dotimes (i 10000000) (format t \"~d~%\" i)) (format *error-output* \"cleaned\"))";
     let folder = Folder::new("pipe");
     let path = folder.file("program.esl", text);
-    let mut child = start(ESLVM, &["run", &path]);
+    let mut child = start(&mut eslvm(&["run", &path]));
     let mut first = [0; 2];
     let mut pipe = child.stdout.take().expect("the output is a pipe");
-    std::io::Read::read_exact(&mut pipe, &mut first).expect("there is output");
+    pipe.read_exact(&mut first).expect("there is output");
     drop(pipe);
     let done = finish(child);
     assert_eq!(&first, b"0\n");
@@ -277,9 +202,9 @@ fn interrupt(child: &Child) {
 fn started(test: &str, text: &str) -> Child {
     let folder = Folder::new(test);
     let path = folder.file("program.esl", text);
-    let mut child = start(ESLVM, &["run", &path]);
+    let mut child = start(&mut eslvm(&["run", &path]));
     let mut pipe = child.stdout.take().expect("the output is a pipe");
-    std::io::Read::read_exact(&mut pipe, &mut [0; 1]).expect("the program begins");
+    pipe.read_exact(&mut [0; 1]).expect("the program begins");
     child.stdout = Some(pipe);
     child
 }

@@ -1,12 +1,13 @@
 //! `eslvm run --timeline`: the trace keeps the rules of the Trace Event Format, and holds what happened; so does the drawing.
 
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::path::Path;
 
+use esl_conformance::process;
 use serde_json::Value;
 
-const ESLVM: &str = env!("CARGO_BIN_EXE_eslvm");
+use crate::eslvm;
+use crate::folder::Folder;
 
 /// Tasks that wait, signal, fail, recover and are aborted; and memory that is collected.
 const PROGRAM: &str = r#"
@@ -24,26 +25,18 @@ const PROGRAM: &str = r#"
   (spawn (:name 'unlucky) (fail :lost)))
 "#;
 
-/// Runs a program with options; gives what it has written to a file with this name.
+/// Runs a program with options; returns the timeline that it writes to a file of this name.
 fn run(name: &str, program: &str, options: &[&str]) -> String {
-    let source = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.esl"));
-    std::fs::write(&source, program).expect("the program can be written");
-    run_file(name, &source, options)
+    let folder = Folder::new(&format!("timeline-{name}"));
+    let source = folder.file("program.esl", program);
+    run_file(&folder.join(name), &source, options)
 }
 
-/// As [`run`], with the program in a file.
-fn run_file(name: &str, source: &Path, options: &[&str]) -> String {
-    let file: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let status = Command::new(ESLVM)
-        .arg("run")
-        .args(options)
-        .arg("--timeline")
-        .args([&file, source])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status();
-    assert!(status.expect("the command can be run").success());
-    std::fs::read_to_string(file).expect("the file is there")
+/// Runs the program in a file with options; returns the timeline, which it writes to `timeline`.
+fn run_file(timeline: &str, source: &str, options: &[&str]) -> String {
+    let run = process::run(eslvm(&["run"]).args(options).args(["--timeline", timeline, source]), "");
+    assert_eq!(run.status, Some(0), "{}", run.errors);
+    std::fs::read_to_string(timeline).expect("the timeline is there")
 }
 
 /// A member of an event that is a text.
@@ -139,8 +132,9 @@ fn a_trace_keeps_the_rules_of_its_format() {
 
 #[test]
 fn the_trace_of_a_large_program_keeps_them_too() {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/rover.esl");
-    let events = check(&run_file("rover.json", &source, &["--clock", "virtual"]));
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/rover.esl").display().to_string();
+    let timeline = Folder::new("timeline-rover").join("rover.json");
+    let events = check(&run_file(&timeline, &source, &["--clock", "virtual"]));
     let is_there = |phase: &str, name: &str| {
         events.iter().any(|event| text(event, "ph") == phase && text(event, "name").starts_with(name))
     };
@@ -185,12 +179,9 @@ fn a_drawing_of_a_long_run_shows_its_beginning() {
 
 #[test]
 fn figures_tell_of_pauses_and_of_tasks() {
-    let source = Path::new(env!("CARGO_TARGET_TMPDIR")).join("figures.esl");
-    std::fs::write(&source, PROGRAM).expect("the program can be written");
-    let run = |option: &str| {
-        let output = Command::new(ESLVM).args(["run", "--clock", "virtual", option]).arg(&source).output();
-        String::from_utf8(output.expect("the command can be run").stderr).expect("text")
-    };
+    let source = Folder::new("figures").file("figures.esl", PROGRAM);
+    let run =
+        |option: &str| process::run(&mut eslvm(&["run", "--clock", "virtual", option, &source]), "").errors;
     let all = run("--stats=tasks");
     let figure = |name: &str| {
         let line = all.lines().find(|line| line.trim_start().starts_with(name));

@@ -1,45 +1,28 @@
 //! Programs of several files: modules found in folders, compiled together and apart, by the commands.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use esl_conformance::process;
 
-const ESLC: &str = env!("CARGO_BIN_EXE_eslc");
-const ESLVM: &str = env!("CARGO_BIN_EXE_eslvm");
+use crate::folder::Folder;
+use crate::{ESLC, ESLVM, command};
 
-/// A folder of files for one test, the working directory of its commands.
-struct Folder(PathBuf);
-
+/// The commands run in the folder.
 impl Folder {
-    fn new(test: &str, files: &[(&str, &str)]) -> Folder {
-        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("modules").join(test);
-        if path.exists() {
-            std::fs::remove_dir_all(&path).expect("what an earlier run has left can be removed");
-        }
-        for (name, text) in files {
-            let file = path.join(name);
-            std::fs::create_dir_all(file.parent().expect("it lies in the folder"))
-                .expect("a folder can be made");
-            std::fs::write(file, text).expect("a file can be written");
-        }
-        Folder(path)
-    }
-
     fn remove(&self, name: &str) {
-        std::fs::remove_file(self.0.join(name)).expect("the file is there");
+        std::fs::remove_file(self.path().join(name)).expect("the file is there");
     }
 
-    /// The status of a command, and what it writes: the lines of output that are not empty, and errors.
-    fn run(&self, command: &str, arguments: &[&str], library: &str) -> (i32, String, String) {
-        let output = Command::new(command)
-            .args(arguments)
-            .current_dir(&self.0)
-            .env("ESL_LIBRARY", library)
-            .output()
-            .expect("the command is there");
-        let lines = String::from_utf8(output.stdout).expect("the commands write UTF-8");
-        let lines: Vec<&str> = lines.lines().map(str::trim_end).filter(|line| !line.is_empty()).collect();
-        let errors = String::from_utf8(output.stderr).expect("the commands write UTF-8");
-        (output.status.code().unwrap_or(-1), lines.join("\n"), errors)
+    fn copy(&self, from: &str, to: &str) {
+        std::fs::copy(self.path().join(from), self.path().join(to)).expect("a file can be copied");
+    }
+
+    /// Runs a command with `library` as `ESL_LIBRARY`. Returns its status, the lines of its output that are not empty, and
+    /// its errors.
+    fn run(&self, program: &str, arguments: &[&str], library: &str) -> (i32, String, String) {
+        let mut command = command(program, arguments);
+        let run = process::run(command.current_dir(self.path()).env("ESL_LIBRARY", library), "");
+        let lines: Vec<&str> =
+            run.output.lines().map(str::trim_end).filter(|line| !line.is_empty()).collect();
+        (run.status.unwrap_or(-1), lines.join("\n"), run.errors)
     }
 
     /// Checks what a program prints when all goes well.
@@ -98,7 +81,10 @@ fn output() -> String {
 }
 
 fn program(test: &str) -> Folder {
-    Folder::new(test, &[("main.esl", MAIN), ("lib/shapes.esl", SHAPES), ("lib/names.esl", NAMES)])
+    Folder::with(
+        &format!("modules-{test}"),
+        &[("main.esl", MAIN), ("lib/shapes.esl", SHAPES), ("lib/names.esl", NAMES)],
+    )
 }
 
 #[test]
@@ -107,9 +93,8 @@ fn a_source_is_run_with_its_modules() {
     folder.check_run(&["--library", "lib", "main.esl"], &output());
     let (status, output, _) = folder.run(ESLVM, &["run", "main.esl"], "nowhere:lib");
     assert_eq!((status, output), (0, self::output()));
-    std::fs::copy(folder.0.join("lib/names.esl"), folder.0.join("names.esl")).expect("a file can be copied");
-    std::fs::copy(folder.0.join("lib/shapes.esl"), folder.0.join("shapes.esl"))
-        .expect("a file can be copied");
+    folder.copy("lib/names.esl", "names.esl");
+    folder.copy("lib/shapes.esl", "shapes.esl");
     folder.check_run(&["main.esl"], &self::output());
 }
 
@@ -166,7 +151,7 @@ fn modules_in_a_circle_are_reported() {
         ("b.esl", "(print 1)\n(require :a)"),
         ("late.esl", "(defun late (x) (require x))\n(late \"a\")"),
     ];
-    let folder = Folder::new("circle", &files);
+    let folder = Folder::with("modules-circle", &files);
     let (status, _, errors) = folder.run(ESLC, &["check", "main.esl"], "");
     assert_eq!(status, 3);
     assert!(errors.contains("the module `a` requires itself, by way of `b`"), "{errors}");
@@ -196,7 +181,7 @@ fn two_tasks_that_require_a_module_run_it_once() {
         ("bad.esl", "(print 'bad) (sleep 1/100) (fail :spoilt)"),
         ("slower.esl", "(print 'slower) (sleep 1/10)"),
     ];
-    let folder = Folder::new("at-once", &files);
+    let folder = Folder::with("modules-at-once", &files);
     // Whoever waits for one that fails, or whose task is aborted, has a try of its own.
     let expected =
         "BEGUN\nDONE\n(T NIL NIL)\nBAD\nBAD\n(:FAILED :FAILED)\nSLOWER\nSLOWER\nT\n(\"slower\" \"slow\")";
@@ -206,7 +191,7 @@ fn two_tasks_that_require_a_module_run_it_once() {
 #[test]
 fn what_is_wrong_in_a_module_is_reported_there() {
     let files = [("main.esl", "(require \"a\")\n(undefined-one)"), ("a.esl", "(print 1)\n(let 5)")];
-    let folder = Folder::new("wrong", &files);
+    let folder = Folder::with("modules-wrong", &files);
     let (status, _, errors) = folder.run(ESLC, &["check", "main.esl"], "");
     assert_eq!(status, 3);
     assert!(errors.contains("a.esl:2:6"), "{errors}");
@@ -215,12 +200,13 @@ fn what_is_wrong_in_a_module_is_reported_there() {
 
 #[test]
 fn a_damaged_module_is_refused() {
-    let folder = Folder::new("damaged", &[("main.esl", "(defun late (x) (require x))\n(late \"a\")")]);
-    std::fs::write(folder.0.join("a.eslb"), b"no bytecode").expect("a file can be written");
+    let folder =
+        Folder::with("damaged-modules", &[("main.esl", "(defun late (x) (require x))\n(late \"a\")")]);
+    folder.file("a.eslb", b"no bytecode");
     let (status, _, errors) = folder.run(ESLVM, &["run", "main.esl"], "");
     assert_eq!(status, 1);
     assert!(errors.contains("it is no sound program"), "{errors}");
-    std::fs::write(folder.0.join("main.esl"), "(require \"a\")").expect("a file can be written");
+    folder.file("main.esl", "(require \"a\")");
     let (status, _, errors) = folder.run(ESLVM, &["run", "main.esl"], "");
     assert_eq!(status, 3);
     assert!(errors.contains("`./a.eslb` is no sound program"), "{errors}");
@@ -236,7 +222,7 @@ fn files_that_are_compiled_together_share_their_modules() {
             "(defpackage :a (:use :cl) (:export :next))(in-package :a)\n(let ((n 0)) (defun next () (incf n)))",
         ),
     ];
-    let folder = Folder::new("together", &files);
+    let folder = Folder::with("modules-together", &files);
     folder.compile(&["one.esl", "two.esl", "-o", "out.eslb"]);
     folder.check_run(&["out.eslb"], "1\n2");
 }
@@ -302,17 +288,17 @@ error[unclosed-list]: expected `)`, found the end of the text
 #[test]
 fn what_is_wrong_in_a_file_that_is_loaded_is_reported_there() {
     let files = MISTAKES.map(|(name, text, _)| (name, text));
-    let folder = Folder::new("mistakes", &files);
+    let folder = Folder::with("modules-mistakes", &files);
     for (name, _, said) in MISTAKES {
         let is_warned = name == "warned.esl";
-        std::fs::write(folder.0.join("main.esl"), format!("(load \"{name}\")")).expect("it can be written");
+        folder.file("main.esl", format!("(load \"{name}\")"));
         let (status, _, errors) = folder.run(ESLVM, &["run", "main.esl"], "");
         assert_eq!(status, i32::from(!is_warned), "{errors}");
         assert!(errors.starts_with(said), "{name}:\n{errors}");
         // A module is compiled as a whole, and when it is required as the program runs, by what the machine brings along.
         let module = name.trim_end_matches(".esl");
         let text = format!("(let ((name \"{module}\")) (require name))");
-        std::fs::write(folder.0.join("main.esl"), text).expect("it can be written");
+        folder.file("main.esl", text);
         let (status, _, errors) = folder.run(ESLVM, &["run", "main.esl"], "");
         assert_eq!(status, i32::from(!is_warned), "{errors}");
         let said = said.replace("--> ", "--> ./");

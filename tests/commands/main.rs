@@ -1,0 +1,34 @@
+//! The commands `eslc` and `eslvm`, run as processes: exit statuses, outputs, and what they do to files.
+
+mod background;
+mod bad_input;
+mod deadlock;
+mod examples;
+mod folder;
+mod modules;
+mod real_time;
+#[cfg(unix)]
+mod terminal;
+mod timeline;
+mod traces;
+
+use std::process::Command;
+
+const ESLC: &str = env!("CARGO_BIN_EXE_eslc");
+const ESLVM: &str = env!("CARGO_BIN_EXE_eslvm");
+
+/// The command `eslc` with these arguments.
+fn eslc(arguments: &[&str]) -> Command {
+    command(ESLC, arguments)
+}
+
+/// The command `eslvm` with these arguments.
+fn eslvm(arguments: &[&str]) -> Command {
+    command(ESLVM, arguments)
+}
+
+fn command(program: &str, arguments: &[&str]) -> Command {
+    let mut command = Command::new(program);
+    command.args(arguments).env_remove("ESL_LIBRARY");
+    command
+}
