@@ -6,7 +6,7 @@
 //! of the text; an error in one form does not keep the others from being looked at.
 //!
 //! A form `(require "name")` of a text stops the compilation ([`Step::Require`]), and the forms of the module come in its
-//! place, or at least what they define at compile time; see [`parts`].
+//! place, or at least what they define at compile time; see `parts`.
 //!
 //! Not here: running anything, finding modules. Whoever drives the compilation does that, see [`esl_bytecode::compile`].
 

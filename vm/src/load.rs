@@ -5,7 +5,7 @@
 //! piece by piece (`image`): a function is a stub until it is called for the first time.
 //!
 //! Guarantees: one value for each entry of a module's pool, so that literal data keep their identity; a Code is laid out
-//! as [`crate::shape`] says.
+//! as `shape` says.
 //!
 //! A constant that names a structure class is its symbol here. The machine puts the class in its place when an
 //! instruction first needs it, so code may be loaded before the class is defined, and sees the class as it is then.

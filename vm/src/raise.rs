@@ -70,14 +70,14 @@ pub enum Raised {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Exit {
-    /// It failed; [`Vm::raised`] says how.
+    /// It failed; `Vm::raised` says how.
     Raise,
     /// It gives other than one value: they are in the value list.
     Values,
     /// The work is above its limit: the ESL function in its row of the table takes over with the same arguments. It
     /// has had no effect.
     Slowly,
-    /// It asks for a call in its place: [`Vm::requested_call`] holds the function and the arguments.
+    /// It asks for a call in its place: `Vm::requested_call` holds the function and the arguments.
     Call,
     /// It needs room: collect, then do it again. It has had no effect.
     Collect,

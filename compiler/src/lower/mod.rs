@@ -1,13 +1,13 @@
 //! Lowering: the core language to bytecode.
 //!
-//! The code generator is driven by destinations: every form is told where its value is wanted ([`dest::Dest`]) and puts
+//! The code generator is driven by destinations: every form is told where its value is wanted (`dest::Dest`) and puts
 //! it there, so that few moves are needed and tests never make a boolean. Each function becomes a graph of segments,
-//! which is improved ([`fuse`]) and then written out ([`assemble`]).
+//! which is improved (`fuse`) and then written out (`assemble`).
 //!
 //! Guarantees: what is emitted passes the verifier. A form that is too large for the format gives a diagnostic.
 //! Not here: what names mean (the expander), linking modules (`esl_bytecode::link`).
 //!
-//! The walk recurses on the native stack, which is extended as needed ([`frame::Frame::form`]); its depth is the depth
+//! The walk recurses on the native stack, which is extended as needed (`frame::Frame::form`); its depth is the depth
 //! of the core tree, which the expander bounds.
 //!
 //! Source: Dybvig, Hieb and Butler 1990, "Destination-driven code generation".

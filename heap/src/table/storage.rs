@@ -11,7 +11,7 @@
 //!
 //! Invariant: the segments in the directories hold `room` entries and [`PER_ENTRY`] heads for each of them, `used` is
 //! at most `room`, and nobody else has the directories or segments. So a number of an entry below `used` is good, and so
-//! is one of a head below [`Storage::heads`].
+//! is one of a head below `Storage::heads`.
 //!
 //! Not here: what is in the entries and how keys are found ([`super`]).
 

@@ -1,9 +1,9 @@
 //! A task: a thread of control of the program, with its own stack.
 //!
 //! A task has two parts. What programs hold is an object of the heap, an event too, that knows its name, how it ended and
-//! the checkpoints that it passed. What runs is a [`Task`], a small record in [`Tasks`], which goes away at its end.
+//! the checkpoints that it passed. What runs is a `Task`, a small record in `Tasks`, which goes away at its end.
 //!
-//! While a task runs, its record is taken out of the table into [`crate::vm::Vm::running`] and `pc` and `base` are kept by
+//! While a task runs, its record is taken out of the table into `Vm::running` and `pc` and `base` are kept by
 //! the interpreter; at a safepoint they are put back, and the record is all there is: no Rust frame holds any state.
 
 mod binding;
