@@ -4,13 +4,17 @@
 use std::fs::File;
 use std::io::{IsTerminal, Read};
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+#[cfg(feature = "cli")]
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
+};
 
 use esl_bytecode::file::MAGIC;
 use esl_compiler::diagnostic::{Format, Renderer, Sources};
 use esl_compiler::reader::decode;
 
+#[cfg(feature = "cli")]
 use esl_vm::host::Waker;
 
 use crate::program::{Compiled, Program, Source};
@@ -23,11 +27,6 @@ pub const USAGE: u8 = 2;
 pub const NOT_COMPILED: u8 = 3;
 /// Exit status: ended from outside, as a shell reports a command that a signal has ended.
 pub const INTERRUPTED: u8 = 130;
-
-/// Reads the command line; a wrong one ends the process with status 2, `--help` and `--version` with status 0.
-pub fn parse<T: clap::Parser>() -> T {
-    T::parse()
-}
 
 /// A file that a command was given.
 pub enum Input {
@@ -140,6 +139,7 @@ pub fn print_diagnostics(compiled: &Compiled, renderer: &Renderer) {
     complain(counts.join(", "));
 }
 
+#[cfg(feature = "cli")]
 /// Sets the flag, and wakes the host, when the process is asked to stop with Ctrl-C. A second one, before the first is seen
 /// to, ends it.
 pub fn interrupt_on_signal(flag: Arc<AtomicBool>, waker: Waker) {
@@ -153,6 +153,7 @@ pub fn interrupt_on_signal(flag: Arc<AtomicBool>, waker: Waker) {
     drop(result);
 }
 
+#[cfg(feature = "cli")]
 /// Has the first Ctrl-C set the flag and end the wait of the machine's host, and the second one end the process.
 pub fn end_on_signal(flag: Arc<AtomicBool>, waker: Waker) {
     let was_asked = AtomicBool::new(false);

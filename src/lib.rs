@@ -24,6 +24,7 @@ pub mod engine;
 pub mod explore;
 pub mod library;
 pub mod program;
+#[cfg(feature = "cli")]
 pub mod repl;
 pub mod timeline;
 

@@ -8,3 +8,8 @@ pub mod lower;
 pub mod reader;
 mod resolve;
 pub mod session;
+
+/// The example of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -86,7 +86,7 @@ enum Action {
 }
 
 fn main() -> ExitCode {
-    let command = command::parse::<Command>();
+    let command = Command::parse();
     let style = &command.style;
     let folders = &command.library;
     let library = |files: &[PathBuf]| Library::new(files.iter().map(PathBuf::as_path), folders);

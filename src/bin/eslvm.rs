@@ -108,7 +108,7 @@ impl Limits {
 }
 
 fn main() -> ExitCode {
-    let Command { action, library } = command::parse::<Command>();
+    let Command { action, library } = Command::parse();
     let status = match action {
         Action::Run { limits, stats, timeline, trace, file, arguments } => {
             let library = Library::new([file.as_path()], &library);

@@ -29,3 +29,8 @@ mod report;
 mod shape;
 mod wait;
 mod world;
+
+/// The example of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
