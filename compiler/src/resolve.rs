@@ -17,7 +17,6 @@ mod inline;
 
 use std::ops::Range;
 
-use esl_bytecode::builtin::Builtin;
 use rustc_hash::FxHashMap;
 
 use crate::core::*;
@@ -384,7 +383,7 @@ impl<'a> Walk<'a> {
             NodeKind::Block(block, body) => self.block_singles[block.index()] && of(body),
             NodeKind::HandlerCase(body, clauses) => of(body) && clauses.iter().all(|clause| of(&clause.body)),
             NodeKind::Values(forms) => forms.len() == 1,
-            NodeKind::Call(Callee::Builtin(builtin), _) => returns_one(*builtin),
+            NodeKind::Call(Callee::Builtin(builtin), _) => builtin.info().returns_one,
             // What recovers from the failure gives the values of a form with a cleanup for failures.
             NodeKind::Call(..)
             | NodeKind::Apply(..)
@@ -413,9 +412,4 @@ impl<'a> Walk<'a> {
             sets: self.sets,
         }
     }
-}
-
-/// Whether the builtin is known to return exactly one value.
-fn returns_one(builtin: Builtin) -> bool {
-    crate::lower::operator::returns_one(builtin)
 }

@@ -25,7 +25,7 @@ mod graph;
 mod lines;
 mod literals;
 mod loops;
-pub(crate) mod operator;
+mod operator;
 mod pool;
 mod recovery;
 mod regalloc;

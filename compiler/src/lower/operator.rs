@@ -142,15 +142,6 @@ fn shape(builtin: Builtin, count: usize) -> Option<Shape> {
     })
 }
 
-/// Whether the builtin always returns exactly one value, as far as is known here.
-pub(crate) fn returns_one(builtin: Builtin) -> bool {
-    use Builtin as B;
-    let several =
-        matches!(builtin, B::Floor | B::Truncate | B::Values | B::ValuesList | B::Funcall | B::Apply);
-    let opened = (0..=3).any(|count| shape(builtin, count).is_some());
-    (opened && !several) || matches!(builtin, B::Append | B::Vector | B::NumNotEqual)
-}
-
 /// Whether a call takes its argument `index`, if it is a literal, from a register that may be anywhere.
 pub(super) fn takes_literals(core: &Core, builtin: Builtin, arguments: &[NodeId], index: usize) -> bool {
     match shape(builtin, arguments.len()) {

@@ -12,6 +12,8 @@ use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
+use super::expect::exactly;
+
 use super::COPY_LIMIT;
 
 /// Elements of a long vector that is being made that are filled at once.
@@ -91,29 +93,27 @@ impl Vm {
     }
 }
 
-/// `vector`
 pub(super) fn vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.exchange.charge_elements(arguments.len());
     Ok(vm.heap.alloc_vector(arguments)?)
 }
 
-/// `svref`
 pub(super) fn svref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(elements) = vm.heap.vector(arguments[0]) else {
-        return vm.exchange.type_error(arguments[0], "SIMPLE-VECTOR");
+    let [vector, index] = exactly(arguments);
+    let Some(elements) = vm.heap.vector(vector) else {
+        return vm.exchange.type_error(vector, "SIMPLE-VECTOR");
     };
-    match arguments[1].as_index().and_then(|index| elements.get(index)) {
+    match index.as_index().and_then(|index| elements.get(index)) {
         Some(&value) => Ok(value),
         None => {
             let length = elements.len();
-            vm.exchange.index_error(arguments[1], length)
+            vm.exchange.index_error(index, length)
         }
     }
 }
 
-/// `%set-svref`
 pub(super) fn set_svref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[vector, index, value] = arguments else { unreachable!("the table says three") };
+    let [vector, index, value] = exactly(arguments);
     let Some(length) = vm.heap.vector(vector).map(<[Value]>::len) else {
         return vm.exchange.type_error(vector, "SIMPLE-VECTOR");
     };
@@ -122,7 +122,6 @@ pub(super) fn set_svref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(value)
 }
 
-/// `aref`
 pub(super) fn aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if let [array, index] = *arguments
         && let Some(index) = index.as_index()
@@ -135,7 +134,6 @@ pub(super) fn aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.element(arguments[0], index)
 }
 
-/// `%set-aref`
 pub(super) fn set_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [array, subscripts @ .., value] = arguments else {
         return vm.exchange.program_error("a value and subscripts are expected");
@@ -144,26 +142,24 @@ pub(super) fn set_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.set_element(*array, index, *value)
 }
 
-/// `row-major-aref`
 pub(super) fn row_major_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let size = array_size(vm, arguments[0])?;
-    let index = vm.index_below(arguments[1], size)?;
-    vm.element(arguments[0], index)
+    let [array, index] = exactly(arguments);
+    let size = array_size(vm, array)?;
+    let index = vm.index_below(index, size)?;
+    vm.element(array, index)
 }
 
-/// `%set-row-major-aref`
 pub(super) fn set_row_major_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let size = array_size(vm, arguments[0])?;
-    let index = vm.index_below(arguments[1], size)?;
-    vm.set_element(arguments[0], index, arguments[2])
+    let [array, index, value] = exactly(arguments);
+    let size = array_size(vm, array)?;
+    let index = vm.index_below(index, size)?;
+    vm.set_element(array, index, value)
 }
 
-/// `array-row-major-index`
 pub(super) fn array_row_major_index(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.row_major_index(arguments[0], &arguments[1..]).map(Value::index)
 }
 
-/// `array-in-bounds-p`
 pub(super) fn array_in_bounds_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(dimensions) = dimensions(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "ARRAY");
@@ -186,12 +182,10 @@ fn array_size(vm: &mut Vm, array: Value) -> Result<usize, Exit> {
     }
 }
 
-/// `array-total-size`
 pub(super) fn array_total_size(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     array_size(vm, arguments[0]).map(Value::index)
 }
 
-/// `array-rank`
 pub(super) fn array_rank(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match dimensions(&vm.heap, arguments[0]) {
         Some(dimensions) => Ok(Value::index(dimensions.len())),
@@ -199,7 +193,6 @@ pub(super) fn array_rank(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `array-dimensions`
 pub(super) fn array_dimensions(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match dimensions(&vm.heap, arguments[0]) {
         Some(dimensions) => {
@@ -210,31 +203,28 @@ pub(super) fn array_dimensions(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `array-dimension`
 pub(super) fn array_dimension(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    match dimensions(&vm.heap, arguments[0]) {
+    let [array, axis] = exactly(arguments);
+    match dimensions(&vm.heap, array) {
         Some(dimensions) => {
-            let axis = vm.index_below(arguments[1], dimensions.len())?;
+            let axis = vm.index_below(axis, dimensions.len())?;
             Ok(Value::index(dimensions[axis]))
         }
-        None => vm.exchange.type_error(arguments[0], "ARRAY"),
+        None => vm.exchange.type_error(array, "ARRAY"),
     }
 }
 
-/// `array-has-fill-pointer-p`
 pub(super) fn array_has_fill_pointer_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     array_size(vm, arguments[0])?;
     Ok(vm.heap.array(arguments[0]).is_some_and(|array| array.fill.is_fixnum()).into())
 }
 
-/// `adjustable-array-p`
 pub(super) fn adjustable_array_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     array_size(vm, arguments[0])?;
     let flags = vm.heap.flags(arguments[0], Kind::Array).unwrap_or(0);
     Ok((flags & Array::ADJUSTABLE != 0).into())
 }
 
-/// `%array-data`
 pub(super) fn array_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match data_of(&vm.heap, arguments[0]) {
         Some(data) => Ok(data),
@@ -242,23 +232,21 @@ pub(super) fn array_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `fill-pointer`
 pub(super) fn fill_pointer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.with_fill_pointer(arguments[0]).map(|(_, fill)| Value::index(fill))
 }
 
-/// `%set-fill-pointer`
 pub(super) fn set_fill_pointer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.with_fill_pointer(arguments[0])?;
-    let size = array_size(vm, arguments[0])?;
-    let fill = vm.index_below(arguments[1], size + 1)?;
-    vm.heap.array_set_fill(arguments[0], Value::index(fill));
-    Ok(arguments[1])
+    let [vector, index] = exactly(arguments);
+    vm.with_fill_pointer(vector)?;
+    let size = array_size(vm, vector)?;
+    let fill = vm.index_below(index, size + 1)?;
+    vm.heap.array_set_fill(vector, Value::index(fill));
+    Ok(index)
 }
 
-/// `vector-push`
 pub(super) fn vector_push(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[value, vector] = arguments else { unreachable!("the table says two") };
+    let [value, vector] = exactly(arguments);
     let (array, fill) = vm.with_fill_pointer(vector)?;
     if fill >= array_size(vm, vector)? {
         return Ok(Value::NIL);
@@ -269,7 +257,6 @@ pub(super) fn vector_push(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::index(fill))
 }
 
-/// `vector-push-extend`
 pub(super) fn vector_push_extend(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (value, vector) = (arguments[0], arguments[1]);
     let (array, fill) = vm.with_fill_pointer(vector)?;
@@ -310,7 +297,6 @@ fn extended(vm: &mut Vm, data: Value, size: usize) -> Outcome {
     Ok(new)
 }
 
-/// `vector-pop`
 pub(super) fn vector_pop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (_, fill) = vm.with_fill_pointer(arguments[0])?;
     let Some(last) = fill.checked_sub(1) else {
@@ -321,35 +307,35 @@ pub(super) fn vector_pop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(value)
 }
 
-/// `%make-vector`
 pub(super) fn make_vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let size = vm.count(arguments[0])?;
+    let [size, object] = exactly(arguments);
+    let size = vm.count(size)?;
     if size > COPY_LIMIT {
         return Err(Exit::Slowly);
     }
-    let vector = vm.heap.alloc_vector_filled(size, arguments[1])?;
+    let vector = vm.heap.alloc_vector_filled(size, object)?;
     vm.exchange.charge_elements(size);
     Ok(vector)
 }
 
-/// `%begin-vector`
 pub(super) fn begin_vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let size = vm.count(arguments[0])?;
-    Ok(vm.heap.begin_vector(size, arguments[1].is_true())?)
+    let [size, string_p] = exactly(arguments);
+    let size = vm.count(size)?;
+    Ok(vm.heap.begin_vector(size, string_p.is_true())?)
 }
 
-/// `%fill-more`
 pub(super) fn fill_more(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [vector, object] = exactly(arguments);
     vm.exchange.charge_elements(FILLED_AT_ONCE);
-    match vm.heap.fill_more(arguments[0], arguments[1], FILLED_AT_ONCE) {
+    match vm.heap.fill_more(vector, object, FILLED_AT_ONCE) {
         Some(is_finished) => Ok(Value::boolean(is_finished)),
-        None => vm.exchange.type_error(arguments[0], "VECTOR"),
+        None => vm.exchange.type_error(vector, "VECTOR"),
     }
 }
 
 /// `%make-array`: an array over data that is there.
 pub(super) fn make_array(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[dimensions, data, fill, adjustable] = arguments else { unreachable!("the table says four") };
+    let [dimensions, data, fill, adjustable] = exactly(arguments);
     let (sizes, fill) = shape(vm, dimensions, data, fill)?;
     let mut flags = if fill.is_nil() { 0 } else { Array::HAS_FILL_POINTER };
     if adjustable.is_true() {
@@ -360,7 +346,7 @@ pub(super) fn make_array(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// `%adjust-array`: other dimensions, data and fill pointer for an array that has as many dimensions.
 pub(super) fn adjust_array(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[array, dimensions, data, fill] = arguments else { unreachable!("the table says four") };
+    let [array, dimensions, data, fill] = exactly(arguments);
     let Some(rank) = vm.heap.array_dimensions(array).map(<[Value]>::len) else {
         return vm.exchange.type_error(array, "ARRAY");
     };

@@ -20,12 +20,10 @@ fn character_of(code: u32) -> Value {
     Value::character(code).unwrap_or(Value::NIL)
 }
 
-/// `(char-code character)` and `(char-int character)`
 pub(super) fn char_code(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::index(code(vm, arguments[0])? as usize))
 }
 
-/// `(code-char code)`
 pub(super) fn code_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let character = arguments[0].as_index().and_then(|code| Value::character(u32::try_from(code).ok()?));
     match character {
@@ -34,7 +32,6 @@ pub(super) fn code_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(character designator)`
 pub(super) fn to_character(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let v = arguments[0];
     if v.is_character() {
@@ -59,34 +56,23 @@ macro_rules! functions {
 }
 
 functions! {
-    /// `(char-upcase character)`
     char_upcase = |code| character_of(character::upcase(code));
-    /// `(char-downcase character)`
     char_downcase = |code| character_of(character::downcase(code));
-    /// `(upper-case-p character)`
     upper_case_p = |code| character::is_upper(code).into();
-    /// `(lower-case-p character)`
     lower_case_p = |code| character::is_lower(code).into();
-    /// `(both-case-p character)`
     both_case_p = |code| (character::is_upper(code) || character::is_lower(code)).into();
-    /// `(alpha-char-p character)`
     alpha_char_p = |code| character::is_alphabetic(code).into();
-    /// `(alphanumericp character)`
     alphanumericp = |code| character::is_alphanumeric(code).into();
-    /// `(graphic-char-p character)`
     graphic_char_p = |code| character::is_graphic(code).into();
-    /// `(standard-char-p character)`
     standard_char_p = |code| (code == 10 || (0x20..0x7F).contains(&code)).into();
 }
 
-/// `(digit-char-p character &optional radix)`
 pub(super) fn digit_char_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let code = code(vm, arguments[0])?;
     let radix = radix_argument(vm, arguments)?;
     Ok(character::digit_weight(code, radix).map_or(Value::NIL, |weight| Value::index(weight as usize)))
 }
 
-/// `(digit-char weight &optional radix)`
 pub(super) fn digit_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let radix = radix_argument(vm, arguments)?;
     let weight = vm.integer(arguments[0])?;
@@ -105,7 +91,6 @@ fn radix_argument(vm: &mut Vm, arguments: &[Value]) -> Result<u32, Exit> {
     }
 }
 
-/// `(char-name character)`
 pub(super) fn char_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let code = code(vm, arguments[0])?;
     match character::name(code) {
@@ -114,7 +99,6 @@ pub(super) fn char_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(name-char name)`
 pub(super) fn name_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let string = vm.string_designator(arguments[0])?;
     let characters = crate::equality::characters_of(&vm.heap, string).unwrap_or_default();
@@ -171,12 +155,10 @@ fn all_differ(vm: &mut Vm, arguments: &[Value], fold: bool) -> Outcome {
     Ok(codes.windows(2).all(|pair| pair[0] != pair[1]).into())
 }
 
-/// `char/=`
 pub(super) fn char_not_equal_exactly(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     all_differ(vm, arguments, false)
 }
 
-/// `char-not-equal`
 pub(super) fn char_not_equal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     all_differ(vm, arguments, true)
 }

@@ -5,6 +5,8 @@ use crate::heap::Kind;
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
+
+use super::expect::exactly;
 use crate::world::class::{MAX_DEPTH, class_slot, slot};
 
 impl Vm {
@@ -45,9 +47,8 @@ impl Vm {
     }
 }
 
-/// `(%make-class name supers slots data)`
 pub(super) fn make_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[name, supers, slots, data] = arguments else { unreachable!("the table says four") };
+    let [name, supers, slots, data] = exactly(arguments);
     if !vm.heap.is(name, Kind::Symbol) {
         return vm.exchange.type_error(name, "SYMBOL");
     }
@@ -73,60 +74,53 @@ pub(super) fn make_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.world.define_class(&mut vm.heap, name, &classes, &slots, data)?)
 }
 
-/// `(%find-class name)`
 pub(super) fn find_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.find_class(arguments[0]).unwrap_or(Value::NIL))
 }
 
-/// `(%class-of object)`
 pub(super) fn class_of(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.structure_class(arguments[0]).unwrap_or(Value::NIL))
 }
 
-/// `(%classp object)`
 pub(super) fn classp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::boolean(vm.heap.is(arguments[0], Kind::Class)))
 }
 
-/// `(%class-name class)`
 pub(super) fn class_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let class = vm.class(arguments[0])?;
     Ok(vm.class_name(class))
 }
 
-/// `(%class-supers class)`
 pub(super) fn class_supers(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let class = vm.class(arguments[0])?;
     Ok(class_slot(&vm.heap, class, slot::SUPERS))
 }
 
-/// `(%class-slots class)`
 pub(super) fn class_slots(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let class = vm.class(arguments[0])?;
     Ok(class_slot(&vm.heap, class, slot::SLOTS))
 }
 
-/// `(%class-data class)`
 pub(super) fn class_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let class = vm.class(arguments[0])?;
     Ok(class_slot(&vm.heap, class, slot::DATA))
 }
 
-/// `(%set-class-data class data)`
 pub(super) fn set_class_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let class = vm.class(arguments[0])?;
-    vm.heap.record_set(class, Kind::Class, slot::DATA, arguments[1]);
-    Ok(arguments[1])
+    let [class, data] = exactly(arguments);
+    let class = vm.class(class)?;
+    vm.heap.record_set(class, Kind::Class, slot::DATA, data);
+    Ok(data)
 }
 
-/// `(%subclass-p class ancestor)`
 pub(super) fn subclass_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let class = vm.class(arguments[0])?;
-    let ancestor = vm.class(arguments[1])?;
+    let [class, ancestor] = exactly(arguments);
+    let class = vm.class(class)?;
+    let ancestor = vm.class(ancestor)?;
     Ok(Value::boolean(vm.world.is_subclass(&vm.heap, class, ancestor)))
 }
 
-/// `(%make-structure class &rest values)`: slots that get no value are `NIL`.
+/// Slots without a value are `NIL`.
 pub(super) fn make_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let class = vm.class(arguments[0])?;
     let count = class_slot(&vm.heap, class, slot::COUNT).as_index().unwrap_or(0);
@@ -145,7 +139,6 @@ pub(super) fn make_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.alloc_structure(class, &slots)?)
 }
 
-/// `(copy-structure structure)`
 pub(super) fn copy_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (Some(class), Some(slots)) =
         (vm.heap.structure_class(arguments[0]), vm.heap.structure_slots(arguments[0]))
@@ -157,27 +150,25 @@ pub(super) fn copy_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.alloc_structure(class, &slots)?)
 }
 
-/// `(%structure-ref instance index)`
 pub(super) fn structure_ref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let index = vm.index_in(arguments[0], arguments[1])?;
-    Ok(vm.slot_value(arguments[0], index))
+    let [instance, index] = exactly(arguments);
+    let index = vm.index_in(instance, index)?;
+    Ok(vm.slot_value(instance, index))
 }
 
-/// `(%set-structure-ref instance index value)`
 pub(super) fn set_structure_ref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let index = vm.index_in(arguments[0], arguments[1])?;
-    vm.heap.structure_set(arguments[0], index, arguments[2]);
-    Ok(arguments[2])
+    let [instance, index, value] = exactly(arguments);
+    let index = vm.index_in(instance, index)?;
+    vm.heap.structure_set(instance, index, value);
+    Ok(value)
 }
 
-/// `(%structurep object)`
 pub(super) fn structurep(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::boolean(vm.heap.is(arguments[0], Kind::Structure)))
 }
 
-/// `(%define-accessor name class slot read-only)`
 pub(super) fn define_accessor(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[name, class, index, read_only] = arguments else { unreachable!("the table says four") };
+    let [name, class, index, read_only] = exactly(arguments);
     vm.definable(name, "function")?;
     if !vm.heap.is(class, Kind::Symbol) {
         return vm.exchange.type_error(class, "SYMBOL");

@@ -8,6 +8,8 @@ use crate::table::Table;
 use crate::value::Value;
 use crate::vm::Vm;
 
+use super::expect::exactly;
+
 /// Work of one step of a query: a fact looked at, a goal, an answer.
 const STEP: usize = 1024;
 
@@ -39,34 +41,33 @@ fn has_locks(vm: &Vm, locks: Value) -> bool {
     Table::of(&vm.heap, locks).is_some_and(|table| table.count(&vm.heap) > 0)
 }
 
-/// `(%assert fact locks)`
 pub(super) fn assert_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [fact, locks] = exactly(arguments);
     vm.point()?;
-    if has_locks(vm, arguments[1]) {
+    if has_locks(vm, locks) {
         return Ok(vm.world.known.locked);
     }
     prepare(vm)?;
     let mut work = 0;
-    let outcome = vm.database.assert(&mut vm.heap, arguments[0], &mut work);
+    let outcome = vm.database.assert(&mut vm.heap, fact, &mut work);
     vm.exchange.charge(4 * work);
     checked(vm, outcome)
 }
 
-/// `(%make-property name width)`
 pub(super) fn make_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [name, width] = exactly(arguments);
     vm.point()?;
     prepare(vm)?;
-    if !vm.world.is_symbol(&vm.heap, arguments[0]) {
-        return vm.exchange.type_error(arguments[0], "SYMBOL");
+    if !vm.world.is_symbol(&vm.heap, name) {
+        return vm.exchange.type_error(name, "SYMBOL");
     }
-    let width = vm.count(arguments[1])?;
+    let width = vm.count(width)?;
     let mut work = 0;
-    let made = vm.database.define_property(&mut vm.heap, arguments[0], width, &mut work)?;
+    let made = vm.database.define_property(&mut vm.heap, name, width, &mut work)?;
     vm.exchange.charge(4 * work);
     Ok(made.into())
 }
 
-/// `(%property-value property)`
 pub(super) fn property_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point_of_read()?;
     prepare(vm)?;
@@ -81,15 +82,15 @@ pub(super) fn property_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%retract fact locks)`
 pub(super) fn retract_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [fact, locks] = exactly(arguments);
     vm.point()?;
-    if has_locks(vm, arguments[1]) {
+    if has_locks(vm, locks) {
         return Ok(vm.world.known.locked);
     }
     prepare(vm)?;
     let mut work = 0;
-    let outcome = vm.database.retract(&mut vm.heap, arguments[0], &mut work);
+    let outcome = vm.database.retract(&mut vm.heap, fact, &mut work);
     vm.exchange.charge(4 * work);
     match outcome {
         Err(FormulaError::Variable(_)) => Ok(Value::small(0)),
@@ -97,11 +98,10 @@ pub(super) fn retract_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%define-rule head body source)`
 pub(super) fn define_rule(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point()?;
     prepare(vm)?;
-    let &[head, body, source] = arguments else { unreachable!("the table says three") };
+    let [head, body, source] = exactly(arguments);
     let mut work = 0;
     let outcome = vm.database.define_rule(&mut vm.heap, [head, body, source], &mut work);
     vm.exchange.charge(4 * work);
@@ -109,11 +109,10 @@ pub(super) fn define_rule(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::T)
 }
 
-/// `(%open-query query bindings facts)`
 pub(super) fn open_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point_of_read()?;
     prepare(vm)?;
-    let &[query, bindings, facts] = arguments else { unreachable!("the table says three") };
+    let [query, bindings, facts] = exactly(arguments);
     let mut work = 0;
     let outcome = vm.database.open(&mut vm.heap, query, bindings, facts.is_true(), &mut work);
     vm.exchange.charge(4 * work);
@@ -133,7 +132,6 @@ fn open<T>(vm: &mut Vm, found: Option<T>) -> Result<T, Exit> {
     }
 }
 
-/// `(%query-step query)`
 pub(super) fn query_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let key = query(vm, arguments[0])?;
     let mut work = STEP;
@@ -175,11 +173,10 @@ fn raise_query_error(vm: &mut Vm, error: QueryError) -> Outcome {
     }
 }
 
-/// `(%begin-query query bindings)`
 pub(super) fn begin_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point_of_read()?;
     prepare(vm)?;
-    let &[query, bindings] = arguments else { unreachable!("the table says two") };
+    let [query, bindings] = exactly(arguments);
     let mut work = 0;
     let opened = vm.database.open(&mut vm.heap, query, bindings, false, &mut work);
     let key = checked(vm, opened)?;
@@ -215,14 +212,13 @@ pub(super) fn begin_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%query-tell query holds)`
 pub(super) fn query_tell(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let key = query(vm, arguments[0])?;
-    vm.database.tell(key, arguments[1].is_true());
+    let [handle, holds] = exactly(arguments);
+    let key = query(vm, handle)?;
+    vm.database.tell(key, holds.is_true());
     Ok(Value::NIL)
 }
 
-/// `(%query-answers query)`
 pub(super) fn query_answers(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let key = query(vm, arguments[0])?;
     let mut work = 0;
@@ -231,20 +227,19 @@ pub(super) fn query_answers(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(open(vm, answers)??)
 }
 
-/// `(%retract-next query locks)`
 pub(super) fn retract_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [handle, locks] = exactly(arguments);
     vm.point()?;
-    if has_locks(vm, arguments[1]) {
+    if has_locks(vm, locks) {
         return Ok(vm.world.known.locked);
     }
-    let key = query(vm, arguments[0])?;
+    let key = query(vm, handle)?;
     let mut work = 0;
     let fact = vm.database.retract_next(&mut vm.heap, key, &mut work);
     vm.exchange.charge(4 * work);
     Ok(open(vm, fact)??)
 }
 
-/// `(%close-query query)`
 pub(super) fn close_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let key = query(vm, arguments[0])?;
     vm.database.close(&mut vm.heap, key);

@@ -7,9 +7,10 @@ use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// `%set-function`
+use super::expect::exactly;
+
 pub(crate) fn set_function(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[name, function] = arguments else { unreachable!("the table says two") };
+    let [name, function] = exactly(arguments);
     let symbol = vm.definable(name, "function")?;
     if !vm.heap.is(function, Kind::Function) {
         return vm.exchange.type_error(function, "FUNCTION");
@@ -24,9 +25,8 @@ pub(crate) fn set_function(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(name)
 }
 
-/// `%set-macro`
 pub(crate) fn set_macro(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[name, function] = arguments else { unreachable!("the table says two") };
+    let [name, function] = exactly(arguments);
     let symbol = vm.definable(name, "macro")?;
     if !vm.heap.is(function, Kind::Function) {
         return vm.exchange.type_error(function, "FUNCTION");
@@ -36,7 +36,6 @@ pub(crate) fn set_macro(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(name)
 }
 
-/// `%proclaim-special`
 pub(crate) fn proclaim_special(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let name = arguments[0];
     let symbol = vm.symbol_object(name)?;
@@ -49,9 +48,8 @@ pub(crate) fn proclaim_special(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(name)
 }
 
-/// `%define-constant`
 pub(crate) fn define_constant(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[name, value] = arguments else { unreachable!("the table says two") };
+    let [name, value] = exactly(arguments);
     let symbol = vm.symbol_object(name)?;
     let flags = vm.heap.flags(symbol, Kind::Symbol).unwrap_or(0);
     let old = vm.heap.symbol(symbol).map_or(Value::UNBOUND, |symbol| symbol.value);

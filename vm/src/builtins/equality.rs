@@ -1,9 +1,12 @@
-//! `equal`, `equalp` and `sxhash`, as far as they go without a call.
+//! `eq`, `eql`, `equal`, `equalp` and `sxhash`, as far as they go without a call.
 
 use crate::equality::{self, Test};
+use crate::number;
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
+
+use super::expect::exactly;
 
 use super::LIMIT;
 
@@ -19,17 +22,23 @@ fn compare(vm: &mut Vm, test: Test, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(equal left right)`
+pub(super) fn eq(_vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(Value::boolean(arguments[0] == arguments[1]))
+}
+
+pub(super) fn eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [left, right] = exactly(arguments);
+    Ok(Value::boolean(number::eql(&vm.heap, left, right)))
+}
+
 pub(super) fn equal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     compare(vm, Test::Equal, arguments)
 }
 
-/// `(equalp left right)`
 pub(super) fn equalp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     compare(vm, Test::Equalp, arguments)
 }
 
-/// `(sxhash object)`
 pub(super) fn sxhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::index(equality::sxhash(&vm.heap, arguments[0]) as usize))
 }

@@ -32,6 +32,8 @@ use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
+use super::expect::exactly;
+
 /// Whether a diagnostic with this code says that a text ends in the middle of a datum.
 fn is_unfinished(code: &str) -> bool {
     code.starts_with("unclosed-") || code.starts_with("unfinished-")
@@ -173,7 +175,6 @@ enum Read {
     Unfinished(String),
 }
 
-/// `(%begin-compilation form)`
 pub(super) fn begin_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut unit = Unit::default();
     let form = vm.as_form(&mut unit, arguments[0], Span::default())?;
@@ -181,16 +182,15 @@ pub(super) fn begin_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.begin(compilation, unit))
 }
 
-/// `(%begin-file name text)`: the compilation of a whole text.
 pub(super) fn begin_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let name = vm.designated_text(arguments[0])?;
-    let Some(text) = vm.text_of(arguments[1]) else { return vm.exchange.type_error(arguments[1], "STRING") };
+    let [name, text] = exactly(arguments);
+    let name = vm.designated_text(name)?;
+    let Some(text) = vm.text_of(text) else { return vm.exchange.type_error(text, "STRING") };
     vm.exchange.charge(text.len());
     let compilation = vm.with_compiler(|_, compiler| compiler.compile_text(&name, &text))?;
     Ok(vm.begin(compilation, Unit::default()))
 }
 
-/// `(%compiled-file path)`: the functions that run the top-level forms of a compiled file, in order, as a list.
 pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
     let bytes = match vm.outside.host.read_file(&path) {
@@ -209,7 +209,6 @@ pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%open-text text &optional name)`
 pub(super) fn open_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(text) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
     vm.exchange.charge(text.len());
@@ -221,7 +220,6 @@ pub(super) fn open_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.compiler.add(CompilerJob::Text(text)))
 }
 
-/// `(%next-form text)`: the compilation of the next form of a text, `NIL` at its end.
 pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (id, mut job) = vm.take_job(arguments[0])?;
     let next = match &mut job {
@@ -245,11 +243,11 @@ fn begin_form(vm: &mut Vm, text: &mut FormText) -> Outcome {
     }
 }
 
-/// `(%compilation-step handle kind outcome)`
 pub(super) fn compilation_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (id, mut job) = vm.take_job(arguments[0])?;
+    let [handle, kind, outcome] = exactly(arguments);
+    let (id, mut job) = vm.take_job(handle)?;
     let told = match &mut job {
-        CompilerJob::Compilation(running) => step(vm, running, arguments[1], arguments[2]),
+        CompilerJob::Compilation(running) => step(vm, running, kind, outcome),
         _ => vm.exchange.program_error("a text is no compilation"),
     };
     vm.compiler.put_back(id, job);
@@ -282,14 +280,12 @@ fn step(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Valu
     told
 }
 
-/// `(%end-compilation handle)`
 pub(super) fn end_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.compiler.end(arguments[0]);
     Ok(Value::NIL)
 }
 
-/// `(%read-from-string string start end)`: whether a datum was read, the datum, and where it ends. The first value is
-/// `NIL` at the end of the string, and `:unfinished` if the datum goes on behind it.
+/// The first value is `NIL` at the end of the string, and `:unfinished` if the datum goes on behind it.
 pub(super) fn read_from_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let characters = vm.characters(arguments[0], optional(arguments, 1), optional(arguments, 2))?;
     let first = optional(arguments, 1).as_index().unwrap_or(0);
@@ -309,7 +305,7 @@ pub(super) fn read_from_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%read stream)`: as `%read-from-string`, without the end. What was read is taken from the stream.
+/// What was read is taken from the stream.
 pub(super) fn read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = optional(arguments, 0);
     loop {

@@ -8,6 +8,8 @@ use crate::heap::Kind;
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
+
+use super::expect::exactly;
 use crate::wait::{WaitOptions, event};
 
 /// The latest time, in nanoseconds: far beyond the life of a machine, and a fixnum.
@@ -71,12 +73,10 @@ impl Vm {
     }
 }
 
-/// `(make-event &optional name)`
 pub(super) fn make_event(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.make_event(arguments.first().copied().unwrap_or(Value::NIL))
 }
 
-/// `(signal event &rest arguments)`, `(signal-event event &rest arguments)`
 pub(super) fn signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point()?;
     if !vm.is_event(arguments[0]) {
@@ -87,7 +87,6 @@ pub(super) fn signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::NIL)
 }
 
-/// `(event-count event)`
 pub(super) fn event_count(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point_of_read()?;
     if !vm.is_event(arguments[0]) {
@@ -96,14 +95,12 @@ pub(super) fn event_count(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.slot(arguments[0], event::COUNT))
 }
 
-/// `(%count-events events)`
 pub(super) fn count_events(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point_of_read()?;
     let sum = vm.count_of_events(arguments[0])?;
     Ok(Value::fixnum(sum).unwrap_or(Value::small(0)))
 }
 
-/// `(%event-name event)`
 pub(super) fn event_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !vm.is_event(arguments[0]) {
         return vm.event_error(arguments[0]);
@@ -111,12 +108,10 @@ pub(super) fn event_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.slot(arguments[0], event::NAME))
 }
 
-/// `(%eventp object)`
 pub(super) fn eventp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::boolean(vm.is_event(arguments[0])))
 }
 
-/// `(%any-event)`
 pub(super) fn any_event(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     Ok(vm.scheduler.any_event)
 }
@@ -151,7 +146,6 @@ fn wait_for_signal(vm: &mut Vm, events: Value, count: Value, what: Value) -> Out
     vm.park(wait, None)
 }
 
-/// `(wait-for-events events &rest options)`, `(wait-for-event events &rest options)`
 pub(super) fn wait_for_events(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match arguments {
         &[events] => wait_for_signal(vm, events, Value::NIL, Value::NIL),
@@ -159,15 +153,14 @@ pub(super) fn wait_for_events(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%wait events count what)`
 pub(super) fn wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    wait_for_signal(vm, arguments[0], arguments[1], arguments[2])
+    let [events, count, what] = exactly(arguments);
+    wait_for_signal(vm, events, count, what)
 }
 
-/// `(%open-wait events seconds count what)`
 pub(super) fn open_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point()?;
-    let &[events, seconds, count, what] = arguments else { unreachable!("the table says four") };
+    let [events, seconds, count, what] = exactly(arguments);
     let deadline = if seconds.is_nil() {
         None
     } else {
@@ -180,7 +173,6 @@ pub(super) fn open_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.open_wait(events, WaitOptions { keeps: true, deadline, what, ..WaitOptions::default() })
 }
 
-/// `(%take-signal wait)`
 pub(super) fn take_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let wait = arguments[0];
     if !vm.heap.is(wait, Kind::Wait) {
@@ -198,20 +190,17 @@ pub(super) fn take_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%close-wait wait)`
 pub(super) fn close_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.close_wait(arguments[0]);
     Ok(Value::NIL)
 }
 
-/// `(%deadline seconds)`
 pub(super) fn deadline(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let nanoseconds = vm.nanoseconds(arguments[0])?;
     let time = vm.time().saturating_add(nanoseconds).min(LATEST);
     Ok(Value::fixnum(time as i64).unwrap_or(Value::NIL))
 }
 
-/// `(%sleep-until deadline)`
 pub(super) fn sleep_until(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(deadline) = arguments[0].as_index() else {
         return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
@@ -220,7 +209,7 @@ pub(super) fn sleep_until(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if now >= deadline as u64 { Ok(Value::NIL) } else { vm.park(Value::NIL, Some(deadline as u64)) }
 }
 
-/// `(%pass-turn)`: done again when the others have had theirs.
+/// Done again when the others have had their turns.
 pub(super) fn pass_turn(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     vm.scheduler.turn.passes_turn = true;
     vm.end_slice_here();

@@ -6,6 +6,8 @@ use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
+use super::expect::exactly;
+
 /// Defines functions of one double.
 macro_rules! functions {
     ($( $(#[doc = $doc:literal])* $name:ident = $function:ident; )*) => {
@@ -17,31 +19,19 @@ macro_rules! functions {
 }
 
 functions! {
-    /// `sin`
     sin = SIN;
-    /// `cos`
     cos = COS;
-    /// `tan`
     tan = TAN;
-    /// `asin`
     asin = ASIN;
-    /// `acos`
     acos = ACOS;
-    /// `sinh`
     sinh = SINH;
-    /// `cosh`
     cosh = COSH;
-    /// `tanh`
     tanh = TANH;
-    /// `asinh`
     asinh = ASINH;
-    /// `acosh`
     acosh = ACOSH;
-    /// `atanh`
     atanh = ATANH;
 }
 
-/// `atan`
 pub(super) fn atan(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match *arguments {
         [y, x] => elementary::angle(vm, y, x),
@@ -49,12 +39,10 @@ pub(super) fn atan(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `exp`
 pub(super) fn exp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     power::exp(vm, arguments[0])
 }
 
-/// `log`
 pub(super) fn log(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match *arguments {
         [number, base] => power::log_in_base(vm, number, base),
@@ -62,22 +50,19 @@ pub(super) fn log(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `expt`
 pub(super) fn expt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    power::expt(vm, arguments[0], arguments[1])
+    let [base, power] = exactly(arguments);
+    power::expt(vm, base, power)
 }
 
-/// `sqrt`
 pub(super) fn sqrt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     power::sqrt(vm, arguments[0])
 }
 
-/// `numerator`
 pub(super) fn numerator(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     part(vm, arguments[0], |(numerator, _)| numerator, arguments[0])
 }
 
-/// `denominator`
 pub(super) fn denominator(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     part(vm, arguments[0], |(_, denominator)| denominator, Value::small(1))
 }
@@ -90,12 +75,21 @@ fn part(vm: &mut Vm, v: Value, part: impl Fn((Value, Value)) -> Value, of_intege
     }
 }
 
-/// `rational`
+/// The caller has divided both by their common factors.
+pub(super) fn make_ratio(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [numerator, denominator] = exactly(arguments);
+    vm.integer(numerator)?;
+    let below = vm.integer(denominator)?;
+    if below.is_negative() || below.is_zero() || denominator == Value::small(1) {
+        return vm.specifier_error(denominator, "(INTEGER 2)");
+    }
+    Ok(vm.heap.alloc_ratio(numerator, denominator)?)
+}
+
 pub(super) fn rational(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     convert(vm, "RATIONAL", arguments[0], float::rational)
 }
 
-/// `rationalize`
 pub(super) fn rationalize(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     convert(vm, "RATIONALIZE", arguments[0], float::rationalize)
 }
@@ -109,7 +103,6 @@ fn convert(vm: &mut Vm, op: &'static str, v: Value, from_float: fn(f64) -> Ratio
     }
 }
 
-/// `float`
 pub(super) fn to_float(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if let Some(&prototype) = arguments.get(1) {
         the_float(vm, prototype)?;
@@ -138,7 +131,6 @@ fn finite_float(vm: &mut Vm, op: &'static str, v: Value) -> Result<f64, Exit> {
     vm.exchange.raise(Raised::Arithmetic(op, "the float is not a finite number".into()))
 }
 
-/// `decode-float`
 pub(super) fn decode_float(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let x = finite_float(vm, "DECODE-FLOAT", arguments[0])?;
     let (fraction, exponent) = float::fraction_and_exponent(x);
@@ -147,7 +139,6 @@ pub(super) fn decode_float(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.give_values(&[fraction, Value::small(exponent), sign])
 }
 
-/// `integer-decode-float`
 pub(super) fn integer_decode_float(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let x = finite_float(vm, "INTEGER-DECODE-FLOAT", arguments[0])?;
     let (mantissa, exponent) = float::decode(x);
@@ -157,15 +148,14 @@ pub(super) fn integer_decode_float(vm: &mut Vm, arguments: &[Value]) -> Outcome 
     vm.give_values(&[mantissa, Value::small(exponent), Value::small(sign)])
 }
 
-/// `scale-float`
 pub(super) fn scale_float(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let x = finite_float(vm, "SCALE-FLOAT", arguments[0])?;
-    let exponent = vm.integer(arguments[1])?;
+    let [float, exponent] = exactly(arguments);
+    let x = finite_float(vm, "SCALE-FLOAT", float)?;
+    let exponent = vm.integer(exponent)?;
     let extreme = if exponent.is_negative() { i64::MIN } else { i64::MAX };
     vm.float_value("SCALE-FLOAT", float::scaled(x, exponent.as_fixnum().unwrap_or(extreme)))
 }
 
-/// `float-sign`
 pub(super) fn float_sign(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let x = the_float(vm, arguments[0])?;
     let magnitude = match arguments.get(1) {
@@ -175,26 +165,22 @@ pub(super) fn float_sign(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.float(magnitude.copysign(x))?)
 }
 
-/// `float-digits`
 pub(super) fn float_digits(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     the_float(vm, arguments[0])?;
     Ok(Value::small(53))
 }
 
-/// `float-radix`
 pub(super) fn float_radix(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     the_float(vm, arguments[0])?;
     Ok(Value::small(2))
 }
 
-/// `float-precision`
 pub(super) fn float_precision(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let x = finite_float(vm, "FLOAT-PRECISION", arguments[0])?;
     let mantissa = float::decode(x).0.unsigned_abs();
     Ok(Value::small(64 - mantissa.leading_zeros() as i32))
 }
 
-/// `%float-string`
 pub(super) fn float_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let text = text::float_text(the_float(vm, arguments[0])?);
     Ok(vm.heap.alloc_str(&text)?)
@@ -217,7 +203,6 @@ pub(super) fn decimal_digits(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.give_values(&[Value::small(point), digits])
 }
 
-/// `%make-random-state`
 pub(super) fn make_random_state(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let seed = arguments[0];
     if seed.is_nil() {
@@ -229,10 +214,10 @@ pub(super) fn make_random_state(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `%random`
 pub(super) fn random(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    match crate::number::sign_of(&vm.heap, arguments[0]) {
-        Some(1) if vm.heap.ratio(arguments[0]).is_none() => random::random(vm, arguments[0], arguments[1]),
-        _ => vm.specifier_error(arguments[0], "(OR (INTEGER 1) (FLOAT (0)))"),
+    let [limit, state] = exactly(arguments);
+    match crate::number::sign_of(&vm.heap, limit) {
+        Some(1) if vm.heap.ratio(limit).is_none() => random::random(vm, limit, state),
+        _ => vm.specifier_error(limit, "(OR (INTEGER 1) (FLOAT (0)))"),
     }
 }

@@ -7,6 +7,8 @@ use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
+use super::expect::exactly;
+
 use super::COPY_LIMIT;
 
 /// Joins integers bit by bit.
@@ -28,17 +30,14 @@ fn fold(vm: &mut Vm, operation: BitOperation, identity: i32, integers: &[Value])
     }
 }
 
-/// `logand`
 pub(super) fn logand(vm: &mut Vm, integers: &[Value]) -> Outcome {
     fold(vm, BitOperation::And, -1, integers)
 }
 
-/// `logior`
 pub(super) fn logior(vm: &mut Vm, integers: &[Value]) -> Outcome {
     fold(vm, BitOperation::Or, 0, integers)
 }
 
-/// `logxor`
 pub(super) fn logxor(vm: &mut Vm, integers: &[Value]) -> Outcome {
     fold(vm, BitOperation::Xor, 0, integers)
 }
@@ -60,76 +59,65 @@ fn joined(vm: &mut Vm, arguments: &[Value], operation: BitOperation, turned: [bo
     vm.integer_value("LOGAND", &result)
 }
 
-/// `logandc1`
 pub(super) fn logandc1(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     joined(vm, arguments, BitOperation::And, [true, false, false])
 }
 
-/// `logandc2`
 pub(super) fn logandc2(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     joined(vm, arguments, BitOperation::And, [false, true, false])
 }
 
-/// `lognand`
 pub(super) fn lognand(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     joined(vm, arguments, BitOperation::And, [false, false, true])
 }
 
-/// `lognor`
 pub(super) fn lognor(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     joined(vm, arguments, BitOperation::Or, [false, false, true])
 }
 
-/// `logorc1`
 pub(super) fn logorc1(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     joined(vm, arguments, BitOperation::Or, [true, false, false])
 }
 
-/// `logorc2`
 pub(super) fn logorc2(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     joined(vm, arguments, BitOperation::Or, [false, true, false])
 }
 
-/// `lognot`
 pub(super) fn lognot(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     bits::complement(vm, arguments[0])
 }
 
-/// `logtest`
 pub(super) fn logtest(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let joined = bits::join(vm, BitOperation::And, arguments[0], arguments[1])?;
+    let [left, right] = exactly(arguments);
+    let joined = bits::join(vm, BitOperation::And, left, right)?;
     Ok((joined != Value::small(0)).into())
 }
 
-/// `logbitp`
 pub(super) fn logbitp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(bits::bit(vm, arguments[0], arguments[1])?.into())
+    let [index, integer] = exactly(arguments);
+    Ok(bits::bit(vm, index, integer)?.into())
 }
 
-/// `logcount`
 pub(super) fn logcount(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let n = vm.integer(arguments[0])?;
     vm.exchange.charge(n.len());
     Ok(Value::index(n.count_bits() as usize))
 }
 
-/// `integer-length`
 pub(super) fn integer_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let n = vm.integer(arguments[0])?;
     Ok(Value::index(n.length() as usize))
 }
 
-/// `ash`
 pub(super) fn ash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    bits::shift(vm, arguments[0], arguments[1])
+    let [integer, count] = exactly(arguments);
+    bits::shift(vm, integer, count)
 }
 
-/// `evenp`
 pub(super) fn evenp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok((!is_odd(vm, arguments[0])?).into())
 }
 
-/// `oddp`
 pub(super) fn oddp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(is_odd(vm, arguments[0])?.into())
 }
@@ -153,23 +141,22 @@ fn field(vm: &mut Vm, size: Value, position: Value) -> Result<(u64, u64), Exit> 
     Ok((count(size)?, count(position)?))
 }
 
-/// `%ldb`
 pub(super) fn load_byte(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (size, position) = field(vm, arguments[0], arguments[1])?;
-    let n = vm.integer(arguments[2])?;
+    let [size, position, integer] = exactly(arguments);
+    let (size, position) = field(vm, size, position)?;
+    let n = vm.integer(integer)?;
     let byte = bits::field(vm, size, position, &n)?;
     vm.integer_value("LDB", &byte)
 }
 
-/// `%dpb`
 pub(super) fn deposit_byte(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (size, position) = field(vm, arguments[1], arguments[2])?;
-    let (new, n) = (vm.integer(arguments[0])?, vm.integer(arguments[3])?);
+    let [new, size, position, integer] = exactly(arguments);
+    let (size, position) = field(vm, size, position)?;
+    let (new, n) = (vm.integer(new)?, vm.integer(integer)?);
     let result = bits::deposit(vm, &new, size, position, &n)?;
     vm.integer_value("DPB", &result)
 }
 
-/// `gcd`
 pub(super) fn gcd(vm: &mut Vm, integers: &[Value]) -> Outcome {
     let mut divisor = Int::ZERO;
     for &v in integers {
@@ -182,7 +169,8 @@ pub(super) fn gcd(vm: &mut Vm, integers: &[Value]) -> Outcome {
 
 /// `%gcd-step`: two smaller integers with the same greatest common divisor, or the divisor and zero.
 pub(super) fn gcd_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (a, b) = (vm.integer(arguments[0])?, vm.integer(arguments[1])?);
+    let [left, right] = exactly(arguments);
+    let (a, b) = (vm.integer(left)?, vm.integer(right)?);
     let (long, short) = (a.len().max(b.len()), a.len().min(b.len()));
     vm.check_work(2 * (long - short + 1), short)?;
     let steps = gcd::steps_within_limit(long);
@@ -192,7 +180,6 @@ pub(super) fn gcd_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.give_values(&[a, b])
 }
 
-/// `lcm`
 pub(super) fn lcm(vm: &mut Vm, integers: &[Value]) -> Outcome {
     let mut multiple = Int::ONE;
     for &v in integers {
@@ -209,7 +196,6 @@ pub(super) fn lcm(vm: &mut Vm, integers: &[Value]) -> Outcome {
     vm.integer_value("LCM", &multiple)
 }
 
-/// `isqrt`
 pub(super) fn isqrt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     power::isqrt(vm, arguments[0])
 }
@@ -222,19 +208,17 @@ pub(crate) fn radix(vm: &mut Vm, v: Value) -> Result<u32, Exit> {
     }
 }
 
-/// `%integer-string`
 pub(super) fn integer_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let n = vm.integer(arguments[0])?;
-    let radix = radix(vm, arguments[1])?;
+    let [integer, base] = exactly(arguments);
+    let n = vm.integer(integer)?;
+    let radix = radix(vm, base)?;
     let text = text::integer_text(vm, &n, radix)?;
     Ok(vm.heap.alloc_str(&text)?)
 }
 
 /// `%parse-integer`: the integer, or `NIL`, and the index where reading stopped.
 pub(super) fn parse_integer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[string, start, end, radix_value, junk_allowed] = arguments else {
-        unreachable!("the table says five")
-    };
+    let [string, start, end, radix_value, junk_allowed] = exactly(arguments);
     let radix = radix(vm, radix_value)?;
     let Some(length) = characters_of(&vm.heap, string).map(<[u32]>::len) else {
         return vm.exchange.type_error(string, "STRING");

@@ -8,7 +8,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 use super::LIMIT;
-use super::expect::optional;
+use super::expect::{exactly, optional};
 
 impl Vm {
     /// The items of a proper list of at most `limit` items; longer ones are for the ESL twin.
@@ -121,42 +121,39 @@ items! {
     fifth = 4; sixth = 5; seventh = 6; eighth = 7; ninth = 8; tenth = 9;
 }
 
-/// `(cons car cdr)`
 pub(super) fn cons(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(vm.heap.cons(arguments[0], arguments[1])?)
+    let [car, cdr] = exactly(arguments);
+    Ok(vm.heap.cons(car, cdr)?)
 }
 
 fn check_pair(vm: &mut Vm, v: Value) -> Result<(), Exit> {
     if v.is_cons() { Ok(()) } else { vm.exchange.type_error(v, "CONS") }
 }
 
-/// `(rplaca pair object)`
 pub(super) fn rplaca(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    check_pair(vm, arguments[0])?;
-    vm.heap.set_car(arguments[0], arguments[1]);
-    Ok(arguments[0])
+    let [pair, object] = exactly(arguments);
+    check_pair(vm, pair)?;
+    vm.heap.set_car(pair, object);
+    Ok(pair)
 }
 
-/// `(rplacd pair object)`
 pub(super) fn rplacd(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    check_pair(vm, arguments[0])?;
-    vm.heap.set_cdr(arguments[0], arguments[1]);
-    Ok(arguments[0])
+    let [pair, object] = exactly(arguments);
+    check_pair(vm, pair)?;
+    vm.heap.set_cdr(pair, object);
+    Ok(pair)
 }
 
-/// `(%set-car pair value)`
 pub(super) fn set_car(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     rplaca(vm, arguments)?;
     Ok(arguments[1])
 }
 
-/// `(%set-cdr pair value)`
 pub(super) fn set_cdr(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     rplacd(vm, arguments)?;
     Ok(arguments[1])
 }
 
-/// `(endp list)`
 pub(super) fn endp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if arguments[0].is_list() {
         Ok(arguments[0].is_nil().into())
@@ -165,30 +162,28 @@ pub(super) fn endp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(nth index list)`
 pub(super) fn nth(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let tail = nthcdr(vm, arguments)?;
     vm.part(tail, b'a')
 }
 
-/// `(nthcdr index list)`
 pub(super) fn nthcdr(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let count = vm.integer(arguments[0])?;
+    let [skipped, list] = exactly(arguments);
+    let count = vm.integer(skipped)?;
     if count.is_negative() {
-        return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
+        return vm.exchange.type_error(skipped, "UNSIGNED-BYTE");
     }
-    let count = arguments[0].as_index().unwrap_or(usize::MAX);
+    let count = skipped.as_index().unwrap_or(usize::MAX);
     if count <= LIMIT {
-        return vm.tail(arguments[1], count);
+        return vm.tail(list, count);
     }
     // A long way down a short list is short.
-    match vm.measure(arguments[1])? {
+    match vm.measure(list)? {
         (_, end) if end.is_nil() => Ok(end),
         (_, end) => vm.exchange.type_error(end, "LIST"),
     }
 }
 
-/// `(list-length list)`: `NIL` for a circular list.
 pub(super) fn list_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match vm.measure(arguments[0])? {
         (length, end) if end.is_nil() => Ok(Value::index(length)),
@@ -196,13 +191,11 @@ pub(super) fn list_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(list &rest objects)`
 pub(super) fn list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.exchange.charge_elements(arguments.len());
     Ok(vm.heap.list(arguments)?)
 }
 
-/// `(list* object &rest objects)`
 pub(super) fn list_star(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.exchange.charge_elements(arguments.len());
     match arguments.split_last() {
@@ -211,34 +204,32 @@ pub(super) fn list_star(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%make-list size item)`
 pub(super) fn make_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let size = vm.count(arguments[0])?;
+    let [size, item] = exactly(arguments);
+    let size = vm.count(size)?;
     if size > LIMIT {
         return Err(Exit::Slowly);
     }
     vm.exchange.charge_elements(size);
     let mut list = Value::NIL;
     for _ in 0..size {
-        list = vm.heap.cons(arguments[1], list)?;
+        list = vm.heap.cons(item, list)?;
     }
     Ok(list)
 }
 
-/// `(acons key value alist)`
 pub(super) fn acons(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let pair = vm.heap.cons(arguments[0], arguments[1])?;
-    Ok(vm.heap.cons(pair, arguments[2])?)
+    let [key, value, alist] = exactly(arguments);
+    let pair = vm.heap.cons(key, value)?;
+    Ok(vm.heap.cons(pair, alist)?)
 }
 
-/// `(last list &optional count)`
 pub(super) fn last(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let count = count_of(vm, arguments)?;
     let (length, _) = vm.measure(arguments[0])?;
     vm.tail(arguments[0], length.saturating_sub(count))
 }
 
-/// `(butlast list &optional count)`
 pub(super) fn butlast(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let count = count_of(vm, arguments)?;
     let (length, _) = vm.measure(arguments[0])?;
@@ -246,7 +237,6 @@ pub(super) fn butlast(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.list(&items)?)
 }
 
-/// `(nbutlast list &optional count)`
 pub(super) fn nbutlast(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let count = count_of(vm, arguments)?;
     let (length, _) = vm.measure(arguments[0])?;
@@ -274,7 +264,6 @@ fn count_of(vm: &mut Vm, arguments: &[Value]) -> Result<usize, Exit> {
     }
 }
 
-/// `(append &rest lists)`
 pub(super) fn append(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some((&last, lists)) = arguments.split_last() else { return Ok(Value::NIL) };
     let mut items = Vec::new();
@@ -284,7 +273,6 @@ pub(super) fn append(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.list_with_tail(&items, last)?)
 }
 
-/// `(nconc &rest lists)`
 pub(super) fn nconc(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some((&last, lists)) = arguments.split_last() else { return Ok(Value::NIL) };
     // All ends are found before the first is changed.
@@ -308,20 +296,20 @@ pub(super) fn nconc(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(ends.first().map_or(last, |&(list, _)| list))
 }
 
-/// `(revappend list tail)`
 pub(super) fn revappend(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let mut items = vm.list_items(arguments[0], LIMIT)?;
+    let [list, tail] = exactly(arguments);
+    let mut items = vm.list_items(list, LIMIT)?;
     items.reverse();
-    Ok(vm.heap.list_with_tail(&items, arguments[1])?)
+    Ok(vm.heap.list_with_tail(&items, tail)?)
 }
 
-/// `(nreconc list tail)`
 pub(super) fn nreconc(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (_, end) = vm.measure(arguments[0])?;
+    let [list, tail] = exactly(arguments);
+    let (_, end) = vm.measure(list)?;
     if !end.is_nil() {
         return vm.exchange.type_error(end, "LIST");
     }
-    Ok(reverse_in_place(vm, arguments[0], arguments[1]))
+    Ok(reverse_in_place(vm, list, tail))
 }
 
 /// Turns the pairs of a proper list round, in front of `tail`.
@@ -335,14 +323,12 @@ pub(super) fn reverse_in_place(vm: &mut Vm, list: Value, tail: Value) -> Value {
     result
 }
 
-/// `(copy-list list)`
 pub(super) fn copy_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (length, end) = vm.measure(arguments[0])?;
     let items = vm.leading_items(arguments[0], length);
     Ok(vm.heap.list_with_tail(&items, end)?)
 }
 
-/// `(copy-alist alist)`
 pub(super) fn copy_alist(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut items = vm.list_items(arguments[0], LIMIT)?;
     for item in &mut items {
@@ -353,7 +339,6 @@ pub(super) fn copy_alist(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.list(&items)?)
 }
 
-/// `(copy-tree tree)`
 pub(super) fn copy_tree(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(root) = vm.heap.as_cons(arguments[0]) else { return Ok(arguments[0]) };
     let copy = vm.heap.cons(root.car, root.cdr)?;
@@ -380,9 +365,8 @@ pub(super) fn copy_tree(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(copy)
 }
 
-/// `(ldiff list object)`: the items in front of the tail that is `object`.
 pub(super) fn ldiff(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[list, object] = arguments else { unreachable!("the table says two") };
+    let [list, object] = exactly(arguments);
     let (length, end) = vm.measure(list)?;
     let mut items = Vec::new();
     let mut rest = list;
@@ -399,9 +383,8 @@ pub(super) fn ldiff(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.list_with_tail(&items, end)?)
 }
 
-/// `(tailp object list)`
 pub(super) fn tailp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[object, list] = arguments else { unreachable!("the table says two") };
+    let [object, list] = exactly(arguments);
     let (length, end) = vm.measure(list)?;
     let mut rest = list;
     for _ in 0..length {
@@ -413,7 +396,6 @@ pub(super) fn tailp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(crate::number::eql(&vm.heap, end, object).into())
 }
 
-/// `(pairlis keys data &optional alist)`
 pub(super) fn pairlis(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let keys = vm.list_items(arguments[0], LIMIT)?;
     let data = vm.list_items(arguments[1], LIMIT)?;

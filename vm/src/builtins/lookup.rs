@@ -8,7 +8,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 use super::LIMIT;
-use super::expect::optional;
+use super::expect::{exactly, optional};
 
 /// Walks a list up to the first pair that `wanted` is true of; `NIL` if there is none.
 fn find_pair(
@@ -82,7 +82,6 @@ searches! {
     Equal: member_equal assoc_equal rassoc_equal;
 }
 
-/// `(%adjoin-eql item list)`
 pub(super) fn adjoin_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let found = member_eql(vm, arguments)?;
     if found.is_true() { Ok(arguments[1]) } else { Ok(vm.heap.cons(arguments[0], arguments[1])?) }
@@ -107,7 +106,6 @@ fn find_property(vm: &mut Vm, plist: Value, indicator: Value) -> Result<Option<[
     Err(Exit::Slowly)
 }
 
-/// `(getf plist indicator &optional default)`
 pub(super) fn getf(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(match find_property(vm, arguments[0], arguments[1])? {
         Some([_, _, value]) => vm.heap.car(value).unwrap_or(Value::NIL),
@@ -115,9 +113,8 @@ pub(super) fn getf(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     })
 }
 
-/// `(%putf plist indicator value)`: the property list with that property, changed in place if it was there.
 pub(super) fn putf(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[plist, indicator, value] = arguments else { unreachable!("the table says three") };
+    let [plist, indicator, value] = exactly(arguments);
     match find_property(vm, plist, indicator)? {
         Some([_, _, pair]) => {
             vm.heap.set_car(pair, value);
@@ -127,9 +124,8 @@ pub(super) fn putf(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%remf plist indicator)`: the property list without that property, and whether it was there.
 pub(super) fn remf(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[plist, indicator] = arguments else { unreachable!("the table says two") };
+    let [plist, indicator] = exactly(arguments);
     let (rest, was_there) = without_property(vm, plist, indicator)?;
     vm.give_values(&[rest, Value::boolean(was_there)])
 }
@@ -150,10 +146,10 @@ pub(super) fn without_property(vm: &mut Vm, plist: Value, indicator: Value) -> R
     })
 }
 
-/// `(get-properties plist indicators)`
 pub(super) fn get_properties(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let indicators = vm.list_items(arguments[1], LIMIT)?;
-    let mut rest = arguments[0];
+    let [plist, indicators] = exactly(arguments);
+    let indicators = vm.list_items(indicators, LIMIT)?;
+    let mut rest = plist;
     let mut work = 0;
     while let Some(pair) = vm.heap.as_cons(rest) {
         work += 1 + indicators.len();

@@ -11,6 +11,8 @@ use crate::run::SpawnOptions;
 use crate::task::TaskId;
 use crate::value::Value;
 use crate::vm::Vm;
+
+use super::expect::exactly;
 use crate::wait::{WaitOptions, event};
 
 impl Vm {
@@ -43,7 +45,6 @@ impl Vm {
     }
 }
 
-/// `(%spawn-net what names &rest functions)`
 pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (what, mut names, functions) = (arguments[0], arguments[1], &arguments[2..]);
     let priority = vm.scheduler.task().priority;
@@ -76,9 +77,8 @@ pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.give_values(&values)
 }
 
-/// `(%await-net net status)`
 pub(super) fn await_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[net, status] = arguments else { unreachable!("the table says two") };
+    let [net, status] = exactly(arguments);
     let wait = vm.wait_of_net(net)?;
     vm.scheduler.task_mut().wait = Value::NIL;
     while let Some(task) = vm.take_kept(wait) {
@@ -95,7 +95,6 @@ pub(super) fn await_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.park(wait, None)
 }
 
-/// `(%end-net net)`
 pub(super) fn end_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point_of_read()?;
     if arguments[0].is_nil() || vm.has_net_ended(arguments[0]) { Ok(Value::NIL) } else { Err(Exit::Slowly) }

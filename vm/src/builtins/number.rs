@@ -5,6 +5,8 @@ use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
 
+use super::expect::exactly;
+
 use super::LIMIT;
 
 /// The one of integers, where it is left out.
@@ -28,7 +30,6 @@ fn fold(
     Ok(result)
 }
 
-/// `+`
 pub(super) fn add(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     match *numbers {
         [] => Ok(Value::small(0)),
@@ -37,7 +38,6 @@ pub(super) fn add(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     }
 }
 
-/// `*`
 pub(super) fn multiply(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     match *numbers {
         [] => Ok(ONE),
@@ -46,7 +46,6 @@ pub(super) fn multiply(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     }
 }
 
-/// `-`
 pub(super) fn subtract(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     match *numbers {
         [only] => number::negate(vm, only),
@@ -54,7 +53,6 @@ pub(super) fn subtract(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     }
 }
 
-/// `/`
 pub(super) fn divide(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     match *numbers {
         [only] => number::divide(vm, ONE, only),
@@ -62,12 +60,10 @@ pub(super) fn divide(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     }
 }
 
-/// `1+`
 pub(super) fn increment(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     number::add(vm, arguments[0], ONE)
 }
 
-/// `1-`
 pub(super) fn decrement(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     number::subtract(vm, arguments[0], ONE)
 }
@@ -90,32 +86,26 @@ fn chain(
     Ok(Value::T)
 }
 
-/// `=`
 pub(super) fn num_equal(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     chain(vm, numbers, "NUMBER", number::num_equal)
 }
 
-/// `<`
 pub(super) fn less(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     chain(vm, numbers, "REAL", number::less)
 }
 
-/// `<=`
 pub(super) fn less_equal(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     chain(vm, numbers, "REAL", number::less_or_equal)
 }
 
-/// `>`
 pub(super) fn greater(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     chain(vm, numbers, "REAL", |vm, a, b| number::less(vm, b, a))
 }
 
-/// `>=`
 pub(super) fn greater_equal(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     chain(vm, numbers, "REAL", |vm, a, b| number::less_or_equal(vm, b, a))
 }
 
-/// `/=`
 pub(super) fn num_not_equal(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     if numbers.len() * numbers.len() / 2 > LIMIT {
         return Err(Exit::Slowly);
@@ -131,34 +121,28 @@ pub(super) fn num_not_equal(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     Ok(Value::T)
 }
 
-/// `max`
 pub(super) fn max(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     chain(vm, numbers, "REAL", |_, _, _| Ok(true))?;
     fold(vm, numbers[0], &numbers[1..], |vm, a, b| Ok(if number::less(vm, a, b)? { b } else { a }))
 }
 
-/// `min`
 pub(super) fn min(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     chain(vm, numbers, "REAL", |_, _, _| Ok(true))?;
     fold(vm, numbers[0], &numbers[1..], |vm, a, b| Ok(if number::less(vm, b, a)? { b } else { a }))
 }
 
-/// `zerop`
 pub(super) fn zerop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok((number::sign(vm, arguments[0], "NUMBER")? == 0).into())
 }
 
-/// `plusp`
 pub(super) fn plusp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok((number::sign(vm, arguments[0], "REAL")? > 0).into())
 }
 
-/// `minusp`
 pub(super) fn minusp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok((number::sign(vm, arguments[0], "REAL")? < 0).into())
 }
 
-/// `abs`
 pub(super) fn abs(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if let Some(x) = vm.heap.as_double(arguments[0]) {
         return Ok(vm.heap.float(x.abs())?);
@@ -167,7 +151,6 @@ pub(super) fn abs(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if sign < 0 { number::negate(vm, arguments[0]) } else { Ok(arguments[0]) }
 }
 
-/// `signum`
 pub(super) fn signum(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match vm.heap.as_double(arguments[0]) {
         Some(x) => Ok(vm.heap.float(if x == 0.0 { x } else { x.signum() })?),
@@ -186,30 +169,22 @@ macro_rules! roundings {
 }
 
 roundings! {
-    /// `floor`
     floor = both Floor;
-    /// `ceiling`
     ceiling = both Ceiling;
-    /// `truncate`
     truncate = both Truncate;
-    /// `round`
     round = both Round;
-    /// `ffloor`
     ffloor = both_with_float Floor;
-    /// `fceiling`
     fceiling = both_with_float Ceiling;
-    /// `ftruncate`
     ftruncate = both_with_float Truncate;
-    /// `fround`
     fround = both_with_float Round;
 }
 
-/// `mod`
 pub(super) fn modulo(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    number::modulo(vm, arguments[0], arguments[1])
+    let [number, divisor] = exactly(arguments);
+    number::modulo(vm, number, divisor)
 }
 
-/// `rem`
 pub(super) fn remainder(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    number::remainder(vm, arguments[0], arguments[1])
+    let [number, divisor] = exactly(arguments);
+    number::remainder(vm, number, divisor)
 }

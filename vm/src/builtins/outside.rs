@@ -7,7 +7,6 @@ use crate::vm::Vm;
 /// Seconds from the beginning of 1900 to that of 1970.
 const UNIX_EPOCH: i64 = 2_208_988_800;
 
-/// `(command-line-arguments)`
 pub(super) fn command_line_arguments(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     let mut strings = Vec::new();
     for argument in vm.outside.host.arguments() {
@@ -16,19 +15,16 @@ pub(super) fn command_line_arguments(vm: &mut Vm, _arguments: &[Value]) -> Outco
     Ok(vm.heap.list(&strings)?)
 }
 
-/// `(now)`
 pub(super) fn now(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     let seconds = vm.outside.host.monotonic() as f64 / 1e9;
     Ok(vm.heap.float(seconds)?)
 }
 
-/// `(get-internal-real-time)`
 pub(super) fn internal_real_time(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     // Nanoseconds are far below 2^61 for the next 70 years.
     Ok(Value::fixnum((vm.outside.host.monotonic() / 1000) as i64).unwrap_or(Value::NIL))
 }
 
-/// `(get-universal-time)`
 pub(super) fn universal_time(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     let seconds = vm.outside.host.wall_clock().div_euclid(1_000_000_000);
     Ok(Value::fixnum(seconds.saturating_add(UNIX_EPOCH)).unwrap_or(Value::NIL))

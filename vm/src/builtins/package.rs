@@ -10,6 +10,8 @@ use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
+use super::expect::exactly;
+
 impl Vm {
     /// The package that `v` designates: a package, or its name.
     ///
@@ -106,7 +108,6 @@ impl Vm {
     }
 }
 
-/// `(find-package name)`
 pub(super) fn find_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if vm.heap.is(arguments[0], Kind::Package) {
         return Ok(arguments[0]);
@@ -118,19 +119,16 @@ pub(super) fn find_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(packagep object)`
 pub(super) fn packagep(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::boolean(vm.heap.is(arguments[0], Kind::Package)))
 }
 
-/// `(package-name package)`
 pub(super) fn package_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let package = vm.package(arguments[0])?;
     let object = vm.world.package_object(&mut vm.heap, package)?;
     Ok(vm.heap.record(object, Kind::Package).map_or(Value::NIL, |record| record[0]))
 }
 
-/// `(package-nicknames package)`
 pub(super) fn package_nicknames(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let package = vm.package(arguments[0])?;
     let names: Vec<String> =
@@ -138,22 +136,19 @@ pub(super) fn package_nicknames(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.string_list(&names)
 }
 
-/// `(package-use-list package)`
 pub(super) fn package_use_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let package = vm.package(arguments[0])?;
     let uses = vm.world.packages().uses(package).to_vec();
     vm.package_list(&uses)
 }
 
-/// `(list-all-packages)`
 pub(super) fn list_all_packages(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     let all: Vec<PackageId> = vm.world.packages().all().collect();
     vm.package_list(&all)
 }
 
-/// `(%make-package name nicknames uses)`: the package of that name, made if there is none.
 pub(super) fn make_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[name, nicknames, uses] = arguments else { unreachable!("the table says three") };
+    let [name, nicknames, uses] = exactly(arguments);
     let name = vm.designated_text(name)?;
     let nicknames = vm.designated_names(nicknames)?;
     let uses = vm.packages(uses)?;
@@ -177,7 +172,6 @@ pub(super) fn make_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.world.package_object(&mut vm.heap, package)?)
 }
 
-/// `(use-package packages &optional package)`
 pub(super) fn use_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let uses = vm.packages(arguments[0])?;
     let package = vm.package_or_current(optional(arguments, 1))?;
@@ -188,7 +182,6 @@ pub(super) fn use_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::T)
 }
 
-/// `(export symbols &optional package)`
 pub(super) fn export(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let symbols = vm.named_symbols(arguments[0])?;
     let package = vm.package_or_current(optional(arguments, 1))?;
@@ -200,7 +193,6 @@ pub(super) fn export(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::T)
 }
 
-/// `(import symbols &optional package)`
 pub(super) fn import(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let symbols = vm.named_symbols(arguments[0])?;
     let package = vm.package_or_current(optional(arguments, 1))?;
@@ -212,7 +204,6 @@ pub(super) fn import(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::T)
 }
 
-/// `(shadow names &optional package)`
 pub(super) fn shadow(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let names = vm.designated_names(arguments[0])?;
     let package = vm.package_or_current(optional(arguments, 1))?;
@@ -224,7 +215,6 @@ pub(super) fn shadow(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::T)
 }
 
-/// `(intern name &optional package)`
 pub(super) fn intern(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(name) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
     let package = vm.package_or_current(optional(arguments, 1))?;
@@ -235,7 +225,6 @@ pub(super) fn intern(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.give_values(&[value, status])
 }
 
-/// `(find-symbol name &optional package)`
 pub(super) fn find_symbol(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(name) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
     let package = vm.package_or_current(optional(arguments, 1))?;
@@ -250,7 +239,6 @@ pub(super) fn find_symbol(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%external-symbols package)`
 pub(super) fn external_symbols(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let package = vm.package(arguments[0])?;
     let packages = vm.world.packages();
@@ -265,7 +253,6 @@ pub(super) fn external_symbols(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.list(&values)?)
 }
 
-/// `(%symbol-qualifier symbol)`
 pub(super) fn symbol_qualifier(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match vm.qualifier(arguments[0]) {
         None => vm.exchange.type_error(arguments[0], "SYMBOL"),

@@ -8,9 +8,11 @@ use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
 
+use super::expect::exactly;
+
 use super::COPY_LIMIT;
 
-/// `(%string-escaped string)`: in quotes, with `\` before `"` and `\`.
+/// The string in quotes, with `\` before `"` and `\`.
 pub(super) fn string_escaped(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(characters) = characters_of(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "STRING");
@@ -31,7 +33,7 @@ pub(super) fn string_escaped(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.alloc_string(&written)?)
 }
 
-/// `(%character-escaped character)`: `#\` and the character or its name.
+/// `#\` and the character or its name.
 pub(super) fn character_escaped(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(code) = arguments[0].as_character() else {
         return vm.exchange.type_error(arguments[0], "CHARACTER");
@@ -45,10 +47,8 @@ pub(super) fn character_escaped(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.alloc_string(&written)?)
 }
 
-/// `(%symbol-name-string name case escape)`: the name of a symbol as it is written, without its package. `case` is 0 for
-/// `:upcase`, 1 for `:downcase`, 2 for `:capitalize`; with `escape`, what would not read back goes between bars.
 pub(super) fn symbol_name_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[name, case, escape] = arguments else { unreachable!("the table says three") };
+    let [name, case, escape] = exactly(arguments);
     let Some(characters) = characters_of(&vm.heap, name) else {
         return vm.exchange.type_error(name, "STRING");
     };

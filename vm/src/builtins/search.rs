@@ -8,11 +8,13 @@ use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
 
+use super::expect::exactly;
+
 use super::{COPY_LIMIT, LIMIT};
 
 /// The index of an element that is the same as `item`, between two bounds, the first or the last of them.
 fn position(vm: &mut Vm, test: Test, arguments: &[Value]) -> Outcome {
-    let &[item, sequence, start, end, from_end] = arguments else { unreachable!("the table says five") };
+    let [item, sequence, start, end, from_end] = exactly(arguments);
     let from_end = from_end.is_true();
     if let Some(elements) = vector_elements(&vm.heap, sequence) {
         let length = elements.len();
@@ -99,19 +101,16 @@ fn in_vector(
     }
 }
 
-/// `(%position-eql item sequence start end from-end)`
 pub(super) fn position_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     position(vm, Test::Eql, arguments)
 }
 
-/// `(%position-equal item sequence start end from-end)`
 pub(super) fn position_equal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     position(vm, Test::Equal, arguments)
 }
 
-/// `(%count-eql item sequence start end)`
 pub(super) fn count_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[item, sequence, start, end] = arguments else { unreachable!("the table says four") };
+    let [item, sequence, start, end] = exactly(arguments);
     if let Some(elements) = vector_elements(&vm.heap, sequence) {
         let length = elements.len();
         let (start, end) = vm.bounds(start, end, length)?;
@@ -136,9 +135,8 @@ pub(super) fn count_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::index(items[start..end].iter().filter(is_it).count()))
 }
 
-/// `(%remove-eql item list)`
 pub(super) fn remove_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[item, list] = arguments else { unreachable!("the table says two") };
+    let [item, list] = exactly(arguments);
     let items = vm.list_items(list, LIMIT)?;
     let kept: Vec<Value> = items.iter().copied().filter(|&v| !number::eql(&vm.heap, item, v)).collect();
     // As it was, where there was nothing to remove.

@@ -10,7 +10,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 use super::array::{Elements, all_elements, data_of, vector_elements, vector_length};
-use super::expect::optional;
+use super::expect::{exactly, optional};
 use super::list::reverse_in_place;
 use super::{COPY_LIMIT, LIMIT};
 
@@ -104,7 +104,6 @@ impl Owned {
     }
 }
 
-/// `(length sequence)`
 pub(super) fn length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let sequence = arguments[0];
     if let Some(length) = vector_length(&vm.heap, sequence) {
@@ -116,9 +115,8 @@ pub(super) fn length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     super::list::list_length(vm, arguments)
 }
 
-/// `(elt sequence index)`
 pub(super) fn elt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[sequence, index] = arguments else { unreachable!("the table says two") };
+    let [sequence, index] = exactly(arguments);
     if let Some(elements) = vector_elements(&vm.heap, sequence) {
         let length = elements.len();
         return match index.as_index().and_then(|index| elements.get(index)) {
@@ -130,9 +128,8 @@ pub(super) fn elt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.car(pair).unwrap_or(Value::NIL))
 }
 
-/// `(%set-elt sequence index value)`
 pub(super) fn set_elt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[sequence, index, value] = arguments else { unreachable!("the table says three") };
+    let [sequence, index, value] = exactly(arguments);
     if let Some(length) = vector_length(&vm.heap, sequence) {
         let index = vm.index_below(index, length)?;
         let data = data_of(&vm.heap, sequence).unwrap_or(sequence);
@@ -166,7 +163,6 @@ fn list_element(vm: &mut Vm, list: Value, index: Value) -> Outcome {
     Err(Exit::Slowly)
 }
 
-/// `(subseq sequence start &optional end)`
 pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (sequence, start, end) = (arguments[0], arguments[1], optional(arguments, 2));
     if let Some(elements) = vector_elements(&vm.heap, sequence) {
@@ -215,12 +211,10 @@ pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.list(&items[start..end])?)
 }
 
-/// `(copy-seq sequence)`
 pub(super) fn copy_seq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     subseq(vm, &[arguments[0], Value::small(0)])
 }
 
-/// `(reverse sequence)`
 pub(super) fn reverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let sequence = arguments[0];
     if let Some(elements) = vector_elements(&vm.heap, sequence) {
@@ -241,7 +235,6 @@ pub(super) fn reverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.list(&items)?)
 }
 
-/// `(nreverse sequence)`
 pub(super) fn nreverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let sequence = arguments[0];
     if let Some(length) = vector_length(&vm.heap, sequence) {
@@ -271,9 +264,8 @@ pub(super) fn nreverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(reverse_in_place(vm, sequence, Value::NIL))
 }
 
-/// `(%fill vector item start end)`
 pub(super) fn fill(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[vector, item, start, end] = arguments else { unreachable!("the table says four") };
+    let [vector, item, start, end] = exactly(arguments);
     let length = vm.vector_length(vector)?;
     let (start, end) = vm.bounds(start, end, length)?;
     if end - start > COPY_LIMIT {
@@ -297,9 +289,9 @@ pub(super) fn fill(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vector)
 }
 
-/// `(%replace target source start1 end1 start2 end2)`, of vectors
+/// The arguments of `%replace`, whose sequences are vectors.
 pub(super) fn replace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[target, source, start1, end1, start2, end2] = arguments else { unreachable!("the table says six") };
+    let [target, source, start1, end1, start2, end2] = exactly(arguments);
     let (to_length, from_length) = (vm.vector_length(target)?, vm.vector_length(source)?);
     let (to, to_end) = vm.bounds(start1, end1, to_length)?;
     let (from, from_end) = vm.bounds(start2, end2, from_length)?;
@@ -313,13 +305,11 @@ pub(super) fn replace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(target)
 }
 
-/// `(%list-vector list)`
 pub(super) fn list_vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let items = vm.list_items(arguments[0], LIMIT)?;
     Ok(vm.heap.alloc_vector(&items)?)
 }
 
-/// `(%list-string list)`
 pub(super) fn list_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let items = vm.list_items(arguments[0], LIMIT)?;
     let mut characters = Vec::with_capacity(items.len());
@@ -332,9 +322,8 @@ pub(super) fn list_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.alloc_string(&characters)?)
 }
 
-/// `(%vector-list vector start end)`
 pub(super) fn vector_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[vector, start, end] = arguments else { unreachable!("the table says three") };
+    let [vector, start, end] = exactly(arguments);
     let length = vm.vector_length(vector)?;
     let (start, end) = vm.bounds(start, end, length)?;
     if end - start > LIMIT {

@@ -15,6 +15,8 @@ use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::task::End;
 use crate::value::Value;
 use crate::vm::Vm;
+
+use super::expect::exactly;
 use crate::world::stream::{StreamKind, make_stream, slot};
 
 mod read;
@@ -312,21 +314,19 @@ impl Vm {
 
 // ---- making and closing
 
-/// `(%standard-stream number)`
 pub(super) fn standard_stream(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let index = vm.index_below(arguments[0], 3)?;
     Ok(vm.world.streams[index])
 }
 
-/// `(%make-string-input string start end)`
 pub(super) fn make_string_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let characters = vm.few_characters(arguments[0], arguments[1], arguments[2])?;
+    let [string, start, end] = exactly(arguments);
+    let characters = vm.few_characters(string, start, end)?;
     vm.exchange.charge_elements(characters.len());
     let buffer = vm.heap.alloc_string(&characters)?;
     Ok(make_stream(&mut vm.heap, StreamKind::StringInput, buffer, 0, characters.len())?)
 }
 
-/// `(%read-from-copy string)`
 pub(super) fn read_from_copy(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(length) = vm.heap.string(arguments[0]).map(<[u32]>::len) else {
         return vm.exchange.type_error(arguments[0], "SIMPLE-STRING");
@@ -334,19 +334,16 @@ pub(super) fn read_from_copy(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(make_stream(&mut vm.heap, StreamKind::StringInput, arguments[0], 0, length)?)
 }
 
-/// `(%string-input-position stream)`
 pub(super) fn string_input_position(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (stream, _) = vm.designated_stream(arguments[0], true)?;
     Ok(vm.stream_slot(stream, slot::POSITION))
 }
 
-/// `(%make-string-output)`
 pub(super) fn make_string_output(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     let buffer = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
     Ok(make_stream(&mut vm.heap, StreamKind::StringOutput, buffer, 0, 0)?)
 }
 
-/// `(get-output-stream-string stream)`
 pub(super) fn get_output_stream_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = arguments[0];
     if StreamKind::of(&vm.heap, stream) != Some(StreamKind::StringOutput) {
@@ -372,7 +369,6 @@ pub(super) fn get_output_stream_string(vm: &mut Vm, arguments: &[Value]) -> Outc
     Ok(text)
 }
 
-/// `(%gathered-length stream)`
 pub(super) fn gathered_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = arguments[0];
     if StreamKind::of(&vm.heap, stream) != Some(StreamKind::StringOutput) {
@@ -381,7 +377,6 @@ pub(super) fn gathered_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::index(vm.stream_index(stream, slot::BEFORE) + vm.stream_index(stream, slot::POSITION)))
 }
 
-/// `(%take-gathered stream length)`
 pub(super) fn take_gathered(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = arguments[0];
     if gathered_length(vm, arguments)? != arguments[1] {
@@ -397,7 +392,6 @@ pub(super) fn take_gathered(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(strings)
 }
 
-/// `(%open-input path)`
 pub(super) fn open_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
     let buffer = file_text(vm, arguments)?;
@@ -408,10 +402,10 @@ pub(super) fn open_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(stream)
 }
 
-/// `(%open-output path mode)`: 0 replaces the file, 1 appends, 2 makes it and fails if there is one.
 pub(super) fn open_output(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
-    let mode = vm.index_below(arguments[1], 3)?;
+    let [path, mode] = exactly(arguments);
+    let Some(path) = vm.text_of(path) else { return vm.exchange.type_error(path, "STRING") };
+    let mode = vm.index_below(mode, 3)?;
     let buffer = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
     let stream = make_stream(&mut vm.heap, StreamKind::FileOutput, buffer, 0, 0)?;
     let name = vm.heap.alloc_str(&path)?;
@@ -435,9 +429,8 @@ fn write_mode(mode: usize) -> WriteMode {
     }
 }
 
-/// `(%close stream abort)`
 pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let stream = arguments[0];
+    let [stream, abort] = exactly(arguments);
     let Some(kind) = StreamKind::of(&vm.heap, stream) else {
         return vm.exchange.type_error(stream, "STREAM");
     };
@@ -449,7 +442,7 @@ pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             vm.outside.flush();
             return Ok(Value::T);
         }
-        StreamKind::FileOutput if arguments[1].is_nil() => {
+        StreamKind::FileOutput if abort.is_nil() => {
             vm.set_stream_slot(stream, slot::OPEN, Value::NIL);
             vm.write_out(stream)?;
         }
@@ -458,7 +451,6 @@ pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::T)
 }
 
-/// `(%file-text path)`
 pub(super) fn file_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
     match vm.outside.host.read_file(&path) {
@@ -470,13 +462,11 @@ pub(super) fn file_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%file-exists-p path)`
 pub(super) fn file_exists_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
     Ok(Value::boolean(vm.outside.host.file_exists(&path)))
 }
 
-/// `(%delete-file path)`
 pub(super) fn delete_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
     match vm.outside.host.delete_file(&path) {
@@ -487,12 +477,10 @@ pub(super) fn delete_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 // ---- asking
 
-/// `(streamp object)`
 pub(super) fn streamp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::boolean(StreamKind::of(&vm.heap, arguments[0]).is_some()))
 }
 
-/// `(input-stream-p stream)`
 pub(super) fn input_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match StreamKind::of(&vm.heap, arguments[0]) {
         Some(kind) => Ok(Value::boolean(kind.is_input())),
@@ -500,7 +488,6 @@ pub(super) fn input_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(output-stream-p stream)`
 pub(super) fn output_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match StreamKind::of(&vm.heap, arguments[0]) {
         Some(kind) => Ok(Value::boolean(!kind.is_input())),
@@ -508,7 +495,6 @@ pub(super) fn output_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(open-stream-p stream)`
 pub(super) fn open_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match StreamKind::of(&vm.heap, arguments[0]) {
         Some(_) => Ok(vm.stream_slot(arguments[0], slot::OPEN)),
@@ -516,7 +502,6 @@ pub(super) fn open_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%stream-kind stream)`: a keyword, and the name of its file.
 pub(super) fn stream_sort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(kind) = StreamKind::of(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "STREAM");
@@ -531,7 +516,6 @@ pub(super) fn stream_sort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.give_values(&[kind, name])
 }
 
-/// `(%stream-column stream)`
 pub(super) fn stream_column(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (stream, kind) = vm.designated_stream(arguments[0], false)?;
     Ok(Value::index(vm.column_of(stream, kind)))

@@ -15,7 +15,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 use super::COPY_LIMIT;
-use super::expect::optional;
+use super::expect::{exactly, optional};
 use super::types::is_string;
 
 /// Length of a pattern times that of the string in which it may be looked for at once.
@@ -53,7 +53,6 @@ fn text(vm: &Vm, string: Value) -> &[u32] {
     characters_of(&vm.heap, string).unwrap_or_default()
 }
 
-/// `(string designator)`
 pub(super) fn string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.string_designator(arguments[0])
 }
@@ -68,20 +67,19 @@ fn string_and_index(vm: &mut Vm, string: Value, index: Value) -> Result<usize, E
     vm.index_below(index, size)
 }
 
-/// `(char string index)`
 pub(super) fn char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    if let (Some(characters), Some(index)) = (vm.heap.string(arguments[0]), arguments[1].as_index())
+    let [string, index] = exactly(arguments);
+    if let (Some(characters), Some(index)) = (vm.heap.string(string), index.as_index())
         && let Some(v) = characters.get(index).and_then(|&code| Value::character(code))
     {
         return Ok(v);
     }
-    let index = string_and_index(vm, arguments[0], arguments[1])?;
-    Ok(all_elements(&vm.heap, arguments[0]).and_then(|elements| elements.get(index)).unwrap_or(Value::NIL))
+    let index = string_and_index(vm, string, index)?;
+    Ok(all_elements(&vm.heap, string).and_then(|elements| elements.get(index)).unwrap_or(Value::NIL))
 }
 
-/// `(%set-char string index character)`
 pub(super) fn set_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[string, index, character] = arguments else { unreachable!("the table says three") };
+    let [string, index, character] = exactly(arguments);
     let index = string_and_index(vm, string, index)?;
     let data = data_of(&vm.heap, string).unwrap_or(string);
     vm.check_element(data, character)?;
@@ -89,12 +87,10 @@ pub(super) fn set_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(character)
 }
 
-/// `(%make-string size character)`
 pub(super) fn make_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let size = vm.count(arguments[0])?;
-    let Some(code) = arguments[1].as_character() else {
-        return vm.exchange.type_error(arguments[1], "CHARACTER");
-    };
+    let [size, character] = exactly(arguments);
+    let size = vm.count(size)?;
+    let Some(code) = character.as_character() else { return vm.exchange.type_error(character, "CHARACTER") };
     if size > COPY_LIMIT {
         return Err(Exit::Slowly);
     }
@@ -129,17 +125,14 @@ fn same(vm: &mut Vm, arguments: &[Value], fold: bool) -> Outcome {
     Ok((compare(vm, arguments, fold)?.0 == Ordering::Equal).into())
 }
 
-/// `(%string= left right &optional start1 end1 start2 end2)`
 pub(super) fn string_equal_exactly(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     same(vm, arguments, false)
 }
 
-/// `(%string-equal left right &optional start1 end1 start2 end2)`
 pub(super) fn string_equal_loosely(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     same(vm, arguments, true)
 }
 
-/// `(%string-compare left right start1 end1 start2 end2 fold)`: -1, 0 or 1, and the index of the first difference.
 pub(super) fn string_compare(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (order, at) = compare(vm, &arguments[..6], arguments[6].is_true())?;
     vm.give_values(&[Value::small(order as i32), Value::index(at)])
@@ -192,32 +185,26 @@ fn converted_in_place(vm: &mut Vm, arguments: &[Value], case: Case) -> Outcome {
     Ok(string)
 }
 
-/// `(%string-upcase string start end)`
 pub(super) fn upcase(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     converted(vm, arguments, Case::Up)
 }
 
-/// `(%string-downcase string start end)`
 pub(super) fn downcase(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     converted(vm, arguments, Case::Down)
 }
 
-/// `(%string-capitalize string start end)`
 pub(super) fn capitalize(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     converted(vm, arguments, Case::Capital)
 }
 
-/// `(%nstring-upcase string start end)`
 pub(super) fn upcase_in_place(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     converted_in_place(vm, arguments, Case::Up)
 }
 
-/// `(%nstring-downcase string start end)`
 pub(super) fn downcase_in_place(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     converted_in_place(vm, arguments, Case::Down)
 }
 
-/// `(%nstring-capitalize string start end)`
 pub(super) fn capitalize_in_place(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     converted_in_place(vm, arguments, Case::Capital)
 }
@@ -244,22 +231,18 @@ fn trimmed(vm: &mut Vm, arguments: &[Value], left: bool, right: bool) -> Outcome
     Ok(vm.heap.alloc_string(&kept)?)
 }
 
-/// `(string-trim bag string)`
 pub(super) fn trim(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     trimmed(vm, arguments, true, true)
 }
 
-/// `(string-left-trim bag string)`
 pub(super) fn left_trim(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     trimmed(vm, arguments, true, false)
 }
 
-/// `(string-right-trim bag string)`
 pub(super) fn right_trim(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     trimmed(vm, arguments, false, true)
 }
 
-/// `(%string-concat &rest strings)`
 pub(super) fn concat(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut characters: SmallVec<[u32; 64]> = SmallVec::new();
     for &string in arguments {
@@ -275,9 +258,8 @@ pub(super) fn concat(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.alloc_string(&characters)?)
 }
 
-/// `(%search-string pattern string start end from-end)`: where the pattern is, in the part of the string.
 pub(super) fn search(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[pattern, string, start, end, from_end] = arguments else { unreachable!("the table says five") };
+    let [pattern, string, start, end, from_end] = exactly(arguments);
     for v in [pattern, string] {
         if !is_string(vm, v) {
             return vm.exchange.type_error(v, "STRING");

@@ -11,6 +11,8 @@ use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
+use super::expect::exactly;
+
 impl Vm {
     /// A copy of the fixed part of a symbol's object.
     fn cell(&mut self, v: Value) -> Result<Symbol, Exit> {
@@ -65,24 +67,20 @@ impl Vm {
     }
 }
 
-/// `(symbol-name symbol)`
 pub(super) fn symbol_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.cell(arguments[0])?.name)
 }
 
-/// `(symbol-package symbol)`
 pub(super) fn symbol_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.cell(arguments[0])?.package)
 }
 
-/// `(symbol-plist symbol)`
 pub(super) fn symbol_plist(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.cell(arguments[0])?.plist)
 }
 
-/// `(%set-symbol-plist symbol plist)`
 pub(super) fn set_symbol_plist(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[symbol, plist] = arguments else { unreachable!("the table says two") };
+    let [symbol, plist] = exactly(arguments);
     if !plist.is_list() {
         return vm.exchange.type_error(plist, "LIST");
     }
@@ -91,15 +89,13 @@ pub(super) fn set_symbol_plist(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(plist)
 }
 
-/// `(get symbol indicator &optional default)`
 pub(super) fn get(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let plist = vm.cell(arguments[0])?.plist;
     lookup::getf(vm, &[plist, arguments[1], optional(arguments, 2)])
 }
 
-/// `(%put symbol indicator value)`
 pub(super) fn put(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[symbol, indicator, value] = arguments else { unreachable!("the table says three") };
+    let [symbol, indicator, value] = exactly(arguments);
     let object = vm.symbol_object(symbol)?;
     let plist = vm.cell(symbol)?.plist;
     let plist = lookup::putf(vm, &[plist, indicator, value])?;
@@ -107,9 +103,8 @@ pub(super) fn put(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(value)
 }
 
-/// `(remprop symbol indicator)`
 pub(super) fn remprop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[symbol, indicator] = arguments else { unreachable!("the table says two") };
+    let [symbol, indicator] = exactly(arguments);
     let object = vm.symbol_object(symbol)?;
     let plist = vm.cell(symbol)?.plist;
     let (plist, was_there) = lookup::without_property(vm, plist, indicator)?;
@@ -117,7 +112,6 @@ pub(super) fn remprop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::boolean(was_there))
 }
 
-/// `(symbol-value symbol)`
 pub(super) fn symbol_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let object = vm.symbol_object(arguments[0])?;
     match vm.symbol_value(object) {
@@ -126,28 +120,24 @@ pub(super) fn symbol_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(set symbol value)`
 pub(super) fn set(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[symbol, value] = arguments else { unreachable!("the table says two") };
+    let [symbol, value] = exactly(arguments);
     let object = vm.symbol_object(symbol)?;
     vm.set_symbol_value(object, value)?;
     Ok(value)
 }
 
-/// `(boundp symbol)`
 pub(super) fn boundp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let object = vm.symbol_object(arguments[0])?;
     Ok(Value::boolean(vm.symbol_value(object).is_some()))
 }
 
-/// `(makunbound symbol)`
 pub(super) fn makunbound(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let object = vm.symbol_object(arguments[0])?;
     vm.set_symbol_value(object, Value::UNBOUND)?;
     Ok(arguments[0])
 }
 
-/// `(fboundp name)`
 pub(super) fn fboundp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let symbol = vm.function_cell(arguments[0])?;
     let is_bound = vm.world.function_of(&vm.heap, symbol).is_some()
@@ -155,7 +145,6 @@ pub(super) fn fboundp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::boolean(is_bound))
 }
 
-/// `(symbol-function symbol)`, `(fdefinition name)`
 pub(super) fn fdefinition(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let symbol = vm.function_cell(arguments[0])?;
     match vm.world.function_of(&vm.heap, symbol).or(vm.world.macro_function_of(&vm.heap, symbol)) {
@@ -164,7 +153,6 @@ pub(super) fn fdefinition(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(fmakunbound name)`
 pub(super) fn fmakunbound(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let symbol = vm.function_cell(arguments[0])?;
     let object = vm.definable(symbol, "function")?;
@@ -173,12 +161,10 @@ pub(super) fn fmakunbound(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(arguments[0])
 }
 
-/// `(%function-cell name)`
 pub(super) fn function_cell(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.function_cell(arguments[0])
 }
 
-/// `(macro-function symbol &optional environment)`
 pub(super) fn macro_function(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let symbol = arguments[0];
     let object = vm.symbol_object(symbol)?;
@@ -193,25 +179,21 @@ pub(super) fn macro_function(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.world.macro_function_of(&vm.heap, object).unwrap_or(Value::NIL))
 }
 
-/// `(%special-p symbol)`
 pub(super) fn special_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let flags = vm.cell(arguments[0])?.header.flags;
     Ok(Value::boolean(flags & Symbol::SPECIAL != 0))
 }
 
-/// `(%constant-p symbol)`
 pub(super) fn constant_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let flags = vm.cell(arguments[0])?.header.flags;
     Ok(Value::boolean(flags & Symbol::CONSTANT != 0))
 }
 
-/// `(%locked-p symbol)`
 pub(super) fn locked_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.symbol_object(arguments[0])?;
     Ok(Value::boolean(vm.world.is_locked(&vm.heap, arguments[0])))
 }
 
-/// `(make-symbol name)`
 pub(super) fn make_symbol(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(text) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
     vm.exchange.charge(text.len());
@@ -219,7 +201,7 @@ pub(super) fn make_symbol(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.world.make_symbol(&mut vm.heap, name, Value::NIL, 0)?)
 }
 
-/// `(gensym &optional (prefix "G"))`; an integer in place of the prefix is the number to use.
+/// An integer in place of the prefix is the number to use.
 pub(super) fn gensym(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let given = optional(arguments, 0);
     let counter = vm.world.known.gensym_counter;
@@ -250,23 +232,19 @@ fn named_symbol(vm: &mut Vm, prefix: &str, number: Value) -> Outcome {
     Ok(vm.world.make_symbol(&mut vm.heap, name, Value::NIL, 0)?)
 }
 
-/// `(%function-name function)`
 pub(super) fn function_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let code = vm.code_of_function(arguments[0])?;
     Ok(vm.heap.code(code).map_or(Value::NIL, |code| code.name))
 }
 
-/// `(%function-lambda-list function)`
 pub(super) fn function_lambda_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.texts_of_function(arguments[0])?.0)
 }
 
-/// `(%function-documentation function)`
 pub(super) fn function_documentation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.texts_of_function(arguments[0])?.1)
 }
 
-/// `(%function-arity function)`
 pub(super) fn function_arity(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.code_of_function(arguments[0])?;
     match vm.arity(arguments[0]) {

@@ -12,7 +12,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 use super::LIMIT;
-use super::expect::optional;
+use super::expect::{exactly, optional};
 
 impl From<Trouble> for Exit {
     fn from(trouble: Trouble) -> Exit {
@@ -81,9 +81,8 @@ enum Place {
     None(u32),
 }
 
-/// `(%make-hash-table test size test-function hash-function)`
 pub(super) fn make_hash_table(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[test, size, test_function, hash_function] = arguments else { unreachable!("the table says four") };
+    let [test, size, test_function, hash_function] = exactly(arguments);
     let comparison = match test.as_index() {
         Some(0) => Comparison::Native(Test::Eq),
         Some(1) => Comparison::Native(Test::Eql),
@@ -98,7 +97,6 @@ pub(super) fn make_hash_table(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(table)
 }
 
-/// `(gethash key table &optional default)`
 pub(super) fn gethash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[1])?;
     match find(vm, table, arguments[0])? {
@@ -107,9 +105,8 @@ pub(super) fn gethash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%puthash key table value)`
 pub(super) fn puthash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[key, table_value, value] = arguments else { unreachable!("the table says three") };
+    let [key, table_value, value] = exactly(arguments);
     let table = table(vm, table_value)?;
     match find(vm, table, key)? {
         Place::Entry(entry, _) => table.set_value(&mut vm.heap, entry, value),
@@ -118,9 +115,8 @@ pub(super) fn puthash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(value)
 }
 
-/// `(%add-to-value key table default delta)`
 pub(super) fn add_to_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[key, table_value, default, delta] = arguments else { unreachable!("the table says four") };
+    let [key, table_value, default, delta] = exactly(arguments);
     let table = table(vm, table_value)?;
     let place = find(vm, table, key)?;
     let old = match place {
@@ -148,37 +144,33 @@ fn add(vm: &mut Vm, table: Table, hash: u32, key: Value, value: Value) -> Result
     Ok(())
 }
 
-/// `(remhash key table)`
 pub(super) fn remhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let table = table(vm, arguments[1])?;
+    let [key, table_value] = exactly(arguments);
+    let table = table(vm, table_value)?;
     let Comparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
-    let hash = equality::hash(&vm.heap, test, arguments[0]);
+    let hash = equality::hash(&vm.heap, test, key);
     let mut work = LIMIT;
-    let found = table.find(&vm.heap, test, arguments[0], hash, &mut work)?;
+    let found = table.find(&vm.heap, test, key, hash, &mut work)?;
     vm.exchange.charge_elements(LIMIT - work);
     Ok(found.is_some_and(|(entry, _)| table.delete(&mut vm.heap, entry, hash)).into())
 }
 
-/// `(clrhash table)`
 pub(super) fn clrhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
     table.clear(&mut vm.heap)?;
     Ok(arguments[0])
 }
 
-/// `(hash-table-count table)`
 pub(super) fn hash_table_count(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
     Ok(Value::index(table.count(&vm.heap)))
 }
 
-/// `(hash-table-size table)`
 pub(super) fn hash_table_size(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
     Ok(Value::index(table.room(&vm.heap)))
 }
 
-/// `(%hash-table-test table)`: the number of the test, and the functions of the program.
 pub(super) fn hash_table_test(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
     let number = match table.comparison(&vm.heap) {
@@ -192,10 +184,10 @@ pub(super) fn hash_table_test(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.give_values(&[Value::small(number), test, hash])
 }
 
-/// `(%table-next table position)`: the position behind the next entry, its key and its value; `NIL` at the end.
 pub(super) fn table_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let table = table(vm, arguments[0])?;
-    let position = vm.count(arguments[1])?;
+    let [table_value, position] = exactly(arguments);
+    let table = table(vm, table_value)?;
+    let position = vm.count(position)?;
     let used = table.used(&vm.heap);
     for at in position..used.min(position.saturating_add(LIMIT)) {
         if let Some((key, value)) = table.entry(&vm.heap, at) {
@@ -209,24 +201,25 @@ pub(super) fn table_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.give_values(&[Value::NIL; 3])
 }
 
-/// `(%table-skip table position)`: a position from which the next entry is the same, at most [`LIMIT`] free ones on.
+/// Passes at most [`LIMIT`] free entries.
 pub(super) fn table_skip(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let table = table(vm, arguments[0])?;
-    let position = vm.count(arguments[1])?;
+    let [table_value, position] = exactly(arguments);
+    let table = table(vm, table_value)?;
+    let position = vm.count(position)?;
     let end = table.used(&vm.heap).min(position.saturating_add(LIMIT)).max(position);
     vm.exchange.charge_elements(end - position);
     let next = (position..end).find(|&at| table.entry(&vm.heap, at).is_some());
     Ok(Value::index(next.unwrap_or(end)))
 }
 
-/// `(%table-hash table key)`: the hash of a key by the table's test of the machine.
 pub(super) fn table_hash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let table = table(vm, arguments[0])?;
+    let [table_value, key] = exactly(arguments);
+    let table = table(vm, table_value)?;
     let test = match table.comparison(&vm.heap) {
         Comparison::Native(test) => test,
         Comparison::Program => Test::Equalp,
     };
-    Ok(Value::index(equality::hash(&vm.heap, test, arguments[1]) as usize))
+    Ok(Value::index(equality::hash(&vm.heap, test, key) as usize))
 }
 
 /// The 32 bits of a hash: a fixnum as [`table_hash`] gives it, or any integer of a hash function of the program.
@@ -237,10 +230,10 @@ fn hash_argument(vm: &mut Vm, v: Value) -> Result<u32, Exit> {
     }
 }
 
-/// `(%table-candidates table hash)`: a list of `(entry . key)` for the keys with this hash.
 pub(super) fn table_candidates(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let table = table(vm, arguments[0])?;
-    let hash = hash_argument(vm, arguments[1])?;
+    let [table_value, hash] = exactly(arguments);
+    let table = table(vm, table_value)?;
+    let hash = hash_argument(vm, hash)?;
     let candidates = table.candidates(&vm.heap, hash);
     vm.exchange.charge_elements(candidates.len());
     let mut list = Value::NIL;
@@ -251,7 +244,6 @@ pub(super) fn table_candidates(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(list)
 }
 
-/// `(%table-serial table)`: a number that changes whenever a key comes or goes.
 pub(super) fn table_serial(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
     Ok(Value::index(table.serial(&vm.heap)))
@@ -265,7 +257,6 @@ fn entry_of_key(vm: &mut Vm, arguments: &[Value]) -> Result<(Table, Option<(usiz
     Ok((table, value.map(|value| (entry, value))))
 }
 
-/// `(%table-value table entry key)`: the value, and whether the entry still has this very key.
 pub(super) fn table_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match entry_of_key(vm, arguments)? {
         (_, Some((_, value))) => vm.give_values(&[value, Value::T]),
@@ -273,7 +264,6 @@ pub(super) fn table_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%set-table-value table entry key value)`: whether it was done, as the entry still has this very key.
 pub(super) fn set_table_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (table, found) = entry_of_key(vm, arguments)?;
     if let Some((entry, _)) = found {
@@ -282,9 +272,8 @@ pub(super) fn set_table_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(found.is_some().into())
 }
 
-/// `(%table-add table hash key value serial)`: whether it was done, as no key came or went since `serial`.
 pub(super) fn table_add(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[table_value, hash, key, value, serial] = arguments else { unreachable!("the table says five") };
+    let [table_value, hash, key, value, serial] = exactly(arguments);
     let table = table(vm, table_value)?;
     let hash = hash_argument(vm, hash)?;
     if serial.as_index() != Some(table.serial(&vm.heap)) {
@@ -294,7 +283,6 @@ pub(super) fn table_add(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::T)
 }
 
-/// `(%table-delete table entry key hash)`: whether it was done, as the entry still has this very key and hash.
 pub(super) fn table_delete(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (table, found) = entry_of_key(vm, arguments)?;
     let hash = hash_argument(vm, arguments[3])?;

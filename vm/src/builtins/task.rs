@@ -10,6 +10,8 @@ use crate::task::guard;
 use crate::task::{DEFAULT_PRIORITY, PRIORITIES, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
+
+use super::expect::exactly;
 use crate::wait::{WaitOptions, event};
 
 impl Vm {
@@ -58,7 +60,6 @@ impl Vm {
     }
 }
 
-/// `(%spawn function &optional name priority budget daemon notify)`
 pub(super) fn spawn(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let argument = |index: usize| arguments.get(index).copied().unwrap_or(Value::NIL);
     let function = vm.callable(arguments[0])?;
@@ -86,17 +87,14 @@ pub(super) fn spawn(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.scheduler.tasks.get(id).map_or(Value::NIL, |task| task.object))
 }
 
-/// `(current-task)`
 pub(super) fn current_task(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     Ok(vm.scheduler.task().object)
 }
 
-/// `(%taskp object)`
 pub(super) fn taskp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::boolean(vm.heap.is(arguments[0], Kind::Task)))
 }
 
-/// `(task-status task)`
 pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point_of_read()?;
     let task = vm.expect_task(arguments[0])?;
@@ -109,7 +107,6 @@ pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     })
 }
 
-/// `(%task-number task)`: its number and that of the task that made it, while it lives; `NIL` afterwards.
 pub(super) fn task_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = vm.expect_task(arguments[0])?;
     let Some(index) = vm.slot(task, event::STATE).as_index() else { return Ok(Value::NIL) };
@@ -121,7 +118,6 @@ pub(super) fn task_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.give_values(&[Value::index(number as usize), parent])
 }
 
-/// `(%task-ticks task)`
 pub(super) fn task_ticks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = vm.expect_task(arguments[0])?;
     let Some(index) = vm.slot(task, event::STATE).as_index() else { return Ok(Value::NIL) };
@@ -129,7 +125,6 @@ pub(super) fn task_ticks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::index(ticks as usize))
 }
 
-/// `(%task-end task)`: the status of a task that has ended, then its values, or the condition; `NIL` before.
 pub(super) fn task_end(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point_of_read()?;
     let task = vm.expect_task(arguments[0])?;
@@ -154,7 +149,6 @@ fn give_end(vm: &mut Vm, task: Value) -> Outcome {
     Err(Exit::Values)
 }
 
-/// `(%task-value task)`
 pub(super) fn task_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = vm.expect_task(arguments[0])?;
     if vm.slot(task, event::STATE) != vm.world.known.succeeded {
@@ -165,7 +159,6 @@ pub(super) fn task_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(if has_one_value { result } else { vm.heap.car(result).unwrap_or(Value::NIL) })
 }
 
-/// `(%all-tasks hidden)`
 pub(super) fn all_tasks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if vm.scheduler.tasks.places() > LIMIT {
         return Err(Exit::Slowly);
@@ -180,15 +173,13 @@ pub(super) fn all_tasks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.list(&objects)?)
 }
 
-/// `(%tasks-from place hidden)`
 pub(super) fn tasks_from(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(place) = arguments[0].as_index() else {
-        return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
-    };
+    let [place, hidden] = exactly(arguments);
+    let Some(place) = place.as_index() else { return vm.exchange.type_error(place, "UNSIGNED-BYTE") };
     let end = vm.scheduler.tasks.places().min(place.saturating_add(LIMIT));
     let mut objects = Vec::new();
     for index in place..end {
-        objects.extend(vm.listed_task(index, arguments[1].is_true()).map(|(_, object)| object));
+        objects.extend(vm.listed_task(index, hidden.is_true()).map(|(_, object)| object));
     }
     let list = vm.heap.list(&objects)?;
     vm.exchange.charge(LIMIT + 8 * objects.len());
@@ -196,19 +187,18 @@ pub(super) fn tasks_from(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.give_values(&[list, next])
 }
 
-/// `(%join task child)`
 pub(super) fn join(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [task, child] = exactly(arguments);
     if vm.scheduler.task().wait.is_nil() {
         vm.point()?;
     }
-    let task = vm.expect_task(arguments[0])?;
-    match vm.wait_for_end(task, false, arguments[1].is_true()) {
+    let task = vm.expect_task(task)?;
+    match vm.wait_for_end(task, false, child.is_true()) {
         Some(outcome) => outcome,
         None => give_end(vm, task),
     }
 }
 
-/// `(%request-abort task)`
 pub(super) fn request_abort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point()?;
     let task = vm.expect_task(arguments[0])?;
@@ -220,7 +210,6 @@ pub(super) fn request_abort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::NIL)
 }
 
-/// `(abort-task task)`
 pub(super) fn abort_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = vm.expect_task(arguments[0])?;
     if vm.scheduler.task().wait.is_nil() {
@@ -242,7 +231,6 @@ pub(super) fn abort_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.wait_for_end(task, true, false).unwrap_or(Ok(Value::NIL))
 }
 
-/// `(%add-checkpoint id)`
 pub(super) fn add_checkpoint(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point()?;
     vm.wait_for_deliveries()?;
@@ -253,14 +241,12 @@ pub(super) fn add_checkpoint(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::NIL)
 }
 
-/// `(%checkpoints task)`
 pub(super) fn checkpoints(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point_of_read()?;
     let task = vm.expect_task(arguments[0])?;
     Ok(vm.slot(task, event::CHECKPOINTS))
 }
 
-/// `(%make-guard function)`
 pub(super) fn make_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let function = vm.callable(arguments[0])?;
     let height = vm.scheduler.task().control.get().map_or(0, |control| control.entries.len());
@@ -272,7 +258,6 @@ pub(super) fn make_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.alloc_record(Kind::Record, 0, guard::AUX, &slots)?)
 }
 
-/// `(%interrupt-by guard)`
 pub(super) fn interrupt_by(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point()?;
     if guard::is_guard(&vm.heap, arguments[0]) {
@@ -282,7 +267,6 @@ pub(super) fn interrupt_by(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::NIL)
 }
 
-/// `(%close-guard guard)`
 pub(super) fn close_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.point()?;
     if guard::is_guard(&vm.heap, arguments[0]) {
@@ -291,15 +275,13 @@ pub(super) fn close_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::NIL)
 }
 
-/// `(%open-limit tag seconds ticks)`
 pub(super) fn open_limit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let &[tag, seconds, ticks] = arguments else { unreachable!("the table says three") };
+    let [tag, seconds, ticks] = exactly(arguments);
     let time = if seconds.is_nil() { None } else { Some(vm.nanoseconds(seconds)?) };
     let ticks = if ticks.is_nil() { None } else { Some(vm.ticks_argument(ticks)?) };
     Ok(Value::boolean(vm.open_limit(tag, time, ticks)))
 }
 
-/// `(%begin-critical)`
 pub(super) fn begin_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     vm.point()?;
     let ticks = i64::from(vm.config.critical_ticks);
@@ -316,7 +298,6 @@ pub(super) fn begin_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     Ok(Value::NIL)
 }
 
-/// `(%end-critical)`
 pub(super) fn end_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     let task = vm.scheduler.task_mut();
     task.critical = task.critical.saturating_sub(1);

@@ -74,65 +74,30 @@ macro_rules! predicates {
 }
 
 predicates! {
-    /// `(consp object)`
     consp = Cons;
-    /// `(atom object)`
     atom = Atom;
-    /// `(listp object)`
     listp = List;
-    /// `(not object)` and `(null object)`
     null = Null;
-    /// `(symbolp object)`
     symbolp = Symbol;
-    /// `(keywordp object)`
     keywordp = Keyword;
-    /// `(numberp object)`
     numberp = Number;
-    /// `(realp object)`
     realp = Real;
-    /// `(rationalp object)`
     rationalp = Rational;
-    /// `(integerp object)`
     integerp = Integer;
-    /// `(floatp object)`
     floatp = Float;
-    /// `(characterp object)`
     characterp = Character;
-    /// `(stringp object)`
     stringp = String;
-    /// `(vectorp object)`
     vectorp = Vector;
-    /// `(simple-vector-p object)`
     simple_vector_p = SimpleVector;
-    /// `(arrayp object)`
     arrayp = Array;
-    /// `(functionp object)`
     functionp = Function;
-    /// `(hash-table-p object)`
     hash_table_p = HashTable;
 }
 
-/// `(identity object)`
-pub(super) fn identity(_vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(arguments[0])
-}
-
-/// `(eq left right)`
-pub(super) fn eq(_vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(Value::boolean(arguments[0] == arguments[1]))
-}
-
-/// `(eql left right)`
-pub(super) fn eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(Value::boolean(number::eql(&vm.heap, arguments[0], arguments[1])))
-}
-
-/// `(simple-string-p object)`
 pub(super) fn simple_string_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.is(arguments[0], Kind::String).into())
 }
 
-/// `(random-state-p object)`
 pub(super) fn random_state_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.is(arguments[0], Kind::RandomState).into())
 }

@@ -126,7 +126,7 @@ fn accessors_are_known_until_they_are_redefined() {
     let name = vm.world.intern_esl(&mut vm.heap, "POINT-Y").unwrap();
     let car = vm.world.intern_cl(&mut vm.heap, "CAR").unwrap();
     let function = vm.world.function_of(&vm.heap, car).unwrap();
-    crate::builtins::native(Builtin::SetFunction)(&mut vm, &[name, function]).unwrap();
+    crate::builtins::NATIVES[Builtin::SetFunction as usize](&mut vm, &[name, function]).unwrap();
     assert_eq!(vm.global(&Symbol::esl("POINT-Y")).accessor, None);
 }
 
@@ -225,7 +225,7 @@ impl Compile for Toy {
 }
 
 fn native(vm: &mut Vm, builtin: Builtin, arguments: &[Value]) -> Vec<Value> {
-    match crate::builtins::native(builtin)(vm, arguments) {
+    match crate::builtins::NATIVES[builtin as usize](vm, arguments) {
         Ok(value) => vec![value],
         Err(crate::raise::Exit::Values) => vm.exchange.values.clone(),
         Err(exit) => panic!("{builtin:?}: {exit:?} {:?}", vm.exchange.raised),
@@ -264,7 +264,11 @@ fn a_program_steps_a_compilation() {
         assert_eq!(step[2], Value::NIL, "no diagnostics");
         native(&mut vm, Builtin::EndCompilation, &[handle]);
         assert!(
-            crate::builtins::native(Builtin::CompilationStep)(&mut vm, &[handle, start, Value::NIL]).is_err()
+            crate::builtins::NATIVES[Builtin::CompilationStep as usize](
+                &mut vm,
+                &[handle, start, Value::NIL]
+            )
+            .is_err()
         );
     }
     assert_eq!(native(&mut vm, Builtin::NextForm, &[text]), [Value::NIL]);

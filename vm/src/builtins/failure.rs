@@ -1,76 +1,25 @@
-//! Calls, multiple values, and what the library needs to signal a failure: the handlers on the control stack, the end of
-//! a task, backtraces.
+//! What the library needs to signal a failure: the handlers on the control stack, the end of a task, backtraces.
 
 use smallvec::SmallVec;
 
-use crate::interp::arguments::MAX_SPREAD;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::task::FailureReport;
 use crate::task::{End, EntryKind, Target, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// `(funcall function &rest arguments)`
-pub(super) fn funcall(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.exchange.request_call(arguments[0], &arguments[1..]);
-    Err(Exit::Call)
-}
+use super::expect::exactly;
 
-/// `(apply function argument &rest arguments)`
-pub(super) fn apply(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (&list, given) = arguments[1..].split_last().expect("the table asks for two arguments");
-    let mut spread = given.to_vec();
-    let mut rest = list;
-    while let Some(pair) = vm.heap.as_cons(rest) {
-        if spread.len() == MAX_SPREAD {
-            return vm.exchange.program_error(format!("more than {MAX_SPREAD} arguments"));
-        }
-        spread.push(pair.car);
-        rest = pair.cdr;
-    }
-    if rest.is_true() {
-        return vm.exchange.type_error(list, "LIST");
-    }
-    vm.exchange.charge(spread.len());
-    vm.exchange.request_call(arguments[0], &spread);
-    Err(Exit::Call)
-}
-
-/// `(values &rest values)`
-pub(super) fn values(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.exchange.values.clear();
-    vm.exchange.values.extend_from_slice(arguments);
-    Err(Exit::Values)
-}
-
-/// `(values-list list)`
-pub(super) fn values_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let mut rest = arguments[0];
-    vm.exchange.values.clear();
-    while let Some(pair) = vm.heap.as_cons(rest) {
-        if vm.exchange.values.len() == MAX_SPREAD {
-            return vm.exchange.program_error(format!("more than {MAX_SPREAD} values"));
-        }
-        vm.exchange.values.push(pair.car);
-        rest = pair.cdr;
-    }
-    if rest.is_true() {
-        return vm.exchange.type_error(arguments[0], "LIST");
-    }
-    vm.exchange.charge(vm.exchange.values.len());
-    Err(Exit::Values)
-}
-
-/// `(%next-handler height failure)`
 pub(super) fn next_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let height = match arguments[0].as_index() {
+    let [height, failure] = exactly(arguments);
+    let (is_failure, is_first) = (failure.is_true(), height.is_nil());
+    let height = match height.as_index() {
         Some(height) => height,
-        None if arguments[0].is_nil() => usize::MAX,
-        None => return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE"),
+        None if is_first => usize::MAX,
+        None => return vm.exchange.type_error(height, "UNSIGNED-BYTE"),
     };
-    let is_failure = arguments[1].is_true();
-    if vm.watch.is_watched && is_failure && arguments[0].is_nil() {
-        vm.tell_of_failure(arguments[1], false);
+    if vm.watch.is_watched && is_failure && is_first {
+        vm.tell_of_failure(failure, false);
     }
     let mut steps = 0;
     let found = vm.scheduler.task().control.find_handlers(height, is_failure, &mut steps);
@@ -87,15 +36,14 @@ pub(super) fn next_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Err(Exit::Values)
 }
 
-/// `(%begin-recovery index table failure)`
 pub(super) fn begin_recovery(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let table = arguments[1];
+    let [index, table, failure] = exactly(arguments);
     let items = vm.heap.vector(table).unwrap_or_default();
     let state = if items.first().is_some_and(|first| first.is_true()) {
         table
     } else {
         let mut items: SmallVec<[Value; 16]> = items.into();
-        let index = arguments[0].as_index().unwrap_or(usize::MAX);
+        let index = index.as_index().unwrap_or(usize::MAX);
         let Some(function) = vm.recovery_function(index)? else {
             return vm
                 .exchange
@@ -112,42 +60,40 @@ pub(super) fn begin_recovery(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         state
     };
     if vm.watch.is_watched {
-        vm.tell_of_failure(arguments[2], true);
+        vm.tell_of_failure(failure, true);
     }
     Ok(state)
 }
 
-/// `(%stand-in index values)`
 pub(super) fn stand_in(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let index = arguments[0].as_index().unwrap_or(usize::MAX);
+    let [index, values] = exactly(arguments);
+    let index = index.as_index().unwrap_or(usize::MAX);
     let control = &vm.scheduler.task().control;
     let Some(handler) = control.entries.get(index) else { return Ok(Value::NIL) };
     // A cleanup of the library goes on to its end, and so does what it has interrupted.
     let cleanup = control.innermost_cleanup().and_then(|index| control.entries.get(index));
     let around = cleanup.map_or(handler.base, |cleanup| cleanup.base.max(handler.base));
-    let mut values = Vec::new();
-    let mut rest = arguments[1];
+    let mut items = Vec::new();
+    let mut rest = values;
     while let Some(pair) = vm.heap.as_cons(rest) {
-        values.push(pair.car);
+        items.push(pair.car);
         rest = pair.cdr;
     }
-    vm.exchange.charge(values.len());
-    let Some(base) = vm.frame_of_operation(around) else { return vm.give_values(&values) };
+    vm.exchange.charge(items.len());
+    let Some(base) = vm.frame_of_operation(around) else { return vm.give_values(&items) };
     let control = &mut vm.scheduler.task_mut().control;
     let entries = control.entries.partition_point(|entry| entry.base < base);
-    control.unwinding = Some(Unwinding { target: Target::Return { entries, base }, values });
+    control.unwinding = Some(Unwinding { target: Target::Return { entries, base }, values: items });
     Err(Exit::Unwind)
 }
 
-/// `(%unwind-to-cleanup index failure)`
 pub(super) fn unwind_to_cleanup(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(index) = arguments[0].as_index() else {
-        return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
-    };
+    let [index, failure] = exactly(arguments);
+    let Some(index) = index.as_index() else { return vm.exchange.type_error(index, "UNSIGNED-BYTE") };
     let control = &mut vm.scheduler.task_mut().control;
     match control.entries.get(index) {
         Some(entry) if entry.kind == EntryKind::FailureCleanup => {
-            let values = vec![arguments[1]];
+            let values = vec![failure];
             control.unwinding = Some(Unwinding { target: Target::Entry(index), values });
             Err(Exit::Unwind)
         }
@@ -155,13 +101,11 @@ pub(super) fn unwind_to_cleanup(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%cleaning-up)`
 pub(super) fn cleaning_up(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     let running = vm.scheduler.task().control.running.last().filter(|running| running.pending.is_none());
     Ok(running.and_then(|running| running.values.first().copied()).unwrap_or(Value::NIL))
 }
 
-/// `(%take-case index case condition)`
 pub(super) fn take_case(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(index) = arguments[0].as_index() else {
         return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
@@ -179,7 +123,6 @@ pub(super) fn take_case(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `(%end-task condition text story ending)`
 pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [story, ending] = [2, 3].map(|index| vm.heap.string_text(arguments[index]).unwrap_or_default());
     match vm.scheduler.task().control.final_unwinding() {
@@ -201,7 +144,6 @@ pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Err(Exit::Unwind)
 }
 
-/// `(%exit status)`
 pub(super) fn exit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let status = arguments[0].as_index().and_then(|status| u8::try_from(status).ok());
     let Some(status) = status else { return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE") };
@@ -211,7 +153,6 @@ pub(super) fn exit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Err(Exit::Unwind)
 }
 
-/// `(%backtrace limit)`
 pub(super) fn backtrace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let limit = arguments[0].as_index().unwrap_or(usize::MAX).min(super::LIMIT);
     let mut rows = Vec::new();
