@@ -10,6 +10,7 @@
 //! | [`number`] | which values are numbers, and which numbers are equal |
 //! | [`equality`] | `eq`, `eql`, `equal`, `equalp`, and hashes that agree with them |
 //! | [`table`] | hash tables that keep the order of insertion |
+//! | [`state`] | the list of all state, and the macro that makes it |
 //! | [`character`] | case, classes and names of characters |
 //!
 //! Guarantees: safe code cannot break memory safety through this crate, however odd the caller, once the two promises of
@@ -24,6 +25,7 @@ pub mod heap;
 pub mod number;
 pub mod saved_pc;
 pub mod stack;
+pub mod state;
 pub mod table;
 pub mod value;
 

@@ -19,6 +19,7 @@
 use std::alloc::{Layout, alloc, dealloc, handle_alloc_error};
 use std::ptr::NonNull;
 
+use crate::list_state;
 use crate::value::Value;
 
 /// A stack.
@@ -26,6 +27,9 @@ pub struct Stack {
     start: NonNull<Value>,
     capacity: u32,
 }
+
+// The words behind `start` are the run's, their address is the process's.
+list_state! { Stack { start: Run, capacity: Run } }
 
 // SAFETY: a stack owns its segment; the values in it belong to the heap of the machine that owns the stack.
 unsafe impl Send for Stack {}

@@ -18,6 +18,7 @@ use super::large::{LargeObject, footprint, is_large};
 use super::layout::GRANULE;
 use super::metadata::{END, next_hole};
 use super::{Heap, Phase};
+use crate::list_state;
 use std::ptr::NonNull;
 
 /// Greatest object, in bytes, for which the first region moves on to its next hole.
@@ -68,6 +69,19 @@ pub(super) struct Region {
     cursor: (usize, usize),
     /// Arena and block of a new arena to consider before that.
     fresh: Option<(usize, usize)>,
+}
+
+list_state! {
+    Region {
+        next: Run,
+        end: Run,
+        hole_end: Run,
+        counted: Run,
+        black_from: Run,
+        scan: Run,
+        cursor: Run,
+        fresh: Run,
+    }
 }
 
 impl Region {

@@ -15,6 +15,7 @@
 
 use super::layout::GRANULE;
 use super::metadata::{self, Summary};
+use crate::list_state;
 use std::alloc::{Layout, alloc, dealloc};
 use std::ops::Range;
 use std::ptr::NonNull;
@@ -64,6 +65,9 @@ pub(super) struct Block {
     pub(super) summary: Summary,
 }
 
+list_state! { ArenaHeader { number: Derived, grays: Derived } }
+list_state! { Block { state: Run, summary: Parts } }
+
 impl Block {
     const EMPTY: Block = Block {
         state: BlockState::Swept,
@@ -81,6 +85,9 @@ pub(super) struct Arena {
     base: NonNull<u8>,
     blocks: [Block; BLOCKS + 1],
 }
+
+// The objects and metadata behind `base` are the run's, their address is the process's.
+list_state! { Arena { base: Run, blocks: Parts } }
 
 impl Arena {
     /// A new arena with empty blocks, or nothing if the system has no memory.

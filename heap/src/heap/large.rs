@@ -10,6 +10,7 @@
 
 use super::arena::LARGE;
 use super::layout::{GRANULE, Header};
+use crate::list_state;
 use std::alloc::{Layout, alloc, dealloc, realloc};
 use std::ptr::NonNull;
 
@@ -32,6 +33,17 @@ pub(super) struct LargeHeader {
 
 const _: () = assert!(size_of::<LargeHeader>() == 32 && size_of::<LargeHeader>().is_multiple_of(GRANULE));
 
+list_state! {
+    LargeHeader {
+        bytes: Run,
+        number: Run,
+        index: Derived,
+        epoch: Run,
+        gray: Run,
+        filled: Run,
+    }
+}
+
 /// Bytes that an object of this size takes from the system.
 pub(super) const fn footprint(bytes: usize) -> usize {
     bytes + size_of::<LargeHeader>()
@@ -45,6 +57,9 @@ pub(super) const fn is_large(bytes: usize) -> bool {
 
 /// A large object, owned.
 pub(super) struct LargeObject(NonNull<LargeHeader>);
+
+// The header and the object are the run's, their address is the process's.
+list_state! { LargeObject { 0: Parts } }
 
 impl LargeObject {
     /// Memory for an object of `bytes`, or nothing if the system has none.

@@ -26,6 +26,7 @@ use super::large;
 use super::layout::{Code, Cons, GRANULE, Header, Kind};
 use super::metadata::{END, EPOCH, GRAY, GRAY_CONS, next_epoch, next_gray};
 use super::{Heap, Phase, SliceOutcome};
+use crate::list_state;
 use crate::value::Value;
 
 /// Elements of a record that are followed at once.
@@ -48,6 +49,8 @@ pub(super) struct Marker {
     /// Bytes marked in this cycle.
     pub(super) bytes: u64,
 }
+
+list_state! { Marker { stack: Run, capacity: Run, pieces: Run, grays: Derived, bytes: Run } }
 
 impl Marker {
     pub(super) fn new(capacity: usize) -> Marker {

@@ -26,6 +26,7 @@
 //! Source: one byte per granule, end bits and bump allocation into the holes are Nofl's (Wingo 2025, arXiv 2503.16971).
 //! We differ in writing no byte when allocating, and in treating all that was allocated while marking as one extent.
 
+use crate::list_state;
 use std::ops::Range;
 
 /// Mask of the epoch.
@@ -52,6 +53,8 @@ pub(super) struct Summary {
     /// The longest hole.
     pub(super) largest: usize,
 }
+
+list_state! { Summary { free: Run, largest: Run } }
 
 /// The eight bytes at `at`, if there are as many and `at` is a multiple of eight.
 #[inline(always)]

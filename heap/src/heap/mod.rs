@@ -52,6 +52,7 @@ pub use alloc::AllocError;
 pub use layout::Kind;
 pub use object::CodeParts;
 
+use crate::list_state;
 use crate::value::{TAG_MASK, Value};
 use alloc::Region;
 use arena::{ARENA, Arena};
@@ -171,6 +172,43 @@ pub struct Heap {
     limit: usize,
 
     stats: HeapStats,
+}
+
+list_state! { Pacing { floor: Run, threshold: Run, since_cycle: Run, black: Run, owed: Run } }
+
+list_state! {
+    HeapStats {
+        cycles: Run,
+        slices: Run,
+        longest_slice: Run,
+        live: Run,
+        allocated: Run,
+        committed: Derived,
+        peak: Run,
+    }
+}
+
+list_state! {
+    Heap {
+        first: Parts,
+        second: Parts,
+        marking: Derived,
+        due: Derived,
+        reserve_open: Run,
+        phase: Run,
+        epoch: Run,
+        cycle_id: Run,
+        pacing: Parts,
+        marker: Parts,
+        sweep: Parts,
+        arenas: Parts,
+        large: Parts,
+        large_number: Run,
+        committed: Derived,
+        external: Derived,
+        limit: Run,
+        stats: Parts,
+    }
 }
 
 // SAFETY: a heap owns its memory, shares none of it, and is tied to no thread.

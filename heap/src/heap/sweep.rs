@@ -6,10 +6,12 @@
 //!
 //! Guarantees: every block is swept once between two markings. What is allocated while sweeping is not touched by it.
 
+use super::alloc::PIECE;
 use super::arena::{ARENA, BLOCKS, BlockState};
 use super::layout::GRANULE;
 use super::metadata::check_canonical;
 use super::{Heap, Phase, SliceOutcome};
+use crate::list_state;
 
 /// Visits that the sweep of a block counts as.
 const BLOCK_VISITS: i64 = 512;
@@ -34,6 +36,8 @@ pub(super) struct Sweep {
     /// Bytes found live.
     live: u64,
 }
+
+list_state! { Sweep { at: Run, large: Run, spares: Run, live: Run } }
 
 impl Heap {
     /// Turns from marking to sweeping.
@@ -176,6 +180,13 @@ impl Heap {
         }
         if committed != self.committed {
             return Err(format!("{committed} bytes are taken, {} noted", self.committed));
+        }
+        let wants_slice = match self.phase {
+            Phase::Idle => self.pacing.since_cycle >= self.pacing.threshold,
+            Phase::Marking | Phase::Sweeping => self.pacing.owed >= PIECE as u64,
+        };
+        if self.due != wants_slice || self.marking != (self.phase == Phase::Marking) {
+            return Err("the flags for the fast paths do not follow from phase and pacing".into());
         }
         if !self.stats.live.is_multiple_of(GRANULE as u64) {
             return Err("live bytes are not whole granules".into());
