@@ -4,6 +4,7 @@ use std::fmt;
 
 use esl_bytecode::symbol::USER_PACKAGE;
 use esl_vm::host::{Host, RealHost};
+use esl_vm::run::CallError;
 use esl_vm::vm::{Config, Vm};
 
 use crate::data::Data;
@@ -111,16 +112,16 @@ impl Engine {
     pub fn eval(&mut self, text: &str) -> Result<Data, Error> {
         let datum = esl_bytecode::datum::Datum::string(text, Default::default());
         let text = self.machine.import(&datum).map_err(|_| Error::Setup("no room for the text".into()))?;
-        let function = self.machine.library_function("%EVAL-TEXT").map_err(Error::Setup)?;
-        let before = self.machine.ticks();
+        let function =
+            self.machine.library_function("%EVAL-TEXT").map_err(|error| Error::Setup(error.to_string()))?;
         match self.machine.call(function, &[text], self.ticks) {
             Ok(values) => {
                 let value = values.first().copied().unwrap_or(esl_vm::value::Value::NIL);
-                let datum = self.machine.export(value).map_err(Error::Failed)?;
+                let datum = self.machine.export(value).map_err(|error| Error::Failed(error.to_string()))?;
                 Ok(Data::from_datum(&datum))
             }
-            Err(_) if self.machine.ticks() - before >= self.ticks => Err(Error::OutOfTicks(self.ticks)),
-            Err(text) => Err(Error::Failed(text)),
+            Err(CallError::TicksUsed(ticks)) => Err(Error::OutOfTicks(ticks)),
+            Err(error) => Err(Error::Failed(error.to_string())),
         }
     }
 

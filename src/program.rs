@@ -229,8 +229,8 @@ pub fn set_traces(machine: &mut Vm, traces: &[String]) -> Result<(), String> {
         traces.iter().map(|name| Datum::symbol(Symbol::keyword(&name.to_uppercase()), Span::default()));
     let list = Datum::list(keywords.collect::<Vec<_>>(), Span::default());
     let list = machine.import(&list).map_err(|_| "there is no room for the names of traces".to_string())?;
-    let function = machine.library_function("%SET-TRACES")?;
-    machine.call(function, &[list], u64::MAX)?;
+    let function = machine.library_function("%SET-TRACES").map_err(|error| error.to_string())?;
+    machine.call(function, &[list], u64::MAX).map_err(|error| error.to_string())?;
     machine.trace_tasks(traces.iter().any(|name| name == "tasks"));
     Ok(())
 }
@@ -245,8 +245,8 @@ pub fn set_library(machine: &mut Vm, library: &Library) -> Result<(), String> {
     let list =
         Datum::list(folders.map(|folder| Datum::string(&folder, nowhere)).collect::<Vec<_>>(), nowhere);
     let list = machine.import(&list).map_err(|_| "there is no room for the names of folders".to_string())?;
-    let function = machine.library_function("%SET-MODULE-PATH")?;
-    machine.call(function, &[list], u64::MAX)?;
+    let function = machine.library_function("%SET-MODULE-PATH").map_err(|error| error.to_string())?;
+    machine.call(function, &[list], u64::MAX).map_err(|error| error.to_string())?;
     Ok(())
 }
 
@@ -265,7 +265,7 @@ pub fn run(program: &Program, config: Config, host: Box<dyn Host + Send>) -> Res
 /// As [`run`].
 pub fn begin(machine: &mut Vm, program: &Program) -> Result<TaskId, String> {
     let functions = machine.load_module(&program.module).map_err(|error| error.to_string())?;
-    let main = machine.spawn_library("%RUN-TOPLEVEL", &[functions])?;
+    let main = machine.spawn_library("%RUN-TOPLEVEL", &[functions]).map_err(|error| error.to_string())?;
     machine.set_interruptible(Some(main));
     machine.set_main(main);
     Ok(main)

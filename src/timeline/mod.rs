@@ -12,6 +12,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use esl_vm::observe::{Observer, Seen};
+use esl_vm::task::TaskNumber;
 use esl_vm::vm::Vm;
 
 pub use svg::Drawing;
@@ -65,7 +66,7 @@ impl Timeline {
 }
 
 impl Observer for Watch {
-    fn see(&mut self, time: u64, task: u64, seen: Seen<'_>) {
+    fn see(&mut self, time: u64, task: TaskNumber, seen: Seen<'_>) {
         match &mut *lock(&self.0) {
             Kind::Trace(trace) => trace.see(time, task, seen),
             Kind::Drawing(drawing, _) => drawing.see(time, task, seen),

@@ -8,6 +8,7 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 
 use esl_vm::observe::{Observer, Seen};
+use esl_vm::task::TaskNumber;
 
 /// Bars, arrows and marks that a drawing has at most, and rows.
 const ITEMS: usize = 20_000;
@@ -104,7 +105,7 @@ impl Drawing {
 }
 
 impl Observer for Drawing {
-    fn see(&mut self, time: u64, task: u64, seen: Seen<'_>) {
+    fn see(&mut self, time: u64, TaskNumber(task): TaskNumber, seen: Seen<'_>) {
         if self.full_at.is_some() {
             return;
         }
@@ -147,7 +148,7 @@ impl Observer for Drawing {
             }
             Seen::Signals(event) => self.mark(time, task, Sign::Signals, format!("signals {event}")),
             Seen::IsWokenBy { task: by, event } => {
-                if let (Some(&from), Some(&to)) = (self.row_of.get(&by), self.row_of.get(&task))
+                if let (Some(&from), Some(&to)) = (self.row_of.get(&by.0), self.row_of.get(&task))
                     && from != to
                 {
                     self.arrows.push((time, from, to, event.into()));

@@ -9,6 +9,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use esl_vm::observe::{Observer, Seen};
+use esl_vm::task::TaskNumber;
 
 /// The process that the tracks of tasks belong to, and that of the machine's own.
 const TASKS: u32 = 1;
@@ -136,7 +137,7 @@ impl<W: Write> Trace<W> {
 }
 
 impl<W: Write + Send> Observer for Trace<W> {
-    fn see(&mut self, time: u64, task: u64, seen: Seen<'_>) {
+    fn see(&mut self, time: u64, TaskNumber(task): TaskNumber, seen: Seen<'_>) {
         self.latest = time;
         match seen {
             Seen::Begins { name, is_hidden } => {
@@ -157,7 +158,7 @@ impl<W: Write + Send> Observer for Trace<W> {
                 self.tasks.remove(&task);
             }
             Seen::Signals(event) => self.mark(task, &format!("signals {event}"), "signal"),
-            Seen::IsWokenBy { task: by, event } => self.flow(by, task, event),
+            Seen::IsWokenBy { task: by, event } => self.flow(by.0, task, event),
             Seen::Fails(cause) => self.mark(task, &format!("fails with {cause}"), "failure"),
             Seen::Recovers(cause) => self.mark(task, &format!("recovers from {cause}"), "failure"),
             Seen::CollectionBegins => self.begin_on_collector("collection"),
@@ -197,13 +198,13 @@ mod tests {
             (6, 2, Seen::Waits("event E")),
             (7, 1, Seen::Signals("event E")),
             (7, 2, Seen::IsReady),
-            (7, 2, Seen::IsWokenBy { task: 1, event: "event E" }),
-            (8, 2, Seen::IsWokenBy { task: 9, event: "of nobody" }),
+            (7, 2, Seen::IsWokenBy { task: TaskNumber(1), event: "event E" }),
+            (8, 2, Seen::IsWokenBy { task: TaskNumber(9), event: "of nobody" }),
             (1500, 0, Seen::CollectionBegins),
             (1501, 1, Seen::Ends("failed")),
         ];
         for (time, task, seen) in seen {
-            trace.see(time, task, seen);
+            trace.see(time, TaskNumber(task), seen);
         }
         trace.end().expect("a vector takes it all");
         let text = String::from_utf8(bytes).expect("text");

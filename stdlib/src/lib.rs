@@ -20,7 +20,7 @@ pub fn load(machine: &mut Vm) -> Result<(), String> {
     let no_room = "there is no memory for the library";
     machine.enter_package(ESL_PACKAGE).map_err(|_| no_room)?;
     let functions = machine.open_image(image).map_err(|error| error.to_string())?;
-    machine.run_toplevel(functions, u64::MAX)?;
+    machine.run_toplevel(functions, u64::MAX).map_err(|error| error.to_string())?;
     machine.enter_package(USER_PACKAGE).map_err(|_| no_room)?;
     machine.seal();
     Ok(())

@@ -35,7 +35,7 @@ const MAX_REMEMBERED: usize = 1 << 19;
 
 /// Why an object does not become a datum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum DatumError {
+pub enum DatumError {
     /// It contains itself.
     Circular,
     /// It is too large.

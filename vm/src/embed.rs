@@ -1,7 +1,9 @@
 //! What an embedder does with a machine beside running it: data in and out, and functions of its own.
 
+use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
@@ -14,8 +16,30 @@ use crate::schedule::Choices;
 use crate::task::TaskId;
 use crate::value::Value;
 use crate::vm::{Config, Vm};
+use crate::world::class;
 
+pub use crate::datum::DatumError as ExportError;
 pub use crate::outside::HostFunction;
+
+/// Why a function of the library could not be called.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LibraryError {
+    /// The library has no function of this name.
+    Missing(String),
+    /// There is no memory left for it.
+    NoMemory,
+}
+
+impl fmt::Display for LibraryError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LibraryError::Missing(name) => write!(f, "the library has no function {name}"),
+            LibraryError::NoMemory => f.write_str("there is no memory left for a task"),
+        }
+    }
+}
+
+impl std::error::Error for LibraryError {}
 
 /// What the embedder holds on to, and its requests.
 #[derive(Default)]
@@ -34,6 +58,25 @@ pub(crate) struct Embedder {
     pub(crate) last_words: Option<String>,
 }
 
+impl Embedder {
+    /// Takes an interrupt, and returns the task that it aborts.
+    pub(crate) fn take_interrupt(&self) -> Option<TaskId> {
+        let id = self.interruptible?;
+        take(&self.interrupt).then_some(id)
+    }
+
+    /// Takes a request to have the run come back.
+    pub(crate) fn take_stop(&self) -> bool {
+        take(&self.stop)
+    }
+}
+
+/// Takes a flag that is set from outside.
+fn take(flag: &AtomicBool) -> bool {
+    // A plain look first: it is done once a turn, and writing would cost more.
+    flag.load(Relaxed) && flag.swap(false, Relaxed)
+}
+
 impl Vm {
     /// Takes in a function of the embedder: its number, for `%call-host`.
     pub fn add_host_function(&mut self, function: HostFunction) -> usize {
@@ -45,12 +88,10 @@ impl Vm {
     /// describes them.
     ///
     /// # Errors
-    /// A text, if the value is circular, or too large.
-    pub fn export(&mut self, value: Value) -> Result<Datum, String> {
+    /// [`ExportError`] if the value is circular, or too large.
+    pub fn export(&mut self, value: Value) -> Result<Datum, ExportError> {
         let mut unit = Unit::default();
-        let datum = unit
-            .datum_of(&self.heap, &self.world, value, Span::default())
-            .map_err(|error| error.to_string())?;
+        let datum = unit.datum_of(&self.heap, &self.world, value, Span::default())?;
         self.exchange.charge(unit.take_work() as usize);
         Ok(datum)
     }
@@ -77,7 +118,7 @@ pub(crate) fn call_host(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     for &argument in &arguments[1..] {
         match vm.export(argument) {
             Ok(datum) => data.push(datum),
-            Err(text) => return vm.exchange.raise(Raised::Simple(text)),
+            Err(error) => return vm.exchange.raise(Raised::Simple(error.to_string())),
         }
     }
     // The function has effects that cannot be done twice, so what it gives is kept until there is room for it.
@@ -101,20 +142,19 @@ impl Vm {
     /// The function of the library with this name, internal to the package `ESL`.
     ///
     /// # Errors
-    /// A text, if the library has none.
-    pub fn library_function(&mut self, name: &str) -> Result<Value, String> {
-        let symbol =
-            self.world.intern_esl(&mut self.heap, name).map_err(|_| "there is no memory left".to_string())?;
-        if self.is_defined(symbol) { Ok(symbol) } else { Err(format!("the library has no function {name}")) }
+    /// [`LibraryError`] if the library has none, or there is no memory for its name.
+    pub fn library_function(&mut self, name: &str) -> Result<Value, LibraryError> {
+        let symbol = self.world.intern_esl(&mut self.heap, name).map_err(|_| LibraryError::NoMemory)?;
+        if self.is_defined(symbol) { Ok(symbol) } else { Err(LibraryError::Missing(name.into())) }
     }
 
     /// Makes a task that calls a function of the library.
     ///
     /// # Errors
-    /// A text, if the library has no such function, or there is no room for a task.
-    pub fn spawn_library(&mut self, name: &str, arguments: &[Value]) -> Result<TaskId, String> {
+    /// [`LibraryError`] if the library has no such function, or there is no memory for a task.
+    pub fn spawn_library(&mut self, name: &str, arguments: &[Value]) -> Result<TaskId, LibraryError> {
         let function = self.library_function(name)?;
-        self.spawn(function, arguments).map_err(|_| "there is no memory left for a task".into())
+        self.spawn(function, arguments).map_err(|_| LibraryError::NoMemory)
     }
 
     /// Settings that count from here on; ticks are counted anew.
@@ -152,7 +192,7 @@ impl Vm {
             return true;
         }
         let class = self.heap.structure_class(condition);
-        let name = class.and_then(|class| self.heap.symbol(self.class_name(class)));
+        let name = class.and_then(|class| self.heap.symbol(class::name_of(&self.heap, class)));
         name.and_then(|symbol| self.heap.string_text(symbol.name))
             .is_some_and(|name| name == "HEAP-EXHAUSTED")
     }

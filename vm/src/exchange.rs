@@ -4,17 +4,54 @@
 //! (the failure behind an [`Exit::Raise`], the values behind an [`Exit::Values`], the call behind an [`Exit::Call`], and what
 //! its work has cost) waits here until the interpreter takes it.
 
-use smallvec::SmallVec;
-
-use crate::raise::{Exit, Expected, Raised};
+use crate::raise::{Arguments, Exit, Expected, Raised};
 use crate::saved_pc::SavedPc;
 use crate::value::Value;
 
-/// Charged by whoever wants the slice to end at the next tick; the task goes on with the next slice.
-pub(crate) const END_OF_SLICE: u64 = 1 << 40;
+/// Charges of builtins: ticks beside those of their calls, and whether the slice is to end.
+///
+/// One word, so that the interpreter finds out by one test after each builtin whether there is anything to see to.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Charges(u64);
 
-/// Arguments of a call.
-pub(crate) type Arguments = SmallVec<[Value; 16]>;
+impl Charges {
+    /// The bit that ends the slice; the others are ticks.
+    const END: u64 = 1 << 63;
+
+    /// Returns whether there is nothing to see to.
+    #[inline(always)]
+    pub(crate) fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Adds ticks.
+    #[inline]
+    pub(crate) fn add(&mut self, ticks: u64) {
+        self.0 += ticks;
+    }
+
+    /// Has the slice of the running task end at the next tick, because what the slice may take has changed. The task goes on with
+    /// another slice, unless its turn is to end otherwise.
+    #[inline]
+    pub(crate) fn end_slice(&mut self) {
+        self.0 |= Charges::END;
+    }
+
+    /// Returns the ticks.
+    pub(crate) fn ticks(self) -> u64 {
+        self.0 & !Charges::END
+    }
+
+    /// Returns whether the slice is to end.
+    pub(crate) fn ends_slice(self) -> bool {
+        self.0 & Charges::END != 0
+    }
+
+    /// Takes everything.
+    pub(crate) fn take(&mut self) -> Charges {
+        std::mem::take(self)
+    }
+}
 
 /// Side channel between the interpreter and builtins.
 pub(crate) struct Exchange {
@@ -26,8 +63,8 @@ pub(crate) struct Exchange {
     pub(crate) requested_call: Vec<Value>,
     /// Key found last in a hash table, and the number of its entry there.
     pub(crate) last_lookup: (Value, usize),
-    /// Ticks charged by builtins beside those of their calls, until the interpreter takes them.
-    pub(crate) charged: u64,
+    /// Charges of builtins, until the interpreter takes them.
+    pub(crate) charges: Charges,
     /// Place and time of the last collection for want of room; a second one there would not help.
     pub(crate) collected_at: Option<(SavedPc, u64, i32)>,
 }
@@ -40,7 +77,7 @@ impl Exchange {
             raised: None,
             requested_call: Vec::new(),
             last_lookup: (Value::UNBOUND, 0),
-            charged: 0,
+            charges: Charges::default(),
             collected_at: None,
         }
     }
@@ -64,6 +101,15 @@ impl Exchange {
         self.raise(Raised::Type(datum, Expected::Type(expected)))
     }
 
+    /// Notes that `datum` is not of the type that `specifier`, a value, names.
+    ///
+    /// # Errors
+    /// Always [`Exit::Raise`].
+    #[cold]
+    pub(crate) fn not_a<T>(&mut self, datum: Value, specifier: Value) -> Result<T, Exit> {
+        self.raise(Raised::Type(datum, Expected::Specifier(specifier)))
+    }
+
     /// Notes that `datum` is not an index below `limit`.
     ///
     /// # Errors
@@ -85,19 +131,14 @@ impl Exchange {
     /// Charges the running task units of work, 64 to a tick. A unit takes about as long as a step of arithmetic on limbs.
     #[inline]
     pub(crate) fn charge(&mut self, units: usize) {
-        self.charged += units as u64 / 64;
+        self.charges.add(units as u64 / 64);
     }
 
     /// Charges the running task for list cells, elements or characters that were walked over, compared, copied or filled:
     /// a tick for each 16. Each takes a few nanoseconds, as they come from memory.
     #[inline]
     pub(crate) fn charge_elements(&mut self, count: usize) {
-        self.charged += count as u64 / 16;
-    }
-
-    /// Takes the ticks charged since the last instruction that saw to it.
-    pub(crate) fn take_charged(&mut self) -> u64 {
-        std::mem::take(&mut self.charged) % END_OF_SLICE
+        self.charges.add(count as u64 / 16);
     }
 
     /// Requests a call in the place of the builtin, which returns [`Exit::Call`].

@@ -18,8 +18,10 @@ pub mod schedule;
 pub mod task;
 pub mod vm;
 
+mod config;
 mod database;
 mod datum;
+mod describe;
 mod environment;
 mod exchange;
 mod interp;

@@ -1,14 +1,17 @@
 //! What a builtin or an instruction says when it cannot do its work.
 //!
-//! A failure leaves Rust as data: a [`Raised`] waits in the [`Vm`] while the builtin returns
+//! A failure leaves Rust as data: a [`Raised`] waits in the exchange while the builtin returns
 //! [`Exit::Raise`]. The interpreter then calls the library function `%raise` at the point of failure, in a frame above
 //! the failed instruction; nothing has been unwound. What `%raise` returns takes the place of the operation's result.
 
 use smallvec::{SmallVec, smallvec};
 
-use crate::heap::AllocError;
+use crate::heap::{AllocError, Heap};
 use crate::value::Value;
-use crate::vm::Vm;
+use crate::world::World;
+
+/// Arguments of a call.
+pub(crate) type Arguments = SmallVec<[Value; 16]>;
 
 /// What was expected in place of a datum: a type specifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,18 +73,18 @@ pub enum Raised {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Exit {
-    /// It failed; `Vm::raised` says how.
+    /// It failed; the exchange holds the [`Raised`].
     Raise,
     /// It gives other than one value: they are in the value list.
     Values,
     /// The work is above its limit: the ESL function in its row of the table takes over with the same arguments. It
     /// has had no effect.
     Slowly,
-    /// It asks for a call in its place: `Vm::requested_call` holds the function and the arguments.
+    /// It asks for a call in its place: the exchange holds the function and the arguments.
     Call,
     /// It needs room: collect, then do it again. It has had no effect.
     Collect,
-    /// The task waits; what wakes it delivers the value.
+    /// The task waits; the builtin is done again when it goes on.
     Park,
     /// It cannot be done yet: it is done again in the task's next turn. It has had no effect.
     Again,
@@ -101,96 +104,88 @@ impl From<AllocError> for Exit {
     }
 }
 
-impl Vm {
-    /// The arguments of `%raise` for the failure that is noted: a keyword, and what goes with it.
+impl Expected {
+    /// Returns the type specifier.
+    fn specifier(self, heap: &mut Heap, world: &mut World) -> Result<Value, AllocError> {
+        match self {
+            Expected::Type(name) => world.intern_cl(heap, name),
+            Expected::Index(limit) => {
+                // (INTEGER 0 (limit))
+                let limit = heap.list(&[Value::index(limit)])?;
+                let integer = world.intern_cl(heap, "INTEGER")?;
+                heap.list(&[integer, Value::small(0), limit])
+            }
+            Expected::Specifier(specifier) => Ok(specifier),
+        }
+    }
+}
+
+impl Raised {
+    /// Returns the arguments of `%raise` for this failure: a keyword, and what goes with it.
     ///
     /// # Errors
-    /// [`Exit::Collect`] if there is no room for a text.
-    pub(crate) fn raised_arguments(&mut self) -> Result<SmallVec<[Value; 16]>, Exit> {
-        // It stays noted until it has been put into words, since that may have to be done again.
-        let raised = self.exchange.raised.clone().unwrap_or(Raised::Simple("an operation failed".into()));
-        let arguments: SmallVec<[Value; 16]> = match raised {
+    /// As for every allocation.
+    pub(crate) fn arguments(&self, heap: &mut Heap, world: &mut World) -> Result<Arguments, AllocError> {
+        let (keyword, rest): (&str, Arguments) = match self {
             Raised::Type(datum, expected) => {
-                let expected = self.specifier(expected)?;
-                smallvec![self.keyword("TYPE-ERROR")?, datum, expected]
+                ("TYPE-ERROR", smallvec![*datum, expected.specifier(heap, world)?])
             }
             Raised::Variable(symbol, datum, expected) => {
-                let expected = self.specifier(expected)?;
-                smallvec![self.keyword("VARIABLE-TYPE-ERROR")?, symbol, datum, expected]
+                ("VARIABLE-TYPE-ERROR", smallvec![*symbol, *datum, expected.specifier(heap, world)?])
             }
             Raised::DivisionByZero(operation, operands) => {
-                let operation = self.world.intern_cl(&mut self.heap, operation)?;
-                let operands = self.heap.list(&operands)?;
-                smallvec![self.keyword("DIVISION-BY-ZERO")?, operation, operands]
+                let operation = world.intern_cl(heap, operation)?;
+                ("DIVISION-BY-ZERO", smallvec![operation, heap.list(operands)?])
             }
             Raised::Arithmetic(operation, text) => {
-                let operation = self.world.intern_cl(&mut self.heap, operation)?;
-                let text = self.heap.alloc_str(&text)?;
-                smallvec![self.keyword("ARITHMETIC-ERROR")?, operation, text]
+                let operation = world.intern_cl(heap, operation)?;
+                ("ARITHMETIC-ERROR", smallvec![operation, heap.alloc_str(text)?])
             }
             Raised::FloatOverflow(operation) => {
-                let operation = self.world.intern_cl(&mut self.heap, operation)?;
-                smallvec![self.keyword("FLOATING-POINT-OVERFLOW")?, operation]
+                ("FLOATING-POINT-OVERFLOW", smallvec![world.intern_cl(heap, operation)?])
             }
-            Raised::UnboundVariable(symbol) => smallvec![self.keyword("UNBOUND-VARIABLE")?, symbol],
-            Raised::UndefinedFunction(symbol) => smallvec![self.keyword("UNDEFINED-FUNCTION")?, symbol],
-            Raised::Program(text) => self.raised_text("PROGRAM-ERROR", &text)?,
-            Raised::Control(text) => self.raised_text("CONTROL-ERROR", &text)?,
-            Raised::Parse(text) => self.raised_text("PARSE-ERROR", &text)?,
-            Raised::Reader(text) => self.raised_text("READER-ERROR", &text)?,
-            Raised::Simple(text) => self.raised_text("SIMPLE-ERROR", &text)?,
-            Raised::EndOfFile(stream) => smallvec![self.keyword("END-OF-FILE")?, stream],
-            Raised::Stream(stream, text) => {
-                let text = self.heap.alloc_str(&text)?;
-                smallvec![self.keyword("STREAM-ERROR")?, stream, text]
+            Raised::UnboundVariable(symbol) => ("UNBOUND-VARIABLE", smallvec![*symbol]),
+            Raised::UndefinedFunction(symbol) => ("UNDEFINED-FUNCTION", smallvec![*symbol]),
+            Raised::Program(text) => ("PROGRAM-ERROR", smallvec![heap.alloc_str(text)?]),
+            Raised::Control(text) => ("CONTROL-ERROR", smallvec![heap.alloc_str(text)?]),
+            Raised::Parse(text) => ("PARSE-ERROR", smallvec![heap.alloc_str(text)?]),
+            Raised::Reader(text) => ("READER-ERROR", smallvec![heap.alloc_str(text)?]),
+            Raised::Simple(text) => ("SIMPLE-ERROR", smallvec![heap.alloc_str(text)?]),
+            Raised::EndOfFile(stream) => ("END-OF-FILE", smallvec![*stream]),
+            Raised::Stream(stream, text) => ("STREAM-ERROR", smallvec![*stream, heap.alloc_str(text)?]),
+            Raised::File(name, text) => {
+                ("FILE-ERROR", smallvec![heap.alloc_str(name)?, heap.alloc_str(text)?])
             }
-            Raised::File(name, text) => self.raised_about("FILE-ERROR", &name, &text)?,
-            Raised::Package(name, text) => self.raised_about("PACKAGE-ERROR", &name, &text)?,
-            Raised::Cause(cause, argument) => {
-                let cause = self.keyword(cause)?;
-                smallvec![self.keyword("CAUSE")?, cause, argument]
+            Raised::Package(name, text) => {
+                ("PACKAGE-ERROR", smallvec![heap.alloc_str(name)?, heap.alloc_str(text)?])
             }
-            Raised::Failure(cause) => smallvec![self.keyword(cause)?],
-            Raised::StackExhausted => smallvec![self.keyword("STACK-EXHAUSTED")?],
-            Raised::HeapExhausted => smallvec![self.keyword("HEAP-EXHAUSTED")?],
+            Raised::Cause(cause, argument) => ("CAUSE", smallvec![world.keyword(heap, cause)?, *argument]),
+            Raised::Failure(cause) => (cause, smallvec![]),
+            Raised::StackExhausted => ("STACK-EXHAUSTED", smallvec![]),
+            Raised::HeapExhausted => ("HEAP-EXHAUSTED", smallvec![]),
         };
-        self.exchange.raised = None;
+        let mut arguments: Arguments = smallvec![world.keyword(heap, keyword)?];
+        arguments.extend(rest);
         Ok(arguments)
     }
 
-    /// The type specifier of what was expected.
-    fn specifier(&mut self, expected: Expected) -> Outcome {
-        Ok(match expected {
-            Expected::Type(name) => self.world.intern_cl(&mut self.heap, name)?,
-            Expected::Index(limit) => {
-                // (INTEGER 0 (limit))
-                let limit = self.heap.list(&[Value::index(limit)])?;
-                let integer = self.world.intern_cl(&mut self.heap, "INTEGER")?;
-                self.heap.list(&[integer, Value::small(0), limit])?
+    /// Calls `visit` with every value of the failure.
+    pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
+        match self {
+            Raised::Type(datum, expected) | Raised::Variable(_, datum, expected) => {
+                // The variable is known to the machine.
+                visit(*datum);
+                if let Expected::Specifier(specifier) = expected {
+                    visit(*specifier);
+                }
             }
-            Expected::Specifier(specifier) => specifier,
-        })
-    }
-
-    fn raised_text(&mut self, kind: &str, text: &str) -> Result<SmallVec<[Value; 16]>, Exit> {
-        let text = self.heap.alloc_str(text)?;
-        Ok(smallvec![self.keyword(kind)?, text])
-    }
-
-    fn raised_about(&mut self, kind: &str, name: &str, text: &str) -> Result<SmallVec<[Value; 16]>, Exit> {
-        let name = self.heap.alloc_str(name)?;
-        let text = self.heap.alloc_str(text)?;
-        Ok(smallvec![self.keyword(kind)?, name, text])
-    }
-
-    /// The keyword of this name.
-    fn keyword(&mut self, name: &str) -> Result<Value, Exit> {
-        Ok(self.world.keyword(&mut self.heap, name)?)
-    }
-
-    /// The arguments of `%raise` as a text, for when there is no library that could say it better.
-    pub(crate) fn describe_failure(&self, arguments: &[Value]) -> String {
-        let words: Vec<String> = arguments.iter().map(|&argument| self.describe(argument)).collect();
-        words.join(" ")
+            Raised::DivisionByZero(_, operands) => operands.iter().copied().for_each(visit),
+            Raised::UnboundVariable(value)
+            | Raised::UndefinedFunction(value)
+            | Raised::EndOfFile(value)
+            | Raised::Stream(value, _)
+            | Raised::Cause(_, value) => visit(*value),
+            _ => {}
+        }
     }
 }

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+pub use crate::config::Config;
 use crate::database::Database;
+use crate::describe::describe;
 use crate::embed::Embedder;
 use crate::environment::Compiler;
 use crate::exchange::Exchange;
-use crate::explore::Points;
 use crate::heap::{AllocError, Heap, HeapConfig, Kind};
 use crate::host::Host;
 use crate::interp::start::make_starter;
@@ -18,55 +19,6 @@ use crate::schedule::{Choices, Scheduler};
 use crate::task::TaskId;
 use crate::value::Value;
 use crate::world::World;
-
-/// Ticks that a cleanup may take once an abort or an expired limit is pending.
-const CLEANUP_TICKS: u64 = 1_000_000;
-/// Nanoseconds that it may take.
-const CLEANUP_TIME: u64 = 60_000_000_000;
-
-/// Limits and settings of a virtual machine.
-#[derive(Clone, Debug)]
-pub struct Config {
-    /// Limit of the heap in bytes.
-    pub memory: usize,
-    /// Limit of a task's stack in words; also of its bindings and of the entries of its control stack.
-    pub stack: usize,
-    /// Ticks that a task runs before the next one has its turn.
-    pub slice: u32,
-    /// Ticks that the whole run may take; `None` without a limit.
-    pub budget: Option<u64>,
-    /// Seed of everything that is chosen at random.
-    pub seed: u64,
-    /// Collect at every safepoint. For tests: what is not rooted is found soon.
-    pub collect_always: bool,
-    /// Ticks that a critical section may take.
-    pub critical_ticks: u32,
-    /// Ticks that a cleanup may take once an abort or an expired limit is pending.
-    pub cleanup_ticks: u64,
-    /// Nanoseconds that it may take then.
-    pub cleanup_time: u64,
-}
-
-impl Config {
-    /// What holds where nothing else is said.
-    pub const DEFAULT: Config = Config {
-        memory: 1 << 30,
-        stack: 1 << 16,
-        slice: 2000,
-        budget: None,
-        seed: 0,
-        collect_always: false,
-        critical_ticks: 20_000,
-        cleanup_ticks: CLEANUP_TICKS,
-        cleanup_time: CLEANUP_TIME,
-    };
-}
-
-impl Default for Config {
-    fn default() -> Config {
-        Config::DEFAULT
-    }
-}
 
 /// A virtual machine.
 ///
@@ -93,8 +45,6 @@ pub struct Vm {
     pub(crate) watch: Watch,
     /// What the embedder holds on to, and its requests.
     pub(crate) embedder: Embedder,
-    /// Where tasks stop while schedules are explored.
-    pub(crate) points: Points,
     /// Limits and settings.
     pub(crate) config: Config,
 }
@@ -122,7 +72,6 @@ impl Vm {
             exchange: Exchange::new(),
             watch: Watch::default(),
             embedder: Embedder { pinned: vec![starter, any_event], ..Embedder::default() },
-            points: Points::default(),
             config,
         })
     }
@@ -132,6 +81,11 @@ impl Vm {
     pub(crate) fn for_tests() -> Vm {
         let host = Box::new(crate::host::VirtualHost::new());
         Vm::new(Config::default(), host).expect("there is room for an empty machine")
+    }
+
+    /// Returns a short text for a value.
+    pub fn describe(&self, value: Value) -> String {
+        describe(&self.heap, value)
     }
 
     /// Limits and settings.
@@ -166,13 +120,6 @@ impl Vm {
         if let Some(task) = id.and_then(|id| self.scheduler.tasks.get(id)) {
             self.scheduler.main_number = Some(task.number);
         }
-    }
-
-    /// Takes an interrupt: the task that it aborts.
-    pub(crate) fn take_interrupt(&mut self) -> Option<TaskId> {
-        use std::sync::atomic::Ordering::Relaxed;
-        let id = self.embedder.interruptible?;
-        (self.embedder.interrupt.load(Relaxed) && self.embedder.interrupt.swap(false, Relaxed)).then_some(id)
     }
 
     /// Whether the embedder has interrupted the program.

@@ -82,7 +82,7 @@ impl Defect {
     pub(crate) fn put_into(&self, machine: &mut Vm) -> Result<(), String> {
         opened(machine, |machine| {
             let functions = machine.load_module(&self.module).map_err(|error| error.to_string())?;
-            machine.run_toplevel(functions, u64::MAX).map(|_| ())
+            machine.run_toplevel(functions, u64::MAX).map(|_| ()).map_err(|error| error.to_string())
         })
     }
 }

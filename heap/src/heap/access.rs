@@ -125,6 +125,18 @@ impl Heap {
         }
     }
 
+    /// Slot `index` of a record, of whatever kind; `NIL` if `v` is none or has no such slot.
+    #[inline]
+    pub fn slot_or_nil(&self, v: Value, index: usize) -> Value {
+        self.slot(v, index).unwrap_or(Value::NIL)
+    }
+
+    /// Sets slot `index` of a record, of whatever kind; see [`Heap::record_set`].
+    #[inline]
+    pub fn slot_set(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
+        self.record_set(v, self.kind(v)?, index, new)
+    }
+
     /// Sets slot `index` of a record of this kind; `None` if `v` is none or has no such slot.
     ///
     /// Not for symbols, functions, arrays and hash tables, nor the class (slot 0) of a structure: these give `None`.

@@ -7,7 +7,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 use super::expect::exactly;
-use crate::world::class::{MAX_DEPTH, class_slot, slot};
+use crate::world::class::{self, MAX_DEPTH, class_slot, slot};
 
 impl Vm {
     /// The class that `v` is or names.
@@ -18,7 +18,7 @@ impl Vm {
         if self.heap.is(v, Kind::Class) {
             return Ok(v);
         }
-        if let Some(class) = self.find_class(v) {
+        if let Some(class) = self.world.find_class(v) {
             return Ok(class);
         }
         if !self.world.is_symbol(&self.heap, v) {
@@ -30,7 +30,7 @@ impl Vm {
 
     /// Notes that `datum` is no instance of `class`.
     fn instance_error<T>(&mut self, datum: Value, class: Value) -> Result<T, Exit> {
-        let name = if self.heap.is(class, Kind::Class) { self.class_name(class) } else { class };
+        let name = if self.heap.is(class, Kind::Class) { class::name_of(&self.heap, class) } else { class };
         self.exchange.raise(Raised::Type(datum, Expected::Specifier(name)))
     }
 
@@ -75,7 +75,7 @@ pub(super) fn make_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn find_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(vm.find_class(arguments[0]).unwrap_or(Value::NIL))
+    Ok(vm.world.find_class(arguments[0]).unwrap_or(Value::NIL))
 }
 
 pub(super) fn class_of(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -88,7 +88,7 @@ pub(super) fn classp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn class_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let class = vm.class(arguments[0])?;
-    Ok(vm.class_name(class))
+    Ok(class::name_of(&vm.heap, class))
 }
 
 pub(super) fn class_supers(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -129,7 +129,7 @@ pub(super) fn make_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return Ok(vm.heap.alloc_structure(class, values)?);
     }
     if values.len() > count {
-        let name = vm.class_name(class);
+        let name = class::name_of(&vm.heap, class);
         let name = vm.describe(name);
         let given = values.len();
         return vm.exchange.program_error(format!("{name} has {count} slots, but {given} values were given"));

@@ -43,7 +43,7 @@ fn has_locks(vm: &Vm, locks: Value) -> bool {
 
 pub(super) fn assert_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [fact, locks] = exactly(arguments);
-    vm.point()?;
+    vm.scheduler.point()?;
     if has_locks(vm, locks) {
         return Ok(vm.world.known.locked);
     }
@@ -56,7 +56,7 @@ pub(super) fn assert_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn make_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [name, width] = exactly(arguments);
-    vm.point()?;
+    vm.scheduler.point()?;
     prepare(vm)?;
     if !vm.world.is_symbol(&vm.heap, name) {
         return vm.exchange.type_error(name, "SYMBOL");
@@ -69,7 +69,7 @@ pub(super) fn make_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn property_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.point_of_read()?;
+    vm.scheduler.point_of_read()?;
     prepare(vm)?;
     let mut work = 0;
     let outcome = vm.database.property_value(&mut vm.heap, arguments[0], &mut work);
@@ -84,7 +84,7 @@ pub(super) fn property_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn retract_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [fact, locks] = exactly(arguments);
-    vm.point()?;
+    vm.scheduler.point()?;
     if has_locks(vm, locks) {
         return Ok(vm.world.known.locked);
     }
@@ -99,7 +99,7 @@ pub(super) fn retract_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn define_rule(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.point()?;
+    vm.scheduler.point()?;
     prepare(vm)?;
     let [head, body, source] = exactly(arguments);
     let mut work = 0;
@@ -110,7 +110,7 @@ pub(super) fn define_rule(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn open_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.point_of_read()?;
+    vm.scheduler.point_of_read()?;
     prepare(vm)?;
     let [query, bindings, facts] = exactly(arguments);
     let mut work = 0;
@@ -174,7 +174,7 @@ fn raise_query_error(vm: &mut Vm, error: QueryError) -> Outcome {
 }
 
 pub(super) fn begin_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.point_of_read()?;
+    vm.scheduler.point_of_read()?;
     prepare(vm)?;
     let [query, bindings] = exactly(arguments);
     let mut work = 0;
@@ -229,7 +229,7 @@ pub(super) fn query_answers(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn retract_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [handle, locks] = exactly(arguments);
-    vm.point()?;
+    vm.scheduler.point()?;
     if has_locks(vm, locks) {
         return Ok(vm.world.known.locked);
     }

@@ -3,6 +3,8 @@
 use smallvec::SmallVec;
 
 use crate::raise::{Exit, Outcome, Raised};
+use crate::report;
+use crate::run;
 use crate::task::FailureReport;
 use crate::task::{End, EntryKind, Target, Unwinding};
 use crate::value::Value;
@@ -19,7 +21,7 @@ pub(super) fn next_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         None => return vm.exchange.type_error(height, "UNSIGNED-BYTE"),
     };
     if vm.watch.is_watched && is_failure && is_first {
-        vm.tell_of_failure(failure, false);
+        report::tell_of_failure(vm, failure, false);
     }
     let mut steps = 0;
     let found = vm.scheduler.task().control.find_handlers(height, is_failure, &mut steps);
@@ -60,7 +62,7 @@ pub(super) fn begin_recovery(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         state
     };
     if vm.watch.is_watched {
-        vm.tell_of_failure(failure, true);
+        report::tell_of_failure(vm, failure, true);
     }
     Ok(state)
 }
@@ -132,7 +134,7 @@ pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             }
         }
         Some(_) => {
-            let label = vm.task_label(vm.scheduler.task().object);
+            let label = report::task_label(vm, vm.scheduler.task().object);
             vm.outside.complain(&format!("In a cleanup of {label}:\n{story}{ending}"));
         }
         None => {
@@ -140,7 +142,7 @@ pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             vm.scheduler.task_mut().extra_mut().report = Some(FailureReport { story, ending });
         }
     }
-    vm.begin_end(End::Failed(arguments[0]));
+    vm.scheduler.task_mut().begin_end(End::Failed(arguments[0]));
     Err(Exit::Unwind)
 }
 
@@ -148,8 +150,8 @@ pub(super) fn exit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let status = arguments[0].as_index().and_then(|status| u8::try_from(status).ok());
     let Some(status) = status else { return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE") };
     vm.outside.exit_status = Some(status);
-    vm.abort_others();
-    vm.begin_end(End::Aborted);
+    run::abort_others(vm);
+    vm.scheduler.task_mut().begin_end(End::Aborted);
     Err(Exit::Unwind)
 }
 

@@ -17,10 +17,10 @@ fn fold(vm: &mut Vm, operation: BitOperation, identity: i32, integers: &[Value])
         [] => Ok(Value::small(identity)),
         [only] => vm.integer(only).map(|_| only),
         [first, ref rest @ ..] => {
-            let ceiling = vm.exchange.charged + limit::WORK_LIMIT as u64 / 64;
+            let ceiling = vm.exchange.charges.ticks() + limit::WORK_LIMIT as u64 / 64;
             let mut result = first;
             for &integer in rest {
-                if vm.exchange.charged > ceiling {
+                if vm.exchange.charges.ticks() > ceiling {
                     return Err(Exit::Slowly);
                 }
                 result = bits::join(vm, operation, result, integer)?;

@@ -5,15 +5,16 @@
 use smallvec::{SmallVec, smallvec};
 
 use crate::builtins::LIMIT;
+use crate::builtins::event::begin_wait;
 use crate::heap::Kind;
 use crate::raise::{Exit, Outcome};
-use crate::run::SpawnOptions;
+use crate::run::{self, SpawnOptions};
 use crate::task::TaskId;
 use crate::value::Value;
 use crate::vm::Vm;
 
 use super::expect::exactly;
-use crate::wait::{WaitOptions, event};
+use crate::wait::{WaitOptions, event, link};
 
 impl Vm {
     /// The wait of a net.
@@ -48,7 +49,7 @@ impl Vm {
 pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (what, mut names, functions) = (arguments[0], arguments[1], &arguments[2..]);
     let priority = vm.scheduler.task().priority;
-    let wait = vm.open_wait(Value::NIL, WaitOptions { keeps: true, what, ..WaitOptions::default() })?;
+    let wait = begin_wait(vm, Value::NIL, WaitOptions { keeps: true, what, ..WaitOptions::default() })?;
     let mut made: SmallVec<[TaskId; 8]> = SmallVec::new();
     // The first value is the net.
     let mut values: SmallVec<[Value; 8]> = smallvec![Value::NIL];
@@ -58,7 +59,7 @@ pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             names = vm.heap.cdr(names).unwrap_or(Value::NIL);
             let options = SpawnOptions { name, priority, notify: wait, ..SpawnOptions::default() };
             let function = vm.callable(function)?;
-            let id = vm.make_task(function, Value::NIL, options)?;
+            let id = run::make_task(vm, function, Value::NIL, options)?;
             made.push(id);
             values.push(vm.scheduler.tasks.get(id).map_or(Value::NIL, |task| task.object));
         }
@@ -81,21 +82,21 @@ pub(super) fn await_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [net, status] = exactly(arguments);
     let wait = vm.wait_of_net(net)?;
     vm.scheduler.task_mut().wait = Value::NIL;
-    while let Some(task) = vm.take_kept(wait) {
+    while let Some(task) = link::take_kept(&mut vm.heap, wait) {
         vm.exchange.charge(1);
-        if vm.slot(task, event::STATE) == status {
+        if vm.heap.slot_or_nil(task, event::STATE) == status {
             return Ok(task);
         }
     }
     if vm.has_net_ended(net) {
         // One that has ended when there was no room to say so has not been in the queue.
-        let ended = vm.find_in_net(net, |task| vm.slot(task, event::STATE) == status);
+        let ended = vm.find_in_net(net, |task| vm.heap.slot_or_nil(task, event::STATE) == status);
         return Ok(ended.unwrap_or(Value::NIL));
     }
-    vm.park(wait, None)
+    vm.scheduler.park_at(wait, None)
 }
 
 pub(super) fn end_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.point_of_read()?;
+    vm.scheduler.point_of_read()?;
     if arguments[0].is_nil() || vm.has_net_ended(arguments[0]) { Ok(Value::NIL) } else { Err(Exit::Slowly) }
 }

@@ -19,10 +19,10 @@ fn fold(
     rest: &[Value],
     step: impl Fn(&mut Vm, Value, Value) -> Outcome,
 ) -> Outcome {
-    let ceiling = vm.exchange.charged + WORK_LIMIT as u64 / 64;
+    let ceiling = vm.exchange.charges.ticks() + WORK_LIMIT as u64 / 64;
     let mut result = first;
     for &number in rest {
-        if vm.exchange.charged > ceiling {
+        if vm.exchange.charges.ticks() > ceiling {
             return Err(Exit::Slowly);
         }
         result = step(vm, result, number)?;

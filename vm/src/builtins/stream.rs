@@ -12,6 +12,7 @@ use crate::equality::characters_of;
 use crate::heap::Kind;
 use crate::host::{HostError, Output, Taken, WriteMode, column_after, encode};
 use crate::raise::{Exit, Expected, Outcome, Raised};
+use crate::run;
 use crate::task::End;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -227,8 +228,8 @@ impl Vm {
                 return Ok(());
             }
             self.outside.exit_status = Some(self.outside.host.broken_output_status());
-            self.abort_others();
-            self.begin_end(End::Aborted);
+            run::abort_others(self);
+            self.scheduler.task_mut().begin_end(End::Aborted);
             return Err(Exit::Unwind);
         }
         match self.outside.console.take_failure() {

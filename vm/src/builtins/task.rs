@@ -4,10 +4,10 @@ use crate::builtins::LIMIT;
 use crate::builtins::event::take_or_park;
 use crate::heap::Kind;
 use crate::raise::{Exit, Outcome};
-use crate::run::SpawnOptions;
+use crate::run::{self, SpawnOptions};
 use crate::task::End;
 use crate::task::guard;
-use crate::task::{DEFAULT_PRIORITY, PRIORITIES, TaskState};
+use crate::task::{DEFAULT_PRIORITY, PRIORITIES, TaskIndex, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -20,12 +20,12 @@ impl Vm {
     /// # Errors
     /// A failure if it is none.
     pub(super) fn expect_task(&mut self, v: Value) -> Result<Value, Exit> {
-        if self.heap.is(v, Kind::Task) { Ok(v) } else { self.task_error(v) }
+        if self.heap.is(v, Kind::Task) { Ok(v) } else { self.exchange.not_a(v, self.world.known.task) }
     }
 
     /// Whether a task has ended.
     pub(super) fn has_ended(&self, task: Value) -> bool {
-        !self.slot(task, event::STATE).is_fixnum()
+        !self.heap.slot_or_nil(task, event::STATE).is_fixnum()
     }
 
     /// A number of ticks.
@@ -40,7 +40,7 @@ impl Vm {
     /// Waits for the end of a task. `None` once it has ended.
     fn wait_for_end(&mut self, task: Value, urgent: bool, child: bool) -> Option<Outcome> {
         if self.has_ended(task) {
-            self.cancel_wait();
+            self.scheduler.cancel_wait(&mut self.heap);
             return None;
         }
         let what = self.world.known.task_end;
@@ -50,11 +50,9 @@ impl Vm {
 }
 
 impl Vm {
-    /// Number and object of the task at a place, if it is one that is listed.
-    fn listed_task(&self, place: usize, shows_hidden: bool) -> Option<(u64, Value)> {
-        let is_running = self.scheduler.turn.index as usize == place;
-        let task = if is_running { self.scheduler.running.as_deref() } else { None };
-        let task = task.or_else(|| self.scheduler.tasks.at(place as u32))?;
+    /// Number and object of the task with this index, if it is one that is listed.
+    fn listed_task(&self, index: usize, shows_hidden: bool) -> Option<(TaskNumber, Value)> {
+        let task = self.scheduler.find(TaskIndex(index as u32))?;
         let is_listed = task.state != TaskState::Ended && (shows_hidden || !task.flags.hidden());
         is_listed.then_some((task.number, task.object))
     }
@@ -83,7 +81,7 @@ pub(super) fn spawn(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         hidden: daemon == vm.world.known.internal,
         notify: argument(5),
     };
-    let id = vm.make_task(function, Value::NIL, options)?;
+    let id = run::make_task(vm, function, Value::NIL, options)?;
     Ok(vm.scheduler.tasks.get(id).map_or(Value::NIL, |task| task.object))
 }
 
@@ -96,12 +94,12 @@ pub(super) fn taskp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.point_of_read()?;
+    vm.scheduler.point_of_read()?;
     let task = vm.expect_task(arguments[0])?;
-    let state = vm.slot(task, event::STATE);
-    let Some(index) = state.as_index() else { return Ok(state) };
+    let state = vm.heap.slot_or_nil(task, event::STATE);
+    let Some(index) = event::task_index(&vm.heap, task) else { return Ok(state) };
     let known = &vm.world.known;
-    Ok(match vm.scheduler.tasks.at(index as u32).map(|task| task.state) {
+    Ok(match vm.scheduler.tasks.at(index).map(|task| task.state) {
         Some(TaskState::Waiting | TaskState::Reading) => known.waiting,
         _ => known.running,
     })
@@ -109,31 +107,29 @@ pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn task_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = vm.expect_task(arguments[0])?;
-    let Some(index) = vm.slot(task, event::STATE).as_index() else { return Ok(Value::NIL) };
-    let number = match vm.scheduler.tasks.at(index as u32) {
-        Some(task) => task.number,
-        None => vm.scheduler.task().number,
-    };
-    let parent = vm.slot(task, event::RESULT);
-    vm.give_values(&[Value::index(number as usize), parent])
+    let Some(index) = event::task_index(&vm.heap, task) else { return Ok(Value::NIL) };
+    let number = vm.scheduler.find(index).map_or(TaskNumber::NONE, |task| task.number);
+    let parent = vm.heap.slot_or_nil(task, event::RESULT);
+    vm.give_values(&[Value::index(number.0 as usize), parent])
 }
 
 pub(super) fn task_ticks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = vm.expect_task(arguments[0])?;
-    let Some(index) = vm.slot(task, event::STATE).as_index() else { return Ok(Value::NIL) };
-    let ticks = vm.scheduler.tasks.at(index as u32).map_or(vm.scheduler.task().ticks, |task| task.ticks);
+    let Some(index) = event::task_index(&vm.heap, task) else { return Ok(Value::NIL) };
+    let ticks = vm.scheduler.find(index).map_or(0, |task| task.ticks);
     Ok(Value::index(ticks as usize))
 }
 
 pub(super) fn task_end(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.point_of_read()?;
+    vm.scheduler.point_of_read()?;
     let task = vm.expect_task(arguments[0])?;
     if vm.has_ended(task) { give_end(vm, task) } else { Ok(Value::NIL) }
 }
 
 /// The status of a task that has ended, then its values, or the condition.
 fn give_end(vm: &mut Vm, task: Value) -> Outcome {
-    let (status, result) = (vm.slot(task, event::STATE), vm.slot(task, event::RESULT));
+    let (status, result) =
+        (vm.heap.slot_or_nil(task, event::STATE), vm.heap.slot_or_nil(task, event::RESULT));
     let has_one_value = vm.heap.header(task).is_some_and(|header| header.aux == 1);
     vm.exchange.values.clear();
     vm.exchange.values.push(status);
@@ -151,10 +147,10 @@ fn give_end(vm: &mut Vm, task: Value) -> Outcome {
 
 pub(super) fn task_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = vm.expect_task(arguments[0])?;
-    if vm.slot(task, event::STATE) != vm.world.known.succeeded {
+    if vm.heap.slot_or_nil(task, event::STATE) != vm.world.known.succeeded {
         return Ok(Value::NIL);
     }
-    let result = vm.slot(task, event::RESULT);
+    let result = vm.heap.slot_or_nil(task, event::RESULT);
     let has_one_value = vm.heap.header(task).is_some_and(|header| header.aux == 1);
     Ok(if has_one_value { result } else { vm.heap.car(result).unwrap_or(Value::NIL) })
 }
@@ -163,7 +159,7 @@ pub(super) fn all_tasks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if vm.scheduler.tasks.places() > LIMIT {
         return Err(Exit::Slowly);
     }
-    let mut tasks: Vec<(u64, Value)> = Vec::new();
+    let mut tasks: Vec<(TaskNumber, Value)> = Vec::new();
     for index in 0..vm.scheduler.tasks.places() {
         tasks.extend(vm.listed_task(index, arguments[0].is_true()));
     }
@@ -190,7 +186,7 @@ pub(super) fn tasks_from(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn join(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [task, child] = exactly(arguments);
     if vm.scheduler.task().wait.is_nil() {
-        vm.point()?;
+        vm.scheduler.point()?;
     }
     let task = vm.expect_task(task)?;
     match vm.wait_for_end(task, false, child.is_true()) {
@@ -200,10 +196,10 @@ pub(super) fn join(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn request_abort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.point()?;
+    vm.scheduler.point()?;
     let task = vm.expect_task(arguments[0])?;
-    if let Some(index) = vm.slot(task, event::STATE).as_index()
-        && let Some(id) = vm.scheduler.tasks.id_at(index as u32)
+    if let Some(index) = event::task_index(&vm.heap, task)
+        && let Some(id) = vm.scheduler.tasks.id_at(index)
     {
         vm.abort(id);
     }
@@ -214,13 +210,11 @@ pub(super) fn abort_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = vm.expect_task(arguments[0])?;
     if vm.scheduler.task().wait.is_nil() {
         if task == vm.scheduler.task().object {
-            let in_cleanup =
-                vm.scheduler.task().control.get().is_some_and(|control| !control.running.is_empty());
-            if in_cleanup || vm.scheduler.task().critical > 0 {
+            if vm.scheduler.task().runs_cleanup() || vm.scheduler.task().critical > 0 {
                 return request_abort(vm, arguments);
             }
             vm.scheduler.task_mut().flags.set_urgent(true);
-            vm.begin_end(End::Aborted);
+            vm.scheduler.task_mut().begin_end(End::Aborted);
             return Err(Exit::Unwind);
         }
         request_abort(vm, arguments)?;
@@ -232,19 +226,19 @@ pub(super) fn abort_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn add_checkpoint(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.point()?;
-    vm.wait_for_deliveries()?;
+    vm.scheduler.point()?;
+    vm.scheduler.wait_for_deliveries()?;
     let task = vm.scheduler.task().object;
-    let list = vm.heap.cons(arguments[0], vm.slot(task, event::CHECKPOINTS))?;
+    let list = vm.heap.cons(arguments[0], vm.heap.slot_or_nil(task, event::CHECKPOINTS))?;
     vm.signal_event(task, arguments)?;
-    vm.set_slot(task, event::CHECKPOINTS, list);
+    vm.heap.slot_set(task, event::CHECKPOINTS, list);
     Ok(Value::NIL)
 }
 
 pub(super) fn checkpoints(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.point_of_read()?;
+    vm.scheduler.point_of_read()?;
     let task = vm.expect_task(arguments[0])?;
-    Ok(vm.slot(task, event::CHECKPOINTS))
+    Ok(vm.heap.slot_or_nil(task, event::CHECKPOINTS))
 }
 
 pub(super) fn make_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -259,18 +253,18 @@ pub(super) fn make_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn interrupt_by(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.point()?;
+    vm.scheduler.point()?;
     if guard::is_guard(&vm.heap, arguments[0]) {
-        vm.set_slot(arguments[0], guard::IS_OPEN, Value::T);
-        vm.interrupt_by(arguments[0]);
+        guard::set_open(&mut vm.heap, arguments[0], true);
+        run::interrupt_by(vm, arguments[0]);
     }
     Ok(Value::NIL)
 }
 
 pub(super) fn close_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.point()?;
+    vm.scheduler.point()?;
     if guard::is_guard(&vm.heap, arguments[0]) {
-        vm.set_slot(arguments[0], guard::IS_OPEN, Value::NIL);
+        guard::set_open(&mut vm.heap, arguments[0], false);
     }
     Ok(Value::NIL)
 }
@@ -279,11 +273,11 @@ pub(super) fn open_limit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [tag, seconds, ticks] = exactly(arguments);
     let time = if seconds.is_nil() { None } else { Some(vm.nanoseconds(seconds)?) };
     let ticks = if ticks.is_nil() { None } else { Some(vm.ticks_argument(ticks)?) };
-    Ok(Value::boolean(vm.open_limit(tag, time, ticks)))
+    Ok(Value::boolean(run::open_limit(vm, tag, time, ticks)))
 }
 
 pub(super) fn begin_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
-    vm.point()?;
+    vm.scheduler.point()?;
     let ticks = i64::from(vm.config.critical_ticks);
     let task = vm.scheduler.task_mut();
     if task.critical == 0 {
@@ -291,7 +285,7 @@ pub(super) fn begin_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
         task.critical = 1;
         vm.scheduler.turn.critical_left = ticks;
         vm.scheduler.turn.critical_is_new = true;
-        vm.end_slice_here();
+        vm.exchange.charges.end_slice();
     } else {
         task.critical = task.critical.saturating_add(1);
     }
@@ -302,7 +296,7 @@ pub(super) fn end_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     let task = vm.scheduler.task_mut();
     task.critical = task.critical.saturating_sub(1);
     if task.critical == 0 && task.flags.attention() {
-        vm.end_slice_here();
+        vm.exchange.charges.end_slice();
     }
     Ok(Value::NIL)
 }

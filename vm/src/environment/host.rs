@@ -15,6 +15,7 @@ use esl_bytecode::operand::*;
 use crate::datum::Unit;
 use crate::heap::AllocError;
 use crate::load::{Alone, LoadError, load};
+use crate::run::CallError;
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -114,8 +115,8 @@ impl Vm {
     /// Runs the functions of a loaded module one after the other, in one task: the value of the last.
     ///
     /// # Errors
-    /// The text of the failure that ended it, or that it took more than `ticks`.
-    pub fn run_toplevel(&mut self, functions: Value, ticks: u64) -> Result<Value, String> {
+    /// [`CallError`].
+    pub fn run_toplevel(&mut self, functions: Value, ticks: u64) -> Result<Value, CallError> {
         self.pin(functions);
         let values = self.runner().and_then(|runner| self.call(runner, &[functions], ticks));
         self.unpin(functions);
@@ -123,9 +124,10 @@ impl Vm {
     }
 
     /// The function that calls the functions of a list.
-    fn runner(&mut self) -> Result<Value, String> {
+    fn runner(&mut self) -> Result<Value, CallError> {
         if self.world.runner.is_nil() {
-            let toplevel = self.load_module(&runner_module()).map_err(|error| error.to_string())?;
+            // The module is the machine's own, so all it can lack is room.
+            let toplevel = self.load_module(&runner_module()).map_err(|_| CallError::NoMemory)?;
             let toplevel = self.heap.car(toplevel).unwrap_or(Value::NIL);
             let runner = self.call(toplevel, &[], LOAD_TICKS)?;
             self.world.runner = runner.first().copied().unwrap_or(Value::NIL);
@@ -182,7 +184,8 @@ impl CompileTimeHost for Vm {
         let Some([function, form, environment]) = prepared else {
             return Err("the macro is not defined any more".into());
         };
-        let values = self.call(function, &[form, environment], MACRO_TICKS)?;
+        let values = self.call(function, &[form, environment], MACRO_TICKS);
+        let values = values.map_err(|error| error.to_string())?;
         let expansion = values.first().copied().unwrap_or(Value::NIL);
         let mut unit = self.world.unit.borrow_mut();
         let datum = unit.datum_of(&self.heap, &self.world, expansion, call.form.span());
@@ -191,7 +194,7 @@ impl CompileTimeHost for Vm {
 
     fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, String> {
         let functions = self.with_room(|vm| vm.load_in_unit(&module)).map_err(|error| error.to_string())?;
-        let value = self.run_toplevel(functions, LOAD_TICKS)?;
+        let value = self.run_toplevel(functions, LOAD_TICKS).map_err(|error| error.to_string())?;
         Ok(keep.then(|| self.world.unit.borrow_mut().pin(value)))
     }
 }

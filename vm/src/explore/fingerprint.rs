@@ -76,7 +76,7 @@ impl Fingerprints {
             self.cycle = vm.heap.cycle_id();
             self.codes.clear();
         }
-        let now = vm.time();
+        let now = vm.scheduler.clock.read(&mut *vm.outside.host);
         let mut walk = Walk {
             vm,
             known: self,
@@ -259,14 +259,15 @@ impl Walk<'_> {
 
     /// What is to happen, in order: when, to whom, and what.
     fn timers(&mut self) {
-        for (time, _, index, due) in self.vm.scheduler.timers.in_order() {
-            let Some(task) = self.vm.scheduler.tasks.at(index) else { continue };
-            if !crate::run::is_wanted(Some(task), due) {
+        let scheduler = &self.vm.scheduler;
+        for timer in scheduler.timers.in_order() {
+            let Some(task) = scheduler.tasks.at(timer.index) else { continue };
+            if !scheduler.is_wanted(timer) {
                 continue;
             }
-            self.time(time);
+            self.time(timer.time);
             self.value(task.object);
-            match due {
+            match timer.due {
                 Due::Wait(_) => self.word(0),
                 Due::Cleanup => self.word(1),
                 Due::Limit(number) => {
@@ -309,7 +310,7 @@ impl Walk<'_> {
         let vm = self.vm;
         if !vm.database.is_quiet() {
             // Where a query stands is not looked into: no other state is like this one.
-            self.word(vm.scheduler.serial);
+            self.word(vm.scheduler.serial.0);
             self.word(vm.scheduler.spent);
         }
         vm.database.visit_state(&mut |item| match item {

@@ -39,19 +39,9 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
 use crate::run::RunOutcome;
+pub use crate::schedule::Grain;
 use crate::vm::Vm;
 use fingerprint::Fingerprints;
-pub(crate) use point::Points;
-
-/// Before what a task stands at a point.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Grain {
-    /// Before it changes what others can see, or begins to wait.
-    #[default]
-    Changes,
-    /// Also before it looks at what others have changed.
-    Reads,
-}
 
 /// How to explore.
 #[derive(Clone, Copy, Debug)]

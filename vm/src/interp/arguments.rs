@@ -1,8 +1,9 @@
 //! The arguments of a call: the list of an application spread, and arguments put in the order of the parameters.
 
 use super::constants_of;
-use crate::exchange::Arguments;
+use crate::describe;
 use crate::heap::layout::Code;
+use crate::raise::Arguments;
 use crate::raise::Exit;
 use crate::shape::Shape;
 use crate::value::Value;
@@ -43,7 +44,7 @@ pub(super) unsafe fn arrange(
     let count = arguments.len();
     let takes_more = shape.rest || shape.takes_keys;
     if count < required || (count > positional && !takes_more) {
-        let name = vm.name_of_function(function);
+        let name = describe::function_name(&vm.heap, function);
         let max = if takes_more { None } else { Some(positional as u32) };
         let given = count_of_arguments(count);
         return vm.exchange.program_error(format!(
@@ -83,7 +84,7 @@ fn take_keys(
     registers: &mut [Value],
 ) -> Result<(), Exit> {
     if !rest.len().is_multiple_of(2) {
-        let name = vm.name_of_function(function);
+        let name = describe::function_name(&vm.heap, function);
         return vm.exchange.program_error(format!("{name} was called with an odd number of key arguments"));
     }
     vm.exchange.charge(rest.len() * (1 + names.len() / 8));
@@ -104,7 +105,7 @@ fn take_keys(
     }
     match unknown {
         Some(key) if !shape.allow_other_keys && allows != Some(true) => {
-            let name = vm.name_of_function(function);
+            let name = describe::function_name(&vm.heap, function);
             let key = vm.describe(key);
             let known: Vec<String> = names.iter().map(|&name| vm.describe(name)).collect();
             vm.exchange.program_error(format!("{name} has no key {key}; its keys are {}", known.join(" ")))

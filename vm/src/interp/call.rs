@@ -13,8 +13,8 @@ use super::{
     Operation, Signal, aux_at, code_of, constants_of, failure, operation, pc_as_value, stubs, word_at,
 };
 use crate::builtins::NATIVES;
-use crate::exchange::Arguments;
 use crate::heap::layout::{Kind, Symbol};
+use crate::raise::Arguments;
 use crate::raise::{Exit, Raised};
 use crate::shape::{Shape, Sort};
 use crate::value::Value;
@@ -171,7 +171,7 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Fram
         }
         Err(exit) => return Signal::Exit(exit),
     }
-    vm.cpu.ticks = vm.attend(vm.cpu.ticks);
+    vm.cpu.ticks = vm.prepare_safepoint(vm.cpu.ticks);
     // SAFETY: by the contract; V3 for the window.
     unsafe {
         match place {

@@ -17,6 +17,7 @@ use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::shape::capture_source;
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::world::class;
 
 /// Puts an outcome into register `dst`.
 unsafe fn finish(base: *mut Value, dst: usize, outcome: Outcome) -> Signal {
@@ -258,8 +259,8 @@ pub(super) unsafe fn slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
         let reads = operation(word) == Operation::Slot;
         let (instance, slot) = if reads { (*base.add(b), c) } else { (*base.add(a), b) };
         let has_slot = vm.heap.structure_slots(instance).is_some_and(|slots| slot < slots.len());
-        if !has_slot || !vm.is_instance(instance, class) {
-            let raised = Raised::Type(instance, Expected::Specifier(vm.class_name(class)));
+        if !has_slot || !vm.world.is_instance(&vm.heap, instance, class) {
+            let raised = Raised::Type(instance, Expected::Specifier(class::name_of(&vm.heap, class)));
             return failure(vm, raised);
         }
         if reads {
@@ -281,7 +282,7 @@ pub(super) unsafe fn slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
 pub(super) unsafe fn is_instance(vm: &mut Vm, base: *mut Value, value: Value, index: usize) -> bool {
     // SAFETY: by the contract.
     let class = unsafe { class_constant(vm, base, index) };
-    vm.is_instance(value, class)
+    vm.world.is_instance(&vm.heap, value, class)
 }
 
 /// The class that is a constant of the running function. As loaded the constant is the name of the class; the class, as
@@ -290,8 +291,9 @@ unsafe fn class_constant(vm: &mut Vm, base: *mut Value, index: usize) -> Value {
     // SAFETY: V4.
     unsafe {
         let constant = constants_of(code_of(*base.sub(2))).add(index).cast_mut();
-        let name = if vm.heap.is(*constant, Kind::Class) { vm.class_name(*constant) } else { *constant };
-        if let Some(class) = vm.find_class(name)
+        let name =
+            if vm.heap.is(*constant, Kind::Class) { class::name_of(&vm.heap, *constant) } else { *constant };
+        if let Some(class) = vm.world.find_class(name)
             && class != *constant
         {
             vm.heap.store(constant, class);

@@ -8,12 +8,12 @@ use super::{Leave, code_of};
 use crate::environment::Compiler;
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Phase, SLICE_VISITS, SliceOutcome};
-use crate::raise::{Expected, Raised};
 use crate::saved_pc::SavedPc;
-use crate::schedule::Scheduler;
-use crate::task::Task;
+use crate::schedule::{Scheduler, TurnEnd};
+use crate::task::{Task, Tasks};
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::wait::Deliveries;
 use crate::world::World;
 
 /// Offset of the first word above the frame with the given base.
@@ -28,9 +28,6 @@ unsafe fn top_of(task: &Task, base: usize) -> usize {
         base + (*code_of(function)).nregs as usize
     }
 }
-
-/// Charged by whoever wants the slice to end at the next tick; the task goes on with the next slice.
-const END_OF_SLICE: u64 = 1 << 40;
 
 /// Turns of the collector after which a slice ends, however many ticks are left: they take their time too. The ticks are
 /// not charged.
@@ -71,16 +68,44 @@ fn mark_roots(
     heap: &mut Heap,
     world: &World,
     compiler: &Compiler,
-    lists: [&mut Vec<Value>; 3],
-    raised: Option<&Raised>,
+    exchange: &Exchange,
+    pinned: &[Value],
+    deliveries: &Deliveries,
 ) {
     world.roots(&mut |value| heap.mark(value));
     compiler.roots(&mut |value| heap.mark(value));
-    for list in lists {
-        heap.mark_slice(list);
-    }
-    if let Some(raised) = raised {
+    heap.mark_slice(&exchange.values);
+    heap.mark_slice(&exchange.requested_call);
+    heap.mark_slice(pinned);
+    if let Some(raised) = &exchange.raised {
         raised.visit(&mut |value| heap.mark(value));
+    }
+    deliveries.visit(&mut |value| heap.mark(value));
+}
+
+/// Marks more: a slice of what is known to be reachable, then the tasks whose stacks have yet to be scanned.
+fn mark_more(heap: &mut Heap, tasks: &mut Tasks) {
+    let SliceOutcome::Drained { left } = heap.slice(SLICE_VISITS) else { return };
+    let (mut left, mut has_scanned) = (left as usize, false);
+    let cycle = heap.cycle_id();
+    while let Some(task) = tasks.next_unmet() {
+        let mut cost = 1;
+        if let Some(task) = task
+            && task.scanned != cycle
+        {
+            // SAFETY: a task that does not run stands where it was noted at the switch.
+            cost += unsafe { scan(heap, task) } / WORDS_PER_VISIT;
+            has_scanned = true;
+        }
+        left = left.saturating_sub(cost);
+        if left == 0 {
+            return;
+        }
+    }
+    if !has_scanned {
+        // SAFETY: the roots and the running task were marked when the cycle began, and every other task since, before it
+        // ran.
+        unsafe { heap.end_marking() };
     }
 }
 
@@ -120,37 +145,32 @@ impl Vm {
         }
     }
 
-    /// Whether a builtin or an allocation has left something to be seen to.
+    /// Whether a builtin or an allocation wants the next tick to be a safepoint, or has charged ticks.
     #[inline(always)]
-    pub(super) fn wants_attention(&self) -> bool {
-        self.exchange.charged != 0 || self.heap.gc_due()
+    pub(super) fn wants_safepoint(&self) -> bool {
+        !self.exchange.charges.is_empty() || self.heap.gc_due()
     }
 
-    /// Takes what was charged from the ticks that are left, and sees to it that the collector has its turn at the next
-    /// tick. Gives the ticks until then.
+    /// Takes what was charged from the ticks that are left, and sees to it that the next tick is a safepoint if one is wanted there.
+    /// Returns the ticks until then.
     #[cold]
     #[inline(never)]
-    pub(super) fn attend(&mut self, ticks: i32) -> i32 {
+    pub(super) fn prepare_safepoint(&mut self, ticks: i32) -> i32 {
+        let charges = self.exchange.charges.take();
         // A task that owes more than this has had its slice many times over.
-        let charged = std::mem::take(&mut self.exchange.charged);
-        let mut ticks = ticks.saturating_sub((charged % END_OF_SLICE).min(1 << 29) as i32);
-        if charged >= END_OF_SLICE {
+        let mut ticks = ticks.saturating_sub(charges.ticks().min(1 << 29) as i32);
+        if charges.ends_slice() {
             let left = ticks + self.cpu.reserve;
             self.cpu.granted -= left.max(0);
             self.cpu.reserve = 0;
             ticks = left.min(0);
-            self.scheduler.turn.slice_is_cut = true;
+            self.scheduler.turn.end_with(TurnEnd::Cut);
         }
         if self.heap.gc_due() && self.cpu.reserve == 0 && ticks > 0 {
             self.cpu.reserve = ticks;
             return 0;
         }
         ticks
-    }
-
-    /// Has the slice of the running task end at the next tick, to go on with another one: what the slice may take has changed.
-    pub(crate) fn end_slice_here(&mut self) {
-        self.exchange.charged |= END_OF_SLICE;
     }
 
     /// Notes where the running task stands, for a scan or a switch.
@@ -164,87 +184,58 @@ impl Vm {
 
     /// A whole cycle at once: because there is no room, or because every safepoint is to be one.
     pub(crate) fn collect_fully(&mut self) {
-        if self.watch.is_watched {
-            self.watched_pause(Vm::collect_fully_now)
-        } else {
-            self.collect_fully_now()
-        }
-    }
-
-    fn collect_fully_now(&mut self) {
-        if self.scheduler.running.is_some() {
-            self.save_cpu();
-        }
+        let pause = self.begin_pause();
         let Vm { heap, world, compiler, scheduler, exchange, embedder, .. } = self;
         let Scheduler { running, tasks, deliveries, .. } = scheduler;
-        let Exchange { values, requested_call, raised, .. } = exchange;
-        let pinned = &mut embedder.pinned;
-        // SAFETY: all roots and all tasks are marked; `save_cpu` has noted the running frame of the running task, those
+        // SAFETY: all roots and all tasks are marked; `begin_pause` has noted the running frame of the running task, those
         // of the others were noted at the switch.
         unsafe {
             heap.collect_fully(|heap| {
-                mark_roots(heap, world, compiler, [values, requested_call, pinned], raised.as_ref());
-                deliveries.iter().for_each(|delivery| delivery.visit(&mut |value| heap.mark(value)));
+                mark_roots(heap, world, compiler, exchange, &embedder.pinned, deliveries);
                 for task in running.as_deref_mut().into_iter().chain(tasks.iter_mut()) {
                     _ = scan(heap, task);
                 }
             });
         }
+        self.end_pause(pause);
     }
 
     /// The collector's turn.
     pub(crate) fn collect_slice(&mut self) {
-        if self.watch.is_watched {
-            self.watched_pause(Vm::collect_slice_now)
-        } else {
-            self.collect_slice_now()
-        }
-    }
-
-    fn collect_slice_now(&mut self) {
-        if self.scheduler.running.is_some() {
-            self.save_cpu();
-        }
+        let pause = self.begin_pause();
         let Vm { heap, world, compiler, scheduler, exchange, embedder, .. } = self;
         let Scheduler { running, tasks, deliveries, .. } = scheduler;
-        let Exchange { values, requested_call, raised, .. } = exchange;
-        let pinned = &mut embedder.pinned;
         match heap.phase() {
-            Phase::Marking => {
-                let SliceOutcome::Drained { left } = heap.slice(SLICE_VISITS) else { return };
-                let (mut left, mut has_scanned) = (left as usize, false);
-                let cycle = heap.cycle_id();
-                while let Some(task) = tasks.next_unmet() {
-                    let mut cost = 1;
-                    if let Some(task) = task
-                        && task.scanned != cycle
-                    {
-                        // SAFETY: a task that does not run stands where it was noted at the switch.
-                        cost += unsafe { scan(heap, task) } / WORDS_PER_VISIT;
-                        has_scanned = true;
-                    }
-                    left = left.saturating_sub(cost);
-                    if left == 0 {
-                        return;
-                    }
-                }
-                if !has_scanned {
-                    // SAFETY: the roots and the running task were marked when the cycle began, and every other task
-                    // since, before it ran.
-                    unsafe { heap.end_marking() };
-                }
-            }
+            Phase::Marking => mark_more(heap, tasks),
             Phase::Sweeping => _ = heap.slice(SLICE_VISITS),
             Phase::Idle => {
                 heap.begin_cycle();
                 tasks.begin_cycle();
-                mark_roots(heap, world, compiler, [values, requested_call, pinned], raised.as_ref());
-                deliveries.iter().for_each(|delivery| delivery.visit(&mut |value| heap.mark(value)));
+                mark_roots(heap, world, compiler, exchange, &embedder.pinned, deliveries);
                 if let Some(task) = running {
-                    // SAFETY: `save_cpu` has noted its running frame.
+                    // SAFETY: `begin_pause` has noted its running frame.
                     _ = unsafe { scan(heap, task) };
                 }
             }
+        }
+        self.end_pause(pause);
+    }
+
+    /// Begins a turn of the collector: notes where the running task stands, and tells whoever watches. Returns when it began, if
+    /// the run is watched.
+    fn begin_pause(&mut self) -> Option<u64> {
+        if self.scheduler.running.is_some() {
+            self.save_cpu();
+        }
+        let Vm { watch, outside, scheduler, .. } = self;
+        watch.is_watched.then(|| watch.begin_pause(&mut *outside.host, scheduler))
+    }
+
+    /// Ends a turn of the collector.
+    fn end_pause(&mut self, began: Option<u64>) {
+        if let Some(began) = began {
+            let is_last = self.heap.phase() == Phase::Idle;
+            self.watch.end_pause(&mut *self.outside.host, &self.scheduler, began, is_last);
         }
     }
 
@@ -259,28 +250,6 @@ impl Vm {
         {
             // SAFETY: the task has not run since its frame was noted.
             _ = unsafe { scan(&mut self.heap, task) };
-        }
-    }
-}
-
-impl Raised {
-    /// Calls `visit` with every value of the failure.
-    fn visit(&self, visit: &mut dyn FnMut(Value)) {
-        match self {
-            Raised::Type(datum, expected) | Raised::Variable(_, datum, expected) => {
-                // The variable is known to the machine.
-                visit(*datum);
-                if let Expected::Specifier(specifier) = expected {
-                    visit(*specifier);
-                }
-            }
-            Raised::DivisionByZero(_, operands) => operands.iter().copied().for_each(visit),
-            Raised::UnboundVariable(value)
-            | Raised::UndefinedFunction(value)
-            | Raised::EndOfFile(value)
-            | Raised::Stream(value, _)
-            | Raised::Cause(_, value) => visit(*value),
-            _ => {}
         }
     }
 }

@@ -6,6 +6,7 @@ use esl_bytecode::builtin::BUILTINS;
 
 use super::call::{FramePlace, call};
 use super::{Signal, aux_at, failure, word_at};
+use crate::describe::describe;
 use crate::raise::{Exit, Raised};
 use crate::saved_pc::SavedPc;
 use crate::task::End;
@@ -58,16 +59,19 @@ unsafe fn take_over(vm: &mut Vm) -> Signal {
 /// # Safety
 /// The contract of [`super::settle`].
 unsafe fn raise(vm: &mut Vm) -> Signal {
-    let arguments = match vm.raised_arguments() {
+    // It stays noted until it has been put into words, since that may have to be done again.
+    let raised = vm.exchange.raised.clone().unwrap_or(Raised::Simple("an operation failed".into()));
+    let arguments = match raised.arguments(&mut vm.heap, &mut vm.world) {
         Ok(arguments) => arguments,
-        Err(exit) => return Signal::Exit(exit),
+        Err(error) => return Signal::Exit(error.into()),
     };
+    vm.exchange.raised = None;
     let function = vm.world.known.raise;
     if !vm.is_defined(function) {
         // Without a library nobody can handle it.
-        let text = vm.describe_failure(&arguments);
-        vm.embedder.last_words = Some(text);
-        vm.begin_end(End::Failed(arguments[0]));
+        let words: Vec<String> = arguments.iter().map(|&v| describe(&vm.heap, v)).collect();
+        vm.embedder.last_words = Some(words.join(" "));
+        vm.scheduler.task_mut().begin_end(End::Failed(arguments[0]));
         return Signal::Unwind;
     }
     // SAFETY: by the contract.

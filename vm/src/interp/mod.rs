@@ -92,7 +92,7 @@ pub(crate) enum Signal {
 pub(crate) enum Leave {
     /// It has used up the ticks that it was given.
     Slice,
-    /// It has ended.
+    /// It has come to its end.
     Ended,
     /// It waits.
     Parked,
@@ -130,6 +130,13 @@ impl Cpu {
             granted: 0,
             collections: 0,
         }
+    }
+
+    /// Takes the ticks of the slice that were used.
+    pub(crate) fn take_used(&mut self) -> u64 {
+        let left = i64::from(self.reserve) + i64::from(self.ticks);
+        self.reserve = 0;
+        (i64::from(self.granted) - left).max(0) as u64
     }
 }
 
@@ -242,20 +249,6 @@ pub(crate) fn load(vm: &mut Vm, ticks: i32) {
     vm.arm();
 }
 
-/// Sees to what was noted of the task in `vm.scheduler.running`, which is loaded: it may begin to unwind, or find itself in another
-/// function.
-pub(crate) fn see_to_attention(vm: &mut Vm) -> Result<(), Leave> {
-    let was_unwinding = vm.scheduler.task().control.is_unwinding();
-    let function = vm.see_to_running_task();
-    if function.is_some() || vm.scheduler.task().control.is_unwinding() != was_unwinding {
-        vm.close_point();
-    }
-    match function {
-        Some(function) => interrupt(vm, function, &[]),
-        None => Ok(()),
-    }
-}
-
 /// Calls `function` where the task in `vm.scheduler.running`, which is loaded, stands.
 pub(crate) fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]) -> Result<(), Leave> {
     // SAFETY: as for `run`; a task that does not run stands before an instruction that has had no effect yet.
@@ -309,7 +302,7 @@ unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
                     None => return Ok(()),
                 },
                 Signal::Park if vm.scheduler.task().critical > 0 => {
-                    vm.cancel_wait();
+                    vm.scheduler.cancel_wait(&mut vm.heap);
                     failure(vm, Raised::Failure("WOULD-BLOCK"))
                 }
                 Signal::Park => return Err(Leave::Parked),
@@ -318,11 +311,7 @@ unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
                 Signal::Call => call::slow_call(vm),
                 Signal::ReturnAll => substitute::return_all(vm),
                 Signal::Unwind => unwind::unwind(vm),
-                Signal::TaskExit if vm.stops_before_end() => return Err(Leave::Slice),
-                Signal::TaskExit => {
-                    vm.finish_task();
-                    return Err(Leave::Ended);
-                }
+                Signal::TaskExit => return Err(Leave::Ended),
             };
         }
     }
@@ -418,8 +407,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 ($words:literal, $function:path) => {{
                     match $function(vm, pc, base) {
                         Signal::Next => {
-                            if vm.wants_attention() {
-                                ticks = vm.attend(ticks);
+                            if vm.wants_safepoint() {
+                                ticks = vm.prepare_safepoint(ticks);
                             }
                             next!($words);
                         }
@@ -1046,8 +1035,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     match native(vm, arguments) {
                         Ok(value) if word.c() == 0 => {
                             *window = value;
-                            if vm.wants_attention() {
-                                ticks = vm.attend(ticks);
+                            if vm.wants_safepoint() {
+                                ticks = vm.prepare_safepoint(ticks);
                             }
                             next!(2)
                         }
@@ -1059,8 +1048,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         }
                         Err(Exit::Values) => {
                             substitute::deliver(vm, window, word.c());
-                            if vm.wants_attention() {
-                                ticks = vm.attend(ticks);
+                            if vm.wants_safepoint() {
+                                ticks = vm.prepare_safepoint(ticks);
                             }
                             next!(2)
                         }
@@ -1119,14 +1108,14 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     (vm.cpu.pc, vm.cpu.base, vm.cpu.wants_one) = (pc, base, false);
                     match native(vm, arguments) {
                         Ok(value) => {
-                            if vm.wants_attention() {
-                                ticks = vm.attend(ticks);
+                            if vm.wants_safepoint() {
+                                ticks = vm.prepare_safepoint(ticks);
                             }
                             return_value!(value)
                         }
                         Err(Exit::Values) => {
-                            if vm.wants_attention() {
-                                ticks = vm.attend(ticks);
+                            if vm.wants_safepoint() {
+                                ticks = vm.prepare_safepoint(ticks);
                             }
                             break Signal::ReturnAll;
                         }

@@ -69,7 +69,7 @@ impl Vm {
                 let unwinding = Unwinding { target: Target::Entry(index), values: Vec::new() };
                 self.scheduler.task_mut().control.unwinding = Some(unwinding);
             }
-            None => self.begin_end(End::Failed(cause)),
+            None => self.scheduler.task_mut().begin_end(End::Failed(cause)),
         }
     }
 }

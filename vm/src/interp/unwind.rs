@@ -11,7 +11,7 @@ use super::{Signal, aux_at, cold, constant, failure, word_at};
 use crate::heap::layout::Kind;
 use crate::raise::{Exit, Raised};
 use crate::saved_pc::SavedPc;
-use crate::task::{End, Entry, EntryKind, Running, Target, Unwinding};
+use crate::task::{Entry, EntryKind, Running, Target, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -153,7 +153,7 @@ pub(super) unsafe fn pop(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Sign
         }
     }
     for _ in 0..limits {
-        vm.close_limit();
+        vm.scheduler.close_limit();
     }
     Signal::Next
 }
@@ -199,7 +199,7 @@ pub(super) unsafe fn end_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value
     vm.exchange.values = values;
     if vm.scheduler.task().flags.attention() {
         // What waited for the end of the cleanup waits no longer.
-        vm.end_slice_here();
+        vm.exchange.charges.end_slice();
     }
     if unwinds { Signal::Unwind } else { Signal::Next }
 }
@@ -273,7 +273,11 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
             }
             EntryKind::Cleanup | EntryKind::FailureCleanup => {
                 let is_forced = unwinding.target.is_forced();
-                let allowance = if is_forced { Some(vm.new_allowance()) } else { None };
+                let allowance = if is_forced {
+                    Some(vm.scheduler.new_allowance(&mut *vm.outside.host, &vm.config))
+                } else {
+                    None
+                };
                 let running = Running { pending: Some(unwinding), allowance, ..Running::default() };
                 vm.scheduler.task_mut().control.run_cleanup(entry, running);
                 // SAFETY: as above; the entry's pc is the cleanup's first instruction.
@@ -283,7 +287,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
             EntryKind::Running => {
                 let interrupted = task.control.running.pop().and_then(|running| running.pending);
                 let next = if unwinding.target == Target::Cleanup(task.control.entries.len()) {
-                    vm.after_cut_off(interrupted)
+                    Some(vm.scheduler.task_mut().after_cut_off(interrupted))
                 } else {
                     Some(unwinding.or_interrupted(interrupted))
                 };
@@ -291,13 +295,13 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
             }
             EntryKind::Limit => {
                 task.control.unwinding = Some(unwinding);
-                vm.close_limit();
+                vm.scheduler.close_limit();
             }
             EntryKind::Interrupt => {
                 task.control.unwinding = Some(unwinding);
                 if entry.data.is_true() {
                     vm.heap.log_if_marking(entry.data);
-                    vm.close_wait(entry.data);
+                    vm.scheduler.close_wait(&mut vm.heap, entry.data);
                 }
             }
             _ => task.control.unwinding = Some(unwinding),
@@ -327,7 +331,7 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
         return Signal::Reload;
     }
     if entry.kind == EntryKind::Limit {
-        vm.close_limit();
+        vm.scheduler.close_limit();
     }
     vm.exchange.values = values;
     // SAFETY: the entry's frame is live, and V10: its landing asks for no more than the registers below the window.
@@ -392,11 +396,5 @@ impl Vm {
             symbols = pair.cdr;
         }
         if symbols.is_true() { self.exchange.type_error(symbols, "LIST") } else { Ok(()) }
-    }
-
-    /// Begins to unwind the running task to its root, which ends it.
-    pub(crate) fn begin_end(&mut self, end: End) {
-        self.scheduler.task_mut().control.unwinding =
-            Some(Unwinding { target: Target::Root(end), values: Vec::new() });
     }
 }

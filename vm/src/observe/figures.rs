@@ -1,55 +1,54 @@
 //! Figures of a run that cost something to gather, and are gathered on request: how long the collector's turns took, and what each
 //! task has used.
 //!
-//! Of the tasks that have ended only those are kept that have used most, so a million of them take no room.
+//! Of the tasks that have ended only those that used most are kept, so a million of them take no room.
 
-/// How long the collector's turns took, in nanoseconds.
+use crate::task::TaskNumber;
+
+/// Lengths of the collector's turns, in nanoseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pauses {
-    /// How many there were.
+    /// Number of turns.
     pub count: u64,
-    /// All together.
+    /// Sum of their lengths.
     pub total: u64,
-    /// The longest.
+    /// Length of the longest.
     pub longest: u64,
 }
 
 /// What a task has used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TaskFigures {
-    /// The how manieth task of the machine it is.
-    pub number: u64,
-    /// How reports call it.
+    /// Ordinal of the task, counted from the machine's first.
+    pub number: TaskNumber,
+    /// Name by which reports call it.
     pub name: String,
     /// How it has ended, `waiting` or `running`.
     pub status: &'static str,
-    /// Ticks that it has used.
+    /// Ticks used.
     pub ticks: u64,
-    /// Turns that it has had.
+    /// Number of its turns.
     pub turns: u64,
-    /// Bytes of its stack.
+    /// Size of its stack in bytes.
     pub stack: usize,
 }
 
-/// What is gathered.
+/// Figures gathered so far.
 #[derive(Default)]
 pub(crate) struct Figures {
+    /// The collector's turns.
     pub(crate) pauses: Pauses,
-    /// Whether any are wanted, and those of tasks.
-    pub(crate) wanted: bool,
+    /// Whether any figures are wanted.
+    pub(crate) are_wanted: bool,
+    /// Whether figures of tasks are wanted.
     pub(crate) of_tasks: bool,
-    /// Tasks that have ended; no more than twice as many as are kept.
+    /// Tasks that have ended; at most twice as many as are kept.
     pub(crate) ended: Vec<TaskFigures>,
 }
 
 impl Figures {
     /// Tasks that are kept, of those that have ended.
     pub(crate) const KEPT: usize = 100;
-
-    /// Whether somebody has asked for figures.
-    pub(crate) fn are_wanted(&self) -> bool {
-        self.wanted
-    }
 
     /// Notes a turn of the collector.
     pub(crate) fn note_pause(&mut self, length: u64) {

@@ -1,4 +1,6 @@
 //! Watching a run: who is told of it, and the figures that are gathered of it.
+//!
+//! Whether a run is watched changes nothing in the run. Not here: the words in which tasks and events are spoken of (`report`).
 
 mod figures;
 mod observer;
@@ -7,6 +9,10 @@ pub(crate) use figures::Figures;
 pub use figures::{Pauses, TaskFigures};
 pub(crate) use observer::Observers;
 pub use observer::{Observer, Seen};
+
+use crate::host::Host;
+use crate::schedule::Scheduler;
+use crate::task::TaskNumber;
 
 /// Everything that is kept for those who watch a run.
 #[derive(Default)]
@@ -19,4 +25,58 @@ pub(crate) struct Watch {
     pub(crate) figures: Figures,
     /// Whether what happens to tasks is written to the stream for reports.
     pub(crate) traces_tasks: bool,
+}
+
+impl Watch {
+    /// Updates `is_watched`.
+    pub(crate) fn update_is_watched(&mut self) {
+        self.is_watched = self.traces_tasks || !self.observers.list.is_empty() || self.figures.are_wanted;
+    }
+
+    /// Tells observers of something, if there are any.
+    pub(crate) fn show(
+        &mut self,
+        host: &mut dyn Host,
+        scheduler: &Scheduler,
+        task: TaskNumber,
+        seen: Seen<'_>,
+    ) {
+        if !self.observers.list.is_empty() {
+            let time = self.observers.time(host, scheduler);
+            self.observers.show(time, task, seen);
+        }
+    }
+
+    /// Notes that the turn of a task is over, though the task could run on.
+    pub(crate) fn end_turn(&mut self, host: &mut dyn Host, scheduler: &Scheduler, task: TaskNumber) {
+        if !self.observers.list.is_empty() {
+            let time = self.observers.time(host, scheduler);
+            self.observers.end_turn(time, task);
+        }
+    }
+
+    /// Begins a turn of the collector, and returns its time by the host's stopwatch, in nanoseconds.
+    pub(crate) fn begin_pause(&mut self, host: &mut dyn Host, scheduler: &Scheduler) -> u64 {
+        if !std::mem::replace(&mut self.observers.collects, true) {
+            self.show(host, scheduler, TaskNumber::NONE, Seen::CollectionBegins);
+        }
+        self.show(host, scheduler, TaskNumber::NONE, Seen::PauseBegins);
+        host.stopwatch()
+    }
+
+    /// Ends the turn of the collector that began at this time. `is_last` says whether its cycle is over.
+    pub(crate) fn end_pause(
+        &mut self,
+        host: &mut dyn Host,
+        scheduler: &Scheduler,
+        began: u64,
+        is_last: bool,
+    ) {
+        self.figures.note_pause(host.stopwatch().saturating_sub(began));
+        self.show(host, scheduler, TaskNumber::NONE, Seen::PauseEnds);
+        if is_last {
+            self.observers.collects = false;
+            self.show(host, scheduler, TaskNumber::NONE, Seen::CollectionEnds);
+        }
+    }
 }

@@ -1,11 +1,14 @@
-//! Watching a run from outside: an [`Observer`] is told what happens to tasks, of signals, failures and collections.
+//! Observers: what they are told, and what they have yet to be told.
 //!
-//! Guarantees: what an observer is told comes in the order of time, and depends on the run alone; whether somebody watches changes nothing
-//! in the run. A turn that follows on one of the same task, with nothing between them, is one turn.
-//! Not here: what is made of it; nothing is kept.
+//! Guarantees: what an observer is told comes in the order of time, and depends on the run alone. A turn that follows on one of the
+//! same task, with nothing between them, is one turn. Nothing is kept of what was told.
 //!
-//! Times are in nanoseconds since the observer came. Where time is virtual, and stands still while tasks run, each tick
+//! Times are in nanoseconds since the first observer came. Where time is virtual, and stands still while tasks run, each tick
 //! counts as one nanosecond more, so that work has a length.
+
+use crate::host::Host;
+use crate::schedule::Scheduler;
+use crate::task::TaskNumber;
 
 /// What an observer is told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,12 +32,12 @@ pub enum Seen<'a> {
     IsToEnd,
     /// It has ended, as this says: `succeeded`, `failed` or `aborted`.
     Ends(&'a str),
-    /// It has signalled the event of this name. The task is 0 if none did.
+    /// It has signalled the event of this name. The task is [`TaskNumber::NONE`] if none did.
     Signals(&'a str),
-    /// A signal that was just given by another task, or by none (0), has ended its wait.
+    /// A signal that was just given has ended its wait.
     IsWokenBy {
-        /// The task that gave the signal.
-        task: u64,
+        /// The task that gave the signal, or [`TaskNumber::NONE`].
+        task: TaskNumber,
         /// The name of the event.
         event: &'a str,
     },
@@ -42,7 +45,7 @@ pub enum Seen<'a> {
     Fails(&'a str),
     /// A recovery procedure begins to deal with a failure of this cause.
     Recovers(&'a str),
-    /// The collector begins a cycle. The task is 0, as for all that the collector does.
+    /// The collector begins a cycle. The task is [`TaskNumber::NONE`], as for all that the collector does.
     CollectionBegins,
     /// The collector begins a turn, in which no task runs.
     PauseBegins,
@@ -52,29 +55,73 @@ pub enum Seen<'a> {
     CollectionEnds,
 }
 
-/// Somebody who watches a run.
+/// A watcher of a run.
 pub trait Observer: Send {
-    /// Is told what happens, to the task of a number, and when in nanoseconds.
-    fn see(&mut self, time: u64, task: u64, seen: Seen<'_>);
+    /// Is told what happens to a task, and when, in nanoseconds.
+    fn see(&mut self, time: u64, task: TaskNumber, seen: Seen<'_>);
 }
 
-/// Who watches, and what they have yet to be told.
+/// The observers of a run, and what they have yet to be told.
 #[derive(Default)]
 pub(crate) struct Observers {
+    /// The observers.
     pub(crate) list: Vec<Box<dyn Observer>>,
     /// Whether time is virtual.
     pub(crate) is_virtual: bool,
-    /// The time when the first of them came, and the latest that they were told.
+    /// Time at which the first of them came.
     pub(crate) start: u64,
+    /// Latest time that they were told.
     pub(crate) latest: u64,
-    /// The time at which the turn of a task was over that may go on at once.
-    pub(crate) unsaid: Option<(u64, u64)>,
+    /// End of a turn not yet reported, since the same task may run on.
+    pub(crate) unsaid: Option<(u64, TaskNumber)>,
     /// Whether a cycle of the collector is under way.
     pub(crate) collects: bool,
 }
 
 impl Observers {
-    pub(crate) fn tell(&mut self, time: u64, task: u64, seen: Seen<'_>) {
+    /// Notes the time, if the first observer is about to come.
+    pub(crate) fn begin(&mut self, host: &mut dyn Host, scheduler: &Scheduler) {
+        if self.list.is_empty() {
+            self.is_virtual = host.is_virtual();
+            self.start = self.clock(host, scheduler);
+        }
+    }
+
+    fn clock(&self, host: &mut dyn Host, scheduler: &Scheduler) -> u64 {
+        if self.is_virtual { scheduler.clock.now + scheduler.spent } else { host.stopwatch() }
+    }
+
+    /// Returns the time since the first observer came.
+    pub(crate) fn time(&self, host: &mut dyn Host, scheduler: &Scheduler) -> u64 {
+        self.clock(host, scheduler).saturating_sub(self.start)
+    }
+
+    /// Tells observers of something.
+    pub(crate) fn show(&mut self, time: u64, task: TaskNumber, seen: Seen<'_>) {
+        match seen {
+            Seen::Runs if self.unsaid.is_some_and(|(_, last)| last == task) => {
+                self.unsaid = None;
+                return;
+            }
+            _ => self.tell_unsaid(),
+        }
+        self.tell(time, task, seen);
+    }
+
+    /// Notes that the turn of a task is over, though the task could run on.
+    pub(crate) fn end_turn(&mut self, time: u64, task: TaskNumber) {
+        self.tell_unsaid();
+        self.unsaid = Some((time, task));
+    }
+
+    /// Tells observers what they have yet to be told.
+    pub(crate) fn tell_unsaid(&mut self) {
+        if let Some((time, task)) = self.unsaid.take() {
+            self.tell(time, task, Seen::IsReady);
+        }
+    }
+
+    fn tell(&mut self, time: u64, task: TaskNumber, seen: Seen<'_>) {
         // A clock that is read twice may seem to go back where two are mixed.
         self.latest = self.latest.max(time);
         for observer in &mut self.list {

@@ -1,5 +1,6 @@
 //! Gathering figures of tasks.
 
+use super::{end_label, label_of};
 use crate::observe::{Figures, Pauses, TaskFigures};
 use crate::task::{Task, TaskState};
 use crate::vm::Vm;
@@ -8,47 +9,48 @@ use crate::wait::event;
 impl Vm {
     /// Has the collector's turns timed from now on, and the figures of tasks gathered if they are wanted.
     pub fn gather_figures(&mut self, of_tasks: bool) {
-        self.watch.figures.wanted = true;
+        self.watch.figures.are_wanted = true;
         self.watch.figures.of_tasks = of_tasks;
-        self.note_who_watches();
+        self.watch.update_is_watched();
     }
 
-    /// How long the collector's turns took since they are timed.
+    /// Returns how long the collector's turns took since they are timed.
     pub fn pauses(&self) -> Pauses {
         self.watch.figures.pauses
     }
 
-    /// The tasks that have used most, most first: of those that have ended and of those that have not, a hundred at most.
+    /// Returns the tasks that have used most, most first: of those that have ended and of those that have not, a hundred at
+    /// most.
     pub fn task_figures(&self) -> Vec<TaskFigures> {
         let mut tasks = self.watch.figures.ended.clone();
         let living = self.scheduler.tasks.iter().filter(|task| task.state != TaskState::Ended);
-        tasks.extend(living.map(|task| self.figures_of(task)));
+        tasks.extend(living.map(|task| figures_of(self, task)));
         tasks.sort_by_key(|task| (std::cmp::Reverse(task.ticks), task.number));
         tasks.truncate(Figures::KEPT);
         tasks
     }
+}
 
-    fn figures_of(&self, task: &Task) -> TaskFigures {
-        let status = match task.state {
-            TaskState::Ended => self.end_label(task),
-            TaskState::Waiting | TaskState::Reading => "waiting",
-            TaskState::Runnable => "running",
-        };
-        TaskFigures {
-            number: task.number,
-            name: self.label_of(self.slot(task.object, event::NAME), task.number),
-            status,
-            ticks: task.ticks,
-            turns: u64::from(task.turns),
-            stack: task.stack.capacity() * 8,
-        }
+fn figures_of(vm: &Vm, task: &Task) -> TaskFigures {
+    let status = match task.state {
+        TaskState::Ended => end_label(vm, task),
+        TaskState::Waiting | TaskState::Reading => "waiting",
+        TaskState::Runnable => "running",
+    };
+    TaskFigures {
+        number: task.number,
+        name: label_of(vm, vm.heap.slot_or_nil(task.object, event::NAME), task.number),
+        status,
+        ticks: task.ticks,
+        turns: u64::from(task.turns),
+        stack: task.stack.capacity() * 8,
     }
+}
 
-    /// Notes what the running task, which has ended, has used.
-    pub(crate) fn note_end_in_figures(&mut self) {
-        if self.watch.figures.of_tasks {
-            let figures = self.figures_of(self.scheduler.task());
-            self.watch.figures.note_end(figures);
-        }
+/// Notes what the running task, which has ended, has used.
+pub(crate) fn note_end_in_figures(vm: &mut Vm) {
+    if vm.watch.figures.of_tasks {
+        let figures = figures_of(vm, vm.scheduler.task());
+        vm.watch.figures.note_end(figures);
     }
 }

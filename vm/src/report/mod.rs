@@ -1,9 +1,14 @@
-//! What is said of tasks and values: to observers, in traces, in reports, and in messages.
+//! What is said of tasks: to observers, in traces, in reports, and in figures.
 
-mod describe;
 mod figures;
+mod label;
 mod observe;
 mod tasks;
 mod trace;
 
-pub(crate) use trace::Happening;
+pub(crate) use figures::note_end_in_figures;
+pub(crate) use label::{
+    cause_label, end_label, event_label, label_of, reason_of, report_in_short, task_label,
+};
+pub(crate) use observe::{show, tell_of_failure, tell_of_signal, tell_of_waking};
+pub(crate) use trace::{Happening, note, trace_end};

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use esl_bytecode::opcode::Opcode;
 
-use crate::heap::Kind;
+use super::{reason_of, task_label};
 use crate::interp::frames::{Frame, Frames};
 use crate::interp::start::first_code_of;
 use crate::task::{Task, TaskState};
@@ -82,9 +82,9 @@ impl Vm {
         tasks.sort_unstable_by_key(|task| task.number);
         let mut text = String::from("Deadlock: no task can ever run again.\n");
         for task in tasks.iter().take(SHOWN) {
-            let label = self.task_label(task.object);
-            let place = self.program_place(task).map_or(String::new(), |place| format!(", {place}"));
-            text.push_str(&format!("  {label} waits for {}{place}\n", self.reason_of(task)));
+            let label = task_label(self, task.object);
+            let place = program_place(self, task).map_or(String::new(), |place| format!(", {place}"));
+            text.push_str(&format!("  {label} waits for {}{place}\n", reason_of(self, task)));
         }
         if tasks.len() > SHOWN {
             text.push_str(&format!("  and {} more\n", tasks.len() - SHOWN));
@@ -102,17 +102,18 @@ impl Vm {
             .filter(|task| task.state != TaskState::Ended && !task.flags.hidden() && !task.flags.kept())
             .collect();
         tasks.sort_unstable_by_key(|task| task.number);
-        let maker = |task: &Task| self.slot(task.object, event::RESULT).as_index().unwrap_or(0) as u64;
-        let depths = depths(tasks.iter().map(|task| (task.number, maker(task))));
+        let maker =
+            |task: &Task| self.heap.slot_or_nil(task.object, event::RESULT).as_index().unwrap_or(0) as u64;
+        let depths = depths(tasks.iter().map(|task| (task.number.0, maker(task))));
         let mut text = String::new();
         for (position, depth) in depths.iter().take(SHOWN_IN_TREE) {
             let task = tasks[*position];
-            let label = self.task_label(task.object);
+            let label = task_label(self, task.object);
             let state = match task.state {
                 TaskState::Runnable => "can run".to_string(),
-                _ => format!("waits for {}", self.reason_of(task)),
+                _ => format!("waits for {}", reason_of(self, task)),
             };
-            let place = self.program_place(task).map_or(String::new(), |place| format!(", {place}"));
+            let place = program_place(self, task).map_or(String::new(), |place| format!(", {place}"));
             let indent = "  ".repeat((*depth).min(20));
             text.push_str(&format!("{indent}{label} {state}{place}, {} ticks\n", task.ticks));
         }
@@ -123,63 +124,23 @@ impl Vm {
         }
         text
     }
+}
 
-    /// What a task waits for.
-    pub(crate) fn reason_of(&self, task: &Task) -> String {
-        if task.state == TaskState::Reading {
-            return "input".into();
-        }
-        if task.wait.is_nil() {
-            return "a time".into();
-        }
-        let (events, what) = self.waited_for(task.wait);
-        let first = events.first().copied().unwrap_or(Value::NIL);
-        if let Some(pair) = self.heap.as_cons(what) {
-            let datum = self.describe(pair.cdr);
-            return match self.describe(pair.car).as_str() {
-                ":CHECKPOINT" => format!("checkpoint {datum} of {}", self.event_label(first)),
-                ":UNTIL" => format!("{datum} to be true"),
-                _ => self.heap.string_text(pair.cdr).unwrap_or(datum),
-            };
-        }
-        let labels: Vec<String> = events.iter().map(|&event| self.event_label(event)).collect();
-        match &labels[..] {
-            [label] if what == self.world.known.task_end => format!("the end of {label}"),
-            [label] if self.heap.is(first, Kind::Task) => format!("a signal of {label}"),
-            labels => labels.join(" or "),
-        }
-    }
-
-    pub(crate) fn event_label(&self, event: Value) -> String {
-        if self.heap.is(event, Kind::Task) {
-            return self.task_label(event);
-        }
-        if !self.is_event(event) {
-            return "nothing".into();
-        }
-        match self.slot(event, crate::wait::event::NAME) {
-            _ if event == self.scheduler.any_event => "any event".into(),
-            name if name.is_true() => format!("event {}", self.describe(name)),
-            _ => "an event".into(),
-        }
-    }
-
-    /// The innermost place of the program, not of the library, at which a task stands; if tail calls have left no frame of the
-    /// program, that of the tail call in the function with which the task began, or of its beginning if there are several.
-    fn program_place(&self, task: &Task) -> Option<String> {
-        let place = |code: Value, word: usize| {
-            let place = self.source_place(code, word as u32).filter(|place| !is_of_library(&place.source))?;
-            Some(format!("{}:{}:{}", place.source, place.line, place.column))
-        };
-        let in_frame = |frame: Frame<'_>| {
-            let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
-            place(self.heap.function_code(frame.function)?, word)
-        };
-        Frames::of_task(task).take(FRAMES).find_map(in_frame).or_else(|| {
-            let code = first_code_of(task);
-            place(code, tail_call_in(self.heap.code_words(code)?).unwrap_or(0))
-        })
-    }
+/// The innermost place of the program, not of the library, at which a task stands; if tail calls have left no frame of the
+/// program, that of the tail call in the function with which the task began, or of its beginning if there are several.
+fn program_place(vm: &Vm, task: &Task) -> Option<String> {
+    let place = |code: Value, word: usize| {
+        let place = vm.source_place(code, word as u32).filter(|place| !is_of_library(&place.source))?;
+        Some(format!("{}:{}:{}", place.source, place.line, place.column))
+    };
+    let in_frame = |frame: Frame<'_>| {
+        let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
+        place(vm.heap.function_code(frame.function)?, word)
+    };
+    Frames::of_task(task).take(FRAMES).find_map(in_frame).or_else(|| {
+        let code = first_code_of(task);
+        place(code, tail_call_in(vm.heap.code_words(code)?).unwrap_or(0))
+    })
 }
 
 #[cfg(test)]

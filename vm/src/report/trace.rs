@@ -1,10 +1,12 @@
-//! What happens to tasks, for those who watch; and what is written when tasks are traced: a line for each beginning, wait, going
-//! on, request of an abort, and end.
+//! What happens to tasks, for those who watch; and the trace of tasks: a line for each beginning, wait, going on, request of an
+//! abort, and end.
 
+use super::{label_of, reason_of, show, task_label};
+use crate::describe::describe;
 use crate::observe::Seen;
+use crate::task::TaskIndex;
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::event;
 
 /// What happens to a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,92 +17,72 @@ pub(crate) enum Happening {
     Waits,
     /// It can run again.
     GoesOn,
-    /// Its end is asked for.
+    /// It was asked to end.
     IsToEnd,
 }
 
 impl Vm {
-    /// Has what happens to tasks written to standard error.
+    /// Says whether what happens to tasks is written to the stream for reports.
     pub fn trace_tasks(&mut self, on: bool) {
         self.watch.traces_tasks = on;
-        self.note_who_watches();
+        self.watch.update_is_watched();
     }
+}
 
-    /// Notes what happens to the task at a place, for whoever watches.
-    #[inline]
-    pub(crate) fn note(&mut self, index: u32, happening: Happening) {
-        if self.watch.is_watched {
-            self.note_for_watchers(index, happening);
+/// Notes what happens to the task with this index, for whoever watches.
+#[inline]
+pub(crate) fn note(vm: &mut Vm, index: TaskIndex, happening: Happening) {
+    if vm.watch.is_watched {
+        note_for_watchers(vm, index, happening);
+    }
+}
+
+#[cold]
+fn note_for_watchers(vm: &mut Vm, index: TaskIndex, happening: Happening) {
+    if vm.watch.traces_tasks {
+        write_trace(vm, index, happening);
+    }
+    let Some(task) = vm.scheduler.tasks.at(index) else { return };
+    let number = task.number;
+    match happening {
+        Happening::Begins => {
+            let (name, is_hidden) = (task_label(vm, task.object), task.flags.hidden());
+            show(vm, number, Seen::Begins { name: &name, is_hidden });
+            show(vm, number, Seen::IsReady);
         }
-    }
-
-    #[cold]
-    fn note_for_watchers(&mut self, index: u32, happening: Happening) {
-        if self.watch.traces_tasks {
-            self.write_trace(index, happening);
+        Happening::Waits => {
+            let reason = reason_of(vm, task);
+            show(vm, number, Seen::Waits(&reason));
         }
-        let Some(task) = self.scheduler.tasks.at(index) else { return };
-        let number = task.number;
-        match happening {
-            Happening::Begins => {
-                let (name, is_hidden) = (self.task_label(task.object), task.flags.hidden());
-                self.show(number, Seen::Begins { name: &name, is_hidden });
-                self.show(number, Seen::IsReady);
-            }
-            Happening::Waits => {
-                let reason = self.reason_of(task);
-                self.show(number, Seen::Waits(&reason));
-            }
-            Happening::GoesOn => self.show(number, Seen::IsReady),
-            Happening::IsToEnd => self.show(number, Seen::IsToEnd),
-        }
+        Happening::GoesOn => show(vm, number, Seen::IsReady),
+        Happening::IsToEnd => show(vm, number, Seen::IsToEnd),
     }
+}
 
-    fn write_trace(&mut self, index: u32, happening: Happening) {
-        let Some(task) = self.scheduler.tasks.at(index).filter(|task| !task.flags.hidden()) else { return };
-        let label = self.task_label(task.object);
-        let what = match happening {
-            Happening::Begins => "begins".into(),
-            Happening::Waits => format!("waits for {}", self.reason_of(task)),
-            Happening::GoesOn => "goes on".into(),
-            Happening::IsToEnd => "is to be aborted".into(),
-        };
-        self.write_trace_line(&label, &what);
-    }
+fn write_trace(vm: &mut Vm, index: TaskIndex, happening: Happening) {
+    let Some(task) = vm.scheduler.tasks.at(index).filter(|task| !task.flags.hidden()) else { return };
+    let label = task_label(vm, task.object);
+    let what = match happening {
+        Happening::Begins => "begins".into(),
+        Happening::Waits => format!("waits for {}", reason_of(vm, task)),
+        Happening::GoesOn => "goes on".into(),
+        Happening::IsToEnd => "is to be aborted".into(),
+    };
+    write_trace_line(vm, &label, &what);
+}
 
-    /// Writes how a task has ended, if tasks are traced.
-    pub(crate) fn trace_end(&mut self, name: Value, status: Value) {
-        if self.watch.traces_tasks && !self.scheduler.task().flags.hidden() {
-            let label = self.label_of(name, self.scheduler.task().number);
-            let status = self.describe(status).trim_start_matches(':').to_lowercase();
-            let what = if status == "aborted" { "was aborted".into() } else { format!("has {status}") };
-            self.write_trace_line(&label, &what);
-        }
+/// Writes how the running task has ended, if tasks are traced.
+pub(crate) fn trace_end(vm: &mut Vm, name: Value, status: Value) {
+    let task = vm.scheduler.task();
+    if vm.watch.traces_tasks && !task.flags.hidden() {
+        let label = label_of(vm, name, task.number);
+        let status = describe(&vm.heap, status).trim_start_matches(':').to_lowercase();
+        let what = if status == "aborted" { "was aborted".into() } else { format!("has {status}") };
+        write_trace_line(vm, &label, &what);
     }
+}
 
-    fn write_trace_line(&mut self, label: &str, what: &str) {
-        let seconds = self.time() as f64 / 1e9;
-        self.outside.complain(&format!("; {seconds:.6} {label} {what}\n"));
-    }
-
-    /// How reports call a task.
-    pub(crate) fn task_label(&self, object: Value) -> String {
-        let index = self.slot(object, event::STATE).as_index();
-        let is_running = index == Some(self.scheduler.turn.index as usize);
-        let task = if is_running { self.scheduler.running.as_deref() } else { None };
-        let number = task.or_else(|| self.scheduler.tasks.at(index? as u32)).map_or(0, |task| task.number);
-        self.label_of(self.slot(object, event::NAME), number)
-    }
-
-    pub(crate) fn label_of(&self, name: Value, number: u64) -> String {
-        if name.is_true() {
-            format!("task {}", self.describe(name))
-        } else if self.scheduler.main_number == Some(number) {
-            "the main task".into()
-        } else if number == 0 {
-            "a task that has ended".into()
-        } else {
-            format!("task {number}")
-        }
-    }
+fn write_trace_line(vm: &mut Vm, label: &str, what: &str) {
+    let seconds = vm.scheduler.clock.read(&mut *vm.outside.host) as f64 / 1e9;
+    vm.outside.complain(&format!("; {seconds:.6} {label} {what}\n"));
 }

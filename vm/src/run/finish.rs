@@ -1,178 +1,113 @@
-//! The end of a task: asking for it, noting how it came, telling who waits for it, and ending the run with the last.
+//! The end of a task: noting how it came, telling whoever waits for it, and ending the run with the last.
 
+use super::abort::abort_others;
+use super::pending::interrupt_by;
+use super::signal::keep;
 use crate::heap::Kind;
 use crate::interp;
 use crate::raise::Exit;
-use crate::report::Happening;
-use crate::schedule::EndOfAll;
-use crate::task::AccountId;
-use crate::task::End;
-use crate::task::{TaskId, TaskState};
+use crate::report;
+use crate::task::{AccountId, End, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
 
-/// Tasks that are asked to end in one step.
-const AT_ONCE: usize = 1000;
+/// Notes how the running task has ended, and tells whoever wants to know.
+pub(super) fn finish_task(vm: &mut Vm) {
+    let end = match vm.scheduler.turn.ending.take().unwrap_or(End::Succeeded) {
+        End::Spent => End::Failed(vm.world.known.budget_exhausted),
+        end => end,
+    };
+    let mut values = std::mem::take(&mut vm.exchange.values);
+    let object = vm.scheduler.task().object;
+    // What others are told of has to be made before; here there is nothing to go back to.
+    let result = match (end, &values[..]) {
+        (End::Succeeded, &[value]) => value,
+        (End::Succeeded, values) => allocate_without_retry(vm, |vm| Ok(vm.heap.list(values)?)),
+        (End::Failed(condition), _) => condition,
+        _ => Value::NIL,
+    };
+    let has_one_value = end == End::Succeeded && values.len() == 1;
+    vm.heap.set_aux(object, Kind::Task, u16::from(has_one_value));
+    vm.heap.slot_set(object, event::RESULT, result);
+    let status = match end {
+        End::Succeeded => vm.world.known.succeeded,
+        End::Failed(_) | End::Spent => vm.world.known.failed,
+        End::Aborted => vm.world.known.aborted,
+    };
+    vm.heap.slot_set(object, event::STATE, status);
+    let is_awaited = event::is_awaited(&vm.heap, object);
+    let task = vm.scheduler.task_mut();
+    let notify = std::mem::replace(&mut task.notify, Value::NIL);
+    interp::start::drop_frames(task);
+    let account = std::mem::replace(&mut task.account, AccountId::NONE);
+    vm.scheduler.accounts.leave(account);
+    report::trace_end(vm, vm.heap.slot_or_nil(object, event::NAME), status);
+    report_end(vm, end, is_awaited || notify.is_true());
+    let task = vm.scheduler.task_mut();
+    task.state = TaskState::Ended;
+    if task.flags.kept() {
+        let extra = task.extra_mut();
+        extra.end = Some(end);
+        extra.values = std::mem::take(&mut values);
+    }
+    values.clear();
+    vm.exchange.values = values;
+    // The list of arguments is made only if somebody will see it.
+    let is_awaited = event::is_awaited(&vm.heap, object);
+    let arguments: &[Value] = if is_awaited { &[vm.world.known.task_end] } else { &[] };
+    allocate_without_retry(vm, |vm| vm.signal_event(object, arguments).map(|()| Value::NIL));
+    if vm.heap.is(notify, Kind::Wait) {
+        let cell = allocate_without_retry(vm, |vm| Ok(vm.heap.cons(object, Value::NIL)?));
+        keep(vm, notify, cell, object);
+    } else if notify.is_true() {
+        interrupt_by(vm, notify);
+    }
+    end_run_if_over(vm, end);
+}
 
-impl Vm {
-    /// Asks for the end of a task, wherever it is. It unwinds, and runs its cleanups, within two slices; inside a cleanup
-    /// or a critical section the request waits for its end.
-    pub fn abort(&mut self, id: TaskId) {
-        if !self.scheduler.tasks.contains(id) {
-            return;
+/// Allocates where an instruction cannot be done again, at the end of a task or between turns: with a collection if need be, and
+/// with the reserve of the heap.
+pub(super) fn allocate_without_retry(
+    vm: &mut Vm,
+    mut allocate: impl FnMut(&mut Vm) -> Result<Value, Exit>,
+) -> Value {
+    for attempt in 0..3 {
+        if let Ok(value) = allocate(vm) {
+            return value;
         }
-        let is_running = id.index == self.scheduler.turn.index && self.scheduler.running.is_some();
-        let task =
-            if is_running { self.scheduler.running.as_deref_mut() } else { self.scheduler.tasks.get_mut(id) };
-        if let Some(task) = task
-            && task.state != TaskState::Ended
-        {
-            task.flags.set_abort_pending(true);
-            self.note(id.index, Happening::IsToEnd);
-            self.call_attention(id.index);
+        match attempt {
+            0 => vm.collect_fully(),
+            _ => _ = vm.heap.open_reserve(),
         }
     }
+    Value::NIL
+}
 
-    /// Asks for the end of every task, as if the program had asked to end.
-    pub fn abort_all(&mut self) {
-        self.abort_others();
+/// Reports the failure that has ended the running task, unless a task waits for it or the embedder wants to.
+fn report_end(vm: &mut Vm, end: End, is_awaited: bool) {
+    let task = vm.scheduler.task_mut();
+    if task.flags.kept() || is_awaited {
+        return;
     }
+    let End::Failed(condition) = end else { return };
+    let report = task.extra.as_mut().and_then(|extra| extra.report.take());
+    let (name, number) = (vm.heap.slot_or_nil(task.object, event::NAME), task.number);
+    let label = report::label_of(vm, name, number);
+    let text = report.map_or_else(|| report::report_in_short(&vm.heap, condition), |report| report.text());
+    vm.outside.complain(&format!("In {label}:\n{text}"));
+}
 
-    /// Asks for the end of every task but the running one. Where there are many, the rest are asked between turns, and only those
-    /// that are being ended have turns until then.
-    pub(crate) fn abort_others(&mut self) {
-        let except = self.scheduler.running.as_ref().map_or(0, |task| task.number);
-        self.scheduler.end_of_all = Some(EndOfAll { place: 0, made: self.scheduler.counts.made, except });
-        self.abort_more();
-        if self.scheduler.end_of_all.is_some()
-            && let Some(task) = &mut self.scheduler.running
-        {
-            task.flags.set_urgent(true);
-        }
+/// Ends the run with the running task, if it is the last that matters.
+fn end_run_if_over(vm: &mut Vm, end: End) {
+    let scheduler = &mut vm.scheduler;
+    scheduler.counts.alive -= 1;
+    if !scheduler.task().flags.daemon() {
+        scheduler.counts.foreground -= 1;
     }
-
-    /// Asks the next tasks to end, if all are to.
-    pub(crate) fn abort_more(&mut self) {
-        let Some(all) = self.scheduler.end_of_all else { return };
-        let end = self.scheduler.tasks.places().min(all.place + AT_ONCE);
-        for index in all.place..end {
-            let index = index as u32;
-            if let Some(task) = self.scheduler.tasks.at(index)
-                && task.number <= all.made
-                && task.number != all.except
-                && let Some(id) = self.scheduler.tasks.id_at(index)
-            {
-                self.abort(id);
-            }
-        }
-        let is_over = end == self.scheduler.tasks.places();
-        self.scheduler.end_of_all = if is_over { None } else { Some(EndOfAll { place: end, ..all }) };
-    }
-
-    /// Notes how the running task has ended, and tells those who want to know.
-    pub(crate) fn finish_task(&mut self) {
-        let end = match self.scheduler.turn.ending.take().unwrap_or(End::Succeeded) {
-            End::Spent => End::Failed(self.world.known.budget_exhausted),
-            end => end,
-        };
-        let mut values = std::mem::take(&mut self.exchange.values);
-        let object = self.scheduler.task().object;
-        // What others are told of has to be made before; here there is nothing to go back to.
-        let result = match (end, &values[..]) {
-            (End::Succeeded, &[value]) => value,
-            (End::Succeeded, values) => self.make_for_end(|vm| Ok(vm.heap.list(values)?)),
-            (End::Failed(condition), _) => condition,
-            _ => Value::NIL,
-        };
-        let aux = u16::from(end == End::Succeeded && values.len() == 1);
-        self.heap.set_aux(object, Kind::Task, aux);
-        self.set_slot(object, event::RESULT, result);
-        let status = match end {
-            End::Succeeded => self.world.known.succeeded,
-            End::Failed(_) | End::Spent => self.world.known.failed,
-            End::Aborted => self.world.known.aborted,
-        };
-        self.set_slot(object, event::STATE, status);
-        let is_awaited = self.slot(object, event::FIRST).is_true();
-        let notify = std::mem::replace(&mut self.scheduler.task_mut().notify, Value::NIL);
-        interp::start::drop_frames(self.scheduler.task_mut());
-        let account = std::mem::replace(&mut self.scheduler.task_mut().account, AccountId::NONE);
-        self.scheduler.accounts.leave(account);
-        self.trace_end(self.slot(object, event::NAME), status);
-        self.report_end(end, is_awaited || notify.is_true());
-        let task = self.scheduler.task_mut();
-        task.state = TaskState::Ended;
-        if task.flags.kept() {
-            let extra = task.extra_mut();
-            extra.end = Some(end);
-            extra.values = std::mem::take(&mut values);
-        }
-        values.clear();
-        self.exchange.values = values;
-        // The list of arguments is made only if somebody will see it.
-        let has_waiters = self.slot(object, event::FIRST).is_true();
-        let arguments: &[Value] = if has_waiters { &[self.world.known.task_end] } else { &[] };
-        self.make_for_end(|vm| vm.signal_event(object, arguments).map(|()| Value::NIL));
-        if self.heap.is(notify, Kind::Wait) {
-            let cell = self.make_for_end(|vm| Ok(vm.heap.cons(object, Value::NIL)?));
-            self.keep(notify, cell, object);
-        } else if notify.is_true() {
-            self.interrupt_by(notify);
-        }
-        self.end_run_if_over(end);
-    }
-
-    /// Does what needs room at the end of a task, where an instruction cannot be done again: with a collection if need be,
-    /// and with the reserve of the heap.
-    pub(crate) fn make_for_end(&mut self, mut make: impl FnMut(&mut Vm) -> Result<Value, Exit>) -> Value {
-        for attempt in 0..3 {
-            if let Ok(value) = make(self) {
-                return value;
-            }
-            match attempt {
-                0 => self.collect_fully(),
-                _ => _ = self.heap.open_reserve(),
-            }
-        }
-        Value::NIL
-    }
-
-    /// Reports the failure that has ended the running task, unless somebody waits for it or the embedder wants to.
-    fn report_end(&mut self, end: End, is_awaited: bool) {
-        let task = self.scheduler.task_mut();
-        if task.flags.kept() || is_awaited {
-            return;
-        }
-        let report = task.extra.as_mut().and_then(|extra| extra.report.take());
-        let name = self.slot(self.scheduler.task().object, event::NAME);
-        let label = self.label_of(name, self.scheduler.task().number);
-        match (end, report) {
-            (End::Failed(_), Some(report)) => {
-                self.outside.complain(&format!("In {label}:\n{}", report.text()))
-            }
-            (End::Failed(condition), None) => {
-                self.outside.complain(&format!("In {label}:\n{}", self.report_in_short(condition)));
-            }
-            _ => {}
-        }
-    }
-
-    /// What is to be said of a failure that has ended a task when there was no room for more.
-    pub(crate) fn report_in_short(&self, condition: Value) -> String {
-        format!("Failure {}, no recovery available.\nAborted\n", self.describe(condition))
-    }
-
-    /// Ends the run with the running task, if it is the last that matters.
-    fn end_run_if_over(&mut self, end: End) {
-        self.scheduler.counts.alive -= 1;
-        if !self.scheduler.task().flags.daemon() {
-            self.scheduler.counts.foreground -= 1;
-        }
-        let Some(main) = self.scheduler.main else { return };
-        let main_has_failed = main.index == self.scheduler.turn.index && (end != End::Succeeded);
-        if main_has_failed || self.scheduler.counts.foreground == 0 {
-            self.abort_others();
-        }
+    let Some(main) = scheduler.main else { return };
+    let main_has_failed = main.index == scheduler.turn.index && end != End::Succeeded;
+    if main_has_failed || scheduler.counts.foreground == 0 {
+        abort_others(vm);
     }
 }

@@ -2,42 +2,50 @@
 //!
 //! ```text
 //! queues    runnable tasks, by priority       choices   which of them, where the order is open
-//! timer     what is due at which time         clock     when the host's clock was read
+//! timer     what happens at which time        clock     readings of the host's clock
 //! account   ticks that may be used together   turn      the turn of the running task
+//! point     places at which a task lets others go first, while schedules are explored
 //! ```
 //!
-//! Guarantees: a task that has not ended is running, in a run queue, held, or parked, and only one of these. Everything here is data
-//! with its own operations; what happens to tasks while the machine runs is in `run`.
+//! Guarantees: a task that has not ended is running, in a run queue, held or parked, and only one of these. Everything here is
+//! data with its own operations; what happens to tasks while the machine runs is in `run`.
 
 mod account;
 mod choices;
 mod clock;
+mod point;
 mod queues;
 mod timer;
 mod turn;
 
-pub(crate) use account::{Accounts, Status};
+pub(crate) use account::{AccountOwner, Accounts};
 pub use choices::Choices;
 pub(crate) use clock::Clock;
+pub use point::Grain;
+pub(crate) use point::Points;
 pub(crate) use queues::RunQueues;
-pub(crate) use timer::{Due, Timers};
-pub(crate) use turn::{Parking, Turn};
+pub(crate) use timer::{Due, Timer, Timers};
+pub(crate) use turn::{Parking, Turn, TurnEnd};
 
-use std::collections::VecDeque;
-
-use crate::task::{Task, TaskId, Tasks};
+use crate::config::Config;
+use crate::heap::Heap;
+use crate::host::Host;
+use crate::raise::{Exit, Outcome};
+use crate::task::{
+    AccountId, Allowance, LimitNumber, Serial, Task, TaskId, TaskIndex, TaskNumber, TaskState, Tasks,
+};
 use crate::value::Value;
-use crate::wait::Delivery;
+use crate::wait::{Deliveries, link};
 
 /// Progress of ending all tasks, which takes several steps where there are many.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EndOfAll {
-    /// Place of the next task to be asked.
-    pub(crate) place: usize,
-    /// Number of the newest task that is to end: those made afterwards are not asked.
-    pub(crate) made: u64,
-    /// Number of the task that wants it, which is not asked, or 0.
-    pub(crate) except: u64,
+    /// Index of the next task to be asked.
+    pub(crate) next: usize,
+    /// Newest task that is to end: those made afterwards are not asked.
+    pub(crate) newest: TaskNumber,
+    /// Task that wants it, which is not asked, or [`TaskNumber::NONE`].
+    pub(crate) except: TaskNumber,
 }
 
 /// Numbers of tasks and of their turns.
@@ -63,14 +71,12 @@ pub(crate) struct Scheduler {
     pub(crate) queues: RunQueues,
     /// The choices among them.
     pub(crate) choices: Choices,
-    /// Waits, limits and cleanups with a time.
+    /// Times at which waits end, limits expire and cleanups are looked at.
     pub(crate) timers: Timers,
     /// Budgets of forms and tasks.
     pub(crate) accounts: Accounts,
-    /// Signals under delivery, in the order in which they were given.
-    pub(crate) deliveries: VecDeque<Delivery>,
-    /// Tasks held back until all signals are delivered, each with its serial number.
-    pub(crate) held: Vec<(u32, u64)>,
+    /// Signals under delivery, and the tasks held back by them.
+    pub(crate) deliveries: Deliveries,
     /// Tasks that wait for input.
     pub(crate) readers: Vec<TaskId>,
     /// Progress of ending all tasks, while that is under way.
@@ -82,11 +88,11 @@ pub(crate) struct Scheduler {
     /// The task with whose failure the run ends; without one, tasks come and go as they like.
     pub(crate) main: Option<TaskId>,
     /// Number of the task that reports call the main task.
-    pub(crate) main_number: Option<u64>,
+    pub(crate) main_number: Option<TaskNumber>,
     /// Numbers of tasks and of turns.
     pub(crate) counts: Counts,
     /// Newest serial number of a task's state.
-    pub(crate) serial: u64,
+    pub(crate) serial: Serial,
     /// Readings of the clock.
     pub(crate) clock: Clock,
     /// Ticks used by all tasks together.
@@ -95,6 +101,8 @@ pub(crate) struct Scheduler {
     pub(crate) running: Option<Box<Task>>,
     /// The turn of the running task.
     pub(crate) turn: Turn,
+    /// Where tasks stop while schedules are explored.
+    pub(crate) points: Points,
 }
 
 impl Scheduler {
@@ -106,8 +114,7 @@ impl Scheduler {
             choices: Choices::seeded(seed),
             timers: Timers::default(),
             accounts: Accounts::default(),
-            deliveries: VecDeque::new(),
-            held: Vec::new(),
+            deliveries: Deliveries::default(),
             readers: Vec::new(),
             end_of_all: None,
             any_event,
@@ -115,11 +122,12 @@ impl Scheduler {
             main: None,
             main_number: None,
             counts: Counts::default(),
-            serial: 0,
+            serial: Serial::default(),
             clock: Clock::default(),
             spent: 0,
             running: None,
             turn: Turn::default(),
+            points: Points::default(),
         }
     }
 
@@ -141,10 +149,174 @@ impl Scheduler {
         self.running.as_mut().expect("a builtin is called by a task")
     }
 
-    /// Returns a number that no state of a task had before.
+    /// Returns the number of the running task, or [`TaskNumber::NONE`].
+    pub(crate) fn running_number(&self) -> TaskNumber {
+        self.running.as_ref().map_or(TaskNumber::NONE, |task| task.number)
+    }
+
+    /// Returns whether the running task has this index.
     #[inline]
-    pub(crate) fn next_serial(&mut self) -> u64 {
-        self.serial += 1;
-        self.serial
+    pub(crate) fn is_running(&self, index: TaskIndex) -> bool {
+        index == self.turn.index && self.running.is_some()
+    }
+
+    /// Returns the task with this index, whether it runs or not.
+    pub(crate) fn find(&self, index: TaskIndex) -> Option<&Task> {
+        if self.is_running(index) { self.running.as_deref() } else { self.tasks.at(index) }
+    }
+
+    /// Returns the task with this index, whether it runs or not.
+    pub(crate) fn find_mut(&mut self, index: TaskIndex) -> Option<&mut Task> {
+        if self.is_running(index) { self.running.as_deref_mut() } else { self.tasks.at_mut(index) }
+    }
+
+    /// Puts a task at the end of its queue, or of the urgent one. Returns whether it was parked.
+    pub(crate) fn make_runnable(&mut self, index: TaskIndex, urgent: bool) -> bool {
+        let serial = self.serial.advance();
+        let Some(task) = self.tasks.at_mut(index) else { return false };
+        let was_parked = std::mem::replace(&mut task.state, TaskState::Runnable) != TaskState::Runnable;
+        task.serial = serial;
+        let (priority, urgent) = (task.priority, urgent || task.flags.urgent());
+        self.queues.push(index, serial, priority, urgent);
+        was_parked
+    }
+
+    /// Keeps a runnable task from running until all signals are delivered.
+    pub(crate) fn hold(&mut self, index: TaskIndex) {
+        let serial = self.serial.advance();
+        if let Some(task) = self.tasks.at_mut(index) {
+            task.serial = serial;
+            self.deliveries.held.push((index, serial));
+        }
+    }
+
+    /// Has an operation on waits of the running task try again once all signals are delivered.
+    ///
+    /// # Errors
+    /// [`Exit::Again`] if signals are under delivery.
+    pub(crate) fn wait_for_deliveries(&mut self) -> Result<(), Exit> {
+        if self.deliveries.is_empty() || self.running.is_none() {
+            return Ok(());
+        }
+        self.turn.end_with(TurnEnd::Held);
+        Err(Exit::Again)
+    }
+
+    /// Parks the running task at `wait`; the instruction is done again when it goes on.
+    ///
+    /// # Errors
+    /// Always [`Exit::Park`].
+    pub(crate) fn park_at(&mut self, wait: Value, deadline: Option<u64>) -> Outcome {
+        self.task_mut().wait = wait;
+        self.turn.parking = Parking::Wait(deadline);
+        Err(Exit::Park)
+    }
+
+    /// Closes a wait.
+    pub(crate) fn close_wait(&mut self, heap: &mut Heap, wait: Value) {
+        link::close(heap, &mut self.deliveries, wait);
+    }
+
+    /// Closes the wait at which the running task was parked, because it will not go on there.
+    pub(crate) fn cancel_wait(&mut self, heap: &mut Heap) {
+        let wait = std::mem::replace(&mut self.task_mut().wait, Value::NIL);
+        if wait.is_true() {
+            heap.log_if_marking(wait);
+            self.close_wait(heap, wait);
+        }
+    }
+
+    /// Leaves the wait at which the running task was parked. Its signal has come, so it is in no list any more.
+    pub(crate) fn leave_signalled(&mut self, heap: &mut Heap) {
+        let wait = std::mem::replace(&mut self.task_mut().wait, Value::NIL);
+        heap.log_if_marking(wait);
+    }
+
+    /// Returns a number for a new limit.
+    pub(crate) fn next_limit(&mut self) -> LimitNumber {
+        LimitNumber(self.serial.advance())
+    }
+
+    /// Closes the innermost limit of the running task, because its entry was popped.
+    pub(crate) fn close_limit(&mut self) {
+        let limit = self.task_mut().extra.as_mut().and_then(|extra| extra.limits.pop());
+        if let Some(limit) = limit
+            && let Some(parent) = self.accounts.close_form(limit.account)
+        {
+            self.task_mut().account = parent;
+        }
+    }
+
+    /// Returns whether the running task has to end because an account that it charges is spent.
+    pub(crate) fn is_task_spent(&self) -> bool {
+        self.accounts.is_spent_for(self.task().account, self.turn.index)
+    }
+
+    /// Returns the allowance of a cleanup of the running task that an abort or an expired limit meets now, and sets its timer.
+    pub(crate) fn new_allowance(&mut self, host: &mut dyn Host, config: &Config) -> Allowance {
+        let time = self.clock.read(host).saturating_add(config.cleanup_time);
+        self.timers.push(time, self.turn.index, Due::Cleanup);
+        // The ticks of the slice under way are not counted yet, and come on top.
+        Allowance { ticks: self.task().ticks.saturating_add(config.cleanup_ticks), time }
+    }
+
+    /// Returns whether the budget of the run is spent.
+    pub(crate) fn is_budget_spent(&self, config: &Config) -> bool {
+        config.budget.is_some_and(|budget| self.spent >= budget)
+    }
+
+    /// Returns the length of the next slice of the running task, of at most `limit` ticks.
+    pub(crate) fn slice_length(&mut self, config: &Config, limit: u64) -> u64 {
+        let mut slice = u64::from(self.choices.slice(config.slice)).min(limit);
+        if let Some(budget) = config.budget {
+            slice = slice.min(budget.saturating_sub(self.spent));
+        }
+        let account = self.task().account;
+        if account != AccountId::NONE {
+            slice = slice.min(self.accounts.left(account));
+        }
+        if let Some(left) = self.task().cleanup_ticks_left() {
+            slice = slice.min(left);
+            if left == 0 {
+                self.task_mut().flags.set_attention(true);
+            }
+        }
+        if self.task().critical > 0 {
+            slice = slice.min(self.turn.critical_left.max(1) as u64);
+        }
+        slice.max(1)
+    }
+
+    /// Returns the time of the first timer that is still wanted, and drops those before it.
+    pub(crate) fn first_timer(&mut self) -> Option<u64> {
+        while let Some(timer) = self.timers.first()
+            && !self.is_wanted(timer)
+        {
+            self.timers.take_first();
+        }
+        self.timers.first().map(|timer| timer.time)
+    }
+
+    /// Drops the timers that are no longer wanted.
+    pub(crate) fn sweep_timers(&mut self) {
+        let tasks = &self.tasks;
+        self.timers.sweep(|timer| is_wanted(tasks, timer));
+    }
+
+    /// Returns whether a timer is still wanted, while no task runs.
+    pub(crate) fn is_wanted(&self, timer: Timer) -> bool {
+        is_wanted(&self.tasks, timer)
+    }
+}
+
+fn is_wanted(tasks: &Tasks, timer: Timer) -> bool {
+    let Some(task) = tasks.at(timer.index) else { return false };
+    match timer.due {
+        Due::Wait(serial) => task.is_waiting_since(serial),
+        Due::Limit(number) => {
+            let limits = task.extra.as_ref().map_or(&[][..], |extra| &extra.limits[..]);
+            limits.iter().any(|limit| limit.number == number)
+        }
+        Due::Cleanup => task.runs_cleanup(),
     }
 }

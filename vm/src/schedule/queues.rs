@@ -14,33 +14,35 @@
 use std::collections::VecDeque;
 
 use super::Choices;
-use crate::task::{PRIORITIES, TaskState, Tasks};
+use crate::task::{PRIORITIES, Serial, TaskIndex, TaskState, Tasks};
 
 /// Runnable tasks among which a choice is made, at most.
 const CHOICE: usize = 8;
 
 /// A place in a queue.
 #[derive(Clone, Copy, Debug)]
-struct Queued {
-    index: u32,
-    serial: u64,
+pub(crate) struct Queued {
+    index: TaskIndex,
+    serial: Serial,
 }
 
 /// The runnable tasks.
 #[derive(Default)]
 pub(crate) struct RunQueues {
-    queues: [VecDeque<Queued>; PRIORITIES],
-    /// A bit for each queue, by priority; not set for one that is empty.
-    occupied: u8,
-    urgent: VecDeque<Queued>,
-    /// Turns so far.
-    turns: u64,
+    /// Queues by priority.
+    pub(crate) queues: [VecDeque<Queued>; PRIORITIES],
+    /// A bit for each queue, by priority; may be set for one that is empty.
+    pub(crate) occupied: u8,
+    /// Queue of the urgent tasks.
+    pub(crate) urgent: VecDeque<Queued>,
+    /// Number of turns so far.
+    pub(crate) turns: u64,
 }
 
 impl RunQueues {
     /// Adds a task.
     #[inline]
-    pub(crate) fn push(&mut self, index: u32, serial: u64, priority: u8, urgent: bool) {
+    pub(crate) fn push(&mut self, index: TaskIndex, serial: Serial, priority: u8, urgent: bool) {
         let queued = Queued { index, serial };
         if urgent {
             self.urgent.push_back(queued);
@@ -51,12 +53,12 @@ impl RunQueues {
     }
 
     /// Takes out the first of those that are being ended, or wait for that.
-    pub(crate) fn next_urgent(&mut self, tasks: &Tasks) -> Option<u32> {
+    pub(crate) fn next_urgent(&mut self, tasks: &Tasks) -> Option<TaskIndex> {
         pop(&mut self.urgent, tasks, &mut Choices::first())
     }
 
     /// Takes out the task whose turn it is.
-    pub(crate) fn next(&mut self, tasks: &Tasks, choices: &mut Choices) -> Option<u32> {
+    pub(crate) fn next(&mut self, tasks: &Tasks, choices: &mut Choices) -> Option<TaskIndex> {
         self.turns += 1;
         if self.turns & 1 == 0
             && !self.urgent.is_empty()
@@ -90,7 +92,7 @@ fn is_valid(queued: Queued, tasks: &Tasks) -> bool {
 
 /// Takes a task out of a queue, and drops places that are no longer good.
 #[inline]
-fn pop(queue: &mut VecDeque<Queued>, tasks: &Tasks, choices: &mut Choices) -> Option<u32> {
+fn pop(queue: &mut VecDeque<Queued>, tasks: &Tasks, choices: &mut Choices) -> Option<TaskIndex> {
     while let Some(&first) = queue.front() {
         if !is_valid(first, tasks) {
             queue.pop_front();
@@ -119,7 +121,7 @@ mod tests {
         let mut tasks = Tasks::default();
         for serial in 0..count {
             let mut task = Box::new(Task::new(Value::NIL, 1));
-            task.serial = u64::from(serial);
+            task.serial = Serial(u64::from(serial));
             tasks.insert(task);
         }
         tasks
@@ -130,13 +132,13 @@ mod tests {
         let tasks = tasks(8);
         let mut queues = RunQueues::default();
         for index in 0..8 {
-            queues.push(index, u64::from(index), index as u8, false);
+            queues.push(TaskIndex(index), Serial(u64::from(index)), index as u8, false);
         }
         let mut turns = [0; 8];
         for _ in 0..64 {
             let index = queues.next(&tasks, &mut Choices::first()).unwrap();
-            turns[index as usize] += 1;
-            queues.push(index, u64::from(index), index as u8, false);
+            turns[index.as_usize()] += 1;
+            queues.push(index, Serial(u64::from(index.0)), index.0 as u8, false);
         }
         assert!(turns.iter().all(|&turns| turns >= 1) && turns[7] > 50, "{turns:?}");
     }
@@ -146,20 +148,21 @@ mod tests {
         let tasks = tasks(10);
         let mut queues = RunQueues::default();
         for index in 0..9 {
-            queues.push(index, u64::from(index), 7, false);
+            queues.push(TaskIndex(index), Serial(u64::from(index)), 7, false);
         }
-        queues.push(9, 9, 0, true);
-        let turns: Vec<u32> = (0..2).filter_map(|_| queues.next(&tasks, &mut Choices::first())).collect();
-        assert!(turns.contains(&9), "{turns:?}");
+        queues.push(TaskIndex(9), Serial(9), 0, true);
+        let turns: Vec<TaskIndex> =
+            (0..2).filter_map(|_| queues.next(&tasks, &mut Choices::first())).collect();
+        assert!(turns.contains(&TaskIndex(9)), "{turns:?}");
     }
 
     #[test]
     fn an_old_place_is_not_good() {
         let tasks = tasks(2);
         let mut queues = RunQueues::default();
-        queues.push(0, 77, 4, false);
-        queues.push(1, 1, 4, false);
-        assert_eq!(queues.next(&tasks, &mut Choices::first()), Some(1));
+        queues.push(TaskIndex(0), Serial(77), 4, false);
+        queues.push(TaskIndex(1), Serial(1), 4, false);
+        assert_eq!(queues.next(&tasks, &mut Choices::first()), Some(TaskIndex(1)));
         assert_eq!(queues.next(&tasks, &mut Choices::first()), None);
     }
 }

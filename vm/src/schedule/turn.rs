@@ -1,8 +1,8 @@
 //! The turn of the running task.
 
-use crate::task::End;
+use crate::task::{End, TaskIndex};
 
-/// How a task comes to be parked.
+/// Why a task is about to park.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Parking {
     /// For input from outside.
@@ -12,20 +12,30 @@ pub(crate) enum Parking {
     Wait(Option<u64>),
 }
 
+/// What follows on a slice after which the task could run on, in order of precedence.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum TurnEnd {
+    /// The ticks are used up: the task goes to the end of its queue.
+    #[default]
+    Spent,
+    /// The slice was cut short, because its length or its account is no longer right: the task goes on with another slice.
+    Cut,
+    /// The task lets others go first: it goes to the end of its queue.
+    Passed,
+    /// The task is held back until all signals are delivered.
+    Held,
+}
+
 /// State of the running task that is over with its turn.
 pub(crate) struct Turn {
-    /// Place of the task, which is free while it runs.
-    pub(crate) index: u32,
-    /// Ticks left of its critical section.
+    /// Index of the task.
+    pub(crate) index: TaskIndex,
+    /// What follows on the present slice.
+    pub(crate) end: TurnEnd,
+    /// Ticks left of the task's critical section.
     pub(crate) critical_left: i64,
     /// Whether its critical section has begun in this slice, whose ticks so far do not count.
     pub(crate) critical_is_new: bool,
-    /// Whether its slice was cut short and goes on with another one.
-    pub(crate) slice_is_cut: bool,
-    /// Whether it lets others have their turns.
-    pub(crate) passes_turn: bool,
-    /// Whether it is to be held back.
-    pub(crate) holds_task: bool,
     /// Whether something was noted of it when its slice began.
     pub(crate) had_attention: bool,
     /// Why it is about to park.
@@ -34,15 +44,21 @@ pub(crate) struct Turn {
     pub(crate) ending: Option<End>,
 }
 
+impl Turn {
+    /// Notes what follows on the slice, unless something else takes precedence.
+    #[inline]
+    pub(crate) fn end_with(&mut self, end: TurnEnd) {
+        self.end = self.end.max(end);
+    }
+}
+
 impl Default for Turn {
     fn default() -> Turn {
         Turn {
-            index: u32::MAX,
+            index: TaskIndex::NONE,
+            end: TurnEnd::default(),
             critical_left: 0,
             critical_is_new: false,
-            slice_is_cut: false,
-            passes_turn: false,
-            holds_task: false,
             had_attention: false,
             parking: Parking::default(),
             ending: None,

@@ -3,16 +3,26 @@
 use crate::heap::{Heap, Kind};
 use crate::value::Value;
 
-/// The task that it guards.
+/// Slot: the task that it guards.
 pub(crate) const TASK: usize = 0;
-/// The function that is to run there.
+/// Slot: the function that is to run there.
 pub(crate) const FUNCTION: usize = 1;
-/// Whether it still may.
+/// Slot: whether it still may.
 pub(crate) const IS_OPEN: usize = 2;
-/// The height of the control stack where it was made: it acts inside a cleanup only if it was made there.
+/// Slot: the height of the control stack where it was made; it acts inside a cleanup only if it was made there.
 pub(crate) const HEIGHT: usize = 3;
 /// `aux` of such a record.
 pub(crate) const AUX: u16 = 1;
+
+/// Returns whether a guard may still act.
+pub(crate) fn is_open(heap: &Heap, guard: Value) -> bool {
+    heap.slot_or_nil(guard, IS_OPEN).is_true()
+}
+
+/// Says whether a guard may act from now on.
+pub(crate) fn set_open(heap: &mut Heap, guard: Value, on: bool) {
+    heap.slot_set(guard, IS_OPEN, Value::boolean(on));
+}
 
 /// Returns whether `object` is a guard.
 pub(crate) fn is_guard(heap: &Heap, object: Value) -> bool {

@@ -1,8 +1,9 @@
-//! The limits that are open in a task, and what cleanups may use.
+//! The limits that are open in a task, and what its cleanups may still use.
 
+use super::LimitNumber;
 use crate::value::Value;
 
-/// Names an account.
+/// Names an account of ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct AccountId(pub(crate) u32);
 
@@ -16,19 +17,19 @@ impl AccountId {
 pub(crate) struct Limit {
     /// Index of its entry in the control stack.
     pub(crate) entry: u32,
-    /// Its number.
-    pub(crate) number: u64,
-    /// Its account, if it limits ticks.
+    /// Number that timers and accounts know it by.
+    pub(crate) number: LimitNumber,
+    /// Account, if it limits ticks.
     pub(crate) account: AccountId,
-    /// Why it has expired: the cause, a keyword.
+    /// Cause of its expiry, a keyword.
     pub(crate) expired: Option<Value>,
 }
 
 /// What a running cleanup may still use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Allowance {
-    /// Up to how many ticks of the task.
+    /// Ticks of the task at which it ends.
     pub ticks: u64,
-    /// Until when, in nanoseconds.
+    /// Time at which it ends, in nanoseconds.
     pub time: u64,
 }

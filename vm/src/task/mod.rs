@@ -9,11 +9,14 @@
 mod binding;
 mod control_stack;
 pub(crate) mod guard;
+mod id;
 mod limit;
 mod tasks;
 
 pub(crate) use binding::{Binding, Bindings};
 pub(crate) use control_stack::{Control, End, Entry, EntryKind, LazyControl, Running, Target, Unwinding};
+pub use id::TaskNumber;
+pub(crate) use id::{LimitNumber, Serial, TaskIndex};
 pub(crate) use limit::{AccountId, Allowance, Limit};
 pub use tasks::TaskId;
 pub(crate) use tasks::Tasks;
@@ -55,9 +58,9 @@ pub(crate) struct Task {
     /// Ticks that it has used.
     pub ticks: u64,
     /// Changes whenever it is queued or parked, so that older places in queues and timers are told from the present one.
-    pub serial: u64,
-    /// The how manieth task of this machine it is.
-    pub number: u64,
+    pub serial: Serial,
+    /// Ordinal, counted from the machine's first task.
+    pub number: TaskNumber,
     /// The collector's cycle in which the stack was last scanned.
     pub scanned: u64,
     /// Offset of the running frame's base, while it does not run.
@@ -203,8 +206,8 @@ impl Task {
             wait: Value::NIL,
             notify: Value::NIL,
             ticks: 0,
-            serial: 0,
-            number: 0,
+            serial: Serial::default(),
+            number: TaskNumber::NONE,
             scanned: 0,
             base: 0,
             turns: 0,
@@ -225,6 +228,55 @@ impl Task {
     /// What few tasks need, made if it is not there.
     pub(crate) fn extra_mut(&mut self) -> &mut Extra {
         self.extra.get_or_insert_default()
+    }
+
+    /// Returns whether it waits since it got this serial number.
+    pub(crate) fn is_waiting_since(&self, serial: Serial) -> bool {
+        self.serial == serial && self.state == TaskState::Waiting
+    }
+
+    /// Returns whether one of its cleanups runs.
+    pub(crate) fn runs_cleanup(&self) -> bool {
+        self.control.get().is_some_and(|control| !control.running.is_empty())
+    }
+
+    /// Returns the ticks that its cleanups may still use; `None` if they have no allowance, or none runs.
+    pub(crate) fn cleanup_ticks_left(&self) -> Option<u64> {
+        let allowances = self.control.get()?.running.iter().filter_map(|running| running.allowance);
+        allowances.map(|allowance| allowance.ticks.saturating_sub(self.ticks)).min()
+    }
+
+    /// Returns the entry of its outermost limit that has expired, and the cause.
+    pub(crate) fn expired_limit(&self) -> Option<(usize, Value)> {
+        let limits = self.extra.as_ref().map_or(&[][..], |extra| &extra.limits[..]);
+        limits.iter().find_map(|limit| Some((limit.entry as usize, limit.expired?)))
+    }
+
+    /// Begins to unwind it to its root, which ends it.
+    pub(crate) fn begin_end(&mut self, end: End) {
+        self.control.unwinding = Some(Unwinding { target: Target::Root(end), values: Vec::new() });
+    }
+
+    /// Returns the unwinding that goes on when the entry of a cleanup that was cut off has been popped. `interrupted` is the unwinding
+    /// that the cleanup has interrupted.
+    pub(crate) fn after_cut_off(&mut self, interrupted: Option<Unwinding>) -> Unwinding {
+        if let Some(interrupted) = interrupted {
+            return interrupted;
+        }
+        // It followed a form that had returned. What made it end is for the whole task or for a form further out; with a
+        // cleanup around it that one is what ends.
+        if let Some(entry) = self.control.innermost_cleanup() {
+            return Unwinding { target: Target::Cleanup(entry), values: Vec::new() };
+        }
+        if !self.flags.abort_pending()
+            && let Some((entry, cause)) = self.expired_limit()
+        {
+            return Unwinding { target: Target::Limit(entry), values: vec![cause] };
+        }
+        let end = if self.flags.abort_pending() { End::Aborted } else { End::Spent };
+        self.flags.set_abort_pending(false);
+        self.flags.set_urgent(true);
+        Unwinding { target: Target::Root(end), values: Vec::new() }
     }
 
     /// What became of it.

@@ -1,12 +1,14 @@
 //! The table of a machine's tasks.
 
-use super::Task;
+use super::{Task, TaskIndex};
 use crate::value::Value;
 
 /// Names a task for as long as the machine lives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct TaskId {
-    pub(crate) index: u32,
+    /// Index in the table.
+    pub(crate) index: TaskIndex,
+    /// Number of tasks that have had this index, up to this one.
     generation: u32,
 }
 
@@ -63,7 +65,8 @@ impl Tasks {
             self.places.push(TaskPlace::default());
             (self.places.len() - 1) as u32
         });
-        let place = &mut self.places[index as usize];
+        let index = TaskIndex(index);
+        let place = &mut self.places[index.as_usize()];
         place.generation = place.generation.wrapping_add(1);
         place.taken = true;
         place.task = Some(task);
@@ -71,12 +74,12 @@ impl Tasks {
     }
 
     fn place(&self, id: TaskId) -> Option<&TaskPlace> {
-        self.places.get(id.index as usize).filter(|place| place.taken && place.generation == id.generation)
+        self.places.get(id.index.as_usize()).filter(|place| place.taken && place.generation == id.generation)
     }
 
     /// The name of the task at a place that is taken.
-    pub(crate) fn id_at(&self, index: u32) -> Option<TaskId> {
-        let place = self.places.get(index as usize).filter(|place| place.taken)?;
+    pub(crate) fn id_at(&self, index: TaskIndex) -> Option<TaskId> {
+        let place = self.places.get(index.as_usize()).filter(|place| place.taken)?;
         Some(TaskId { index, generation: place.generation })
     }
 
@@ -93,7 +96,7 @@ impl Tasks {
     /// A task that does not run.
     pub(crate) fn get_mut(&mut self, id: TaskId) -> Option<&mut Task> {
         self.places
-            .get_mut(id.index as usize)
+            .get_mut(id.index.as_usize())
             .filter(|place| place.taken && place.generation == id.generation)?
             .task
             .as_deref_mut()
@@ -101,36 +104,36 @@ impl Tasks {
 
     /// The task at a place, if it does not run.
     #[inline]
-    pub(crate) fn at(&self, index: u32) -> Option<&Task> {
-        self.places.get(index as usize)?.task.as_deref()
+    pub(crate) fn at(&self, index: TaskIndex) -> Option<&Task> {
+        self.places.get(index.as_usize())?.task.as_deref()
     }
 
     /// The task at a place, if it does not run.
     #[inline]
-    pub(crate) fn at_mut(&mut self, index: u32) -> Option<&mut Task> {
-        self.places.get_mut(index as usize)?.task.as_deref_mut()
+    pub(crate) fn at_mut(&mut self, index: TaskIndex) -> Option<&mut Task> {
+        self.places.get_mut(index.as_usize())?.task.as_deref_mut()
     }
 
     /// Takes a task out of its place, to be run.
     #[inline]
-    pub(crate) fn take(&mut self, index: u32) -> Option<Box<Task>> {
-        self.places.get_mut(index as usize)?.task.take()
+    pub(crate) fn take(&mut self, index: TaskIndex) -> Option<Box<Task>> {
+        self.places.get_mut(index.as_usize())?.task.take()
     }
 
     /// Puts a task back into its place.
     #[inline]
-    pub(crate) fn put_back(&mut self, index: u32, task: Box<Task>) {
-        self.places[index as usize].task = Some(task);
+    pub(crate) fn put_back(&mut self, index: TaskIndex, task: Box<Task>) {
+        self.places[index.as_usize()].task = Some(task);
     }
 
     /// Frees the place of a task.
     pub(crate) fn remove(&mut self, id: TaskId) -> Option<Box<Task>> {
-        let place = self.places.get_mut(id.index as usize)?;
+        let place = self.places.get_mut(id.index.as_usize())?;
         if !place.taken || place.generation != id.generation {
             return None;
         }
         place.taken = false;
-        self.free.push(id.index);
+        self.free.push(id.index.0);
         place.task.take()
     }
 
@@ -141,7 +144,7 @@ impl Tasks {
 
     /// The names of all tasks, in the order of their places.
     pub(crate) fn ids(&self) -> Vec<TaskId> {
-        (0..self.places.len() as u32).filter_map(|index| self.id_at(index)).collect()
+        (0..self.places.len() as u32).filter_map(|index| self.id_at(TaskIndex(index))).collect()
     }
 
     /// All tasks but the running one.

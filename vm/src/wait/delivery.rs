@@ -1,26 +1,57 @@
-//! Signals that are being handed out.
+//! Signals under delivery.
+//!
+//! A signal that more tasks wait for than are seen to in one step is delivered between turns, a part at a time. Until then no task
+//! may notice that others have not got it yet: the task that signals is held back, and operations on waits try again.
 
-use crate::task::AccountId;
+use std::collections::VecDeque;
+
+use crate::task::{AccountId, Serial, TaskIndex, TaskNumber};
 use crate::value::Value;
 
-/// A signal that is being handed out.
+/// A signal under delivery.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Delivery {
-    /// What was signalled.
+    /// Signalled event.
     pub(crate) event: Value,
-    /// With what: a list.
+    /// List of the signal's arguments.
     pub(crate) arguments: Value,
-    /// The next wait that gets it: a link in the list of the event, or `NIL`.
+    /// Next link in the list of the event that gets the signal, or `NIL`.
     pub(crate) next: Value,
-    /// Who pays for the work.
+    /// Account that the work is charged to.
     pub(crate) account: AccountId,
-    /// The number of the task that signals, or 0.
-    pub(crate) by: u64,
+    /// Task that signals, or [`TaskNumber::NONE`].
+    pub(crate) by: TaskNumber,
 }
 
-impl Delivery {
-    /// Calls `visit` with its values.
+/// Signals under delivery, and the tasks that are held back until all of them are delivered.
+#[derive(Default)]
+pub(crate) struct Deliveries {
+    /// Signals, in the order in which they were given.
+    pub(crate) signals: VecDeque<Delivery>,
+    /// Tasks held back, each with its serial number then.
+    pub(crate) held: Vec<(TaskIndex, Serial)>,
+}
+
+impl Deliveries {
+    /// Returns whether no signal is under delivery.
+    #[inline]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.signals.is_empty()
+    }
+
+    /// Notes that a link leaves its list, in front of `next`, so that no delivery goes by it.
+    pub(crate) fn pass_over(&mut self, link: Value, next: Value) {
+        for delivery in &mut self.signals {
+            if delivery.next == link {
+                delivery.next = next;
+            }
+        }
+    }
+
+    /// Calls `visit` with every value of the signals.
     pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
-        [self.event, self.arguments, self.next].into_iter().for_each(visit);
+        for delivery in &self.signals {
+            [delivery.event, delivery.arguments, delivery.next].into_iter().for_each(&mut *visit);
+        }
     }
 }

@@ -10,7 +10,6 @@
 
 use crate::heap::{AllocError, Heap, Kind};
 use crate::value::Value;
-use crate::vm::Vm;
 use crate::world::World;
 
 /// Slots of a Class.
@@ -102,6 +101,17 @@ impl World {
         line_of(heap, class).get(depth) == Some(&ancestor)
             || list(heap, class_slot(heap, class, slot::OTHERS)).any(|other| other == ancestor)
     }
+
+    /// Returns whether `value` is an instance of `class`, or of a class that inherits from it.
+    #[inline]
+    pub(crate) fn is_instance(&self, heap: &Heap, value: Value, class: Value) -> bool {
+        heap.structure_class(value).is_some_and(|own| self.is_subclass(heap, own, class))
+    }
+}
+
+/// Returns the name of a class; `NIL` for what is none.
+pub(crate) fn name_of(heap: &Heap, class: Value) -> Value {
+    class_slot(heap, class, slot::NAME)
 }
 
 /// A slot of a Class; `NIL` for what is none.
@@ -132,25 +142,6 @@ fn list(heap: &Heap, list: Value) -> impl Iterator<Item = Value> {
 fn is_same_layout(heap: &Heap, class: Value, supers: &[Value], slots: &[Value]) -> bool {
     list(heap, class_slot(heap, class, slot::SUPERS)).eq(supers.iter().copied())
         && list(heap, class_slot(heap, class, slot::SLOTS)).eq(slots.iter().copied())
-}
-
-impl Vm {
-    /// The class of this name.
-    pub(crate) fn find_class(&self, name: Value) -> Option<Value> {
-        self.world.find_class(name)
-    }
-
-    /// The name of a class; `NIL` for what is none.
-    pub(crate) fn class_name(&self, class: Value) -> Value {
-        class_slot(&self.heap, class, slot::NAME)
-    }
-
-    /// Whether `value` is an instance of `class`, or of a class that inherits from it.
-    #[inline]
-    pub(crate) fn is_instance(&self, value: Value, class: Value) -> bool {
-        let own = self.heap.structure_class(value);
-        own.is_some_and(|own| self.world.is_subclass(&self.heap, own, class))
-    }
 }
 
 #[cfg(test)]

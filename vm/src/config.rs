@@ -1,0 +1,50 @@
+//! Limits and settings of a virtual machine.
+
+/// Ticks that a cleanup may take once an abort or an expired limit is pending.
+const CLEANUP_TICKS: u64 = 1_000_000;
+/// Nanoseconds that it may take.
+const CLEANUP_TIME: u64 = 60_000_000_000;
+
+/// Limits and settings of a virtual machine.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// Limit of the heap in bytes.
+    pub memory: usize,
+    /// Limit of a task's stack in words; also of its bindings and of the entries of its control stack.
+    pub stack: usize,
+    /// Ticks that a task runs before the next one has its turn.
+    pub slice: u32,
+    /// Ticks that the whole run may take; `None` without a limit.
+    pub budget: Option<u64>,
+    /// Seed of everything that is chosen at random.
+    pub seed: u64,
+    /// Collect at every safepoint. For tests: what is not rooted is found soon.
+    pub collect_always: bool,
+    /// Ticks that a critical section may take.
+    pub critical_ticks: u32,
+    /// Ticks that a cleanup may take once an abort or an expired limit is pending.
+    pub cleanup_ticks: u64,
+    /// Nanoseconds that it may take then.
+    pub cleanup_time: u64,
+}
+
+impl Config {
+    /// What holds where nothing else is said.
+    pub const DEFAULT: Config = Config {
+        memory: 1 << 30,
+        stack: 1 << 16,
+        slice: 2000,
+        budget: None,
+        seed: 0,
+        collect_always: false,
+        critical_ticks: 20_000,
+        cleanup_ticks: CLEANUP_TICKS,
+        cleanup_time: CLEANUP_TIME,
+    };
+}
+
+impl Default for Config {
+    fn default() -> Config {
+        Config::DEFAULT
+    }
+}

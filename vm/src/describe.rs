@@ -1,0 +1,149 @@
+//! Values as short texts, for messages of the machine itself.
+//!
+//! The printer that programs use is written in ESL; this one is for failures that are put into words before any ESL can
+//! run, such as a wrong number of arguments. It shows a few elements and levels and no more.
+
+use num_bigint::BigInt;
+
+use crate::heap::layout::{Code, Symbol};
+use crate::heap::{Heap, Kind};
+use crate::value::Value;
+use crate::world::class;
+
+/// Elements of a list or vector, characters of a string, and levels that are shown.
+const LENGTH: usize = 10;
+const CHARACTERS: usize = 60;
+const DEPTH: usize = 3;
+/// Limbs of an integer whose digits are shown.
+const LIMBS: usize = 8;
+
+/// Returns a short text for a value.
+pub(crate) fn describe(heap: &Heap, value: Value) -> String {
+    let mut text = String::new();
+    describe_into(heap, value, DEPTH, &mut text);
+    text
+}
+
+/// Returns the name of a function.
+pub(crate) fn function_name(heap: &Heap, function: Value) -> String {
+    let code = heap.function_code(function).and_then(|code| heap.code(code));
+    match code {
+        Some(Code { name, .. }) if name.is_true() => describe(heap, *name),
+        _ => "an anonymous function".into(),
+    }
+}
+
+// The depth is bounded by `DEPTH`, so recursion is fine here.
+fn describe_into(heap: &Heap, value: Value, depth: usize, text: &mut String) {
+    if let Some(n) = value.as_fixnum() {
+        text.push_str(&n.to_string());
+    } else if let Some(x) = heap.as_double(value) {
+        text.push_str(&format!("{x:?}"));
+    } else if let Some(code) = value.as_character() {
+        text.push_str("#\\");
+        text.push(char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER));
+    } else if value.is_nil() {
+        text.push_str("NIL");
+    } else if value == Value::T {
+        text.push('T');
+    } else if value.is_cons() {
+        describe_list(heap, value, depth, text);
+    } else {
+        describe_object(heap, value, depth, text);
+    }
+}
+
+fn describe_list(heap: &Heap, list: Value, depth: usize, text: &mut String) {
+    if depth == 0 {
+        text.push('#');
+        return;
+    }
+    text.push('(');
+    let mut rest = list;
+    for i in 0.. {
+        let Some(pair) = heap.as_cons(rest) else { break };
+        if i > 0 {
+            text.push(' ');
+        }
+        if i == LENGTH {
+            text.push_str("...)");
+            return;
+        }
+        describe_into(heap, pair.car, depth - 1, text);
+        rest = pair.cdr;
+    }
+    if rest.is_true() {
+        text.push_str(" . ");
+        describe_into(heap, rest, depth - 1, text);
+    }
+    text.push(')');
+}
+
+fn describe_object(heap: &Heap, value: Value, depth: usize, text: &mut String) {
+    match heap.kind(value) {
+        Some(Kind::Symbol) => describe_symbol(heap, value, text),
+        Some(Kind::String) => {
+            let characters = heap.string(value).unwrap_or(&[]);
+            let shown: String = characters
+                .iter()
+                .take(CHARACTERS)
+                .map(|&code| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER))
+                .collect();
+            let more = if characters.len() > CHARACTERS { "..." } else { "" };
+            text.push_str(&format!("\"{shown}{more}\""));
+        }
+        Some(Kind::Bignum) => {
+            if let Some(big) = heap.bignum(value)
+                && big.limbs.len() <= LIMBS
+            {
+                let bytes: Vec<u8> = big.limbs.iter().flat_map(|limb| limb.to_le_bytes()).collect();
+                let magnitude = BigInt::from_bytes_le(num_bigint::Sign::Plus, &bytes);
+                text.push_str(&if big.negative { -magnitude } else { magnitude }.to_string());
+            } else {
+                text.push_str("a large integer");
+            }
+        }
+        Some(Kind::Ratio) => {
+            if let Some((numerator, denominator)) = heap.ratio(value) {
+                describe_into(heap, numerator, depth, text);
+                text.push('/');
+                describe_into(heap, denominator, depth, text);
+            }
+        }
+        Some(Kind::SimpleVector) => {
+            if depth == 0 {
+                text.push('#');
+                return;
+            }
+            text.push_str("#(");
+            for (i, &element) in heap.vector(value).unwrap_or(&[]).iter().enumerate() {
+                if i > 0 {
+                    text.push(' ');
+                }
+                if i == LENGTH {
+                    text.push_str("...");
+                    break;
+                }
+                describe_into(heap, element, depth - 1, text);
+            }
+            text.push(')');
+        }
+        Some(Kind::Function) => text.push_str(&format!("#<function {}>", function_name(heap, value))),
+        Some(Kind::Structure) => {
+            let class = heap.structure_class(value).unwrap_or(Value::NIL);
+            text.push_str("#<");
+            describe_into(heap, class::name_of(heap, class), depth, text);
+            text.push('>');
+        }
+        Some(kind) => text.push_str(&format!("#<{}>", format!("{kind:?}").to_lowercase())),
+        None => text.push_str("#<object>"),
+    }
+}
+
+fn describe_symbol(heap: &Heap, symbol: Value, text: &mut String) {
+    let Some(cell) = heap.symbol(symbol) else { return };
+    if cell.header.flags & Symbol::KEYWORD != 0 {
+        text.push(':');
+    }
+    text.push_str(&heap.string_text(cell.name).unwrap_or_default());
+}

@@ -1,0 +1,98 @@
+//! The words by which reports call tasks, events and causes of failures.
+
+use crate::describe::describe;
+use crate::heap::{Heap, Kind};
+use crate::task::{Task, TaskNumber, TaskState};
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::wait::{event, link};
+use crate::world::class;
+
+/// Returns what reports call the task that `object` stands for.
+pub(crate) fn task_label(vm: &Vm, object: Value) -> String {
+    let task = event::task_index(&vm.heap, object).and_then(|index| vm.scheduler.find(index));
+    let number = task.map_or(TaskNumber::NONE, |task| task.number);
+    label_of(vm, vm.heap.slot_or_nil(object, event::NAME), number)
+}
+
+/// Returns what reports call a task of this name and number. The number is [`TaskNumber::NONE`] if the task has ended.
+pub(crate) fn label_of(vm: &Vm, name: Value, number: TaskNumber) -> String {
+    if name.is_true() {
+        format!("task {}", describe(&vm.heap, name))
+    } else if vm.scheduler.main_number == Some(number) {
+        "the main task".into()
+    } else if number == TaskNumber::NONE {
+        "a task that has ended".into()
+    } else {
+        format!("task {number}")
+    }
+}
+
+/// Returns what reports call an event.
+pub(crate) fn event_label(vm: &Vm, event: Value) -> String {
+    if vm.heap.is(event, Kind::Task) {
+        return task_label(vm, event);
+    }
+    if !event::is_event(&vm.heap, event) {
+        return "nothing".into();
+    }
+    match vm.heap.slot_or_nil(event, event::NAME) {
+        _ if event == vm.scheduler.any_event => "any event".into(),
+        name if name.is_true() => format!("event {}", describe(&vm.heap, name)),
+        _ => "an event".into(),
+    }
+}
+
+/// Returns what a parked task waits for.
+pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
+    if task.state == TaskState::Reading {
+        return "input".into();
+    }
+    if task.wait.is_nil() {
+        return "a time".into();
+    }
+    let (events, what) = link::waited_for(&vm.heap, task.wait);
+    let first = events.first().copied().unwrap_or(Value::NIL);
+    if let Some(pair) = vm.heap.as_cons(what) {
+        let datum = describe(&vm.heap, pair.cdr);
+        return match describe(&vm.heap, pair.car).as_str() {
+            ":CHECKPOINT" => format!("checkpoint {datum} of {}", event_label(vm, first)),
+            ":UNTIL" => format!("{datum} to be true"),
+            _ => vm.heap.string_text(pair.cdr).unwrap_or(datum),
+        };
+    }
+    let labels: Vec<String> = events.iter().map(|&event| event_label(vm, event)).collect();
+    match &labels[..] {
+        [label] if what == vm.world.known.task_end => format!("the end of {label}"),
+        [label] if vm.heap.is(first, Kind::Task) => format!("a signal of {label}"),
+        labels => labels.join(" or "),
+    }
+}
+
+/// Returns how a task has ended, in a word.
+pub(crate) fn end_label(vm: &Vm, task: &Task) -> &'static str {
+    let status = vm.heap.slot_or_nil(task.object, event::STATE);
+    let known = &vm.world.known;
+    match status {
+        status if status == known.succeeded => "succeeded",
+        status if status == known.failed => "failed",
+        _ => "aborted",
+    }
+}
+
+/// Returns what a condition is called where it is said that it was signalled: its cause, or the name of its type.
+pub(crate) fn cause_label(heap: &Heap, condition: Value) -> String {
+    let Some(class) = heap.structure_class(condition) else { return describe(heap, condition) };
+    let name = describe(heap, class::name_of(heap, class));
+    if name == "FAILURE" {
+        let cause = heap.structure_slots(condition).and_then(|slots| slots.first());
+        cause.map_or(name, |&cause| describe(heap, cause))
+    } else {
+        format!(":{name}")
+    }
+}
+
+/// Returns the report of a failure that has ended a task when there was no room for more.
+pub(crate) fn report_in_short(heap: &Heap, condition: Value) -> String {
+    format!("Failure {}, no recovery available.\nAborted\n", describe(heap, condition))
+}

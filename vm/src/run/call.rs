@@ -1,0 +1,118 @@
+//! Calling a function from outside, and what became of a task.
+
+use std::fmt;
+
+use super::RunOutcome;
+use crate::observe::Seen;
+use crate::report;
+use crate::task::{End, Task, TaskId, TaskResult};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// Why a call from outside returned no values.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum CallError {
+    /// A failure ended the task. The text says which.
+    Failed(String),
+    /// The task was aborted.
+    Aborted,
+    /// Every task waits for what cannot come.
+    Deadlocked,
+    /// The budget of the run is spent.
+    BudgetSpent,
+    /// The call did not end within this number of ticks.
+    TicksUsed(u64),
+    /// The embedder has stopped the run.
+    Stopped,
+    /// There is no memory left for a task.
+    NoMemory,
+}
+
+impl fmt::Display for CallError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            CallError::Failed(text) => f.write_str(text),
+            CallError::Aborted => f.write_str("it was aborted"),
+            CallError::Deadlocked => f.write_str("it waits for what cannot come"),
+            CallError::BudgetSpent => f.write_str("the budget of the run is spent"),
+            CallError::TicksUsed(ticks) => write!(f, "it did not end within {ticks} ticks"),
+            CallError::Stopped => f.write_str("the run was stopped"),
+            CallError::NoMemory => f.write_str("there is no memory left for a task"),
+        }
+    }
+}
+
+impl std::error::Error for CallError {}
+
+impl Vm {
+    /// Calls a function in a task of its own and runs tasks until it has ended, at most for `ticks`.
+    ///
+    /// # Errors
+    /// [`CallError`].
+    pub fn call(
+        &mut self,
+        function: Value,
+        arguments: &[Value],
+        ticks: u64,
+    ) -> Result<Vec<Value>, CallError> {
+        let id = self.spawn(function, arguments).map_err(|_| CallError::NoMemory)?;
+        let outcome = self.run_until(Some(id), ticks);
+        let result = self.result(id);
+        self.forget(id);
+        match (result, outcome) {
+            (TaskResult::Succeeded(values), _) => Ok(values),
+            (TaskResult::Failed(condition), _) => {
+                let text = self.embedder.last_words.take().unwrap_or_else(|| self.describe(condition));
+                Err(CallError::Failed(text))
+            }
+            (TaskResult::Aborted, _) => Err(CallError::Aborted),
+            (TaskResult::Running, RunOutcome::Waiting) => Err(CallError::Deadlocked),
+            (TaskResult::Running, RunOutcome::BudgetSpent) => Err(CallError::BudgetSpent),
+            (TaskResult::Running, RunOutcome::Stopped) => Err(CallError::Stopped),
+            (TaskResult::Running, RunOutcome::Done | RunOutcome::TicksUsed) => {
+                Err(CallError::TicksUsed(ticks))
+            }
+        }
+    }
+
+    /// Makes a program's main task the one with whose failure the run ends.
+    pub fn set_main(&mut self, id: TaskId) {
+        self.scheduler.main = Some(id);
+        self.scheduler.main_number = self.scheduler.tasks.get(id).map(|task| task.number);
+        if let Some(number) = self.scheduler.main_number {
+            report::show(self, number, Seen::IsNamed("the main task"));
+        }
+    }
+
+    /// Returns what became of a task. A task that was forgotten counts as running.
+    pub fn result(&self, id: TaskId) -> TaskResult {
+        self.scheduler.tasks.get(id).map_or(TaskResult::Running, Task::result)
+    }
+
+    /// Returns the report of the failure that ended a task.
+    pub fn report(&self, id: TaskId) -> Option<String> {
+        let extra = self.scheduler.tasks.get(id)?.extra.as_ref()?;
+        match (&extra.report, extra.end) {
+            (Some(report), _) => Some(report.text()),
+            (None, Some(End::Failed(condition))) => Some(report::report_in_short(&self.heap, condition)),
+            _ => None,
+        }
+    }
+
+    /// Returns the ticks that a task has used.
+    pub fn ticks_of(&self, id: TaskId) -> u64 {
+        self.scheduler.tasks.get(id).map_or(0, |task| task.ticks)
+    }
+
+    /// Returns the ticks that all tasks together have used.
+    pub fn ticks(&self) -> u64 {
+        self.scheduler.spent
+    }
+
+    /// Returns the number of tasks made, of their turns, and of the turns that came after one of another task, since
+    /// the program began.
+    pub fn tasks_turns_and_switches(&self) -> (u64, u64, u64) {
+        let counts = &self.scheduler.counts;
+        (counts.made, counts.turns, counts.switches)
+    }
+}

@@ -1,0 +1,191 @@
+//! Delivering what is pending for a task: aborts, expired limits, interrupts by guards.
+//!
+//! None of these acts at once. They are noted in the task, which gets the flag `attention`, and are delivered just before it
+//! next runs, where [`deliver_pending`] turns them into an unwinding or a call. While a cleanup runs they wait,
+//! and the cleanup has an allowance from then on; the unwinding of an abort or of an expired limit gives one to each cleanup
+//! that it meets. A cleanup that outruns its allowance is left, and the unwinding goes on outward: no task is unkillable.
+
+use super::wake::call_attention;
+use crate::interp::{self, Leave};
+use crate::report;
+use crate::schedule::Due;
+use crate::task::{AccountId, Allowance, Control, End, Target, Unwinding, guard};
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::wait::{event, link};
+
+/// Interval at which a cleanup that waits for the end of a child is looked at again, in nanoseconds.
+const CHILD_INTERVAL: u64 = 1_000_000_000;
+
+/// Has `guard` interrupt the task that it guards, if it is open.
+pub(crate) fn interrupt_by(vm: &mut Vm, guard: Value) {
+    let task = vm.heap.slot_or_nil(guard, guard::TASK);
+    let Some(index) = event::task_index(&vm.heap, task) else { return };
+    if !guard::is_open(&vm.heap, guard) {
+        return;
+    }
+    if let Some(task) = vm.scheduler.find_mut(index) {
+        task.extra_mut().interrupts.push(guard);
+        call_attention(vm, index);
+    }
+}
+
+/// Delivers what is pending for the running task, which is loaded: it may begin to unwind, or find itself in another function.
+///
+/// # Errors
+/// What takes the task off the processor before it runs.
+pub(super) fn deliver_pending(vm: &mut Vm) -> Result<(), Leave> {
+    let was_unwinding = vm.scheduler.task().control.is_unwinding();
+    let function = take_pending(vm);
+    if function.is_some() || vm.scheduler.task().control.is_unwinding() != was_unwinding {
+        // The task will not do what it stands before.
+        vm.scheduler.points.is_open = false;
+    }
+    match function {
+        Some(function) => interp::interrupt(vm, function, &[]),
+        None => Ok(()),
+    }
+}
+
+/// Turns what is pending for the running task into an unwinding, or returns a function to be called where the task stands. What has
+/// to wait for the end of a cleanup, or of a critical section, stays noted.
+fn take_pending(vm: &mut Vm) -> Option<Value> {
+    let scheduler = &mut vm.scheduler;
+    if scheduler.task().account != AccountId::NONE && scheduler.is_task_spent() {
+        scheduler.task_mut().flags.set_attention(true);
+    }
+    if !scheduler.task().flags.attention() || scheduler.task().critical > 0 {
+        return None;
+    }
+    let cleanup = scheduler.task().control.get().and_then(Control::innermost_cleanup);
+    if cleanup.is_some() && cut_off_cleanup(vm) {
+        return None;
+    }
+    let scheduler = &mut vm.scheduler;
+    let mut waits = false;
+    if scheduler.task().flags.abort_pending() || scheduler.is_task_spent() {
+        if cleanup.is_none() {
+            end_running_task(vm);
+            return None;
+        }
+        waits = true;
+    }
+    if let Some((entry, cause)) = scheduler.task().expired_limit() {
+        if cleanup.is_none_or(|cleanup| cleanup < entry) {
+            unwind_to_limit(vm, entry, cause);
+            // What is noted besides is looked at again when that is over.
+            return None;
+        }
+        waits = true;
+    }
+    if waits {
+        allow_cleanups(vm);
+    }
+    let interrupt = take_interrupt(vm, cleanup);
+    let task = vm.scheduler.task_mut();
+    let has_more = task.extra.as_ref().is_some_and(|extra| !extra.interrupts.is_empty());
+    task.flags.set_attention(waits || has_more);
+    interrupt
+}
+
+/// Begins to end the running task.
+fn end_running_task(vm: &mut Vm) {
+    vm.scheduler.cancel_wait(&mut vm.heap);
+    let task = vm.scheduler.task_mut();
+    let end = if task.flags.abort_pending() { End::Aborted } else { End::Spent };
+    task.flags.set_abort_pending(false);
+    task.flags.set_attention(false);
+    task.flags.set_urgent(true);
+    if let Some(extra) = &mut task.extra {
+        extra.interrupts.clear();
+    }
+    let unwinding = task.control.get().and_then(|control| control.unwinding.as_ref());
+    if !unwinding.is_some_and(|unwinding| matches!(unwinding.target, Target::Root(_))) {
+        task.begin_end(end);
+    }
+}
+
+/// Begins to unwind the running task to the entry of a limit, unless it is on its way further out.
+fn unwind_to_limit(vm: &mut Vm, entry: usize, cause: Value) {
+    vm.scheduler.cancel_wait(&mut vm.heap);
+    let control = &mut vm.scheduler.task_mut().control;
+    let passes_by = control.unwinding.as_ref().is_some_and(|unwinding| match unwinding.target {
+        Target::Root(_) => true,
+        Target::Entry(index) | Target::Limit(index) | Target::Cleanup(index) => index <= entry,
+        Target::Return { entries, .. } => entries <= entry,
+    });
+    if !passes_by {
+        control.unwinding = Some(Unwinding { target: Target::Limit(entry), values: vec![cause] });
+    }
+}
+
+/// Takes the function of the first guard whose interrupt may be delivered now.
+fn take_interrupt(vm: &mut Vm, cleanup: Option<usize>) -> Option<Value> {
+    let task = vm.scheduler.task();
+    let interrupts = task.extra.as_ref().map_or(&[][..], |extra| &extra.interrupts[..]);
+    if interrupts.is_empty() || task.control.is_unwinding() {
+        return None;
+    }
+    let may_act = |&guard: &Value| {
+        let height = vm.heap.slot_or_nil(guard, guard::HEIGHT).as_index().unwrap_or(0);
+        cleanup.is_none_or(|cleanup| cleanup < height)
+    };
+    let position = interrupts.iter().position(may_act)?;
+    let guard = vm.scheduler.task_mut().extra_mut().interrupts.remove(position);
+    if !guard::is_open(&vm.heap, guard) {
+        return None;
+    }
+    guard::set_open(&mut vm.heap, guard, false);
+    Some(vm.heap.slot_or_nil(guard, guard::FUNCTION))
+}
+
+/// Gives an allowance to each running cleanup of the running task that has none.
+fn allow_cleanups(vm: &mut Vm) {
+    let scheduler = &mut vm.scheduler;
+    let time = scheduler.clock.read(&mut *vm.outside.host).saturating_add(vm.config.cleanup_time);
+    let ticks = scheduler.task().ticks.saturating_add(vm.config.cleanup_ticks);
+    let mut is_new = false;
+    for running in &mut scheduler.task_mut().control.running {
+        if running.allowance.is_none() {
+            running.allowance = Some(Allowance { ticks, time });
+            is_new = true;
+        }
+    }
+    if is_new {
+        scheduler.timers.push(time, scheduler.turn.index, Due::Cleanup);
+    }
+}
+
+/// Begins to leave the outermost cleanup of the running task that has outrun its allowance. Returns whether there is one.
+fn cut_off_cleanup(vm: &mut Vm) -> bool {
+    let scheduler = &mut vm.scheduler;
+    let now = scheduler.clock.read(&mut *vm.outside.host);
+    let task = scheduler.task();
+    let awaits_child = task.wait.is_true() && link::is_for_child(&vm.heap, task.wait);
+    let ticks = task.ticks;
+    let is_spent = |allowance: Allowance| ticks >= allowance.ticks || now >= allowance.time && !awaits_child;
+    let running = &task.control.running;
+    let has_allowance = running.iter().any(|running| running.allowance.is_some());
+    let position = running.iter().position(|running| running.allowance.is_some_and(is_spent));
+    if awaits_child && has_allowance {
+        // Children are bounded in their turn; their end is what this cleanup is for.
+        let index = scheduler.turn.index;
+        scheduler.timers.push(now.saturating_add(CHILD_INTERVAL), index, Due::Cleanup);
+    }
+    let Some(position) = position else { return false };
+    let Some(entry) = scheduler.task().control.cleanup_entry(position) else { return false };
+    scheduler.cancel_wait(&mut vm.heap);
+    let task = scheduler.task_mut();
+    let is_under_way = task
+        .control
+        .unwinding
+        .as_ref()
+        .is_some_and(|unwinding| matches!(unwinding.target, Target::Cleanup(index) if index <= entry));
+    if !is_under_way {
+        task.control.unwinding = Some(Unwinding { target: Target::Cleanup(entry), values: Vec::new() });
+        let object = task.object;
+        let name = report::task_label(vm, object);
+        vm.outside.complain(&format!("A cleanup of {name} takes too long and is left.\n"));
+    }
+    true
+}

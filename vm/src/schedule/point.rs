@@ -1,0 +1,72 @@
+//! Points: places at which a task lets others go first, while schedules are explored.
+//!
+//! A builtin that stands at a point gives up ([`Exit::Again`]) before it has had any effect, its task leaves the processor, and when
+//! the task goes on the builtin is done again and let through. Unless schedules are explored that costs a test.
+
+use super::{Scheduler, TurnEnd};
+use crate::raise::Exit;
+use crate::task::{End, Target, Unwinding};
+use crate::value::Value;
+
+/// Kinds of operations before which a task stands at a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Grain {
+    /// Those that change what others can see, or begin to wait.
+    #[default]
+    Changes,
+    /// Also those that look at what others have changed.
+    Reads,
+}
+
+/// Where tasks stop while schedules are explored.
+#[derive(Default)]
+pub(crate) struct Points {
+    /// Operations before which they stop; `None` unless schedules are explored.
+    pub(crate) grain: Option<Grain>,
+    /// Whether the running task may pass the point at which it stands.
+    pub(crate) is_open: bool,
+}
+
+impl Scheduler {
+    /// Stops the running task at a point before something that other tasks can see. For builtins, once each time that they
+    /// are done.
+    ///
+    /// # Errors
+    /// [`Exit::Again`] if others are to be given the choice to go first; the builtin will be done again.
+    #[inline]
+    pub(crate) fn point(&mut self) -> Result<(), Exit> {
+        if self.points.grain.is_some() && self.stops_here() { Err(Exit::Again) } else { Ok(()) }
+    }
+
+    /// Stops the running task at a point before it looks at what other tasks have done.
+    ///
+    /// # Errors
+    /// As [`Scheduler::point`].
+    #[inline]
+    pub(crate) fn point_of_read(&mut self) -> Result<(), Exit> {
+        if self.points.grain == Some(Grain::Reads) && self.stops_here() { Err(Exit::Again) } else { Ok(()) }
+    }
+
+    /// Returns whether the running task stops at the point that it has come to.
+    #[cold]
+    fn stops_here(&mut self) -> bool {
+        if self.task().critical > 0 || std::mem::take(&mut self.points.is_open) {
+            return false;
+        }
+        self.task_mut().flags.set_at_point(true);
+        self.turn.end_with(TurnEnd::Passed);
+        true
+    }
+
+    /// Stops the running task, which has come to its end with these values, before the last step of the unwinding that ends it.
+    /// Returns whether it stops.
+    pub(crate) fn stops_before_end(&mut self, values: &mut Vec<Value>) -> bool {
+        if self.points.grain.is_none() || !self.stops_here() {
+            return false;
+        }
+        let target = Target::Root(self.turn.ending.take().unwrap_or(End::Succeeded));
+        let values = std::mem::take(values);
+        self.task_mut().control.unwinding = Some(Unwinding { target, values });
+        true
+    }
+}

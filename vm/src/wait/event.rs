@@ -1,0 +1,58 @@
+//! Events: objects of the heap with a count of their signals and a list of the waits for them.
+//!
+//! A task is an event too, which its checkpoints and its end signal; its slots are those of an event and a few more.
+
+use crate::heap::{AllocError, Heap, Kind};
+use crate::task::TaskIndex;
+use crate::value::Value;
+
+/// Slot: name, any value or `NIL`.
+pub(crate) const NAME: usize = 0;
+/// Slot: number of signals so far.
+pub(crate) const COUNT: usize = 1;
+/// Slot: link of the wait that began first, or `NIL`.
+pub(crate) const FIRST: usize = 2;
+/// Slot: link of the wait that began last, or `NIL`.
+pub(crate) const LAST: usize = 3;
+/// Slot of a task: its index in the table while it lives, then its status.
+pub(crate) const STATE: usize = 4;
+/// Slot of a task: number of its maker while it lives; then its value or values, or the condition.
+pub(crate) const RESULT: usize = 5;
+/// Slot of a task: checkpoints that it has passed.
+pub(crate) const CHECKPOINTS: usize = 6;
+/// Number of slots of a task.
+pub(crate) const TASK_LENGTH: usize = 7;
+
+/// Creates an event.
+///
+/// # Errors
+/// As for every allocation.
+pub(crate) fn make(heap: &mut Heap, name: Value) -> Result<Value, AllocError> {
+    heap.alloc_record(Kind::Event, 0, 0, &[name, Value::small(0), Value::NIL, Value::NIL])
+}
+
+/// Returns whether `object` is an event; tasks are.
+pub(crate) fn is_event(heap: &Heap, object: Value) -> bool {
+    matches!(heap.kind(object), Some(Kind::Event | Kind::Task))
+}
+
+/// Returns how often an event was signalled.
+pub(crate) fn count(heap: &Heap, event: Value) -> i64 {
+    heap.slot_or_nil(event, COUNT).as_fixnum().unwrap_or(0)
+}
+
+/// Counts a signal of an event.
+pub(crate) fn count_signal(heap: &mut Heap, event: Value) {
+    let count = Value::fixnum(count(heap, event) + 1).unwrap_or(Value::small(0));
+    heap.slot_set(event, COUNT, count);
+}
+
+/// Returns whether a wait for an event is open.
+pub(crate) fn is_awaited(heap: &Heap, event: Value) -> bool {
+    heap.slot_or_nil(event, FIRST).is_true()
+}
+
+/// Returns the place of the task that `object` stands for, while it lives.
+pub(crate) fn task_index(heap: &Heap, object: Value) -> Option<TaskIndex> {
+    heap.slot_or_nil(object, STATE).as_index().map(|index| TaskIndex(index as u32))
+}
