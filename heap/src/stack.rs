@@ -40,6 +40,7 @@ const SMALLEST: usize = 15;
 
 /// The words of the segment that holds at least `words` words: 15, 23, 31, 47, 63, 95, ...
 fn segment(words: usize) -> usize {
+    assert!(words < 1 << 31, "a stack has less than 2^31 words");
     let power = (words + 1).max(SMALLEST + 1).next_power_of_two();
     let between = power / 4 * 3 - 1;
     if between >= words.max(SMALLEST) { between } else { power - 1 }
@@ -47,6 +48,9 @@ fn segment(words: usize) -> usize {
 
 impl Stack {
     /// A stack of nils with at least `words` words.
+    ///
+    /// # Panics
+    /// If `words` is not below 2^31.
     pub fn new(words: usize) -> Stack {
         let capacity = segment(words);
         Stack { start: allocate(capacity), capacity: capacity as u32 }
@@ -70,6 +74,9 @@ impl Stack {
     }
 
     /// Makes room for at least `words` words, keeping the contents. Moves the stack.
+    ///
+    /// # Panics
+    /// If `words` is not below 2^31.
     pub fn grow(&mut self, words: usize) {
         self.move_to(segment(words.max(self.capacity() + self.capacity() / 4)));
     }
@@ -87,8 +94,7 @@ impl Stack {
             std::ptr::copy_nonoverlapping(self.start.as_ptr(), start.as_ptr(), words);
         };
         let old = std::mem::replace(&mut self.start, start);
-        // SAFETY: `old` was allocated with this layout and is no longer used.
-        unsafe { dealloc(old.as_ptr().cast(), layout(self.capacity())) };
+        free(old, self.capacity());
         self.capacity = capacity as u32;
     }
 
@@ -111,15 +117,20 @@ impl Stack {
 
 impl Drop for Stack {
     fn drop(&mut self) {
-        if self.capacity > 0 {
-            // SAFETY: the segment was allocated with this layout.
-            unsafe { dealloc(self.start.as_ptr().cast(), layout(self.capacity())) };
-        }
+        free(self.start, self.capacity());
     }
 }
 
 fn layout(words: usize) -> Layout {
     Layout::array::<Value>(words).expect("a stack is far smaller than the address space")
+}
+
+/// Gives back the memory of a stack, which has some unless it is a stack without words.
+fn free(start: NonNull<Value>, words: usize) {
+    if words > 0 {
+        // SAFETY: `allocate` made every segment with words, with this layout; its owner uses it no longer.
+        unsafe { dealloc(start.as_ptr().cast(), layout(words)) };
+    }
 }
 
 fn allocate(words: usize) -> NonNull<Value> {
@@ -137,7 +148,19 @@ fn allocate(words: usize) -> NonNull<Value> {
 
 #[cfg(test)]
 mod tests {
-    use super::segment;
+    use super::{Stack, segment};
+    use crate::value::Value;
+
+    #[test]
+    fn a_stack_without_words_grows_and_shrinks_like_any_other() {
+        let mut stack = Stack::none();
+        assert_eq!((stack.capacity(), stack.words(0).len()), (0, 0));
+        stack.wipe(0);
+        stack.grow(20);
+        assert_eq!(stack.words(20), [Value::NIL; 20]);
+        stack.shrink(3);
+        assert_eq!(stack.capacity(), segment(3));
+    }
 
     #[test]
     fn segments_are_as_large_as_asked_for_and_not_much_larger() {

@@ -232,7 +232,8 @@ impl Model {
                 // SAFETY: nobody runs this code.
                 unsafe { heap.alloc_code(parts) }
             }
-            Kind::Function => heap.alloc_function(values[0], &values[1..]),
+            // SAFETY: nobody runs the code of this function.
+            Kind::Function => unsafe { heap.alloc_function(values[0], &values[1..]) },
             Kind::Box => heap.alloc_box(values[0]),
             Kind::Structure => heap.alloc_structure(values[0], &values[1..]),
             Kind::Symbol => {
@@ -341,17 +342,18 @@ impl Model {
         let stored = match shadow.kind {
             None if index == 0 => heap.set_car(shadow.value, value),
             None => heap.set_cdr(shadow.value, value),
-            Some(Kind::Box) => heap.set_box(shadow.value, value),
             Some(Kind::SimpleVector) => heap.vector_set(shadow.value, index, value),
             Some(Kind::Symbol) => match index {
-                1 => heap.symbol_set_package(shadow.value, value),
                 2 => heap.symbol_set_value(shadow.value, value),
                 3 => heap.symbol_set_function(shadow.value, value),
                 4 => heap.symbol_set_macro_function(shadow.value, value),
                 5 => heap.symbol_set_plist(shadow.value, value),
                 _ => None,
             },
-            Some(Kind::Function) if index > 0 => heap.function_set_capture(shadow.value, index - 1, value),
+            Some(Kind::Function) if index > 0 => {
+                // SAFETY: nobody runs the code of this function.
+                unsafe { heap.function_set_capture(shadow.value, index - 1, value) }
+            }
             Some(Kind::Structure) if index > 0 => heap.structure_set(shadow.value, index - 1, value),
             Some(kind) => heap.record_set(shadow.value, kind, index, value),
         };

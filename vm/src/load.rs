@@ -145,7 +145,7 @@ impl Loader<'_> {
         let stub = trust::alloc_stub(self.heap, Value::NIL, Value::NIL, shape, 0, LAZY_WORD)?;
         for function in &self.module.functions {
             let has_captures = !function.captures.is_empty();
-            let object = if has_captures { Value::NIL } else { self.heap.alloc_function(stub, &[])? };
+            let object = if has_captures { Value::NIL } else { trust::alloc_function(self.heap, stub, &[])? };
             self.functions.push(object);
         }
         self.pool.reserve_exact(self.module.constants.len());

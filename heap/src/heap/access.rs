@@ -11,7 +11,7 @@
 //! the data of an array, the class of a structure) have setters of their own, or none.
 
 use super::Heap;
-use super::layout::{Array, Bignum, Boxed, Code, Cons, Float, Function, Header, Kind, Symbol};
+use super::layout::{Array, Bignum, Code, Cons, Float, Function, Header, Kind, Symbol};
 use super::object::is_vouched_for;
 use crate::value::Value;
 use std::slice;
@@ -101,10 +101,10 @@ impl Heap {
 
     // Records.
 
-    /// All slots of a record of this kind, in the order of its layout.
+    /// All slots of a record of this kind, in the order of its layout; `None` if `v` is no such record, or is a hash table.
     #[inline]
     pub fn record(&self, v: Value, kind: Kind) -> Option<&[Value]> {
-        if !kind.is_record() {
+        if !kind.is_open_record() {
             return None;
         }
         let object = self.object_of(v, kind)?;
@@ -112,13 +112,13 @@ impl Heap {
         Some(unsafe { slice::from_raw_parts(object.add(1).cast(), (*object).len as usize) })
     }
 
-    /// Slot `index` of a record, of whatever kind; `None` if `v` is none or has no such slot.
+    /// Slot `index` of a record, of whatever kind but a hash table; `None` if `v` is none or has no such slot.
     #[inline(always)]
     pub fn slot(&self, v: Value, index: usize) -> Option<Value> {
         let object = v.as_object_ptr()?;
         // SAFETY: an object value is the address of a live object; a live record has `len` values after its header.
         unsafe {
-            if !(*object).kind.is_record() || index >= (*object).len as usize {
+            if !(*object).kind.is_open_record() || index >= (*object).len as usize {
                 return None;
             }
             Some(*object.add(1).cast::<Value>().add(index))
@@ -213,20 +213,6 @@ impl Heap {
         Some(())
     }
 
-    /// What a box holds.
-    #[inline(always)]
-    pub fn unbox(&self, v: Value) -> Option<Value> {
-        let object = self.object_of(v, Kind::Box)?;
-        // SAFETY: a live box.
-        Some(unsafe { (*object.cast::<Boxed>()).value })
-    }
-
-    /// Sets what a box holds; `None` if `v` is none.
-    #[inline(always)]
-    pub fn set_box(&mut self, v: Value, new: Value) -> Option<()> {
-        self.set_slot(v, Kind::Box, 0, new)
-    }
-
     /// The slots of a structure, without its class.
     #[inline]
     pub fn structure_slots(&self, v: Value) -> Option<&[Value]> {
@@ -258,11 +244,6 @@ impl Heap {
     /// Sets the value cell of a symbol; `None` if `v` is none.
     pub fn symbol_set_value(&mut self, v: Value, new: Value) -> Option<()> {
         self.set_slot(v, Kind::Symbol, 2, new)
-    }
-
-    /// Sets the home package of a symbol; `None` if `v` is none.
-    pub fn symbol_set_package(&mut self, v: Value, new: Value) -> Option<()> {
-        self.set_slot(v, Kind::Symbol, 1, new)
     }
 
     /// Sets the function of a symbol; `None` if `v` is none or `new` is not a function.
@@ -324,7 +305,10 @@ impl Heap {
     }
 
     /// Sets a captured value of a function; `None` if `v` is none or has no such capture.
-    pub fn function_set_capture(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
+    ///
+    /// # Safety
+    /// The function's code may read the new value where it expects the old one: a box where the capture is declared as boxed.
+    pub unsafe fn function_set_capture(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
         self.set_slot(v, Kind::Function, index.checked_add(1)?, new)
     }
 

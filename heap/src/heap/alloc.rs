@@ -239,7 +239,7 @@ impl Heap {
             }
         }
         // 2. Blocks in order of address, unless that takes too long.
-        let may_grow = self.committed + self.external + ARENA <= self.limit_now();
+        let may_grow = self.committed.saturating_add(self.external).saturating_add(ARENA) <= self.limit_now();
         let mut swept_in_vain = 0;
         while self.region(which).cursor.0 < self.arenas.len() {
             let (arena, block) = self.region(which).cursor;
@@ -289,7 +289,7 @@ impl Heap {
 
     /// Bytes that may be taken from the system, with the reserve if it is open.
     pub(super) fn limit_now(&self) -> usize {
-        if self.reserve_open { self.limit + super::RESERVE } else { self.limit }
+        if self.reserve_open { self.limit.saturating_add(super::RESERVE) } else { self.limit }
     }
 
     /// Takes a new arena from the system. Its number is the least free one.
@@ -314,7 +314,7 @@ impl Heap {
         if footprint(bytes) > self.limit {
             return Err(AllocError::TooLarge { requested: bytes });
         }
-        if self.committed + self.external + footprint(bytes) > self.limit_now() {
+        if self.committed.saturating_add(self.external).saturating_add(footprint(bytes)) > self.limit_now() {
             return Err(AllocError::NeedCollection);
         }
         // The current epoch: marked while marking and not yet swept while sweeping; stale by the next cycle.

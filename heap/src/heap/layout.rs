@@ -22,8 +22,8 @@ pub const MAX_LENGTH: usize = 1 << 31;
 
 /// What an object is.
 ///
-/// The numbers carry meaning: below 0x20 all slots are values, from 0x40 none is; the high half gives the size of
-/// an element. They may change with any version; nothing stores them outside of a running heap.
+/// The numbers carry meaning: below 0x20 all slots are values, below 0x1F anyone may read them, from 0x40 no slot is a
+/// value; the high half gives the size of an element. They may change with any version; nothing stores them outside of a running heap.
 #[repr(u8)]
 #[derive(Copy, Clone, PartialEq, Eq, Debug, Hash)]
 pub enum Kind {
@@ -39,8 +39,6 @@ pub enum Kind {
     Array = 0x05,
     /// A ratio in lowest terms: numerator, denominator.
     Ratio = 0x06,
-    /// A hash table: [`HashTable`]; `aux` is its test.
-    HashTable = 0x07,
     /// An instance of a structure, condition types included: class, then the slots. [`Structure`].
     Structure = 0x08,
     /// The description of a structure or condition type.
@@ -61,6 +59,8 @@ pub enum Kind {
     Wait = 0x10,
     /// A record of the VM itself that needs no kind of its own; `aux` tells which.
     Record = 0x11,
+    /// A hash table: [`HashTable`]; `aux` is its test.
+    HashTable = 0x1F,
     /// Compiled code with its constants: [`Code`].
     Code = 0x20,
     /// A double outside the window of [`Value::double`]: [`Float`].
@@ -116,6 +116,13 @@ impl Kind {
     #[inline(always)]
     pub const fn is_record(self) -> bool {
         (self as u8) < 0x20
+    }
+
+    /// Whether all slots are values that anyone may read. Those of a hash table are for its own functions, which rely on what
+    /// the storage behind them holds.
+    #[inline(always)]
+    pub const fn is_open_record(self) -> bool {
+        (self as u8) < Kind::HashTable as u8
     }
 
     /// Whether no slot is a value, so that the collector need not look inside.

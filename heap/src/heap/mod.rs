@@ -289,7 +289,11 @@ impl Heap {
     /// [`AllocError::NeedCollection`] if the limit is passed.
     pub fn set_external(&mut self, bytes: usize) -> Result<(), AllocError> {
         self.external = bytes;
-        if self.committed + bytes > self.limit_now() { Err(AllocError::NeedCollection) } else { Ok(()) }
+        if self.committed.saturating_add(bytes) > self.limit_now() {
+            Err(AllocError::NeedCollection)
+        } else {
+            Ok(())
+        }
     }
 
     /// Opens the reserve above the limit for the clause that handles `:heap-exhausted`; false if it is open already.

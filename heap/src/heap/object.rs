@@ -275,9 +275,12 @@ impl Heap {
 
     /// A new function: code with captured variables.
     ///
+    /// # Safety
+    /// The captures are what the code reads: as many, and boxes where it declares them as boxed.
+    ///
     /// # Panics
     /// When `code` is not a Code.
-    pub fn alloc_function(&mut self, code: Value, captures: &[Value]) -> Result<Value, AllocError> {
+    pub unsafe fn alloc_function(&mut self, code: Value, captures: &[Value]) -> Result<Value, AllocError> {
         assert_eq!(self.kind(code), Some(Kind::Code), "the code of a function is a Code");
         self.record_from(Kind::Function, 0, 0, &[code], captures)
     }

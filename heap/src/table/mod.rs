@@ -487,6 +487,15 @@ mod tests {
     }
 
     #[test]
+    fn nobody_else_gets_hold_of_the_storage() {
+        let mut heap = Heap::for_tests();
+        let v = new(&mut heap, Test::Eq).0;
+        assert_eq!(heap.record(v, Kind::HashTable), None);
+        assert_eq!((0..9).find_map(|index| heap.slot(v, index)), None);
+        assert_eq!(heap.record_set(v, Kind::HashTable, 0, Value::NIL), None);
+    }
+
+    #[test]
     fn keys_of_one_hash_are_candidates() {
         let mut heap = Heap::for_tests();
         let table = new(&mut heap, Test::Eql);

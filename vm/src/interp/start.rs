@@ -88,7 +88,9 @@ pub(crate) fn make_starter(heap: &mut Heap) -> Result<Value, AllocError> {
         constants: &[],
         words: &[word, aux.unwrap_or(0)],
     };
-    // SAFETY: the one instruction keeps to its three registers and leaves the frame.
-    let code = unsafe { heap.alloc_code(parts)? };
-    heap.alloc_function(code, &[])
+    // SAFETY: the one instruction keeps to its three registers, leaves the frame, and reads no captures.
+    unsafe {
+        let code = heap.alloc_code(parts)?;
+        heap.alloc_function(code, &[])
+    }
 }

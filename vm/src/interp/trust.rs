@@ -88,17 +88,45 @@ pub(crate) fn alloc_stub(
     unsafe { heap.alloc_code(parts) }
 }
 
-/// Puts the real code of a function in place of its stub; `None` if the function has another sort of code, or fewer
-/// captures than the new code reads.
-pub(crate) fn replace_stub(heap: &mut Heap, function: Value, code: Value) -> Option<()> {
-    let captures = heap.code(code)?.spare[1] as usize;
-    let old = heap.code(heap.function_code(function)?)?;
-    if Shape::unpack(old.spare[0]).sort == Sort::Bytecode
-        || captures > heap.function_captures(function)?.len()
-    {
+/// Whether code reads captures of its function: only bytecode does, and `spare[1]` says how many.
+fn reads_captures(code: &Code) -> bool {
+    Shape::unpack(code.spare[0]).sort == Sort::Bytecode && code.spare[1] != 0
+}
+
+/// Whether the code of a function is bytecode and no stub; `None` if `function` is none.
+fn is_bytecode(heap: &Heap, function: Value) -> Option<bool> {
+    let code = heap.code(heap.function_code(function)?)?;
+    Some(Shape::unpack(code.spare[0]).sort == Sort::Bytecode)
+}
+
+/// Creates a function of code that reads no captures. The captures of a stub are for whoever replaces it.
+///
+/// # Errors
+/// As for every allocation.
+///
+/// # Panics
+/// If `code` is not a Code, or reads captures: then only `make-closure` makes functions of it.
+pub(crate) fn alloc_function(heap: &mut Heap, code: Value, captures: &[Value]) -> Result<Value, AllocError> {
+    assert!(!heap.code(code).is_none_or(reads_captures), "a function is made of code without captures");
+    // SAFETY: the code reads no captures.
+    unsafe { heap.alloc_function(code, captures) }
+}
+
+/// Sets a capture of a stub's function; `None` if its code is no stub, or has no such capture.
+pub(crate) fn set_stub_capture(heap: &mut Heap, function: Value, index: usize, value: Value) -> Option<()> {
+    if is_bytecode(heap, function)? {
         return None;
     }
-    // SAFETY: a stub is never executed, and `spare[1]` is the number of captures that the code reads.
+    // SAFETY: a stub is never executed, so nothing reads its captures but what replaces it.
+    unsafe { heap.function_set_capture(function, index, value) }
+}
+
+/// Puts the real code of a function in place of its stub; `None` if the function has no stub, or the code reads captures.
+pub(crate) fn replace_stub(heap: &mut Heap, function: Value, code: Value) -> Option<()> {
+    if is_bytecode(heap, function)? || reads_captures(heap.code(code)?) {
+        return None;
+    }
+    // SAFETY: a stub is never executed, and the new code reads no captures.
     unsafe { heap.function_set_code(function, code) }
 }
 

@@ -180,7 +180,8 @@ impl ImageLoader<'_> {
         if let Some(function) = self.made(table, number.0) {
             return Ok(function);
         }
-        let function = self.heap.alloc_function(self.image().lazy, &[Value::index(number.0 as usize)])?;
+        let function =
+            trust::alloc_function(self.heap, self.image().lazy, &[Value::index(number.0 as usize)])?;
         self.heap.vector_set(table, number.0 as usize, function);
         Ok(function)
     }

@@ -247,9 +247,9 @@ impl World {
         package: Value,
         flags: u8,
     ) -> Result<Value, AllocError> {
-        let function = heap.alloc_function(self.undefined, &[Value::NIL])?;
+        let function = trust::alloc_function(heap, self.undefined, &[Value::NIL])?;
         let object = heap.alloc_symbol(flags, name, package, function)?;
-        heap.function_set_capture(function, 0, object);
+        trust::set_stub_capture(heap, function, 0, object);
         Ok(object)
     }
 
@@ -257,7 +257,7 @@ impl World {
         let number = builtin.number();
         let shape = Shape::other(Sort::Native, number as u16);
         let code = trust::alloc_stub(heap, name, Value::NIL, shape, 0, stubs::native_word(builtin))?;
-        heap.alloc_function(code, &[])
+        trust::alloc_function(heap, code, &[])
     }
 
     /// The symbol object of a symbol: the companion of `NIL` and `T`, others are their own. `None` if `v` is no symbol.
@@ -319,7 +319,7 @@ impl World {
     /// As for every allocation.
     pub(crate) fn remove_function(&mut self, heap: &mut Heap, v: Value) -> Result<Option<()>, AllocError> {
         let Some(object) = self.object_of(heap, v) else { return Ok(None) };
-        let function = heap.alloc_function(self.undefined, &[v])?;
+        let function = trust::alloc_function(heap, self.undefined, &[v])?;
         Ok(heap.symbol_set_function(object, function))
     }
 
