@@ -1,4 +1,4 @@
-;;;; Forms at which implementations of subsets go wrong, one program each.
+;;;; Forms that implementations of Common Lisp subsets tend to get wrong, one program each.
 
 ;; subforms of the place first, once each, left to right; then the value
 ;;; 1

@@ -1,4 +1,4 @@
-;;;; Made from `grammar.txt` with the seed 1997: change that, not this.
+;;;; Made from `grammar.txt` with the seed 1997: change the grammar, not this file.
 
 ;;; 1
 (answer 1 -7)

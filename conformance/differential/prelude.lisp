@@ -1,4 +1,5 @@
-;;;; What the programs are run with, by ESL and by SBCL: (ANSWER number form) prints the number, and what becomes of the form.
+;;;; Loaded before the programs, by ESL and by SBCL: (ANSWER number form) prints the number and the outcome
+;;;; of the form.
 
 (defun kind-of-error (condition)
   (typecase condition

@@ -1,6 +1,6 @@
 ;;;; Runs a file of programs under SBCL: sbcl --script run-sbcl.lisp PRELUDE PROGRAMS
 ;;;;
-;;;; ESL has one float type, the double: what makes a single float of a rational makes a double here.
+;;;; ESL has one float type, the double: functions that convert a rational to a single float produce a double.
 
 (defpackage "ESL" (:use "COMMON-LISP")
   (:shadow "FLOAT" "COERCE" "SQRT" "EXP" "LOG" "SIN" "COS" "TAN" "ASIN" "ACOS" "ATAN" "SINH" "COSH" "TANH"
@@ -19,7 +19,7 @@
   (of-doubles sqrt exp log sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh
               ffloor fceiling ftruncate fround))
 (setf *print-pretty* nil *read-default-float-format* 'double-float)
-;; Of the float types there is one, too, so its constants are those of the doubles.
+;; Since there is one float type, the constants of the other types are those of the double.
 (dolist (name '(most-positive most-negative least-positive least-negative least-positive-normalized
                 least-negative-normalized))
   (dolist (type '("SINGLE" "SHORT" "LONG"))

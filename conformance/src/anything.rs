@@ -1,6 +1,7 @@
-//! Input of any kind, for tests and fuzzing that look for panics, hangs, and what the verifier lets through.
+//! Entry points for arbitrary input, used by tests and fuzzing to look for panics, hangs and gaps in the
+//! verifier.
 //!
-//! What is run has small limits of ticks and memory and a host without files, so whatever it is, it comes to an end soon.
+//! Runs have small limits of ticks and memory and a host without files, so every run ends soon.
 
 use std::time::{Duration, Instant};
 
@@ -15,9 +16,10 @@ use esl_compiler::diagnostic::{Renderer, Sources};
 use esl_compiler::session::Compiler;
 use esl_vm::vm::Vm;
 
-/// Ticks that a run may take.
+/// Limit of a run, in ticks.
 const TICKS: u64 = 100_000;
-/// The longest that one input may take. The limit of ticks ends it long before that, or does not do what it is for.
+/// Longest time for one step on an input. The limit of ticks ends a run long before that, unless the limit is
+/// broken.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn machine() -> Vm {
@@ -26,7 +28,7 @@ fn machine() -> Vm {
     program::machine(config, Box::new(host)).expect("there is room for the library")
 }
 
-/// Does something that may not take long.
+/// Does `work`, and panics if it takes too long.
 fn hasten<T>(what: &str, work: impl FnOnce() -> T) -> T {
     let start = Instant::now();
     let result = work();
@@ -34,15 +36,15 @@ fn hasten<T>(what: &str, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Reads bytes as data. Gives the numbers of data and of diagnostics.
+/// Reads bytes as data. Returns the numbers of data and of diagnostics.
 pub fn read(bytes: &[u8]) -> (usize, usize) {
     hasten("reading", || esl_compiler::reader::read_anything(bytes))
 }
 
-/// Compiles a text, draws its diagnostics, and verifies the module if there is one.
+/// Compiles a text, renders its diagnostics, and verifies the module if there is one.
 ///
 /// # Panics
-/// If the verifier refuses what the compiler has made.
+/// If the verifier refuses the compiled module.
 pub fn compile(text: &str) -> Option<Module> {
     let mut machine = machine();
     let source = SourceId::default();
@@ -54,24 +56,24 @@ pub fn compile(text: &str) -> Option<Module> {
         Renderer::default().render(diagnostic, &sources);
     }
     if let Some(module) = &module {
-        verify::verify(module).expect("the verifier accepts what the compiler makes");
+        verify::verify(module).expect("the verifier accepts compiled modules");
     }
     module
 }
 
-/// Verifies a module, and runs it if it is accepted; whether it was.
+/// Verifies a module and runs it if it is accepted. Returns whether it was accepted.
 pub fn run(module: &Module) -> bool {
     if verify::verify(module).is_err() {
         return false;
     }
     let mut machine = machine();
     let Ok(functions) = machine.load_module(module) else { return false };
-    // How it ends is its own business.
+    // Any outcome is legal.
     drop(hasten("running", || machine.run_toplevel(functions, TICKS)));
     true
 }
 
-/// Reads bytes as a file of bytecode, with checksums that fit, and runs what the verifier accepts; whether it did.
+/// Reads bytes as a bytecode file, and runs the module if the verifier accepts it. Returns whether it did.
 pub fn run_file(bytes: &[u8]) -> bool {
     match file::read(bytes) {
         Ok(module) => run(&module),
@@ -82,8 +84,8 @@ pub fn run_file(bytes: &[u8]) -> bool {
     }
 }
 
-/// The bytes as a file whose checksums are right, as far as it has sections: damage that only checksums would find is not
-/// what fuzzing looks for.
+/// Returns the bytes as a file with corrected checksums, as far as its sections can be found: fuzzing looks
+/// for damage that checksums do not reveal.
 pub fn with_checksums(bytes: &[u8]) -> Vec<u8> {
     const TABLE: usize = 32;
     const ENTRY: usize = 16;

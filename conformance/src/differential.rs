@@ -1,42 +1,42 @@
-//! Programs by chance: made from a grammar and a seed, so that they reach every operator, for a comparison with another
-//! implementation. See `differential/README.md`.
+//! Random programs, generated from a grammar and a seed, for the comparison with another implementation.
+//! Together they use every operator. See `differential/README.md`.
 //!
-//! Guarantees: the same grammar and seed give the same programs on every machine.
+//! Guarantees: a grammar and a seed yield the same programs on every machine.
 
 use std::collections::BTreeMap;
 
-/// What a template is made of.
+/// A part of a template.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum Piece {
-    /// Text as it is.
+enum TemplatePart {
+    /// Literal text.
     Text(String),
-    /// Something of this type.
+    /// A place for an expression of this type.
     Hole(String),
-    /// The number of the program.
+    /// A place for the number of the program.
     Number,
 }
 
-/// A template of a type.
+/// A template for expressions of one type.
 #[derive(Clone, Debug)]
 struct Template {
     kind: String,
-    pieces: Vec<Piece>,
+    parts: Vec<TemplatePart>,
     uses: u32,
 }
 
 impl Template {
     fn is_leaf(&self) -> bool {
-        !self.pieces.iter().any(|piece| matches!(piece, Piece::Hole(_)))
+        !self.parts.iter().any(|part| matches!(part, TemplatePart::Hole(_)))
     }
 }
 
-/// The type of templates that are whole programs, with definitions in front.
+/// Type of the templates that are whole programs, with definitions before the form.
 const WHOLE: &str = "top";
 
-/// How deeply templates are put into each other.
+/// Depth to which templates are nested.
 const DEPTH: u32 = 3;
 
-/// The templates, and how they were used so far.
+/// The templates, with the number of uses of each.
 #[derive(Debug)]
 pub struct Grammar {
     templates: Vec<Template>,
@@ -45,10 +45,10 @@ pub struct Grammar {
 }
 
 impl Grammar {
-    /// Reads a grammar: lines `type| template`; `#` begins a line that is a comment.
+    /// Reads a grammar: lines `type| template`; a line that begins with `#` is a comment.
     ///
     /// # Errors
-    /// The line and what is wrong with it.
+    /// The line and its fault.
     pub fn parse(text: &str, seed: u64) -> Result<Grammar, String> {
         let mut grammar = Grammar { templates: Vec::new(), by_type: BTreeMap::new(), state: seed };
         for (index, line) in text.lines().enumerate() {
@@ -60,11 +60,15 @@ impl Grammar {
                 .ok_or_else(|| format!("line {}: expected `type| template`", index + 1))?;
             let number = grammar.templates.len();
             grammar.by_type.entry(kind.to_string()).or_default().push(number);
-            grammar.templates.push(Template { kind: kind.to_string(), pieces: pieces(template), uses: 0 });
+            grammar.templates.push(Template {
+                kind: kind.to_string(),
+                parts: parse_template(template),
+                uses: 0,
+            });
         }
         for template in &grammar.templates {
-            for piece in &template.pieces {
-                if let Piece::Hole(kind) = piece
+            for part in &template.parts {
+                if let TemplatePart::Hole(kind) = part
                     && !grammar.by_type.contains_key(kind)
                 {
                     return Err(format!("there are no templates of the type `{kind}`"));
@@ -74,7 +78,7 @@ impl Grammar {
         Ok(grammar)
     }
 
-    /// The programs: one for each template that has holes or is a whole program, in their order.
+    /// Returns the programs, one for each template that has holes, is a whole program or is a call, in order.
     pub fn programs(&mut self) -> Vec<String> {
         let is_root = |template: &Template| {
             template.kind != "fn" && !template.is_leaf() || template.kind == WHOLE || is_call(template)
@@ -93,11 +97,11 @@ impl Grammar {
 
     fn fill(&mut self, template: usize, number: usize, depth: u32, text: &mut String) {
         self.templates[template].uses += 1;
-        for piece in self.templates[template].pieces.clone() {
-            match piece {
-                Piece::Text(piece) => text.push_str(&piece),
-                Piece::Number => text.push_str(&number.to_string()),
-                Piece::Hole(kind) => {
+        for part in self.templates[template].parts.clone() {
+            match part {
+                TemplatePart::Text(part) => text.push_str(&part),
+                TemplatePart::Number => text.push_str(&number.to_string()),
+                TemplatePart::Hole(kind) => {
                     let chosen = self.choose(&kind, depth);
                     self.fill(chosen, number, depth.saturating_sub(1), text);
                 }
@@ -105,8 +109,8 @@ impl Grammar {
         }
     }
 
-    /// A template of a type: one of those that were used least. Near the bottom only leaves, if the type has any; above,
-    /// leaves in a third of the cases.
+    /// Chooses one of the least used templates of a type. At depth 0 it chooses a leaf, if the type has any;
+    /// above, it prefers leaves in a third of the cases.
     fn choose(&mut self, kind: &str, depth: u32) -> usize {
         let all = self.by_type[kind].clone();
         let wants_leaf = depth == 0 || self.random(3) == 0;
@@ -124,7 +128,7 @@ impl Grammar {
         rare[chosen]
     }
 
-    /// A number below `limit`, by the generator SplitMix64.
+    /// Returns a random number below `limit`, by the generator SplitMix64.
     fn random(&mut self, limit: u64) -> u64 {
         self.state = self.state.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.state;
@@ -135,13 +139,13 @@ impl Grammar {
 }
 
 fn is_call(template: &Template) -> bool {
-    // What stands in a string is no form; functions cannot be compared by what they print as.
+    // The content of a string is not a form, and the printed form of a function cannot be compared.
     !["datum", "fn", "pred"].contains(&&*template.kind)
-        && matches!(&template.pieces[..], [Piece::Text(text)] if text.starts_with('('))
+        && matches!(&template.parts[..], [TemplatePart::Text(text)] if text.starts_with('('))
 }
 
-fn pieces(template: &str) -> Vec<Piece> {
-    let mut pieces = Vec::new();
+fn parse_template(template: &str) -> Vec<TemplatePart> {
+    let mut parts = Vec::new();
     let mut text = String::new();
     let mut rest = template;
     while let Some(c) = rest.chars().next() {
@@ -149,28 +153,28 @@ fn pieces(template: &str) -> Vec<Piece> {
         let is_name = |name: &str| !name.is_empty() && name.chars().all(|c| c.is_ascii_lowercase());
         match hole {
             Some((kind, after)) if is_name(kind) => {
-                pieces.push(Piece::Text(std::mem::take(&mut text)));
-                pieces.push(Piece::Hole(kind.to_string()));
+                parts.push(TemplatePart::Text(std::mem::take(&mut text)));
+                parts.push(TemplatePart::Hole(kind.to_string()));
                 rest = after;
                 continue;
             }
             _ if c == '@' && text.ends_with(|c: char| c.is_ascii_alphabetic() || c == '*') => {
-                pieces.push(Piece::Text(std::mem::take(&mut text)));
-                pieces.push(Piece::Number);
+                parts.push(TemplatePart::Text(std::mem::take(&mut text)));
+                parts.push(TemplatePart::Number);
             }
             _ => text.push(c),
         }
         rest = &rest[c.len_utf8()..];
     }
-    pieces.push(Piece::Text(text));
-    pieces.retain(|piece| *piece != Piece::Text(String::new()));
-    pieces
+    parts.push(TemplatePart::Text(text));
+    parts.retain(|part| *part != TemplatePart::Text(String::new()));
+    parts
 }
 
-/// A program: the definitions, and the form whose answer is wanted.
+/// Returns a program: the definitions, then the form to be answered.
 fn whole(text: &str, number: usize, has_definitions: bool) -> String {
     let mut program = format!(";;; {number}\n");
-    let mut forms = if has_definitions { parts(text) } else { vec![text] };
+    let mut forms = if has_definitions { progn_forms(text) } else { vec![text] };
     let last = forms.pop().unwrap_or(text);
     for form in forms {
         program.push_str(form);
@@ -180,8 +184,8 @@ fn whole(text: &str, number: usize, has_definitions: bool) -> String {
     program
 }
 
-/// The forms in `(progn form…)`.
-fn parts(text: &str) -> Vec<&str> {
+/// Returns the forms in `(progn form…)`.
+fn progn_forms(text: &str) -> Vec<&str> {
     let inside = text.strip_prefix("(progn ").and_then(|text| text.strip_suffix(')')).unwrap_or(text);
     let (mut forms, mut start, mut depth, mut in_string) = (Vec::new(), 0, 0_u32, false);
     let bytes = inside.as_bytes();
@@ -204,7 +208,7 @@ fn parts(text: &str) -> Vec<&str> {
     forms
 }
 
-/// The answers in what a run prints, by the numbers of the programs.
+/// Returns the answers in the output of a run, by program number.
 pub fn answers(output: &str) -> BTreeMap<usize, String> {
     let mut answers = BTreeMap::new();
     let mut number = 0;

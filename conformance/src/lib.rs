@@ -1,16 +1,17 @@
-//! What a conformance program says of itself: expectations beside its lines, and headers. See `README.md` for the format.
+//! The expectations that a conformance program states in its comments. `README.md` describes the format.
 #![forbid(unsafe_code)]
 
 pub mod anything;
 pub mod chapter;
 pub mod differential;
 pub mod process;
+pub mod programs;
 pub mod transcript;
 
-/// Under which conditions a program runs.
+/// A setting under which a program runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting {
-    /// As a user runs it.
+    /// The defaults of `eslvm`.
     Default,
     /// With slices of one tick.
     Slice1,
@@ -19,10 +20,10 @@ pub enum Setting {
 }
 
 impl Setting {
-    /// All of them.
+    /// All settings.
     pub const ALL: [Setting; 3] = [Setting::Default, Setting::Slice1, Setting::GcStress];
 
-    /// Its name in headers.
+    /// Returns the name that headers use.
     pub fn name(self) -> &'static str {
         match self {
             Setting::Default => "default",
@@ -32,10 +33,10 @@ impl Setting {
     }
 }
 
-/// What a program expects of itself.
+/// The expectations of a program.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Expectations {
-    /// Lines of standard output, without those that are empty.
+    /// Non-empty lines of standard output.
     pub output: Vec<String>,
     /// Cause and line of the failure that ends the main task.
     pub failure: Option<(String, usize)>,
@@ -43,13 +44,13 @@ pub struct Expectations {
     pub errors: Vec<(usize, String)>,
     /// Line and code of warnings.
     pub warnings: Vec<(usize, String)>,
-    /// The exit status, when it is not the one that follows from the rest.
+    /// Exit status, if it differs from the one that the other expectations imply.
     pub status: Option<u8>,
-    /// What is known not to work yet: the program fails, and has to, until that is mended.
+    /// Known defect: the program must fail until the defect is fixed.
     pub known: Option<String>,
     /// Further options of `eslvm`.
     pub options: Vec<String>,
-    /// The settings under which it runs.
+    /// Settings under which the program runs.
     pub settings: Vec<Setting>,
 }
 
@@ -57,7 +58,7 @@ impl Expectations {
     /// Reads the comments of a program.
     ///
     /// # Errors
-    /// The line and what is wrong with it.
+    /// The line and its fault.
     pub fn parse(text: &str) -> Result<Expectations, String> {
         let mut found = Expectations { settings: Setting::ALL.to_vec(), ..Expectations::default() };
         let mut in_header = true;
@@ -109,7 +110,7 @@ impl Expectations {
         Ok(())
     }
 
-    /// The exit status that it expects.
+    /// Returns the expected exit status.
     pub fn expected_status(&self) -> u8 {
         self.status.unwrap_or(match (&self.errors[..], &self.failure) {
             ([], None) => 0,

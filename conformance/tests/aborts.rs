@@ -1,8 +1,8 @@
-//! An abort at every safepoint of a nest of cleanups, and a second one at every safepoint after it: whatever was entered is
-//! cleaned up once, to its end, and the task ends.
+//! Aborts a nest of cleanups at every safepoint, and again at every later safepoint: each form that was
+//! entered is cleaned up exactly once and completely, and the task ends.
 //!
-//! The machine is driven tick by tick, so no step is left out: the first loop ends when the nest is through before it is
-//! aborted, the second one when it has ended before it is aborted again.
+//! The test drives the machine tick by tick, so it misses no step. The outer loop stops when the nest
+//! completes before the first abort, the inner loop when it has ended before the second.
 
 use esl::host::VirtualHost;
 use esl::program::{self, Source};
@@ -13,7 +13,8 @@ use esl_vm::task::TaskResult;
 use esl_vm::value::Value;
 use esl_vm::vm::Vm;
 
-/// Each entry of a form has a number of its own. `in` is noted inside its body, `begin` and `end` at both ends of its cleanup.
+/// Each entry of a form has its own number. The log holds `in` for its body, `begin` and `end` for its
+/// cleanup.
 const PROGRAM: &str = "
 (defvar *entries* 0)
 (defvar *log* nil)
@@ -65,7 +66,7 @@ fn each_cleanup_runs_once_wherever_its_task_is_aborted() {
     let program = program::compile(&[Source::new("nest", PROGRAM.to_string())]).program.expect("it compiles");
     let config = esl::Config { slice: 1, ..esl::Config::default() };
     let mut machine = program::machine(config, Box::new(VirtualHost::new())).expect("there is room");
-    program::run_in(&mut machine, &program).expect("it can be begun");
+    program::run_in(&mut machine, &program).expect("it can start");
     let nest = symbol(&mut machine, "NEST");
     let (mut first, mut runs, mut ends) = (0, 0, false);
     while !ends {
@@ -83,10 +84,10 @@ fn each_cleanup_runs_once_wherever_its_task_is_aborted() {
             let faults = call(&mut machine, "FAULTS");
             assert_eq!(
                 faults, "NIL",
-                "aborted after {first} ticks, and {second} later: (entry in begun ended)"
+                "aborted after {first} ticks, and again after {second} more: (entry in begun ended)"
             );
             if ends {
-                assert!(matches!(result, TaskResult::Failed(_)), "it fails if nobody aborts it");
+                assert!(matches!(result, TaskResult::Failed(_)), "it fails unless it is aborted");
             } else {
                 assert!(
                     matches!(result, TaskResult::Aborted | TaskResult::Failed(_)),

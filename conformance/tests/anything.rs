@@ -1,43 +1,27 @@
-//! Programs that nobody would write: the conformance programs with their tokens mixed up, and their bytecode with
-//! instructions changed. Nothing may panic, hang, or get past the verifier and do harm.
+//! Compiles and runs mutated conformance programs: texts with mixed-up tokens, and bytecode with changed
+//! instructions. None may panic or hang, and none may pass the verifier and do harm.
 //!
-//! `PROPTEST_CASES=10000 cargo test -p esl-conformance --test anything --features paranoid` looks longer.
+//! `PROPTEST_CASES=10000 cargo test -p esl-conformance --test anything --features paranoid` searches longer.
 
-use std::path::Path;
 use std::sync::LazyLock;
 
 use esl_bytecode::module::Module;
-use esl_conformance::anything;
+use esl_conformance::{anything, programs};
 use proptest::prelude::*;
 use proptest::sample::Index;
 
-/// The texts of all conformance programs but those that are large on purpose.
+/// The texts of all conformance programs except those that are large on purpose.
 static TEXTS: LazyLock<Vec<String>> = LazyLock::new(|| {
-    let mut texts = Vec::new();
-    let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("programs")];
-    while let Some(folder) = folders.pop() {
-        let mut paths: Vec<_> = folder
-            .read_dir()
-            .expect("the folder is there")
-            .map(|entry| entry.expect("it can be read").path())
-            .collect();
-        paths.sort();
-        for path in paths {
-            match path.is_dir() {
-                true if !path.ends_with("limits") => folders.push(path),
-                true => {}
-                false => texts.extend(std::fs::read_to_string(&path).ok()),
-            }
-        }
-    }
-    texts
+    let limits = programs::folder().join("limits");
+    let paths = programs::paths("").into_iter().filter(|path| !path.starts_with(&limits));
+    paths.map(|path| std::fs::read_to_string(path).expect("a program is text")).collect()
 });
 
 fn text_at(index: &Index) -> &'static str {
     &TEXTS[index.index(TEXTS.len())]
 }
 
-/// The tokens of a text, comments left out: parentheses, quotes, strings, everything else between blanks.
+/// Returns the tokens of a text without comments: parentheses, quotes, strings, and words between blanks.
 fn tokens(text: &str) -> Vec<&str> {
     let mut tokens = Vec::new();
     let mut rest = text.trim_start();
@@ -56,31 +40,32 @@ fn tokens(text: &str) -> Vec<&str> {
     tokens
 }
 
+/// A change of a program's tokens.
 #[derive(Clone, Debug)]
-enum Change {
+enum TokenMutation {
     Delete(Index),
     Repeat(Index),
     Swap(Index, Index),
-    /// Puts a token of another program in the place of one.
+    /// Replaces a token by a token of another program.
     Replace(Index, Index, Index),
-    /// Puts a form of another program in the place of a token.
+    /// Replaces a token by a form of another program.
     Graft(Index, Index, Index),
     Wrap(Index),
 }
 
-fn change() -> impl Strategy<Value = Change> {
+fn token_mutation() -> impl Strategy<Value = TokenMutation> {
     let index = any::<Index>;
     prop_oneof![
-        index().prop_map(Change::Delete),
-        index().prop_map(Change::Repeat),
-        (index(), index()).prop_map(|(a, b)| Change::Swap(a, b)),
-        (index(), index(), index()).prop_map(|(at, text, token)| Change::Replace(at, text, token)),
-        (index(), index(), index()).prop_map(|(at, text, token)| Change::Graft(at, text, token)),
-        index().prop_map(Change::Wrap),
+        index().prop_map(TokenMutation::Delete),
+        index().prop_map(TokenMutation::Repeat),
+        (index(), index()).prop_map(|(a, b)| TokenMutation::Swap(a, b)),
+        (index(), index(), index()).prop_map(|(at, text, token)| TokenMutation::Replace(at, text, token)),
+        (index(), index(), index()).prop_map(|(at, text, token)| TokenMutation::Graft(at, text, token)),
+        index().prop_map(TokenMutation::Wrap),
     ]
 }
 
-/// Position after the form that begins at `start`.
+/// Returns the position after the form that begins at `start`.
 fn end_of_form(tokens: &[&str], start: usize) -> usize {
     let mut depth = 0_usize;
     for (position, &token) in tokens.iter().enumerate().skip(start) {
@@ -97,33 +82,33 @@ fn end_of_form(tokens: &[&str], start: usize) -> usize {
     tokens.len()
 }
 
-fn mix(text: &Index, changes: &[Change]) -> String {
+fn mix(text: &Index, mutations: &[TokenMutation]) -> String {
     let mut mixed = tokens(text_at(text));
-    for change in changes {
+    for mutation in mutations {
         if mixed.is_empty() {
             break;
         }
         let size = mixed.len();
-        match change {
-            Change::Delete(at) => _ = mixed.remove(at.index(size)),
-            Change::Repeat(at) => {
+        match mutation {
+            TokenMutation::Delete(at) => _ = mixed.remove(at.index(size)),
+            TokenMutation::Repeat(at) => {
                 let start = at.index(size);
                 let form = mixed[start..end_of_form(&mixed, start)].to_vec();
                 mixed.splice(start..start, form);
             }
-            Change::Swap(a, b) => mixed.swap(a.index(size), b.index(size)),
-            Change::Replace(at, text, token) => {
+            TokenMutation::Swap(a, b) => mixed.swap(a.index(size), b.index(size)),
+            TokenMutation::Replace(at, text, token) => {
                 let other = tokens(text_at(text));
                 mixed[at.index(size)] = other[token.index(other.len())];
             }
-            Change::Graft(at, text, token) => {
+            TokenMutation::Graft(at, text, token) => {
                 let other = tokens(text_at(text));
                 let start = token.index(other.len());
                 let form = other[start..end_of_form(&other, start)].to_vec();
                 let at = at.index(size);
                 mixed.splice(at..=at, form);
             }
-            Change::Wrap(at) => {
+            TokenMutation::Wrap(at) => {
                 let start = at.index(size);
                 let end = end_of_form(&mixed, start);
                 mixed.insert(end, ")");
@@ -134,10 +119,10 @@ fn mix(text: &Index, changes: &[Change]) -> String {
     mixed.join(" ")
 }
 
-/// A change of one thing of a module: which function, what of it, where, and to what.
-type Patch = (Index, u8, Index, u32);
+/// A change of a module: which function, what kind of change, where, and the new value.
+type ModuleMutation = (Index, u8, Index, u32);
 
-fn patch(module: &mut Module, (function, what, at, to): &Patch) {
+fn mutate(module: &mut Module, (function, what, at, to): &ModuleMutation) {
     if module.functions.is_empty() {
         return;
     }
@@ -150,7 +135,7 @@ fn patch(module: &mut Module, (function, what, at, to): &Patch) {
     let words = function.code.len();
     let at_word = at.index(words);
     match what {
-        // A byte of an instruction, a little more or less of one, a bit.
+        // Sets a byte of an instruction word, then arms that increment, decrement or flip one.
         0..=3 => {
             let shift = 8 * u32::from(what % 4);
             function.code[at_word] = function.code[at_word] & !(0xff << shift) | (to & 0xff) << shift;
@@ -187,9 +172,9 @@ proptest! {
     #[test]
     fn mixed_up_programs_compile_and_run_without_harm(
         text in any::<Index>(),
-        changes in prop::collection::vec(change(), 1..8),
+        mutations in prop::collection::vec(token_mutation(), 1..8),
     ) {
-        if let Some(module) = anything::compile(&mix(&text, &changes)) {
+        if let Some(module) = anything::compile(&mix(&text, &mutations)) {
             prop_assert!(anything::run(&module));
         }
     }
@@ -197,10 +182,10 @@ proptest! {
     #[test]
     fn the_verifier_lets_nothing_harmful_through(
         text in any::<Index>(),
-        patches in prop::collection::vec((any::<Index>(), 0..16_u8, any::<Index>(), any::<u32>()), 1..4),
+        mutations in prop::collection::vec((any::<Index>(), 0..16_u8, any::<Index>(), any::<u32>()), 1..4),
     ) {
         if let Some(mut module) = anything::compile(text_at(&text)) {
-            patches.iter().for_each(|change| patch(&mut module, change));
+            mutations.iter().for_each(|mutation| mutate(&mut module, mutation));
             anything::run(&module);
         }
     }

@@ -1,14 +1,14 @@
-//! Every function, macro and special form that programs can name is used by a conformance program.
+//! Checks that the conformance programs use every function, macro and special form of the language.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
 use esl::{Config, Engine, host::VirtualHost};
+use esl_conformance::programs;
 
-/// What no program uses, and why.
+/// Names that no program uses, with the reason.
 const EXCEPTIONS: &[(&str, &str)] = &[("UNBOUND-SLOT-INSTANCE", "no operation leaves a slot unbound")];
 
-/// Names that are defined, as the language itself lists them.
+/// Form that lists the defined names.
 const NAMES: &str = "
 (let ((names nil))
   (dolist (symbol (apropos-list \"\" \"ESL\") (format nil \"~{~a~^ ~}\" names))
@@ -16,13 +16,10 @@ const NAMES: &str = "
                (or (special-operator-p symbol) (macro-function symbol) (fboundp symbol)))
       (push (symbol-name symbol) names))))";
 
-fn words(folder: &Path, words: &mut BTreeSet<String>) {
-    for entry in folder.read_dir().expect("the folder of programs is there") {
-        let path = entry.expect("the folder of programs can be read").path();
-        if path.is_dir() {
-            self::words(&path, words);
-            continue;
-        }
+/// Returns the words of all programs, in upper case.
+fn words() -> BTreeSet<String> {
+    let mut words = BTreeSet::new();
+    for path in programs::paths("") {
         let text = std::fs::read_to_string(&path).expect("a program is text").to_uppercase();
         for line in text.lines() {
             let code = line.split(" ;").next().unwrap_or(line);
@@ -32,12 +29,12 @@ fn words(folder: &Path, words: &mut BTreeSet<String>) {
             }
         }
     }
+    words
 }
 
 #[test]
 fn every_name_is_used_by_a_program() {
-    let mut used = BTreeSet::new();
-    words(&Path::new(env!("CARGO_MANIFEST_DIR")).join("programs"), &mut used);
+    let used = words();
     let mut engine =
         Engine::with(Config::default(), Box::new(VirtualHost::new())).expect("there is room for the library");
     let names = engine.eval(NAMES).expect("the names can be listed").to_string();
@@ -48,6 +45,6 @@ fn every_name_is_used_by_a_program() {
         names.into_iter().filter(|name| !used.contains(*name) && !excepted(name)).collect();
     assert!(unused.is_empty(), "no conformance program uses {} names: {}", unused.len(), unused.join(" "));
     for (name, reason) in EXCEPTIONS {
-        assert!(!used.contains(*name), "a program uses {name}; it is no exception any more ({reason})");
+        assert!(!used.contains(*name), "a program uses {name}: remove the exception ({reason})");
     }
 }

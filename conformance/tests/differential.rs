@@ -1,5 +1,5 @@
-//! Programs made by chance, and a checklist, answer as under SBCL. The programs and SBCL's answers are stored; with `ESL_BLESS=1` they
-//! are made anew, for which SBCL must be installed. See `differential/README.md`.
+//! Compares random programs and a checklist with SBCL. The programs and SBCL's answers are stored;
+//! `ESL_BLESS=1` makes them again, for which SBCL must be installed. See `differential/README.md`.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -10,14 +10,14 @@ use esl::program::{self, Source};
 use esl::{Config, Engine};
 use esl_conformance::differential::{Grammar, answers};
 
-/// What the stored programs were made with.
+/// Seed of the stored programs.
 const SEED: u64 = 1997;
 
-/// Names that no program can be compared about, and why.
+/// Names that the comparison leaves out, with the reason.
 const EXCEPTIONS: &[(&str, &str)] = &[
     ("* ** *** + -", "*, + and - are used as functions; the REPL sets the variables"),
-    ("apropos apropos-list describe", "what they write is the implementation's own"),
-    ("clear-input sleep random", "their effect is none, or by chance; used, not compared"),
+    ("apropos apropos-list describe", "their output is specific to the implementation"),
+    ("clear-input sleep random", "they have no effect or a random one; used, not compared"),
     (
         "defpackage in-package make-package use-package import export shadow list-all-packages",
         "programs share a package",
@@ -26,7 +26,7 @@ const EXCEPTIONS: &[(&str, &str)] = &[
     ("file-error-pathname load open probe-file delete-file with-open-file", "programs have no files"),
     ("require provide *modules*", "modules are files"),
     ("print-not-readable-object unbound-slot-instance", "nothing signals these errors"),
-    ("type-of", "it names the implementation's own types"),
+    ("type-of", "it returns types specific to the implementation"),
     ("signal assert abort", "written with the prefix of their package"),
     ("t nil", "used everywhere"),
 ];
@@ -45,12 +45,13 @@ fn is_blessing() -> bool {
 
 fn generated(seed: u64) -> String {
     let mut grammar = Grammar::parse(&read("grammar.txt"), seed).expect("the grammar is sound");
-    let mut text = format!(";;;; Made from `grammar.txt` with the seed {seed}: change that, not this.\n\n");
+    let mut text =
+        format!(";;;; Made from `grammar.txt` with the seed {seed}: change the grammar, not this file.\n\n");
     text.push_str(&grammar.programs().join("\n"));
     text
 }
 
-/// SBCL's output for a file of programs.
+/// Returns SBCL's output for a file of programs.
 fn sbcl(programs: &str) -> String {
     let output = Command::new("timeout")
         .args(["60", "sbcl", "--script", "run-sbcl.lisp", "prelude.lisp", programs])
@@ -65,7 +66,7 @@ fn sbcl(programs: &str) -> String {
     String::from_utf8(output.stdout).expect("SBCL writes UTF-8")
 }
 
-/// ESL's output for programs.
+/// Returns ESL's output for programs.
 fn esl(programs: &str) -> String {
     let sources = [Source::new("prelude.lisp", read("prelude.lisp")), Source::new("programs.lisp", programs)];
     let compiled = program::compile(&sources);
@@ -78,8 +79,8 @@ fn esl(programs: &str) -> String {
     assert!(errors.is_empty(), "the programs do not compile: {errors:#?}");
     let host = VirtualHost::new();
     let captured = host.captured();
-    let program = compiled.program.expect("there was no error");
-    program::run(&program, Config::default(), Box::new(host)).expect("it can be run");
+    let program = compiled.program.expect("there are no errors");
+    program::run(&program, Config::default(), Box::new(host)).expect("it can start");
     captured.output()
 }
 
@@ -97,7 +98,7 @@ fn compare(programs: &str, stored: &str) {
         }
     }
     assert!(wrong.is_empty(), "{} of {} answers differ\n{}", wrong.len(), expected.len(), wrong.join("\n"));
-    assert_eq!(found.len(), expected.len(), "a program has no stored answer: regenerate");
+    assert_eq!(found.len(), expected.len(), "a program has no stored answer: regenerate the answers");
 }
 
 #[test]
@@ -110,14 +111,14 @@ fn generated_programs_answer_as_under_sbcl() {
     }
     assert!(
         programs == read("generated.lisp"),
-        "the grammar has changed: ESL_BLESS=1 cargo test -p esl-conformance --test differential"
+        "the grammar has changed: run `ESL_BLESS=1 cargo test -p esl-conformance --test differential`"
     );
     compare(&programs, &read("generated.answers"));
 }
 
 /// Needs SBCL: `ESL_SEEDS=1-12 cargo test -p esl-conformance --test differential -- --ignored`.
 #[test]
-#[ignore = "looks for new differences, with SBCL"]
+#[ignore = "searches for new differences; needs SBCL"]
 fn programs_of_other_seeds_answer_as_under_sbcl() {
     let seeds = std::env::var("ESL_SEEDS").unwrap_or_else(|_| "1-4".to_string());
     let (first, last) = seeds.split_once('-').unwrap_or((&seeds, &seeds));
@@ -134,7 +135,7 @@ fn programs_of_other_seeds_answer_as_under_sbcl() {
         }
     }
     std::fs::remove_file(&file).expect("the programs can be removed");
-    assert!(failures.is_empty(), "these seeds have shown differences: {failures:?}");
+    assert!(failures.is_empty(), "these seeds reveal differences: {failures:?}");
 }
 
 #[test]

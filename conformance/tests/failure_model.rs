@@ -1,8 +1,9 @@
-//! Random nests of recovery forms, cleanups, handlers, throws and failures, run by the machine and by a model.
+//! Compares the machine with a model on random nests of recovery forms, cleanups, handlers, throws and
+//! failures.
 //!
-//! The model says what the language promises in a few lines: a failure is a function of what stands outside of it, looks at
-//! that from the inside out, and calls; leaving is an error value. It shares nothing with the implementation, which has a
-//! control stack, masks and a state of unwinding.
+//! The model states the promises of the language in a few lines: a failure searches the enclosing forms from
+//! the inside out and calls what it finds; leaving a form is an error value. The model shares nothing with
+//! the implementation, which has a control stack, masks and an unwinding state.
 
 use std::cell::RefCell;
 use std::fmt::Write;
@@ -11,7 +12,7 @@ use std::rc::Rc;
 use esl::host::VirtualHost;
 use esl::program::{self, Source};
 
-/// A form. All give a number; each `Out` is a line of output.
+/// A form. Every form returns a number; each `Out` prints a line.
 #[derive(Clone, Debug)]
 enum Form {
     Number(u32),
@@ -21,16 +22,16 @@ enum Form {
     /// `(car 0)`: the cause is `:type-error`.
     Wrong,
     Recovery(Vec<Clause>, Box<Form>),
-    /// Body, cleanup.
+    /// Body and cleanup.
     FailureCleanup(Box<Form>, Box<Form>),
-    /// Body, cleanup.
+    /// Body and cleanup.
     Protect(Box<Form>, Box<Form>),
-    /// Tag, body.
+    /// Tag and body.
     Catch(u32, Box<Form>),
     Throw(u32),
-    /// Body, what a failure gives.
+    /// Body, and the clause whose value a failure returns.
     HandlerCase(Box<Form>, Box<Form>),
-    /// Body, what the handler does before it declines.
+    /// Body, and the form that the handler evaluates before it declines.
     HandlerBind(Box<Form>, Box<Form>),
 }
 
@@ -39,40 +40,40 @@ struct Clause {
     cause: usize,
     retries: u32,
     body: Form,
-    end: End,
+    end: ClauseEnd,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum End {
+enum ClauseEnd {
     Retry,
     Abort(u32),
     Resume(u32),
     Fail(usize),
 }
 
-/// Causes; each is below the ones that `ABOVE` lists, and all are below the last.
+/// Causes. `ABOVE` lists the causes above each; the last is above all others.
 const CAUSES: [&str; 6] = [":a", ":b", ":under-a", ":type-error", ":error", ":general-failure"];
 const ABOVE: [&[usize]; 6] = [&[5], &[5], &[0, 5], &[4, 5], &[5], &[]];
 
 // ---- the model
 
-/// Something that stands around a form while it is evaluated.
+/// A form that encloses the one being evaluated. Numbers identify activations.
 #[derive(Clone)]
-enum Around {
+enum Enclosing {
     Recovery(usize, Rc<Vec<Clause>>, Rc<RefCell<Vec<u32>>>),
     FailureCleanup(usize),
     HandlerCase(usize),
     HandlerBind(Rc<Form>),
 }
 
-/// A way to leave: by numbers of activations.
-enum Leave {
+/// A non-local exit; its target is the number of an activation.
+enum NonLocalExit {
     Retry(usize),
     Abort(usize, u32),
     ToCleanup(usize, usize),
     ToCase(usize),
     Throw(u32),
-    /// Takes too long to be of interest.
+    /// The program takes too many steps and is not compared.
     TooLong,
 }
 
@@ -83,7 +84,7 @@ struct Model {
     catches: Vec<u32>,
 }
 
-type Outcome = Result<u32, Leave>;
+type Evaluation = Result<u32, NonLocalExit>;
 
 impl Model {
     fn activation(&mut self) -> usize {
@@ -91,100 +92,101 @@ impl Model {
         self.activations
     }
 
-    fn form(&mut self, form: &Form, around: &[Around]) -> Outcome {
+    fn form(&mut self, form: &Form, enclosing: &[Enclosing]) -> Evaluation {
         self.steps += 1;
         if self.steps > 3000 {
-            return Err(Leave::TooLong);
+            return Err(NonLocalExit::TooLong);
         }
-        let with = |entry: Around| -> Vec<Around> { around.iter().cloned().chain([entry]).collect() };
+        let with =
+            |entry: Enclosing| -> Vec<Enclosing> { enclosing.iter().cloned().chain([entry]).collect() };
         match form {
             Form::Number(number) => Ok(*number),
             Form::Out(number) => {
                 self.output.push(*number);
                 Ok(*number)
             }
-            Form::Sequence(forms) => forms.iter().try_fold(0, |_, form| self.form(form, around)),
-            Form::Fail(cause) => self.fail(*cause, around),
-            Form::Wrong => self.fail(3, around),
+            Form::Sequence(forms) => forms.iter().try_fold(0, |_, form| self.form(form, enclosing)),
+            Form::Fail(cause) => self.fail(*cause, enclosing),
+            Form::Wrong => self.fail(3, enclosing),
             Form::Recovery(clauses, body) => {
                 let me = self.activation();
                 let left = Rc::new(RefCell::new(clauses.iter().map(|clause| clause.retries).collect()));
-                let inside = with(Around::Recovery(me, Rc::new(clauses.clone()), left));
+                let inside = with(Enclosing::Recovery(me, Rc::new(clauses.clone()), left));
                 loop {
                     match self.form(body, &inside) {
-                        Err(Leave::Retry(target)) if target == me => {}
-                        Err(Leave::Abort(target, value)) if target == me => return Ok(value),
+                        Err(NonLocalExit::Retry(target)) if target == me => {}
+                        Err(NonLocalExit::Abort(target, value)) if target == me => return Ok(value),
                         outcome => return outcome,
                     }
                 }
             }
             Form::FailureCleanup(body, cleanup) => {
                 let me = self.activation();
-                match self.form(body, &with(Around::FailureCleanup(me))) {
-                    Err(Leave::ToCleanup(target, cause)) if target == me => {
-                        self.form(cleanup, around)?;
-                        self.fail(cause, around)
+                match self.form(body, &with(Enclosing::FailureCleanup(me))) {
+                    Err(NonLocalExit::ToCleanup(target, cause)) if target == me => {
+                        self.form(cleanup, enclosing)?;
+                        self.fail(cause, enclosing)
                     }
                     outcome => outcome,
                 }
             }
             Form::Protect(body, cleanup) => {
-                let outcome = self.form(body, around);
-                if !matches!(outcome, Err(Leave::TooLong)) {
-                    self.form(cleanup, around)?;
+                let outcome = self.form(body, enclosing);
+                if !matches!(outcome, Err(NonLocalExit::TooLong)) {
+                    self.form(cleanup, enclosing)?;
                 }
                 outcome
             }
             Form::Catch(tag, body) => {
                 self.catches.push(*tag);
-                let outcome = self.form(body, around);
+                let outcome = self.form(body, enclosing);
                 self.catches.pop();
                 match outcome {
-                    Err(Leave::Throw(thrown)) if thrown == *tag => Ok(thrown),
+                    Err(NonLocalExit::Throw(thrown)) if thrown == *tag => Ok(thrown),
                     outcome => outcome,
                 }
             }
-            // Without a catch it would be a control error.
-            Form::Throw(tag) if self.catches.contains(tag) => Err(Leave::Throw(*tag)),
+            // Without a matching catch, the throw would be a control error.
+            Form::Throw(tag) if self.catches.contains(tag) => Err(NonLocalExit::Throw(*tag)),
             Form::Throw(_) => Ok(0),
             Form::HandlerCase(body, clause) => {
                 let me = self.activation();
-                match self.form(body, &with(Around::HandlerCase(me))) {
-                    Err(Leave::ToCase(target)) if target == me => self.form(clause, around),
+                match self.form(body, &with(Enclosing::HandlerCase(me))) {
+                    Err(NonLocalExit::ToCase(target)) if target == me => self.form(clause, enclosing),
                     outcome => outcome,
                 }
             }
             Form::HandlerBind(body, handler) => {
-                self.form(body, &with(Around::HandlerBind(Rc::new((**handler).clone()))))
+                self.form(body, &with(Enclosing::HandlerBind(Rc::new((**handler).clone()))))
             }
         }
     }
 
-    fn fail(&mut self, cause: usize, around: &[Around]) -> Outcome {
-        for (index, entry) in around.iter().enumerate().rev() {
+    fn fail(&mut self, cause: usize, enclosing: &[Enclosing]) -> Evaluation {
+        for (index, entry) in enclosing.iter().enumerate().rev() {
             match entry {
-                Around::FailureCleanup(id) => return Err(Leave::ToCleanup(*id, cause)),
-                Around::HandlerCase(id) => return Err(Leave::ToCase(*id)),
-                Around::HandlerBind(handler) => drop(self.form(&handler.clone(), &around[..index])?),
-                Around::Recovery(id, clauses, left) => {
+                Enclosing::FailureCleanup(id) => return Err(NonLocalExit::ToCleanup(*id, cause)),
+                Enclosing::HandlerCase(id) => return Err(NonLocalExit::ToCase(*id)),
+                Enclosing::HandlerBind(handler) => drop(self.form(&handler.clone(), &enclosing[..index])?),
+                Enclosing::Recovery(id, clauses, left) => {
                     let applies =
                         |clause: &Clause| clause.cause == cause || ABOVE[cause].contains(&clause.cause);
                     let found = (0..clauses.len()).find(|&at| left.borrow()[at] > 0 && applies(&clauses[at]));
                     let Some(at) = found else { continue };
                     left.borrow_mut()[at] -= 1;
-                    // The form's own clauses are in force, and what stands outside of it.
-                    let around = &around[..=index];
-                    self.form(&clauses[at].body, around)?;
+                    // The form's own clauses are in force, and everything outside the form.
+                    let enclosing = &enclosing[..=index];
+                    self.form(&clauses[at].body, enclosing)?;
                     return match clauses[at].end {
-                        End::Retry => Err(Leave::Retry(*id)),
-                        End::Abort(value) => Err(Leave::Abort(*id, value)),
-                        End::Resume(value) => Ok(value),
-                        End::Fail(cause) => self.fail(cause, around),
+                        ClauseEnd::Retry => Err(NonLocalExit::Retry(*id)),
+                        ClauseEnd::Abort(value) => Err(NonLocalExit::Abort(*id, value)),
+                        ClauseEnd::Resume(value) => Ok(value),
+                        ClauseEnd::Fail(cause) => self.fail(cause, enclosing),
                     };
                 }
             }
         }
-        unreachable!("every program has a handler around it")
+        unreachable!("a handler encloses every program")
     }
 }
 
@@ -241,10 +243,10 @@ impl Random {
         let number = self.below(1000);
         let body = self.form(depth.min(2));
         let end = match self.below(6) {
-            0 | 1 => End::Retry,
-            2 => End::Abort(number),
-            3 | 4 => End::Resume(number),
-            _ => End::Fail(self.cause()),
+            0 | 1 => ClauseEnd::Retry,
+            2 => ClauseEnd::Abort(number),
+            3 | 4 => ClauseEnd::Resume(number),
+            _ => ClauseEnd::Fail(self.cause()),
         };
         Clause { cause, retries: 1 + self.below(3), body, end }
     }
@@ -277,10 +279,10 @@ fn write(form: &Form, text: &mut String) {
                 _ = write!(text, "({} :retries {} ", CAUSES[clause.cause], clause.retries);
                 write(&clause.body, text);
                 _ = match clause.end {
-                    End::Retry => write!(text, "(retry))"),
-                    End::Abort(value) => write!(text, "(abort {value}))"),
-                    End::Resume(value) => write!(text, "(values {value}))"),
-                    End::Fail(cause) => write!(text, "(fail {}))", CAUSES[cause]),
+                    ClauseEnd::Retry => write!(text, "(retry))"),
+                    ClauseEnd::Abort(value) => write!(text, "(abort {value}))"),
+                    ClauseEnd::Resume(value) => write!(text, "(values {value}))"),
+                    ClauseEnd::Fail(cause) => write!(text, "(fail {}))", CAUSES[cause]),
                 };
             }
             text.push(')');
@@ -333,7 +335,7 @@ fn expectation(form: &Form) -> Option<String> {
     Some(text)
 }
 
-/// What a program alone writes.
+/// Returns the output of a program run alone.
 fn outcome(form: &Form, slice: u32) -> String {
     let mut text = format!("{PRELUDE}(format t \"value ~d~%\" ");
     write(form, &mut text);
@@ -343,11 +345,11 @@ fn outcome(form: &Form, slice: u32) -> String {
     let captured = host.captured();
     let config = esl::Config { slice, ..esl::Config::default() };
     let program = compiled.program.expect("random programs compile");
-    program::run(&program, config, Box::new(host)).expect("the program can be begun");
+    program::run(&program, config, Box::new(host)).expect("the program can start");
     captured.output()
 }
 
-/// The forms that are one step simpler.
+/// Returns the forms that are one step simpler.
 fn simpler(form: &Form) -> Vec<Form> {
     let mut found = Vec::new();
     let mut pair = |a: &Form, b: &Form, make: &dyn Fn(Box<Form>, Box<Form>) -> Form| {
@@ -399,7 +401,7 @@ fn simpler(form: &Form) -> Vec<Form> {
     found
 }
 
-/// The simplest form found for which machine and model differ, given one.
+/// Simplifies a form for which machine and model differ, as long as they still differ.
 fn simplest(mut form: Form, slice: u32) -> Form {
     let differs = |form: &Form| expectation(form).is_some_and(|expected| expected != outcome(form, slice));
     while let Some(next) =
@@ -434,7 +436,7 @@ fn the_machine_does_what_the_model_says() {
             let host = VirtualHost::new();
             let captured = host.captured();
             let config = esl::Config { slice, ..esl::Config::default() };
-            program::run(&program, config, Box::new(host)).expect("the program can be begun");
+            program::run(&program, config, Box::new(host)).expect("the program can start");
             let output = captured.output();
             let mut rest = output.as_str();
             for (form, expected) in &expected {

@@ -1,4 +1,4 @@
-//! Machines in one process share nothing, and can be sent from thread to thread while they run.
+//! Checks that the machines of a process share no state and can move between threads while they run.
 
 use esl::Config;
 use esl::host::VirtualHost;
@@ -6,7 +6,7 @@ use esl::program::{self, Program, Source};
 use esl_vm::run::RunOutcome;
 use esl_vm::vm::Vm;
 
-/// Tasks, an event, facts, a global variable, random numbers and output.
+/// Uses tasks, an event, facts, a global variable, random numbers and output.
 const PROGRAM: &str = "
     (defvar *n* 0)
     (defvar *bump* (make-event 'bump))
@@ -23,14 +23,14 @@ fn machine(program: &Program, seed: u64) -> (Vm, esl::host::Captured) {
     let captured = host.captured();
     let config = Config { seed, ..Config::default() };
     let mut machine = program::machine(config, Box::new(host)).expect("there is room for the library");
-    program::begin(&mut machine, program).expect("it can be begun");
+    program::begin(&mut machine, program).expect("it can start");
     (machine, captured)
 }
 
 fn is_send<T: Send>() {}
 
 #[test]
-fn machines_by_turns_do_what_each_does_alone() {
+fn interleaved_machines_do_what_each_does_alone() {
     is_send::<Vm>();
     is_send::<esl::Engine>();
     let compiled = program::compile(&[Source::new("program", PROGRAM)]);
@@ -45,7 +45,7 @@ fn machines_by_turns_do_what_each_does_alone() {
         .collect();
     assert!(alone[0].0.contains("(600 200 "), "{}", alone[0].0);
 
-    // By turns of a few ticks, each turn in a thread of its own.
+    // Interleave the machines, a few ticks at a time, each step in a thread of its own.
     let mut machines: Vec<_> = (0..4).map(|seed| (machine(&program, seed), false)).collect();
     while machines.iter().any(|(_, is_done)| !is_done) {
         machines = machines
@@ -65,7 +65,7 @@ fn machines_by_turns_do_what_each_does_alone() {
         assert_eq!(captured.output(), *output);
     }
 
-    // All at the same time.
+    // Run all machines at the same time.
     let threads: Vec<_> = (0..4)
         .map(|seed| {
             let (mut machine, captured) = machine(&program, seed);

@@ -1,44 +1,30 @@
-//! Runs every program of `programs/` and compares what it does with what its comments say.
+//! Runs every program of `programs/` and compares the result with the expectations in its comments.
 //!
-//! Each program is one test. It is compiled once; then it runs from the compiled module and from the bytes of the file that
-//! the module would be written to, under every setting that it does not exclude.
-#![allow(clippy::print_stderr, reason = "a runner of tests reports")]
+//! Each program is one test. It is compiled once, then runs under every setting that it does not exclude:
+//! from the compiled module, and from the bytes of the corresponding file.
+#![allow(clippy::print_stderr, reason = "a test runner prints its results")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use esl::Config;
 use esl::host::VirtualHost;
 use esl::program::{self, Compiled, Program, Source};
 use esl_bytecode::diagnostic::Severity;
-use esl_conformance::{Expectations, Setting};
+use esl_conformance::{Expectations, Setting, programs};
 use libtest_mimic::{Arguments, Failed, Trial};
 
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("programs");
-    let mut paths = Vec::new();
-    find_programs(&folder, &mut paths);
-    paths.sort();
-    let trials = paths.into_iter().map(|path| {
+    let folder = programs::folder();
+    let trials = programs::paths("").into_iter().map(|path| {
         let name = path.strip_prefix(&folder).unwrap_or(&path).display().to_string();
         Trial::test(name.clone(), move || check_known(&name, &path))
     });
     libtest_mimic::run(&arguments, trials.collect()).exit_code()
 }
 
-fn find_programs(folder: &Path, paths: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(folder).expect("the folder of programs is there") {
-        let path = entry.expect("the folder of programs can be read").path();
-        if path.is_dir() {
-            find_programs(&path, paths);
-        } else if path.extension().is_some_and(|extension| extension == "esl") {
-            paths.push(path);
-        }
-    }
-}
-
-/// Checks a program; one that is known not to do yet what it says has to fail, so that its note does not outlive the reason.
+/// Checks a program. A program with a known defect must fail, so that its note does not outlive the defect.
 fn check_known(name: &str, path: &Path) -> Result<(), Failed> {
     let text = std::fs::read_to_string(path)?;
     let result = check(name, path);
@@ -46,7 +32,7 @@ fn check_known(name: &str, path: &Path) -> Result<(), Failed> {
         (None, result) => result,
         (Some(_), Err(_)) => Ok(()),
         (Some(reason), Ok(())) => {
-            Err(format!("it does what it says now; remove its line `known: {reason}`").into())
+            Err(format!("the program now passes; remove its line `known: {reason}`").into())
         }
     }
 }
@@ -60,7 +46,7 @@ fn check(name: &str, path: &Path) -> Result<(), Failed> {
     let bytes = program.to_bytes()?;
     let from_file = Program::from_bytes(&bytes)?;
     for &setting in &expected.settings {
-        // A collection at every safepoint takes time in proportion to what is live, which is what these make large.
+        // A collection takes time in proportion to the live data, and these programs keep much data alive.
         if setting == Setting::GcStress && name.starts_with("limits") {
             continue;
         }
@@ -107,7 +93,7 @@ fn check_diagnostics(expected: &Expectations, compiled: &Compiled) -> Result<(),
     Ok(())
 }
 
-/// The configuration that a program's options and a setting ask for.
+/// Returns the configuration for a program's options and a setting.
 fn config(options: &[String], setting: Setting) -> Result<Config, Failed> {
     let mut config = Config::default();
     for pair in options.chunks(2) {
@@ -117,9 +103,9 @@ fn config(options: &[String], setting: Setting) -> Result<Config, Failed> {
             "--budget" => config.budget = Some(value.parse()?),
             "--slice" => config.slice = value.parse()?,
             "--seed" => config.seed = value.parse()?,
-            // Time is always virtual here.
+            // The runner always uses virtual time.
             "--clock" if value == "virtual" => {}
-            _ => return Err(format!("the option `{option}` is not known here").into()),
+            _ => return Err(format!("the runner does not know the option `{option}`").into()),
         }
     }
     match setting {
@@ -159,7 +145,8 @@ fn run(name: &str, expected: &Expectations, program: &Program, config: Config) -
         if !errors.lines().any(|line| line == first) {
             return Err(format!("expected the failure {cause}\nstandard error:\n{errors}"));
         }
-        // A tail call leaves no frame, and a long backtrace is cut; what is shown has to be right.
+        // A tail call leaves no frame, and a long backtrace is truncated; the part that is shown must be
+        // right.
         let shown = errors.lines().filter(|line| line.trim_start().starts_with("in ")).count();
         let mentions = errors.lines().any(|line| line.contains(&format!("{name}:")));
         if mentions && shown < 20 && !errors.contains(&format!("{name}:{line}:")) {

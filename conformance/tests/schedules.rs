@@ -1,28 +1,29 @@
-//! Runs the programs about tasks under many schedules: what the language promises holds under each of them.
+//! Runs the programs about tasks and locks under many schedules: the promises of the language hold under
+//! each.
 //!
-//! A failure names the seed and the slice, and the choices that were made: `Choices::given` reproduces the run from them. By hand:
+//! A failure message names the seed, the slice and the scheduler's choices, from which `Choices::given`
+//! reproduces the run. To reproduce it by hand, the command
 //!
 //! ```text
 //! ESL_SCHEDULE="NAME.esl 7 0,1,1,0" cargo test -p esl-conformance --test schedules a_given -- --nocapture
 //! ```
 //!
-//! runs a program of `programs/tasks` with slices of at most seven ticks and these choices, and prints what it does.
+//! runs a program of `programs/tasks` with slices of at most seven ticks and these choices, and prints the
+//! result.
 
-#![allow(clippy::print_stdout, reason = "a test reports")]
-
-use std::path::Path;
+#![allow(clippy::print_stdout, reason = "a test prints its result")]
 
 use esl::Config;
 use esl::host::VirtualHost;
 use esl::program::{self, Program, Source};
-use esl_conformance::Expectations;
+use esl_conformance::{Expectations, programs};
 use esl_vm::schedule::Choices;
 
 /// Seeds for each slice; 0 is plain round-robin.
 const SEEDS: u64 = 100;
 const SLICES: [u32; 4] = [1, 7, 100, 2000];
 
-/// What a run did: the lines that it wrote, its status, and the choices that led there.
+/// The result of a run: the lines that it wrote, its status, and the choices that led there.
 struct Run {
     lines: Vec<String>,
     status: u8,
@@ -37,7 +38,7 @@ fn run(program: &Program, choices: Choices, slice: u32) -> Run {
     let config = Config { slice, ..Config::default() };
     let mut machine = program::machine(config, Box::new(host)).expect("there is room for the library");
     machine.set_choices(choices.recorded());
-    let report = program::run_in(&mut machine, program).expect("the program can be begun");
+    let report = program::run_in(&mut machine, program).expect("the program can start");
     let output = captured.output();
     let lines = output.lines().map(str::trim_end).filter(|line| !line.is_empty()).map(String::from);
     Run {
@@ -64,15 +65,10 @@ fn programs_with_locks_do_what_they_say_under_every_schedule() {
 }
 
 fn check_programs(folder: &str) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("programs").join(folder);
-    let mut names: Vec<String> = std::fs::read_dir(&folder)
-        .expect("the folder is there")
-        .map(|entry| entry.expect("it can be read").file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
     let mut failures = Vec::new();
-    for name in names {
-        let text = std::fs::read_to_string(folder.join(&name)).expect("the program can be read");
+    for path in programs::paths(folder) {
+        let name = path.file_name().expect("a program has a name").to_string_lossy();
+        let text = std::fs::read_to_string(&path).expect("the program can be read");
         if text.lines().any(|line| line.starts_with("; schedules: skip")) {
             continue;
         }
@@ -83,8 +79,13 @@ fn check_programs(folder: &str) {
                 let run = run(&program, Choices::seeded(seed), slice);
                 if run.lines != expected.output || run.status != expected.expected_status() {
                     failures.push(format!(
-                        "{name}, seed {seed}, slice {slice}: status {}\nexpected {:?}\nfound    {:?}\n{}ESL_SCHEDULE=\"{name} {slice} {}\"",
-                        run.status, expected.output, run.lines, run.errors, as_text(&run.choices)
+                        "{name}, seed {seed}, slice {slice}: status {}\nexpected {:?}\nfound    {:?}\n\
+                         {}ESL_SCHEDULE=\"{name} {slice} {}\"",
+                        run.status,
+                        expected.output,
+                        run.lines,
+                        run.errors,
+                        as_text(&run.choices)
                     ));
                     break 'schedules;
                 }
@@ -94,24 +95,26 @@ fn check_programs(folder: &str) {
     assert!(failures.is_empty(), "{}", failures.join("\n\n"));
 }
 
-/// Choices as they are given by hand.
+/// Formats choices as `ESL_SCHEDULE` takes them.
 fn as_text(choices: &[u32]) -> String {
     choices.iter().map(u32::to_string).collect::<Vec<_>>().join(",")
 }
 
 #[test]
-fn a_given_schedule_is_run_again() {
+fn a_given_schedule_is_reproduced() {
     let Ok(given) = std::env::var("ESL_SCHEDULE") else { return };
     let words: Vec<&str> = given.split(' ').collect();
-    let [name, slice, choices] = words[..] else { panic!("a name, a slice and choices, not {given}") };
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("programs/tasks");
-    let text = std::fs::read_to_string(folder.join(name)).expect("the program can be read");
+    let [name, slice, choices] = words[..] else {
+        panic!("expected a name, a slice and choices, found {given}")
+    };
+    let text = std::fs::read_to_string(programs::folder().join("tasks").join(name))
+        .expect("the program can be read");
     let choices: Vec<u32> = choices.split(',').map(|choice| choice.parse().expect("a number")).collect();
     let run = run(&compile(name, &text), Choices::given(&choices), slice.parse().expect("a number of ticks"));
     println!("status {}\n{}\n{}", run.status, run.lines.join("\n"), run.errors);
 }
 
-/// Four tasks that each write their name a few times.
+/// Runs four tasks, each of which writes its name a few times.
 const RACE: &str = "(dolist (name '(a b c d))
                       (let ((name name))
                         (spawn (dotimes (i 5) (princ name) (sleep 0)))))";
@@ -142,7 +145,7 @@ fn a_schedule_can_be_given_as_a_list_of_choices() {
     assert!(!first.choices.is_empty());
     let again = run(&program, Choices::given(&first.choices), 50);
     assert_eq!((again.lines, again.ticks, again.choices), (first.lines, first.ticks, first.choices));
-    // Any list is legal: what it leaves open is the first choice.
+    // Any list is legal: every choice that it leaves open is the first.
     let other = run(&program, Choices::given(&[3, 1, 4, 1, 5, 9, 2, 6]), 50);
     let mut letters: Vec<char> = other.lines.concat().chars().collect();
     letters.sort_unstable();

@@ -1,11 +1,12 @@
-//! The known defects of the original property locks, which model checking, a flight and our own exploration have found: each is
-//! looked for under all schedules of a program in which it would show. Then it is put back into the library, and has to show.
+//! The known defects of the original property locks, found by model checking, in flight and by our own
+//! exploration. For each, a program that would reveal it runs under all schedules, without the defect. Then
+//! the test puts the defect back into the library, and the exploration must reveal it.
 
 use esl::explore::{Grain, Settings, explore_with};
 use esl::program::Ended;
 use esl_vm::vm::Vm;
 
-use crate::putting_back::{Change, changed_functions};
+use crate::putting_back::{TextChange, changed_functions};
 use crate::{TWO_TASKS, TWO_TASKS_ENDINGS, check, compile};
 
 const POWER: &str = "
@@ -18,29 +19,33 @@ const POWER: &str = "
       (without-interrupts (power 'camera))))
   (defun locks () (hash-table-count esl::*%locks*))";
 
-/// That each schedule of a program ends well and writes one of these lines, and that this is no longer so with `changes` in the
-/// library.
-fn check_locks(text: &str, expected: &[&str], changes: &[Change]) {
+/// Checks that a program ends well and writes one of the `expected` lines under every schedule, but not with
+/// `changes` in the library.
+fn check_locks(text: &str, expected: &[&str], changes: &[TextChange]) {
     let text = format!("{POWER} {text}");
     check(&text, Grain::Changes, expected);
     check_that_it_shows(&text, expected, changes);
 }
 
-/// That some schedule of a program does not end well, or writes another line, with `changes` in the library.
-fn check_that_it_shows(text: &str, expected: &[&str], changes: &[Change]) {
+/// Checks that, with `changes` in the library, a program ends badly or writes another line under some
+/// schedule.
+fn check_that_it_shows(text: &str, expected: &[&str], changes: &[TextChange]) {
     let defect = changed_functions(changes);
     let settings = Settings { states: 50_000, ..Settings::default() };
     let prepare = |machine: &mut Vm| defect.put_into(machine);
-    let found = explore_with(&compile(text), &settings, &prepare).expect("the program can be begun");
+    let found = explore_with(&compile(text), &settings, &prepare).expect("the program can start");
     let is_well = |ending: &esl::explore::Ending<esl::explore::Outcome>| {
         let output = ending.what.output.split_whitespace().collect::<Vec<_>>().join(" ");
         ending.what.ended == Ended::Normally(0) && expected.contains(&&*output)
     };
     let is_ended = found.is_complete && found.endless.is_none() && !found.has_cycle;
-    assert!(!(is_ended && found.endings.iter().all(is_well)), "the defect does not show: {changes:?}");
+    assert!(
+        !(is_ended && found.endings.iter().all(is_well)),
+        "the exploration does not reveal the defect: {changes:?}"
+    );
 }
 
-/// It is released after the body, not in a cleanup.
+/// Defect: the lock is released after the body instead of in a cleanup.
 #[test]
 fn an_abort_during_the_release_does_not_leak_the_lock() {
     check_locks(
@@ -59,7 +64,7 @@ fn an_abort_during_the_release_does_not_leak_the_lock() {
     );
 }
 
-/// It is subscribed to before the cleanup stands. A second abort comes while the first one is seen to.
+/// Defect: the subscription precedes the establishment of the cleanup. A second abort comes during the first.
 #[test]
 fn the_lock_is_acquired_inside_the_protection() {
     check_locks(
@@ -79,7 +84,7 @@ fn the_lock_is_acquired_inside_the_protection() {
     );
 }
 
-/// It is waited for whatever the count is.
+/// Defect: the wait ignores the count.
 #[test]
 fn a_count_is_tested_and_waited_for_in_one_step() {
     check_locks(
@@ -90,9 +95,9 @@ fn a_count_is_tested_and_waited_for_in_one_step() {
     );
 }
 
-/// The state is set without looking at the property again.
+/// Defect: the state is set without another look at the property.
 #[test]
-fn a_property_that_was_broken_meanwhile_does_not_count_as_achieved() {
+fn a_property_that_was_violated_meanwhile_does_not_count_as_achieved() {
     check_locks(
         "(let ((task (spawn (with-recovery-procedures ((:maintained-property-violation (abort :told))
                                                        (:condition-not-achieved (abort :told)))
@@ -111,7 +116,7 @@ fn a_property_that_was_broken_meanwhile_does_not_count_as_achieved() {
     );
 }
 
-/// The others wait before they look.
+/// Defect: secondary subscribers wait before they look.
 #[test]
 fn a_secondary_subscriber_looks_before_it_waits() {
     check_locks(
@@ -135,7 +140,7 @@ fn a_secondary_subscriber_looks_before_it_waits() {
     );
 }
 
-/// Nobody is told when it leaves.
+/// Defect: an owner that leaves tells nobody.
 #[test]
 fn an_owner_that_dies_before_achieving_is_succeeded() {
     check_locks(
@@ -153,7 +158,7 @@ fn an_owner_that_dies_before_achieving_is_succeeded() {
     );
 }
 
-/// The guard is left open, and does not ask for the lock.
+/// Defect: the guard stays open and does not check the subscription.
 #[test]
 fn a_task_that_has_released_is_not_interrupted() {
     check_locks(
@@ -184,7 +189,7 @@ fn a_task_that_has_released_is_not_interrupted() {
     );
 }
 
-/// The only one that is not in the library: back with a `Vm::wake_waiter` that takes a pending abort from the task.
+/// The only defect outside the library: it returns if waking a waiter clears a pending abort of the task.
 #[test]
 fn a_wake_up_does_not_revive_an_aborted_task() {
     const TEXT: &str = "(defvar *go* (make-event))
@@ -197,7 +202,7 @@ fn a_wake_up_does_not_revive_an_aborted_task() {
     check(&format!("{POWER} {TEXT}"), Grain::Changes, &["(:ABORTED 0)"]);
 }
 
-/// A wait without a test takes the test of the wait before it.
+/// Defect: a wait without a test uses the test of the previous wait.
 #[test]
 fn a_test_is_not_left_behind_for_the_next_wait() {
     check_locks(
@@ -222,10 +227,10 @@ fn a_test_is_not_left_behind_for_the_next_wait() {
     );
 }
 
-/// The daemon waits before it looks.
+/// Defect: the daemon waits before it looks.
 #[test]
-fn a_violation_before_the_daemon_first_waits_is_seen_to() {
-    // The change may come while the property is being achieved.
+fn a_violation_before_the_daemon_first_waits_is_restored() {
+    // The change may come during the achievement of the property.
     check_locks(
         "(spawn (with-recovery-procedures ((:condition-not-achieved (abort :not-achieved)))
                   (with-automatic-recoveries (print (hold))))
@@ -240,8 +245,8 @@ fn a_violation_before_the_daemon_first_waits_is_seen_to() {
     );
 }
 
-/// The last one to release a lock leaves the task that restores it to itself: it violates the lock of whoever comes next. Found
-/// by exploring our own.
+/// Defect: the last task to release a lock does not end the task that restores the property, which then
+/// violates the lock of the next subscriber. Found by exploring our own implementation.
 #[test]
 fn a_restoration_for_nobody_does_not_violate_the_next_lock() {
     check_that_it_shows(

@@ -1,4 +1,4 @@
-//! Explores all schedules of small programs: shows what never happens, and finds what does.
+//! Explores all schedules of small programs: proves what never happens, and finds what does.
 
 mod defects;
 mod putting_back;
@@ -12,26 +12,26 @@ pub(crate) fn compile(text: &str) -> Program {
     compiled.program.unwrap_or_else(|| panic!("the program compiles: {messages:?}"))
 }
 
-#[allow(clippy::print_stdout, reason = "a test of this kind has its figures to say")]
+#[allow(clippy::print_stdout, reason = "an exploration prints its figures")]
 fn say<T>(grain: Grain, found: &Exploration<T>) {
     println!("{grain:?}: {} states, {} runs, {} endings", found.states, found.runs, found.endings.len());
 }
 
-/// Everything that runs of a program come to. Each ending is reached again by its choices.
+/// Explores a program, and checks that the choices of each ending lead to it again.
 pub(crate) fn endings(text: &str, grain: Grain) -> Exploration<Outcome> {
     let program = compile(text);
     let settings = Settings { grain, ..Settings::default() };
-    let found = explore(&program, &settings).expect("the program can be begun");
+    let found = explore(&program, &settings).expect("the program can start");
     assert!(found.is_complete, "more than {} states", found.states);
     for ending in &found.endings {
-        let again = follow(&program, &settings, &ending.choices).expect("the program can be begun");
+        let again = follow(&program, &settings, &ending.choices).expect("the program can start");
         assert_eq!(again, ending.what, "choices {:?}", ending.choices);
     }
     say(grain, &found);
     found
 }
 
-/// The outputs of runs that have all ended well, in order.
+/// Returns the sorted outputs of an exploration whose runs have all ended well.
 fn outputs(found: &Exploration<Outcome>) -> Vec<String> {
     let mut outputs = Vec::new();
     for ending in &found.endings {
@@ -44,16 +44,17 @@ fn outputs(found: &Exploration<Outcome>) -> Vec<String> {
     outputs
 }
 
-/// That each schedule of a program ends well, and what they write.
+/// Checks that a program ends well under every schedule, with exactly the `expected` outputs.
 pub(crate) fn check(text: &str, grain: Grain, expected: &[&str]) -> Exploration<Outcome> {
     let found = endings(text, grain);
     assert_eq!(outputs(&found), expected);
-    assert_eq!((&found.endless, found.has_cycle), (&None, false), "a run may go on for ever");
+    assert_eq!((&found.endless, found.has_cycle), (&None, false), "a run may never end");
     found
 }
 
-/// The tasks that stopped the Remote Agent in flight in May 1999: each waits for the other's signal unless its counter shows
-/// that there was one. `wait` is how the first argument is waited for unless its count differs from `seen`.
+/// Returns the program that stopped the Remote Agent in flight in May 1999: each of two tasks waits for the
+/// other's signal unless its counter shows that there was one. `wait` is the body of a macro that waits for
+/// `event` unless the event's count differs from `seen`.
 fn remote_agent(wait: &str) -> String {
     format!(
         "(defvar *first* (make-event 'first))
@@ -81,7 +82,7 @@ fn a_counter_tested_before_the_wait_deadlocks() {
         let found = endings(&text, grain);
         let deadlock = found.endings.iter().find(|ending| ending.what.ended == Ended::Deadlocked);
         let deadlock = deadlock.expect("a schedule deadlocks");
-        // One untimely switch is enough: between the test and the wait.
+        // A single untimely switch suffices, between the test and the wait.
         let switches = deadlock.choices.iter().filter(|&&choice| choice != 0).count();
         assert!(switches <= 2, "{:?}", deadlock.choices);
         assert!(deadlock.what.errors.contains("waits for event FIRST"), "{}", deadlock.what.errors);
@@ -97,7 +98,8 @@ fn a_counter_tested_by_the_wait_does_not_deadlock() {
     }
 }
 
-/// Two tasks that want different values of one property, and a change from outside: what was model-checked in 1997.
+/// Two tasks that want different values of a property, and a change from outside: the case model-checked in
+/// 1997.
 pub(crate) const TWO_TASKS: &str = "
   (define-property power (device))
   (to-achieve (power device value)
@@ -130,14 +132,14 @@ pub(crate) const TWO_TASKS_ENDINGS: &[&str] = &[
 
 #[test]
 fn two_tasks_a_change_and_the_daemon() {
-    // Whoever holds the lock finds the value that it wants, or is told of the violation; the other one waits for nothing. Never
-    // do both find theirs violated, since there is one change only; in the end no lock is left.
+    // The holder of the lock finds the value that it wants or is told of the violation; the other task fails
+    // at once. The single change never violates the locks of both tasks, and no lock is left at the end.
     check(TWO_TASKS, Grain::Changes, TWO_TASKS_ENDINGS);
 }
 
 #[test]
 fn no_lock_is_held_by_a_task_that_has_ended() {
-    // The last task looks once, so it looks at every state.
+    // The last task looks once; under some schedule it looks at each reachable state.
     let text = "
       (define-property power (device))
       (to-achieve (power device value)
@@ -169,13 +171,13 @@ fn a_violated_subscriber_recovers() {
             (sleep 0)
             (without-interrupts (print (power 'camera))))))
       (assert '(power camera :off))";
-    // What is read is read after the recovery, or before the change; or the change comes when the lock is held but nobody has
-    // looked yet: the interrupt waits for the end of the critical section.
+    // The read happens before the change or after the recovery. If the change comes between the acquisition
+    // of the lock and the read, the interrupt waits for the end of the critical section.
     check(text, Grain::Changes, &[":ON"]);
 }
 
 #[test]
-fn what_runs_for_ever_is_told_from_what_may_run_for_ever() {
+fn endless_runs_are_distinguished_from_possibly_endless_ones() {
     let found = endings(
         "(defvar *stop* nil) (spawn (setq *stop* t)) (loop (when *stop* (return)) (sleep 0))",
         Grain::Changes,

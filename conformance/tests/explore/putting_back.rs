@@ -1,4 +1,5 @@
-//! Puts a defect into the library of a machine: some of its functions, from the text of the library with changes.
+//! Puts a defect back into the library of a machine, by recompiling some of its functions from a changed
+//! text.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,16 +14,16 @@ use esl_compiler::diagnostic::Sources;
 use esl_compiler::session::Compiler;
 use esl_vm::vm::Vm;
 
-/// A change of the library: in this file, the text, which stands there once, becomes the other.
-pub(crate) type Change = (&'static str, &'static str, &'static str);
+/// A textual change of the library: file, old text, which must occur exactly once, and new text.
+pub(crate) type TextChange = (&'static str, &'static str, &'static str);
 
-/// Functions to be put into the library of a machine.
+/// Changed functions for the library of a machine.
 pub(crate) struct Defect {
     module: Module,
 }
 
-/// The functions of the library that `changes` are about, changed.
-pub(crate) fn changed_functions(changes: &[Change]) -> Defect {
+/// Returns the functions of the library that `changes` affect, changed and compiled.
+pub(crate) fn changed_functions(changes: &[TextChange]) -> Defect {
     let mut texts: Vec<(&str, String)> = Vec::new();
     for &(file, from, to) in changes {
         let index = texts.iter().position(|(name, _)| *name == file).unwrap_or_else(|| {
@@ -31,7 +32,7 @@ pub(crate) fn changed_functions(changes: &[Change]) -> Defect {
             texts.len() - 1
         });
         let text = &mut texts[index].1;
-        assert_eq!(text.matches(from).count(), 1, "this stands once in {file}: {from}");
+        assert_eq!(text.matches(from).count(), 1, "{file} must contain this once: {from}");
         *text = text.replace(from, &format!("{MARK}{to}"));
     }
     let functions: String =
@@ -39,10 +40,10 @@ pub(crate) fn changed_functions(changes: &[Change]) -> Defect {
     Defect { module: compile(&functions.replace(MARK, "")) }
 }
 
-/// Stands where a text was changed.
+/// Marks a changed place in a text.
 const MARK: char = '\u{1}';
 
-/// The forms of a file, each of which begins a line.
+/// Returns the top-level forms of a file, each of which starts at the beginning of a line.
 fn forms(text: &str) -> impl Iterator<Item = String> {
     text.split("\n(").skip(1).map(|form| format!("\n({form}"))
 }
@@ -63,12 +64,12 @@ fn compile(text: &str) -> Module {
         Ok(())
     })
     .expect("the package of the library is there");
-    module.expect("it compiles")
+    module.expect("the functions compile")
 }
 
-/// Does `work` in a machine whose language is open for it.
+/// Does `work` in a machine whose language packages are unlocked for the duration.
 fn opened(machine: &mut Vm, work: impl FnOnce(&mut Vm) -> Result<(), String>) -> Result<(), String> {
-    let no_room = |_| "there is no room".to_string();
+    let no_room = |_| "out of memory".to_string();
     machine.unseal();
     machine.enter_package(ESL_PACKAGE).map_err(no_room)?;
     work(machine)?;
@@ -78,7 +79,7 @@ fn opened(machine: &mut Vm, work: impl FnOnce(&mut Vm) -> Result<(), String>) ->
 }
 
 impl Defect {
-    /// Has the functions of a machine's library replaced.
+    /// Replaces the functions in a machine's library.
     pub(crate) fn put_into(&self, machine: &mut Vm) -> Result<(), String> {
         opened(machine, |machine| {
             let functions = machine.load_module(&self.module).map_err(|error| error.to_string())?;
