@@ -1,27 +1,27 @@
 //! The examples of a chapter of the manual.
 //!
-//! A fenced block of `lisp` is a piece of program; the pieces of a chapter are one program, in order. A block without a
-//! language right behind it is what that piece prints. A block of `repl` is a session (see [`crate::transcript`]) in which the
-//! pieces before it are loaded. Blocks of other languages are not looked at.
+//! The `lisp` blocks of a chapter form one program, in order. A block without a language, directly after a
+//! `lisp` block, shows the output of that block. A `repl` block is a session (see [`crate::transcript`]) that
+//! has loaded the `lisp` blocks before it. Blocks in other languages are ignored.
 
-/// An example.
+/// An example of a chapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Example {
-    /// A piece of program, and what it prints; `None` if the manual does not say.
+    /// A `lisp` block.
     Program {
-        /// The text.
+        /// Text of the block.
         text: String,
-        /// What it prints.
+        /// Expected output; `None` if the manual does not show any.
         output: Option<String>,
     },
-    /// A session.
+    /// The text of a `repl` block.
     Session(String),
 }
 
-/// The examples of a chapter, each with the line on which it begins.
+/// Returns the examples of a chapter, each with the line on which it begins.
 ///
 /// # Errors
-/// A text, if a block is not closed, or output stands behind no program.
+/// A message, if a block is not closed or an output block does not follow a program.
 pub fn examples(markdown: &str) -> Result<Vec<(usize, Example)>, String> {
     let mut found: Vec<(usize, Example)> = Vec::new();
     let mut lines = markdown.lines().enumerate();
@@ -35,7 +35,7 @@ pub fn examples(markdown: &str) -> Result<Vec<(usize, Example)>, String> {
                     text.push_str(line);
                     text.push('\n');
                 }
-                None => return Err(format!("line {}: a block that is not closed", index + 1)),
+                None => return Err(format!("line {}: unclosed block", index + 1)),
             }
         }
         match language.trim() {
@@ -43,7 +43,7 @@ pub fn examples(markdown: &str) -> Result<Vec<(usize, Example)>, String> {
             "repl" => found.push((index + 1, Example::Session(text))),
             "" => match found.last_mut() {
                 Some((_, Example::Program { output: output @ None, .. })) => *output = Some(text),
-                _ => return Err(format!("line {}: output of no program", index + 1)),
+                _ => return Err(format!("line {}: output without a program", index + 1)),
             },
             _ => {}
         }

@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn answers_are_told_apart() {
+    fn answers_are_separated() {
         let found = answers(";;; 1\n5\n;;; 3\nprints \"a\nb\"\nNIL\n");
         let expected = [(1, "5\n".to_string()), (3, "prints \"a\nb\"\nNIL\n".to_string())];
         assert_eq!(found, expected.into());

@@ -1,7 +1,7 @@
 //! A command run as a process, with a text at its standard input, for tests of `eslc` and `eslvm`.
 //!
-//! Guarantees: a command that does not end is killed, and panics the test. Both outputs are read while the command runs, so
-//! that it never waits for a full pipe.
+//! Guarantees: a command that does not end is killed, and the test panics. Both outputs are read while the
+//! command runs, so that it never waits for a full pipe.
 
 use std::io::{Read, Write};
 use std::process::{Child, Command, Stdio};

@@ -1,4 +1,4 @@
-//! Transcripts of sessions with the REPL: what is typed, and what has to be answered, to the letter.
+//! Transcripts of sessions with the REPL: the typed text and the expected answers, verbatim.
 //!
 //! ```text
 //! ; a comment, up to the first prompt
@@ -11,20 +11,20 @@
 //! X
 //! ```
 //!
-//! A line that begins with `? ` is typed, and so are the lines after it until its parentheses are closed. What follows, up
-//! to the next such line, is the answer; blanks at the end of a line do not count, nor do empty lines at the very end.
+//! A line that begins with `? ` is typed, and so are the lines after it until its parentheses are closed. The
+//! text up to the next such line is the answer. Trailing blanks and empty lines at the very end are ignored.
 
 /// A transcript.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Transcript {
-    /// Everything that is typed.
+    /// All typed text.
     pub input: String,
-    /// Everything that is answered.
+    /// All expected answers.
     pub output: String,
 }
 
 impl Transcript {
-    /// Reads a transcript.
+    /// Parses a transcript.
     pub fn parse(text: &str) -> Transcript {
         let mut transcript = Transcript::default();
         let mut is_typed = false;
@@ -53,10 +53,10 @@ impl Transcript {
         transcript
     }
 
-    /// Compares the output with what the REPL has written.
+    /// Compares the expected output with the REPL's output.
     ///
     /// # Errors
-    /// The first difference.
+    /// A description of the first difference.
     pub fn compare(&self, found: &str) -> Result<(), String> {
         compare(&self.output, found)
     }
@@ -65,7 +65,7 @@ impl Transcript {
 /// Compares outputs line by line.
 ///
 /// # Errors
-/// The first difference, with what comes before and after it.
+/// A description of the first difference, with the lines around it.
 pub fn compare(expected: &str, found: &str) -> Result<(), String> {
     let lines = |text: &str| -> Vec<String> {
         text.trim_end().lines().map(|line| line.trim_end().to_string()).collect()
@@ -83,7 +83,7 @@ pub fn compare(expected: &str, found: &str) -> Result<(), String> {
     Err(format!("line {}: expected\n{}\nfound\n{}", first + 1, part(&expected), part(&found)))
 }
 
-/// Whether the parentheses and strings of a text are closed.
+/// Returns whether the parentheses and strings of a text are closed.
 fn is_whole(text: &str) -> bool {
     let (mut depth, mut in_string) = (0, false);
     let mut characters = text.chars();
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn typed_lines_and_answers_are_told_apart() {
+    fn typed_lines_are_distinguished_from_answers() {
         let transcript = Transcript::parse("; comment\n? (list 1 ; (\n   \"(\" #\\()\n(1)\n? 5\n5\n?\n");
         assert_eq!(transcript.input, "(list 1 ; (\n   \"(\" #\\()\n5\n\n");
         assert_eq!(transcript.output, "(1)\n5\n");
