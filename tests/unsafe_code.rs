@@ -1,4 +1,4 @@
-//! The fence around unsafe code: where it may stand.
+//! The fence around unsafe code: where it may stand, and that each use names the fact it relies on.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -91,4 +91,25 @@ fn documents_name_the_places() {
             |paragraph: &str| ALLOWED.iter().all(|place| paragraph.contains(&format!("`{place}`")));
         assert!(paragraphs.any(names_them), "{document} says where unsafe code stands: {ALLOWED:?}");
     }
+}
+
+/// A note that only points elsewhere leaves its reader to guess what holds.
+#[test]
+fn safety_notes_name_a_fact() {
+    const VAGUE: [&str; 7] = ["as ", "see ", "likewise", "same ", "safe", "ditto", "by the contract."];
+    let mut vague = Vec::new();
+    for (path, text) in sources() {
+        if path == "tests/unsafe_code.rs" {
+            continue;
+        }
+        for (number, line) in text.lines().enumerate() {
+            let Some((_, note)) = line.split_once("// SAFETY: ") else { continue };
+            // The name of an item alone, such as `V4.`, does not say what of it matters here.
+            let is_short = note.split_whitespace().count() < 4;
+            if is_short || VAGUE.iter().any(|start| note.to_lowercase().starts_with(start)) {
+                vague.push(format!("{path}:{}: {}", number + 1, line.trim()));
+            }
+        }
+    }
+    assert!(vague.is_empty(), "these notes do not name the fact that they rely on:\n{}", vague.join("\n"));
 }

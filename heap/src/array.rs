@@ -1,9 +1,11 @@
 //! Elements of arrays, wherever they are kept.
 //!
-//! A simple vector, a string and a row of bytes are arrays of rank 1 by themselves; every other array is a record over
-//! one of these, its *data*. The data decides what the elements may be: any value, characters, or integers below 256.
+//! A simple vector, a string and a row of bytes are arrays of rank 1 by themselves; every other array is a
+//! record over one of these, its *data*. The data decides what the elements may be: any value, characters, or
+//! integers below 256.
 //!
-//! Guarantees: an array whose dimensions or fill pointer ask for more than its data holds has the elements that are there.
+//! Guarantees: an array whose dimensions or fill pointer ask for more than its data holds has the elements
+//! that are there.
 //!
 //! Not here: storing elements, and making and changing arrays.
 

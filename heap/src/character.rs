@@ -1,7 +1,8 @@
 //! Characters: case, classes and names. A character is a code point below 0x11_0000, surrogates included.
 //!
-//! Case is that of Common Lisp: a letter has case only if it and one other letter are each other's counterparts. So `ß`,
-//! whose upper case is two letters, and `µ`, whose upper case belongs to another letter, have none.
+//! Case is that of Common Lisp: a letter has case only if it and one other letter are each other's
+//! counterparts. So `ß`, whose upper case is two letters, and `µ`, whose upper case belongs to another
+//! letter, have none.
 
 /// The upper case of a letter that has one; the character itself otherwise.
 #[inline]
@@ -98,7 +99,8 @@ pub fn digit_weight(code: u32, radix: u32) -> Option<u32> {
     char::from_u32(code)?.to_digit(radix)
 }
 
-/// Names of the characters that have no better way to be written; the first for a code is the one that is printed.
+/// Names of the characters that have no better way to be written; the first for a code is the one that is
+/// printed.
 const NAMES: [(u32, &str); 42] = [
     (0, "Nul"),
     (1, "Soh"),
@@ -144,8 +146,8 @@ const NAMES: [(u32, &str); 42] = [
     (127, "Del"),
 ];
 
-/// The name of a character: a word for those that show nothing, `U` and its code in hexadecimal for other ones that do
-/// not print as themselves. Characters that do have none.
+/// The name of a character: a word for those that show nothing, `U` and its code in hexadecimal for other
+/// ones that do not print as themselves. Characters that do have none.
 pub fn name(code: u32) -> Option<String> {
     if let Some((_, name)) = NAMES.iter().find(|&&(named, _)| named == code) {
         return Some((*name).into());

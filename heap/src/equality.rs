@@ -1,10 +1,9 @@
 //! When objects count as the same: `eq`, `eql`, `equal`, `equalp`, and hashes that agree with them.
 //!
-//! Guarantees: no native stack in proportion to depth; a comparison stops when the work it was given is used up, and
-//! says so; a hash looks at a bounded part of an object. Equal objects have equal hashes, and the hashes of a run are the
-//! same in every run of the same program.
-//! Not here: functions of the program as tests, which ESL calls; hash tables and `equalp`, where ESL compares as soon
-//! as two different tables meet.
+//! Guarantees: no native stack in proportion to depth; a comparison stops when the work it was given is used
+//! up, and says so; a hash looks at a bounded part of an object. Equal objects have equal hashes, and the
+//! hashes of a run are the same in every run of the same program. Not here: functions of the program as
+//! tests, which ESL calls; hash tables and `equalp`, where ESL compares as soon as two different tables meet.
 
 use smallvec::{SmallVec, smallvec};
 
@@ -27,8 +26,8 @@ pub enum Test {
     Equalp,
 }
 
-/// Whether `a` and `b` are the same by `test`. `None` when that takes more than `work`, from which what was done is
-/// taken, or when only ESL can tell.
+/// Whether `a` and `b` are the same by `test`. `None` when that takes more than `work`, from which what was
+/// done is taken, or when only ESL can tell.
 #[inline]
 pub fn same(heap: &Heap, test: Test, a: Value, b: Value, work: &mut usize) -> Option<bool> {
     if a == b {
@@ -161,9 +160,9 @@ fn finish(hash: u64) -> u32 {
     ((hash >> 32) ^ hash) as u32
 }
 
-/// A hash of a fixnum in which sixteen neighbours stay neighbours: keys are often numbers that a program counts up, and a
-/// table then finds them in one place of memory. Their order there is mixed as well, so that no step between keys makes hashes
-/// that share their low bits.
+/// A hash of a fixnum in which sixteen neighbours stay neighbours: keys are often numbers that a program
+/// counts up, and a table then finds them in one place of memory. Their order there is mixed as well, so that
+/// no step between keys makes hashes that share their low bits.
 #[inline]
 pub fn fixnum_hash(n: i64) -> u32 {
     let group = finish(mix(0, (n >> 4) as u64));
@@ -246,7 +245,8 @@ fn characters_hash(characters: &[u32], loosely: bool) -> u64 {
     }
 }
 
-/// The hash of pairs, strings and, `loosely`, arrays and structures, from the first parts in the order of reading.
+/// The hash of pairs, strings and, `loosely`, arrays and structures, from the first parts in the order of
+/// reading.
 fn parts_hash(heap: &Heap, v: Value, loosely: bool) -> u64 {
     let mut open: SmallVec<[Value; 16]> = smallvec![v];
     let mut hash = 0;

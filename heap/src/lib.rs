@@ -13,8 +13,9 @@
 //! | [`state`] | the list of all state, and the macro that makes it |
 //! | [`character`] | case, classes and names of characters |
 //!
-//! Guarantees: safe code cannot break memory safety through this crate, however odd the caller, once the two promises of
-//! [`Heap::new`] and [`Heap::end_marking`] are kept. Every function with a contract is an `unsafe fn` that states it.
+//! Guarantees: safe code cannot break memory safety through this crate, however odd the caller, once the two
+//! promises of [`Heap::new`] and [`Heap::end_marking`] are kept. Every function with a contract is an `unsafe
+//! fn` that states it.
 //!
 //! Not here: roots, the time at which to collect, and everything that a program does with its data.
 

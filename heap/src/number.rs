@@ -2,8 +2,9 @@
 //!
 //! Comparisons look at the words and limbs in place; nothing is allocated or rounded.
 //!
-//! Guarantees: [`eql`] and [`same_value`] are exact for integers, ratios and doubles of any size. They rely on numbers
-//! being normalized: an integer that fits a fixnum is one, a ratio is in lowest terms with a denominator above 1.
+//! Guarantees: [`eql`] and [`same_value`] are exact for integers, ratios and doubles of any size. They rely
+//! on numbers being normalized: an integer that fits a fixnum is one, a ratio is in lowest terms with a
+//! denominator above 1.
 //!
 //! Not here: order and arithmetic, which the virtual machine does.
 
@@ -32,7 +33,8 @@ pub fn is_number(heap: &Heap, v: Value) -> bool {
         || matches!(heap.kind(v), Some(Kind::Bignum | Kind::Ratio | Kind::Float))
 }
 
-/// Returns whether `a` and `b` are the same object, or numbers of one type with one value. The sign of zero counts.
+/// Returns whether `a` and `b` are the same object, or numbers of one type with one value. The sign of zero
+/// counts.
 #[inline]
 pub fn eql(heap: &Heap, a: Value, b: Value) -> bool {
     a == b || a.is_object() && b.is_object() && boxed_eql(heap, a, b)
@@ -87,7 +89,8 @@ pub(crate) fn exact_double(heap: &Heap, v: Value) -> Option<f64> {
     scaled(is_negative, above, -(shift as i64))
 }
 
-/// Returns whether an integer is below zero, and its magnitude in limbs, least first. `room` holds the limb of a fixnum.
+/// Returns whether an integer is below zero, and its magnitude in limbs, least first. `room` holds the limb
+/// of a fixnum.
 fn magnitude<'a>(heap: &'a Heap, v: Value, room: &'a mut [u64; 1]) -> Option<(bool, &'a [u64])> {
     if let Some(n) = v.as_fixnum() {
         room[0] = n.unsigned_abs();

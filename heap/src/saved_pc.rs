@@ -8,8 +8,8 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SavedPc(*const u32);
 
-// SAFETY: a saved address gives no access to what is there: to follow it is unsafe, and whoever does so shows that the code
-// belongs to the machine in hand.
+// SAFETY: a saved address gives no access to what is there: to follow it is unsafe, and whoever does so shows
+// that the code belongs to the machine in hand.
 unsafe impl Send for SavedPc {}
 
 impl SavedPc {

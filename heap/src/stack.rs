@@ -5,14 +5,14 @@
 //!                      ^ base of the first frame                               ^ base of the running frame
 //! ```
 //!
-//! Frames overlap: the window of a call becomes the callee's frame. Nothing in the heap points into a stack, so growing
-//! one is a copy.
+//! Frames overlap: the window of a call becomes the callee's frame. Nothing in the heap points into a stack,
+//! so growing one is a copy.
 //!
 //! Invariants:
-//! 1. Every word from the start to `capacity` is initialised and reads as a valid [`Value`]: a return pc has its low bits
-//!    clear and so looks like a fixnum.
-//! 2. Words that may hold an address of a dead object are above the top of the running frame; [`Stack::wipe`] clears
-//!    them before each scan.
+//! 1. Every word from the start to `capacity` is initialised and reads as a valid [`Value`]: a return pc has
+//!    its low bits clear and so looks like a fixnum.
+//! 2. Words that may hold an address of a dead object are above the top of the running frame; [`Stack::wipe`]
+//!    clears them before each scan.
 
 #![allow(unsafe_code)]
 
@@ -34,8 +34,8 @@ list_state! { Stack { start: Run, capacity: Run } }
 // SAFETY: a stack owns its segment; the values in it belong to the heap of the machine that owns the stack.
 unsafe impl Send for Stack {}
 
-/// Words of the smallest stack. With the word that an allocator takes for itself it fills a block of 128 bytes, and so do
-/// the others.
+/// Words of the smallest stack. With the word that an allocator takes for itself it fills a block of 128
+/// bytes, and so do the others.
 const SMALLEST: usize = 15;
 
 /// The words of the segment that holds at least `words` words: 15, 23, 31, 47, 63, 95, ...
@@ -88,7 +88,7 @@ impl Stack {
 
     fn move_to(&mut self, capacity: usize) {
         let start = allocate(capacity);
-        // SAFETY: both segments are ours and hold at least so many words.
+        // SAFETY: both segments are ours, distinct, and hold at least so many words.
         unsafe {
             let words = self.capacity().min(capacity);
             std::ptr::copy_nonoverlapping(self.start.as_ptr(), start.as_ptr(), words);
@@ -102,7 +102,7 @@ impl Stack {
     pub fn wipe(&mut self, top: usize) {
         // The interpreter does not note how high it has written: that would cost each call a store.
         for index in top..self.capacity() {
-            // SAFETY: the index is below the capacity.
+            // SAFETY: the index is below the capacity, so the word lies in the segment.
             unsafe { self.start.as_ptr().add(index).write(Value::NIL) };
         }
     }
@@ -110,7 +110,7 @@ impl Stack {
     /// The words below `top`.
     pub fn words(&self, top: usize) -> &[Value] {
         debug_assert!(top <= self.capacity());
-        // SAFETY: invariant 1.
+        // SAFETY: invariant 1: every word below the capacity is a value; the slice borrows the stack.
         unsafe { std::slice::from_raw_parts(self.start.as_ptr(), top.min(self.capacity())) }
     }
 }
@@ -135,7 +135,7 @@ fn free(start: NonNull<Value>, words: usize) {
 
 fn allocate(words: usize) -> NonNull<Value> {
     let layout = layout(words);
-    // SAFETY: the layout is not empty.
+    // SAFETY: the layout is not empty, since the smallest segment is not.
     let Some(start) = NonNull::new(unsafe { alloc(layout) }.cast::<Value>()) else {
         handle_alloc_error(layout)
     };

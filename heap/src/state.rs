@@ -1,9 +1,9 @@
 //! The list of all state: what each field of the machine means for a run.
 //!
-//! [`list_state!`](crate::list_state) lists the fields of a struct, in any module that sees them. It takes the struct
-//! apart without `..`, so a new field does not compile until the list gives it a [`Role`]. A field that consists of
-//! listed structs has the role `Parts`, which compiles only if they are listed too. So [`Listed::FIELDS`] of a struct
-//! is a tree of everything that it owns.
+//! [`list_state!`](crate::list_state) lists the fields of a struct, in any module that sees them. It takes
+//! the struct apart without `..`, so a new field does not compile until the list gives it a [`Role`]. A field
+//! that consists of listed structs has the role `Parts`, which compiles only if they are listed too. So
+//! [`Listed::FIELDS`] of a struct is a tree of everything that it owns.
 //!
 //! Guarantees: the tree is complete. Code that compares, saves or copies a machine can be checked against it.
 

@@ -11,16 +11,16 @@
 //! ```
 //!
 //! Guarantees: two values are `eq` in the language exactly when their words are equal, except that nothing is
-//! promised about boxed numbers; every word that safe code can make is either free of addresses or was handed out by
-//! the heap. Truth is one compare with [`Value::NIL`]. Fixnums add, subtract and compare without untagging, a test of
-//! two fixnums is `(a | b) & 3 == 0`, of two immediate doubles `a & b & 3 == 3`.
+//! promised about boxed numbers; every word that safe code can make is either free of addresses or was handed
+//! out by the heap. Truth is one compare with [`Value::NIL`]. Fixnums add, subtract and compare without
+//! untagging, a test of two fixnums is `(a | b) & 3 == 0`, of two immediate doubles `a & b & 3 == 3`.
 //!
-//! A raw pointer to an instruction has its two low bits clear, so the collector takes it for a fixnum; that is why a
-//! stack may hold return addresses between values.
+//! A raw pointer to an instruction has its two low bits clear, so the collector takes it for a fixnum; that
+//! is why a stack may hold return addresses between values.
 //!
-//! Not here: following an address (`heap`), doubles outside the window and big integers (boxed, `heap`), the names
-//! and property lists of `nil` and `t`, whose symbol objects the VM keeps aside: in programs [`Value::NIL`] and
-//! [`Value::T`] are their only representation.
+//! Not here: following an address (`heap`), doubles outside the window and big integers (boxed, `heap`), the
+//! names and property lists of `nil` and `t`, whose symbol objects the VM keeps aside: in programs
+//! [`Value::NIL`] and [`Value::T`] are their only representation.
 //!
 //! Unsafe invariants:
 //! 1. A word tagged as cons or object was made from the address of a live object of the heap of this VM
@@ -35,7 +35,8 @@
 use crate::heap::layout::{Cons, Header};
 use std::fmt;
 
-/// A datum: a number, character or constant in the word itself, or the address of a cons or object in the heap.
+/// A datum: a number, character or constant in the word itself, or the address of a cons or object in the
+/// heap.
 ///
 /// `==` is the language's `eq`.
 #[repr(transparent)]
@@ -112,7 +113,8 @@ impl Value {
 
     /// The word itself, for tables keyed by identity of what is not an address, and for the interpreter.
     ///
-    /// An address must not decide anything that a program can see; see `Heap::identity` for a number that may.
+    /// An address must not decide anything that a program can see; see `Heap::identity` for a number that
+    /// may.
     #[inline(always)]
     pub const fn bits(self) -> u64 {
         self.0
@@ -255,8 +257,8 @@ impl Value {
         !self.is_nil()
     }
 
-    /// The character with this code, or nothing at [`Value::CHARACTER_LIMIT`] and above. Surrogates are characters,
-    /// as they are in SBCL.
+    /// The character with this code, or nothing at [`Value::CHARACTER_LIMIT`] and above. Surrogates are
+    /// characters, as they are in SBCL.
     #[inline(always)]
     pub const fn character(code: u32) -> Option<Value> {
         if code < Self::CHARACTER_LIMIT { Some(immediate(SUB_CHARACTER, code as u64)) } else { None }

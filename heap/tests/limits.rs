@@ -1,4 +1,5 @@
-//! Allocation and collection at large: limits, pacing, what goes back to the system, and structures of great depth.
+//! Allocation and collection at large: limits, pacing, what goes back to the system, and structures of great
+//! depth.
 
 #![allow(unsafe_code, reason = "tests keep the promises that the heap asks of its owner")]
 

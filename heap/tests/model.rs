@@ -1,10 +1,12 @@
-//! The collector against a model: a random program over heap, globals and several task stacks, with slices of the
-//! collector between any two of its steps, and a shadow of the object graph that says what must and what may survive.
+//! The collector against a model: a random program over heap, globals and several task stacks, with slices of
+//! the collector between any two of its steps, and a shadow of the object graph that says what must and what
+//! may survive.
 //!
-//! Checked at the end of each marking: everything reachable is marked (nothing in use is freed), and nothing is marked
-//! but what was reachable when the cycle began or was allocated since (garbage floats for at most one cycle). Checked
-//! all the time: every object that the program meets holds what the shadow says. The stacks follow the rule that the
-//! collector is built on: a stack is scanned before its task runs in a cycle, otherwise any time, once.
+//! Checked at the end of each marking: everything reachable is marked (nothing in use is freed), and nothing
+//! is marked but what was reachable when the cycle began or was allocated since (garbage floats for at most
+//! one cycle). Checked all the time: every object that the program meets holds what the shadow says. The
+//! stacks follow the rule that the collector is built on: a stack is scanned before its task runs in a cycle,
+//! otherwise any time, once.
 
 #![allow(unsafe_code, reason = "tests keep the promises that the heap asks of its owner")]
 
@@ -281,8 +283,8 @@ impl Model {
         Ok(())
     }
 
-    /// Moves the values of the running task's stack into a new vector, or forgets them: so structures grow deep, and
-    /// most objects are in use through the heap alone.
+    /// Moves the values of the running task's stack into a new vector, or forgets them: so structures grow
+    /// deep, and most objects are in use through the heap alone.
     fn bundle(&mut self) {
         let values = std::mem::take(&mut self.tasks[self.running].values);
         if self.random.one_in(8) {
@@ -324,8 +326,8 @@ impl Model {
         }
     }
 
-    /// Overwrites a slot of an object, through the heap's own functions, which hold the barrier. The running task
-    /// may have read the old value first, and then holds the only reference to it.
+    /// Overwrites a slot of an object, through the heap's own functions, which hold the barrier. The running
+    /// task may have read the old value first, and then holds the only reference to it.
     fn store(&mut self) {
         let Some(object) = self.pick_object() else { return };
         let new = self.pick();
@@ -572,7 +574,8 @@ impl Model {
         self.verify_reachable();
         self.collect_fully(&[]);
         self.verify_reachable();
-        // Nothing but the globals' garbage is left when everything is forgotten, and the memory is given back.
+        // Nothing but the globals' garbage is left when everything is forgotten, and the memory is given
+        // back.
         self.tasks.iter_mut().for_each(|task| task.values.clear());
         self.globals.iter_mut().for_each(|global| *global = Shade::Plain(Value::NIL));
         self.collect_fully(&[]);

@@ -1,14 +1,13 @@
 //! Checked access to objects: the whole heap as safe code sees it.
 //!
-//! Guarantees: nothing here can break memory safety, however odd the caller. Each function tests tag and kind and every
-//! index, and answers `None` when one does not fit. That the address itself is good follows from two facts: values with
-//! an address come only from the allocation functions of the same heap, and memory is given back only after
-//! `end_marking`, whose caller vouches that everything still in use was marked. Borrows do the rest: a slice of the
-//! heap borrows the heap, so nothing can be stored, allocated or collected while it is in use.
+//! Guarantees: nothing here can break memory safety, however odd the caller. Each function tests tag and kind
+//! and every index, and answers `None` when one does not fit. That the address itself is good, and what is
+//! behind it, are the facts H1 to H5 of [`super`]. A slice of the heap borrows the heap, so nothing can be
+//! stored, allocated or collected while it is in use.
 //!
-//! Every store of a value goes through [`Heap::store`], which is the write barrier; stores of raw data need none.
-//! The parts of objects that the interpreter trusts without a test (the function of a symbol, the code of a function,
-//! the data of an array, the class of a structure) have setters of their own, or none.
+//! Every store of a value goes through [`Heap::store`], which is the write barrier; stores of raw data need
+//! none. The parts of objects that the interpreter trusts without a test (the function of a symbol, the code
+//! of a function, the data of an array, the class of a structure) have setters of their own, or none.
 
 use super::Heap;
 use super::layout::{Array, Bignum, Code, Cons, Float, Function, Header, Kind, Symbol};
@@ -41,14 +40,14 @@ impl Heap {
     /// The header of an object.
     #[inline(always)]
     pub fn header(&self, v: Value) -> Option<Header> {
-        // SAFETY: an object value is the address of a live object (module header).
+        // SAFETY: H1, H2: an object value is the address of a live header.
         v.as_object_ptr().map(|object| unsafe { *object })
     }
 
     #[inline(always)]
     pub(crate) fn object_of(&self, v: Value, kind: Kind) -> Option<*mut Header> {
         let object = v.as_object_ptr()?;
-        // SAFETY: an object value is the address of a live object.
+        // SAFETY: H1, H2: an object value is the address of a live header.
         if unsafe { (*object).kind } == kind { Some(object) } else { None }
     }
 
@@ -57,7 +56,7 @@ impl Heap {
     /// The cons, if `v` is one.
     #[inline(always)]
     pub fn as_cons(&self, v: Value) -> Option<Cons> {
-        // SAFETY: a cons value is the address of a live cons.
+        // SAFETY: H1, H2: a cons value is the address of a live cons.
         v.as_cons_ptr().map(|cons| unsafe { *cons })
     }
 
@@ -85,7 +84,7 @@ impl Heap {
     #[inline(always)]
     pub fn set_car(&mut self, v: Value, new: Value) -> Option<()> {
         let cons = v.as_cons_ptr()?;
-        // SAFETY: a cons value is the address of a live cons.
+        // SAFETY: H1, H2: a cons value is the address of a live cons.
         unsafe { self.store(&raw mut (*cons).car, new) };
         Some(())
     }
@@ -94,29 +93,32 @@ impl Heap {
     #[inline(always)]
     pub fn set_cdr(&mut self, v: Value, new: Value) -> Option<()> {
         let cons = v.as_cons_ptr()?;
-        // SAFETY: a cons value is the address of a live cons.
+        // SAFETY: H1, H2: a cons value is the address of a live cons.
         unsafe { self.store(&raw mut (*cons).cdr, new) };
         Some(())
     }
 
     // Records.
 
-    /// All slots of a record of this kind, in the order of its layout; `None` if `v` is no such record, or is a hash table.
+    /// All slots of a record of this kind, in the order of its layout; `None` if `v` is no such record, or is
+    /// a hash table.
     #[inline]
     pub fn record(&self, v: Value, kind: Kind) -> Option<&[Value]> {
         if !kind.is_open_record() {
             return None;
         }
         let object = self.object_of(v, kind)?;
-        // SAFETY: a live record has `len` initialised values after its header; they are borrowed with the heap.
+        // SAFETY: H3: a record has `len` values after its header; H5: they are borrowed with the heap.
         Some(unsafe { slice::from_raw_parts(object.add(1).cast(), (*object).len as usize) })
     }
 
-    /// Slot `index` of a record, of whatever kind but a hash table; `None` if `v` is none or has no such slot.
+    /// Slot `index` of a record, of whatever kind but a hash table; `None` if `v` is none or has no such
+    /// slot.
     #[inline(always)]
     pub fn slot(&self, v: Value, index: usize) -> Option<Value> {
         let object = v.as_object_ptr()?;
-        // SAFETY: an object value is the address of a live object; a live record has `len` values after its header.
+        // SAFETY: H1, H2: an object value is the address of a live object; H3: a record has `len` values
+        // after its header.
         unsafe {
             if !(*object).kind.is_open_record() || index >= (*object).len as usize {
                 return None;
@@ -139,7 +141,8 @@ impl Heap {
 
     /// Sets slot `index` of a record of this kind; `None` if `v` is none or has no such slot.
     ///
-    /// Not for symbols, functions, arrays and hash tables, nor the class (slot 0) of a structure: these give `None`.
+    /// Not for symbols, functions, arrays and hash tables, nor the class (slot 0) of a structure: these give
+    /// `None`.
     #[inline]
     pub fn record_set(&mut self, v: Value, kind: Kind, index: usize, new: Value) -> Option<()> {
         if !kind.is_record() || is_vouched_for(kind) && (kind != Kind::Structure || index == 0) {
@@ -151,7 +154,8 @@ impl Heap {
     #[inline(always)]
     fn set_slot(&mut self, v: Value, kind: Kind, index: usize, new: Value) -> Option<()> {
         let object = self.object_of(v, kind)?;
-        // SAFETY: a live record has `len` values after its header, and `index` is below that.
+        // SAFETY: H3: the kind is that of a record, which has `len` values after its header; `index` is below
+        // that.
         unsafe {
             if index >= (*object).len as usize {
                 return None;
@@ -173,8 +177,8 @@ impl Heap {
         self.set_slot(v, Kind::SimpleVector, index, new)
     }
 
-    /// Copies elements of a simple vector over those of another, or of the same, as if by way of a third; `None` if one
-    /// is none or has not so many.
+    /// Copies elements of a simple vector over those of another, or of the same, as if by way of a third;
+    /// `None` if one is none or has not so many.
     pub fn vector_copy(
         &mut self,
         from: Value,
@@ -187,7 +191,7 @@ impl Heap {
         let old = self.vector(to)?.get(to_start..)?.get(..count)?.len();
         debug_assert_eq!(old, count);
         let to = self.object_of(to, Kind::SimpleVector)?;
-        // SAFETY: both ranges are inside of live vectors; all that is overwritten was marked before.
+        // SAFETY: H3: both ranges are inside of vectors; H5: all that is overwritten is marked first.
         unsafe {
             let target = to.add(1).cast::<Value>().add(to_start);
             if self.marking {
@@ -198,11 +202,12 @@ impl Heap {
         Some(())
     }
 
-    /// Sets the elements of a simple vector from `start` to before `end`; `None` if `v` is none or has not so many.
+    /// Sets the elements of a simple vector from `start` to before `end`; `None` if `v` is none or has not so
+    /// many.
     pub fn vector_fill(&mut self, v: Value, start: usize, end: usize, value: Value) -> Option<()> {
         let count = self.vector(v)?.get(start..end)?.len();
         let object = self.object_of(v, Kind::SimpleVector)?;
-        // SAFETY: the range is inside of a live vector; all that is overwritten was marked before.
+        // SAFETY: H3: the range is inside of a vector; H5: all that is overwritten is marked first.
         unsafe {
             let target = object.add(1).cast::<Value>().add(start);
             if self.marking {
@@ -237,7 +242,7 @@ impl Heap {
     #[inline(always)]
     pub fn symbol(&self, v: Value) -> Option<&Symbol> {
         let object = self.object_of(v, Kind::Symbol)?;
-        // SAFETY: a live symbol, borrowed with the heap.
+        // SAFETY: H3: the kind says that this is a Symbol; H5: it is borrowed with the heap.
         Some(unsafe { &*object.cast() })
     }
 
@@ -268,14 +273,15 @@ impl Heap {
     #[inline(always)]
     pub fn function_code(&self, v: Value) -> Option<Value> {
         let object = self.object_of(v, Kind::Function)?;
-        // SAFETY: a live function.
+        // SAFETY: H3: the kind says that this is a Function.
         Some(unsafe { (*object.cast::<Function>()).code })
     }
 
     /// Puts other code in place of a function's; `None` if `v` is no function or `code` no Code.
     ///
     /// # Safety
-    /// The old code of the function is not being executed, and the new code reads no capture that the function lacks.
+    /// The old code of the function is not being executed, and the new code reads no capture that the
+    /// function lacks.
     pub unsafe fn function_set_code(&mut self, v: Value, code: Value) -> Option<()> {
         if !self.is(code, Kind::Code) {
             return None;
@@ -289,7 +295,7 @@ impl Heap {
     /// The code's words may run with the new constant: it is of the sort that they take for granted.
     pub unsafe fn code_set_constant(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
         let object = self.object_of(v, Kind::Code)?;
-        // SAFETY: a live code object has `nconsts` values at the fixed offset, and `index` is below that.
+        // SAFETY: H3: a Code has `nconsts` values at a fixed offset, and `index` is below that.
         unsafe {
             if index >= (*object.cast::<Code>()).nconsts as usize {
                 return None;
@@ -307,7 +313,8 @@ impl Heap {
     /// Sets a captured value of a function; `None` if `v` is none or has no such capture.
     ///
     /// # Safety
-    /// The function's code may read the new value where it expects the old one: a box where the capture is declared as boxed.
+    /// The function's code may read the new value where it expects the old one: a box where the capture is
+    /// declared as boxed.
     pub unsafe fn function_set_capture(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
         self.set_slot(v, Kind::Function, index.checked_add(1)?, new)
     }
@@ -316,14 +323,14 @@ impl Heap {
     #[inline(always)]
     pub fn code(&self, v: Value) -> Option<&Code> {
         let object = self.object_of(v, Kind::Code)?;
-        // SAFETY: a live code object, borrowed with the heap.
+        // SAFETY: H3: the kind says that this is a Code; H5: it is borrowed with the heap.
         Some(unsafe { &*object.cast() })
     }
 
     /// The constants of code.
     pub fn code_constants(&self, v: Value) -> Option<&[Value]> {
         let object = self.object_of(v, Kind::Code)?;
-        // SAFETY: a live code object has `nconsts` values at the fixed offset.
+        // SAFETY: H3: a Code has `nconsts` values at a fixed offset; H5: they are borrowed with the heap.
         unsafe {
             let n = (*object.cast::<Code>()).nconsts as usize;
             Some(slice::from_raw_parts(object.byte_add(Code::CONSTANTS_OFFSET).cast(), n))
@@ -333,7 +340,7 @@ impl Heap {
     /// The instruction words of code, as they are now.
     pub fn code_words(&self, v: Value) -> Option<&[u32]> {
         let object = self.object_of(v, Kind::Code)?;
-        // SAFETY: a live code object has `nwords` words after its constants.
+        // SAFETY: H3: a Code has `nwords` words after its constants; H5: they are borrowed with the heap.
         unsafe {
             let code = &*object.cast::<Code>();
             Some(slice::from_raw_parts(object.byte_add(code.words_offset()).cast(), code.nwords as usize))
@@ -350,7 +357,7 @@ impl Heap {
     /// The fixed part of an array that is not simple.
     pub fn array(&self, v: Value) -> Option<&Array> {
         let object = self.object_of(v, Kind::Array)?;
-        // SAFETY: a live array, borrowed with the heap.
+        // SAFETY: H3: the kind says that this is an Array; H5: it is borrowed with the heap.
         Some(unsafe { &*object.cast() })
     }
 
@@ -364,7 +371,8 @@ impl Heap {
         self.set_slot(v, Kind::Array, 1, fill)
     }
 
-    /// Gives an array other elements; `None` if `v` is no array or `data` none of SimpleVector, String, Bytes.
+    /// Gives an array other elements; `None` if `v` is no array or `data` none of SimpleVector, String,
+    /// Bytes.
     pub fn array_set_data(&mut self, v: Value, data: Value) -> Option<()> {
         if !self.is_array_data(data) {
             return None;
@@ -384,7 +392,7 @@ impl Heap {
     pub fn as_double(&self, v: Value) -> Option<f64> {
         v.as_double().or_else(|| {
             let object = self.object_of(v, Kind::Float)?;
-            // SAFETY: a live boxed double.
+            // SAFETY: H3: the kind says that this is a Float.
             Some(unsafe { (*object.cast::<Float>()).value })
         })
     }
@@ -447,7 +455,8 @@ impl Heap {
     fn raw<T: RawElement>(&self, v: Value, kind: Kind) -> Option<&[T]> {
         debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
         let object = self.object_of(v, kind)?;
-        // SAFETY: a live raw object has `len` initialised elements of this size, of a type without invalid patterns.
+        // SAFETY: H3: a raw object has `len` elements of this size, of a type without invalid patterns; H5:
+        // they are borrowed with the heap.
         Some(unsafe { slice::from_raw_parts(object.add(1).cast(), (*object).len as usize) })
     }
 
@@ -455,7 +464,8 @@ impl Heap {
     fn raw_mut<T: RawElement>(&mut self, v: Value, kind: Kind) -> Option<&mut [T]> {
         debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
         let object = self.object_of(v, kind)?;
-        // SAFETY: as in `raw`; the heap is borrowed mutably, so nobody else sees the elements.
+        // SAFETY: H3: a raw object has `len` elements of this size, of a type without invalid patterns; H5:
+        // the heap is borrowed mutably, so nobody else sees them.
         Some(unsafe { slice::from_raw_parts_mut(object.add(1).cast(), (*object).len as usize) })
     }
 
@@ -471,7 +481,7 @@ impl Heap {
     /// Sets the flags of an object of this kind; `None` if `v` is none.
     pub fn set_flags(&mut self, v: Value, kind: Kind, flags: u8) -> Option<()> {
         let object = self.object_of(v, kind)?;
-        // SAFETY: a live object; no size and no memory safety depends on the flags.
+        // SAFETY: `object_of` has found a live object; H3: neither size nor contents depend on the flags.
         unsafe { (*object).flags = flags };
         Some(())
     }
@@ -482,12 +492,14 @@ impl Heap {
             return None;
         }
         let object = self.object_of(v, kind)?;
-        // SAFETY: a live object; no size and no memory safety depends on `aux`.
+        // SAFETY: `object_of` has found a live object; H3: neither size nor contents depend on `aux`, but for
+        // the rank of an array.
         unsafe { (*object).aux = aux };
         Some(())
     }
 
-    /// The write barrier and the store behind it: the one way by which a value overwrites another in the heap.
+    /// The write barrier and the store behind it: the one way by which a value overwrites another in the
+    /// heap.
     ///
     /// # Safety
     /// `slot` is a value slot of a live object of this heap.

@@ -1,17 +1,17 @@
 //! Allocation: bump pointers into the holes that the last sweep left.
 //!
-//! Two regions cut objects off the front of their current hole. The first takes every object that fits; when one does
-//! not, a small object (up to [`SMALL`]) moves the first region on to its next hole, and a medium one goes to the
-//! second region, so that a big object does not throw away the rest of a small hole. Large objects have memory of
-//! their own (`large`). Regions walk the blocks in order of address, sweeping what they come to, then take a new arena,
-//! and at the limit the small holes that they passed over.
+//! Two regions cut objects off the front of their current hole. The first takes every object that fits; when
+//! one does not, a small object (up to [`SMALL`]) moves the first region on to its next hole, and a medium
+//! one goes to the second region, so that a big object does not throw away the rest of a small hole. Large
+//! objects have memory of their own (`large`). Regions walk the blocks in order of address, sweeping what
+//! they come to, then take a new arena, and at the limit the small holes that they passed over.
 //!
-//! Guarantees: nothing here collects. What is allocated while marking counts as marked. A refill sweeps at most
-//! [`REFILL_SWEEPS`] blocks while the heap may grow. The same allocations give the same addresses relative to their
-//! arenas, and ask for slices at the same points, in every run.
+//! Guarantees: nothing here collects. What is allocated while marking counts as marked. A refill sweeps at
+//! most [`REFILL_SWEEPS`] blocks while the heap may grow. The same allocations give the same addresses
+//! relative to their arenas, and ask for slices at the same points, in every run.
 //!
-//! Invariants: `next <= end <= hole_end`; the granules from `next` to `hole_end` are free and in one block whose state
-//! is Taken; their metadata is zero, or the epoch while marking (see `metadata`, invariant 3).
+//! Invariants: `next <= end <= hole_end`; the granules from `next` to `hole_end` are free and in one block
+//! whose state is Taken; their metadata is zero, or the epoch while marking (see `metadata`, invariant 3).
 
 use super::arena::{ARENA, Arena, BLOCK, BLOCKS, BlockState, metadata_of};
 use super::large::{LargeObject, footprint, is_large};
@@ -23,8 +23,8 @@ use std::ptr::NonNull;
 
 /// Greatest object, in bytes, for which the first region moves on to its next hole.
 const SMALL: usize = 256;
-/// A hole is used in pieces of this many bytes, so that slices come in time; also what one slice is owed for. Together
-/// with `SLICE_VISITS` this is the pace: one visit for every cons allocated.
+/// A hole is used in pieces of this many bytes, so that slices come in time; also what one slice is owed for.
+/// Together with `SLICE_VISITS` this is the pace: one visit for every cons allocated.
 pub(super) const PIECE: usize = 16 << 10;
 /// Blocks that one refill sweeps in vain before it takes a new arena, if it may.
 const REFILL_SWEEPS: usize = 8;
@@ -106,7 +106,8 @@ impl Region {
         }
         self.next = start + bytes;
         debug_assert!(start != 0 && bytes != 0);
-        // SAFETY: `bytes` is not zero, so there is a hole, and no hole is at address zero.
+        // SAFETY: there are `bytes`, more than none, from `start` on, so there is a hole, and no hole is at
+        // address zero.
         Some(unsafe { NonNull::new_unchecked(std::ptr::with_exposed_provenance_mut(start)) })
     }
 
@@ -127,7 +128,8 @@ impl Region {
             fill_metadata(self.next, self.hole_end, 0);
         }
         if marking && self.black_from < self.next {
-            // SAFETY: the granule before `next` lies in the current hole, in a live arena.
+            // SAFETY: something was allocated since `black_from`, so the granule before `next` lies in the
+            // current hole, in a live arena.
             unsafe { *metadata_of(self.next - GRANULE) |= END };
         }
         debug_assert_eq!(self.uncounted(), 0);
@@ -265,7 +267,8 @@ impl Heap {
             debug_assert!(taken);
             return Ok((arena, 1));
         }
-        // 4. Any hole that is long enough. The cursor has passed every block, unless the system refused memory.
+        // 4. Any hole that is long enough. The cursor has passed every block, unless the system refused
+        //    memory.
         for arena in 0..self.arenas.len() {
             for block in 1..=BLOCKS {
                 self.sweep_if_needed(arena, block);

@@ -5,13 +5,15 @@
 //! | ArenaHeader | metadata of blocks 1 to 15 | objects ...
 //! ```
 //!
-//! One byte of metadata for 16 bytes is a sixteenth, so the metadata of all blocks is just the size of one block, and
-//! the bytes that would describe block 0 itself make room for the header. From any address in an arena, masking gives
-//! the header, shifting the byte of its granule.
+//! One byte of metadata for 16 bytes is a sixteenth, so the metadata of all blocks is just the size of one
+//! block, and the bytes that would describe block 0 itself make room for the header. From any address in an
+//! arena, masking gives the header, shifting the byte of its granule.
 //!
 //! Unsafe invariants:
-//! 1. An arena is live, and its metadata initialised, from [`Arena::new`] until it is dropped; its provenance is exposed.
-//! 2. References to metadata are made only through a borrow of the [`Arena`], and live no longer than one function.
+//! 1. An arena is live, and its metadata initialised, from [`Arena::new`] until it is dropped; its provenance
+//!    is exposed.
+//! 2. References to metadata are made only through a borrow of the [`Arena`], and live no longer than one
+//!    function.
 
 use super::layout::GRANULE;
 use super::metadata::{self, Summary};
@@ -92,7 +94,8 @@ list_state! { Arena { base: Run, blocks: Parts } }
 impl Arena {
     /// A new arena with empty blocks, or nothing if the system has no memory.
     pub(super) fn new(number: u32) -> Option<Arena> {
-        // SAFETY: the size is not zero. The metadata block is zeroed and the header written before anything reads them.
+        // SAFETY: the size is not zero. The metadata block is zeroed and the header written before anything
+        // reads them.
         unsafe {
             let base = NonNull::new(alloc(LAYOUT))?;
             base.write_bytes(0, BLOCK);
@@ -145,7 +148,7 @@ impl Arena {
         let address = self.address(block);
         let summary = metadata::sweep(self.metadata_mut(block), epoch, |hole| {
             if cfg!(debug_assertions) {
-                // SAFETY: a hole of a block just swept holds nothing that anyone will read.
+                // SAFETY: H2: a hole of a block just swept holds nothing that anyone will read.
                 unsafe { poison(address, hole) };
             }
         });
@@ -156,7 +159,8 @@ impl Arena {
     /// The metadata of a block.
     pub(super) fn metadata(&self, block: usize) -> &[u8] {
         debug_assert!((1..=BLOCKS).contains(&block));
-        // SAFETY: invariants 1 and 2; the bytes of block b stand at offset b * BLOCK / 16.
+        // SAFETY: invariant 1: the arena is live; the bytes of block b stand at offset b * BLOCK / 16;
+        // invariant 2: the slice borrows the arena.
         unsafe {
             let start = self.base.as_ptr().add(block * BLOCK_GRANULES);
             std::slice::from_raw_parts(start, BLOCK_GRANULES)
@@ -166,7 +170,8 @@ impl Arena {
     /// The metadata of a block, to be changed.
     pub(super) fn metadata_mut(&mut self, block: usize) -> &mut [u8] {
         debug_assert!((1..=BLOCKS).contains(&block));
-        // SAFETY: as in `metadata`, and the arena is borrowed mutably.
+        // SAFETY: invariant 1: the arena is live; the bytes of block b stand at offset b * BLOCK / 16;
+        // invariant 2: the slice borrows the arena mutably.
         unsafe {
             let start = self.base.as_ptr().add(block * BLOCK_GRANULES);
             std::slice::from_raw_parts_mut(start, BLOCK_GRANULES)
@@ -175,20 +180,21 @@ impl Arena {
 
     /// The header.
     pub(super) fn header_mut(&mut self) -> &mut ArenaHeader {
-        // SAFETY: invariant 1, and the arena is borrowed mutably.
+        // SAFETY: invariant 1: the arena is live and begins with its header, which is borrowed mutably with
+        // it.
         unsafe { self.base.cast().as_mut() }
     }
 
     /// The header.
     pub(super) fn header(&self) -> &ArenaHeader {
-        // SAFETY: invariant 1.
+        // SAFETY: invariant 1: the arena is live and begins with its header, which is borrowed with it.
         unsafe { self.base.cast().as_ref() }
     }
 }
 
 impl Drop for Arena {
     fn drop(&mut self) {
-        // SAFETY: allocated with this layout in `new`, and dropped once.
+        // SAFETY: `new` has allocated the arena with this layout; it is dropped once.
         unsafe { dealloc(self.base.as_ptr(), LAYOUT) }
     }
 }

@@ -1,5 +1,5 @@
-//! Large objects: above an eighth of a block, each in memory of its own, which the sweep gives back to the system, piece by
-//! piece: the system takes as long for that as it took to provide the memory.
+//! Large objects: above an eighth of a block, each in memory of its own, which the sweep gives back to the
+//! system, piece by piece: the system takes as long for that as it took to provide the memory.
 //!
 //! ```text
 //! | LargeHeader (32 bytes) | Header | elements ...
@@ -81,13 +81,14 @@ impl LargeObject {
         unsafe { self.0.add(1).cast() }
     }
 
-    /// Gives about so many bytes from the end of an object that nobody uses any more back to the system; how many that
-    /// were. None if few would be left, or the system does not want them: then it is to be dropped.
+    /// Gives about so many bytes from the end of an object that nobody uses any more back to the system; how
+    /// many that were. None if few would be left, or the system does not want them: then it is to be dropped.
     pub(super) fn shrink(&mut self, bytes: usize) -> Option<usize> {
         let old = self.header().bytes;
         let bytes = bytes / GRANULE * GRANULE;
         let new = old.checked_sub(bytes).filter(|&new| bytes > 0 && new > super::arena::LARGE)?;
-        // SAFETY: allocated with this layout, and longer than before it is not; the header is at the start, which stays.
+        // SAFETY: this is the layout of the allocation, and `new` is a smaller size; the header is at the
+        // start, which stays.
         unsafe {
             let layout = Layout::from_size_align_unchecked(old, GRANULE);
             self.0 = NonNull::new(realloc(self.0.as_ptr().cast(), layout, new))?.cast();
@@ -98,13 +99,14 @@ impl LargeObject {
 
     /// The header.
     pub(super) fn header(&self) -> &LargeHeader {
-        // SAFETY: written in `new`, and live until `self` is dropped.
+        // SAFETY: `new` has written the header, which lives until `self` is dropped and is borrowed with it.
         unsafe { self.0.as_ref() }
     }
 
     /// The header.
     pub(super) fn header_mut(&mut self) -> &mut LargeHeader {
-        // SAFETY: as in `header`, and borrowed mutably.
+        // SAFETY: `new` has written the header, which lives until `self` is dropped and is borrowed mutably
+        // with it.
         unsafe { self.0.as_mut() }
     }
 }
@@ -112,7 +114,7 @@ impl LargeObject {
 impl Drop for LargeObject {
     fn drop(&mut self) {
         let bytes = self.header().bytes;
-        // SAFETY: allocated with this layout in `new`, and dropped once.
+        // SAFETY: `new` or `shrink` has allocated the object with this layout; it is dropped once.
         unsafe { dealloc(self.0.as_ptr().cast(), Layout::from_size_align_unchecked(bytes, GRANULE)) }
     }
 }
@@ -123,6 +125,6 @@ impl Drop for LargeObject {
 /// `object` is a live large object.
 #[inline(always)]
 pub(super) unsafe fn header_of(object: *mut Header) -> *mut LargeHeader {
-    // SAFETY: a large object is preceded by its header in the same allocation.
+    // SAFETY: by the contract the object is large, so its header precedes it in the same allocation.
     unsafe { object.cast::<LargeHeader>().sub(1) }
 }

@@ -1,14 +1,16 @@
-//! The layouts of heap objects, fixed to the byte: the interpreter, and later compiled code, reach into them directly.
+//! The layouts of heap objects, fixed to the byte: the interpreter, and later compiled code, reach into them
+//! directly.
 //!
 //! ```text
 //! cons      | car | cdr |                                          no header
 //! object    | kind u8 | flags u8 | aux u16 | len u32 | elements... |
 //! ```
 //!
-//! Guarantees: an object is one of three sorts, told by its kind: all slots are values ([`Kind::is_record`]), none is
-//! ([`Kind::is_raw`]), or it is [`Kind::Code`]. `len` counts the elements after the header in the unit of the kind
-//! (values, limbs, characters, words, bytes), so kind and `len` alone give the size, and neither ever changes, but for the
-//! kind of an unfinished vector or string, once: into that of a finished one. A header carries nothing of the collector.
+//! Guarantees: an object is one of three sorts, told by its kind: all slots are values ([`Kind::is_record`]),
+//! none is ([`Kind::is_raw`]), or it is [`Kind::Code`]. `len` counts the elements after the header in the
+//! unit of the kind (values, limbs, characters, words, bytes), so kind and `len` alone give the size, and
+//! neither ever changes, but for the kind of an unfinished vector or string, once: into that of a finished
+//! one. A header carries nothing of the collector.
 //!
 //! Not here: making objects (`object`), checked access (`access`), tracing (`mark`).
 
@@ -22,8 +24,9 @@ pub const MAX_LENGTH: usize = 1 << 31;
 
 /// What an object is.
 ///
-/// The numbers carry meaning: below 0x20 all slots are values, below 0x1F anyone may read them, from 0x40 no slot is a
-/// value; the high half gives the size of an element. They may change with any version; nothing stores them outside of a running heap.
+/// The numbers carry meaning: below 0x20 all slots are values, below 0x1F anyone may read them, from 0x40 no
+/// slot is a value; the high half gives the size of an element. They may change with any version; nothing
+/// stores them outside of a running heap.
 #[repr(u8)]
 #[derive(Copy, Clone, PartialEq, Eq, Debug, Hash)]
 pub enum Kind {
@@ -65,7 +68,8 @@ pub enum Kind {
     Code = 0x20,
     /// A double outside the window of [`Value::double`]: [`Float`].
     Float = 0x40,
-    /// An integer outside the fixnums: limbs of 64 bits, least first, no leading zero; the sign is in `flags`.
+    /// An integer outside the fixnums: limbs of 64 bits, least first, no leading zero; the sign is in
+    /// `flags`.
     Bignum = 0x41,
     /// Words of 64 bits, for indexes.
     Words64 = 0x42,
@@ -118,8 +122,8 @@ impl Kind {
         (self as u8) < 0x20
     }
 
-    /// Whether all slots are values that anyone may read. Those of a hash table are for its own functions, which rely on what
-    /// the storage behind them holds.
+    /// Whether all slots are values that anyone may read. Those of a hash table are for its own functions,
+    /// which rely on what the storage behind them holds.
     #[inline(always)]
     pub const fn is_open_record(self) -> bool {
         (self as u8) < Kind::HashTable as u8
@@ -234,8 +238,8 @@ const _: () = assert!(size_of::<Function>() == 16);
 
 /// Compiled code.
 ///
-/// Only `name`, `debug`, `owner` and the constants are traced. The words may be rewritten in place (quickening, inline
-/// caches): they must not hold addresses of objects.
+/// Only `name`, `debug`, `owner` and the constants are traced. The words may be rewritten in place
+/// (quickening, inline caches): they must not hold addresses of objects.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
 pub struct Code {
@@ -367,7 +371,8 @@ impl Bignum {
     pub const NEGATIVE: u8 = 1;
 }
 
-/// A hash table. `used` and `room` are counts, `entries` and `heads` directories of segments; the heap sees to that (`table`).
+/// A hash table. `used` and `room` are counts, `entries` and `heads` directories of segments; the heap sees
+/// to that (`table`).
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
 pub struct HashTable {

@@ -1,25 +1,29 @@
 //! Marking: which objects are reachable from the roots as they were when the cycle began.
 //!
-//! The collector is incremental, snapshot-at-the-beginning (Yuasa 1990). Whatever was reachable when the cycle began
-//! survives it, whatever the program does meanwhile: before a value in the heap is overwritten it is marked. What is
-//! allocated during the cycle survives it too, without being followed. So a cycle may take as many slices as it likes,
-//! and nothing is ever scanned twice; what became garbage during the cycle is found by the next.
+//! The collector is incremental, snapshot-at-the-beginning (Yuasa 1990). Whatever was reachable when the
+//! cycle began survives it, whatever the program does meanwhile: before a value in the heap is overwritten it
+//! is marked. What is allocated during the cycle survives it too, without being followed. So a cycle may take
+//! as many slices as it likes, and nothing is ever scanned twice; what became garbage during the cycle is
+//! found by the next.
 //!
-//! Stacks are not scanned at the beginning. Each is scanned once in the cycle, before its task runs in it, or by the
-//! marker at its leisure. That is sound because only the task itself reads its stack: until it is scanned nothing
-//! leaves it, and what others write into it comes from stacks scanned, from marked objects, or from new ones.
+//! Stacks are not scanned at the beginning. Each is scanned once in the cycle, before its task runs in it, or
+//! by the marker at its leisure. That is sound because only the task itself reads its stack: until it is
+//! scanned nothing leaves it, and what others write into it comes from stacks scanned, from marked objects,
+//! or from new ones.
 //!
 //! ```text
 //! begin_cycle, mark(fixed roots) -> slice ... slice -> Drained -> mark_slice(stack), slice ... -> end_marking
 //! ```
 //!
-//! Guarantees: no recursion on the native stack; the mark stack has a fixed capacity, beyond which objects wait as gray
-//! bytes in the metadata; the work of a slice is bounded by its visits; a vector is followed in pieces of
-//! [`PIECE_LENGTH`] elements.
+//! Guarantees: no recursion on the native stack; the mark stack has a fixed capacity, beyond which objects
+//! wait as gray bytes in the metadata; the work of a slice is bounded by its visits; a vector is followed in
+//! pieces of [`PIECE_LENGTH`] elements.
 //!
 //! Invariants while marking:
-//! 1. A marked object that may hold unmarked addresses of the snapshot is on the mark stack, in `pieces`, or gray.
-//! 2. A marked object's last granule carries the end bit: it is set together with the mark, since the size is known.
+//! 1. A marked object that may hold unmarked addresses of the snapshot is on the mark stack, in `pieces`, or
+//!    gray.
+//! 2. A marked object's last granule carries the end bit: it is set together with the mark, since the size is
+//!    known.
 
 use super::arena::{self, Arena, BLOCKS, metadata_of};
 use super::large;
@@ -91,8 +95,8 @@ impl Marker {
 }
 
 impl Heap {
-    /// Begins a cycle. The caller marks the fixed roots at once, before anything else runs. Does nothing while
-    /// marking; a sweep under way is finished first.
+    /// Begins a cycle. The caller marks the fixed roots at once, before anything else runs. Does nothing
+    /// while marking; a sweep under way is finished first.
     pub fn begin_cycle(&mut self) {
         match self.phase {
             Phase::Marking => return,
@@ -116,7 +120,8 @@ impl Heap {
         self.second.begin_marking(self.epoch);
     }
 
-    /// Marks a value: it, and what it leads to, outlives this cycle. Does nothing when no marking is under way.
+    /// Marks a value: it, and what it leads to, outlives this cycle. Does nothing when no marking is under
+    /// way.
     #[inline]
     pub fn mark(&mut self, v: Value) {
         if self.marking && v.is_address() && self.set_mark(v) {
@@ -131,12 +136,14 @@ impl Heap {
         }
     }
 
-    /// Whether `v` is marked in the cycle under way; of no meaning when none is. What has no address counts as marked.
+    /// Whether `v` is marked in the cycle under way; of no meaning when none is. What has no address counts
+    /// as marked.
     pub fn is_marked(&self, v: Value) -> bool {
         if !v.is_address() {
             return true;
         }
-        // SAFETY: a value with an address is that of a live object (`access`, module header).
+        // SAFETY: H1, H2: the value is the address of a live cons or object; by its size it lies in an arena
+        // or is large.
         unsafe {
             if let Some(object) = v.as_object_ptr()
                 && large::is_large((*object).size())
@@ -156,7 +163,7 @@ impl Heap {
         let epoch = self.epoch;
         if v.is_cons() {
             let byte = metadata_of(v.cons_ptr().addr());
-            // SAFETY: a cons value is the address of a live cons, which lies in an arena.
+            // SAFETY: H1, H2: a cons value is the address of a live cons, which lies in an arena.
             unsafe {
                 if *byte & EPOCH == epoch {
                     return false;
@@ -167,7 +174,8 @@ impl Heap {
             return true;
         }
         let object = v.object_ptr();
-        // SAFETY: an object value is the address of a live object; by its size it lies in an arena or is large.
+        // SAFETY: H1, H2: an object value is the address of a live object; by its size it lies in an arena or
+        // is large.
         unsafe {
             let header = *object;
             let bytes = header.size();
@@ -217,8 +225,8 @@ impl Heap {
         }
     }
 
-    /// Runs a slice of marking or sweeping of about `max_visits` objects, twice as many when the heap has run ahead. Every
-    /// slice pays for 16 KiB allocated; ask [`Heap::gc_due`] whether the next is due already.
+    /// Runs a slice of marking or sweeping of about `max_visits` objects, twice as many when the heap has run
+    /// ahead. Every slice pays for 16 KiB allocated; ask [`Heap::gc_due`] whether the next is due already.
     pub fn slice(&mut self, max_visits: u32) -> SliceOutcome {
         let behind = self.pacing.since_cycle > 2 * self.pacing.threshold + self.stats.live;
         let budget = i64::from(max_visits) * if behind { 2 } else { 1 };
@@ -262,7 +270,7 @@ impl Heap {
                 return self.push(v);
             }
             *left -= 1;
-            // SAFETY: a marked cons is live.
+            // SAFETY: H1, H2: a marked value is the address of a live cons.
             let Cons { car, cdr } = unsafe { *v.cons_ptr() };
             let follow_cdr = cdr.is_address() && self.set_mark(cdr);
             let follow_car = car.is_address() && self.set_mark(car);
@@ -282,8 +290,8 @@ impl Heap {
     /// Follows a marked object from slot `from` on.
     fn visit_record(&mut self, v: Value, from: usize, left: &mut i64) {
         let object = v.object_ptr();
-        // SAFETY: a marked object is live; its kind says which of its words are values, and none of them is
-        // written while this runs.
+        // SAFETY: H1, H2: a marked value is the address of a live object; H3: its kind says which of its
+        // words are values; none of them is written while this runs.
         let (slots, more): (&[Value], &[Value]) = unsafe {
             let header = *object;
             let first = object.add(1).cast::<Value>();
@@ -308,7 +316,8 @@ impl Heap {
         *left -= 1 + (end - from) as i64 / ELEMENTS_PER_VISIT;
     }
 
-    /// Moves gray objects to the empty mark stack: as many as fit, from one arena or from among the large objects.
+    /// Moves gray objects to the empty mark stack: as many as fit, from one arena or from among the large
+    /// objects.
     fn collect_grays(&mut self, left: &mut i64) {
         debug_assert!(self.marker.stack.is_empty());
         *left -= GRAY_SEARCH_VISITS;
@@ -326,11 +335,12 @@ impl Heap {
     /// Ends marking; what was neither marked nor allocated in this cycle will be freed.
     ///
     /// # Safety
-    /// Every value that anyone will still use was marked, is reachable from what was marked, or was allocated since
-    /// the cycle began.
+    /// Every value that anyone will still use was marked, is reachable from what was marked, or was allocated
+    /// since the cycle began.
     ///
     /// # Panics
-    /// Unless marking is under way and the last slice was [`SliceOutcome::Drained`], with nothing marked since.
+    /// Unless marking is under way and the last slice was [`SliceOutcome::Drained`], with nothing marked
+    /// since.
     pub unsafe fn end_marking(&mut self) {
         assert!(
             self.phase == Phase::Marking && self.marker.is_drained(),
@@ -345,7 +355,8 @@ impl Heap {
         self.begin_sweep();
     }
 
-    /// Forgets the marking under way. Its marks stay in the metadata; the sweep of the next cycle clears them.
+    /// Forgets the marking under way. Its marks stay in the metadata; the sweep of the next cycle clears
+    /// them.
     fn abandon_marking(&mut self) {
         self.count_regions();
         self.first.restart(true);
@@ -360,10 +371,11 @@ impl Heap {
         self.phase = Phase::Idle;
     }
 
-    /// A whole cycle at once: drops one in progress, calls `mark_roots`, follows everything, and frees the rest.
+    /// A whole cycle at once: drops one in progress, calls `mark_roots`, follows everything, and frees the
+    /// rest.
     ///
     /// # Safety
-    /// As for [`Heap::end_marking`], of what `mark_roots` marks.
+    /// The contract of [`Heap::end_marking`], for what `mark_roots` marks.
     pub unsafe fn collect_fully(&mut self, mark_roots: impl FnOnce(&mut Heap)) {
         match self.phase {
             Phase::Marking => self.abandon_marking(),
@@ -373,7 +385,8 @@ impl Heap {
         self.start_marking();
         mark_roots(self);
         while let SliceOutcome::More = self.follow(&mut i64::from(u32::MAX)) {}
-        // SAFETY: the caller's promise.
+        // SAFETY: by the contract, `mark_roots` has marked what somebody will use, and all that it leads to
+        // was followed.
         unsafe { self.end_marking() };
         self.finish_sweep();
     }

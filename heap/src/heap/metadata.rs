@@ -8,23 +8,26 @@
 //! bit  5     body    a granule between the first and the last
 //! ```
 //!
-//! An *extent* is a run of granules that stays: its first byte carries the epoch, its last byte the end bit (one byte
-//! may be both). It is one marked object, or all that was allocated in one hole while marking. A *hole* is a maximal
-//! run outside of extents.
+//! An *extent* is a run of granules that stays: its first byte carries the epoch, its last byte the end bit
+//! (one byte may be both). It is one marked object, or all that was allocated in one hole while marking. A
+//! *hole* is a maximal run outside of extents.
 //!
 //! Invariants:
-//! 1. *Canonical* is a block in which the bytes of extents are `epoch body … body end` and all others are zero.
-//!    [`sweep`] makes it so, and allocation begins only in canonical blocks. Allocating writes no metadata: what was
-//!    allocated since the last sweep looks like a hole, which is why a hole is handed out once per sweep and never
-//!    looked for again behind the allocator. Marking writes into extents, but never a zero; so the zeros of a canonical
-//!    block are its holes at any time.
-//! 2. An end bit is only ever set on the last granule of an object, so a stale one never cuts a live object in two.
-//! 3. While marking, a hole is filled with the epoch before it is handed out: every object that starts in it is marked
-//!    already. When the hole is given up the used part becomes one extent and the rest zero.
-//! 4. Every block is swept between two cycles, so the epoch of a new cycle stands nowhere but where it was put.
+//! 1. *Canonical* is a block in which the bytes of extents are `epoch body … body end` and all others are
+//!    zero. [`sweep`] makes it so, and allocation begins only in canonical blocks. Allocating writes no
+//!    metadata: what was allocated since the last sweep looks like a hole, which is why a hole is handed out
+//!    once per sweep and never looked for again behind the allocator. Marking writes into extents, but never
+//!    a zero; so the zeros of a canonical block are its holes at any time.
+//! 2. An end bit is only ever set on the last granule of an object, so a stale one never cuts a live object
+//!    in two.
+//! 3. While marking, a hole is filled with the epoch before it is handed out: every object that starts in it
+//!    is marked already. When the hole is given up the used part becomes one extent and the rest zero.
+//! 4. Every block is swept between two cycles, so the epoch of a new cycle stands nowhere but where it was
+//!    put.
 //!
-//! Source: one byte per granule, end bits and bump allocation into the holes are Nofl's (Wingo 2025, arXiv 2503.16971).
-//! We differ in writing no byte when allocating, and in treating all that was allocated while marking as one extent.
+//! Source: one byte per granule, end bits and bump allocation into the holes are Nofl's (Wingo 2025, arXiv
+//! 2503.16971). We differ in writing no byte when allocating, and in treating all that was allocated while
+//! marking as one extent.
 
 use crate::list_state;
 use std::ops::Range;
@@ -170,7 +173,8 @@ pub(super) fn check_canonical(bytes: &[u8], epoch: u8) -> Result<Summary, String
 mod tests {
     use super::*;
 
-    /// One character per granule: `.` zero, digits epochs, `-` body, `)` end, letters epoch and end (`a` = 1).
+    /// One character per granule: `.` zero, digits epochs, `-` body, `)` end, letters epoch and end (`a` =
+    /// 1).
     fn parse(text: &str) -> Vec<u8> {
         let byte = |c| match c {
             '.' => 0,

@@ -8,16 +8,27 @@
 //! metadata  one byte per granule                         table    the storage of hash tables
 //! ```
 //!
-//! Objects never move. A cycle of the collector marks what is reachable, in slices between which the program runs, then
-//! what was not marked is swept, in slices and as the allocator needs it. When to run depends on nothing but the number
-//! of bytes allocated, so a run repeats exactly.
+//! Objects never move. A cycle of the collector marks what is reachable, in slices between which the program
+//! runs, then what was not marked is swept, in slices and as the allocator needs it. When to run depends on
+//! nothing but the number of bytes allocated, so a run repeats exactly.
 //!
-//! Guarantees: safe code cannot break memory safety through this interface. The argument:
-//! 1. Values with an address come only from the allocation functions, fully initialised, and [`Heap::new`] makes its
-//!    caller promise that they are used with no other heap, and not after this one.
-//! 2. No allocation collects. Memory is reused only after [`Heap::end_marking`], whose caller promises that all values
-//!    still in use were reached. So between two safepoints every value is good, and builtins need no roots.
-//! 3. Access tests tag, kind and index, and borrows the heap. Every store passes the write barrier.
+//! Guarantees: safe code cannot break memory safety through this interface, however odd it is. The facts
+//! behind that, which the `SAFETY:` notes name:
+//!
+//! * **H1, addresses.** A value with the tag of a cons or object is the address of a complete cons or object
+//!   of this heap: only the allocation functions make such values, and the caller of [`Heap::new`] promises
+//!   to use them with no other heap, and not after this one.
+//! * **H2, life.** No allocation collects. Memory is reused only after [`Heap::end_marking`], whose caller
+//!   promises that all values still in use were reached. So between two collections every value is good, and
+//!   builtins need no roots.
+//! * **H3, layout.** The kind and `len` in a header say what follows it (`layout`). All of it is initialised,
+//!   and neither changes while the object lives, but for the kind of an unfinished vector or string.
+//! * **H4, contents.** The name of a symbol is a String and its function a Function; the code of a function
+//!   is a Code; the class of a structure is a Class; the data of an array is a SimpleVector, a String or
+//!   Bytes. A hash table has the storage that [`crate::table`] says, and nobody else has it. Allocation and
+//!   setters test all this.
+//! * **H5, borrows.** Access borrows the heap, so nothing is stored or collected while a slice of it is in
+//!   use. Every store of a value passes the write barrier.
 //!
 //! What the VM does at a tick when [`Heap::gc_due`]:
 //!
@@ -28,9 +39,10 @@
 //! Sweeping   slice
 //! ```
 //!
-//! Roots are of three sorts. *Fixed* roots are marked at the beginning, and whoever overwrites one later calls
-//! [`Heap::log_if_marking`] with the old value first. *Stacks* are scanned once per cycle, before their task runs in it
-//! (why that is sound: `mark`). *Few and changing* roots may be marked at the beginning and all again before the end.
+//! Roots are of three sorts. *Fixed* roots are marked at the beginning, and whoever overwrites one later
+//! calls [`Heap::log_if_marking`] with the old value first. *Stacks* are scanned once per cycle, before their
+//! task runs in it (why that is sound: `mark`). *Few and changing* roots may be marked at the beginning and
+//! all again before the end.
 //!
 //! Not here: which roots there are, when to run a slice, weak references.
 
@@ -65,8 +77,8 @@ pub const RESERVE: usize = 1 << 20;
 
 /// Visits of an ordinary slice.
 ///
-/// With 100 MB live a slice takes 3 µs on a list in order of allocation, 85 µs on a random graph of vectors, and 200 µs on
-/// a list linked in random order, where every visit waits for memory (cloud Xeon, 2.5 GHz).
+/// With 100 MB live a slice takes 3 µs on a list in order of allocation, 85 µs on a random graph of vectors,
+/// and 200 µs on a list linked in random order, where every visit waits for memory (cloud Xeon, 2.5 GHz).
 pub const SLICE_VISITS: u32 = 1000;
 
 /// What a heap may use, and when it collects.
@@ -74,8 +86,8 @@ pub const SLICE_VISITS: u32 = 1000;
 pub struct HeapConfig {
     /// Bytes that the heap may take from the system, metadata included; at least one arena of 1 MiB.
     pub limit: usize,
-    /// A cycle starts when this much was allocated since the last one, or as much as was live then if that is more.
-    /// Near the limit it starts sooner.
+    /// A cycle starts when this much was allocated since the last one, or as much as was live then if that is
+    /// more. Near the limit it starts sooner.
     pub cycle_floor: usize,
     /// Most objects on the mark stack, of 8 bytes each; more of them wait in the metadata, which is slower.
     pub mark_stack: usize,
@@ -211,15 +223,15 @@ list_state! {
     }
 }
 
-// SAFETY: a heap owns its memory, shares none of it, and is tied to no thread.
+// SAFETY: a heap owns its memory, shares none of it, and has no state in any thread.
 unsafe impl Send for Heap {}
 
 impl Heap {
     /// Makes an empty heap.
     ///
     /// # Safety
-    /// The caller promises that a value with an address is used only with the heap that it came from, and not after
-    /// that heap was dropped.
+    /// The caller promises that a value with an address is used only with the heap that it came from, and not
+    /// after that heap was dropped.
     pub unsafe fn new(config: HeapConfig) -> Heap {
         let floor = config.cycle_floor as u64;
         Heap {
@@ -247,12 +259,12 @@ impl Heap {
     /// A heap for the unit tests of this crate.
     #[cfg(test)]
     pub(crate) fn for_tests() -> Heap {
-        // SAFETY: tests of this crate make one heap each and keep to it.
+        // SAFETY: H1: a test of this crate uses the values of one heap, while it has it.
         unsafe { Heap::new(HeapConfig::default()) }
     }
 
-    /// The write barrier: whoever overwrites a value in the heap, or in a fixed root, calls this with the old value
-    /// first.
+    /// The write barrier: whoever overwrites a value in the heap, or in a fixed root, calls this with the old
+    /// value first.
     #[inline(always)]
     pub fn log_if_marking(&mut self, old: Value) {
         if self.marking {
@@ -266,8 +278,8 @@ impl Heap {
         self.mark(old);
     }
 
-    /// Whether the collector wants to run at the next tick: begin a cycle when idle, else run a slice. Changes only
-    /// when allocation takes its slow path, and by the collector's own functions.
+    /// Whether the collector wants to run at the next tick: begin a cycle when idle, else run a slice.
+    /// Changes only when allocation takes its slow path, and by the collector's own functions.
     #[inline(always)]
     pub fn gc_due(&self) -> bool {
         self.due
@@ -283,7 +295,8 @@ impl Heap {
         self.cycle_id
     }
 
-    /// Notes how many bytes outside of the heap count against its limit. What there is stays, whatever the answer.
+    /// Notes how many bytes outside of the heap count against its limit. What there is stays, whatever the
+    /// answer.
     ///
     /// # Errors
     /// [`AllocError::NeedCollection`] if the limit is passed.
@@ -296,7 +309,8 @@ impl Heap {
         }
     }
 
-    /// Opens the reserve above the limit for the clause that handles `:heap-exhausted`; false if it is open already.
+    /// Opens the reserve above the limit for the clause that handles `:heap-exhausted`; false if it is open
+    /// already.
     pub fn open_reserve(&mut self) -> bool {
         !std::mem::replace(&mut self.reserve_open, true)
     }
@@ -306,13 +320,14 @@ impl Heap {
         self.reserve_open = false;
     }
 
-    /// A number that tells a value from all others alive at the same time, the same in every run of the same program:
-    /// what `eq` hash tables hash.
+    /// A number that tells a value from all others alive at the same time, the same in every run of the same
+    /// program: what `eq` hash tables hash.
     pub fn identity(&self, v: Value) -> u64 {
         if !v.is_address() {
             return v.bits();
         }
-        // SAFETY: a value with an address is that of a live object (`access`, module header).
+        // SAFETY: H1, H2: the value is the address of a live cons or object; by its size it lies in an arena
+        // or is large.
         unsafe {
             if let Some(object) = v.as_object_ptr()
                 && large::is_large((*object).size())
@@ -337,7 +352,8 @@ impl Heap {
     /// Asserts that the address of `v` is one of this heap.
     #[cfg(feature = "paranoid")]
     fn assert_mine(&self, v: Value) {
-        // SAFETY: none if `v` is foreign, which is what this looks for; for a value of this heap both are live.
+        // SAFETY: none if `v` is foreign, which is what this looks for; for a value of this heap both are
+        // live.
         unsafe {
             if let Some(object) = v.as_object_ptr()
                 && large::is_large((*object).size())
@@ -377,7 +393,8 @@ mod tests {
         let mut heap = Heap::for_tests();
         let dead = heap.cons(Value::T, Value::NIL).unwrap();
         let live = heap.cons(Value::T, Value::NIL).unwrap();
-        // SAFETY: `dead` is followed below, but its arena is kept by `live`.
+        // SAFETY: `dead` is read below although it was not marked, but its memory is not reused, and kept by
+        // `live`.
         unsafe { heap.collect_fully(|heap| heap.mark(live)) };
         assert_eq!((heap.car(dead), heap.cdr(dead)), (Some(Value::POISON), Some(Value::POISON)));
         assert_eq!(heap.car(live), Some(Value::T));

@@ -1,12 +1,12 @@
 //! Making objects: one function per kind.
 //!
-//! Guarantees: no function here collects, so values in the caller's hands stay good; every object is initialised in
-//! full before its address becomes a [`Value`]; on an error nothing has changed that a program could see. Initialising
-//! stores need no barrier, since nothing was overwritten.
+//! Guarantees: no function here collects, so values in the caller's hands stay good; every object is
+//! initialised in full before its address becomes a [`Value`]; on an error nothing has changed that a program
+//! could see. Initialising stores need no barrier, since nothing was overwritten.
 //!
-//! The promises about contents that the interpreter relies on are asserted here: the code of a function is a Code, the
-//! function of a symbol is a Function, its name a String, the class of a structure a Class, the data of an array a
-//! SimpleVector, String or Bytes.
+//! The promises about contents that the interpreter relies on are asserted here: the code of a function is a
+//! Code, the function of a symbol is a Function, its name a String, the class of a structure a Class, the
+//! data of an array a SimpleVector, String or Bytes.
 
 use super::layout::{Bignum, Boxed, Code, Cons, Float, Function, Header, Kind, MAX_LENGTH, Symbol, Vector};
 use super::{AllocError, Heap};
@@ -38,7 +38,8 @@ impl Heap {
     #[inline(always)]
     pub fn cons_in_hole(&mut self, car: Value, cdr: Value) -> Option<Value> {
         let cons = self.bump(size_of::<Cons>())?.as_ptr().cast::<Cons>();
-        // SAFETY: `bump` gave us 16 aligned bytes of our own, and both fields are written before the value is made.
+        // SAFETY: `bump` gave us 16 aligned bytes of our own, and both fields are written before the value is
+        // made.
         unsafe {
             cons.write(Cons { car, cdr });
             Some(Value::from_cons(cons))
@@ -83,7 +84,7 @@ impl Heap {
     pub fn alloc_box(&mut self, value: Value) -> Result<Value, AllocError> {
         let boxed = self.allocate(size_of::<Boxed>())?.as_ptr().cast::<Boxed>();
         let header = Header { kind: Kind::Box, flags: 0, aux: 0, len: 1 };
-        // SAFETY: 16 aligned bytes of our own, written before the value is made.
+        // SAFETY: `allocate` gave us 16 aligned bytes of our own, written before the value is made.
         unsafe {
             boxed.write(Boxed { header, value });
             Ok(Value::from_object(boxed.cast()))
@@ -103,7 +104,7 @@ impl Heap {
     fn alloc_float(&mut self, x: f64) -> Result<Value, AllocError> {
         let float = self.allocate(size_of::<Float>())?.as_ptr().cast::<Float>();
         let header = Header { kind: Kind::Float, flags: 0, aux: 0, len: 1 };
-        // SAFETY: 16 aligned bytes of our own, written before the value is made.
+        // SAFETY: `allocate` gave us 16 aligned bytes of our own, written before the value is made.
         unsafe {
             float.write(Float { header, value: x });
             Ok(Value::from_object(float.cast()))
@@ -160,9 +161,9 @@ impl Heap {
         self.alloc_record_filled(Kind::SimpleVector, 0, len, fill)
     }
 
-    /// A vector or string to be, of `len` elements, which [`Heap::fill_more`] fills piece by piece: the system takes its time
-    /// for memory that is touched for the first time. One that is not large is filled at once, with 0 or the character of
-    /// code 0.
+    /// A vector or string to be, of `len` elements, which [`Heap::fill_more`] fills piece by piece: the
+    /// system takes its time for memory that is touched for the first time. One that is not large is filled
+    /// at once, with 0 or the character of code 0.
     pub fn begin_vector(&mut self, len: usize, is_string: bool) -> Result<Value, AllocError> {
         let kind = if is_string { Kind::UnfinishedString } else { Kind::UnfinishedVector };
         if !super::large::is_large(kind.size(len)) {
@@ -173,17 +174,19 @@ impl Heap {
             };
         }
         let object = self.begin_object(kind, 0, 0, len)?;
-        // SAFETY: nobody reads the elements of an unfinished object: the collector does not look inside, and `access` has
-        // nothing for these kinds.
+        // SAFETY: nobody reads the elements of an unfinished object: the collector does not look inside, and
+        // `access` has nothing for these kinds.
         Ok(unsafe { Value::from_object(object) })
     }
 
-    /// Fills the next elements of what [`Heap::begin_vector`] began, at most so many; whether that were the last, and it is
-    /// a vector or string now. A value with an address is not filled in, but 0 in its place. `None` if `v` is not unfinished.
+    /// Fills the next elements of what [`Heap::begin_vector`] began, at most so many; whether that were the
+    /// last, and it is a vector or string now. A value with an address is not filled in, but 0 in its place.
+    /// `None` if `v` is not unfinished.
     pub fn fill_more(&mut self, v: Value, fill: Value, count: usize) -> Option<bool> {
         let object = v.as_object_ptr()?;
-        // SAFETY: a live object; if unfinished it is large, so that it has a large header, and its elements from `filled` to
-        // `len` are ours to write. When all are written it is what its new kind says.
+        // SAFETY: H1, H2: an object value is the address of a live object. If it is unfinished it is large,
+        // so that it has a large header, and its elements from `filled` to `len` are ours to write. When all
+        // are written it is what its new kind says.
         unsafe {
             let finished = match (*object).kind {
                 Kind::UnfinishedVector => Kind::SimpleVector,
@@ -214,7 +217,8 @@ impl Heap {
     /// How many elements of an unfinished object have been filled, of how many; `None` if `v` is none.
     pub fn filled(&self, v: Value) -> Option<(usize, usize)> {
         let object = v.as_object_ptr()?;
-        // SAFETY: a live object; an unfinished one is large, so that it has a large header.
+        // SAFETY: H1, H2: an object value is the address of a live object; an unfinished one is large, so
+        // that it has a large header.
         unsafe {
             matches!((*object).kind, Kind::UnfinishedVector | Kind::UnfinishedString)
                 .then(|| ((*super::large::header_of(object)).filled as usize, (*object).len as usize))
@@ -296,7 +300,8 @@ impl Heap {
     ) -> Result<*mut Function, AllocError> {
         debug_assert_eq!(self.kind(code), Some(Kind::Code));
         let function = self.begin_object(Kind::Function, 0, 0, 1 + ncaptures)?.cast::<Function>();
-        // SAFETY: `begin_object` gave room for the code and the captures.
+        // SAFETY: `begin_object` gave room for the code and the captures; all are written before the address
+        // is given out.
         unsafe {
             (&raw mut (*function).code).write(code);
             let captures = (&raw mut (*function).captures).cast::<Value>();
@@ -311,8 +316,8 @@ impl Heap {
     /// New code.
     ///
     /// # Safety
-    /// Words, constants, registers and arity have passed the verifier together, or were made by the VM to the same
-    /// rules: the interpreter runs them without a check.
+    /// Words, constants, registers and arity have passed the verifier together, or were made by the VM to the
+    /// same rules: the interpreter runs them without a check.
     pub unsafe fn alloc_code(&mut self, parts: CodeParts<'_>) -> Result<Value, AllocError> {
         let (nconsts, nwords) = (parts.constants.len(), parts.words.len());
         let len = Code::len(nconsts, nwords);
@@ -321,9 +326,9 @@ impl Heap {
         }
         let object = self.begin_object(Kind::Code, 0, 0, len)?;
         let code = object.cast::<Code>();
-        // SAFETY: `begin_object` gave room for `len` units of 8 bytes, which `Code::len` computed for exactly these
-        // constants and words; everything is written before the value is made. Provenance is exposed because the
-        // interpreter walks from `entry` through the whole object.
+        // SAFETY: `begin_object` gave room for `len` units of 8 bytes, which `Code::len` computed for exactly
+        // these constants and words; everything is written before the value is made. Provenance is exposed
+        // because the interpreter walks from `entry` through the whole object.
         unsafe {
             let constants = (&raw mut (*code).constants).cast::<Value>();
             let words = constants.add(nconsts).cast::<u32>();
@@ -359,7 +364,8 @@ impl Heap {
     /// A new string with the text of `text`.
     pub fn alloc_str(&mut self, text: &str) -> Result<Value, AllocError> {
         let object = self.begin_object(Kind::String, 0, 0, text.chars().count())?;
-        // SAFETY: `begin_object` gave room for as many words as `text` has characters.
+        // SAFETY: `begin_object` gave room for as many words as `text` has characters; they are written
+        // before the value is made.
         unsafe {
             let characters = object.add(1).cast::<u32>();
             for (i, c) in text.chars().enumerate() {
@@ -414,7 +420,8 @@ impl Heap {
         Ok(object)
     }
 
-    /// A new record of a kind whose contents the heap vouches for; that they are as they should be is up to the caller.
+    /// A new record of a kind whose contents the heap vouches for; that they are as they should be is up to
+    /// the caller.
     pub(crate) fn vouched_record(
         &mut self,
         kind: Kind,
@@ -447,7 +454,8 @@ impl Heap {
     fn raw_from<T: Copy>(&mut self, kind: Kind, flags: u8, elements: &[T]) -> Result<Value, AllocError> {
         debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
         let object = self.begin_object(kind, flags, 0, elements.len())?;
-        // SAFETY: `begin_object` gave room for as many elements of this size; they are written before the value is made.
+        // SAFETY: `begin_object` gave room for as many elements of this size; they are written before the
+        // value is made.
         unsafe {
             std::ptr::copy_nonoverlapping(elements.as_ptr(), object.add(1).cast::<T>(), elements.len());
             Ok(Value::from_object(object))
@@ -457,7 +465,8 @@ impl Heap {
     fn raw_filled<T: Copy>(&mut self, kind: Kind, len: usize, fill: T) -> Result<Value, AllocError> {
         debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
         let object = self.begin_object(kind, 0, 0, len)?;
-        // SAFETY: `begin_object` gave room for `len` elements of this size; they are written before the value is made.
+        // SAFETY: `begin_object` gave room for `len` elements of this size; they are written before the value
+        // is made.
         unsafe {
             let elements = object.add(1).cast::<T>();
             for i in 0..len {

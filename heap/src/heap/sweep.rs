@@ -1,10 +1,11 @@
 //! Sweeping: what the last marking did not reach is free.
 //!
-//! Blocks are swept when the allocator comes to them, or by slices, whichever is first; large objects by slices only.
-//! An arena in which nothing is left goes back to the system, but for those that will be filled before the next cycle: to
-//! take them from the system again would cost more than to fill them.
+//! Blocks are swept when the allocator comes to them, or by slices, whichever is first; large objects by
+//! slices only. An arena in which nothing is left goes back to the system, but for those that will be filled
+//! before the next cycle: to take them from the system again would cost more than to fill them.
 //!
-//! Guarantees: every block is swept once between two markings. What is allocated while sweeping is not touched by it.
+//! Guarantees: every block is swept once between two markings. What is allocated while sweeping is not
+//! touched by it.
 
 use super::alloc::PIECE;
 use super::arena::{ARENA, BLOCKS, BlockState};
@@ -47,7 +48,8 @@ impl Heap {
             arena.expect_sweep();
         }
         self.sweep = Sweep { at: (0, 1), large: self.large.len(), spares: 0, live: 0 };
-        // What was allocated during the cycle is mostly garbage: it counts as live here, but does not put off the next.
+        // What was allocated during the cycle is mostly garbage: it counts as live here, but does not put off
+        // the next.
         let room = (self.limit as u64).saturating_sub(self.stats.live) / 2;
         self.pacing.threshold = self.marker.bytes.max(self.pacing.floor).min(room.max(LEAST_THRESHOLD));
         self.pacing.since_cycle = 0;
@@ -99,8 +101,8 @@ impl Heap {
         {}
     }
 
-    /// Gives an arena in which nothing lives back to the system, unless it is to be kept; whether it did. None is kept beyond
-    /// the limit.
+    /// Gives an arena in which nothing lives back to the system, unless it is to be kept; whether it did.
+    /// None is kept beyond the limit.
     fn release_if_empty(&mut self, arena: usize) -> bool {
         if self.arenas[arena].as_ref().is_none_or(|arena| !arena.is_empty()) {
             return false;
@@ -114,8 +116,8 @@ impl Heap {
         true
     }
 
-    /// Looks at the last large object that was not looked at, and frees it unless it was marked: as much of it as the budget
-    /// is for.
+    /// Looks at the last large object that was not looked at, and frees it unless it was marked: as much of
+    /// it as the budget is for.
     fn free_large_if_dead(&mut self, index: usize, left: &mut i64) {
         let header = self.large[index].header();
         debug_assert!(!header.gray && header.index == index);
@@ -143,7 +145,8 @@ impl Heap {
         }
     }
 
-    /// Looks for contradictions in the metadata and the books; for tests. Says nothing of blocks still to be swept.
+    /// Looks for contradictions in the metadata and the books; for tests. Says nothing of blocks still to be
+    /// swept.
     ///
     /// # Errors
     /// What was found.

@@ -1,19 +1,19 @@
 //! Hash tables: entries in the order of insertion, found by linear hashing.
 //!
-//! A link leads to an entry: the hash of its key (32 bits), its number, one too high (28 bits; 0 leads nowhere), and whether the
-//! chain goes on behind it. The heads of the chains are links, and each entry has the link to the next of its chain. So a search knows
-//! the hash of a key before it goes there, and a key that is not there is mostly missed without a look at any entry.
-//! [`storage`] has how all this is stored.
+//! A link leads to an entry: the hash of its key (32 bits), its number, one too high (28 bits; 0 leads
+//! nowhere), and whether the chain goes on behind it. The heads of the chains are links, and each entry has
+//! the link to the next of its chain. So a search knows the hash of a key before it goes there, and a key
+//! that is not there is mostly missed without a look at any entry. [`storage`] has how all this is stored.
 //!
-//! Invariant: a table has [`PER_ENTRY`] chains for each entry that was ever in use (and for one at least). So each new
-//! entry adds as many, and each of these takes its share from one other; nothing is ever rehashed at once, and no
-//! operation takes time in proportion to the size of the table. What was removed leaves a free entry, and the last one freed is
-//! the first to be taken again, which is also where SBCL puts a new key: the order of iteration is the same.
+//! Invariant: a table has [`PER_ENTRY`] chains for each entry that was ever in use (and for one at least). So
+//! each new entry adds as many, and each of these takes its share from one other; nothing is ever rehashed at
+//! once, and no operation takes time in proportion to the size of the table. What was removed leaves a free
+//! entry, and the last one freed is the first to be taken again, which is also where SBCL puts a new key: the
+//! order of iteration is the same.
 //!
-//! Not here: tests that are functions of the program. ESL calls them, over [`Table::candidates`], and [`Table::serial`] says
-//! whether keys came or went meanwhile.
-//! Source: Larson, "Dynamic hash tables", 1988, for growing by one bucket. We keep the entries apart from the
-//! buckets, for the order.
+//! Not here: tests that are functions of the program. ESL calls them, over [`Table::candidates`], and
+//! [`Table::serial`] says whether keys came or went meanwhile. Source: Larson, "Dynamic hash tables", 1988,
+//! for growing by one bucket. We keep the entries apart from the buckets, for the order.
 
 use crate::equality::{self, Test};
 use crate::heap::{AllocError, Heap, Kind};
@@ -114,7 +114,8 @@ impl Table {
         if heap.is(v, Kind::HashTable) { Some(Table(v)) } else { None }
     }
 
-    /// A new table with room for about `size` entries. `test` and `hash` are the functions of the program, or `NIL`.
+    /// A new table with room for about `size` entries. `test` and `hash` are the functions of the program, or
+    /// `NIL`.
     ///
     /// # Errors
     /// As for every allocation.
@@ -326,7 +327,8 @@ impl Table {
         Ok(())
     }
 
-    /// Moves to the new chain `new`, which comes from no other new one, what belongs there from the chain that has held it so far.
+    /// Moves to the new chain `new`, which comes from no other new one, what belongs there from the chain
+    /// that has held it so far.
     fn split(self, heap: &mut Heap, new: usize) {
         let old = new - (1 << new.ilog2());
         let mut link = Link(self.storage(heap).head(old));

@@ -1,4 +1,5 @@
-//! The storage of hash tables: entries and heads of chains, read without tests of what the heap itself sees to.
+//! The storage of hash tables: entries and heads of chains, read without tests of what the heap itself sees
+//! to.
 //!
 //! ```text
 //! table     | count | used | free | room | entries | heads | test | hash | serial |      header.aux: which test
@@ -6,12 +7,12 @@
 //! heads     directory of Words64:         | link | link | link | ...
 //! ```
 //!
-//! A directory lists segments of [`SEGMENT`] entries, or of the [`PER_ENTRY`] heads of each; only the first one grows,
-//! by doubling, so nothing here takes time in proportion to the size of a table.
+//! A directory lists segments of [`SEGMENT`] entries, or of the [`PER_ENTRY`] heads of each; only the first
+//! one grows, by doubling, so nothing here takes time in proportion to the size of a table.
 //!
-//! Invariant: the segments in the directories hold `room` entries and [`PER_ENTRY`] heads for each of them, `used` is
-//! at most `room`, and nobody else has the directories or segments. So a number of an entry below `used` is good, and so
-//! is one of a head below `Storage::heads`.
+//! Invariant: the segments in the directories hold `room` entries and [`PER_ENTRY`] heads for each of them,
+//! `used` is at most `room`, and nobody else has the directories or segments. So a number of an entry below
+//! `used` is good, and so is one of a head below `Storage::heads`.
 //!
 //! Not here: what is in the entries and how keys are found ([`super`]).
 
@@ -26,7 +27,8 @@ use crate::value::Value;
 /// Entries of a segment.
 pub(super) const SEGMENT: usize = 1 << SHIFT;
 const SHIFT: usize = if cfg!(miri) { 4 } else { 12 };
-/// Chains for each entry. With one, a search for a key that is not there meets one entry on the average; with two half of one.
+/// Chains for each entry. With one, a search for a key that is not there meets one entry on the average; with
+/// two half of one.
 pub(super) const PER_ENTRY: usize = 2;
 /// Values of an entry in its segment: key, value, link.
 pub(super) const ENTRY: usize = 3;
@@ -77,8 +79,9 @@ impl Storage<'_> {
     /// What the head of the chain of a hash holds.
     #[inline(always)]
     pub(super) fn first(&self, hash: u32) -> u64 {
-        // SAFETY: what `head_of` gives is less than `heads`: if the low bits are not, they are at least `half`, which
-        // is at most `heads`, and at most `half` is left of them. So the head is in use, and lies in a segment (invariant).
+        // SAFETY: what `head_of` gives is less than `heads`: if the low bits are not, they are at least
+        // `half`, which is at most `heads`, and at most `half` is left of them. So the head is in use, and
+        // lies in a segment (invariant).
         unsafe { *self.place_of_head(self.head_of(hash)) }
     }
 
@@ -102,6 +105,8 @@ impl Storage<'_> {
         Some(unsafe { *self.place_of_entry(entry).cast::<[Value; ENTRY]>() })
     }
 
+    /// Where an entry begins.
+    ///
     /// # Safety
     /// `entry` is less than the table's room.
     #[inline(always)]
@@ -110,12 +115,14 @@ impl Storage<'_> {
         unsafe { elements::<Value>(*self.entries.add(entry >> SHIFT)).add(ENTRY * (entry & (SEGMENT - 1))) }
     }
 
+    /// Where a head is.
+    ///
     /// # Safety
     /// `head` is less than [`PER_ENTRY`] times the table's room.
     #[inline(always)]
     unsafe fn place_of_head(&self, head: usize) -> *mut u64 {
         const HEADS: usize = PER_ENTRY * SEGMENT;
-        // SAFETY: as for entries.
+        // SAFETY: by the contract and the invariant there is such a segment, and the head in it.
         unsafe { elements::<u64>(*self.heads.add(head / HEADS)).add(head % HEADS) }
     }
 }
@@ -126,7 +133,7 @@ impl Storage<'_> {
 /// `object` is a live object.
 #[inline(always)]
 unsafe fn elements<T>(object: Value) -> *mut T {
-    // SAFETY: elements follow the header.
+    // SAFETY: by the contract this is a live object; its elements follow the header.
     unsafe { object.object_ptr().add(1).cast() }
 }
 
@@ -142,7 +149,8 @@ pub(super) enum Counter {
 }
 
 impl Heap {
-    /// A new table with room for `room` entries, at most [`SEGMENT`]. `functions` are its test and its hash function, or `NIL`.
+    /// A new table with room for `room` entries, at most [`SEGMENT`]. `functions` are its test and its hash
+    /// function, or `NIL`.
     ///
     /// # Errors
     /// As for every allocation.
@@ -169,7 +177,7 @@ impl Heap {
     #[inline(always)]
     pub(super) fn table_storage(&self, v: Value) -> Option<Storage<'_>> {
         let table = self.table_object(v)?;
-        // SAFETY: a live table, whose slots are as the invariant says.
+        // SAFETY: H3: the kind says that this is a HashTable; H4: its directories are live objects.
         unsafe {
             Some(Storage {
                 which_test: (*table).header.aux,
@@ -183,13 +191,13 @@ impl Heap {
 
     /// Entries for which a table has room without more memory.
     pub(super) fn table_room(&self, v: Value) -> Option<usize> {
-        // SAFETY: a live table.
+        // SAFETY: H3: the kind says that this is a HashTable.
         self.table_object(v).and_then(|table| unsafe { (*table).room }.as_index())
     }
 
     /// The functions of the program by which a table compares and hashes, or `NIL`.
     pub(super) fn table_functions(&self, v: Value) -> Option<[Value; 2]> {
-        // SAFETY: a live table.
+        // SAFETY: H3: the kind says that this is a HashTable.
         self.table_object(v).map(|table| unsafe { [(*table).test, (*table).hash] })
     }
 
@@ -197,7 +205,7 @@ impl Heap {
     #[inline]
     pub(super) fn table_counter(&self, v: Value, counter: Counter) -> Option<usize> {
         let table = self.table_object(v)?;
-        // SAFETY: a live table.
+        // SAFETY: H3: the kind says that this is a HashTable.
         let value = unsafe {
             match counter {
                 Counter::Count => (*table).count,
@@ -212,7 +220,8 @@ impl Heap {
     #[inline]
     pub(super) fn table_set_counter(&mut self, v: Value, counter: Counter, n: usize) -> Option<()> {
         let table = self.table_object(v)?;
-        // SAFETY: a live table; nothing relies on these counters. No address is overwritten, so the barrier has no work.
+        // SAFETY: H3: the kind says that this is a HashTable; nothing relies on these counters. No address is
+        // overwritten, so the barrier has no work.
         unsafe {
             match counter {
                 Counter::Count => (*table).count = Value::index(n),
@@ -264,13 +273,14 @@ impl Heap {
     /// As for every allocation; nothing has changed then.
     pub(super) fn table_extend(&mut self, v: Value) -> Result<usize, AllocError> {
         let Some(table) = self.table_object(v) else { unreachable!("the caller has a table") };
-        // SAFETY: a live table.
+        // SAFETY: H3: the kind says that this is a HashTable.
         let (used, room) =
             unsafe { ((*table).used.as_index().unwrap_or(0), (*table).room.as_index().unwrap_or(0)) };
         if used == room {
             self.grow_table(table, room)?;
         }
-        // SAFETY: a live table; there is room for one more. A fixnum is overwritten, so the barrier has no work.
+        // SAFETY: H3: the kind says that this is a HashTable; there is room for one more. A fixnum is
+        // overwritten, so the barrier has no work.
         unsafe { (*table).used = Value::index(used + 1) };
         Ok(used)
     }
@@ -281,10 +291,10 @@ impl Heap {
     /// As for every allocation; nothing has changed then.
     pub(super) fn table_clear(&mut self, v: Value) -> Result<(), AllocError> {
         let Some(table) = self.table_object(v) else { unreachable!("the caller has a table") };
-        // SAFETY: a live table.
+        // SAFETY: H3: the kind says that this is a HashTable.
         let room = unsafe { (*table).room }.as_index().unwrap_or(0).min(SEGMENT);
         let [entries, heads] = self.fresh_directories(room)?;
-        // SAFETY: a live table; the new directories have room for `room`.
+        // SAFETY: H3: the kind says that this is a HashTable; the new directories have room for `room`.
         unsafe {
             self.store(&raw mut (*table).entries, entries);
             self.store(&raw mut (*table).heads, heads);
@@ -301,13 +311,13 @@ impl Heap {
         if room >= MOST {
             return Err(AllocError::TooLarge { requested: 8 * ENTRY * room });
         }
-        // SAFETY: a live table.
+        // SAFETY: H3: the kind says that this is a HashTable.
         let (old_entries, old_heads) = unsafe { ((*table).entries, (*table).heads) };
         if room < SEGMENT {
             let entries = self.alloc_vector_filled(2 * ENTRY * room, FREE)?;
             let heads = self.alloc_words64(2 * PER_ENTRY * room)?;
-            // SAFETY: the first segments have room for `room` entries, the new ones for twice as many; nobody else
-            // has the new ones, so the barrier has no work but where the directories are changed.
+            // SAFETY: the first segments have room for `room` entries, the new ones for twice as many; nobody
+            // else has the new ones, so the barrier has no work but where the directories are changed.
             unsafe {
                 let (from_entries, from_heads) =
                     (elements::<Value>(old_entries), elements::<Value>(old_heads));
@@ -325,14 +335,16 @@ impl Heap {
         let mut directories = [old_entries, old_heads];
         for (directory, segment) in directories.iter_mut().zip([entries, heads]) {
             if self.vector_set(*directory, segments, segment).is_none() {
-                // The directories are a small part of a thousandth of the table, so copying them is a small matter.
+                // The directories are a small part of a thousandth of the table, so copying them is a small
+                // matter.
                 let mut longer = self.vector(*directory).unwrap_or_default().to_vec();
                 longer.push(segment);
                 longer.resize(2 * segments, Value::NIL);
                 *directory = self.alloc_vector(&longer)?;
             }
         }
-        // SAFETY: a live table; the directories have one segment more than before.
+        // SAFETY: H3: the kind says that this is a HashTable; the directories have one segment more than
+        // before.
         unsafe {
             self.store(&raw mut (*table).entries, directories[0]);
             self.store(&raw mut (*table).heads, directories[1]);

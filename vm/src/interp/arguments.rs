@@ -63,8 +63,9 @@ pub(super) unsafe fn arrange(
         let keys = usize::from(shape.number);
         let first = arranged.len();
         arranged.resize(first + keys, Value::UNSUPPLIED);
-        // SAFETY: by the contract, the names of the keys are the last constants (`shape`).
-        // Code does not move, and the frame or its caller's holds on to it.
+        // SAFETY: by the contract the last constants of the code are the names of its keys (`shape`). They
+        // stay where they are, since code does not move, and alive, since nothing collects before the call is
+        // made.
         let names = unsafe {
             let names = constants_of(code).add((*code).nconsts as usize - keys);
             std::slice::from_raw_parts(names, keys)

@@ -51,7 +51,8 @@ impl FramePlace {
 /// # Safety
 /// The contract of [`super::settle`], at a call instruction.
 pub(super) unsafe fn slow_call(vm: &mut Vm) -> Signal {
-    // SAFETY: V1, V3 and V4: the instruction has its aux word, window and arguments are registers of the frame.
+    // SAFETY: V1: the instruction has its aux word; V3: window and arguments are registers of the frame; V4:
+    // the constant is there; F2: the running function is below the registers.
     unsafe {
         let (pc, base) = (vm.cpu.pc, vm.cpu.base);
         let word = word_at(pc);
@@ -86,21 +87,24 @@ pub(super) unsafe fn call(vm: &mut Vm, callee: Value, arguments: &[Value], place
         Ok(function) => function,
         Err(exit) => return Signal::Exit(exit),
     };
-    // SAFETY: `callable` gives a Function that is ready to run.
+    // SAFETY: `callable` returns a Function that is ready to run.
     let (code, shape) = unsafe {
         let code = code_of(function);
         (code, Shape::unpack((*code).spare[0]))
     };
     if shape.sort == Sort::Native {
-        // SAFETY: by the contract.
+        // SAFETY: the contract of `call_native` is that of this function.
         return unsafe { call_native(vm, shape.number, arguments, place) };
     }
     let mut arranged = Arguments::new();
-    // SAFETY: the code is that of the function, and bytecode.
+    // SAFETY: `code` and `shape` are those of the function, which is neither native nor a stub: `callable`
+    // has loaded it.
     if let Err(exit) = unsafe { arrange(vm, function, code, shape, arguments, &mut arranged) } {
         return Signal::Exit(exit);
     }
-    // SAFETY: the frame's place is computed from the running frame, after room was made for it.
+    // SAFETY: F2: the new frame lies in the window of the running one (V3), behind its registers, or in its
+    // place, and `reserve_stack` has made room up to its last register; its link and the saved pc lie between
+    // the two.
     unsafe {
         let nregs = (*code).nregs as usize;
         let frame = match place {
@@ -159,20 +163,22 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Fram
         Err(Exit::Values) => {}
         Err(Exit::Slowly) => {
             return match vm.twin_of(info) {
-                // SAFETY: by the contract; a twin is no builtin, so this goes one level deep.
+                // SAFETY: the builtin has left `vm.cpu` as it was, so the contract still holds. A twin is no
+                // builtin, so this goes one level deep.
                 Ok(function) => unsafe { call(vm, function, arguments, place) },
                 Err(exit) => Signal::Exit(exit),
             };
         }
         Err(Exit::Call) => {
             let (function, arguments) = vm.exchange.take_requested_call();
-            // SAFETY: by the contract. A builtin that asks for itself would go on for ever, and none does.
+            // SAFETY: the builtin has left `vm.cpu` as it was, so the contract still holds. A builtin that
+            // asks for itself would go on for ever, and none does.
             return unsafe { call(vm, function, &arguments, place) };
         }
         Err(exit) => return Signal::Exit(exit),
     }
     vm.cpu.ticks = vm.prepare_safepoint(vm.cpu.ticks);
-    // SAFETY: by the contract; V3 for the window.
+    // SAFETY: F1 holds by the contract; V3: the instruction of a `Window` has one in its frame.
     unsafe {
         match place {
             FramePlace::Tail => return_all(vm),
@@ -205,7 +211,8 @@ impl Vm {
             }
             _ => return self.exchange.type_error(callee, "FUNCTION"),
         };
-        // SAFETY: a Function, by its kind or because the function of a symbol is one.
+        // SAFETY: this is a Function, by its kind or because the heap guarantees it of the function of a
+        // symbol.
         let sort = unsafe { Shape::unpack((*code_of(function)).spare[0]).sort };
         match sort {
             Sort::Undefined => self.exchange.raise(Raised::UndefinedFunction(callee)),

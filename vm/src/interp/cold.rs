@@ -20,10 +20,13 @@ use crate::vm::Vm;
 use crate::world::class;
 
 /// Puts an outcome into register `dst`.
+///
+/// # Safety
+/// The frame at `base` has such a register.
 unsafe fn finish(base: *mut Value, dst: usize, outcome: Outcome) -> Signal {
     match outcome {
         Ok(value) => {
-            // SAFETY: V3: a register of the frame.
+            // SAFETY: by the contract, the register lies in the frame.
             unsafe { *base.add(dst) = value };
             Signal::Next
         }
@@ -73,7 +76,7 @@ fn ask_twin(vm: &mut Vm, builtin: Builtin, arguments: &[Value]) -> Outcome {
 #[cold]
 #[inline(never)]
 pub(super) unsafe fn arithmetic(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V1, V3: the operands of the instruction at `pc` are registers of the frame at `base`.
     unsafe {
         let word = word_at(pc);
         let (dst, b, c) = (word.a(), word.b(), word.c());
@@ -107,7 +110,7 @@ pub(super) unsafe fn arithmetic(vm: &mut Vm, pc: *const u32, base: *mut Value) -
 #[cold]
 #[inline(never)]
 pub(super) unsafe fn compare(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Result<bool, Signal> {
-    // SAFETY: see the module's header.
+    // SAFETY: V1, V3: the operands of the instruction at `pc` are registers of the frame at `base`.
     unsafe {
         let word = word_at(pc);
         let (a, b) = (word.a(), word.b());
@@ -169,7 +172,7 @@ pub(super) fn is_type(vm: &Vm, value: Value, code: u8) -> bool {
 #[cold]
 #[inline(never)]
 pub(super) unsafe fn cons(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V1, V3: the operands of the instruction at `pc` are registers of the frame at `base`.
     unsafe {
         let word = word_at(pc);
         let (dst, b, c) = (word.a(), word.b(), word.c());
@@ -181,7 +184,7 @@ pub(super) unsafe fn cons(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
 /// `list`.
 #[inline(never)]
 pub(super) unsafe fn list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header; V3: the items are registers of the frame.
+    // SAFETY: V3: `dst` and all items are registers of the frame at `base`.
     unsafe {
         let word = word_at(pc);
         let (dst, first, count) = (word.a(), word.b(), word.c());
@@ -201,7 +204,7 @@ pub(super) unsafe fn list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
 #[cold]
 #[inline(never)]
 pub(super) unsafe fn list_part(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V1, V3: the operands of the instruction at `pc` are registers of the frame at `base`.
     unsafe {
         let word = word_at(pc);
         let (a, b) = (word.a(), word.b());
@@ -229,7 +232,7 @@ pub(super) unsafe fn list_part(vm: &mut Vm, pc: *const u32, base: *mut Value) ->
 #[cold]
 #[inline(never)]
 pub(super) unsafe fn array(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V1, V3: the operands of the instruction at `pc` are registers of the frame at `base`.
     unsafe {
         let word = word_at(pc);
         let (a, b, c) = (word.a(), word.b(), word.c());
@@ -251,7 +254,8 @@ pub(super) unsafe fn array(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sig
 #[cold]
 #[inline(never)]
 pub(super) unsafe fn slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V1, V3: there is an aux word, and the operands are registers of the frame; V4: the aux word
+    // is a constant for a class.
     unsafe {
         let word = word_at(pc);
         let (a, b, c) = (word.a(), word.b(), word.c());
@@ -276,19 +280,23 @@ pub(super) unsafe fn slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
 /// Whether `value` is an instance of the class that is constant `index`, or of a subclass.
 ///
 /// # Safety
-/// See the module's header.
+/// The frame at `base` is the running one, and constant `index` of its function is for a class.
 #[cold]
 #[inline(never)]
 pub(super) unsafe fn is_instance(vm: &mut Vm, base: *mut Value, value: Value, index: usize) -> bool {
-    // SAFETY: by the contract.
+    // SAFETY: the contract is that of `class_constant`.
     let class = unsafe { class_constant(vm, base, index) };
     vm.world.is_instance(&vm.heap, value, class)
 }
 
 /// The class that is a constant of the running function. As loaded the constant is the name of the class; the class, as
 /// it is now, is put in its place, also when the class of that name has become another one.
+///
+/// # Safety
+/// The frame at `base` is the running one, and constant `index` of its function is for a class.
 unsafe fn class_constant(vm: &mut Vm, base: *mut Value, index: usize) -> Value {
-    // SAFETY: V4.
+    // SAFETY: F2: the running function is below the registers; by the contract its code has such a constant,
+    // and nobody else looks at it meanwhile.
     unsafe {
         let constant = constants_of(code_of(*base.sub(2))).add(index).cast_mut();
         let name =
@@ -305,7 +313,7 @@ unsafe fn class_constant(vm: &mut Vm, base: *mut Value, index: usize) -> Value {
 /// `make-box`.
 #[inline(never)]
 pub(super) unsafe fn make_box(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V1, V3: the operands of the instruction at `pc` are registers of the frame at `base`.
     unsafe {
         let word = word_at(pc);
         let (dst, src) = (word.a(), word.b());
@@ -317,8 +325,8 @@ pub(super) unsafe fn make_box(vm: &mut Vm, pc: *const u32, base: *mut Value) -> 
 /// `make-closure` of a function with captures.
 #[inline(never)]
 pub(super) unsafe fn make_closure(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header; the constant is the code of a function with captures (`shape`), and V8 says that
-    // what they are taken from is there.
+    // SAFETY: V3: `dst` is a register of the frame; V4, V8: the constant is the code of a function with
+    // captures, and the frame has what they are taken from.
     unsafe {
         let word = word_at(pc);
         let dst = word.a();
@@ -338,8 +346,9 @@ pub(super) unsafe fn make_closure(vm: &mut Vm, pc: *const u32, base: *mut Value)
 /// # Safety
 /// `make-closure` may stand where that frame is: V8.
 pub(super) unsafe fn closure(vm: &mut Vm, code: Value, base: *mut Value) -> Result<Value, Exit> {
-    // SAFETY: the constant is the code of a function with captures (`shape`), and V8 says that what they are taken from
-    // is there.
+    // SAFETY: by the contract `code` is the Code of a function with captures, which ends with a word for each
+    // (`shape`); V8: the registers and captures that these words name are there. All captures are written
+    // before the value is made.
     unsafe {
         let running = *base.sub(2);
         let layout = code.object_ptr().cast::<Code>();
@@ -365,7 +374,7 @@ pub(super) unsafe fn closure(vm: &mut Vm, code: Value, base: *mut Value) -> Resu
 /// `set-values` and the values of `return-values`.
 #[inline(never)]
 pub(super) unsafe fn set_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header; V3: the values are registers of the frame.
+    // SAFETY: V3: the values are registers of the frame at `base`, whose words are initialised (F4).
     unsafe {
         let word = word_at(pc);
         let (first, count) = (word.a(), word.b());
@@ -378,7 +387,7 @@ pub(super) unsafe fn set_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -
 /// `get-values`.
 #[inline(never)]
 pub(super) unsafe fn get_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header; V3: the registers are of the frame.
+    // SAFETY: V3: the registers that receive the values are of the frame at `base`.
     unsafe {
         let word = word_at(pc);
         let (first, count) = (word.a(), word.b());
@@ -394,14 +403,14 @@ pub(super) unsafe fn get_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -
 pub(super) unsafe fn values_to_list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     vm.exchange.charge(vm.exchange.values.len());
     let outcome = vm.heap.list(&vm.exchange.values).map_err(Exit::from);
-    // SAFETY: see the module's header.
+    // SAFETY: V3: `dst` is a register of the frame at `base`.
     unsafe { finish(base, word_at(pc).a(), outcome) }
 }
 
 /// `list-to-values`.
 #[inline(never)]
 pub(super) unsafe fn list_to_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V3: the operand is a register of the frame at `base`.
     let list = unsafe { *base.add(word_at(pc).a()) };
     vm.exchange.values.clear();
     let mut rest = list;

@@ -21,7 +21,7 @@ use crate::world::World;
 /// # Safety
 /// `base` is the offset of a frame of `task`.
 unsafe fn top_of(task: &Task, base: usize) -> usize {
-    // SAFETY: below a frame's base is its link, which begins with its function.
+    // SAFETY: F2: below the base of a frame is its link, which begins with its function.
     unsafe {
         let function = *task.stack.start().add(base - 2);
         // The saved pc of a failed instruction lies behind the registers, below the frame that handles it.
@@ -38,7 +38,7 @@ const WORDS_PER_VISIT: usize = 4;
 
 /// Words of the stack of a task that does not run.
 pub(crate) fn top_of_task(task: &Task) -> usize {
-    // SAFETY: the task stands where it was noted at the switch.
+    // SAFETY: F3: the base of a task that does not run is that of its frame.
     unsafe { top_of(task, task.base as usize) }
 }
 
@@ -47,7 +47,7 @@ pub(crate) fn top_of_task(task: &Task) -> usize {
 /// # Safety
 /// `task.base` is the offset of its running frame.
 unsafe fn scan(heap: &mut Heap, task: &mut Task) -> usize {
-    // SAFETY: by the contract.
+    // SAFETY: by the contract the base is that of a frame.
     let top = unsafe { top_of(task, task.base as usize) };
     task.stack.wipe(top);
     heap.mark_slice(task.stack.words(top));
@@ -93,7 +93,7 @@ fn mark_more(heap: &mut Heap, tasks: &mut Tasks) {
         if let Some(task) = task
             && task.scanned != cycle
         {
-            // SAFETY: a task that does not run stands where it was noted at the switch.
+            // SAFETY: F3: the base of a task that does not run is that of its frame.
             cost += unsafe { scan(heap, task) } / WORDS_PER_VISIT;
             has_scanned = true;
         }
@@ -103,8 +103,8 @@ fn mark_more(heap: &mut Heap, tasks: &mut Tasks) {
         }
     }
     if !has_scanned {
-        // SAFETY: the roots and the running task were marked when the cycle began, and every other task since, before it
-        // ran.
+        // SAFETY: the roots and the running task were marked when the cycle began, and every other task
+        // since, before it ran.
         unsafe { heap.end_marking() };
     }
 }
@@ -187,8 +187,8 @@ impl Vm {
         let pause = self.begin_pause();
         let Vm { heap, world, compiler, scheduler, exchange, embedder, .. } = self;
         let Scheduler { running, tasks, deliveries, .. } = scheduler;
-        // SAFETY: all roots and all tasks are marked; `begin_pause` has noted the running frame of the running task, those
-        // of the others were noted at the switch.
+        // SAFETY: all roots and all tasks are marked; `begin_pause` has noted the running frame of the
+        // running task, those of the others were noted at the switch.
         unsafe {
             heap.collect_fully(|heap| {
                 mark_roots(heap, world, compiler, exchange, &embedder.pinned, deliveries);
@@ -213,7 +213,7 @@ impl Vm {
                 tasks.begin_cycle();
                 mark_roots(heap, world, compiler, exchange, &embedder.pinned, deliveries);
                 if let Some(task) = running {
-                    // SAFETY: `begin_pause` has noted its running frame.
+                    // SAFETY: `begin_pause` has noted the base of its running frame.
                     _ = unsafe { scan(heap, task) };
                 }
             }
@@ -248,7 +248,7 @@ impl Vm {
         if let Some(task) = &mut self.scheduler.running
             && task.scanned != cycle
         {
-            // SAFETY: the task has not run since its frame was noted.
+            // SAFETY: F3: the task has not run since its base was noted.
             _ = unsafe { scan(&mut self.heap, task) };
         }
     }

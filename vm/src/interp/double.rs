@@ -29,8 +29,9 @@ mod register {
     #[inline(always)]
     pub(in super::super) unsafe fn load(register: *const Value) -> f64 {
         let x: f64;
-        // SAFETY: 8 bytes are read, by the contract, and what is at `BIAS`: a rotation to the right, less the bias.
-        // As intrinsics, this would be compiled to the way through general registers again.
+        // SAFETY: the code reads the 8 bytes of a value, by the contract, and `BIAS`; it writes registers
+        // only: a rotation to the right, less the bias. As intrinsics, this would be compiled to the way
+        // through general registers again.
         unsafe {
             asm!(
                 "movq {x}, qword ptr [{register}]",
@@ -56,7 +57,8 @@ mod register {
     #[inline(always)]
     pub(in super::super) unsafe fn store(register: *mut Value, x: f64) -> bool {
         let (word, bits): (f64, u64);
-        // SAFETY: what is at `BIAS` is read: the bias is added, and a rotation to the left follows.
+        // SAFETY: the code reads `BIAS` and writes registers only: the bias is added, and a rotation to the
+        // left follows.
         unsafe {
             asm!(
                 "paddq {x}, xmmword ptr [rip + {bias}]",
@@ -75,7 +77,7 @@ mod register {
         if bits & 3 != 3 {
             return false;
         }
-        // SAFETY: by the contract; the word is the value of a double.
+        // SAFETY: by the contract there is a place for a value; the word is that of a double.
         unsafe { *register.cast::<f64>() = word };
         true
     }
@@ -91,7 +93,7 @@ mod register {
     /// `register` points to a value.
     #[inline(always)]
     pub(in super::super) unsafe fn load(register: *const Value) -> f64 {
-        // SAFETY: by the contract.
+        // SAFETY: by the contract there is a value.
         unsafe { (*register).windowed_double() }
     }
 
@@ -102,7 +104,7 @@ mod register {
     #[inline(always)]
     pub(in super::super) unsafe fn store(register: *mut Value, x: f64) -> bool {
         match Value::double(x).filter(|v| v.is_windowed_double()) {
-            // SAFETY: by the contract.
+            // SAFETY: by the contract there is a place for a value.
             Some(v) => unsafe { *register = v },
             None => return false,
         }
@@ -150,7 +152,7 @@ mod tests {
             for low in [0, 1, 0x000F_FFFF_FFFF_FFFF, 1 << 63] {
                 let x = f64::from_bits(exponent << 52 | low);
                 let mut register = Value::NIL;
-                // SAFETY: a value of our own.
+                // SAFETY: the register is a local variable.
                 let (is_stored, back) = unsafe { (store(&raw mut register, x), load(&raw const register)) };
                 let expected = Value::double(x).filter(|v| v.is_windowed_double());
                 assert_eq!(is_stored.then_some(register), expected, "{x:e}");

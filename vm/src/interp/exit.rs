@@ -17,7 +17,8 @@ use crate::vm::Vm;
 /// # Safety
 /// The contract of [`super::settle`].
 pub(super) unsafe fn exit(vm: &mut Vm, exit: Exit) -> Signal {
-    // SAFETY: each of these has the contract of this function.
+    // SAFETY: F1 holds by the contract, and each of these functions needs just that; V1: `pc` is at an
+    // instruction. Only the instructions that call a builtin give `Exit::Slowly`.
     unsafe {
         match exit {
             Exit::Values => Signal::ReturnAll,
@@ -42,7 +43,8 @@ pub(super) unsafe fn exit(vm: &mut Vm, exit: Exit) -> Signal {
 /// The contract of [`super::settle`], at `call-builtin` or `tail-call-builtin`. No other instruction gives
 /// [`Exit::Slowly`]: as a function a builtin is called in `call`, which deals with it.
 unsafe fn take_over(vm: &mut Vm) -> Signal {
-    // SAFETY: V1, V3 and V5: the aux word is the builtin, and the arguments are registers of the frame.
+    // SAFETY: V1, V5: the aux word is the number of the builtin; V3: the arguments are registers of the
+    // frame.
     unsafe {
         let word = word_at(vm.cpu.pc);
         let function = match vm.twin_of(&BUILTINS[aux_at(vm.cpu.pc) as usize]) {
@@ -74,7 +76,7 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
         vm.scheduler.task_mut().begin_end(End::Failed(arguments[0]));
         return Signal::Unwind;
     }
-    // SAFETY: by the contract.
+    // SAFETY: F1 holds by the contract, and a frame above the running one needs no window.
     unsafe { call(vm, function, &arguments, FramePlace::Above) }
 }
 
@@ -84,7 +86,7 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
 /// # Safety
 /// The contract of [`super::settle`].
 unsafe fn collect(vm: &mut Vm) -> Signal {
-    // SAFETY: V1.
+    // SAFETY: V1: `pc` is at an instruction.
     let word = unsafe { word_at(vm.cpu.pc) };
     let is_call = FramePlace::for_instruction(word) != FramePlace::Above;
     if is_call {

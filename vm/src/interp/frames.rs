@@ -34,13 +34,14 @@ pub(crate) struct Frame<'a> {
 impl<'a> Frame<'a> {
     /// Returns its registers, up to the frame above it.
     pub(crate) fn registers(&self) -> &'a [Value] {
-        // SAFETY: so many registers of the frame lie in the stack, whose words are all initialised; `Frames` borrows it.
+        // SAFETY: F2, F4: so many registers of the frame lie in the stack, and all its words are values;
+        // `Frames` borrows it.
         unsafe { std::slice::from_raw_parts(self.base, self.registers) }
     }
 
     /// Returns the address at which its function returns, that of a stub for the outermost frame.
     fn return_address(&self) -> *const u32 {
-        // SAFETY: below the registers of a frame is its link.
+        // SAFETY: F2: below the registers of a frame is its link.
         unsafe { pc_from_value(*self.base.sub(1)) }
     }
 
@@ -48,7 +49,7 @@ impl<'a> Frame<'a> {
     /// the caller was given.
     fn is_called_by_name(&self) -> bool {
         let return_to = self.return_address();
-        // SAFETY: two words before a return address is the word of the call.
+        // SAFETY: F2: two words before a return address is the word of the call.
         let call = unsafe { word_at(return_to.sub(2)) };
         stubs::is_error_return(return_to)
             || matches!(call.opcode(), Some(Opcode::CallGlobal | Opcode::CallSelf))
@@ -56,7 +57,7 @@ impl<'a> Frame<'a> {
 
     /// Whether its function is one of the library.
     fn is_of_library(&self) -> bool {
-        // SAFETY: the function of a frame is a Function.
+        // SAFETY: F2: the function of a frame is a Function.
         unsafe { (*code_of(self.function)).owner.is_fixnum() }
     }
 }
@@ -74,8 +75,10 @@ pub(crate) struct Frames<'a> {
 }
 
 impl<'a> Frames<'a> {
+    /// Walks from a frame outward.
+    ///
     /// # Safety
-    /// The task to which `stack` belongs stands at `pc` in the frame with the registers at `base`, for `'a`.
+    /// The task whose stack begins at `bottom` stands at `pc` in the frame with the registers at `base`, for `'a`.
     unsafe fn new(bottom: *mut Value, pc: *const u32, base: *mut Value) -> Frames<'a> {
         let next = Some((pc, base));
         Frames { bottom, next, is_exact: true, uncovered: usize::MAX, stack: PhantomData }
@@ -84,7 +87,7 @@ impl<'a> Frames<'a> {
     /// Returns the frames of a task that does not run.
     pub(crate) fn of_task(task: &'a Task) -> Frames<'a> {
         let bottom = task.stack.start();
-        // SAFETY: the task stands where it was noted at the switch.
+        // SAFETY: F3: the task stands where it was noted at the switch, and is borrowed for as long.
         unsafe { Frames::new(bottom, task.pc.get(), bottom.add(task.base as usize)) }
     }
 }
@@ -97,7 +100,8 @@ impl<'a> Iterator for Frames<'a> {
         if base.addr() < self.bottom.addr() + BELOW_FRAMES * size_of::<Value>() {
             return None;
         }
-        // SAFETY: frames are linked as `call` and the loop link them, down to the outermost, whose link is a stub's.
+        // SAFETY: F2: each link leads to the frame below, down to the outermost, whose link is a stub's; F3:
+        // where a stub of another sort is linked, the pc of the frame below is behind its registers.
         unsafe {
             let function = *base.sub(2);
             let code = code_of(function);
@@ -124,7 +128,7 @@ impl<'a> Iterator for Frames<'a> {
 /// # Safety
 /// `code` points to a Code.
 unsafe fn word_in(code: *mut Code, pc: *const u32) -> usize {
-    // SAFETY: the words are at this offset inside the object.
+    // SAFETY: by the contract this is a live Code, and its words are at this offset.
     let start = unsafe { code.byte_add((*code).words_offset()) };
     pc.addr().wrapping_sub(start.addr()) / size_of::<u32>()
 }
@@ -134,7 +138,7 @@ pub(crate) fn entry_word(task: &Task, entry: &Entry) -> Option<usize> {
     if entry.pc.is_none() {
         return None;
     }
-    // SAFETY: the frame of an entry is live.
+    // SAFETY: F5: the frame of an entry is live.
     unsafe {
         let code = code_of(*task.stack.start().add(entry.base as usize).sub(2));
         Some(word_in(code, entry.pc.get()))
@@ -146,7 +150,7 @@ impl Vm {
     /// them only up to its innermost frame's pc, so that one is given as it was saved.
     pub(crate) fn frames(&self) -> impl Iterator<Item = Frame<'_>> {
         let task = self.scheduler.running.as_ref();
-        // SAFETY: `vm.cpu` describes the running task.
+        // SAFETY: F1: `vm.cpu` describes the running task, which is borrowed for as long.
         task.map(|task| unsafe { Frames::new(task.stack.start(), self.cpu.pc, self.cpu.base) })
             .into_iter()
             .flatten()

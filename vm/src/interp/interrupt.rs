@@ -21,7 +21,7 @@ pub(super) unsafe fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]
     let kind = EntryKind::Interrupt;
     let entry = Entry { data: wait, pc: SavedPc::NONE, base, bindings, window: 0, want: 0, kind };
     task.control.entries.push(entry);
-    // SAFETY: by the contract.
+    // SAFETY: F1 holds by the contract, and a frame above the running one needs no window.
     unsafe { call(vm, function, arguments, FramePlace::Interrupt) }
 }
 
@@ -31,7 +31,7 @@ pub(super) unsafe fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]
 /// # Safety
 /// The contract of [`super::settle`], at the stub.
 pub(super) unsafe fn interrupt_return(vm: &mut Vm, base: *mut Value) -> Signal {
-    // SAFETY: the frame is one above which `interrupt` has put a function.
+    // SAFETY: F3: the stub is the return address of a function that `interrupt` has put above this frame.
     unsafe { resume_below(vm, base) };
     vm.restore_wait();
     Signal::Reload

@@ -1,17 +1,33 @@
 //! THE loop: runs the bytecode of one task until its slice is over, it ends, or it waits.
 //!
-//! Registers of the machine are locals of [`run`]: `pc`, `base` (the running frame's first register), `k` (the running
-//! code's constants) and `ticks`. An arm decodes, takes the fast path, and leaves everything else to a cold function or to
-//! a [`Signal`], which breaks out of the inner loop with `pc` still at the instruction; the outer loop deals with it and
-//! comes back with fresh registers. So the hot loop holds nothing that has to be dropped, and the size of its frame stays
-//! small.
+//! Registers of the machine are locals of [`dispatch`]: `pc`, `base` (the running frame's first register),
+//! `k` (the running code's constants) and `ticks`. An arm decodes, takes the fast path, and leaves everything
+//! else to a cold function or to a [`Signal`], which breaks out of the inner loop with `pc` still at the
+//! instruction; the outer loop deals with it and comes back with fresh registers. So the hot loop holds
+//! nothing that has to be dropped, and the size of its frame stays small.
 //!
-//! Safepoints are ticks: a call or a turn of a loop takes one, and when none is left the instruction is given up before
-//! it has had any effect. Preemption, collection and aborts happen there and nowhere else, save that an instruction for
-//! which there is no room is given up too, and done again after a collection.
+//! Safepoints are ticks: a call or a turn of a loop takes one, and when none is left the instruction is given
+//! up before it has had any effect. Preemption, collection and aborts happen there and nowhere else, save
+//! that an instruction for which there is no room is given up too, and done again after a collection.
 //!
-//! What the loop takes for granted of code is the list V1 to V13 in `esl_bytecode::verify`; its `SAFETY:` notes name the
-//! items. What it owes in return is M1 to M6 there.
+//! What the interpreter takes for granted of code is the list V1 to V13 in `esl_bytecode::verify`; its
+//! `SAFETY:` notes name the items. What it owes in return is M1 to M6 there. The notes also name facts that
+//! it establishes itself:
+//!
+//! * **F1, registers of the machine.** When the loop is left, `Cpu::pc` is at an instruction of the running
+//!   function's code, or in a stub, and `Cpu::base` is the base of the running frame.
+//! * **F2, frames.** A frame is the words of its task's stack from its base on, as many as its function's
+//!   code has registers. Below the base is its link: its function, a Function, which keeps the code alive,
+//!   and the address at which it returns. That is behind an instruction of two words in the code of the frame
+//!   below, in whose window the link lies; or it is in a stub, which begins with a call word of the same
+//!   form.
+//! * **F3, parked frames.** `base` and `pc` of a task that does not run are those that it had at the switch.
+//!   The pc of a frame above which the machine has put a function is in the word behind its registers.
+//! * **F4, words.** Every word of a stack is a value, or an address of code that looks like a fixnum.
+//! * **F5, entries.** The frame of an entry of the control stack is live, since the entries of a frame are
+//!   popped before it is left; the entry's pc is the landing that the entry's instruction names (V2).
+//!
+//! Only this module and its children write the fields behind F1, F3 and F5.
 #![allow(unsafe_code)]
 
 pub(crate) mod arguments;
@@ -140,7 +156,8 @@ impl Cpu {
     }
 }
 
-// SAFETY: the pointers are into the running task's stack and into code, both owned by the machine.
+// SAFETY: the pointers lead into the running task's stack and into code; the machine owns both and moves with
+// them.
 unsafe impl Send for Cpu {}
 
 /// The code of a function.
@@ -149,7 +166,7 @@ unsafe impl Send for Cpu {}
 /// `function` is a Function.
 #[inline(always)]
 pub(crate) unsafe fn code_of(function: Value) -> *mut Code {
-    // SAFETY: by the contract; the heap sees to it that the code of a function is a Code.
+    // SAFETY: by the contract this is a live Function; the heap guarantees that its code is a Code.
     unsafe { (*function.object_ptr().cast::<Function>()).code.object_ptr().cast() }
 }
 
@@ -159,7 +176,7 @@ pub(crate) unsafe fn code_of(function: Value) -> *mut Code {
 /// `code` points to a Code.
 #[inline(always)]
 pub(crate) unsafe fn constants_of(code: *mut Code) -> *const Value {
-    // SAFETY: the constants are at a fixed offset inside the object.
+    // SAFETY: the constants are at a fixed offset inside the Code.
     unsafe { code.byte_add(Code::CONSTANTS_OFFSET).cast() }
 }
 
@@ -169,7 +186,7 @@ pub(crate) unsafe fn constants_of(code: *mut Code) -> *const Value {
 /// `base` is that of a frame, and the code of its function has such a constant.
 #[inline(always)]
 unsafe fn constant(base: *mut Value, index: usize) -> Value {
-    // SAFETY: below the registers of a frame is its function.
+    // SAFETY: F2: the function is below the registers; by the contract its code has such a constant.
     unsafe { *constants_of(code_of(*base.sub(2))).add(index) }
 }
 
@@ -179,7 +196,7 @@ unsafe fn constant(base: *mut Value, index: usize) -> Value {
 /// `pc` points into code.
 #[inline(always)]
 unsafe fn word_at(pc: *const u32) -> Word {
-    // SAFETY: by the contract.
+    // SAFETY: by the contract there is a word of live code.
     Word(unsafe { *pc })
 }
 
@@ -189,7 +206,7 @@ unsafe fn word_at(pc: *const u32) -> Word {
 /// `pc` is at an instruction of two words.
 #[inline(always)]
 unsafe fn aux_at(pc: *const u32) -> u32 {
-    // SAFETY: by the contract.
+    // SAFETY: by the contract a second word of live code follows.
     unsafe { *pc.add(1) }
 }
 
@@ -199,7 +216,8 @@ unsafe fn aux_at(pc: *const u32) -> u32 {
 /// The word is one of code that has passed the verifier, or of a stub.
 #[inline(always)]
 unsafe fn operation(word: Word) -> Operation {
-    // SAFETY: V1; stubs consist of operations too.
+    // SAFETY: V1: the low byte of an instruction is the number of an operation; those of stubs are operations
+    // too.
     unsafe { std::mem::transmute(word.number()) }
 }
 
@@ -228,7 +246,7 @@ fn failure(vm: &mut Vm, raised: Raised) -> Signal {
 /// `object` is a record with more than `i` elements.
 #[inline(always)]
 unsafe fn element(object: Value, i: usize) -> *mut Value {
-    // SAFETY: elements follow the header.
+    // SAFETY: by the contract the record has such an element; elements follow the header.
     unsafe { object.object_ptr().byte_add(size_of::<Vector>()).cast::<Value>().add(i) }
 }
 
@@ -242,7 +260,7 @@ fn is_simple_vector(v: Value) -> bool {
 pub(crate) fn load(vm: &mut Vm, ticks: i32) {
     let task = vm.scheduler.task();
     let pc = task.pc.get();
-    // SAFETY: the base of a task lies in its stack.
+    // SAFETY: F3: the base of the task lies in its stack.
     let base = unsafe { task.stack.start().add(task.base as usize) };
     let stack_end = vm.stack_end();
     vm.cpu = Cpu { pc, base, stack_end, wants_one: false, ticks, reserve: 0, granted: ticks, collections: 0 };
@@ -251,7 +269,8 @@ pub(crate) fn load(vm: &mut Vm, ticks: i32) {
 
 /// Calls `function` where the task in `vm.scheduler.running`, which is loaded, stands.
 pub(crate) fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]) -> Result<(), Leave> {
-    // SAFETY: as for `run`; a task that does not run stands before an instruction that has had no effect yet.
+    // SAFETY: F1: the task is loaded; a task that was switched out stands at an instruction that has had no
+    // effect yet.
     unsafe {
         let signal = interrupt::interrupt(vm, function, arguments);
         settle(vm, signal)
@@ -261,19 +280,21 @@ pub(crate) fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]) -> Re
 /// Runs the task in `vm.scheduler.running` from `vm.cpu` until it leaves the processor.
 pub(crate) fn run(vm: &mut Vm) -> Leave {
     if vm.scheduler.task().control.is_unwinding() {
-        // SAFETY: as below.
+        // SAFETY: F1: the task is loaded, and what unwinds it works on its control stack and on `vm.cpu`
+        // only.
         if let Err(leave) = unsafe { settle(vm, Signal::Unwind) } {
             return leave;
         }
     }
     loop {
-        // SAFETY: `vm.cpu` describes the running task: its pc lies in code that its innermost frame keeps alive and that
-        // has passed the verifier, its base in its stack, with room for the registers of that code.
+        // SAFETY: F1, F2: `vm.cpu` describes the running task: its pc lies in code that its innermost frame
+        // keeps alive and that has passed the verifier, its base in its stack, with room for the registers of
+        // that code.
         let signal = unsafe { dispatch(vm) };
         if signal == Signal::Exit(Exit::Park) && vm.scheduler.task().critical == 0 {
             return Leave::Parked;
         }
-        // SAFETY: `dispatch` has put its registers back.
+        // SAFETY: F1: `dispatch` has put its registers back, at the instruction that gave the signal.
         let signal = unsafe { settle(vm, signal) };
         if let Err(leave) = signal {
             return leave;
@@ -286,7 +307,7 @@ pub(crate) fn run(vm: &mut Vm) -> Leave {
 /// # Safety
 /// `vm.cpu` describes the running task, at the instruction that gave the signal.
 unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
-    // SAFETY: for all of these, each has the contract of this function and leaves `vm.cpu` in order.
+    // SAFETY: F1 holds by the contract, and each of these functions needs just that and restores it.
     unsafe {
         loop {
             signal = match signal {
@@ -320,18 +341,19 @@ unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
 /// The inner loop.
 ///
 /// # Safety
-/// As [`settle`]; the code at `pc` has passed the verifier, or is a stub.
+/// The contract of [`settle`]; the code at `pc` has passed the verifier, or is a stub.
 #[allow(clippy::too_many_lines, reason = "one arm for each row of the opcode table")]
 unsafe fn dispatch(vm: &mut Vm) -> Signal {
     let mut pc = vm.cpu.pc;
     let mut base = vm.cpu.base;
     let mut ticks = vm.cpu.ticks;
-    // SAFETY: `base[-2]` is the function of the frame (M2), which keeps its code alive.
+    // SAFETY: F2: below the base is the function of the frame, which keeps its code alive.
     let mut k = unsafe { constants_of(code_of(*base.sub(2))) };
 
-    // SAFETY: for the whole loop, V1 makes every word reached an instruction with its aux word; V3 keeps registers inside
-    // the frame, for which the call made room; V4 keeps constants inside the code; V6 makes every register read hold an
-    // object of the program. What depends on data is tested before it is used (M6).
+    // SAFETY: for the whole loop, V1 makes every word reached an instruction with its aux word; V3 keeps
+    // registers inside the frame, for which the call made room (F2); V4 keeps constants inside the code; V6
+    // makes every register read hold an object of the program, whose value is the address of a live object.
+    // What depends on data is tested before it is used (M6).
     let signal = unsafe {
         loop {
             let word = word_at(pc);
@@ -933,7 +955,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 // ---- variables
                 Operation::MakeBox => cold!(1, cold::make_box),
                 Operation::BoxRef => {
-                    // SAFETY: V7 makes this a box, and likewise in the three arms below that deal with boxes.
+                    // SAFETY: V7: the register holds a box. In the three arms below that deal with boxes, V7
+                    // says the same of the register or capture.
                     set!(word.a(), (*get!(word.b()).object_ptr().cast::<Boxed>()).value);
                     next!(1)
                 }
@@ -952,7 +975,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     cold!(1, cold::make_closure)
                 }
                 Operation::PatchCapture => {
-                    // SAFETY: V8: a closure with such a capture.
+                    // SAFETY: V8: the register holds a closure with such a capture.
                     vm.heap.store(element(get!(word.a()), 1 + word.b()), get!(word.c()));
                     next!(1)
                 }
@@ -1029,7 +1052,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     tick!();
                     let window = base.add(word.a());
                     let arguments = std::slice::from_raw_parts(window.add(2), word.b());
-                    // SAFETY: V5: the number is in the table, the number of arguments right.
+                    // SAFETY: V5: the number is in the table, the number of arguments right. The slice of
+                    // arguments stays good, since no builtin writes to the stack or moves it.
                     let native = *NATIVES.get_unchecked(aux!() as usize);
                     (vm.cpu.pc, vm.cpu.base, vm.cpu.wants_one) = (pc, base, word.c() == 0);
                     match native(vm, arguments) {
@@ -1183,7 +1207,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
 /// Whether `value` is an instance of just this class, not of a subclass.
 #[inline(always)]
 unsafe fn is_instance_of_exactly(value: Value, class: Value) -> bool {
-    // SAFETY: an object's value is the address of a live header; the class of a structure follows it.
+    // SAFETY: an object's value is the address of a live header; in a structure its class follows.
     value.is_object()
         && unsafe {
             (*value.object_ptr()).kind == Kind::Structure

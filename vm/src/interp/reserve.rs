@@ -22,7 +22,7 @@ impl Vm {
     /// Address up to which the running task's stack may be used: its end, or its limit if that comes first.
     pub(super) fn stack_end(&self) -> *mut Value {
         let stack = &self.scheduler.task().stack;
-        // SAFETY: not behind the end of the segment.
+        // SAFETY: the offset is at most the capacity of the stack.
         unsafe { stack.start().add(stack.capacity().min(self.stack_limit())) }
     }
 
@@ -45,7 +45,7 @@ impl Vm {
         }
         let offset = self.offset_of(self.cpu.base);
         self.scheduler.task_mut().stack.grow(words);
-        // SAFETY: the offset was inside the old stack, and the new one is larger.
+        // SAFETY: the offset was inside of the stack, which has grown.
         self.cpu.base = unsafe { self.scheduler.task().stack.start().add(offset) };
         self.cpu.stack_end = self.stack_end();
         Ok(())

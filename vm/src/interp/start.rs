@@ -29,7 +29,8 @@ fn direct_code(heap: &Heap, function: Value, arguments: Value) -> Option<&Code> 
 pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function: Value, arguments: Value) {
     let stub = stubs::task_exit();
     if let Some(code) = direct_code(heap, function, arguments) {
-        // SAFETY: `first_words` has made room for two links and the registers of this code, which takes no arguments.
+        // SAFETY: the task was made with `first_words`: room for two links and the registers of this code.
+        // The stub's address has the low bits of a fixnum.
         unsafe {
             let start = task.stack.start();
             *start = starter;
@@ -41,7 +42,8 @@ pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function
         task.base = 4;
         return;
     }
-    // SAFETY: a new stack has room for two links and the three registers of the starter, which is bytecode.
+    // SAFETY: the task was made with `first_words`: room for two links and the three registers of the
+    // starter, a Function of bytecode. The stub's address has the low bits of a fixnum.
     unsafe {
         let start = task.stack.start();
         // A link for the frame that the stub at the end of the task runs in.

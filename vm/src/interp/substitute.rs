@@ -25,7 +25,7 @@ use crate::vm::Vm;
 pub(super) unsafe fn deliver(vm: &mut Vm, window: *mut Value, want: usize) {
     let count = if want == 0 || want == 255 { 1 } else { want };
     for i in 0..count {
-        // SAFETY: by the contract.
+        // SAFETY: by the contract the window has so many registers.
         unsafe { *window.add(i) = vm.exchange.values.get(i).copied().unwrap_or(Value::NIL) };
     }
 }
@@ -35,8 +35,8 @@ pub(super) unsafe fn deliver(vm: &mut Vm, window: *mut Value, want: usize) {
 /// # Safety
 /// The contract of [`super::settle`].
 pub(super) unsafe fn return_all(vm: &mut Vm) -> Signal {
-    // SAFETY: the link of a frame is its function and the address after a call, or of a stub; the call's window is where
-    // the link begins.
+    // SAFETY: F2: the link leads behind a call word whose window begins with the link; V3: the window has the
+    // registers that the call wants.
     unsafe {
         let base = vm.cpu.base;
         let return_to = pc_from_value(*base.sub(1));
@@ -55,7 +55,8 @@ pub(super) unsafe fn return_all(vm: &mut Vm) -> Signal {
 /// # Safety
 /// The contract of [`super::settle`], at an instruction.
 pub(super) unsafe fn substitute(vm: &mut Vm) -> Signal {
-    // SAFETY: V1 to V3: what the row of the opcode says is there.
+    // SAFETY: V1, V2: the instruction has an aux word and a target if its row says so; V3: its operand and
+    // its window are registers of the frame.
     unsafe {
         let (pc, base) = (vm.cpu.pc, vm.cpu.base);
         let word = word_at(pc);
@@ -90,7 +91,7 @@ pub(super) unsafe fn substitute(vm: &mut Vm) -> Signal {
 /// The word is one of code that has passed the verifier.
 unsafe fn jumps_when(word: Word) -> bool {
     !matches!(
-        // SAFETY: by the contract.
+        // SAFETY: by the contract the word is an instruction.
         unsafe { operation(word) },
         Operation::JumpNotNumEq
             | Operation::JumpNotLess
@@ -107,7 +108,8 @@ unsafe fn jumps_when(word: Word) -> bool {
 /// # Safety
 /// The contract of [`super::settle`], at the stub.
 pub(super) unsafe fn error_return(vm: &mut Vm, base: *mut Value) -> Signal {
-    // SAFETY: the frame is one above which `call` has put a function.
+    // SAFETY: F3: the stub is the return address of a function that `call` has put above this frame; its pc
+    // is saved, and is that of an instruction.
     unsafe {
         resume_below(vm, base);
         substitute(vm)
@@ -119,7 +121,7 @@ pub(super) unsafe fn error_return(vm: &mut Vm, base: *mut Value) -> Signal {
 /// # Safety
 /// `base` is that of a frame above which `call` has put a function: its pc is saved behind its registers.
 pub(super) unsafe fn resume_below(vm: &mut Vm, base: *mut Value) {
-    // SAFETY: by the contract.
+    // SAFETY: F3: by the contract the pc is in the word behind the registers.
     unsafe {
         let registers = (*code_of(*base.sub(2))).nregs as usize;
         vm.cpu.base = base;

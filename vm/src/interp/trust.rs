@@ -1,7 +1,7 @@
 //! The promises on which interpreter and heap rely, made where safe code can see what it promises.
 //!
-//! The loader, the world and the machine make heaps, code and stubs with these functions. Each names the fact that makes
-//! its unsafe step sound; the rest of the machine needs no unsafe code for any of it.
+//! The loader, the world and the machine make heaps, code and stubs with these functions. Each names the fact
+//! that makes its unsafe step sound; the rest of the machine needs no unsafe code for any of it.
 //!
 //! Not here: the verifier (`esl_bytecode::verify`), whose theorem V1 to V13 is what [`Verified`] stands for.
 
@@ -15,8 +15,8 @@ use crate::value::Value;
 
 /// Creates the heap of a machine.
 pub(crate) fn new_heap(config: HeapConfig) -> Heap {
-    // SAFETY: a machine uses the values of its heap with no other, and drops both together. The documentation of `Vm` asks
-    // the same of an embedder who gets hold of values.
+    // SAFETY: a machine uses the values of its heap with no other, and drops both together. The documentation
+    // of `Vm` asks the same of an embedder who gets hold of values.
     unsafe { Heap::new(config) }
 }
 
@@ -26,7 +26,8 @@ pub(crate) fn heap_for_tests() -> Heap {
     new_heap(HeapConfig::default())
 }
 
-/// Evidence that a module has passed the verifier, or belongs to the image of the library, whose build has verified it.
+/// Evidence that a module has passed the verifier, or belongs to the image of the library, whose build has
+/// verified it.
 pub(crate) struct Verified(());
 
 impl Verified {
@@ -57,7 +58,8 @@ pub(crate) fn alloc_code(
     unsafe { heap.alloc_code(parts) }
 }
 
-/// Creates code of one word of the machine's own, such as what stands in for a function that is not there yet.
+/// Creates code of one word of the machine's own, such as what stands in for a function that is not there
+/// yet.
 ///
 /// # Errors
 /// As for every allocation.
@@ -83,8 +85,8 @@ pub(crate) fn alloc_stub(
         constants: &[],
         words: &[word],
     };
-    // SAFETY: a call of code with `ANY_ARITY` goes by the shape, which is not that of bytecode: the word never runs, and
-    // there are neither constants nor registers to look at.
+    // SAFETY: a call of code with `ANY_ARITY` goes by the shape, which is not that of bytecode: the word
+    // never runs, and there are neither constants nor registers to look at.
     unsafe { heap.alloc_code(parts) }
 }
 
@@ -108,7 +110,7 @@ fn is_bytecode(heap: &Heap, function: Value) -> Option<bool> {
 /// If `code` is not a Code, or reads captures: then only `make-closure` makes functions of it.
 pub(crate) fn alloc_function(heap: &mut Heap, code: Value, captures: &[Value]) -> Result<Value, AllocError> {
     assert!(!heap.code(code).is_none_or(reads_captures), "a function is made of code without captures");
-    // SAFETY: the code reads no captures.
+    // SAFETY: the assertion: the code reads no captures, so any will do.
     unsafe { heap.alloc_function(code, captures) }
 }
 
@@ -121,7 +123,8 @@ pub(crate) fn set_stub_capture(heap: &mut Heap, function: Value, index: usize, v
     unsafe { heap.function_set_capture(function, index, value) }
 }
 
-/// Puts the real code of a function in place of its stub; `None` if the function has no stub, or the code reads captures.
+/// Puts the real code of a function in place of its stub; `None` if the function has no stub, or the code
+/// reads captures.
 pub(crate) fn replace_stub(heap: &mut Heap, function: Value, code: Value) -> Option<()> {
     if is_bytecode(heap, function)? || reads_captures(heap.code(code)?) {
         return None;
@@ -132,6 +135,7 @@ pub(crate) fn replace_stub(heap: &mut Heap, function: Value, code: Value) -> Opt
 
 /// Fills in a constant of code that is being loaded and has not run: the code of an inner function.
 pub(crate) fn set_constant(heap: &mut Heap, code: Value, index: usize, inner: Value) -> Option<()> {
-    // SAFETY: the loader calls this for the constants that the module declares as functions, before it hands out the code.
+    // SAFETY: the loader calls this for constants that the module declares as functions with captures, whose
+    // code is what `make-closure` expects, and before it hands out the code.
     unsafe { heap.code_set_constant(code, index, inner) }
 }

@@ -20,7 +20,7 @@ use crate::vm::Vm;
 pub(super) unsafe fn new_tag(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     match vm.heap.alloc_tag(Value::NIL) {
         Ok(tag) => {
-            // SAFETY: V3: a register of the frame.
+            // SAFETY: V3: the operand is a register of the frame at `base`.
             unsafe { *base.add(word_at(pc).a()) = tag };
             Signal::Next
         }
@@ -59,7 +59,8 @@ fn push(vm: &mut Vm, base: *mut Value, entry: Entry) -> Signal {
 /// `push-catch`.
 #[inline(never)]
 pub(super) unsafe fn push_catch(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V1, V3: the instruction at `pc` has an aux word, and its operand is a register of the frame
+    // at `base`.
     unsafe {
         let word = word_at(pc);
         let (data, want) = (*base.add(word.b()), word.c() as u8);
@@ -70,7 +71,7 @@ pub(super) unsafe fn push_catch(vm: &mut Vm, pc: *const u32, base: *mut Value) -
 /// `push-cleanup`.
 #[inline(never)]
 pub(super) unsafe fn push_cleanup(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V1: the instruction at `pc` has an aux word.
     unsafe {
         let word = word_at(pc);
         push(vm, base, Entry { pc: landing(pc), ..entry(EntryKind::Cleanup, word) })
@@ -80,7 +81,7 @@ pub(super) unsafe fn push_cleanup(vm: &mut Vm, pc: *const u32, base: *mut Value)
 /// `push-failure-cleanup`.
 #[inline(never)]
 pub(super) unsafe fn push_failure_cleanup(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V1: the instruction at `pc` has an aux word.
     unsafe {
         let word = word_at(pc);
         push(vm, base, Entry { pc: landing(pc), ..entry(EntryKind::FailureCleanup, word) })
@@ -90,7 +91,7 @@ pub(super) unsafe fn push_failure_cleanup(vm: &mut Vm, pc: *const u32, base: *mu
 /// `push-handler-case`.
 #[inline(never)]
 pub(super) unsafe fn push_handler_case(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V1, V4: the instruction at `pc` has an aux word, and its constant is there.
     unsafe {
         let word = word_at(pc);
         let data = constant(base, word.d());
@@ -101,7 +102,8 @@ pub(super) unsafe fn push_handler_case(vm: &mut Vm, pc: *const u32, base: *mut V
 /// `push-recovery`.
 #[inline(never)]
 pub(super) unsafe fn push_recovery(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V1, V3: the instruction at `pc` has an aux word, and its operand is a register of the frame
+    // at `base`.
     unsafe {
         let word = word_at(pc);
         let data = *base.add(word.b());
@@ -112,7 +114,7 @@ pub(super) unsafe fn push_recovery(vm: &mut Vm, pc: *const u32, base: *mut Value
 /// `push-handlers`.
 #[inline(never)]
 pub(super) unsafe fn push_handlers(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V3: the operand is a register of the frame at `base`.
     unsafe {
         let word = word_at(pc);
         push(vm, base, Entry { data: *base.add(word.b()), ..entry(EntryKind::Handlers, word) })
@@ -122,7 +124,7 @@ pub(super) unsafe fn push_handlers(vm: &mut Vm, pc: *const u32, base: *mut Value
 /// `push-mask`.
 #[inline(never)]
 pub(super) unsafe fn push_mask(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V3: the operand is a register of the frame at `base`.
     unsafe {
         let word = word_at(pc);
         push(vm, base, Entry { data: *base.add(word.b()), ..entry(EntryKind::Mask, word) })
@@ -132,7 +134,7 @@ pub(super) unsafe fn push_mask(vm: &mut Vm, pc: *const u32, base: *mut Value) ->
 /// `push-scope`.
 #[inline(never)]
 pub(super) unsafe fn push_scope(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V1: `pc` is at an instruction.
     unsafe {
         let word = word_at(pc);
         push(vm, base, entry(EntryKind::Scope, word))
@@ -142,7 +144,7 @@ pub(super) unsafe fn push_scope(vm: &mut Vm, pc: *const u32, base: *mut Value) -
 /// `pop-control`.
 #[inline(never)]
 pub(super) unsafe fn pop(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Signal {
-    // SAFETY: V1.
+    // SAFETY: V1: `pc` is at an instruction.
     let count = unsafe { word_at(pc) }.a();
     let control = &mut vm.scheduler.task_mut().control;
     let mut limits = 0;
@@ -161,7 +163,7 @@ pub(super) unsafe fn pop(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Sign
 /// `bind-list`.
 #[inline(never)]
 pub(super) unsafe fn bind_list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: V3: registers of the frame.
+    // SAFETY: V3: both operands are registers of the frame at `base`.
     let (symbols, values) = unsafe {
         let word = word_at(pc);
         (*base.add(word.a()), *base.add(word.b()))
@@ -207,7 +209,7 @@ pub(super) unsafe fn end_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value
 /// `throw`.
 #[inline(never)]
 pub(super) unsafe fn throw(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: V3: a register of the frame.
+    // SAFETY: V3: the tag is in a register of the frame at `base`.
     let (tag, kind) = unsafe {
         let word = word_at(pc);
         (*base.add(word.a()), word.b())
@@ -238,7 +240,7 @@ pub(super) unsafe fn throw(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sig
 /// Works on the unwinding of the running task until it lands, meets a cleanup, or a tick is due.
 ///
 /// # Safety
-/// As [`super::settle`].
+/// The contract of [`super::settle`].
 pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
     loop {
         let task = vm.scheduler.task_mut();
@@ -246,13 +248,13 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
         let height = task.control.entries.len();
         match unwinding.target {
             Target::Entry(index) | Target::Limit(index) if index + 1 >= height => {
-                // SAFETY: the entry's frame is live: entries of a frame are popped before it is left.
+                // SAFETY: the contract of `unwind` is that of `land`, and the target is the topmost entry.
                 return unsafe { land(vm, unwinding.values) };
             }
             Target::Return { entries, base } if height <= entries => {
                 task.control.bindings.truncate_from(base);
                 vm.exchange.values = unwinding.values;
-                // SAFETY: the frame is live: it lies inside those of the entries that are left, and nothing has left it.
+                // SAFETY: the base is that of a frame that the task has not left, so it lies in the stack.
                 vm.cpu.base = unsafe { vm.scheduler.task().stack.start().add(base as usize) };
                 vm.close_reserves();
                 return Signal::ReturnAll;
@@ -280,7 +282,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
                 };
                 let running = Running { pending: Some(unwinding), allowance, ..Running::default() };
                 vm.scheduler.task_mut().control.run_cleanup(entry, running);
-                // SAFETY: as above; the entry's pc is the cleanup's first instruction.
+                // SAFETY: F5: the entry's frame is live, and its pc is the cleanup's first instruction.
                 unsafe { vm.resume_at(&entry) };
                 return Signal::Reload;
             }
@@ -316,7 +318,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
 /// Ends an unwinding at the entry on top of the control stack.
 ///
 /// # Safety
-/// As [`unwind`].
+/// The contract of [`super::settle`].
 unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
     let control = &mut vm.scheduler.task_mut().control;
     let Some(entry) = control.entries.pop() else { return Signal::Reload };
@@ -325,7 +327,7 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
         // The failure waits for the end of the cleanup as the values of a protected form do.
         control.run_cleanup(entry, Running { values, ..Running::default() });
         vm.exchange.values.clear();
-        // SAFETY: as below; the entry's pc is the cleanup's first instruction.
+        // SAFETY: F5: the entry's frame is live, and its pc is the cleanup's first instruction.
         unsafe { vm.resume_at(&entry) };
         vm.close_reserves();
         return Signal::Reload;
@@ -334,7 +336,8 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
         vm.scheduler.close_limit();
     }
     vm.exchange.values = values;
-    // SAFETY: the entry's frame is live, and V10: its landing asks for no more than the registers below the window.
+    // SAFETY: F5: the entry's frame is live; V10: the landing takes its results in registers of that frame,
+    // and asks for no more than the registers below the window.
     unsafe {
         vm.resume_at(&entry);
         let window = vm.cpu.base.add(usize::from(entry.window));
@@ -352,8 +355,9 @@ impl Vm {
         if entry.kind != EntryKind::Recovery {
             return Ok(None);
         }
-        // SAFETY: the entry's frame is live and its pc that of an instruction of the frame's function (V1, V2); V10 says
-        // that this may do what that instruction does as long as the entry stands.
+        // SAFETY: F5: the entry's frame is live, and its pc that of an instruction of the frame's function;
+        // V10: this may do what that instruction does as long as the entry stands. An object's value is the
+        // address of a live header.
         unsafe {
             let base = self.scheduler.task().stack.start().add(entry.base as usize);
             let word = word_at(entry.pc.get());
@@ -376,7 +380,7 @@ impl Vm {
     /// The entry belongs to the running task, and its frame is live.
     unsafe fn resume_at(&mut self, entry: &Entry) {
         self.cpu.pc = entry.pc.get();
-        // SAFETY: by the contract, the offset lies in the stack.
+        // SAFETY: by the contract, the base of the entry lies in the stack.
         self.cpu.base = unsafe { self.scheduler.task().stack.start().add(entry.base as usize) };
     }
 

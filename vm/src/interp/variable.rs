@@ -14,7 +14,7 @@ use crate::vm::Vm;
 /// `symbol-value` of a symbol that some task has bound, or that has no value.
 #[inline(never)]
 pub(super) unsafe fn symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V3: the operand is a register of the frame at `base`; V4: the constant is there.
     unsafe {
         let word = word_at(pc);
         let symbol = constant(base, word.d());
@@ -31,7 +31,7 @@ pub(super) unsafe fn symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Value)
 /// `set-symbol-value`.
 #[inline(never)]
 pub(super) unsafe fn set_symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V3: the operand is a register of the frame at `base`; V4: the constant is there.
     unsafe {
         let word = word_at(pc);
         let symbol = constant(base, word.d());
@@ -46,7 +46,7 @@ pub(super) unsafe fn set_symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Va
 /// `bind`.
 #[inline(never)]
 pub(super) unsafe fn bind(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V3: the operand is a register of the frame at `base`; V4: the constant is there.
     unsafe {
         let word = word_at(pc);
         let symbol = constant(base, word.d());
@@ -62,7 +62,7 @@ pub(super) unsafe fn bind(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
 /// `unbind`.
 #[inline(never)]
 pub(super) unsafe fn unbind(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V1: `pc` is at an instruction.
     let count = unsafe { word_at(pc) }.a();
     let bindings = &mut vm.scheduler.task_mut().control.bindings;
     bindings.truncate(bindings.len().saturating_sub(count));
@@ -72,7 +72,8 @@ pub(super) unsafe fn unbind(vm: &mut Vm, pc: *const u32, _base: *mut Value) -> S
 /// `function-ref`.
 #[inline(never)]
 pub(super) unsafe fn function_ref(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: see the module's header.
+    // SAFETY: V3: the operand is a register of the frame at `base`; V4: the constant is a symbol, whose
+    // function is a Function with a Code.
     unsafe {
         let word = word_at(pc);
         let symbol = constant(base, word.d());
