@@ -12,8 +12,12 @@
 //!
 //! [`for_each_builtin`]: crate::for_each_builtin
 
+use std::sync::LazyLock;
+
+use rustc_hash::FxHashMap;
+
 use crate::compile::Arity;
-use crate::symbol::{CL_PACKAGE, ESL_PACKAGE};
+use crate::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol};
 
 /// Who a builtin's name is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,6 +158,19 @@ impl Builtin {
     /// Its row.
     pub fn info(self) -> &'static BuiltinInfo {
         &BUILTINS[self as usize]
+    }
+
+    /// Returns the symbol that names the builtin.
+    pub fn symbol(self) -> Symbol {
+        let info = self.info();
+        Symbol::new(&info.package().into(), info.name)
+    }
+
+    /// Returns the builtin that `symbol` names.
+    pub fn named(symbol: &Symbol) -> Option<Builtin> {
+        static BY_NAME: LazyLock<FxHashMap<Symbol, Builtin>> =
+            LazyLock::new(|| BUILTINS.iter().map(|info| (info.builtin.symbol(), info.builtin)).collect());
+        BY_NAME.get(symbol).copied()
     }
 }
 

@@ -158,6 +158,13 @@ impl fmt::Display for Want {
     }
 }
 
+impl Reg {
+    /// Returns the register `count` above this one, or the last one if there is none so far up.
+    pub fn offset(self, count: u8) -> Reg {
+        Reg(self.0.saturating_add(count))
+    }
+}
+
 impl From<Reg> for Dst {
     fn from(reg: Reg) -> Dst {
         Dst(reg.0)

@@ -104,6 +104,23 @@ pub struct Lambda {
 }
 
 impl Lambda {
+    /// Creates the text of a function of no parameters.
+    pub(crate) fn without_parameters(parent: Option<LambdaId>, span: Span, body: NodeId) -> Lambda {
+        Lambda {
+            name: None,
+            lambda_list: None,
+            documentation: None,
+            parent,
+            span,
+            required: Vec::new(),
+            optional: Vec::new(),
+            rest: None,
+            keys: None,
+            allow_other_keys: false,
+            body,
+        }
+    }
+
     /// Whether it takes required parameters only.
     pub fn is_exact(&self) -> bool {
         self.optional.is_empty() && self.rest.is_none() && self.keys.is_none()
@@ -174,7 +191,7 @@ pub struct Tagbody {
 
 /// What a binding form binds.
 #[derive(Clone, Debug)]
-pub enum Target {
+pub enum BoundVariable {
     /// A lexical variable.
     Lexical(VarId),
     /// A special variable, dynamically.
@@ -240,7 +257,7 @@ pub enum NodeKind {
         /// Whether one after another.
         sequential: bool,
         /// What is bound to what.
-        bindings: Vec<(Target, NodeId)>,
+        bindings: Vec<(BoundVariable, NodeId)>,
         /// The body.
         body: NodeId,
     },
@@ -274,7 +291,7 @@ pub enum NodeKind {
     /// Multiple values.
     Values(Vec<NodeId>),
     /// Binds variables to the values of a form around a body: targets, form, body.
-    BindValues(Vec<Target>, NodeId, NodeId),
+    BindValues(Vec<BoundVariable>, NodeId, NodeId),
     /// Calls a function with all values of the forms.
     CallValues(NodeId, Vec<NodeId>),
     /// All values of the first form, after which the second has been evaluated.

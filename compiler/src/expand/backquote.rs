@@ -1,42 +1,44 @@
 //! Backquote: templates of lists and vectors.
 //!
-//! The reader gives `` `x `` as `(%backquote x)`, `,x` as `(%unquote x)` and `,@x` as `(%unquote-splicing x)`. A
-//! template becomes calls of `list`, `list*`, `cons`, `append` and `vector` that build it; parts without a comma stay
-//! constants, shared by all that the template makes. A backquote within a backquote is data of the outer one, but for
-//! commas that belong to that.
+//! The reader represents `` `x `` as `(%backquote x)`, `,x` as `(%unquote x)` and `,@x` as `(%unquote-splicing x)`. A
+//! template becomes calls of `list`, `list*`, `cons`, `append` and `vector` that build it. Parts without a comma stay
+//! constants, shared by everything that the template makes. A backquote within a backquote is data of the outer one,
+//! except for commas that belong to the outer one.
 //!
-//! Templates are walked with an explicit stack: they may be as deep as the reader allows.
+//! Templates are walked with an explicit stack, since they may be as deep as the reader allows.
 
 use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::symbol::Symbol;
 
+use super::expander::Expander;
 use super::form::{Checked, Form, Make, is_constant, is_esl, operator};
-use super::machine::{Job, Machine, To};
+use super::job::{Job, To};
 use crate::diagnostic::code;
 
-/// What a part of a template is.
+/// Meaning of a part of a template.
 #[derive(Debug)]
 enum Piece {
-    /// Itself.
+    /// The part itself.
     Constant(Datum),
-    /// The values of these forms; one, except after `,` with several arguments within a nested backquote.
+    /// The values of these forms: one form, except after `,` with several arguments within a nested backquote.
     Forms(Vec<Datum>),
-    /// The elements of the lists that these forms give.
+    /// The elements of the lists that these forms return.
     Splices(Vec<Datum>),
 }
 
-/// Something to be done in walking a template.
-enum Task {
-    /// Look at a part at a level of backquotes; leaves a piece.
+/// A step of the walk over a template.
+enum TemplateStep {
+    /// Visits a part at a level of backquotes; leaves a piece.
     Visit(Datum, usize),
-    /// Make a list of so many newest pieces, and of one more for the tail if there is a dot.
+    /// Makes a list of the `count` newest pieces, and of one more for the tail if there is a dot.
     List { original: Datum, count: usize, is_dotted: bool },
-    /// Make a vector of so many newest pieces.
+    /// Makes a vector of the `count` newest pieces.
     Vector { original: Datum, count: usize },
 }
 
 /// `(%backquote template)`
-pub(super) fn backquote(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn backquote(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(1..=1, "takes one template")?;
     let make = Make(to.span);
     let built = match template(&form.args[0], make) {
@@ -47,32 +49,32 @@ pub(super) fn backquote(machine: &mut Machine, _: &mut dyn Environment, form: Fo
             return Err(Box::new(code::MISPLACED_SPLICE.at(to.span, message)));
         }
     };
-    machine.schedule([Job::Expand(built, to)]);
+    expander.schedule([Job::Expand(built, to)]);
     Ok(())
 }
 
-/// `(%unquote form)` where there is no backquote.
-pub(super) fn misplaced_unquote(_: &mut Machine, _: &mut dyn Environment, form: Form, _: To) -> Checked {
+/// `(%unquote form)` outside of a backquote.
+pub(super) fn misplaced_unquote(_: &mut Expander, _: &mut dyn Environment, form: Form, _: To) -> Checked {
     let message = "this comma belongs to no backquote";
     Err(Box::new(code::COMMA_OUTSIDE_BACKQUOTE.at(form.span, message)))
 }
 
 fn template(datum: &Datum, make: Make) -> Piece {
-    let mut tasks = vec![Task::Visit(datum.clone(), 1)];
+    let mut steps = vec![TemplateStep::Visit(datum.clone(), 1)];
     let mut pieces: Vec<Piece> = Vec::new();
-    while let Some(task) = tasks.pop() {
-        match task {
-            Task::Visit(datum, level) => {
-                if let Some(piece) = visit(&datum, level, &mut tasks) {
+    while let Some(step) = steps.pop() {
+        match step {
+            TemplateStep::Visit(datum, level) => {
+                if let Some(piece) = visit(&datum, level, &mut steps) {
                     pieces.push(piece);
                 }
             }
-            Task::List { original, count, is_dotted } => {
+            TemplateStep::List { original, count, is_dotted } => {
                 let tail = if is_dotted { pieces.pop() } else { None };
                 let items = pieces.split_off(pieces.len() - count);
                 pieces.push(list(original, items, tail, make));
             }
-            Task::Vector { original, count } => {
+            TemplateStep::Vector { original, count } => {
                 let items = pieces.split_off(pieces.len() - count);
                 pieces.push(vector(original, items, make));
             }
@@ -86,12 +88,12 @@ fn is_operation(datum: &Datum, name: &str) -> bool {
     operator(datum).is_some_and(|symbol| is_esl(symbol, name))
 }
 
-/// Looks at a part: gives its piece, or puts down the tasks that will.
-fn visit(datum: &Datum, level: usize, tasks: &mut Vec<Task>) -> Option<Piece> {
+/// Visits a part: returns its piece, or schedules the steps that leave it.
+fn visit(datum: &Datum, level: usize, steps: &mut Vec<TemplateStep>) -> Option<Piece> {
     match datum.kind() {
         DatumKind::Vector(items) => {
-            tasks.push(Task::Vector { original: datum.clone(), count: items.len() });
-            tasks.extend(items.iter().rev().map(|item| Task::Visit(item.clone(), level)));
+            steps.push(TemplateStep::Vector { original: datum.clone(), count: items.len() });
+            steps.extend(items.iter().rev().map(|item| TemplateStep::Visit(item.clone(), level)));
             None
         }
         DatumKind::Cons(_, args) => {
@@ -101,25 +103,25 @@ fn visit(datum: &Datum, level: usize, tasks: &mut Vec<Task>) -> Option<Piece> {
                 let forms = args.elements().cloned().collect();
                 return Some(if is_splice { Piece::Splices(forms) } else { Piece::Forms(forms) });
             }
-            // Within a nested backquote, a comma is data around parts of the level below.
+            // Within a nested backquote, a comma is data, and the parts inside it belong to the level below.
             let inner = match () {
                 () if is_unquote => level - 1,
                 () if is_operation(datum, "%BACKQUOTE") => level + 1,
                 () => level,
             };
-            visit_list(datum, level, inner, tasks);
+            visit_list(datum, level, inner, steps);
             None
         }
         _ => Some(Piece::Constant(datum.clone())),
     }
 }
 
-fn visit_list(datum: &Datum, level: usize, inner: usize, tasks: &mut Vec<Task>) {
+fn visit_list(datum: &Datum, level: usize, inner: usize, steps: &mut Vec<TemplateStep>) {
     let mut items = Vec::new();
     let mut rest = datum;
     let mut tail = None;
     while let Some((item, next)) = rest.as_cons() {
-        // `(a . ,b)` reads as `(a %unquote b)`: from the second element on, such a rest is what follows the dot.
+        // `(a . ,b)` reads as `(a %unquote b)`: from the second element on, such a rest is the tail behind a dot.
         let is_tail =
             ["%UNQUOTE", "%UNQUOTE-SPLICING", "%BACKQUOTE"].iter().any(|name| is_operation(rest, name))
                 && next.as_cons().is_some_and(|(_, end)| end.is_nil());
@@ -128,15 +130,15 @@ fn visit_list(datum: &Datum, level: usize, inner: usize, tasks: &mut Vec<Task>) 
             break;
         }
         let level = if items.is_empty() { level } else { inner };
-        items.push(Task::Visit(item.clone(), level));
+        items.push(TemplateStep::Visit(item.clone(), level));
         rest = next;
     }
     if tail.is_none() && !rest.is_nil() {
         tail = Some(rest.clone());
     }
-    tasks.push(Task::List { original: datum.clone(), count: items.len(), is_dotted: tail.is_some() });
-    tasks.extend(tail.map(|tail| Task::Visit(tail, inner)));
-    tasks.extend(items.into_iter().rev());
+    steps.push(TemplateStep::List { original: datum.clone(), count: items.len(), is_dotted: tail.is_some() });
+    steps.extend(tail.map(|tail| TemplateStep::Visit(tail, inner)));
+    steps.extend(items.into_iter().rev());
 }
 
 fn quote(datum: Datum, make: Make) -> Datum {
@@ -150,7 +152,7 @@ fn quote(datum: Datum, make: Make) -> Datum {
     }
 }
 
-/// A list of pieces; a constant if all of them are.
+/// Makes a list of pieces: a constant if all of them are.
 fn list(original: Datum, items: Vec<Piece>, tail: Option<Piece>, make: Make) -> Piece {
     // The constant end of the list is shared.
     let mut constant_end = match &tail {
@@ -175,13 +177,13 @@ fn list(original: Datum, items: Vec<Piece>, tail: Option<Piece>, make: Make) -> 
             (!rest.is_nil()).then(|| quote(rest.clone(), make))
         }
         (None, Some(Piece::Forms(mut forms))) if forms.len() == 1 => Some(forms.swap_remove(0)),
-        // `(a . ,@b)` has no meaning; the reader does not let it pass. Several forms cannot stand for one tail.
+        // The reader rejects `(a . ,@b)`, which has no meaning. Several forms cannot stand for one tail.
         (None, Some(Piece::Forms(forms) | Piece::Splices(forms))) => Some(make.call_cl("APPEND", forms)),
         (None, Some(Piece::Constant(_)) | None) => None,
     };
     let kept = constant_end.unwrap_or(items.len());
 
-    // Runs of items and spliced lists alternate; the last run takes the end along.
+    // Runs of items alternate with spliced lists; the last run includes the end.
     let mut parts: Vec<Datum> = Vec::new();
     let mut run: Vec<Datum> = Vec::new();
     for piece in items.into_iter().take(kept) {
@@ -224,17 +226,16 @@ fn vector(original: Datum, items: Vec<Piece>, make: Make) -> Piece {
         let forms: Vec<Datum> = forms.collect();
         return Piece::Forms(vec![make.call_cl("VECTOR", forms)]);
     }
-    // Constant elements at the end are taken from a list that is made for it.
+    // A list of the same elements serves as the constant end.
     let constants: Vec<Datum> = match original.kind() {
         DatumKind::Vector(items) => items.to_vec(),
         _ => Vec::new(),
     };
     let as_list = Datum::list(constants, make.0);
     match list(as_list, items, None, make) {
-        Piece::Forms(mut forms) if forms.len() == 1 => Piece::Forms(vec![make.esl(
-            "%APPLY-GLOBAL",
-            [make.symbol(&esl_bytecode::symbol::Symbol::cl("VECTOR")), forms.swap_remove(0)],
-        )]),
+        Piece::Forms(mut forms) if forms.len() == 1 => Piece::Forms(vec![
+            make.esl("%APPLY-GLOBAL", [make.symbol(&Symbol::cl("VECTOR")), forms.swap_remove(0)]),
+        ]),
         other => other,
     }
 }

@@ -1,48 +1,35 @@
-//! Calls: of local functions, builtins, global functions, and of what a form evaluates to.
+//! Calls: of local functions, builtins, global functions, and of the value of a form.
 
-use std::sync::LazyLock;
-
-use esl_bytecode::builtin::{BUILTINS, Builtin};
+use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::{Arity, Environment, Global, GlobalFunction, MacroRef};
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::symbol::Symbol;
-use rustc_hash::FxHashMap;
 
+use super::expander::Expander;
 use super::form::{Checked, Form, Make, arguments, constant_value, is_cl_form, name};
-use super::lambda::{FunctionName, out_of_reach};
-use super::lambda_list::{Kind, LambdaList};
-use super::machine::{Job, Machine, To};
-use super::scope::{Function, Visible};
-use super::unit::{Name, accepts, wrong_count};
-use crate::core::{Callee, NodeId, NodeKind};
-use crate::diagnostic::code;
+use super::function::{FunctionName, WrittenName};
+use super::global::{accepts, wrong_count};
+use super::job::{Job, To, Waiting};
+use super::lambda_list::{LambdaList, LambdaListKind};
+use super::scope::{FunctionMeaning, Visible};
+use crate::core::{Callee, NodeId, NodeKind, VarId};
 
-/// The builtins by name.
-static BY_NAME: LazyLock<FxHashMap<Symbol, Builtin>> = LazyLock::new(|| {
-    let symbols = BUILTINS.iter().map(|info| (Symbol::new(&info.package().into(), info.name), info.builtin));
-    symbols.collect()
-});
-
-/// The builtin that `symbol` names.
-pub(super) fn builtin(symbol: &Symbol) -> Option<Builtin> {
-    BY_NAME.get(symbol).copied()
-}
-
-/// How many arguments a call passes in registers. Of more, the rest goes as a list.
+/// Arguments that a call passes in registers. Further arguments are passed as a list.
 pub(super) const DIRECT_ARGUMENTS: usize = 60;
 
-/// What is called, as far as its name tells.
-enum Target {
-    Local(crate::core::VarId, Arity),
+/// What a call designates as its function.
+enum FunctionDesignator {
+    /// A local function, kept in this variable.
+    Local(VarId, Arity),
     /// A global function, by name.
-    Global(FunctionName),
-    /// The function that a symbol names when the call is made: nothing can be said of it before.
-    Named(FunctionName),
-    /// What a form evaluates to.
+    Global(WrittenName),
+    /// The function that a symbol names when the call is made, unknown until then.
+    Named(WrittenName),
+    /// The value of a form.
     Form(Datum),
 }
 
-impl Machine {
+impl Expander {
     /// Expands a form that begins with a symbol.
     pub(super) fn expand_operation(
         &mut self,
@@ -51,21 +38,21 @@ impl Machine {
         to: To,
     ) -> Checked {
         match self.scope.function(&form.operator, self.level()) {
-            Visible::Is(Function::Local(variable, arity)) => {
-                self.call(environment, Target::Local(variable, arity), &form.args, &form, to)
+            Visible::Is(FunctionMeaning::Local(variable, arity)) => {
+                self.call(environment, FunctionDesignator::Local(variable, arity), &form.args, &form, to)
             }
-            Visible::Is(Function::Macro(Some(function))) => {
+            Visible::Is(FunctionMeaning::Macro(Some(function))) => {
                 self.stop_for_form(MacroRef::Local(function), &form, false, to)
             }
-            Visible::Is(Function::Macro(None)) => {
+            Visible::Is(FunctionMeaning::Macro(None)) => {
                 self.fill(to, NodeKind::Constant(Datum::nil(to.span)));
                 Ok(())
             }
             Visible::OutOfReach => {
-                let function = FunctionName::of(&Make(form.span).symbol(&form.operator));
-                Err(out_of_reach(&form, &function.expect("a symbol names a function")))
+                let named = Make(form.span).symbol(&form.operator);
+                Err(WrittenName::symbol(&form.operator, named).out_of_reach(&form))
             }
-            Visible::No => match super::operator::find(&form.operator) {
+            Visible::No => match (self.find_operator)(&form.operator) {
                 Some(operator) => operator(self, environment, form, to),
                 None => self.global_operation(environment, form, to),
             },
@@ -74,7 +61,7 @@ impl Machine {
 
     fn global_operation(&mut self, environment: &mut dyn Environment, form: Form, to: To) -> Checked {
         let global = environment.global(&form.operator);
-        if self.unit.is_broken_macro(&form.operator) {
+        if self.globals.is_broken_macro(&form.operator) {
             self.fill(to, NodeKind::Constant(Datum::nil(to.span)));
             return Ok(());
         }
@@ -88,20 +75,28 @@ impl Machine {
         if let Some(compiler_macro) = environment.property(&form.operator, &Symbol::esl("%COMPILER-MACRO"))
             && let Some(compiler_macro) = compiler_macro.as_symbol()
         {
-            return self.stop_for_call(compiler_macro.clone(), form, to);
+            let function = MacroRef::Global(compiler_macro.clone());
+            let waiting = |origin| Waiting::Call(form.clone(), To { origin, ..to });
+            return self.stop_for_macro(function, &form, true, to.origin, waiting);
         }
         if global.locked && global.instead.is_some() {
-            // What stands in it need not be forms: it is left out of the call, which fails in any case.
-            self.unit.note_call(Name::plain(&form.operator), None, form.span, form.span);
+            // The arguments need not be forms. They are left out of the call, which fails in any case.
+            self.globals.note_call(FunctionName::plain(&form.operator), None, form.span, form.span);
             self.fill(to, NodeKind::Call(Callee::Global(form.operator.clone()), Vec::new()));
             return Ok(());
         }
         let named = form.datum.as_cons().map_or(&form.datum, |(head, _)| head);
-        let function = FunctionName::of(named).expect("a symbol names a function");
-        self.call(environment, Target::Global(function), &form.args, &form, to)
+        let function = WrittenName::symbol(&form.operator, named.clone());
+        self.call(environment, FunctionDesignator::Global(function), &form.args, &form, to)
     }
 
-    /// Opens up calls that have nodes of their own: accessors of structures, and what they are defined with.
+    /// Stops for the expansion of a macro call in a form.
+    fn stop_for_form(&mut self, function: MacroRef, form: &Form, is_standard: bool, to: To) -> Checked {
+        let waiting = |origin| Waiting::Form(To { origin, ..to });
+        self.stop_for_macro(function, form, is_standard, to.origin, waiting)
+    }
+
+    /// Opens up calls that have nodes of their own: accessors of structures, and the functions they are defined with.
     fn inline(&mut self, global: &Global, form: &Form, to: To) -> bool {
         let kind = match (&global.accessor, form.args.as_slice()) {
             (Some(accessor), [instance]) => {
@@ -109,7 +104,7 @@ impl Machine {
                 self.schedule([job]);
                 NodeKind::Slot(accessor.class.clone(), accessor.slot, node)
             }
-            _ => match (builtin(&form.operator), form.args.as_slice()) {
+            _ => match (Builtin::named(&form.operator), form.args.as_slice()) {
                 (Some(Builtin::SlotOf), [class, index, instance]) => {
                     let Some((class, index)) = slot(class, index) else { return false };
                     let (node, job) = self.part(instance.clone(), to);
@@ -145,14 +140,14 @@ impl Machine {
     fn call(
         &mut self,
         environment: &mut dyn Environment,
-        target: Target,
+        target: FunctionDesignator,
         args: &[Datum],
         form: &Form,
         to: To,
     ) -> Checked {
         let count = args.len();
         let (callee, mut jobs) = match target {
-            Target::Local(variable, arity) => {
+            FunctionDesignator::Local(variable, arity) => {
                 self.note_read(variable, to);
                 if !accepts(arity, u32::try_from(count).unwrap_or(u32::MAX)) {
                     let function = name(&self.core().variables[variable.index()].name);
@@ -160,11 +155,11 @@ impl Machine {
                 }
                 (Callee::Local(variable), Vec::new())
             }
-            Target::Global(function) => {
+            FunctionDesignator::Global(function) => {
                 (self.global_callee(environment, &function, Some(count), form, to)?, Vec::new())
             }
-            Target::Named(function) => (named_callee(&function, Some(count)), Vec::new()),
-            Target::Form(function) => {
+            FunctionDesignator::Named(function) => (named_callee(&function, Some(count)), Vec::new()),
+            FunctionDesignator::Form(function) => {
                 let (node, job) = self.part(function, to);
                 (Callee::Value(node), vec![job])
             }
@@ -179,20 +174,20 @@ impl Machine {
         Ok(())
     }
 
-    /// The global function called `function`; with the number of its arguments if that is known.
+    /// Returns the global function `function` as a callee. `count` is the number of arguments, if that is known.
     fn global_callee(
         &mut self,
         environment: &mut dyn Environment,
-        function: &FunctionName,
+        function: &WrittenName,
         count: Option<usize>,
         form: &Form,
         to: To,
     ) -> Checked<Callee> {
-        check_names_function(function, form)?;
-        let builtin = if function.name.is_setf { None } else { builtin(&function.cell) };
+        function.check_callable(form)?;
+        let builtin = if function.name.is_setf { None } else { Builtin::named(&function.cell) };
         let Some(builtin) = builtin else {
             let named = form.at(function.datum.span());
-            self.unit.note_call(function.name.clone(), count, named, to.span);
+            self.globals.note_call(function.name.clone(), count, named, to.span);
             return Ok(Callee::Global(function.cell.clone()));
         };
         let arity = builtin.info().arity;
@@ -234,7 +229,7 @@ impl Machine {
         let Some((list, body)) = parts.split_first() else {
             return Err(form.malformed_at(lambda.span(), "needs a lambda list"));
         };
-        let parsed = LambdaList::parse(list, Kind::Ordinary, form.at(list.span()))?;
+        let parsed = LambdaList::parse(list, LambdaListKind::Ordinary, form.at(list.span()))?;
         let arity = parsed.arity();
         if !accepts(arity, u32::try_from(args.len()).unwrap_or(u32::MAX)) {
             self.report(wrong_count("this function", arity, args.len() as u32, to.span), to.origin);
@@ -248,67 +243,60 @@ impl Machine {
             self.schedule([Job::Expand(form, to)]);
             return Ok(());
         }
-        self.call(environment, Target::Form(lambda.clone()), args, form, to)
+        self.call(environment, FunctionDesignator::Form(lambda.clone()), args, form, to)
     }
 
-    /// What the function argument of `funcall` or `apply` stands for.
+    /// Returns what the function argument of `funcall` or `apply` designates.
     fn function_argument(
         &self,
         environment: &dyn Environment,
         argument: &Datum,
         form: &Form,
-    ) -> Checked<Target> {
-        let other = || Ok(Target::Form(argument.clone()));
+    ) -> Checked<FunctionDesignator> {
+        let other = || Ok(FunctionDesignator::Form(argument.clone()));
         let is_function = is_cl_form(argument, "FUNCTION");
         if !is_function && !is_cl_form(argument, "QUOTE") {
             return other();
         }
         let named = arguments(argument).unwrap_or_default();
         let [named] = named.as_slice() else { return other() };
-        let Some(function) = FunctionName::of(named) else { return other() };
+        let Some(function) = WrittenName::of(named) else { return other() };
         if is_function {
             match self.scope.function(&function.cell, self.level()) {
-                Visible::Is(Function::Local(variable, arity)) => return Ok(Target::Local(variable, arity)),
-                Visible::Is(Function::Macro(_)) => return other(),
-                Visible::OutOfReach => return Err(out_of_reach(form, &function)),
+                Visible::Is(FunctionMeaning::Local(variable, arity)) => {
+                    return Ok(FunctionDesignator::Local(variable, arity));
+                }
+                Visible::Is(FunctionMeaning::Macro(_)) => return other(),
+                Visible::OutOfReach => return Err(function.out_of_reach(form)),
                 Visible::No => {}
             }
         } else if function.name.is_setf || function.cell.is_cl("T") {
             return other();
         }
         let is_operator = !function.name.is_setf
-            && builtin(&function.cell).is_none()
-            && (super::operator::find(&function.cell).is_some()
-                || self.is_macro(environment, &function.cell));
+            && Builtin::named(&function.cell).is_none()
+            && (self.is_operator(&function.cell) || self.is_macro(environment, &function.cell));
         Ok(match (is_operator, is_function) {
-            (true, _) => Target::Form(argument.clone()),
-            (false, true) => Target::Global(function),
-            (false, false) => Target::Named(function),
+            (true, _) => FunctionDesignator::Form(argument.clone()),
+            (false, true) => FunctionDesignator::Global(function),
+            (false, false) => FunctionDesignator::Named(function),
         })
     }
 }
 
-/// What a symbol names when the call is made. Builtins stay what they are.
-fn named_callee(function: &FunctionName, count: Option<usize>) -> Callee {
+/// Returns what a symbol names when the call is made. A builtin cannot change until then.
+fn named_callee(function: &WrittenName, count: Option<usize>) -> Callee {
     let fits = |builtin: &Builtin| {
         count.is_none_or(|count| accepts(builtin.info().arity, u32::try_from(count).unwrap_or(u32::MAX)))
     };
-    match builtin(&function.cell).filter(fits) {
+    match Builtin::named(&function.cell).filter(fits) {
         Some(builtin) => Callee::Builtin(builtin),
         None => Callee::Global(function.cell.clone()),
     }
 }
 
-/// Refuses `t` as the name of a global function: it is no symbol to the module format.
-pub(super) fn check_names_function(function: &FunctionName, form: &Form) -> Checked {
-    if function.cell.is_cl("T") {
-        let message = "`t` is a constant and cannot be called";
-        return Err(Box::new(code::MALFORMED_FORM.at(form.at(function.datum.span()), message)));
-    }
-    Ok(())
-}
-
-/// The arguments of a call that passes most of them in a list, the last argument: `a … (list* b … (list z …))`.
+/// Returns the arguments of a call that passes most of them in a list, its last argument:
+/// `a … (list* b … (list z …))`.
 fn spread(args: &[Datum], make: Make) -> Vec<Datum> {
     let (direct, rest) = args.split_at(DIRECT_ARGUMENTS / 2);
     let mut chunks = rest.rchunks(DIRECT_ARGUMENTS - 1);
@@ -320,7 +308,7 @@ fn spread(args: &[Datum], make: Make) -> Vec<Datum> {
     direct.iter().cloned().chain([list]).collect()
 }
 
-/// A quoted class name and a literal index.
+/// Returns a class and an index, if they are a quoted symbol and a literal.
 fn slot(class: &Datum, index: &Datum) -> Option<(Symbol, u16)> {
     let index = match index.kind() {
         DatumKind::Integer(index) => u16::try_from(index).ok()?,
@@ -329,7 +317,7 @@ fn slot(class: &Datum, index: &Datum) -> Option<(Symbol, u16)> {
     Some((quoted_symbol(class)?, index))
 }
 
-/// The symbol that a form quotes.
+/// Returns the symbol that a form quotes.
 pub(super) fn quoted_symbol(form: &Datum) -> Option<Symbol> {
     if !is_cl_form(form, "QUOTE") {
         return None;
@@ -339,55 +327,59 @@ pub(super) fn quoted_symbol(form: &Datum) -> Option<Symbol> {
 
 /// `(funcall function argument*)`
 pub(super) fn funcall(
-    machine: &mut Machine,
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: Form,
     to: To,
 ) -> Checked {
     let Some((function, args)) = form.args.split_first() else {
-        return as_function(machine, environment, &form, to);
+        return as_function(expander, environment, &form, to);
     };
     if let Some(lambda) = lambda_expression(function) {
-        return machine.lambda_call(environment, &lambda, args, &form, to);
+        return expander.lambda_call(environment, &lambda, args, &form, to);
     }
-    let target = machine.function_argument(environment, function, &form)?;
-    machine.call(environment, target, args, &form, to)
+    let target = expander.function_argument(environment, function, &form)?;
+    expander.call(environment, target, args, &form, to)
 }
 
 /// `(apply function argument* list)`
-pub(super) fn apply(machine: &mut Machine, environment: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn apply(
+    expander: &mut Expander,
+    environment: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
     if form.args.len() < 2 || form.args.len() > DIRECT_ARGUMENTS {
-        return as_function(machine, environment, &form, to);
+        return as_function(expander, environment, &form, to);
     }
-    let (callee, mut jobs) = match machine.function_argument(environment, &form.args[0], &form)? {
-        Target::Local(variable, _) => {
-            machine.note_read(variable, to);
+    let (callee, mut jobs) = match expander.function_argument(environment, &form.args[0], &form)? {
+        FunctionDesignator::Local(variable, _) => {
+            expander.note_read(variable, to);
             (Callee::Local(variable), Vec::new())
         }
-        Target::Global(function) => {
-            (machine.global_callee(environment, &function, None, &form, to)?, Vec::new())
+        FunctionDesignator::Global(function) => {
+            (expander.global_callee(environment, &function, None, &form, to)?, Vec::new())
         }
-        Target::Named(function) => (named_callee(&function, None), Vec::new()),
-        Target::Form(function) => {
-            let (node, job) = machine.part(function, to);
+        FunctionDesignator::Named(function) => (named_callee(&function, None), Vec::new()),
+        FunctionDesignator::Form(function) => {
+            let (node, job) = expander.part(function, to);
             (Callee::Value(node), vec![job])
         }
     };
-    let (nodes, arguments) = machine.children(form.args[1..].to_vec(), to);
+    let (nodes, arguments) = expander.children(form.args[1..].to_vec(), to);
     jobs.extend(arguments);
-    machine.fill(to, NodeKind::Apply(callee, nodes));
-    machine.schedule(jobs);
+    expander.fill(to, NodeKind::Apply(callee, nodes));
+    expander.schedule(jobs);
     Ok(())
 }
 
 /// Expands a call of `funcall` or `apply` as one of an ordinary function.
-fn as_function(machine: &mut Machine, environment: &mut dyn Environment, form: &Form, to: To) -> Checked {
-    let function =
-        FunctionName::of(&Make(form.span).symbol(&form.operator)).expect("a symbol names a function");
-    machine.call(environment, Target::Global(function), &form.args, form, to)
+fn as_function(expander: &mut Expander, environment: &mut dyn Environment, form: &Form, to: To) -> Checked {
+    let function = WrittenName::symbol(&form.operator, Make(form.span).symbol(&form.operator));
+    expander.call(environment, FunctionDesignator::Global(function), &form.args, form, to)
 }
 
-/// The `lambda` expression that a form is or stands for.
+/// Returns the `lambda` expression that a form is or quotes by `#'`.
 fn lambda_expression(form: &Datum) -> Option<Datum> {
     if is_cl_form(form, "LAMBDA") {
         return Some(form.clone());
@@ -402,9 +394,9 @@ fn lambda_expression(form: &Datum) -> Option<Datum> {
     }
 }
 
-/// `(%call-global name argument*)`: calls the global function of that name, whatever is local.
+/// `(%call-global name argument*)`: calls the global function of that name, even where a local one has it.
 pub(super) fn call_global(
-    machine: &mut Machine,
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: Form,
     to: To,
@@ -413,33 +405,33 @@ pub(super) fn call_global(
     let Some((named, args)) = form.args.split_first() else {
         return Err(form.malformed(shape));
     };
-    let Some(function) = FunctionName::of(named) else {
+    let Some(function) = WrittenName::of(named) else {
         return Err(form.malformed_at(named.span(), shape));
     };
     if !function.name.is_setf {
         let call = Form { operator: function.cell.clone(), args: args.to_vec(), ..form.clone() };
         let global = environment.global(&function.cell);
-        if machine.inline(&global, &call, to) {
+        if expander.inline(&global, &call, to) {
             return Ok(());
         }
     }
-    machine.call(environment, Target::Global(function), args, &form, to)
+    expander.call(environment, FunctionDesignator::Global(function), args, &form, to)
 }
 
-/// `(%apply-global name argument* list)`: as `%call-global`, the last argument a list of arguments.
+/// `(%apply-global name argument* list)`: as `%call-global`; the last argument is a list of arguments.
 pub(super) fn apply_global(
-    machine: &mut Machine,
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: Form,
     to: To,
 ) -> Checked {
     form.takes(2..=DIRECT_ARGUMENTS, "needs the name of a function and a list of arguments")?;
-    let Some(function) = FunctionName::of(&form.args[0]) else {
+    let Some(function) = WrittenName::of(&form.args[0]) else {
         return Err(form.malformed_at(form.args[0].span(), "needs the name of a function"));
     };
-    let callee = machine.global_callee(environment, &function, None, &form, to)?;
-    let (nodes, jobs): (Vec<NodeId>, Vec<Job>) = machine.children(form.args[1..].to_vec(), to);
-    machine.fill(to, NodeKind::Apply(callee, nodes));
-    machine.schedule(jobs);
+    let callee = expander.global_callee(environment, &function, None, &form, to)?;
+    let (nodes, jobs): (Vec<NodeId>, Vec<Job>) = expander.children(form.args[1..].to_vec(), to);
+    expander.fill(to, NodeKind::Apply(callee, nodes));
+    expander.schedule(jobs);
     Ok(())
 }

@@ -1,5 +1,5 @@
-//! Definitions: `defun`, `defmacro`, `declaim`, `load-time-value`, and the rule that what belongs to the language
-//! stays as it is.
+//! Definitions: `defun`, `defmacro`, `declaim`, `load-time-value`; and the rule that programs cannot redefine names of
+//! the language.
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::{Environment, InternError};
@@ -8,17 +8,18 @@ use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
-use super::body::Body;
 use super::call::quoted_symbol;
 use super::chunk::Purpose;
+use super::expander::Expander;
 use super::form::{Checked, Form, Make, fresh, name, quoted};
-use super::lambda::{FunctionName, Parts};
-use super::machine::{Job, Machine, To};
+use super::function::{Body, FunctionParts, WrittenName};
+use super::job::{Job, To};
+use super::origin::OriginId;
 use crate::core::{Callee, NodeKind};
 use crate::diagnostic::code;
 
-impl Machine {
-    /// Refuses to define `symbol` as a function or macro if it belongs to the language.
+impl Expander {
+    /// Refuses a definition of `symbol` as a function or macro if the name belongs to the language.
     pub(super) fn check_definable(
         &self,
         environment: &dyn Environment,
@@ -28,23 +29,23 @@ impl Machine {
         if environment.global(symbol).locked { Err(locked(symbol, span)) } else { Ok(()) }
     }
 
-    /// As [`Machine::check_definable`] for a local definition, which may also come from a macro of the library.
+    /// As [`Expander::check_definable`], for a local definition; macros of the library may make those.
     pub(super) fn check_locally_definable(
         &self,
         environment: &dyn Environment,
         symbol: &Symbol,
         span: Span,
-        origin: Option<u32>,
+        origin: Option<OriginId>,
     ) -> Checked {
-        if self.is_of_library(span, origin) {
+        if self.origins.is_of_library(span, origin) {
             Ok(())
         } else {
             self.check_definable(environment, symbol, span)
         }
     }
 
-    /// Refuses calls of the functions that define, if what they define belongs to the language. What a definition inside
-    /// another form defines is known at the end of the unit.
+    /// Refuses calls of the defining functions with a name of the language. Notes variables that they define inside other
+    /// forms, which matters at the end of the unit.
     pub(super) fn check_defining(
         &mut self,
         environment: &dyn Environment,
@@ -63,7 +64,7 @@ impl Machine {
             return Err(locked(&symbol, form.span));
         }
         if matches!(builtin, Builtin::ProclaimSpecial | Builtin::DefineConstant) {
-            self.unit.note_variable_definition(&symbol);
+            self.globals.note_variable_definition(&symbol);
         }
         Ok(())
     }
@@ -75,85 +76,94 @@ fn locked(symbol: &Symbol, span: Span) -> Box<Diagnostic> {
 }
 
 /// `(defun name lambda-list . body)`
-pub(super) fn defun(machine: &mut Machine, environment: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn defun(
+    expander: &mut Expander,
+    environment: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
     let shape = "needs a name and a lambda list";
-    let Some(function) = form.args.first().and_then(FunctionName::of) else {
+    let Some(function) = form.args.first().and_then(WrittenName::of) else {
         let span = form.args.first().map_or(form.span, Datum::span);
         return Err(form.malformed_at(span, shape));
     };
-    let outcome = define_function(machine, environment, &form, &function, to);
+    let outcome = define_function(expander, environment, &form, &function, to);
     if outcome.is_err() {
-        // Calls of it are not to be blamed for what is wrong here.
-        machine.unit.note_broken_function(function.name);
+        // Its calls are not checked: the fault is here.
+        expander.globals.note_broken_function(function.name);
     }
     outcome
 }
 
 fn define_function(
-    machine: &mut Machine,
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: &Form,
-    function: &FunctionName,
+    function: &WrittenName,
     to: To,
 ) -> Checked {
-    machine.check_definable(environment, &function.name.symbol, form.at(function.datum.span()))?;
+    expander.check_definable(environment, &function.name.symbol, form.at(function.datum.span()))?;
     form.takes(2..=usize::MAX, "needs a name and a lambda list")?;
-    let parts = Parts {
+    let parts = FunctionParts {
         name: Some(&function.datum),
         block: Some(&function.block()),
         list: &form.args[1],
         body: &form.args[2..],
     };
-    let text = machine.lambda_text(environment, parts, form, to.origin)?;
-    machine.unit.note_definition(function.name.clone(), text.arity());
+    let text = expander.lambda_text(environment, parts, form, to.origin)?;
+    expander.globals.note_definition(function.name.clone(), text.arity());
 
     let mut call = to;
     if function.name.is_setf {
-        call = machine.child(to);
-        let value = machine.child(to);
-        machine.fill(to, NodeKind::Progn(vec![call.node, value.node]));
-        machine.fill(value, NodeKind::Constant(function.datum.clone()));
+        call = expander.child(to);
+        let value = expander.child(to);
+        expander.fill(to, NodeKind::Progn(vec![call.node, value.node]));
+        expander.fill(value, NodeKind::Constant(function.datum.clone()));
     }
-    let cell = machine.child(call);
-    machine.fill(cell, NodeKind::Constant(Datum::symbol(function.cell.clone(), to.span)));
-    let closure = machine.child(call);
-    machine.fill(call, NodeKind::Call(Callee::Builtin(Builtin::SetFunction), vec![cell.node, closure.node]));
-    machine.closure(text, closure);
+    let cell = expander.child(call);
+    expander.fill(cell, NodeKind::Constant(Datum::symbol(function.cell.clone(), to.span)));
+    let closure = expander.child(call);
+    expander.fill(call, NodeKind::Call(Callee::Builtin(Builtin::SetFunction), vec![cell.node, closure.node]));
+    expander.closure(text, closure);
     Ok(())
 }
 
 /// `(defmacro name lambda-list . body)`
 pub(super) fn defmacro(
-    machine: &mut Machine,
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: Form,
     to: To,
 ) -> Checked {
     let symbol = form.symbol(0, "needs a name and a lambda list")?;
-    machine.check_definable(environment, &symbol, form.at(form.args[0].span()))?;
-    machine.note_macro(&symbol);
+    expander.check_definable(environment, &symbol, form.at(form.args[0].span()))?;
+    expander.note_macro(&symbol);
     form.takes(2..=usize::MAX, "needs a name and a lambda list")?;
-    // The definition keeps the place where it was written, so that its unused variables are reported.
+    // The definition keeps its place in the source, so that its unused variables are reported.
     let make = Make(form.datum.span());
     let shown = make.cl("MACRO-FUNCTION", [form.args[0].clone()]);
     let function = make.esl("%MACRO-LAMBDA", std::iter::once(shown).chain(form.args.iter().cloned()));
     let define = make.call_esl("%SET-MACRO", [make.quote(form.args[0].clone()), function]);
-    machine.schedule([Job::Expand(define, to)]);
+    expander.schedule([Job::Expand(define, to)]);
     Ok(())
 }
 
 /// `(declaim specifier*)`
-pub(super) fn declaim(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
-    let effects = proclamations(machine, &form, to.origin)?;
-    machine.schedule([Job::Expand(effects, to)]);
+pub(super) fn declaim(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    let effects = proclamations(expander, &form, to.origin)?;
+    expander.schedule([Job::Expand(effects, to)]);
     Ok(())
 }
 
-/// The form that does what a `declaim` says.
-pub(super) fn proclamations(machine: &mut Machine, form: &Form, origin: Option<u32>) -> Checked<Datum> {
+/// Returns the form that carries out a `declaim`.
+pub(super) fn proclamations(
+    expander: &mut Expander,
+    form: &Form,
+    origin: Option<OriginId>,
+) -> Checked<Datum> {
     let mut body = Body::default();
     for specifier in &form.args {
-        machine.declaration(specifier, &mut body, form, origin)?;
+        expander.declaration(specifier, &mut body, form, origin)?;
     }
     let make = Make(form.span);
     if body.specials.is_empty() {
@@ -168,17 +178,17 @@ pub(super) fn proclamations(machine: &mut Machine, form: &Form, origin: Option<u
 
 /// `(in-package name)`
 pub(super) fn in_package(
-    machine: &mut Machine,
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: Form,
     to: To,
 ) -> Checked {
     let enter = package_change(environment, &form)?;
-    machine.schedule([Job::Expand(enter, to)]);
+    expander.schedule([Job::Expand(enter, to)]);
     Ok(())
 }
 
-/// The form that makes the package of an `in-package` the current one.
+/// Returns the form that makes the package of an `in-package` the current one.
 pub(super) fn package_change(environment: &mut dyn Environment, form: &Form) -> Checked<Datum> {
     let make = Make(form.span);
     let named = match form.args.as_slice() {
@@ -193,7 +203,7 @@ pub(super) fn package_change(environment: &mut dyn Environment, form: &Form) -> 
     let Some(named) = named else {
         return Err(form.malformed("takes the name of one package"));
     };
-    // To ask for a name in the package tells whether there is one.
+    // Looking up any name in the package shows whether the package exists.
     if let Err(InternError::NoPackage(_)) = environment.intern(Some(&named), "NIL", false) {
         let message = format!("there is no package called {}", quoted(&form.args[0]));
         return Err(Box::new(code::UNKNOWN_PACKAGE.at(form.at(form.args[0].span()), message)));
@@ -203,16 +213,16 @@ pub(super) fn package_change(environment: &mut dyn Environment, form: &Form) -> 
     Ok(make.cl("EVAL-WHEN", [always(make), enter]))
 }
 
-/// The situations in which a form is evaluated whenever it can be.
+/// Returns the situations of a form that is evaluated whenever possible.
 fn always(make: Make) -> Datum {
     let situations = ["COMPILE-TOPLEVEL", "LOAD-TOPLEVEL", "EXECUTE"];
     make.items(situations.map(|situation| make.symbol(&Symbol::keyword(situation))))
 }
 
-/// `(%compiler-warning code message where . body)`: the body; reports a warning, of a code in the table of codes, at the
-/// place where the datum `where` was written.
+/// `(%compiler-warning code message where . body)`: expands to the body; reports a finding, of a code in the table of
+/// codes, at the place of the datum `where`.
 pub(super) fn compiler_warning(
-    machine: &mut Machine,
+    expander: &mut Expander,
     _: &mut dyn Environment,
     form: Form,
     to: To,
@@ -227,28 +237,28 @@ pub(super) fn compiler_warning(
         return Err(form.malformed(&format!("knows no code {named}")));
     };
     let span = form.at(place.span());
-    machine.report(code.at(span, message.to_string()), None);
-    let jobs = machine.body(body.to_vec(), to);
-    machine.schedule(jobs);
+    expander.report(code.at(span, message.to_string()), None);
+    let jobs = expander.body(body.to_vec(), to);
+    expander.schedule(jobs);
     Ok(())
 }
 
-/// `(load-time-value form [read-only])`: a chunk of its own, which runs before the one around it, sets a variable that
-/// nobody else knows.
+/// `(load-time-value form [read-only])`: reads a variable with a fresh name, which a separate chunk sets before the chunk
+/// around the form runs.
 pub(super) fn load_time_value(
-    machine: &mut Machine,
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: Form,
     to: To,
 ) -> Checked {
     form.takes(1..=2, "takes a form and at most one flag")?;
     let variable = fresh(environment, "LOAD-TIME-VALUE");
-    machine.fill(to, NodeKind::Special(variable.clone()));
-    let outer = machine.purpose();
+    expander.fill(to, NodeKind::Special(variable.clone()));
+    let outer = expander.purpose();
     let purpose = Purpose { emit: outer.emit, load: outer.load, keep: false };
-    let inside = machine.begin_chunk(to.span, to.origin, purpose);
-    let (value, job) = machine.part(form.args[0].clone(), inside);
-    machine.fill(inside, NodeKind::SetSpecial(variable, value));
-    machine.schedule([job, Job::FinishChunk]);
+    let inside = expander.begin_chunk(to.span, to.origin, purpose);
+    let (value, job) = expander.part(form.args[0].clone(), inside);
+    expander.fill(inside, NodeKind::SetSpecial(variable, value));
+    expander.schedule([job, Job::FinishChunk]);
     Ok(())
 }

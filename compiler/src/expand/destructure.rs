@@ -1,39 +1,39 @@
 //! Taking lists apart by pattern: macro lambda lists and `destructuring-bind`.
 //!
-//! A pattern becomes a row of bindings of a `let*`, each variable bound to a piece of the list. The number of elements
-//! is checked first, by functions of the library, all internal to the package `ESL`; `context` is the name of the macro
-//! or the pattern, for their messages:
+//! A pattern becomes a row of bindings of a `let*`, each variable bound to a piece of the list. Functions of the library,
+//! all internal to the package `ESL`, check the number of elements first; `context` is the name of the macro, or the
+//! pattern, for their messages:
 //!
-//! * `(%check-arguments list minimum maximum context)` gives `list` back, or fails with a `program-error`, if it is
-//!   not a list of that many elements. Without a maximum (`NIL`) only the first `minimum` conses are looked at.
-//! * `(%check-keys list keys allow-other-keys context)` gives `list` back, or fails with a `program-error`, if it is
-//!   not a list of keys and values, or has other keys than the list `keys` without allowing them.
-//! * `(%key-tail list key)` gives the tail of a list of keys and values that begins with the value of `key`, or `NIL`.
+//! * `(%check-arguments list minimum maximum context)` returns `list`, or fails with a `program-error` if it is not a
+//!   list of that many elements. Without a maximum (`NIL`) it looks at the first `minimum` conses only.
+//! * `(%check-keys list keys allow-other-keys context)` returns `list`, or fails with a `program-error` if it is not a
+//!   list of keys and values, or contains other keys than the list `keys` without allowing them.
+//! * `(%key-tail list key)` returns the tail of a list of keys and values that begins with the value of `key`, or `NIL`.
 
 use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::Symbol;
 
-use super::binding::check_distinct;
-use super::body::Body;
-use super::form::{Checked, Form, Make};
-use super::lambda::LambdaText;
-use super::lambda_list::{Kind, LambdaList, Optional};
-use super::machine::{Job, Machine, To};
+use super::expander::Expander;
+use super::form::{Checked, Form, Make, check_distinct};
+use super::function::{Body, FunctionText};
+use super::job::{Job, To};
+use super::lambda_list::{LambdaList, LambdaListKind, OptionalSpec};
 
-/// A variable or pattern, and the form that it receives the value of.
+/// A variable or pattern, and the form whose value it receives.
 type Binding = (Datum, Datum);
 
-/// The bindings that a pattern is becoming. Patterns among them are still to be taken apart.
+/// Bindings made from a pattern. Patterns among them are still to be taken apart.
 struct Row<'e> {
     make: Make,
     environment: &'e mut dyn Environment,
-    /// The quoted name of the macro, or pattern.
+    /// Quoted name of the macro, or quoted pattern.
     context: Datum,
     bindings: Vec<Binding>,
 }
 
 impl Row<'_> {
+    /// Binds a fresh variable to the value of a form.
     fn bind(&mut self, name: &str, form: Datum) -> Datum {
         let variable = self.make.fresh(self.environment, name);
         self.bindings.push((variable.clone(), form));
@@ -45,8 +45,8 @@ impl Row<'_> {
         self.bindings.push((variable.clone(), form));
     }
 
-    /// The bindings, all of them of variables. Patterns are taken apart from left to right, each in its place; nesting
-    /// takes no native stack.
+    /// Takes all patterns apart, from left to right, each in its place; returns the bindings, now of variables only.
+    /// Nesting takes no native stack.
     fn finish(mut self, form: &Form) -> Checked<Vec<Binding>> {
         let mut finished: Vec<Binding> = Vec::new();
         let mut waiting: Vec<Binding> = std::mem::take(&mut self.bindings);
@@ -56,7 +56,7 @@ impl Row<'_> {
                 finished.push((variable, form));
                 continue;
             }
-            let list = LambdaList::parse(&variable, Kind::Pattern, self.make.0)?;
+            let list = LambdaList::parse(&variable, LambdaListKind::Pattern, self.make.0)?;
             let whole = self.bind("LIST", form);
             self.pattern(&list, &whole, &whole);
             waiting.extend(self.bindings.drain(..).rev());
@@ -67,7 +67,7 @@ impl Row<'_> {
         Ok(finished)
     }
 
-    /// Binds the variables of `list`: `whole` is what `&whole` gets, `arguments` the form of the list to take apart.
+    /// Binds the variables of `list`. `whole` is the value of `&whole`, `arguments` the form of the list to take apart.
     fn pattern(&mut self, list: &LambdaList, whole: &Datum, arguments: &Datum) {
         let make = self.make;
         if let Some(variable) = &list.whole {
@@ -99,7 +99,7 @@ impl Row<'_> {
                 break;
             }
             let tail = make.call_cl("CDR", [rest.clone()]);
-            // With a rest parameter, the list may be dotted.
+            // Before a rest parameter the list may be dotted.
             let tail = match list.rest {
                 Some(_) => make.cl("IF", [make.call_cl("CONSP", [rest.clone()]), tail, rest]),
                 None => tail,
@@ -125,8 +125,8 @@ impl Row<'_> {
         }
     }
 
-    /// Binds an optional parameter: to `value` if `is_given`, otherwise to its default.
-    fn defaulted(&mut self, optional: &Optional, is_given: Datum, value: Datum) {
+    /// Binds an optional parameter to `value` if `is_given`, otherwise to its default.
+    fn defaulted(&mut self, optional: &OptionalSpec, is_given: Datum, value: Datum) {
         let make = self.make;
         let chosen = make.cl("IF", [is_given.clone(), value, optional.default.clone()]);
         self.receive(&optional.variable, chosen);
@@ -139,27 +139,27 @@ impl Row<'_> {
 
 /// `(destructuring-bind pattern form . body)`
 pub(super) fn destructuring_bind(
-    machine: &mut Machine,
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: Form,
     to: To,
 ) -> Checked {
     form.takes(2..=usize::MAX, "needs a pattern and a form")?;
-    // The bindings keep the place where they were written, so that unused variables are reported.
+    // The bindings keep their place in the source, so that unused variables are reported.
     let make = Make(form.datum.span());
     let context = make.quote(form.args[0].clone());
     // `(destructuring-bind x …)` is a dotted pattern of no elements.
     let bindings = vec![(form.args[0].clone(), form.args[1].clone())];
     let bindings = Row { make, environment, context, bindings }.finish(&form)?;
     let whole = make.let_in_order(bindings, form.args[2..].to_vec());
-    machine.schedule([Job::Expand(whole, to)]);
+    expander.schedule([Job::Expand(whole, to)]);
     Ok(())
 }
 
-/// `(%macro-lambda shown name lambda-list . body)`: the function of the macro `name`, a function of a form and an
-/// environment, which is shown to people as `shown`.
+/// `(%macro-lambda shown name lambda-list . body)`: the function of the macro `name`, which takes a form and an
+/// environment and is shown to people as `shown`.
 pub(super) fn macro_lambda(
-    machine: &mut Machine,
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: Form,
     to: To,
@@ -167,8 +167,8 @@ pub(super) fn macro_lambda(
     form.takes(3..=usize::MAX, "needs two names and a lambda list")?;
     let symbol = form.symbol(1, "needs the name of a macro")?;
     let make = Make(form.datum.span());
-    let list = LambdaList::parse(&form.args[2], Kind::Macro, form.at(form.args[2].span()))?;
-    let mut body = machine.take_body(&form.args[3..], true, &form, to.origin)?;
+    let list = LambdaList::parse(&form.args[2], LambdaListKind::Macro, form.at(form.args[2].span()))?;
+    let mut body = expander.take_body(&form.args[3..], true, &form, to.origin)?;
 
     let call = make.fresh(environment, "FORM");
     let around = make.fresh(environment, "ENVIRONMENT");
@@ -183,7 +183,7 @@ pub(super) fn macro_lambda(
     let block = std::iter::once(make.symbol(&symbol)).chain(std::mem::take(&mut body.forms));
     let block = make.cl("BLOCK", block);
     let inner = std::mem::take(&mut body.declarations).into_iter().chain([block]).collect();
-    let function = LambdaText {
+    let function = FunctionText {
         name: Some(form.args[0].clone()),
         shown: form.args[2].clone(),
         list: LambdaList { required: vec![call, around], ..LambdaList::default() },
@@ -195,6 +195,6 @@ pub(super) fn macro_lambda(
         block: None,
         form: form.datum.span(),
     };
-    machine.closure(function, to);
+    expander.closure(function, to);
     Ok(())
 }

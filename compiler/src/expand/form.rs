@@ -4,37 +4,36 @@ use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
-use esl_bytecode::symbol::Symbol;
+use esl_bytecode::symbol::{ESL_PACKAGE, Symbol};
+use rustc_hash::FxHashMap;
 
 use crate::diagnostic::code;
 
-/// The outcome of looking at a form.
+/// Outcome of a check of a form.
 pub(super) type Checked<T = ()> = Result<T, Box<Diagnostic>>;
 
 /// A compound form.
 #[derive(Clone, Debug)]
 pub(super) struct Form {
-    /// All of it.
+    /// The whole form.
     pub(super) datum: Datum,
-    /// Its operator, for messages.
     pub(super) operator: Symbol,
-    /// Its arguments.
     pub(super) args: Vec<Datum>,
-    /// Where it was written, or the form around it, or the macro call that made it.
+    /// Place of the form, of the form around it, or of the macro call that made it.
     pub(super) span: Span,
 }
 
 impl Form {
-    /// Takes a compound form apart. `span` is where it, or the form around it, was written.
+    /// Takes a compound form apart. `span` is its place, or that of the form around it.
     pub(super) fn of(datum: &Datum, span: Span) -> Checked<Form> {
         let malformed = |what: String| Box::new(code::MALFORMED_FORM.at(span, what));
         let Some((head, rest)) = datum.as_cons() else {
             return Err(malformed(format!("{} is no compound form", quoted(datum))));
         };
-        // A call of a `lambda` expression goes by the name of that.
+        // Messages call a call of a `lambda` expression by the name `lambda`.
         let operator = match head.as_symbol() {
             Some(symbol) => symbol.clone(),
-            None if super::form::is_cl_form(head, "LAMBDA") => Symbol::cl("LAMBDA"),
+            None if is_cl_form(head, "LAMBDA") => Symbol::cl("LAMBDA"),
             None => {
                 let message =
                     format!("a form begins with the name of an operator, not with {}", quoted(head));
@@ -50,17 +49,17 @@ impl Form {
         }
     }
 
-    /// The same as a call of the global function, whatever else the operator means.
+    /// Returns the form as a call of the global function, whatever else the operator means.
     pub(super) fn globally(&self) -> Datum {
         Make(self.datum.span()).call(&self.operator, self.args.iter().cloned())
     }
 
-    /// A diagnostic about this form: its operator, then what is wrong.
+    /// Returns the error about this form. The message is its operator, followed by `what`.
     pub(super) fn malformed(&self, what: &str) -> Box<Diagnostic> {
         self.malformed_at(self.span, what)
     }
 
-    /// A diagnostic about the part of this form at `span`.
+    /// Returns the error about the part of this form at `span`. The message is its operator, followed by `what`.
     pub(super) fn malformed_at(&self, span: Span, what: &str) -> Box<Diagnostic> {
         let span = if is_known(span) { span } else { self.span };
         Box::new(code::MALFORMED_FORM.at(span, format!("{} {what}", name(&self.operator))))
@@ -71,12 +70,12 @@ impl Form {
         if count.contains(&self.args.len()) { Ok(()) } else { Err(self.malformed(what)) }
     }
 
-    /// The form with the given span in place of an unknown one.
+    /// Returns `span` if it is known, and the place of the form otherwise.
     pub(super) fn at(&self, span: Span) -> Span {
         if is_known(span) { span } else { self.span }
     }
 
-    /// Argument `index` as the name of a variable, block or the like. `NIL` is none.
+    /// Returns argument `index` as a name. `NIL` does not count as one.
     pub(super) fn symbol(&self, index: usize, what: &str) -> Checked<Symbol> {
         match self.args.get(index).and_then(Datum::as_symbol) {
             Some(symbol) => Ok(symbol.clone()),
@@ -88,33 +87,34 @@ impl Form {
     }
 }
 
-/// Whether a span says where something was written. Data that a program made have an empty one.
+/// Whether a span is a place in a source. Data made by a program have an empty span.
 pub(super) fn is_known(span: Span) -> bool {
     span.end > span.start
 }
 
-/// A name as messages show it: in backticks, in lower case as people write it, unless it has lower case of its own.
+/// Returns a name as messages show it: in backticks, and in lower case unless it has lower case of its own.
 pub(super) fn name(symbol: &Symbol) -> String {
     format!("`{}`", plain(symbol))
 }
 
-/// A name in lower case, without backticks.
+/// Returns a name as [`name`], without the backticks.
 pub(super) fn plain(symbol: &Symbol) -> String {
     let text = symbol.to_string();
     if text.chars().any(char::is_lowercase) { text } else { text.to_lowercase() }
 }
 
-/// How many characters of a form a message quotes.
+/// Characters of a form that a message quotes.
 const QUOTED: usize = 40;
 
-/// The beginning of a datum as messages show it.
+/// Returns the beginning of a datum as messages show it.
 pub(super) fn quoted(datum: &Datum) -> String {
     let text = on_one_line(datum, QUOTED);
     let short: String = text.chars().take(QUOTED).collect();
     if short.len() < text.len() { format!("`{short}…`") } else { format!("`{short}`") }
 }
 
-/// A datum on one line, in lower case, cut off soon after `limit` characters: a form may be as long as a file.
+/// Returns a datum on one line, in lower case. A form may be as long as a file, so the text is cut soon after `limit`
+/// characters.
 pub(super) fn on_one_line(datum: &Datum, limit: usize) -> String {
     enum Part<'a> {
         Datum(&'a Datum),
@@ -124,7 +124,7 @@ pub(super) fn on_one_line(datum: &Datum, limit: usize) -> String {
     let mut text = String::new();
     let mut parts = vec![Part::Datum(datum)];
     while let Some(part) = parts.pop() {
-        // Bytes for characters: this only decides when to stop.
+        // The count of bytes decides only whether to count characters.
         if text.len() > 4 * limit || text.len() > limit && text.chars().count() > limit {
             break;
         }
@@ -176,7 +176,7 @@ pub(super) fn on_one_line(datum: &Datum, limit: usize) -> String {
     text
 }
 
-/// The mark with which people write a form such as `(quote x)`, and what it stands before.
+/// Returns the mark that abbreviates a form such as `(quote x)`, and its argument.
 pub(super) fn abbreviation<'a>(car: &'a Datum, cdr: &'a Datum) -> Option<(&'static str, &'a Datum)> {
     let operator = car.as_symbol()?;
     let (argument, rest) = cdr.as_cons()?;
@@ -193,10 +193,10 @@ pub(super) fn abbreviation<'a>(car: &'a Datum, cdr: &'a Datum) -> Option<(&'stat
 
 /// Whether `symbol` is the symbol `name` of the package `ESL`.
 pub(super) fn is_esl(symbol: &Symbol, name: &str) -> bool {
-    symbol.name() == name && symbol.is_in(esl_bytecode::symbol::ESL_PACKAGE)
+    symbol.name() == name && symbol.is_in(ESL_PACKAGE)
 }
 
-/// The operator of a compound form that begins with a symbol.
+/// Returns the operator of a compound form that begins with a symbol.
 pub(super) fn operator(datum: &Datum) -> Option<&Symbol> {
     datum.as_cons()?.0.as_symbol()
 }
@@ -206,13 +206,13 @@ pub(super) fn is_cl_form(datum: &Datum, name: &str) -> bool {
     operator(datum).is_some_and(|symbol| symbol.is_cl(name))
 }
 
-/// The arguments of a compound form, if it is a proper list.
+/// Returns the arguments of a compound form, if it is a proper list.
 pub(super) fn arguments(datum: &Datum) -> Option<Vec<Datum>> {
     let (_, rest) = datum.as_cons()?;
     Some(rest.as_list()?.into_iter().cloned().collect())
 }
 
-/// Whether evaluating `datum` is certain to give the same value without effect: a literal or a quoted datum.
+/// Whether `datum` always has the same value and no effect: a literal or a quoted datum.
 pub(super) fn is_constant(datum: &Datum) -> bool {
     match datum.kind() {
         DatumKind::Symbol(symbol) => symbol.is_keyword() || symbol.is_cl("T"),
@@ -221,7 +221,7 @@ pub(super) fn is_constant(datum: &Datum) -> bool {
     }
 }
 
-/// The datum that a constant form (see [`is_constant`]) evaluates to.
+/// Returns the value of a constant form (see [`is_constant`]).
 pub(super) fn constant_value(datum: &Datum) -> Option<Datum> {
     match datum.kind() {
         DatumKind::Cons(car, cdr) if car.as_symbol().is_some_and(|symbol| symbol.is_cl("QUOTE")) => {
@@ -232,74 +232,98 @@ pub(super) fn constant_value(datum: &Datum) -> Option<Datum> {
     }
 }
 
-/// A fresh uninterned symbol.
+/// Refuses two equal names.
+///
+/// # Errors
+/// `duplicate-parameter`.
+pub(super) fn check_distinct<'a>(
+    names: impl IntoIterator<Item = (&'a Symbol, Span)>,
+    form: &Form,
+) -> Checked {
+    let mut seen = FxHashMap::default();
+    for (symbol, span) in names {
+        if let Some(first) = seen.insert(symbol, span) {
+            let message = format!("{} is bound twice", name(symbol));
+            let diagnostic = code::DUPLICATE_PARAMETER.at(form.at(span), message);
+            return Err(Box::new(diagnostic.also(form.at(first), "it is bound here already")));
+        }
+    }
+    Ok(())
+}
+
+/// Returns the place of `datum` if that is known, and `otherwise` if not.
+pub(super) fn span_of(datum: &Datum, otherwise: Span) -> Span {
+    if is_known(datum.span()) { datum.span() } else { otherwise }
+}
+
+/// Creates an uninterned symbol.
 pub(super) fn fresh(environment: &mut dyn Environment, name: &str) -> Symbol {
     Symbol::uninterned(environment.fresh(), name)
 }
 
-/// Makes forms that all come from one place in the source.
+/// Makes forms that all have one place in the source.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Make(pub(super) Span);
 
 impl Make {
-    /// A symbol.
+    /// Returns a symbol.
     pub(super) fn symbol(self, symbol: &Symbol) -> Datum {
         Datum::symbol(symbol.clone(), self.0)
     }
 
-    /// A fresh uninterned symbol.
+    /// Creates an uninterned symbol.
     pub(super) fn fresh(self, environment: &mut dyn Environment, name: &str) -> Datum {
         Datum::symbol(fresh(environment, name), self.0)
     }
 
-    /// The empty list.
+    /// Returns the empty list.
     pub(super) fn nil(self) -> Datum {
         Datum::nil(self.0)
     }
 
-    /// A list.
+    /// Returns a list.
     pub(super) fn list<const N: usize>(self, items: [Datum; N]) -> Datum {
         Datum::list(items, self.0)
     }
 
-    /// A list of as many items as there are.
+    /// Returns a list of any number of items.
     pub(super) fn items(self, items: impl IntoIterator<Item = Datum>) -> Datum {
         Datum::list(items.into_iter().collect::<Vec<_>>(), self.0)
     }
 
-    /// `(operator . args)`, the operator a symbol of the package `COMMON-LISP`.
+    /// Returns `(operator . args)`; the operator is a symbol of the package `COMMON-LISP`.
     pub(super) fn cl(self, operator: &str, args: impl IntoIterator<Item = Datum>) -> Datum {
         let operator = self.symbol(&Symbol::cl(operator));
         self.items(std::iter::once(operator).chain(args))
     }
 
-    /// `(operator . args)`, the operator a symbol of the package `ESL`.
+    /// Returns `(operator . args)`; the operator is a symbol of the package `ESL`.
     pub(super) fn esl(self, operator: &str, args: impl IntoIterator<Item = Datum>) -> Datum {
         let operator = self.symbol(&Symbol::esl(operator));
         self.items(std::iter::once(operator).chain(args))
     }
 
-    /// A call of the global function `function`, whatever local function has its name.
+    /// Returns a call of the global function `function`, even where a local function has its name.
     pub(super) fn call(self, function: &Symbol, args: impl IntoIterator<Item = Datum>) -> Datum {
         self.esl("%CALL-GLOBAL", std::iter::once(self.symbol(function)).chain(args))
     }
 
-    /// A call of the standard function `function`.
+    /// Returns a call of the standard function `function`.
     pub(super) fn call_cl(self, function: &str, args: impl IntoIterator<Item = Datum>) -> Datum {
         self.call(&Symbol::cl(function), args)
     }
 
-    /// A call of the function `function` of the package `ESL`.
+    /// Returns a call of the function `function` of the package `ESL`.
     pub(super) fn call_esl(self, function: &str, args: impl IntoIterator<Item = Datum>) -> Datum {
         self.call(&Symbol::esl(function), args)
     }
 
-    /// A quoted datum.
+    /// Returns a quoted datum.
     pub(super) fn quote(self, datum: Datum) -> Datum {
         self.cl("QUOTE", [datum])
     }
 
-    /// `(let* bindings . body)`, or the body alone if nothing is bound.
+    /// Returns `(let* bindings . body)`, or the body alone if there are no bindings.
     pub(super) fn let_in_order(self, bindings: Vec<(Datum, Datum)>, body: Vec<Datum>) -> Datum {
         if bindings.is_empty() {
             return self.progn(body);
@@ -308,7 +332,7 @@ impl Make {
         self.cl("LET*", std::iter::once(bindings).chain(body))
     }
 
-    /// `(progn . body)`, or the one form of the body.
+    /// Returns `(progn . body)`, or the only form of the body.
     pub(super) fn progn(self, mut body: Vec<Datum>) -> Datum {
         match body.len() {
             1 => body.swap_remove(0),

@@ -4,21 +4,23 @@ use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::symbol::Symbol;
 
+use super::expander::Expander;
 use super::form::{Checked, Form, Make, fresh};
-use super::machine::{Job, Machine, To};
-use super::scope::{Entry, Variable};
+use super::job::{Job, To};
+use super::scope::{ScopeEntry, VariableMeaning};
+use super::variable::Deed;
 use crate::core::{HandlerClause, NodeKind};
 
-/// `(%handler-case form (type ([variable]) . body)*)`: runs `form`; a condition of a clause's type that is signalled in
+/// `(%handler-case form (type ([variable]) . body)*)`: runs `form`. A condition of a clause's type that is signalled in
 /// it unwinds to here and runs the body.
 pub(super) fn handler_case(
-    machine: &mut Machine,
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: Form,
     to: To,
 ) -> Checked {
     form.takes(1..=usize::MAX, "needs a form")?;
-    let (protected, job) = machine.part(form.args[0].clone(), to);
+    let (protected, job) = expander.part(form.args[0].clone(), to);
     let mut jobs = vec![job];
     let mut clauses = Vec::new();
     for clause in &form.args[1..] {
@@ -39,20 +41,24 @@ pub(super) fn handler_case(
             _ => return Err(form.malformed_at(clause.span(), shape)),
         };
         let forms: Vec<Datum> = body.iter().map(|&form| form.clone()).collect();
-        let mut body = machine.take_body(&forms, false, &form, to.origin)?;
+        let mut body = expander.take_body(&forms, false, &form, to.origin)?;
         let name: Symbol = match &bound {
-            Some(datum) => machine.variable_name(environment, datum, &form, "bound")?,
+            Some(datum) => expander.variable_name(environment, datum, &form, Deed::Bind)?,
             None => fresh(environment, "CONDITION"),
         };
-        let inside = machine.child(to);
-        let variable = machine.variable(name.clone(), inside.span, to);
+        let inside = expander.child(to);
+        let variable = expander.variable(name.clone(), inside.span, to);
         let mut entries = Vec::new();
         if let Some(datum) = &bound {
-            if machine.is_special(environment, &name, &body) {
-                // The condition arrives in a lexical variable; the special one is bound to it.
+            if expander.is_special(environment, &name, &body) {
+                // The condition arrives in a lexical variable, to which the special one is bound.
                 let make = Make(to.span);
                 let condition = fresh(environment, "CONDITION");
-                entries.push(Entry::Variable(condition.clone(), Variable::Lexical(variable), None));
+                entries.push(ScopeEntry::Variable(
+                    condition.clone(),
+                    VariableMeaning::Lexical(variable),
+                    None,
+                ));
                 let bindings = make.list([make.list([datum.clone(), make.symbol(&condition)])]);
                 body.forms = vec![make.cl("LET", std::iter::once(bindings).chain(forms))];
                 body.specials.clear();
@@ -60,9 +66,9 @@ pub(super) fn handler_case(
                 let report = if body.ignored.contains(&name) {
                     None
                 } else {
-                    machine.report_unused(&name, datum, form.datum.span(), to.origin)
+                    expander.report_unused(&name, datum, form.datum.span(), to.origin)
                 };
-                entries.push(Entry::Variable(name.clone(), Variable::Lexical(variable), report));
+                entries.push(ScopeEntry::Variable(name.clone(), VariableMeaning::Lexical(variable), report));
             }
         }
         entries.extend(body.free_specials(&[name]));
@@ -73,10 +79,10 @@ pub(super) fn handler_case(
         });
         let count = entries.len();
         jobs.push(Job::Enter(entries));
-        jobs.extend(machine.body(body.forms, inside));
+        jobs.extend(expander.body(body.forms, inside));
         jobs.push(Job::Leave(count));
     }
-    machine.fill(to, NodeKind::HandlerCase(protected, clauses));
-    machine.schedule(jobs);
+    expander.fill(to, NodeKind::HandlerCase(protected, clauses));
+    expander.schedule(jobs);
     Ok(())
 }

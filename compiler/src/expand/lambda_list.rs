@@ -1,71 +1,72 @@
 //! Lambda lists: ordinary ones, those of macros, and those of `destructuring-bind`.
 //!
-//! One parser reads all three. Where an ordinary lambda list has a variable, the other two may have a pattern, which
-//! is a lambda list again; [`super::destructure`] takes patterns apart.
+//! One parser reads all three. Where an ordinary lambda list has a variable, the other two may have a pattern, which is a
+//! lambda list itself; [`super::destructure`] takes patterns apart.
 
 use esl_bytecode::compile::Arity;
 use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
-use super::form::{Checked, is_known, plain, quoted};
+use super::form::{Checked, plain, quoted, span_of};
 use crate::diagnostic::code;
 
-/// Which lambda list is read.
+/// Kind of a lambda list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    /// That of a function.
+pub(super) enum LambdaListKind {
+    /// Of a function.
     Ordinary,
-    /// That of a macro: `&whole`, `&environment`, `&body`, patterns, a dotted end.
+    /// Of a macro: with `&whole`, `&environment`, `&body`, patterns, a dotted end.
     Macro,
-    /// That of `destructuring-bind`, or a pattern: as a macro's, without `&environment`.
+    /// Of `destructuring-bind`, or a pattern: as of a macro, without `&environment`.
     Pattern,
 }
 
 /// An optional parameter.
 #[derive(Clone, Debug)]
-pub(super) struct Optional {
-    /// The variable or pattern.
+pub(super) struct OptionalSpec {
+    /// Variable or pattern.
     pub(super) variable: Datum,
-    /// The default's form.
+    /// Form of the default.
     pub(super) default: Datum,
-    /// The variable that tells whether there was an argument.
+    /// Variable that says whether there was an argument.
     pub(super) supplied: Option<Datum>,
 }
 
 /// A key parameter.
 #[derive(Clone, Debug)]
-pub(super) struct Key {
-    /// The symbol that selects it.
+pub(super) struct KeySpec {
+    /// Symbol that selects it.
     pub(super) key: Symbol,
-    /// The rest.
-    pub(super) optional: Optional,
+    /// Variable, default and supplied-p.
+    pub(super) optional: OptionalSpec,
 }
 
 /// A lambda list taken apart.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LambdaList {
-    /// The variable or pattern after `&whole`.
+    /// Variable or pattern after `&whole`.
     pub(super) whole: Option<Datum>,
-    /// The variable after `&environment`.
+    /// Variable after `&environment`.
     pub(super) environment: Option<Datum>,
-    /// The required parameters.
+    /// Required parameters.
     pub(super) required: Vec<Datum>,
-    /// The optional parameters.
-    pub(super) optional: Vec<Optional>,
-    /// The rest parameter.
+    /// Optional parameters.
+    pub(super) optional: Vec<OptionalSpec>,
+    /// Rest parameter.
     pub(super) rest: Option<Datum>,
-    /// The key parameters; `None` without `&key`.
-    pub(super) keys: Option<Vec<Key>>,
+    /// Key parameters; `None` without `&key`.
+    pub(super) keys: Option<Vec<KeySpec>>,
     /// Whether other keys are allowed.
     pub(super) allow_other_keys: bool,
-    /// The auxiliary variables and their values' forms.
+    /// Auxiliary variables and the forms of their values.
     pub(super) aux: Vec<(Datum, Datum)>,
 }
 
-/// The part of a lambda list that is being read.
+/// Section of a lambda list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Part {
+enum Section {
     Required,
     Optional,
     Rest,
@@ -76,12 +77,12 @@ enum Part {
 }
 
 impl LambdaList {
-    /// Reads a lambda list. `span` is used where the list itself has none.
-    pub(super) fn parse(list: &Datum, kind: Kind, span: Span) -> Checked<LambdaList> {
-        Parser { kind, span, part: Part::Required, parsed: LambdaList::default() }.parse(list)
+    /// Parses a lambda list. `span` is the place of data without a place of their own.
+    pub(super) fn parse(list: &Datum, kind: LambdaListKind, span: Span) -> Checked<LambdaList> {
+        Parser { kind, span, section: Section::Required, parsed: LambdaList::default() }.parse(list)
     }
 
-    /// How many arguments a function of this lambda list takes.
+    /// Returns how many arguments a function of this lambda list takes.
     pub(super) fn arity(&self) -> Arity {
         let min = self.required.len() as u32;
         let is_open = self.rest.is_some() || self.keys.is_some();
@@ -90,16 +91,16 @@ impl LambdaList {
 }
 
 struct Parser {
-    kind: Kind,
+    kind: LambdaListKind,
     span: Span,
-    part: Part,
+    section: Section,
     parsed: LambdaList,
 }
 
 impl Parser {
     fn parse(mut self, list: &Datum) -> Checked<LambdaList> {
         let is_list = matches!(list.kind(), DatumKind::Cons(..) | DatumKind::Nil);
-        if !is_list && (self.kind != Kind::Pattern || list.as_symbol().is_none()) {
+        if !is_list && (self.kind != LambdaListKind::Pattern || list.as_symbol().is_none()) {
             return Err(self.wrong(list, &format!("a lambda list is a list, not {}", quoted(list))));
         }
         let mut elements = list.elements();
@@ -120,13 +121,16 @@ impl Parser {
         }
         let tail = elements.tail();
         if !tail.is_nil() {
-            if self.kind == Kind::Ordinary || self.parsed.rest.is_some() || self.part > Part::Optional {
+            if self.kind == LambdaListKind::Ordinary
+                || self.parsed.rest.is_some()
+                || self.section > Section::Optional
+            {
                 return Err(self.wrong(tail, "the lambda list ends in a dot and something that is no list"));
             }
             self.variable(tail)?;
             self.parsed.rest = Some(tail.clone());
         }
-        if self.part == Part::Rest {
+        if self.section == Section::Rest {
             return Err(self.wrong(list, "`&rest` needs the name of a variable after it"));
         }
         Ok(self.parsed)
@@ -134,15 +138,15 @@ impl Parser {
 
     fn keyword(&mut self, keyword: &Symbol, item: &Datum, follower: Option<&Datum>) -> Checked {
         let name = keyword.name();
-        let goes_on = |part| self.part < part && self.part != Part::Rest;
+        let goes_on = |section| self.section < section && self.section != Section::Rest;
         let next = match name {
-            "&OPTIONAL" if goes_on(Part::Optional) => Part::Optional,
-            "&REST" if goes_on(Part::Rest) => Part::Rest,
-            "&BODY" if goes_on(Part::Rest) && self.kind != Kind::Ordinary => Part::Rest,
-            "&KEY" if goes_on(Part::Key) => Part::Key,
-            "&ALLOW-OTHER-KEYS" if self.part == Part::Key => Part::AfterKey,
-            "&AUX" if goes_on(Part::Aux) => Part::Aux,
-            "&WHOLE" if self.kind != Kind::Ordinary && self.is_fresh() => {
+            "&OPTIONAL" if goes_on(Section::Optional) => Section::Optional,
+            "&REST" if goes_on(Section::Rest) => Section::Rest,
+            "&BODY" if goes_on(Section::Rest) && self.kind != LambdaListKind::Ordinary => Section::Rest,
+            "&KEY" if goes_on(Section::Key) => Section::Key,
+            "&ALLOW-OTHER-KEYS" if self.section == Section::Key => Section::AfterKey,
+            "&AUX" if goes_on(Section::Aux) => Section::Aux,
+            "&WHOLE" if self.kind != LambdaListKind::Ordinary && self.is_fresh() => {
                 let Some(variable) = follower else {
                     return Err(self.wrong(item, "`&whole` needs the name of a variable after it"));
                 };
@@ -150,7 +154,7 @@ impl Parser {
                 self.parsed.whole = Some(variable.clone());
                 return Ok(());
             }
-            "&ENVIRONMENT" if self.kind == Kind::Macro && self.parsed.environment.is_none() => {
+            "&ENVIRONMENT" if self.kind == LambdaListKind::Macro && self.parsed.environment.is_none() => {
                 match follower.filter(|variable| variable.as_symbol().is_some()) {
                     Some(variable) => self.parsed.environment = Some(variable.clone()),
                     None => {
@@ -170,65 +174,69 @@ impl Parser {
             }
         };
         match next {
-            Part::Key => self.parsed.keys = Some(Vec::new()),
-            Part::AfterKey => self.parsed.allow_other_keys = true,
+            Section::Key => self.parsed.keys = Some(Vec::new()),
+            Section::AfterKey => self.parsed.allow_other_keys = true,
             _ => {}
         }
-        self.part = next;
+        self.section = next;
         Ok(())
     }
 
-    /// Whether nothing has been read.
+    /// Whether nothing has been parsed.
     fn is_fresh(&self) -> bool {
-        self.part == Part::Required
+        self.section == Section::Required
             && self.parsed.required.is_empty()
             && self.parsed.whole.is_none()
             && self.parsed.environment.is_none()
     }
 
     fn parameter(&mut self, item: &Datum) -> Checked {
-        match self.part {
-            Part::Required => {
+        match self.section {
+            Section::Required => {
                 self.variable(item)?;
                 self.parsed.required.push(item.clone());
             }
-            Part::Optional => {
+            Section::Optional => {
                 let optional = self.optional(item)?;
                 self.parsed.optional.push(optional);
             }
-            Part::Rest => {
+            Section::Rest => {
                 self.variable(item)?;
                 self.parsed.rest = Some(item.clone());
-                self.part = Part::AfterRest;
+                self.section = Section::AfterRest;
             }
-            Part::Key => {
+            Section::Key => {
                 let key = self.key(item)?;
                 self.parsed.keys.get_or_insert_default().push(key);
             }
-            Part::Aux => {
-                let Optional { variable, default, supplied } = self.optional(item)?;
+            Section::Aux => {
+                let OptionalSpec { variable, default, supplied } = self.optional(item)?;
                 if let Some(extra) = supplied {
                     return Err(self.wrong(&extra, "an `&aux` variable takes a value only"));
                 }
                 self.parsed.aux.push((variable, default));
             }
-            Part::AfterRest => return Err(self.wrong(item, "only one name can follow `&rest`")),
-            Part::AfterKey => return Err(self.wrong(item, "no name can follow `&allow-other-keys`")),
+            Section::AfterRest => return Err(self.wrong(item, "only one name can follow `&rest`")),
+            Section::AfterKey => return Err(self.wrong(item, "no name can follow `&allow-other-keys`")),
         }
         Ok(())
     }
 
     /// `name`, `(name)`, `(name default)` or `(name default supplied)`
-    fn optional(&mut self, item: &Datum) -> Checked<Optional> {
+    fn optional(&mut self, item: &Datum) -> Checked<OptionalSpec> {
         let Some((variable, rest)) = item.as_cons() else {
             self.variable(item)?;
-            return Ok(Optional { variable: item.clone(), default: Datum::nil(item.span()), supplied: None });
+            return Ok(OptionalSpec {
+                variable: item.clone(),
+                default: Datum::nil(item.span()),
+                supplied: None,
+            });
         };
         self.variable(variable)?;
         self.with_default(variable.clone(), rest, item)
     }
 
-    fn with_default(&mut self, variable: Datum, rest: &Datum, item: &Datum) -> Checked<Optional> {
+    fn with_default(&mut self, variable: Datum, rest: &Datum, item: &Datum) -> Checked<OptionalSpec> {
         let rest = rest.as_list();
         let (default, supplied) = match rest.as_deref() {
             Some([]) => (Datum::nil(item.span()), None),
@@ -246,11 +254,11 @@ impl Parser {
                 return Err(self.wrong(item, message));
             }
         };
-        Ok(Optional { variable, default, supplied })
+        Ok(OptionalSpec { variable, default, supplied })
     }
 
-    /// As [`Parser::optional`]; or with `(key name)` in place of the name.
-    fn key(&mut self, item: &Datum) -> Checked<Key> {
+    /// As [`Parser::optional`], or with `(key name)` in place of the name.
+    fn key(&mut self, item: &Datum) -> Checked<KeySpec> {
         if let Some((head, rest)) = item.as_cons()
             && head.as_cons().is_some()
         {
@@ -263,41 +271,40 @@ impl Parser {
             };
             self.variable(variable)?;
             let optional = self.with_default((*variable).clone(), rest, item)?;
-            return Ok(Key { key: symbol.clone(), optional });
+            return Ok(KeySpec { key: symbol.clone(), optional });
         }
         let optional = self.optional(item)?;
         match optional.variable.as_symbol() {
-            Some(symbol) => Ok(Key { key: Symbol::keyword(symbol.name()), optional }),
+            Some(symbol) => Ok(KeySpec { key: Symbol::keyword(symbol.name()), optional }),
             None => Err(self.wrong(item, "a key parameter is a name, or begins with `(:key name)`")),
         }
     }
 
     /// Checks that `item` can receive an argument.
     fn variable(&self, item: &Datum) -> Checked {
-        let is_pattern =
-            self.kind != Kind::Ordinary && matches!(item.kind(), DatumKind::Cons(..) | DatumKind::Nil);
+        let is_pattern = self.kind != LambdaListKind::Ordinary
+            && matches!(item.kind(), DatumKind::Cons(..) | DatumKind::Nil);
         if item.as_symbol().is_some() || is_pattern {
             return Ok(());
         }
         Err(self.wrong(item, &format!("a parameter is a name, not {}", quoted(item))))
     }
 
-    fn wrong(&self, item: &Datum, message: &str) -> Box<esl_bytecode::diagnostic::Diagnostic> {
-        let span = if is_known(item.span()) { item.span() } else { self.span };
-        Box::new(code::MALFORMED_LAMBDA_LIST.at(span, message))
+    fn wrong(&self, item: &Datum, message: &str) -> Box<Diagnostic> {
+        Box::new(code::MALFORMED_LAMBDA_LIST.at(span_of(item, self.span), message))
     }
 }
 
 trait WithOrder {
-    fn with_order(self, kind: Kind) -> Self;
+    fn with_order(self, kind: LambdaListKind) -> Self;
 }
 
-impl WithOrder for Box<esl_bytecode::diagnostic::Diagnostic> {
-    /// Says in which order the keywords stand.
-    fn with_order(self, kind: Kind) -> Self {
+impl WithOrder for Box<Diagnostic> {
+    /// Adds the order of the keywords.
+    fn with_order(self, kind: LambdaListKind) -> Self {
         let order = match kind {
-            Kind::Ordinary => "`&optional`, `&rest`, `&key`, `&allow-other-keys`, `&aux`",
-            Kind::Macro | Kind::Pattern => {
+            LambdaListKind::Ordinary => "`&optional`, `&rest`, `&key`, `&allow-other-keys`, `&aux`",
+            LambdaListKind::Macro | LambdaListKind::Pattern => {
                 "`&whole`, `&optional`, `&rest` or `&body`, `&key`, `&allow-other-keys`, `&aux`"
             }
         };

@@ -5,26 +5,26 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
-use super::binding::check_distinct;
-use super::body::Body;
-use super::form::{Checked, Form, Make};
-use super::lambda::{FunctionName, LambdaText, Parts};
-use super::machine::{Job, Machine, To};
-use super::scope::{Entry, Function};
+use super::expander::Expander;
+use super::form::{Checked, Form, Make, check_distinct, span_of};
+use super::function::{Body, FunctionParts, FunctionText, WrittenName};
+use super::job::{Job, To};
+use super::origin::OriginId;
+use super::scope::{FunctionMeaning, ScopeEntry};
 use crate::core::NodeKind;
 
-/// A local definition taken apart: its name and the parts after it.
+/// A local definition taken apart.
 struct Definition {
-    name: FunctionName,
+    name: WrittenName,
     lambda_list: Datum,
     body: Vec<Datum>,
 }
 
 fn definitions(
-    machine: &Machine,
+    expander: &Expander,
     environment: &dyn Environment,
     form: &Form,
-    origin: Option<u32>,
+    origin: Option<OriginId>,
 ) -> Checked<Vec<Definition>> {
     let shape = "needs a list of definitions, such as `((f (x) (* x x)))`";
     let Some(items) = form.args.first().and_then(Datum::as_list) else {
@@ -35,7 +35,7 @@ fn definitions(
         let Some((head, rest)) = item.as_cons() else {
             return Err(form.malformed_at(item.span(), shape));
         };
-        let Some(name) = FunctionName::of(head) else {
+        let Some(name) = WrittenName::of(head) else {
             return Err(form.malformed_at(head.span(), "needs a name at the beginning of each definition"));
         };
         let Some(parts) = rest.as_list().filter(|parts| !parts.is_empty()) else {
@@ -44,7 +44,7 @@ fn definitions(
         };
         if !name.name.is_setf {
             let span = form.at(head.span());
-            machine.check_locally_definable(environment, &name.cell, span, origin)?;
+            expander.check_locally_definable(environment, &name.cell, span, origin)?;
         }
         let body = parts[1..].iter().map(|&part| part.clone()).collect();
         definitions.push(Definition { name, lambda_list: parts[0].clone(), body });
@@ -56,50 +56,56 @@ fn definitions(
 }
 
 /// `(flet ((name lambda-list . body)*) . body)`
-pub(super) fn flet(machine: &mut Machine, environment: &mut dyn Environment, form: Form, to: To) -> Checked {
-    local_functions(machine, environment, &form, to, false)
-}
-
-/// `(labels ((name lambda-list . body)*) . body)`
-pub(super) fn labels(
-    machine: &mut Machine,
+pub(super) fn flet(
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: Form,
     to: To,
 ) -> Checked {
-    local_functions(machine, environment, &form, to, true)
+    local_functions(expander, environment, &form, to, false)
+}
+
+/// `(labels ((name lambda-list . body)*) . body)`
+pub(super) fn labels(
+    expander: &mut Expander,
+    environment: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
+    local_functions(expander, environment, &form, to, true)
 }
 
 fn local_functions(
-    machine: &mut Machine,
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: &Form,
     to: To,
     recursive: bool,
 ) -> Checked {
     let make = Make(to.span);
-    let mut texts: Vec<(FunctionName, LambdaText)> = Vec::new();
-    for Definition { name, lambda_list, body } in definitions(machine, environment, form, to.origin)? {
+    let mut texts: Vec<(WrittenName, FunctionText)> = Vec::new();
+    for Definition { name, lambda_list, body } in definitions(expander, environment, form, to.origin)? {
         let shown = make.items([make.symbol(&form.operator), name.datum.clone()]);
-        let parts = Parts { name: Some(&shown), block: Some(&name.block()), list: &lambda_list, body: &body };
-        let text = machine.lambda_text(environment, parts, form, to.origin)?;
+        let parts =
+            FunctionParts { name: Some(&shown), block: Some(&name.block()), list: &lambda_list, body: &body };
+        let text = expander.lambda_text(environment, parts, form, to.origin)?;
         texts.push((name, text));
     }
-    let body = machine.take_body(&form.args[1..], false, form, to.origin)?;
+    let body = expander.take_body(&form.args[1..], false, form, to.origin)?;
 
     let mut functions = Vec::new();
     let mut entries = Vec::new();
     let mut lambdas = Vec::new();
     for (name, text) in texts {
-        let span = super::body::span_of(&name.datum, to.span);
-        let variable = machine.variable(name.name.symbol.clone(), span, to);
-        entries.push(Entry::Function(name.cell, Function::Local(variable, text.arity())));
-        let lambda = machine.lambda(to);
+        let span = span_of(&name.datum, to.span);
+        let variable = expander.variable(name.name.symbol.clone(), span, to);
+        entries.push(ScopeEntry::Function(name.cell, FunctionMeaning::Local(variable, text.arity())));
+        let lambda = expander.lambda(to);
         functions.push((variable, lambda));
         lambdas.extend([Job::Lambda(Box::new(text), lambda, to), Job::CheckReturn(variable, lambda)]);
     }
-    let inside = machine.child(to);
-    machine.fill(to, NodeKind::Functions { definitions: functions, body: inside.node });
+    let inside = expander.child(to);
+    expander.fill(to, NodeKind::Functions { definitions: functions, body: inside.node });
 
     let free = body.free_specials(&[]);
     let count = entries.len() + free.len();
@@ -112,15 +118,16 @@ fn local_functions(
         jobs.push(Job::Enter(entries));
     }
     jobs.push(Job::Enter(free));
-    jobs.extend(machine.body(body.forms, inside));
+    jobs.extend(expander.body(body.forms, inside));
     jobs.push(Job::Leave(count));
-    machine.schedule(jobs);
+    expander.schedule(jobs);
     Ok(())
 }
 
-/// The jobs that define the macros of a `macrolet`, how many names they enter, and the body.
+/// Returns the jobs that define the macros of a `macrolet`, the number of names that they bring into scope, and the
+/// body.
 pub(super) fn local_macros(
-    machine: &mut Machine,
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: &Form,
     to: To,
@@ -128,18 +135,18 @@ pub(super) fn local_macros(
     let make = Make(to.span);
     let mut jobs = Vec::new();
     let mut names = Vec::new();
-    for Definition { name, lambda_list, body } in definitions(machine, environment, form, to.origin)? {
+    for Definition { name, lambda_list, body } in definitions(expander, environment, form, to.origin)? {
         if name.name.is_setf {
             return Err(form.malformed_at(name.datum.span(), "needs a symbol as the name of a macro"));
         }
-        // The definition keeps the place where it was written, so that its unused variables are reported.
+        // The definition keeps its place in the source, so that its unused variables are reported.
         let definition = Make(form.datum.span());
         let shown = make.items([make.symbol(&form.operator), name.datum.clone()]);
         let parts = [shown, name.datum.clone(), lambda_list].into_iter().chain(body);
         jobs.push(Job::Macro(definition.esl("%MACRO-LAMBDA", parts), to));
         names.push(name.cell);
     }
-    let body = machine.take_body(&form.args[1..], false, form, to.origin)?;
+    let body = expander.take_body(&form.args[1..], false, form, to.origin)?;
     let free = body.free_specials(&[]);
     let count = names.len() + free.len();
     jobs.push(Job::EnterMacros(names));
@@ -149,14 +156,14 @@ pub(super) fn local_macros(
 
 /// `(macrolet ((name lambda-list . body)*) . body)`
 pub(super) fn macrolet(
-    machine: &mut Machine,
+    expander: &mut Expander,
     environment: &mut dyn Environment,
     form: Form,
     to: To,
 ) -> Checked {
-    let (mut jobs, count, mut body) = local_macros(machine, environment, &form, to)?;
-    jobs.extend(machine.body(std::mem::take(&mut body.forms), to));
+    let (mut jobs, count, mut body) = local_macros(expander, environment, &form, to)?;
+    jobs.extend(expander.body(std::mem::take(&mut body.forms), to));
     jobs.push(Job::Leave(count));
-    machine.schedule(jobs);
+    expander.schedule(jobs);
     Ok(())
 }

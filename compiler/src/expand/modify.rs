@@ -1,66 +1,20 @@
 //! Forms that set places: `setf`, `psetf`, `incf`, `push` and their like, and `%modify`, of which others are made.
 //!
-//! The order of evaluation is the standard's: subforms of the place from left to right, then further arguments, then
+//! The order of evaluation is the standard's: subforms of the place from left to right, then further arguments; then
 //! the old value is read, and the new one stored. Only `push` and `pushnew` evaluate their item first.
 
 use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::symbol::Symbol;
 
-use super::form::{Checked, Form, Make, is_cl_form, is_constant};
-use super::machine::{Job, Machine, To};
-use super::place::Place;
-use super::scope::{Variable, Visible};
+use super::expander::Expander;
+use super::form::{Checked, Form, Make, arguments, is_cl_form, is_constant};
+use super::job::{Job, To};
+use super::scope::{VariableMeaning, Visible};
+use super::setf::{Change, PlaceUse, SetfExpansion};
 use crate::core::NodeKind;
 
-/// What is to be done with places that were found.
-#[derive(Debug)]
-pub(super) enum PlaceUse {
-    /// Makes the place `(values place…)` of the newest places.
-    Values(usize),
-    /// Makes a `getf` place of the newest place.
-    Getf(Form),
-    /// Makes an `ldb` or `mask-field` place of the newest place.
-    Field(Form),
-    /// Gives the five parts of the newest place, as a list.
-    Parts,
-    /// Stores the values of a form.
-    Setf(Datum),
-    /// Stores the values of forms, after all of them are computed.
-    Psetf(Vec<Datum>),
-    /// Moves values from place to place, the first one to the last place.
-    Rotatef(usize),
-    /// Moves values from place to place, the value of the form to the last one.
-    Shiftf(usize, Datum),
-    /// Replaces a value by one computed from it.
-    Modify(Change),
-}
-
-/// How a new value is made of the old one.
-#[derive(Debug)]
-pub(super) enum Change {
-    /// `(function old argument…)`, the arguments evaluated before the old value is read.
-    Call(Symbol, Vec<Datum>),
-    /// `(function item old argument…)`, the item evaluated before the place.
-    Push(Symbol, Datum, Vec<Datum>),
-    /// The tail of the old value; the result is its head.
-    Pop,
-    /// The old value without the property; the result is whether there was one.
-    Remf(Datum),
-    /// The value of a form in which a variable is bound to the old value, after further bindings.
-    Bound {
-        /// The variable.
-        old: Datum,
-        /// The further bindings.
-        bindings: Vec<(Datum, Datum)>,
-        /// The form.
-        new: Datum,
-        /// The form whose values are the result, instead of the new value.
-        result: Option<Datum>,
-    },
-}
-
-impl Machine {
+impl Expander {
     /// Uses the newest places.
     pub(super) fn use_places(
         &mut self,
@@ -103,15 +57,21 @@ impl Machine {
         Ok(())
     }
 
-    /// The newest places, if nothing is wrong with them.
-    fn sound(&mut self, count: usize) -> Option<Vec<Place>> {
+    /// Takes the newest places; returns them if none is faulty.
+    fn sound(&mut self, count: usize) -> Option<Vec<SetfExpansion>> {
         let places = self.take_places(count);
         (!places.iter().any(|place| place.is_broken)).then_some(places)
     }
 
-    fn modify(&self, environment: &mut dyn Environment, place: &Place, change: Change, make: Make) -> Datum {
+    fn modify(
+        &self,
+        environment: &mut dyn Environment,
+        place: &SetfExpansion,
+        change: Change,
+        make: Make,
+    ) -> Datum {
         let mut bindings = Vec::new();
-        // Binds a form unless evaluating it later makes no difference.
+        // Binds a form, unless it may as well be evaluated later.
         let bind = |form: &Datum, bindings: &mut Vec<(Datum, Datum)>, environment: &mut dyn Environment| {
             if is_inert(form) || (place.is_variable() && self.is_plain_variable(form)) {
                 return form.clone();
@@ -128,7 +88,7 @@ impl Machine {
                 make.let_in_order(bindings, vec![place.write(new)])
             }
             Change::Push(function, item, args) => {
-                // In front of a variable, the item is evaluated first in any case.
+                // If the place is a variable, the item is evaluated first in any case.
                 let item = if place.is_variable() && args.iter().all(is_inert) {
                     item
                 } else {
@@ -167,34 +127,34 @@ impl Machine {
         }
     }
 
-    /// Whether `form` is a variable, reading which has no effect.
+    /// Whether `form` is a lexical variable.
     fn is_plain_variable(&self, form: &Datum) -> bool {
         let is_macro = |symbol| match self.scope.variable(symbol, self.level()) {
-            Visible::Is(Variable::Lexical(_)) => false,
+            Visible::Is(VariableMeaning::Lexical(_)) => false,
             Visible::Is(_) | Visible::No | Visible::OutOfReach => true,
         };
         form.as_symbol().is_some_and(|symbol| !is_macro(symbol))
     }
 }
 
-/// Whether it does not matter when, or whether, a form is evaluated.
+/// Whether a form may as well be evaluated at another time, or not at all.
 fn is_inert(form: &Datum) -> bool {
     is_constant(form) || is_cl_form(form, "FUNCTION") || is_cl_form(form, "LAMBDA")
 }
 
-/// Variables to be bound to the values of a form, after other bindings.
-struct Step<'a> {
+/// Stores bound to the values of a form, after other bindings.
+struct StoreStep<'a> {
     before: Vec<(Datum, Datum)>,
     stores: &'a [Datum],
     value: Datum,
 }
 
-/// Binds all variables in order around a body.
-fn bind_in_order(steps: Vec<Step<'_>>, mut body: Vec<Datum>, make: Make) -> Datum {
-    // From the last step to the first, so that one with several values can enclose those after it. The bindings that
-    // will enclose the body are gathered from the last to the first, too.
+/// Returns a form that makes all bindings in order around a body.
+fn bind_in_order(steps: Vec<StoreStep<'_>>, mut body: Vec<Datum>, make: Make) -> Datum {
+    // From the last step to the first, so that a step with several values can enclose the steps after it. The bindings
+    // around the body are gathered from the last to the first, too.
     let mut bindings: Vec<(Datum, Datum)> = Vec::new();
-    for Step { before, stores, value } in steps.into_iter().rev() {
+    for StoreStep { before, stores, value } in steps.into_iter().rev() {
         if let [store] = stores {
             bindings.push((store.clone(), value));
         } else {
@@ -208,33 +168,33 @@ fn bind_in_order(steps: Vec<Step<'_>>, mut body: Vec<Datum>, make: Make) -> Datu
     make.let_in_order(bindings, body)
 }
 
-/// All subforms and values in order, then the values stored.
-fn store_all(places: &[Place], values: Vec<Datum>, make: Make) -> Datum {
-    let steps = places.iter().zip(values).map(|(place, value)| Step {
+/// Returns a form that evaluates all subforms and values in order, then stores the values.
+fn store_all(places: &[SetfExpansion], values: Vec<Datum>, make: Make) -> Datum {
+    let steps = places.iter().zip(values).map(|(place, value)| StoreStep {
         before: place.temporaries.clone(),
         stores: &place.stores,
         value,
     });
-    let body = places.iter().map(Place::write_stores).chain([make.nil()]);
+    let body = places.iter().map(SetfExpansion::write_stores).chain([make.nil()]);
     bind_in_order(steps.collect(), body.collect(), make)
 }
 
-/// All subforms, then the values read in order, each for the place before its own, then stored.
-fn rotate(places: &[Place], make: Make) -> Datum {
+/// Returns a form that evaluates all subforms, reads all values, and stores each in the place before its own.
+fn rotate(places: &[SetfExpansion], make: Make) -> Datum {
     let takers = places.iter().cycle().skip(places.len() - 1);
-    let steps = places.iter().zip(takers).map(|(place, taker)| Step {
+    let steps = places.iter().zip(takers).map(|(place, taker)| StoreStep {
         before: Vec::new(),
         stores: &taker.stores,
         value: place.reader.clone(),
     });
-    let mut steps: Vec<Step<'_>> = steps.collect();
+    let mut steps: Vec<StoreStep<'_>> = steps.collect();
     steps[0].before = temporaries(places);
-    let body = places.iter().map(Place::write_stores).chain([make.nil()]);
+    let body = places.iter().map(SetfExpansion::write_stores).chain([make.nil()]);
     bind_in_order(steps, body.collect(), make)
 }
 
-/// As [`rotate`], but the last place takes the value of a form, and the old value of the first one is the result.
-fn shift(places: &[Place], value: Datum, old: Datum, make: Make) -> Datum {
+/// As [`rotate`], except that the last place takes the value of a form, and the first one's old value is returned.
+fn shift(places: &[SetfExpansion], value: Datum, old: Datum, make: Make) -> Datum {
     let [first, others @ ..] = places else { return value };
     let is_single = first.stores.len() == 1;
     let reader = first.reader.clone();
@@ -244,118 +204,118 @@ fn shift(places: &[Place], value: Datum, old: Datum, make: Make) -> Datum {
         (make.cl("MULTIPLE-VALUE-LIST", [reader]), make.call_cl("VALUES-LIST", [old.clone()]))
     };
     let olds = [old];
-    let mut steps = vec![Step { before: temporaries(places), stores: &olds, value: kept }];
+    let mut steps = vec![StoreStep { before: temporaries(places), stores: &olds, value: kept }];
     let values = others.iter().map(|place| place.reader.clone()).chain([value]);
-    steps.extend(places.iter().zip(values).map(|(taker, value)| Step {
+    steps.extend(places.iter().zip(values).map(|(taker, value)| StoreStep {
         before: Vec::new(),
         stores: &taker.stores,
         value,
     }));
-    let body = places.iter().map(Place::write_stores).chain([result]);
+    let body = places.iter().map(SetfExpansion::write_stores).chain([result]);
     bind_in_order(steps, body.collect(), make)
 }
 
-fn temporaries(places: &[Place]) -> Vec<(Datum, Datum)> {
+fn temporaries(places: &[SetfExpansion]) -> Vec<(Datum, Datum)> {
     places.iter().flat_map(|place| place.temporaries.iter().cloned()).collect()
 }
 
 /// `(setf {place form}*)`
-pub(super) fn setf(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn setf(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     let make = Make(to.span);
     match form.args.as_slice() {
         [place, value] => {
             let usage = PlaceUse::Setf(value.clone());
-            machine.schedule([Job::Place(place.clone(), to), Job::Use(Box::new(usage), to)]);
+            expander.schedule([Job::Place(place.clone(), to), Job::Use(Box::new(usage), to)]);
         }
         args if args.len() % 2 == 1 => return Err(form.malformed("needs a value for each place")),
         args => {
             let pairs: Vec<Datum> =
                 args.chunks(2).map(|pair| make.cl("SETF", pair.iter().cloned())).collect();
-            let jobs = machine.body(pairs, to);
-            machine.schedule(jobs);
+            let jobs = expander.body(pairs, to);
+            expander.schedule(jobs);
         }
     }
     Ok(())
 }
 
-/// `(%place-parts place)`: what `get-setf-expansion` returns for a place, as a list.
-pub(super) fn place_parts(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+/// `(%place-parts place)`: the values of `get-setf-expansion` for a place, as a list.
+pub(super) fn place_parts(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(1..=1, "takes one place")?;
-    machine.schedule([Job::Place(form.args[0].clone(), to), Job::Use(Box::new(PlaceUse::Parts), to)]);
+    expander.schedule([Job::Place(form.args[0].clone(), to), Job::Use(Box::new(PlaceUse::Parts), to)]);
     Ok(())
 }
 
 /// `(psetf {place form}*)`
-pub(super) fn psetf(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn psetf(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     if form.args.len() % 2 == 1 {
         return Err(form.malformed("needs a value for each place"));
     }
     let mut jobs: Vec<Job> = form.args.iter().step_by(2).map(|place| Job::Place(place.clone(), to)).collect();
     let values = form.args.iter().skip(1).step_by(2).cloned().collect();
     jobs.push(Job::Use(Box::new(PlaceUse::Psetf(values)), to));
-    machine.schedule(jobs);
+    expander.schedule(jobs);
     Ok(())
 }
 
 /// `(rotatef place*)`
-pub(super) fn rotatef(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn rotatef(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     if form.args.is_empty() {
-        machine.fill(to, NodeKind::Constant(Datum::nil(to.span)));
+        expander.fill(to, NodeKind::Constant(Datum::nil(to.span)));
         return Ok(());
     }
     let count = form.args.len();
     let mut jobs: Vec<Job> = form.args.into_iter().map(|place| Job::Place(place, to)).collect();
     jobs.push(Job::Use(Box::new(PlaceUse::Rotatef(count)), to));
-    machine.schedule(jobs);
+    expander.schedule(jobs);
     Ok(())
 }
 
 /// `(shiftf place+ form)`
-pub(super) fn shiftf(machine: &mut Machine, _: &mut dyn Environment, mut form: Form, to: To) -> Checked {
+pub(super) fn shiftf(expander: &mut Expander, _: &mut dyn Environment, mut form: Form, to: To) -> Checked {
     form.takes(2..=usize::MAX, "needs at least one place and a form")?;
     let value = form.args.pop().expect("the number of arguments was checked");
     let count = form.args.len();
     let mut jobs: Vec<Job> = form.args.into_iter().map(|place| Job::Place(place, to)).collect();
     jobs.push(Job::Use(Box::new(PlaceUse::Shiftf(count, value)), to));
-    machine.schedule(jobs);
+    expander.schedule(jobs);
     Ok(())
 }
 
-fn change(machine: &mut Machine, place: &Datum, change: Change, to: To) -> Checked {
-    machine.schedule([Job::Place(place.clone(), to), Job::Use(Box::new(PlaceUse::Modify(change)), to)]);
+fn change(expander: &mut Expander, place: &Datum, change: Change, to: To) -> Checked {
+    expander.schedule([Job::Place(place.clone(), to), Job::Use(Box::new(PlaceUse::Modify(change)), to)]);
     Ok(())
 }
 
 /// `(incf place [delta])`
-pub(super) fn incf(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
-    add(machine, &form, "+", to)
+pub(super) fn incf(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    add(expander, &form, "+", to)
 }
 
 /// `(decf place [delta])`
-pub(super) fn decf(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
-    add(machine, &form, "-", to)
+pub(super) fn decf(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    add(expander, &form, "-", to)
 }
 
-fn add(machine: &mut Machine, form: &Form, function: &str, to: To) -> Checked {
+fn add(expander: &mut Expander, form: &Form, function: &str, to: To) -> Checked {
     form.takes(1..=2, "takes a place and at most one form")?;
     let delta = form.args.get(1).cloned().unwrap_or_else(|| Datum::integer(1, to.span));
-    if let Some(counter) = counter(machine, &form.args[0], function, &delta, to) {
-        machine.schedule([Job::Expand(counter, to)]);
+    if let Some(counter) = counter(expander, &form.args[0], function, &delta, to) {
+        expander.schedule([Job::Expand(counter, to)]);
         return Ok(());
     }
-    change(machine, &form.args[0], Change::Call(Symbol::cl(function), vec![delta]), to)
+    change(expander, &form.args[0], Change::Call(Symbol::cl(function), vec![delta]), to)
 }
 
-/// The call that adds to the value of a key in a hash table with one search: counting in tables is so common that it has a
-/// builtin of its own.
-fn counter(machine: &Machine, place: &Datum, function: &str, delta: &Datum, to: To) -> Option<Datum> {
+/// Returns the call that adds to the value of a key in a hash table with one search. Counting in tables is so common
+/// that it has a builtin of its own.
+fn counter(expander: &Expander, place: &Datum, function: &str, delta: &Datum, to: To) -> Option<Datum> {
     let gethash = Symbol::cl("GETHASH");
-    let is_global = matches!(machine.scope.function(&gethash, machine.level()), Visible::No);
+    let is_global = matches!(expander.scope.function(&gethash, expander.level()), Visible::No);
     if function != "+" || !is_global || !is_cl_form(place, "GETHASH") {
         return None;
     }
     let make = Make(to.span);
-    let (key, table, default) = match &*super::form::arguments(place)? {
+    let (key, table, default) = match &*arguments(place)? {
         [key, table] => (key.clone(), table.clone(), Datum::nil(to.span)),
         [key, table, default] => (key.clone(), table.clone(), default.clone()),
         _ => return None,
@@ -364,34 +324,34 @@ fn counter(machine: &Machine, place: &Datum, function: &str, delta: &Datum, to: 
 }
 
 /// `(push item place)`
-pub(super) fn push(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn push(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(2..=2, "takes an item and a place")?;
-    change(machine, &form.args[1], Change::Push(Symbol::cl("CONS"), form.args[0].clone(), Vec::new()), to)
+    change(expander, &form.args[1], Change::Push(Symbol::cl("CONS"), form.args[0].clone(), Vec::new()), to)
 }
 
 /// `(pushnew item place . keys)`
-pub(super) fn pushnew(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn pushnew(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(2..=usize::MAX, "takes an item, a place and keyword arguments")?;
     let keys = form.args[2..].to_vec();
-    change(machine, &form.args[1], Change::Push(Symbol::cl("ADJOIN"), form.args[0].clone(), keys), to)
+    change(expander, &form.args[1], Change::Push(Symbol::cl("ADJOIN"), form.args[0].clone(), keys), to)
 }
 
 /// `(pop place)`
-pub(super) fn pop(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn pop(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(1..=1, "takes a place")?;
-    change(machine, &form.args[0], Change::Pop, to)
+    change(expander, &form.args[0], Change::Pop, to)
 }
 
 /// `(remf place indicator)`
-pub(super) fn remf(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn remf(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(2..=2, "takes a place and an indicator")?;
-    change(machine, &form.args[0], Change::Remf(form.args[1].clone()), to)
+    change(expander, &form.args[0], Change::Remf(form.args[1].clone()), to)
 }
 
 /// `(%modify (old (name form)*) place new [result])`: evaluates the subforms of the place, then binds the names to the
-/// forms one after another, then `old` to the old value, and stores the value of `new`. Gives that value, or those of
-/// `result`, which is evaluated last.
-pub(super) fn modify(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+/// forms one after another, then `old` to the old value, and stores the value of `new`. Returns that value, or the
+/// values of `result`, which is evaluated last.
+pub(super) fn modify(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(3..=4, "takes names, a place, the new value and at most one result")?;
     let names = form.args[0].as_list().unwrap_or_default();
     let Some((old, further)) =
@@ -410,5 +370,5 @@ pub(super) fn modify(machine: &mut Machine, _: &mut dyn Environment, form: Form,
     }
     let result = form.args.get(3).cloned();
     let bound = Change::Bound { old: (*old).clone(), bindings, new: form.args[2].clone(), result };
-    change(machine, &form.args[1], bound, to)
+    change(expander, &form.args[1], bound, to)
 }

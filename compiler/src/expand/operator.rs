@@ -1,23 +1,18 @@
-//! The table of operators that the expander knows: special forms, the standard macros that are written in Rust, and
-//! the library's internal operators.
+//! The table of operators that the compiler itself expands: special forms, the standard macros that are written in Rust,
+//! and the library's internal operators.
 //!
-//! A row is the name and the function that expands a form of it. Nothing else says which operators there are.
+//! A row is a name and the function that expands a form of it. This table is the only list of operators.
 
 use std::sync::LazyLock;
 
-use esl_bytecode::compile::Environment;
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashMap;
 
-use super::form::{Checked, Form};
-use super::machine::{Machine, To};
+use super::expander::{Expander, Operator};
 use super::{
     backquote, binding, call, control, define, destructure, handler, lambda, local, modify, recovery,
     variable,
 };
-
-/// Expands a form into a node.
-pub(super) type Operator = fn(&mut Machine, &mut dyn Environment, Form, To) -> Checked;
 
 /// The operators of the package `COMMON-LISP`.
 const STANDARD: &[(&str, Operator)] = &[
@@ -76,7 +71,7 @@ const STANDARD: &[(&str, Operator)] = &[
     ("VALUES", control::values),
 ];
 
-/// The operators of the package `ESL`; those whose names begin with `%` are internal to it.
+/// The operators of the package `ESL`. A name that begins with `%` is internal to it.
 const OWN: &[(&str, Operator)] = &[
     ("%APPLY-GLOBAL", call::apply_global),
     ("%BACKQUOTE", backquote::backquote),
@@ -105,13 +100,26 @@ static TABLE: LazyLock<FxHashMap<Symbol, Operator>> = LazyLock::new(|| {
     standard.chain(internal).collect()
 });
 
-/// The operator called `symbol`.
-pub(super) fn find(symbol: &Symbol) -> Option<Operator> {
+/// Returns the operator called `symbol`.
+fn find(symbol: &Symbol) -> Option<Operator> {
     TABLE.get(symbol).copied()
 }
 
-/// The names of all operators that the compiler knows by itself. Of these, `funcall`, `apply` and `values` are
+/// Returns the names of all operators that the compiler itself expands. Of these, `funcall`, `apply` and `values` are
 /// functions too.
 pub fn names() -> impl Iterator<Item = Symbol> {
     TABLE.keys().cloned()
+}
+
+impl Expander {
+    /// Creates an expander that has not seen any form.
+    pub fn new() -> Expander {
+        Expander::with_operators(find)
+    }
+}
+
+impl Default for Expander {
+    fn default() -> Expander {
+        Expander::new()
+    }
 }

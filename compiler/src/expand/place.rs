@@ -1,150 +1,30 @@
 //! Places: what `setf` and its relatives can set.
 //!
-//! A place is found as five parts, of which all these forms are made: variables and the forms they are bound to (the
-//! subforms of the place, evaluated once and in order), variables for the new values, a form that stores them, and a
-//! form that reads the old value. [`Job::Place`] finds the parts of one place, expanding macros as needed, and leaves
-//! them on the machine's list of places; [`super::modify`] makes forms of them.
+//! [`Job::Place`] finds the setf expansion of one place, expanding macros as needed, and puts it on the expander's list
+//! of places; [`super::modify`] makes forms of them.
 //!
-//! How a call `(f …)` is set is looked for in this order: local functions and macros; the forms of [`super::standard_place`];
-//! accessors of structures; the property `%setf` of `f`, which `defsetf` and its like record; a builtin `%set-f` that
-//! takes the new value last; a macro `f`; and at last the function `(setf f)`, which takes the new value first.
+//! How a call `(f …)` is set is looked up in this order: local functions and macros; the forms of
+//! [`super::standard_place`]; accessors of structures; the property `%setf` of `f`, which `defsetf` and its like record;
+//! a builtin `%set-f` that takes the new value last; a macro `f`; and last the function `(setf f)`, which takes the new
+//! value first.
 
+use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::{Accessor, Environment, GlobalFunction, MacroRef};
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
-use esl_bytecode::symbol::{CL_PACKAGE, Symbol};
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol};
 
+use super::expander::Expander;
 use super::form::{Checked, Form, Make, is_constant, name, quoted};
-use super::lambda::{FunctionName, out_of_reach};
-use super::machine::{Job, Machine, To};
-use super::scope::{Function, Variable, Visible};
+use super::function::WrittenName;
+use super::job::{Job, To, Waiting};
+use super::scope::{FunctionMeaning, VariableMeaning, Visible};
+use super::setf::{SetfExpansion, Writer};
 use super::variable::Meaning;
 use crate::diagnostic::code;
 
-/// How the new value is stored.
-#[derive(Clone, Debug)]
-pub(super) enum Writer {
-    /// By the form `(before… value after…)`.
-    Call(Vec<Datum>, Vec<Datum>),
-    /// By this form, within which the variables for the new values are bound.
-    Form(Datum),
-}
-
-/// The five parts of a place.
-#[derive(Clone, Debug)]
-pub(super) struct Place {
-    /// Variables and the subforms that they are bound to, in order.
-    pub(super) temporaries: Vec<(Datum, Datum)>,
-    /// Variables for the new values.
-    pub(super) stores: Vec<Datum>,
-    pub(super) writer: Writer,
-    /// The form that reads the old value.
-    pub(super) reader: Datum,
-    /// Whether the writer takes the temporaries in order and the value after them.
-    pub(super) is_direct: bool,
-    /// Whether something was wrong with it, which has been reported.
-    pub(super) is_broken: bool,
-    pub(super) make: Make,
-}
-
-impl Place {
-    /// Stands for a place with which something is wrong.
-    pub(super) fn broken(span: Span) -> Place {
-        let make = Make(span);
-        Place {
-            temporaries: Vec::new(),
-            stores: Vec::new(),
-            writer: Writer::Form(make.nil()),
-            reader: make.nil(),
-            is_direct: false,
-            is_broken: true,
-            make,
-        }
-    }
-
-    pub(super) fn new(make: Make, stores: Vec<Datum>, writer: Writer, reader: Datum) -> Place {
-        Place { temporaries: Vec::new(), stores, writer, reader, is_direct: false, is_broken: false, make }
-    }
-
-    /// The five values that a `define-setf-expander` has given for `place`.
-    pub(super) fn from_values(place: &Datum, values: &Datum, span: Span) -> Checked<Place> {
-        let wrong = || {
-            let message = format!(
-                "the expander of {} must give five values: variables, forms, stores, writer, reader",
-                quoted(place)
-            );
-            Box::new(code::MACRO_FAILED.at(span, message))
-        };
-        let parts = values.as_list().ok_or_else(wrong)?;
-        let [variables, forms, stores, writer, reader] = parts.as_slice() else { return Err(wrong()) };
-        let (variables, forms) = (variables.as_list().ok_or_else(wrong)?, forms.as_list().ok_or_else(wrong)?);
-        let stores: Vec<Datum> = stores.as_list().ok_or_else(wrong)?.into_iter().cloned().collect();
-        if variables.len() != forms.len() || stores.is_empty() {
-            return Err(wrong());
-        }
-        let mut found = Place::new(Make(span), stores, Writer::Form((*writer).clone()), (*reader).clone());
-        found.temporaries = variables.into_iter().cloned().zip(forms.into_iter().cloned()).collect();
-        Ok(found)
-    }
-
-    /// The five parts, as a list: variables, forms, stores, writer, reader.
-    pub(super) fn parts(&self) -> Datum {
-        let make = self.make;
-        make.list([
-            make.items(self.temporaries.iter().map(|(variable, _)| variable.clone())),
-            make.items(self.temporaries.iter().map(|(_, form)| form.clone())),
-            make.items(self.stores.iter().cloned()),
-            self.write_stores(),
-            self.reader.clone(),
-        ])
-    }
-
-    /// Whether this is a variable: reading it has no effect, and nothing has to be bound for it.
-    pub(super) fn is_variable(&self) -> bool {
-        self.temporaries.is_empty() && self.reader.as_symbol().is_some()
-    }
-
-    /// The form that stores the values of `value`, where the temporaries are bound.
-    pub(super) fn write(&self, value: Datum) -> Datum {
-        let make = self.make;
-        match (&self.writer, self.stores.as_slice()) {
-            (Writer::Call(before, after), _) => {
-                make.items(before.iter().cloned().chain([value]).chain(after.iter().cloned()))
-            }
-            (Writer::Form(form), [store]) => {
-                make.let_in_order(vec![(store.clone(), value)], vec![form.clone()])
-            }
-            (Writer::Form(form), stores) => {
-                make.cl("MULTIPLE-VALUE-BIND", [make.items(stores.iter().cloned()), value, form.clone()])
-            }
-        }
-    }
-
-    /// The form that stores values already bound to the variables for them.
-    pub(super) fn write_stores(&self) -> Datum {
-        match (&self.writer, self.stores.first()) {
-            (Writer::Call(..), Some(store)) => self.write(store.clone()),
-            (Writer::Form(form), _) => form.clone(),
-            (Writer::Call(..), None) => self.make.nil(),
-        }
-    }
-
-    /// The form that stores `value`, all by itself.
-    pub(super) fn set(&self, value: Datum) -> Datum {
-        if let (true, Writer::Call(before, _)) = (self.is_direct, &self.writer) {
-            // Subforms and value are evaluated in the right order as arguments: nothing has to be bound.
-            let inlined = before.iter().map(|item| {
-                let temporary = self.temporaries.iter().find(|(name, _)| name.is_same(item));
-                temporary.map_or_else(|| item.clone(), |(_, form)| form.clone())
-            });
-            return self.make.items(inlined.chain([value]));
-        }
-        self.make.let_in_order(self.temporaries.clone(), vec![self.write(value)])
-    }
-}
-
-impl Machine {
+impl Expander {
     /// Finds the five parts of a place.
     pub(super) fn find_place(&mut self, environment: &mut dyn Environment, datum: Datum, to: To) -> Checked {
         let make = Make(to.span);
@@ -160,20 +40,20 @@ impl Machine {
             DatumKind::Cons(head, _) if head.as_symbol().is_some() => {
                 let form = Form::of(&datum, to.span)?;
                 match self.scope.function(&form.operator, self.level()) {
-                    Visible::Is(Function::Local(..)) => {
+                    Visible::Is(FunctionMeaning::Local(..)) => {
                         self.function_place(environment, form, to);
                         Ok(())
                     }
-                    Visible::Is(Function::Macro(Some(function))) => {
+                    Visible::Is(FunctionMeaning::Macro(Some(function))) => {
                         self.stop_for_place(MacroRef::Local(function), &form, false, to)
                     }
-                    Visible::Is(Function::Macro(None)) => {
-                        self.places.push(Place::broken(to.span));
+                    Visible::Is(FunctionMeaning::Macro(None)) => {
+                        self.places.push(SetfExpansion::broken(to.span));
                         Ok(())
                     }
                     Visible::OutOfReach => {
-                        let function = FunctionName::of(&make.symbol(&form.operator));
-                        Err(out_of_reach(&form, &function.expect("a symbol names a function")))
+                        let named = make.symbol(&form.operator);
+                        Err(WrittenName::symbol(&form.operator, named).out_of_reach(&form))
                     }
                     Visible::No => self.global_place(environment, form, to),
                 }
@@ -191,8 +71,8 @@ impl Machine {
     ) -> Checked {
         let make = Make(to.span);
         match self.meaning(environment, symbol, to.span)? {
-            Some(Meaning::Variable(Variable::SymbolMacro(form))) => {
-                let origin = self.origin(symbol, to.span, true, to.origin)?;
+            Some(Meaning::Variable(VariableMeaning::SymbolMacro(form))) => {
+                let origin = self.origins.enter(symbol, to.span, true, to.origin)?;
                 self.schedule([Job::Place(form, To { origin, ..to })]);
             }
             Some(Meaning::Constant(_)) => {
@@ -202,8 +82,8 @@ impl Machine {
             Some(Meaning::Variable(_)) | None => {
                 let store = make.fresh(environment, "NEW");
                 let before = vec![make.symbol(&Symbol::cl("SETQ")), datum.clone()];
-                let place = Place::new(make, vec![store], Writer::Call(before, Vec::new()), datum);
-                self.places.push(Place { is_direct: true, ..place });
+                let place = SetfExpansion::new(make, vec![store], Writer::Call(before, Vec::new()), datum);
+                self.places.push(SetfExpansion { is_direct: true, ..place });
             }
         }
         Ok(())
@@ -233,14 +113,20 @@ impl Machine {
                 let stores: Vec<Datum> = (0..count).map(|_| make.fresh(environment, "NEW")).collect();
                 let call = [make.symbol(&expander), make.items(stores.iter().cloned())];
                 let writer = Writer::Form(make.items(call.into_iter().chain(args.iter().cloned())));
-                let place = Place::new(make, stores, writer, reader(&form, args, make));
-                self.places.push(Place { temporaries, ..place });
+                let place = SetfExpansion::new(make, stores, writer, reader(&form, args, make));
+                self.places.push(SetfExpansion { temporaries, ..place });
             }
-            Some(Update::Expander(expander)) => return self.stop_for_five(expander, &form, to),
-            None if super::operator::find(&form.operator).is_some() => {
+            Some(Update::Expander(expander)) => {
+                let place = form.datum.clone();
+                let waiting = |origin| Waiting::SetfExpansion(place, To { origin, ..to });
+                return self.stop_for_macro(MacroRef::Global(expander), &form, true, to.origin, waiting);
+            }
+            None if self.is_operator(&form.operator) => {
                 return Err(no_place(&form.datum, to.span));
             }
-            None if self.unit.is_broken_macro(&form.operator) => self.places.push(Place::broken(to.span)),
+            None if self.globals.is_broken_macro(&form.operator) => {
+                self.places.push(SetfExpansion::broken(to.span))
+            }
             None if self.is_macro(environment, &form.operator) => {
                 let function = MacroRef::Global(form.operator.clone());
                 return self.stop_for_place(function, &form, global.locked, to);
@@ -250,7 +136,13 @@ impl Machine {
         Ok(())
     }
 
-    /// A place that the function `(setf f)` sets.
+    /// Stops for the expansion of a macro call that stands for a place.
+    fn stop_for_place(&mut self, function: MacroRef, form: &Form, is_standard: bool, to: To) -> Checked {
+        let waiting = |origin| Waiting::Place(To { origin, ..to });
+        self.stop_for_macro(function, form, is_standard, to.origin, waiting)
+    }
+
+    /// Adds a place that the function `(setf f)` sets.
     fn function_place(&mut self, environment: &mut dyn Environment, form: Form, to: To) {
         let make = Make(to.span);
         let (temporaries, args) = arguments(environment, &form.args, make);
@@ -258,11 +150,11 @@ impl Machine {
         let before = vec![make.symbol(&Symbol::cl("FUNCALL")), make.cl("FUNCTION", [setter])];
         let store = make.fresh(environment, "NEW");
         let reader = reader(&form, args.clone(), make);
-        let place = Place::new(make, vec![store], Writer::Call(before, args), reader);
-        self.places.push(Place { temporaries, ..place });
+        let place = SetfExpansion::new(make, vec![store], Writer::Call(before, args), reader);
+        self.places.push(SetfExpansion { temporaries, ..place });
     }
 
-    /// A place that is set by the form `(prefix… argument… value)`, which takes only the first `taken` arguments.
+    /// Adds a place that the form `(prefix… argument… value)` sets, which takes only the first `taken` arguments.
     pub(super) fn update_place(
         &mut self,
         environment: &mut dyn Environment,
@@ -276,9 +168,13 @@ impl Machine {
         let before = prefix.into_iter().chain(args.iter().take(taken).cloned()).collect();
         let store = make.fresh(environment, "NEW");
         let is_direct = args.len() <= taken;
-        let place =
-            Place::new(make, vec![store], Writer::Call(before, Vec::new()), reader(&form, args, make));
-        self.places.push(Place { temporaries, is_direct, ..place });
+        let place = SetfExpansion::new(
+            make,
+            vec![store],
+            Writer::Call(before, Vec::new()),
+            reader(&form, args, make),
+        );
+        self.places.push(SetfExpansion { temporaries, is_direct, ..place });
     }
 
     fn slot_place(
@@ -304,17 +200,18 @@ impl Machine {
     }
 
     /// Takes the newest place.
-    pub(super) fn take_place(&mut self) -> Place {
+    pub(super) fn take_place(&mut self) -> SetfExpansion {
         self.places.pop().expect("a place was found for each use")
     }
 
     /// Takes the newest `count` places, in the order in which they were found.
-    pub(super) fn take_places(&mut self, count: usize) -> Vec<Place> {
+    pub(super) fn take_places(&mut self, count: usize) -> Vec<SetfExpansion> {
         self.places.split_off(self.places.len() - count)
     }
 }
 
-/// Variables for the subforms of a place that are not constant, and the subforms with these in their place.
+/// Returns variables bound to the subforms of a place that are not constant, and the subforms with these variables in
+/// their place.
 pub(super) fn arguments(
     environment: &mut dyn Environment,
     args: &[Datum],
@@ -334,23 +231,24 @@ pub(super) fn arguments(
     (temporaries, names)
 }
 
-/// The form that reads the place: its own operator with the temporaries for arguments.
+/// Returns the form that reads the place: its own operator with the temporaries as arguments.
 pub(super) fn reader(form: &Form, args: Vec<Datum>, make: Make) -> Datum {
     make.items(std::iter::once(make.symbol(&form.operator)).chain(args))
 }
 
-/// How the library says that a place is set.
+/// How a place is set, according to the library.
 pub(super) enum Update {
     /// By a global function that takes the new value last.
     Function(Symbol),
     /// By a macro that takes the new value last.
     Operator(Symbol),
-    /// By the form `(macro (store…) argument…)`, with so many stores.
+    /// By the form `(macro (store…) argument…)`, with this number of stores.
     Macro(Symbol, usize),
-    /// By what this macro says: a list of the five parts.
+    /// By the five parts that this macro returns as a list.
     Expander(Symbol),
 }
 
+/// Returns how the place `(symbol …)` is set, if the library or a builtin says so.
 pub(super) fn update_of(environment: &dyn Environment, symbol: &Symbol) -> Option<Update> {
     if let Some(recorded) = environment.property(symbol, &Symbol::esl("%SETF")) {
         if let Some(update) = recorded.as_symbol() {
@@ -373,10 +271,11 @@ pub(super) fn update_of(environment: &dyn Environment, symbol: &Symbol) -> Optio
         }
     }
     let update = Symbol::esl(&format!("%SET-{}", symbol.name()));
-    let is_standard = symbol.is_in(CL_PACKAGE) || symbol.is_in(esl_bytecode::symbol::ESL_PACKAGE);
-    (is_standard && super::call::builtin(&update).is_some()).then_some(Update::Function(update))
+    let is_standard = symbol.is_in(CL_PACKAGE) || symbol.is_in(ESL_PACKAGE);
+    (is_standard && Builtin::named(&update).is_some()).then_some(Update::Function(update))
 }
 
+/// Returns the error about a form that is used as a place.
 pub(super) fn no_place(datum: &Datum, span: Span) -> Box<Diagnostic> {
     let message = format!("{} is no place that can be set", quoted(datum));
     Box::new(

@@ -1,27 +1,27 @@
 //! The core language as text, for `eslc expand` and for tests.
 //!
-//! What is printed is Lisp that means the same as the core tree, as far as it can be written: a second variable of the
-//! same name gets a number, tags are numbered, and operators of the library appear under their internal names.
+//! The text is Lisp with the meaning of the core tree, as far as that can be written: a second variable of the same name
+//! gets a number, tags are numbered, and operators of the library appear under their internal names.
 
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_bytecode::span::Span;
+use esl_bytecode::span::{SourceId, Span};
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashMap;
 
 use super::form::{Make, on_one_line};
 use crate::core::{
-    BlockId, Callee, Core, Lambda, LambdaId, NodeId, NodeKind, OptionalParameter, Parameter, TagbodyId,
-    TagbodyItem, Target, VarId,
+    BlockId, BoundVariable, Callee, Core, Lambda, LambdaId, NodeId, NodeKind, OptionalParameter, Parameter,
+    TagbodyId, TagbodyItem, VarId,
 };
 
-const MAKE: Make = Make(Span { source: esl_bytecode::span::SourceId(0), start: 0, end: 0 });
+const MAKE: Make = Make(Span { source: SourceId(0), start: 0, end: 0 });
 
-/// The longest line, where lines can be broken.
+/// Characters of the longest line, where lines can be broken.
 const WIDTH: usize = 100;
-/// Forms nested more deeply than this are not broken into lines.
+/// Nesting depth from which on forms are not broken into lines.
 const BROKEN_DEPTH: usize = 60;
 
-/// The text of a top-level form.
+/// Returns the text of a top-level form.
 pub fn print(core: &Core) -> String {
     let printer = Printer { core, names: variable_names(core), blocks: block_names(core) };
     let mut text = String::new();
@@ -68,7 +68,7 @@ fn block_names(core: &Core) -> Vec<Datum> {
 
 impl Printer<'_> {
     fn form(&self) -> Datum {
-        // Children have higher numbers than their parents: from the end on, all parts of a node are there.
+        // Children have higher numbers than their parents: going backward, all parts of a node are printed before it.
         let mut forms: Vec<Datum> = vec![MAKE.nil(); self.core.nodes.len()];
         for index in (0..forms.len()).rev() {
             forms[index] = self.node(&self.core.nodes[index].kind, &forms);
@@ -93,9 +93,7 @@ impl Printer<'_> {
             NodeKind::Special(symbol) => MAKE.symbol(symbol),
             NodeKind::SetSpecial(symbol, value) => MAKE.cl("SETQ", [MAKE.symbol(symbol), at(value)]),
             NodeKind::FunctionRef(symbol) => MAKE.cl("FUNCTION", [MAKE.symbol(symbol)]),
-            NodeKind::BuiltinRef(builtin) => {
-                MAKE.cl("FUNCTION", [MAKE.symbol(&Symbol::cl(builtin.info().name))])
-            }
+            NodeKind::BuiltinRef(builtin) => MAKE.cl("FUNCTION", [MAKE.symbol(&builtin.symbol())]),
             NodeKind::Lambda(lambda) => self.lambda(*lambda, forms),
             NodeKind::If(test, then, otherwise) => MAKE.cl("IF", [at(test), at(then), at(otherwise)]),
             NodeKind::Progn(ids) => MAKE.cl("PROGN", all(ids)),
@@ -103,7 +101,7 @@ impl Printer<'_> {
             NodeKind::Or(ids) => MAKE.cl("OR", all(ids)),
             NodeKind::Let { sequential, bindings, body } => {
                 let bindings =
-                    bindings.iter().map(|(target, value)| MAKE.list([self.target(target), at(value)]));
+                    bindings.iter().map(|(variable, value)| MAKE.list([self.bound(variable), at(value)]));
                 MAKE.cl(if *sequential { "LET*" } else { "LET" }, [MAKE.items(bindings), at(body)])
             }
             NodeKind::Functions { definitions, body } => {
@@ -143,9 +141,9 @@ impl Printer<'_> {
                 MAKE.cl("APPLY", std::iter::once(function).chain(all(args)))
             }
             NodeKind::Values(ids) => MAKE.cl("VALUES", all(ids)),
-            NodeKind::BindValues(targets, form, body) => {
-                let targets = MAKE.items(targets.iter().map(|target| self.target(target)));
-                MAKE.cl("MULTIPLE-VALUE-BIND", [targets, at(form), at(body)])
+            NodeKind::BindValues(variables, form, body) => {
+                let variables = MAKE.items(variables.iter().map(|variable| self.bound(variable)));
+                MAKE.cl("MULTIPLE-VALUE-BIND", [variables, at(form), at(body)])
             }
             NodeKind::CallValues(function, ids) => {
                 MAKE.cl("MULTIPLE-VALUE-CALL", std::iter::once(at(function)).chain(all(ids)))
@@ -186,17 +184,17 @@ impl Printer<'_> {
         self.blocks[index as usize].clone()
     }
 
-    fn target(&self, target: &Target) -> Datum {
-        match target {
-            Target::Lexical(variable) => self.variable(*variable),
-            Target::Special(symbol) => MAKE.symbol(symbol),
+    fn bound(&self, variable: &BoundVariable) -> Datum {
+        match variable {
+            BoundVariable::Lexical(variable) => self.variable(*variable),
+            BoundVariable::Special(symbol) => MAKE.symbol(symbol),
         }
     }
 
     fn callee(&self, callee: &Callee) -> Datum {
         match callee {
             Callee::Global(symbol) => MAKE.symbol(symbol),
-            Callee::Builtin(builtin) => MAKE.symbol(&Symbol::cl(builtin.info().name)),
+            Callee::Builtin(builtin) => MAKE.symbol(&builtin.symbol()),
             Callee::Local(variable) => self.variable(*variable),
             Callee::Value(_) => MAKE.symbol(&Symbol::cl("FUNCALL")),
         }
@@ -215,7 +213,7 @@ impl Printer<'_> {
         }
     }
 
-    /// The lambda list, and the body.
+    /// Returns the lambda list and the body.
     fn text(&self, lambda: &Lambda, forms: &[Datum]) -> [Datum; 2] {
         let keyword = |name| MAKE.symbol(&Symbol::cl(name));
         let mut list: Vec<Datum> =
@@ -242,7 +240,7 @@ impl Printer<'_> {
         [MAKE.items(list), forms[lambda.body.index()].clone()]
     }
 
-    /// A special parameter is shown as `(special name)`.
+    /// Returns a parameter; a special one as `(special name)`.
     fn parameter(&self, parameter: &Parameter) -> Datum {
         let name = self.variable(parameter.variable);
         if parameter.is_special { MAKE.cl("SPECIAL", [name]) } else { name }
@@ -271,7 +269,7 @@ fn lay_out(form: &Datum, column: usize, depth: usize, text: &mut String) {
         text.push_str(&on_one_line(form, usize::MAX / 4));
         return;
     };
-    // The operator, and what belongs on its line; the rest below it.
+    // Number of arguments on the line of the operator; the others go below it.
     let beside = match items[0].as_symbol().map(Symbol::name) {
         Some("LET" | "LET*" | "LABELS" | "LAMBDA" | "BLOCK" | "RETURN-FROM" | "SETQ" | "IF" | "CATCH") => 1,
         Some("%NAMED-LAMBDA" | "MULTIPLE-VALUE-BIND") => 2,

@@ -1,14 +1,14 @@
 //! `%with-recovery` and its relatives, on which the library builds `with-recovery-procedures` and
-//! `with-cleanup-procedure`, and what is to be said about the clauses.
+//! `with-cleanup-procedure`; and the checks of recovery clauses.
 
 use esl_bytecode::compile::Environment;
-use esl_bytecode::datum::{Datum, DatumKind};
-use esl_bytecode::span::Span;
+use esl_bytecode::datum::DatumKind;
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashSet;
 
-use super::form::{Checked, Form, Make};
-use super::machine::{Job, Machine, To};
+use super::expander::Expander;
+use super::form::{Checked, Form, Make, is_esl, name, operator};
+use super::job::{Job, To};
 use super::scope::Visible;
 use crate::core::*;
 use crate::diagnostic::code;
@@ -18,81 +18,90 @@ const LEAVING: &[&str] = &["FAIL", "%FAIL-FOR", "%NO-CASE", "NEXT-BINDINGS", "EX
 const LEAVING_STANDARD: &[&str] = &["ERROR", "INVOKE-RESTART", "ABORT"];
 
 /// `(%with-recovery table (%named-lambda …) . body)`: see [`NodeKind::Recovery`].
-pub(super) fn with_recovery(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn with_recovery(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(2..=usize::MAX, "needs a table and a function")?;
     let table = form.args[0].clone();
-    let is_function = super::form::operator(&form.args[1])
-        .is_some_and(|operator| super::form::is_esl(operator, "%NAMED-LAMBDA"));
+    let is_function = operator(&form.args[1]).is_some_and(|operator| is_esl(operator, "%NAMED-LAMBDA"));
     if !matches!(table.kind(), DatumKind::Vector(_)) || !is_function {
         return Err(form.malformed("needs a vector and a function's text"));
     }
-    let (procedures, job) = machine.part(form.args[1].clone(), to);
-    let body = machine.child(to);
-    machine.fill(to, NodeKind::Recovery { table, procedures, body: body.node });
+    let (procedures, job) = expander.part(form.args[1].clone(), to);
+    let body = expander.child(to);
+    expander.fill(to, NodeKind::Recovery { table, procedures, body: body.node });
     let mut jobs = vec![job];
-    jobs.extend(machine.body(form.args[2..].to_vec(), body));
-    machine.schedule(jobs);
+    jobs.extend(expander.body(form.args[2..].to_vec(), body));
+    expander.schedule(jobs);
     Ok(())
 }
 
 /// `(%with-failure-cleanup form . body)`: see [`NodeKind::FailureCleanup`].
 pub(super) fn with_failure_cleanup(
-    machine: &mut Machine,
+    expander: &mut Expander,
     _: &mut dyn Environment,
     form: Form,
     to: To,
 ) -> Checked {
     form.takes(1..=usize::MAX, "needs a form for the cleanup")?;
-    let body = machine.child(to);
-    let mut jobs = machine.body(form.args[1..].to_vec(), body);
-    let (cleanup, job) = machine.part(form.args[0].clone(), to);
-    machine.fill(to, NodeKind::FailureCleanup(body.node, cleanup));
+    let body = expander.child(to);
+    let mut jobs = expander.body(form.args[1..].to_vec(), body);
+    let (cleanup, job) = expander.part(form.args[0].clone(), to);
+    expander.fill(to, NodeKind::FailureCleanup(body.node, cleanup));
     // The cleanup is expanded first, as it is written first.
     jobs.insert(0, job);
-    machine.schedule(jobs);
+    expander.schedule(jobs);
     Ok(())
 }
 
 /// `(%clause where . body)`: the body of a recovery clause.
-pub(super) fn clause(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn clause(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(1..=usize::MAX, "needs a datum that says where the clause is")?;
     let span = form.at(form.args[0].span());
-    let body = machine.child(to);
-    machine.fill(to, NodeKind::Progn(vec![body.node]));
-    let mut jobs = machine.body(form.args[1..].to_vec(), body);
+    let body = expander.child(to);
+    expander.fill(to, NodeKind::Progn(vec![body.node]));
+    let mut jobs = expander.body(form.args[1..].to_vec(), body);
     jobs.push(Job::CheckClause(To { span, ..body }, form.args.len() == 1));
-    machine.schedule(jobs);
+    expander.schedule(jobs);
     Ok(())
 }
 
-/// `(%cause cause where . body)`: the body; notes that the cause is named there.
-pub(super) fn cause(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+/// `(%cause cause where . body)`: expands to the body; notes that the datum `where` names the cause.
+pub(super) fn cause(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(2..=usize::MAX, "needs a cause and a datum that says where it is")?;
     if let Some(cause) = form.args[0].as_symbol() {
-        machine.unit.note_cause(cause, form.at(form.args[1].span()));
+        expander.globals.note_cause(cause, form.at(form.args[1].span()));
     }
-    let jobs = machine.body(form.args[2..].to_vec(), to);
-    machine.schedule(jobs);
+    let jobs = expander.body(form.args[2..].to_vec(), to);
+    expander.schedule(jobs);
     Ok(())
 }
 
-/// `(retry)`: runs the body of the form again that the clause around this belongs to.
-pub(super) fn retry(machine: &mut Machine, environment: &mut dyn Environment, form: Form, to: To) -> Checked {
+/// `(retry)`: runs the body of the recovery form around the clause again.
+pub(super) fn retry(
+    expander: &mut Expander,
+    environment: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
     form.takes(0..=0, "takes no arguments")?;
-    leave(machine, environment, form, to)
+    leave(expander, environment, form, to)
 }
 
-/// `(abort [result])`: leaves the form that the clause around this belongs to.
-pub(super) fn abort(machine: &mut Machine, environment: &mut dyn Environment, form: Form, to: To) -> Checked {
+/// `(abort [result])`: leaves the recovery form around the clause.
+pub(super) fn abort(
+    expander: &mut Expander,
+    environment: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
     form.takes(0..=1, "takes at most a result")?;
-    leave(machine, environment, form, to)
+    leave(expander, environment, form, to)
 }
 
-/// Throws to the form's state, which is a parameter of the function around the clause.
-fn leave(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+/// Throws to the state of the recovery form, which is a parameter of the function around the clause.
+fn leave(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     let state = Symbol::esl("%RECOVERY");
-    if !matches!(machine.scope.variable(&state, machine.level()), Visible::Is(_)) {
-        let message = format!("{} stands outside of a recovery clause", super::form::name(&form.operator));
+    if !matches!(expander.scope.variable(&state, expander.level()), Visible::Is(_)) {
+        let message = format!("{} stands outside of a recovery clause", name(&form.operator));
         let help = "only clauses of `with-recovery-procedures` can contain it";
         return Err(Box::new(code::OUTSIDE_CLAUSE.at(form.span, message).help(help)));
     }
@@ -101,22 +110,23 @@ fn leave(machine: &mut Machine, _: &mut dyn Environment, form: Form, to: To) -> 
     let result = form.args.into_iter().next().unwrap_or(make.nil());
     let first = if is_retry { make.symbol(&state) } else { make.nil() };
     let throw = make.cl("THROW", [make.symbol(&state), make.cl("VALUES", [first, result])]);
-    machine.schedule([Job::Expand(throw, to)]);
+    expander.schedule([Job::Expand(throw, to)]);
     Ok(())
 }
 
-impl Machine {
-    /// Warns if control can fall off the end of a recovery clause without its saying so.
+impl Expander {
+    /// Warns if control can reach the end of a recovery clause that does not say that its value is meant.
     pub(super) fn check_clause(&mut self, to: To, is_empty: bool) {
         if is_empty || !ends(self.core(), to.node, End::LeavesOrResumes) {
             let message = "this clause can end without saying how to go on, and its value then stands for that of \
                            the operation that failed";
-            let help = "end it with `(retry)`, `(abort …)` or `(fail …)`, or with `(values …)` to go on behind the failure";
+            let help = "end it with `(retry)`, `(abort …)` or `(fail …)`, or with `(values …)` to go on behind \
+                        the failure";
             self.report(code::CLAUSE_FALLS_OFF.at(to.span, message.to_string()).help(help), to.origin);
         }
     }
 
-    /// Notes whether a local function, whose text has been expanded, never returns.
+    /// Notes whether a local function, whose text is expanded, never returns.
     pub(super) fn check_return(&mut self, function: VarId, lambda: LambdaId) {
         let core = self.core();
         let body = core.lambdas[lambda.index()].body;
@@ -124,16 +134,16 @@ impl Machine {
     }
 }
 
-/// What is asked of the end of a form.
+/// A question about the end of a form.
 #[derive(Clone, Copy)]
 enum End {
-    /// That it is never reached, or says that its value is meant.
+    /// Whether control never reaches it, or the form says that its value is meant.
     LeavesOrResumes,
-    /// That it is never reached: the end of this function's body.
+    /// Whether control never reaches it; the form is the body of this function.
     Leaves(VarId),
 }
 
-/// Whether the end of a form is as is asked. A `NIL` that a macro has put at the end of what it makes of a form, as `dolist`
+/// Answers a question about the end of a form. A `NIL` that a macro has put at the end of its expansion, as `dolist`
 /// does, does not say that it is meant. A function that calls itself at its end does not return there.
 fn ends(core: &Core, node: NodeId, end: End) -> bool {
     let leaves = matches!(end, End::Leaves(_));
@@ -146,7 +156,7 @@ fn ends(core: &Core, node: NodeId, end: End) -> bool {
             NodeKind::Constant(constant) if constant.is_nil() && around == Some(span) => return false,
             NodeKind::Constant(_) | NodeKind::Values(_) if leaves => return false,
             NodeKind::Constant(_) | NodeKind::Values(_) | NodeKind::Throw(..) | NodeKind::Go(..) => {}
-            // It may be left from anywhere inside.
+            // Control may leave it from anywhere inside.
             NodeKind::Block(block, _) if leaves && core.blocks[block.index()].is_used => return false,
             NodeKind::ReturnFrom(block, value) => {
                 if inside.contains(block) {
@@ -158,8 +168,8 @@ fn ends(core: &Core, node: NodeId, end: End) -> bool {
                 pending.push(inside_it(*body));
             }
             NodeKind::If(_, consequent, alternative) => {
-                // What `when` and `cond` leave out is not said.
-                let is_left_out = |node: &NodeId| matches!(&core.nodes[node.index()].kind, NodeKind::Constant(c) if c.is_nil());
+                // A branch that `when` or `cond` leaves out does not say that its value is meant.
+                let is_left_out = |node: &NodeId| matches!(&core.nodes[node.index()].kind, NodeKind::Constant(constant) if constant.is_nil());
                 if is_left_out(consequent) || is_left_out(alternative) {
                     return false;
                 }
@@ -192,7 +202,7 @@ fn ends(core: &Core, node: NodeId, end: End) -> bool {
                 _ => return false,
             },
             NodeKind::Call(Callee::Global(function), _) => {
-                let is_known = LEAVING.iter().any(|name| super::form::is_esl(function, name))
+                let is_known = LEAVING.iter().any(|name| is_esl(function, name))
                     || LEAVING_STANDARD.iter().any(|name| function.is_cl(name));
                 if !is_known {
                     return false;
@@ -214,22 +224,4 @@ fn ends(core: &Core, node: NodeId, end: End) -> bool {
         }
     }
     true
-}
-
-/// The warning about a cause that nobody has declared.
-pub(super) fn undeclared(
-    environment: &dyn Environment,
-    cause: &Symbol,
-    span: Span,
-) -> Option<esl_bytecode::diagnostic::Diagnostic> {
-    let property = |of: &Symbol, indicator: &str| -> Option<Datum> {
-        environment.property(of, &Symbol::esl(indicator)).filter(|value| !value.is_nil())
-    };
-    property(&Symbol::esl("DEFINE-CAUSE"), "%USED")?;
-    if cause.name() == "GENERAL-FAILURE" || property(cause, "%CAUSE").is_some() {
-        return None;
-    }
-    let message = format!("no cause is called {}", super::form::name(cause));
-    let help = format!("declare it with `(define-cause {} ())`", super::form::plain(cause));
-    Some(code::UNDECLARED_CAUSE.at(span, message).help(help))
 }

@@ -1,10 +1,10 @@
-//! What names mean at the point that the expander has reached.
+//! The local names in scope at the point that the expander has reached.
 //!
-//! Jobs run in the order of the text, so one table with a log of what it replaced is enough: [`Scope::enter`] adds a
-//! meaning, [`Scope::leave`] takes the newest ones back. Every look-up is one step, however deep the nesting.
+//! Jobs run in the order of the text, so one table with a log of replaced meanings is enough: [`Scope::enter`] adds a
+//! meaning, [`Scope::leave`] takes the newest one back. Every look-up is one step, however deep the nesting.
 //!
-//! A chunk within a chunk (the function of a `macrolet`) runs at compile time: it sees macros and symbol macros around
-//! it, but no variables, functions, blocks or tags. Entries know the chunk that they belong to; see
+//! A chunk within a chunk (the function of a `macrolet`) runs at compile time. It sees the macros and symbol macros around
+//! it, but no variables, functions, blocks or tags. Every meaning knows the level of its chunk; see
 //! [`Visible::OutOfReach`].
 
 use std::sync::Arc;
@@ -18,37 +18,37 @@ use rustc_hash::FxHashMap;
 
 use crate::core::{BlockId, TagbodyId, VarId};
 
-/// What a name means as a variable.
+/// Meaning of a name as a variable.
 #[derive(Clone, Debug)]
-pub(super) enum Variable {
+pub(super) enum VariableMeaning {
     /// A lexical variable.
     Lexical(VarId),
     /// The special variable of the name.
     Special,
-    /// This form.
+    /// A symbol macro, which stands for this form.
     SymbolMacro(Datum),
 }
 
-/// What a name means as a function.
+/// Meaning of a name as a function.
 #[derive(Clone, Debug)]
-pub(super) enum Function {
+pub(super) enum FunctionMeaning {
     /// A local function, kept in this variable.
     Local(VarId, Arity),
-    /// A local macro; `None` if its definition has failed, which has been reported.
+    /// A local macro; `None` if its definition failed, which has been reported.
     Macro(Option<ObjectId>),
 }
 
 /// A tag of a `tagbody`. Tags are compared by `eql`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Tag {
-    /// A symbol; `NIL` is one.
+    /// A symbol, `NIL` included.
     Symbol(Symbol),
     /// An integer.
     Integer(BigInt),
 }
 
 impl Tag {
-    /// The tag that `datum` is, if it is one.
+    /// Returns the tag that `datum` is, if it is one.
     pub(super) fn of(datum: &Datum) -> Option<Tag> {
         match datum.kind() {
             DatumKind::Nil => Some(Tag::Symbol(Symbol::cl("NIL"))),
@@ -59,38 +59,36 @@ impl Tag {
     }
 }
 
-/// A name and its meaning, to be entered.
+/// A name and its meaning, to be entered into the scope.
 #[derive(Clone, Debug)]
-pub(super) enum Entry {
-    /// A variable. If a place is given, it is one where an unused lexical variable is to be reported.
-    Variable(Symbol, Variable, Option<Span>),
-    /// A function; `(setf f)` goes by the symbol that keeps it.
-    Function(Symbol, Function),
+pub(super) enum ScopeEntry {
+    /// A variable; with a place, an unused lexical variable is reported there.
+    Variable(Symbol, VariableMeaning, Option<Span>),
+    /// A function; `(setf f)` is entered under the symbol that keeps it.
+    Function(Symbol, FunctionMeaning),
     /// A block.
     Block(Symbol, BlockId),
-    /// A tag: its number in the tagbody.
+    /// A tag, and its number in the tagbody.
     Tag(Tag, TagbodyId, u32),
 }
 
-/// A lexical variable that has gone out of scope and is to be reported if it is unused.
+/// A lexical variable that has gone out of scope, to be reported if it is unused.
 #[derive(Debug)]
 pub(super) struct Gone {
-    /// Its name.
     pub(super) name: Symbol,
-    /// The variable.
     pub(super) variable: VarId,
-    /// Where it was bound.
+    /// Place of its binding.
     pub(super) span: Span,
 }
 
-/// Outcome of a look-up among local names.
+/// Outcome of a look-up among the local names.
 #[derive(Clone, Debug)]
 pub(super) enum Visible<T> {
-    /// This.
+    /// The name has this local meaning.
     Is(T),
-    /// No local meaning.
+    /// The name has no local meaning.
     No,
-    /// A local meaning, which exists only at run time while the code being expanded runs at compile time.
+    /// The name has a local meaning that exists only at run time, but the current code runs at compile time.
     OutOfReach,
 }
 
@@ -100,11 +98,11 @@ struct Held<T> {
     level: usize,
 }
 
-/// What an entry replaced.
+/// Meaning that an entry replaced.
 #[derive(Debug)]
 enum Undo {
-    Variable(Symbol, Option<Held<Variable>>, Option<Span>),
-    Function(Symbol, Option<Held<Function>>, Option<Arc<[LocalDefinition]>>),
+    Variable(Symbol, Option<Held<VariableMeaning>>, Option<Span>),
+    Function(Symbol, Option<Held<FunctionMeaning>>, Option<Arc<[LocalDefinition]>>),
     Block(Symbol, Option<Held<BlockId>>),
     Tag(Tag, Option<Held<(TagbodyId, u32)>>),
 }
@@ -112,39 +110,39 @@ enum Undo {
 /// The local meanings of names.
 #[derive(Debug, Default)]
 pub(super) struct Scope {
-    variables: FxHashMap<Symbol, Held<Variable>>,
-    functions: FxHashMap<Symbol, Held<Function>>,
+    variables: FxHashMap<Symbol, Held<VariableMeaning>>,
+    functions: FxHashMap<Symbol, Held<FunctionMeaning>>,
     blocks: FxHashMap<Symbol, Held<BlockId>>,
     tags: FxHashMap<Tag, Held<(TagbodyId, u32)>>,
     log: Vec<Undo>,
-    /// The functions and macros in scope, innermost last.
+    /// Functions and macros in scope, the innermost last.
     definitions: Vec<LocalDefinition>,
-    /// `definitions` the other way round, once somebody has asked for it.
+    /// `definitions` in reverse order, computed on demand.
     locals: Option<Arc<[LocalDefinition]>>,
 }
 
 impl Scope {
-    /// Gives a name a meaning, in code of chunk level `level`.
-    pub(super) fn enter(&mut self, entry: Entry, level: usize) {
+    /// Enters a name, in code of chunk level `level`.
+    pub(super) fn enter(&mut self, entry: ScopeEntry, level: usize) {
         let undo = match entry {
-            Entry::Variable(name, meaning, report) => {
+            ScopeEntry::Variable(name, meaning, report) => {
                 let old = self.variables.insert(name.clone(), Held { meaning, level });
                 Undo::Variable(name, old, report)
             }
-            Entry::Function(name, meaning) => {
+            ScopeEntry::Function(name, meaning) => {
                 let expander = match &meaning {
-                    Function::Macro(expander) => *expander,
-                    Function::Local(..) => None,
+                    FunctionMeaning::Macro(expander) => *expander,
+                    FunctionMeaning::Local(..) => None,
                 };
                 self.definitions.push(LocalDefinition { name: name.clone(), expander });
                 let old = self.functions.insert(name.clone(), Held { meaning, level });
                 Undo::Function(name, old, self.locals.take())
             }
-            Entry::Block(name, block) => {
+            ScopeEntry::Block(name, block) => {
                 let old = self.blocks.insert(name.clone(), Held { meaning: block, level });
                 Undo::Block(name, old)
             }
-            Entry::Tag(tag, tagbody, number) => {
+            ScopeEntry::Tag(tag, tagbody, number) => {
                 let old = self.tags.insert(tag.clone(), Held { meaning: (tagbody, number), level });
                 Undo::Tag(tag, old)
             }
@@ -152,13 +150,15 @@ impl Scope {
         self.log.push(undo);
     }
 
-    /// Takes the newest meaning back.
+    /// Takes the newest entry out of the scope.
     pub(super) fn leave(&mut self) -> Option<Gone> {
         match self.log.pop()? {
             Undo::Variable(name, old, report) => {
                 let gone = restore(&mut self.variables, &name, old);
                 match (gone.map(|held| held.meaning), report) {
-                    (Some(Variable::Lexical(variable)), Some(span)) => Some(Gone { name, variable, span }),
+                    (Some(VariableMeaning::Lexical(variable)), Some(span)) => {
+                        Some(Gone { name, variable, span })
+                    }
                     _ => None,
                 }
             }
@@ -179,44 +179,44 @@ impl Scope {
         }
     }
 
-    /// What `name` means as a variable to code of chunk level `level`.
-    pub(super) fn variable(&self, name: &Symbol, level: usize) -> Visible<Variable> {
+    /// Returns the meaning of `name` as a variable, for code of chunk level `level`.
+    pub(super) fn variable(&self, name: &Symbol, level: usize) -> Visible<VariableMeaning> {
         match self.variables.get(name) {
             None => Visible::No,
-            Some(Held { meaning: Variable::Lexical(_), level: bound }) if *bound != level => {
+            Some(Held { meaning: VariableMeaning::Lexical(_), level: bound }) if *bound != level => {
                 Visible::OutOfReach
             }
             Some(held) => Visible::Is(held.meaning.clone()),
         }
     }
 
-    /// What `name` means as a function to code of chunk level `level`.
-    pub(super) fn function(&self, name: &Symbol, level: usize) -> Visible<Function> {
+    /// Returns the meaning of `name` as a function, for code of chunk level `level`.
+    pub(super) fn function(&self, name: &Symbol, level: usize) -> Visible<FunctionMeaning> {
         match self.functions.get(name) {
             None => Visible::No,
-            Some(Held { meaning: Function::Local(..), level: bound }) if *bound != level => {
+            Some(Held { meaning: FunctionMeaning::Local(..), level: bound }) if *bound != level => {
                 Visible::OutOfReach
             }
             Some(held) => Visible::Is(held.meaning.clone()),
         }
     }
 
-    /// The block called `name`.
+    /// Returns the block called `name`.
     pub(super) fn block(&self, name: &Symbol, level: usize) -> Visible<BlockId> {
         reach(self.blocks.get(name), level)
     }
 
-    /// The tagbody of `tag`, and its number there.
+    /// Returns the tagbody of `tag`, and the number of the tag there.
     pub(super) fn tag(&self, tag: &Tag, level: usize) -> Visible<(TagbodyId, u32)> {
         reach(self.tags.get(tag), level)
     }
 
-    /// The names of the blocks in scope.
+    /// Returns the names of the blocks in scope.
     pub(super) fn block_names(&self) -> impl Iterator<Item = &Symbol> {
         self.blocks.keys()
     }
 
-    /// The local functions and macros, innermost first.
+    /// Returns the local functions and macros, the innermost first.
     pub(super) fn locals(&mut self) -> Arc<[LocalDefinition]> {
         let definitions = &self.definitions;
         self.locals.get_or_insert_with(|| definitions.iter().rev().cloned().collect()).clone()

@@ -1,17 +1,18 @@
-//! The standard's places that are more than the call of an accessor, and those that stand for simpler ones.
+//! Places of the standard that are more than the call of an accessor, or stand for simpler ones.
 
 use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::Symbol;
 
-use super::form::{Checked, Form, Make, is_cl_form};
-use super::machine::{Job, Machine, To};
-use super::modify::PlaceUse;
-use super::place::{Place, Update, Writer, arguments, no_place, reader, update_of};
+use super::expander::Expander;
+use super::form::{self, Checked, Form, Make, is_cl_form};
+use super::job::{Job, To};
+use super::place::{Update, arguments, no_place, reader, update_of};
 use super::scope::Visible;
+use super::setf::{PlaceUse, SetfExpansion, Writer};
 
-impl Machine {
-    /// The places of the standard that are more than an update function.
+impl Expander {
+    /// Finds a place of the standard that needs more than an update function. Returns `None` for all others.
     pub(super) fn standard_place(
         &mut self,
         environment: &mut dyn Environment,
@@ -58,8 +59,8 @@ impl Machine {
                     replace.extend([keyword("END1"), end.clone()]);
                 }
                 let writer = Writer::Form(make.progn(vec![make.call_cl("REPLACE", replace), store.clone()]));
-                let place = Place::new(make, vec![store], writer, reader(form, args, make));
-                self.places.push(Place { temporaries, ..place });
+                let place = SetfExpansion::new(make, vec![store], writer, reader(form, args, make));
+                self.places.push(SetfExpansion { temporaries, ..place });
             }
             ("APPLY", [function, rest @ ..]) if !rest.is_empty() => {
                 return Some(self.apply_place(environment, form, function, rest, to));
@@ -72,7 +73,7 @@ impl Machine {
         Some(Ok(()))
     }
 
-    /// `(apply #'f argument… list)` as a place.
+    /// Adds the place `(apply #'f argument… list)`.
     fn apply_place(
         &mut self,
         environment: &mut dyn Environment,
@@ -82,7 +83,7 @@ impl Machine {
         to: To,
     ) -> Checked {
         let make = Make(to.span);
-        let named = super::form::arguments(function).unwrap_or_default();
+        let named = form::arguments(function).unwrap_or_default();
         let symbol = match named.as_slice() {
             [named] if is_cl_form(function, "FUNCTION") => named.as_symbol(),
             _ => None,
@@ -106,12 +107,12 @@ impl Machine {
                 Writer::Call(vec![make.symbol(&Symbol::cl("APPLY")), setter], args)
             }
         };
-        let place = Place::new(make, vec![store], writer, reader);
-        self.places.push(Place { temporaries, ..place });
+        let place = SetfExpansion::new(make, vec![store], writer, reader);
+        self.places.push(SetfExpansion { temporaries, ..place });
         Ok(())
     }
 
-    /// Makes one place of several: `(values place…)`.
+    /// Makes the place `(values place…)` of the newest places.
     pub(super) fn values_place(&mut self, environment: &mut dyn Environment, count: usize, to: To) {
         let make = Make(to.span);
         let mut temporaries = Vec::new();
@@ -120,7 +121,7 @@ impl Machine {
         for place in self.take_places(count) {
             is_broken |= place.is_broken;
             let store = make.fresh(environment, "NEW");
-            // One value goes to each place; what takes several gets `NIL` for the others.
+            // One value goes to each place; a place that takes several gets `NIL` for the others.
             writers.push(place.write(match place.stores.len() {
                 1 => store.clone(),
                 _ => make.cl("VALUES", [store.clone()]),
@@ -130,8 +131,8 @@ impl Machine {
             temporaries.extend(place.temporaries);
         }
         let writer = Writer::Form(make.cl("VALUES", writers));
-        let place = Place::new(make, stores, writer, make.cl("VALUES", readers));
-        self.places.push(Place { temporaries, is_broken, ..place });
+        let place = SetfExpansion::new(make, stores, writer, make.cl("VALUES", readers));
+        self.places.push(SetfExpansion { temporaries, is_broken, ..place });
     }
 
     /// Makes the place `(getf inner indicator [default])` of the newest place.
@@ -171,10 +172,10 @@ impl Machine {
         );
     }
 
-    /// A place within a place: storing `store` in it stores `put` in the inner one.
+    /// Adds a place within a place: storing `store` in it stores `put` in the inner one.
     fn inner_place(
         &mut self,
-        inner: Place,
+        inner: SetfExpansion,
         store: Datum,
         put: Datum,
         get: Datum,
@@ -182,13 +183,13 @@ impl Machine {
         make: Make,
     ) {
         let writer = Writer::Form(make.progn(vec![inner.write(put), store.clone()]));
-        let place = Place::new(make, vec![store], writer, get);
+        let place = SetfExpansion::new(make, vec![store], writer, get);
         let is_broken = inner.is_broken;
-        self.places.push(Place { temporaries: order(inner.temporaries), is_broken, ..place });
+        self.places.push(SetfExpansion { temporaries: order(inner.temporaries), is_broken, ..place });
     }
 }
 
-/// The place `(car …)` or `(cdr …)` that a place is another name for.
+/// Returns the place `(car …)` or `(cdr …)` that a place abbreviates.
 fn simpler(form: &Form, make: Make) -> Option<Datum> {
     const ORDINALS: [&str; 10] =
         ["FIRST", "SECOND", "THIRD", "FOURTH", "FIFTH", "SIXTH", "SEVENTH", "EIGHTH", "NINTH", "TENTH"];

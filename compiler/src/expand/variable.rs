@@ -5,22 +5,33 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
-use super::form::{Checked, Form, Make, fresh, is_known, name};
-use super::machine::{Job, Machine, To};
-use super::scope::{Variable, Visible};
+use super::expander::Expander;
+use super::form::{Checked, Form, Make, fresh, is_known, name, quoted};
+use super::job::{Job, To};
+use super::origin::OriginId;
+use super::scope::{VariableMeaning, Visible};
 use crate::core::NodeKind;
 use crate::diagnostic::code;
 
-/// What a name stands for where a variable is read or set.
+/// Meaning of a name where a variable is read or set.
 pub(super) enum Meaning {
-    /// A lexical or special variable.
-    Variable(Variable),
-    /// A constant.
+    /// A variable or a symbol macro.
+    Variable(VariableMeaning),
+    /// A constant with this value.
     Constant(Datum),
 }
 
-impl Machine {
-    /// What `symbol` means as a variable.
+/// What is done to a variable by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Deed {
+    /// It is bound.
+    Bind,
+    /// It is set.
+    Set,
+}
+
+impl Expander {
+    /// Returns the meaning of `symbol` as a variable.
     pub(super) fn meaning(
         &self,
         environment: &dyn Environment,
@@ -39,11 +50,11 @@ impl Machine {
             return Ok(Some(Meaning::Constant(Datum::symbol(symbol.clone(), span))));
         }
         Ok(match environment.global(symbol).variable {
-            GlobalVariable::Special => Some(Meaning::Variable(Variable::Special)),
+            GlobalVariable::Special => Some(Meaning::Variable(VariableMeaning::Special)),
             GlobalVariable::Constant(value) => Some(Meaning::Constant(value)),
             GlobalVariable::Undefined => environment
                 .property(symbol, &Symbol::esl("%SYMBOL-MACRO"))
-                .map(|form| Meaning::Variable(Variable::SymbolMacro(form))),
+                .map(|form| Meaning::Variable(VariableMeaning::SymbolMacro(form))),
         })
     }
 
@@ -56,19 +67,19 @@ impl Machine {
         to: To,
     ) -> Checked {
         let kind = match self.meaning(environment, symbol, to.span)? {
-            Some(Meaning::Variable(Variable::Lexical(variable))) => {
+            Some(Meaning::Variable(VariableMeaning::Lexical(variable))) => {
                 self.note_read(variable, to);
                 NodeKind::Local(variable)
             }
-            Some(Meaning::Variable(Variable::Special)) => NodeKind::Special(symbol.clone()),
-            Some(Meaning::Variable(Variable::SymbolMacro(form))) => {
-                let origin = self.origin(symbol, to.span, true, to.origin)?;
+            Some(Meaning::Variable(VariableMeaning::Special)) => NodeKind::Special(symbol.clone()),
+            Some(Meaning::Variable(VariableMeaning::SymbolMacro(form))) => {
+                let origin = self.origins.enter(symbol, to.span, true, to.origin)?;
                 self.schedule([Job::Expand(form, To { origin, ..to })]);
                 return Ok(());
             }
             Some(Meaning::Constant(value)) => match value.kind() {
                 DatumKind::Symbol(same) if same == symbol => NodeKind::Constant(datum.clone()),
-                // A copy of these cannot be told from the original.
+                // No program can tell a copy of these from the original.
                 DatumKind::Nil
                 | DatumKind::Symbol(_)
                 | DatumKind::Integer(_)
@@ -78,7 +89,7 @@ impl Machine {
                 _ => NodeKind::Special(symbol.clone()),
             },
             None => {
-                self.unit.note_variable(symbol, to.span);
+                self.globals.note_variable(symbol, to.span);
                 NodeKind::Special(symbol.clone())
             }
         };
@@ -87,67 +98,76 @@ impl Machine {
     }
 
     /// Checks that a name may be bound or set.
-    pub(super) fn check_not_constant(
+    fn check_not_constant(
         &self,
         environment: &dyn Environment,
         symbol: &Symbol,
         span: Span,
-        deed: &str,
+        deed: Deed,
     ) -> Checked {
         let is_constant = symbol.is_keyword()
             || symbol.is_cl("T")
             || symbol.is_cl("NIL")
             || matches!(environment.global(symbol).variable, GlobalVariable::Constant(_));
         if is_constant {
+            let deed = match deed {
+                Deed::Bind => "bound",
+                Deed::Set => "set",
+            };
             let message = format!("{} is a constant and cannot be {deed}", name(symbol));
             return Err(Box::new(code::ASSIGNMENT_TO_CONSTANT.at(span, message)));
         }
         Ok(())
     }
 
-    /// Checks that `datum` names a variable that may be bound or set.
+    /// Returns the name of a variable that `datum` is, if it may be bound or set.
     pub(super) fn variable_name(
         &self,
         environment: &dyn Environment,
         datum: &Datum,
         form: &Form,
-        deed: &str,
+        deed: Deed,
     ) -> Checked<Symbol> {
         let symbol = match datum.kind() {
             DatumKind::Symbol(symbol) => symbol.clone(),
             DatumKind::Nil => Symbol::cl("NIL"),
             _ => {
-                let what = format!("needs the name of a variable here, not {}", super::form::quoted(datum));
+                let what = format!("needs the name of a variable here, not {}", quoted(datum));
                 return Err(form.malformed_at(datum.span(), &what));
             }
         };
         let is_local = matches!(self.scope.variable(&symbol, self.level()), Visible::Is(_));
-        if deed != "set" || !is_local {
+        if deed == Deed::Bind || !is_local {
             self.check_not_constant(environment, &symbol, form.at(datum.span()), deed)?;
         }
         Ok(symbol)
     }
 }
 
-impl Machine {
-    /// Where an unused variable of this name, bound by a form at `form`, is to be reported, if at all: only if both were
-    /// written in the source. What macros bind for their own use is their own matter.
+impl Expander {
+    /// Returns the place at which an unused variable of this name, bound by a form at `form`, is reported. `None` if a
+    /// macro made one of them: variables that macros bind for their own use may be unused.
     pub(super) fn report_unused(
         &self,
         symbol: &Symbol,
         datum: &Datum,
         form: Span,
-        origin: Option<u32>,
+        origin: Option<OriginId>,
     ) -> Option<Span> {
-        let place = self.written(datum.span(), origin);
+        let place = self.origins.written(datum.span(), origin);
         let is_written =
-            is_known(place) && is_known(self.written(form, origin)) && symbol.package().is_some();
+            is_known(place) && is_known(self.origins.written(form, origin)) && symbol.package().is_some();
         is_written.then_some(place)
     }
 }
 
 /// `(setq {name form}*)`
-pub(super) fn setq(machine: &mut Machine, environment: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn setq(
+    expander: &mut Expander,
+    environment: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
     if form.args.len() % 2 == 1 {
         return Err(form.malformed("needs a value for each variable"));
     }
@@ -155,58 +175,63 @@ pub(super) fn setq(machine: &mut Machine, environment: &mut dyn Environment, for
         let make = Make(to.span);
         let pairs = form.args.chunks(2).map(|pair| make.cl("SETQ", pair.iter().cloned()));
         let pairs: Vec<Datum> = pairs.collect();
-        let jobs = machine.body(pairs, to);
-        machine.schedule(jobs);
+        let jobs = expander.body(pairs, to);
+        expander.schedule(jobs);
         return Ok(());
     }
-    let symbol = machine.variable_name(environment, &form.args[0], &form, "set")?;
-    let meaning = machine.meaning(environment, &symbol, to.span)?;
-    if let Some(Meaning::Variable(Variable::SymbolMacro(_))) = meaning {
+    let symbol = expander.variable_name(environment, &form.args[0], &form, Deed::Set)?;
+    let meaning = expander.meaning(environment, &symbol, to.span)?;
+    if let Some(Meaning::Variable(VariableMeaning::SymbolMacro(_))) = meaning {
         let setf = Make(to.span).cl("SETF", form.args);
-        machine.schedule([Job::Expand(setf, to)]);
+        expander.schedule([Job::Expand(setf, to)]);
         return Ok(());
     }
-    let (value, job) = machine.part(form.args[1].clone(), to);
+    let (value, job) = expander.part(form.args[1].clone(), to);
     match meaning {
-        Some(Meaning::Variable(Variable::Lexical(variable))) => {
-            machine.note_assigned(variable, to);
-            machine.fill(to, NodeKind::SetLocal(variable, value));
+        Some(Meaning::Variable(VariableMeaning::Lexical(variable))) => {
+            expander.note_assigned(variable, to);
+            expander.fill(to, NodeKind::SetLocal(variable, value));
         }
         meaning => {
             if meaning.is_none() {
-                machine.unit.note_variable(&symbol, form.at(form.args[0].span()));
+                expander.globals.note_variable(&symbol, form.at(form.args[0].span()));
             }
-            machine.fill(to, NodeKind::SetSpecial(symbol, value));
+            expander.fill(to, NodeKind::SetSpecial(symbol, value));
         }
     }
-    machine.schedule([job]);
+    expander.schedule([job]);
     Ok(())
 }
 
 /// `(psetq {name form}*)`: all values before the first assignment.
-pub(super) fn psetq(machine: &mut Machine, environment: &mut dyn Environment, form: Form, to: To) -> Checked {
+pub(super) fn psetq(
+    expander: &mut Expander,
+    environment: &mut dyn Environment,
+    form: Form,
+    to: To,
+) -> Checked {
     if form.args.len() % 2 == 1 {
         return Err(form.malformed("needs a value for each variable"));
     }
     let make = Make(to.span);
     let mut names = Vec::new();
     for pair in form.args.chunks(2) {
-        let symbol = machine.variable_name(environment, &pair[0], &form, "set")?;
-        if let Some(Meaning::Variable(Variable::SymbolMacro(_))) =
-            machine.meaning(environment, &symbol, to.span)?
+        let symbol = expander.variable_name(environment, &pair[0], &form, Deed::Set)?;
+        if let Some(Meaning::Variable(VariableMeaning::SymbolMacro(_))) =
+            expander.meaning(environment, &symbol, to.span)?
         {
             let psetf = make.cl("PSETF", form.args);
-            machine.schedule([Job::Expand(psetf, to)]);
+            expander.schedule([Job::Expand(psetf, to)]);
             return Ok(());
         }
         names.push(symbol);
     }
     let Some(last) = names.len().checked_sub(1) else {
-        machine.fill(to, NodeKind::Constant(make.nil()));
+        expander.fill(to, NodeKind::Constant(make.nil()));
         return Ok(());
     };
-    // The last variable can take its value at once, since all other values are computed by then; unless it is named
-    // twice, when the later assignment is the one to stay.
+    // The last variable can take its value at once, since all other values are computed by then; except if it is named
+    // twice, because the later assignment has to prevail.
     let direct = !names[..last].contains(&names[last]);
     let mut bindings = Vec::new();
     let mut body = Vec::new();
@@ -222,6 +247,6 @@ pub(super) fn psetq(machine: &mut Machine, environment: &mut dyn Environment, fo
         body.push(make.cl("SETQ", [pair[0].clone(), new]));
     }
     body.push(make.nil());
-    machine.schedule([Job::Expand(make.let_in_order(bindings, body), to)]);
+    expander.schedule([Job::Expand(make.let_in_order(bindings, body), to)]);
     Ok(())
 }

@@ -5,24 +5,54 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::opcode::{Instr, TypeCode};
 use esl_bytecode::operand::*;
 
+use super::builder::FunctionBuilder;
 use super::dest::Dest;
-use super::frame::{Frame, small_integer};
 use super::graph::Cond;
-use super::operator::{Binary, Comparison};
 use crate::core::*;
 
-impl Frame<'_, '_> {
-    /// The datum of a constant.
+/// An instruction on two registers.
+pub(super) type Binary = fn(Dst, Reg, Reg) -> Instr;
+
+/// A comparison of numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Comparison {
+    Equal,
+    Less,
+    LessEqual,
+    Greater,
+    GreaterEqual,
+}
+
+impl Comparison {
+    /// Whether there are jumps that compare with a literal in this way.
+    pub(super) fn has_literal_form(self) -> bool {
+        !matches!(self, Comparison::LessEqual | Comparison::GreaterEqual)
+    }
+
+    /// Returns the comparison with its arguments exchanged.
+    fn mirrored(self) -> Comparison {
+        match self {
+            Comparison::Equal => Comparison::Equal,
+            Comparison::Less => Comparison::Greater,
+            Comparison::LessEqual => Comparison::GreaterEqual,
+            Comparison::Greater => Comparison::Less,
+            Comparison::GreaterEqual => Comparison::LessEqual,
+        }
+    }
+}
+
+impl FunctionBuilder<'_, '_> {
+    /// Returns the datum of a constant.
     pub(super) fn literal(&self, node: NodeId) -> Option<&Datum> {
         literal(self.core, node)
     }
 
-    /// Two numbers or more, joined from left to right.
+    /// Lowers a call that joins two numbers or more from left to right.
     pub(super) fn fold(&mut self, builtin: Builtin, instr: Binary, numbers: &[NodeId], dest: Dest) {
         let top = self.registers.top();
         let mut numbers = numbers.to_vec();
         if addend(self.core, builtin, numbers[0]).is_some() && builtin == Builtin::Add {
-            // A literal has no effects: it may as well come second.
+            // A literal has no effects, so it may come second.
             numbers.swap(0, 1);
         }
         let mut sum = self.operand(numbers[0], &numbers[1..]);
@@ -42,21 +72,22 @@ impl Frame<'_, '_> {
             if index + 1 == numbers.len() {
                 return self.compute(dest, step);
             }
-            sum = Reg(self.registers.take(1));
-            self.emit(step(Dst(sum.0)));
+            sum = self.registers.take(1);
+            self.emit(step(sum.into()));
         }
     }
 
+    /// Lowers a comparison of two numbers.
     pub(super) fn compare(&mut self, comparison: Comparison, left: NodeId, right: NodeId, dest: Dest) {
         if let Dest::Test { .. } = dest {
             if let Some(value) = literal_int(self.core, right)
-                && has_literal_form(comparison)
+                && comparison.has_literal_form()
             {
                 return self.compare_int(comparison, left, value, dest);
             }
-            let mirrored = mirror(comparison);
+            let mirrored = comparison.mirrored();
             if let Some(value) = literal_int(self.core, left)
-                && has_literal_form(mirrored)
+                && mirrored.has_literal_form()
             {
                 return self.compare_int(mirrored, right, value, dest);
             }
@@ -67,7 +98,7 @@ impl Frame<'_, '_> {
         self.compare_registers(comparison, left, right, dest);
     }
 
-    /// Compares a form's value with a literal.
+    /// Lowers a comparison of a form's value with a literal.
     pub(super) fn compare_int(&mut self, comparison: Comparison, number: NodeId, value: Int16, dest: Dest) {
         let top = self.registers.top();
         let left = self.operand(number, &[]);
@@ -84,13 +115,13 @@ impl Frame<'_, '_> {
             }
         }
         let right = self.registers.take(1);
-        self.emit(Instr::LoadInt { dst: Dst(right), value });
+        self.emit(Instr::LoadInt { dst: right.into(), value });
         self.registers.release(top);
-        self.compare_registers(comparison, left, Reg(right), dest);
+        self.compare_registers(comparison, left, right, dest);
     }
 
     fn compare_registers(&mut self, comparison: Comparison, left: Reg, right: Reg, dest: Dest) {
-        // The operands have been evaluated in order; which of them the instruction names first is free.
+        // The operands have been evaluated in order, so the instruction may name them in either order.
         let (left, right) = match comparison {
             Comparison::Greater | Comparison::GreaterEqual => (right, left),
             _ => (left, right),
@@ -110,6 +141,7 @@ impl Frame<'_, '_> {
         });
     }
 
+    /// Lowers `(not object)`.
     pub(super) fn not(&mut self, object: NodeId, dest: Dest) {
         match dest {
             Dest::Test { holds, fails } => self.form(object, Dest::Test { holds: fails, fails: holds }),
@@ -123,6 +155,7 @@ impl Frame<'_, '_> {
         }
     }
 
+    /// Lowers a type test.
     pub(super) fn is_type(&mut self, code: TypeCode, object: NodeId, dest: Dest) {
         let top = self.registers.top();
         let src = self.operand(object, &[]);
@@ -138,7 +171,7 @@ impl Frame<'_, '_> {
         }
     }
 
-    /// `eq`, or `eql` if `by_value`.
+    /// Lowers `eq`, or `eql` if `by_value`.
     pub(super) fn identical(&mut self, by_value: bool, left: NodeId, right: NodeId, dest: Dest) {
         let top = self.registers.top();
         for (object, other) in [(left, right), (right, left)] {
@@ -149,7 +182,7 @@ impl Frame<'_, '_> {
             if let (Dest::Test { holds, fails }, true) = (dest, by_value || is_word(&literal)) {
                 let object = self.operand(object, &[]);
                 self.registers.release(top);
-                let entry = self.builder.pool.datum(&literal);
+                let entry = self.module.pool.datum(&literal);
                 let constant = ConstIdx(self.constant_index(entry));
                 return self.branch(Cond::EqlConst(object, constant), holds, fails);
             }
@@ -166,7 +199,7 @@ impl Frame<'_, '_> {
     }
 }
 
-/// The datum of a constant.
+/// Returns the datum of a constant.
 fn literal(core: &Core, node: NodeId) -> Option<&Datum> {
     match &core.nodes[node.index()].kind {
         NodeKind::Constant(datum) => Some(datum),
@@ -174,40 +207,32 @@ fn literal(core: &Core, node: NodeId) -> Option<&Datum> {
     }
 }
 
-/// The value of a constant that fits an instruction.
+/// Returns the value of a constant that fits an instruction.
 pub(super) fn literal_int(core: &Core, node: NodeId) -> Option<Int16> {
     literal(core, node).and_then(small_integer)
 }
 
-/// What `add-int` adds in place of `builtin` with `node` as its second argument.
+/// Returns the number that `add-int` adds in place of `builtin` with `node` as its second argument.
 pub(super) fn addend(core: &Core, builtin: Builtin, node: NodeId) -> Option<Int8> {
     let Int16(value) = literal_int(core, node)?;
     let addend = match builtin {
         Builtin::Add => value,
-        // Less zero is not the same as plus zero: it keeps a negative zero.
+        // Subtracting zero differs from adding zero: it keeps a negative zero.
         Builtin::Subtract if value != 0 => value.checked_neg()?,
         _ => return None,
     };
     i8::try_from(addend).ok().map(Int8)
 }
 
-/// Whether there are jumps that compare with a literal in this way.
-pub(super) fn has_literal_form(comparison: Comparison) -> bool {
-    !matches!(comparison, Comparison::LessEqual | Comparison::GreaterEqual)
-}
-
-/// The comparison with its arguments exchanged.
-fn mirror(comparison: Comparison) -> Comparison {
-    match comparison {
-        Comparison::Equal => Comparison::Equal,
-        Comparison::Less => Comparison::Greater,
-        Comparison::LessEqual => Comparison::GreaterEqual,
-        Comparison::Greater => Comparison::Less,
-        Comparison::GreaterEqual => Comparison::LessEqual,
+/// Returns the value of an integer that fits an instruction.
+pub(super) fn small_integer(datum: &Datum) -> Option<Int16> {
+    match datum.kind() {
+        DatumKind::Integer(value) => i16::try_from(value).ok().map(Int16),
+        _ => None,
     }
 }
 
-/// Whether objects of this kind are the same when they are `eql`: those that fit a word.
+/// Whether objects that are `eql` to this one are identical to it, since it fits a word.
 fn is_word(datum: &Datum) -> bool {
     match datum.kind() {
         DatumKind::Nil | DatumKind::Symbol(_) | DatumKind::Character(_) => true,

@@ -1,4 +1,4 @@
-//! Calls: windows, arguments, and what becomes of the results.
+//! Calls: windows, arguments, and the delivery of results.
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::datum::DatumKind;
@@ -6,45 +6,50 @@ use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 use esl_bytecode::symbol::Symbol;
 
+use super::builder::FunctionBuilder;
 use super::dest::Dest;
-use super::frame::Frame;
-use super::variable::Place;
+use super::variable::VariableLocation;
 use crate::core::*;
 use crate::resolve::FunctionKind;
 
-/// A call with more arguments than this makes a list of them and applies the function to it.
+/// Arguments that a call passes in registers. With more, it makes a list of them and applies the function to that.
 pub(super) const MAX_DIRECT: usize = 100;
-/// A list of more items than this is put together from parts.
+/// Items of a list that one instruction makes. A longer list is put together from parts.
 const MAX_LIST: usize = 64;
 
-/// What is called, when it is clear how.
+/// Target of a call.
 #[derive(Clone, Copy)]
-pub(super) enum Target<'a> {
+pub(super) enum CallTarget<'a> {
     Global(&'a Symbol),
     Builtin(Builtin),
     /// The running function.
     Itself,
-    /// The function in a place, which keeps it while the arguments are evaluated, or is a box.
-    Place(Place),
+    /// The function in a variable that keeps its value while the arguments are evaluated, or lives in a box.
+    Variable(VariableLocation),
     /// The function of a lambda that captures nothing.
     Constant(LambdaId),
-    /// What a form gives, before the arguments.
+    /// The value of a form, which is evaluated before the arguments.
     Form(NodeId),
 }
 
-impl Target<'_> {
-    /// Whether what is called must be fetched before the arguments.
+impl CallTarget<'_> {
+    /// Whether the function must be fetched before the arguments.
     fn comes_first(self) -> bool {
-        matches!(self, Target::Form(_) | Target::Place(Place::Box(_) | Place::CaptureBox(_)))
+        matches!(
+            self,
+            CallTarget::Form(_)
+                | CallTarget::Variable(VariableLocation::Box(_) | VariableLocation::CaptureBox(_))
+        )
     }
 
-    /// So many registers of the window are written only when the arguments are there.
+    /// Returns how many registers of the window are written only after the arguments.
     fn slack(self) -> u8 {
         if self.comes_first() { 0 } else { 2 }
     }
 }
 
-impl<'a> Frame<'_, 'a> {
+impl<'a> FunctionBuilder<'_, 'a> {
+    /// Lowers a call.
     pub(super) fn call(&mut self, callee: &'a Callee, arguments: &'a [NodeId], dest: Dest) {
         match callee {
             Callee::Builtin(builtin) => self.builtin(*builtin, arguments, dest),
@@ -59,7 +64,7 @@ impl<'a> Frame<'_, 'a> {
         if own.is_named(name) && own.takes_exactly(arguments.len()) {
             self.call_itself(arguments, dest);
         } else {
-            self.emit_call(Target::Global(name), arguments, dest);
+            self.emit_call(CallTarget::Global(name), arguments, dest);
         }
     }
 
@@ -67,16 +72,16 @@ impl<'a> Frame<'_, 'a> {
         if let Dest::Tail = dest {
             self.jump_to_function(self.lambda, self.entry, arguments);
         } else {
-            self.emit_call(Target::Itself, arguments, dest);
+            self.emit_call(CallTarget::Itself, arguments, dest);
         }
     }
 
     fn call_local(&mut self, variable: VarId, arguments: &'a [NodeId], dest: Dest) {
-        let resolution = &self.builder.resolution;
+        let resolution = &self.module.resolution;
         let Some(lambda) = resolution.function(variable) else {
             // A variable that holds a function.
-            let place = self.place(variable);
-            return self.emit_call(Target::Place(place), arguments, dest);
+            let location = self.location(variable);
+            return self.emit_call(CallTarget::Variable(location), arguments, dest);
         };
         let kind = resolution.function_kind(lambda);
         if kind == FunctionKind::Inline {
@@ -84,16 +89,17 @@ impl<'a> Frame<'_, 'a> {
         } else if lambda == self.lambda && self.core.lambdas[lambda.index()].takes_exactly(arguments.len()) {
             self.call_itself(arguments, dest);
         } else if kind == FunctionKind::Closure {
-            let place = self.place(variable);
-            self.emit_call(Target::Place(place), arguments, dest);
+            let location = self.location(variable);
+            self.emit_call(CallTarget::Variable(location), arguments, dest);
         } else {
-            self.emit_call(Target::Constant(lambda), arguments, dest);
+            self.emit_call(CallTarget::Constant(lambda), arguments, dest);
         }
     }
 
+    /// Lowers a call of a form's value.
     pub(super) fn call_value(&mut self, function: NodeId, arguments: &'a [NodeId], dest: Dest) {
         match &self.core.nodes[function.index()].kind {
-            NodeKind::Lambda(lambda) if self.builder.resolution.frame(*lambda) != *lambda => {
+            NodeKind::Lambda(lambda) if self.module.resolution.frame(*lambda) != *lambda => {
                 self.call_inline(*lambda, arguments, dest);
             }
             NodeKind::FunctionRef(name) => self.call_global(name, arguments, dest),
@@ -103,27 +109,28 @@ impl<'a> Frame<'_, 'a> {
             NodeKind::Constant(datum) if matches!(datum.kind(), DatumKind::Symbol(name) if !name.is_cl("T")) =>
             {
                 let DatumKind::Symbol(name) = datum.kind() else { unreachable!("just matched") };
-                self.emit_call(Target::Global(name), arguments, dest);
+                self.emit_call(CallTarget::Global(name), arguments, dest);
             }
             NodeKind::Local(variable) if self.keeps_its_value(*variable, arguments) => {
-                let place = self.place(*variable);
-                self.emit_call(Target::Place(place), arguments, dest);
+                let location = self.location(*variable);
+                self.emit_call(CallTarget::Variable(location), arguments, dest);
             }
-            _ => self.emit_call(Target::Form(function), arguments, dest),
+            _ => self.emit_call(CallTarget::Form(function), arguments, dest),
         }
     }
 
+    /// Lowers a call whose last argument is a list of arguments.
     pub(super) fn apply(&mut self, callee: &'a Callee, arguments: &'a [NodeId], dest: Dest) {
-        let load = |frame: &mut Self, dest| match callee {
-            Callee::Global(name) => frame.function_ref(name, dest),
-            Callee::Builtin(builtin) => frame.builtin_ref(*builtin, dest),
-            Callee::Local(variable) => frame.local(*variable, dest),
-            Callee::Value(function) => frame.form(*function, dest),
+        let load = |builder: &mut Self, dest| match callee {
+            Callee::Global(name) => builder.function_ref(name, dest),
+            Callee::Builtin(builtin) => builder.builtin_ref(*builtin, dest),
+            Callee::Local(variable) => builder.local(*variable, dest),
+            Callee::Value(function) => builder.form(*function, dest),
         };
         self.apply_form(load, arguments, dest);
     }
 
-    /// Applies what `load` gives to arguments, the last of which is a list.
+    /// Applies the function that `load` fetches to arguments, the last of which is a list.
     pub(super) fn apply_form(
         &mut self,
         load: impl FnOnce(&mut Self, Dest),
@@ -140,17 +147,17 @@ impl<'a> Frame<'_, 'a> {
         } else {
             self.arguments(arguments);
         }
-        let count = self.registers.top().saturating_sub(window.saturating_add(2));
+        let count = self.registers.taken_since(window.offset(2));
         self.finish_apply(window, count, dest);
     }
 
-    /// Applies what is in `window` to `count` arguments, the last of which is a list. Frees the window.
-    pub(super) fn finish_apply(&mut self, window: u8, count: u8, dest: Dest) {
+    /// Applies the function in `window` to `count` arguments, the last of which is a list. Frees the window.
+    pub(super) fn finish_apply(&mut self, window: Reg, count: u8, dest: Dest) {
         if self.keeps_its_frame(dest) {
             self.finish_apply(window, count, Dest::All);
             return self.finish(Dest::All, dest);
         }
-        let (base, count) = (Base(window), Count(count));
+        let (base, count) = (Base::from(window), Count(count));
         if let Dest::Tail = dest {
             self.end(Instr::TailApply { window: base, count, pad: Pad(0) });
             return self.registers.release(window);
@@ -160,7 +167,7 @@ impl<'a> Frame<'_, 'a> {
         self.results(window, dest);
     }
 
-    /// Lowers `forms` to the next registers, which stay taken.
+    /// Lowers forms to the next registers, which stay taken.
     pub(super) fn arguments(&mut self, forms: &[NodeId]) {
         for &form in forms {
             let register = self.registers.top();
@@ -169,30 +176,34 @@ impl<'a> Frame<'_, 'a> {
         }
     }
 
-    /// Lowers a call whose callee and arguments are not opened up.
-    pub(super) fn emit_call(&mut self, target: Target<'a>, arguments: &'a [NodeId], dest: Dest) {
-        let fails = matches!(target, Target::Global(name) if fails(name));
+    /// Lowers a call that is not opened up.
+    pub(super) fn emit_call(&mut self, target: CallTarget<'a>, arguments: &'a [NodeId], dest: Dest) {
+        let fails = matches!(target, CallTarget::Global(name) if fails(name));
         if self.keeps_its_frame(dest) || matches!(dest, Dest::Tail) && fails {
             self.emit_call(target, arguments, Dest::All);
             return self.finish(Dest::All, dest);
         }
-        if arguments.len() > MAX_DIRECT && !matches!(target, Target::Itself) {
+        if arguments.len() > MAX_DIRECT && !matches!(target, CallTarget::Itself) {
             return self.call_with_list(target, arguments, dest);
         }
         let top = self.registers.top();
-        // The window begins at the destination if all registers above are free by the time it is written.
+        // The window begins at the destination if all registers above that are free by the time it is written.
         let window = match dest {
-            Dest::Fresh(first) | Dest::Values(first, _) if top - first <= target.slack() => first,
+            Dest::Fresh(first) | Dest::Values(first, _)
+                if self.registers.taken_since(first) <= target.slack() =>
+            {
+                first
+            }
             _ => top,
         };
-        let base = Base(window);
+        let base = Base::from(window);
         if target.comes_first() {
             self.load_target(target, window);
         }
-        let first = window.saturating_add(2);
-        self.registers.take(usize::from(first.saturating_sub(top)));
+        let first = window.offset(2);
+        self.registers.take(usize::from(first.0.saturating_sub(top.0)));
         self.arguments(arguments);
-        if !target.comes_first() && matches!(target, Target::Place(_) | Target::Constant(_)) {
+        if !target.comes_first() && matches!(target, CallTarget::Variable(_) | CallTarget::Constant(_)) {
             self.load_target(target, window);
         }
         self.registers.release(top);
@@ -200,11 +211,11 @@ impl<'a> Frame<'_, 'a> {
         let (count, want, pad) = (Count(arguments.len() as u8), dest.want(), Pad(0));
         if let Dest::Tail = dest {
             let instr = match target {
-                Target::Global(name) => {
+                CallTarget::Global(name) => {
                     let symbol = WideSymbolIdx(u32::from(self.symbol_index(name).0));
                     Instr::TailCallGlobal { window: base, count, symbol }
                 }
-                Target::Builtin(builtin) => {
+                CallTarget::Builtin(builtin) => {
                     Instr::TailCallBuiltin { window: base, count, builtin: BuiltinIdx(builtin.number()) }
                 }
                 _ => Instr::TailCall { window: base, count, pad },
@@ -212,34 +223,34 @@ impl<'a> Frame<'_, 'a> {
             return self.end(instr);
         }
         let instr = match target {
-            Target::Global(name) => {
+            CallTarget::Global(name) => {
                 let symbol = WideSymbolIdx(u32::from(self.symbol_index(name).0));
                 Instr::CallGlobal { window: base, count, want, symbol }
             }
-            Target::Builtin(builtin) => {
+            CallTarget::Builtin(builtin) => {
                 Instr::CallBuiltin { window: base, count, want, builtin: BuiltinIdx(builtin.number()) }
             }
-            Target::Itself => Instr::CallSelf { window: base, count, want, pad },
+            CallTarget::Itself => Instr::CallSelf { window: base, count, want, pad },
             _ => Instr::Call { window: base, count, want, pad },
         };
         self.emit(instr);
         self.results(window, dest);
     }
 
-    /// Whether a tail call is none after all: the frame of a top-level form is kept, so that backtraces show the form.
+    /// Whether a tail call keeps the frame: that of a top-level form is kept, so that backtraces show the form.
     fn keeps_its_frame(&self, dest: Dest) -> bool {
         matches!(dest, Dest::Tail) && self.lambda == LambdaId(0)
     }
 
     /// Calls a global function with the arguments that are in a window at the top of the registers.
-    pub(super) fn call_in_window(&mut self, name: &Symbol, window: u8, count: u8, dest: Dest) {
+    pub(super) fn call_in_window(&mut self, name: &Symbol, window: Reg, count: u8, dest: Dest) {
         if self.keeps_its_frame(dest) {
             self.call_in_window(name, window, count, Dest::All);
             return self.finish(Dest::All, dest);
         }
         self.registers.reserve(window, usize::from(dest.want().registers()));
         let symbol = WideSymbolIdx(u32::from(self.symbol_index(name).0));
-        let (base, count, want) = (Base(window), Count(count), dest.want());
+        let (base, count, want) = (window.into(), Count(count), dest.want());
         if let Dest::Tail = dest {
             return self.end(Instr::TailCallGlobal { window: base, count, symbol });
         }
@@ -247,21 +258,21 @@ impl<'a> Frame<'_, 'a> {
         self.results(window, dest);
     }
 
-    /// Puts what is called to `window`.
-    fn load_target(&mut self, target: Target<'a>, window: u8) {
+    /// Puts the function that is called into `window`.
+    fn load_target(&mut self, target: CallTarget<'a>, window: Reg) {
         let dest = Dest::Fresh(window);
         match target {
-            Target::Global(name) => self.function_ref(name, dest),
-            Target::Builtin(builtin) => self.builtin_ref(builtin, dest),
-            Target::Place(place) => self.fetch(place, dest),
-            Target::Constant(lambda) => self.constant_function(lambda, dest),
-            Target::Form(function) => self.form(function, dest),
-            Target::Itself => unreachable!("a function that calls itself has its arguments in registers"),
+            CallTarget::Global(name) => self.function_ref(name, dest),
+            CallTarget::Builtin(builtin) => self.builtin_ref(builtin, dest),
+            CallTarget::Variable(location) => self.fetch(location, dest),
+            CallTarget::Constant(lambda) => self.constant_function(lambda, dest),
+            CallTarget::Form(function) => self.form(function, dest),
+            CallTarget::Itself => unreachable!("a function that calls itself has its arguments in registers"),
         }
     }
 
-    /// Passes on what a call has put into its window.
-    fn results(&mut self, window: u8, dest: Dest) {
+    /// Delivers the results that a call has put into its window.
+    fn results(&mut self, window: Reg, dest: Dest) {
         match dest {
             Dest::All => {}
             Dest::Values(first, count) => self.move_range(first, window, count),
@@ -269,8 +280,8 @@ impl<'a> Frame<'_, 'a> {
         }
     }
 
-    /// Lowers a call with very many arguments.
-    fn call_with_list(&mut self, target: Target<'a>, arguments: &'a [NodeId], dest: Dest) {
+    /// Lowers a call with too many arguments for registers.
+    fn call_with_list(&mut self, target: CallTarget<'a>, arguments: &'a [NodeId], dest: Dest) {
         let window = self.registers.top();
         self.load_target(target, window);
         self.registers.take(2);
@@ -280,7 +291,7 @@ impl<'a> Frame<'_, 'a> {
         self.finish_apply(window, 1, dest);
     }
 
-    /// A fresh list of what the forms give.
+    /// Makes a list of the values of forms.
     pub(super) fn list(&mut self, forms: &[NodeId], dest: Dest) {
         if forms.is_empty() {
             return self.deliver_nil(dest);
@@ -290,7 +301,7 @@ impl<'a> Frame<'_, 'a> {
             self.arguments(forms);
             self.registers.release(top);
             let count = Count(forms.len() as u8);
-            return self.compute(dest, |dst| Instr::List { dst, first: Base(top), count });
+            return self.compute(dest, |dst| Instr::List { dst, first: top.into(), count });
         }
         let mut size = MAX_LIST;
         while forms.len().div_ceil(size) > MAX_LIST {
@@ -305,7 +316,7 @@ impl<'a> Frame<'_, 'a> {
         self.append(top, dest);
     }
 
-    /// The list of what the first forms give, joined with the lists that the others give; in the next register.
+    /// Makes the list of the values of `items`, joined with the values of `lists`, in the next register.
     fn joined_list(&mut self, items: &[NodeId], lists: &[NodeId]) {
         let window = self.registers.top();
         self.registers.take(2);
@@ -317,23 +328,23 @@ impl<'a> Frame<'_, 'a> {
         self.registers.take(1);
     }
 
-    /// Joins the lists that are the arguments in a window at the top of the registers, and frees it.
-    pub(super) fn append(&mut self, window: u8, dest: Dest) {
-        let count = Count(self.registers.top().saturating_sub(window.saturating_add(2)));
+    /// Joins the lists that are the arguments in a window at the top of the registers. Frees the window.
+    pub(super) fn append(&mut self, window: Reg, dest: Dest) {
+        let count = Count(self.registers.taken_since(window.offset(2)));
         let builtin = BuiltinIdx(Builtin::Append.number());
-        self.emit(Instr::CallBuiltin { window: Base(window), count, want: Want::ONE, builtin });
+        self.emit(Instr::CallBuiltin { window: window.into(), count, want: Want::ONE, builtin });
         self.registers.release(window);
         self.registers.reserve(window, 1);
         self.deliver(window, dest);
     }
 }
 
-/// Whether a function fails: backtraces are to show who has called it.
+/// Whether a function always fails. Its tail calls keep the frame, so that backtraces show the caller.
 fn fails(function: &Symbol) -> bool {
     function.is_cl("ERROR") || [Symbol::esl("FAIL"), Symbol::esl("%FAIL-FOR")].contains(function)
 }
 
-/// Whether a builtin takes so many arguments.
+/// Whether a builtin takes `count` arguments.
 pub(super) fn takes(builtin: Builtin, count: usize) -> bool {
     let arity = builtin.info().arity;
     count >= arity.min as usize && arity.max.is_none_or(|max| count <= max as usize)

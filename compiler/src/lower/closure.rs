@@ -6,31 +6,29 @@ use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 use esl_bytecode::symbol::Symbol;
 
+use super::builder::{Excess, FunctionBuilder};
 use super::dest::Dest;
-use super::frame::Frame;
 use crate::core::*;
 use crate::resolve::{FunctionKind, Lexical};
 
-impl<'a> Frame<'_, 'a> {
-    /// The global function kept in a symbol.
+impl<'a> FunctionBuilder<'_, 'a> {
+    /// Reads the global function kept in a symbol.
     pub(super) fn function_ref(&mut self, symbol: &Symbol, dest: Dest) {
         let symbol = self.symbol_index(symbol);
         self.compute(dest, |dst| Instr::FunctionRef { dst, symbol });
     }
 
-    /// A builtin as a function.
+    /// Reads a builtin as a function.
     pub(super) fn builtin_ref(&mut self, builtin: Builtin, dest: Dest) {
-        let info = builtin.info();
-        let symbol = Symbol::new(&info.package().into(), info.name);
-        self.function_ref(&symbol, dest);
+        self.function_ref(&builtin.symbol(), dest);
     }
 
-    /// The closure of a lambda that is written here.
+    /// Makes the closure of a lambda that is written here.
     pub(super) fn lambda(&mut self, lambda: LambdaId, dest: Dest) {
         if let Dest::Effect = dest {
             return;
         }
-        if self.builder.resolution.captures(lambda).is_empty() {
+        if self.module.resolution.captures(lambda).is_empty() {
             return self.constant_function(lambda, dest);
         }
         let top = self.registers.top();
@@ -40,40 +38,40 @@ impl<'a> Frame<'_, 'a> {
         self.compute(dest, |dst| Instr::MakeClosure { dst, function });
     }
 
-    /// A function that captures nothing.
+    /// Reads a function that captures nothing.
     pub(super) fn constant_function(&mut self, lambda: LambdaId, dest: Dest) {
         let constant = ConstIdx(self.function_index(lambda).0);
         self.compute(dest, |dst| Instr::LoadConst { dst, constant });
     }
 
     fn function_index(&mut self, lambda: LambdaId) -> FunctionIdx {
-        let number = self.builder.number(lambda);
-        let entry = self.builder.pool.function(number);
+        let number = self.module.number(lambda);
+        let entry = self.module.pool.function(number);
         FunctionIdx(self.constant_index(entry))
     }
 
-    /// A local function as a value.
+    /// Reads a local function as a value.
     pub(super) fn function_value(&mut self, variable: VarId, lambda: LambdaId, dest: Dest) {
         if let Dest::Effect = dest {
             return;
         }
-        match self.builder.resolution.function_kind(lambda) {
+        match self.module.resolution.function_kind(lambda) {
             FunctionKind::Closure => {
-                let place = self.place(variable);
-                self.fetch(place, dest);
+                let location = self.location(variable);
+                self.fetch(location, dest);
             }
             _ => self.constant_function(lambda, dest),
         }
     }
 
-    /// Notes where the closure of a lambda, made here, takes its captures from. Closures of `unmade` come later: returns
-    /// which captures those are. Takes registers for variables that have none.
+    /// Notes the sources of the captures of a lambda whose closure is made here. Returns the captures that are among
+    /// `unmade`, local functions whose closures do not exist yet. Takes registers for variables without one.
     fn set_captures(&mut self, lambda: LambdaId, unmade: &[VarId]) -> Vec<(Index, VarId)> {
         let core = self.core;
         let mut late = Vec::new();
         let mut captures = Vec::new();
-        for index in 0..self.builder.resolution.captures(lambda).len() {
-            let resolution = &self.builder.resolution;
+        for index in 0..self.module.resolution.captures(lambda).len() {
+            let resolution = &self.module.resolution;
             let lexical = resolution.captures(lambda)[index];
             let is_own = resolution.frame(lexical.owner(core)) == self.lambda;
             let boxed = matches!(lexical, Lexical::Variable(variable) if resolution.is_boxed(variable));
@@ -87,45 +85,47 @@ impl<'a> Frame<'_, 'a> {
                     Some(place) => {
                         let register = self.registers.take(1);
                         self.load_spilled(place, register);
-                        register
+                        register.0
                     }
-                    None => self.register(variable),
+                    None => self.register(variable).0,
                 }),
-                Lexical::Block(block) => CaptureSource::Register(self.builder.blocks[block.index()]),
-                Lexical::Tagbody(tagbody) => CaptureSource::Register(self.builder.tagbodies[tagbody.index()]),
+                Lexical::Block(block) => CaptureSource::Register(self.module.blocks[block.index()].0),
+                Lexical::Tagbody(tagbody) => {
+                    CaptureSource::Register(self.module.tagbodies[tagbody.index()].0)
+                }
             };
             captures.push(Capture { source, boxed });
         }
         if captures.len() > usize::from(u8::MAX) {
-            self.excess = Some("captured variables");
+            self.excess = Some(Excess::Captures);
         }
-        self.builder.captures[lambda.index()] = captures;
+        self.module.captures[lambda.index()] = captures;
         late
     }
 
-    /// Binds local functions around a body. Constants and inlined functions need nothing here.
+    /// Binds local functions around a body. Constants and inlined functions need no code here.
     pub(super) fn functions(&mut self, definitions: &[(VarId, LambdaId)], body: NodeId, dest: Dest) {
         let top = self.registers.top();
-        let resolution = &self.builder.resolution;
+        let resolution = &self.module.resolution;
         let closures = definitions
             .iter()
             .filter(|(_, lambda)| resolution.function_kind(*lambda) == FunctionKind::Closure);
         let closures: Vec<(VarId, LambdaId)> = closures.copied().collect();
         let mut unmade: Vec<VarId> = closures.iter().map(|&(variable, _)| variable).collect();
         unmade.reverse();
-        let mut patches: Vec<(u8, Index, VarId)> = Vec::new();
+        let mut patches: Vec<(Reg, Index, VarId)> = Vec::new();
         for &(variable, lambda) in &closures {
             let late = self.set_captures(lambda, &unmade);
             let function = self.function_index(lambda);
             let register = self.registers.take(1);
-            self.builder.variables[variable.index()] = register;
-            self.emit(Instr::MakeClosure { dst: Dst(register), function });
+            self.module.variables[variable.index()] = register;
+            self.emit(Instr::MakeClosure { dst: register.into(), function });
             patches.extend(late.into_iter().map(|(index, captured)| (register, index, captured)));
             unmade.pop();
         }
         for (closure, index, captured) in patches {
-            let src = Reg(self.register(captured));
-            self.emit(Instr::PatchCapture { closure: Reg(closure), index, src });
+            let src = self.register(captured);
+            self.emit(Instr::PatchCapture { closure, index, src });
         }
         self.form(body, dest);
         self.registers.release(top);

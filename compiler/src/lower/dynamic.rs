@@ -3,12 +3,12 @@
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 
+use super::builder::{Extent, FunctionBuilder};
 use super::dest::Dest;
-use super::frame::{Extent, Frame};
 use super::graph::{Cond, Exit};
 use crate::core::*;
 
-impl Frame<'_, '_> {
+impl FunctionBuilder<'_, '_> {
     /// The protected form and its cleanup, which control enters from it and unwindings enter from anywhere in it:
     ///
     /// ```text
@@ -20,7 +20,7 @@ impl Frame<'_, '_> {
     /// ```
     pub(super) fn unwind_protect(&mut self, protected: NodeId, cleanup: NodeId, dest: Dest) {
         let top = self.registers.top();
-        let is_single = self.builder.resolution.is_single(protected);
+        let is_single = self.module.resolution.is_single(protected);
         // A single value waits in a register below the window, all of them in the value list.
         let inner = match dest {
             Dest::Effect => Dest::Effect,
@@ -30,7 +30,7 @@ impl Frame<'_, '_> {
         };
         let depth = self.extents.len();
         let landing = self.graph.label();
-        let window = Base(self.registers.top());
+        let window = Base::from(self.registers.top());
         self.push_entry(Instr::PushCleanup { window, to: Jump(0) }, landing, Extent::Cleanup);
         self.form(protected, inner);
         let returns = self.graph.is_open();
@@ -55,7 +55,7 @@ impl Frame<'_, '_> {
         let depth = self.extents.len();
         let symbols = self.operand(symbols, &[values]);
         let values = self.operand(values, &[]);
-        let window = Base(self.registers.top());
+        let window = Base::from(self.registers.top());
         self.emit(Instr::PushScope { window });
         self.open(Extent::Control);
         self.emit(Instr::BindList { symbols, values });
@@ -68,7 +68,7 @@ impl Frame<'_, '_> {
         let depth = self.extents.len();
         let handlers = self.operand(handlers, &[]);
         self.registers.release(top);
-        self.emit(Instr::PushHandlers { window: Base(top), handlers });
+        self.emit(Instr::PushHandlers { window: top.into(), handlers });
         self.open(Extent::Control);
         self.form_inside(body, dest, depth);
     }
@@ -78,7 +78,7 @@ impl Frame<'_, '_> {
         let depth = self.extents.len();
         let from = self.operand(from, &[]);
         self.registers.release(top);
-        self.emit(Instr::PushMask { window: Base(top), from });
+        self.emit(Instr::PushMask { window: top.into(), from });
         self.open(Extent::Control);
         self.form_inside(body, dest, depth);
     }
@@ -90,11 +90,11 @@ impl Frame<'_, '_> {
         let depth = self.extents.len();
         let (landing, end) = (self.graph.label(), self.graph.label());
         let window = self.registers.top();
-        let types = clauses.iter().map(|clause| self.builder.pool.datum(&clause.condition_type)).collect();
-        let types = self.builder.pool.vector(types);
+        let types = clauses.iter().map(|clause| self.module.pool.datum(&clause.condition_type)).collect();
+        let types = self.module.pool.vector(types);
         let types = VectorIdx(self.constant_index(types));
         self.push_entry(
-            Instr::PushHandlerCase { window: Base(window), types, to: Jump(0) },
+            Instr::PushHandlerCase { window: window.into(), types, to: Jump(0) },
             landing,
             Extent::Control,
         );
@@ -108,10 +108,10 @@ impl Frame<'_, '_> {
             if number + 1 < clauses.len() {
                 let this = self.graph.label();
                 let number = Int16(number.min(i16::MAX as usize) as i16);
-                self.branch(Cond::NumEqInt(Reg(index), number), this, next);
+                self.branch(Cond::NumEqInt(index, number), this, next);
                 self.graph.bind(this);
             }
-            self.builder.variables[clause.variable.index()] = condition;
+            self.module.variables[clause.variable.index()] = condition;
             self.box_variable(clause.variable);
             self.form(clause.body, dest);
             self.join(end, dest);

@@ -1,35 +1,19 @@
 //! Blocks, tagbodies, and exits from them; catch and throw.
 //!
-//! An exit to a place in the same frame, with no cleanup in between, pops what stands in between and jumps. Otherwise
-//! the place makes a tag of its own, which the code that leaves has at hand or captures, and catches it.
+//! An exit to a place in the same frame, with no cleanup in between, pops the control entries in between and jumps.
+//! Otherwise the place makes a tag of its own, which the code that leaves has at hand or captures, and catches it.
 
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 
+use super::builder::{BlockExit, Extent, FunctionBuilder, TagbodyExits};
 use super::dest::Dest;
-use super::frame::{Extent, Frame};
 use super::graph::{Cond, Label};
-use super::variable::Place;
+use super::variable::VariableLocation;
 use crate::core::*;
 use crate::resolve::Lexical;
 
-/// How to leave a block of this frame.
-#[derive(Clone, Copy)]
-pub(super) struct BlockState {
-    dest: Dest,
-    end: Label,
-    /// How many extents stand outside the block, its own catch apart.
-    depth: usize,
-}
-
-/// How to go to the tags of a tagbody of this frame.
-pub(super) struct TagbodyState {
-    tags: Vec<Label>,
-    /// How many extents stand while the forms of the tagbody run.
-    depth: usize,
-}
-
-/// Which form throws, as the instruction says it.
+/// Form that throws, as the instruction encodes it.
 #[derive(Clone, Copy)]
 enum ThrowKind {
     Throw = 0,
@@ -37,11 +21,12 @@ enum ThrowKind {
     Go = 2,
 }
 
-impl Frame<'_, '_> {
+impl FunctionBuilder<'_, '_> {
+    /// Lowers a block.
     pub(super) fn block(&mut self, block: BlockId, body: NodeId, dest: Dest) {
         let end = self.graph.label();
-        if !self.builder.resolution.block_needs_catch(block) {
-            self.blocks.insert(block, BlockState { dest, end, depth: self.extents.len() });
+        if !self.module.resolution.block_needs_catch(block) {
+            self.blocks.insert(block, BlockExit { dest, end, depth: self.extents.len() });
             self.form(body, dest);
             self.blocks.remove(&block);
             if dest.goes_on() {
@@ -50,12 +35,12 @@ impl Frame<'_, '_> {
             return;
         }
         let tag = self.registers.take(1);
-        self.builder.blocks[block.index()] = tag;
-        self.emit(Instr::NewTag { dst: Dst(tag) });
-        // What is thrown counts as what the block gives: one value only if all exits give one.
+        self.module.blocks[block.index()] = tag;
+        self.emit(Instr::NewTag { dst: tag.into() });
+        // Thrown values are values of the block, which has one value only if all exits have one.
         let inner = self.inner(dest, false);
         let depth = self.extents.len();
-        let state = BlockState { dest: inner, end, depth };
+        let state = BlockExit { dest: inner, end, depth };
         self.blocks.insert(block, state);
         self.guarded(tag, end, inner, body);
         self.blocks.remove(&block);
@@ -63,30 +48,31 @@ impl Frame<'_, '_> {
         self.finish(inner, dest);
     }
 
-    /// Lowers a body inside a catch for the tag in a register; `end` is where both ways out meet.
-    fn guarded(&mut self, tag: u8, end: Label, inner: Dest, body: NodeId) {
+    /// Lowers a body inside a catch for the tag in a register. Both ways out meet at `end`.
+    fn guarded(&mut self, tag: Reg, end: Label, inner: Dest, body: NodeId) {
         let depth = self.extents.len();
         let (window, want) = (self.registers.top(), inner.want());
         self.registers.reserve(window, usize::from(want.registers()));
-        let push = Instr::PushCatch { window: Base(window), tag: Reg(tag), want, to: Jump(0) };
+        let push = Instr::PushCatch { window: window.into(), tag, want, to: Jump(0) };
         self.push_entry(push, end, Extent::Control);
         self.form(body, inner);
         self.close(depth);
         self.graph.bind(end);
     }
 
+    /// Lowers an exit from a block.
     pub(super) fn return_from(&mut self, block: BlockId, value: NodeId, dest: Dest) {
         let state = self.blocks.get(&block).copied();
         let local = state.filter(|state| !self.extents[state.depth..].contains(&Extent::Cleanup));
         let Some(state) = local else {
             self.form(value, Dest::All);
-            let register = self.builder.blocks[block.index()];
+            let register = self.module.blocks[block.index()];
             return self.throw_to_own(Lexical::Block(block), register, ThrowKind::ReturnFrom, dest);
         };
         if self.extents.len() == state.depth {
             self.form(value, state.dest);
         } else {
-            let inner = self.inner(state.dest, self.builder.resolution.is_single(value));
+            let inner = self.inner(state.dest, self.module.resolution.is_single(value));
             self.form(value, inner);
             self.leave(state.depth);
             self.finish(inner, state.dest);
@@ -94,16 +80,17 @@ impl Frame<'_, '_> {
         self.join(state.end, state.dest);
     }
 
+    /// Lowers a tagbody.
     pub(super) fn tagbody(&mut self, tagbody: TagbodyId, items: &[TagbodyItem], dest: Dest) {
         let count = items.iter().filter(|item| matches!(item, TagbodyItem::Tag)).count();
         let tags: Vec<Label> = (0..count).map(|_| self.graph.label()).collect();
         let top = self.registers.top();
         let has_literals = self.load_tagbody_literals(tagbody, items);
-        if self.builder.resolution.tagbody_needs_catch(tagbody) {
+        if self.module.resolution.tagbody_needs_catch(tagbody) {
             self.catching_tagbody(tagbody, items, tags);
         } else {
             let depth = self.extents.len();
-            self.tagbody_forms(tagbody, items, TagbodyState { tags, depth });
+            self.tagbody_forms(tagbody, items, TagbodyExits { tags, depth });
         }
         if has_literals {
             self.literals = None;
@@ -112,7 +99,7 @@ impl Frame<'_, '_> {
         self.deliver_nil(dest);
     }
 
-    fn tagbody_forms(&mut self, tagbody: TagbodyId, items: &[TagbodyItem], state: TagbodyState) {
+    fn tagbody_forms(&mut self, tagbody: TagbodyId, items: &[TagbodyItem], state: TagbodyExits) {
         let mut tags = state.tags.clone().into_iter();
         self.tagbodies.insert(tagbody, state);
         for item in items {
@@ -144,20 +131,20 @@ impl Frame<'_, '_> {
         let number = self.registers.take(1);
         let window = self.registers.top();
         self.registers.reserve(window, 1);
-        self.builder.tagbodies[tagbody.index()] = tag;
-        self.emit(Instr::NewTag { dst: Dst(tag) });
-        self.emit(Instr::LoadInt { dst: Dst(number), value: Int16(-1) });
+        self.module.tagbodies[tagbody.index()] = tag;
+        self.emit(Instr::NewTag { dst: tag.into() });
+        self.emit(Instr::LoadInt { dst: number.into(), value: Int16(-1) });
         self.graph.bind(again);
         let depth = self.extents.len();
-        let push = Instr::PushCatch { window: Base(window), tag: Reg(tag), want: Want::ONE, to: Jump(0) };
+        let push = Instr::PushCatch { window: window.into(), tag, want: Want::ONE, to: Jump(0) };
         self.push_entry(push, caught, Extent::Control);
         for (index, &label) in tags.iter().enumerate() {
             let next = self.graph.label();
             let index = Int16(index.min(i16::MAX as usize) as i16);
-            self.branch(Cond::NumEqInt(Reg(number), index), label, next);
+            self.branch(Cond::NumEqInt(number, index), label, next);
             self.graph.bind(next);
         }
-        self.tagbody_forms(tagbody, items, TagbodyState { tags, depth: depth + 1 });
+        self.tagbody_forms(tagbody, items, TagbodyExits { tags, depth: depth + 1 });
         self.close(depth);
         self.jump(end);
         self.graph.bind(caught);
@@ -167,6 +154,7 @@ impl Frame<'_, '_> {
         self.registers.release(tag);
     }
 
+    /// Lowers a jump to a tag.
     pub(super) fn go(&mut self, tagbody: TagbodyId, tag: u32, dest: Dest) {
         let local = self
             .tagbodies
@@ -179,36 +167,38 @@ impl Frame<'_, '_> {
         }
         let number = self.target(Dest::Effect);
         let value = Int16(tag.min(i16::MAX as u32) as i16);
-        self.emit(Instr::LoadInt { dst: Dst(number), value });
-        self.emit(Instr::SetValues { first: Base(number), count: Count(1) });
-        let register = self.builder.tagbodies[tagbody.index()];
+        self.emit(Instr::LoadInt { dst: number.into(), value });
+        self.emit(Instr::SetValues { first: number.into(), count: Count(1) });
+        let register = self.module.tagbodies[tagbody.index()];
         self.throw_to_own(Lexical::Tagbody(tagbody), register, ThrowKind::Go, dest);
     }
 
-    /// Throws the value list to the tag of a block or tagbody, which is in `register` if this frame owns it. A throw
-    /// that fails, for the place was left long ago, may be recovered from: then the form gives the value of that.
-    fn throw_to_own(&mut self, lexical: Lexical, register: u8, kind: ThrowKind, dest: Dest) {
+    /// Throws the value list to the tag of a block or tagbody, which is in `register` if this frame owns it. The throw
+    /// fails if the place has been left before; the form then has the value with which the program recovers.
+    fn throw_to_own(&mut self, lexical: Lexical, register: Reg, kind: ThrowKind, dest: Dest) {
         let mut tag = register;
-        if self.builder.resolution.frame(lexical.owner(self.core)) != self.lambda {
+        if self.module.resolution.frame(lexical.owner(self.core)) != self.lambda {
             let index = self.capture_index(lexical);
             tag = self.target(Dest::Effect);
-            self.fetch(Place::Capture(index), Dest::Fresh(tag));
+            self.fetch(VariableLocation::Capture(index), Dest::Fresh(tag));
         }
-        self.emit(Instr::Throw { tag: Reg(tag), kind: Count(kind as u8) });
+        self.emit(Instr::Throw { tag, kind: Count(kind as u8) });
         self.deliver_first(dest);
     }
 
+    /// Lowers a catch.
     pub(super) fn catch(&mut self, tag: NodeId, body: NodeId, dest: Dest) {
         let top = self.registers.top();
         let register = self.operand(tag, &[]);
-        // The tag is not needed any more once the entry stands.
+        // Once the entry is pushed, the tag is not needed any more.
         self.registers.release(top);
         let inner = self.inner(dest, false);
         let end = self.graph.label();
-        self.guarded(register.0, end, inner, body);
+        self.guarded(register, end, inner, body);
         self.finish(inner, dest);
     }
 
+    /// Lowers a throw.
     pub(super) fn throw(&mut self, tag: NodeId, values: NodeId, dest: Dest) {
         let top = self.registers.top();
         let register = self.operand(tag, &[values]);

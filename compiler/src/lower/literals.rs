@@ -1,34 +1,35 @@
 //! Literals in loops: loaded once, in front of the loop, into registers of their own.
 //!
-//! Only literals that an instruction takes from a register gain by this: those that become part of an instruction, and
-//! arguments of calls, which need a register of the window anyhow, stay where they are. The outermost loop of a frame
+//! Only literals that an instruction takes from a register profit. Literals that become part of an instruction stay where
+//! they are, and so do arguments of calls, which need a register of the window anyway. The outermost loop of a frame
 //! loads the literals of all loops inside it.
 
 use esl_bytecode::module::PoolIdx;
+use esl_bytecode::operand::Reg;
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::builder::FunctionBuilder;
 use super::dest::Dest;
-use super::frame::Frame;
 use super::operator::takes_literals;
 use crate::core::*;
 use crate::resolve::{FunctionKind, children, lambda_nodes};
 
-/// A loop has at most so many literals in registers.
+/// Literals that a loop keeps in registers at most.
 const MAX_LITERALS: usize = 16;
-/// A frame with more registers in use than this keeps none.
-const MAX_TOP: u8 = 150;
+/// First free register above which a frame keeps no literals.
+const MAX_TOP: Reg = Reg(150);
 
-/// What a walk through a loop has found.
+/// Findings of a walk through a loop.
 struct Survey {
-    /// The literals, in the order of their first use.
+    /// Literals, in the order of their first use.
     literals: Vec<NodeId>,
     entries: FxHashSet<PoolIdx>,
     /// Whether there is a jump back.
     turns: bool,
 }
 
-impl Frame<'_, '_> {
-    /// Loads the literals of a tagbody, if it is a loop. Returns whether it did, so that they be forgotten after it.
+impl FunctionBuilder<'_, '_> {
+    /// Loads the literals of a tagbody, if it is a loop. Returns whether it is, so that the caller forgets them later.
     pub(super) fn load_tagbody_literals(&mut self, tagbody: TagbodyId, items: &[TagbodyItem]) -> bool {
         if !self.may_load_literals() {
             return false;
@@ -58,7 +59,7 @@ impl Frame<'_, '_> {
         self.literals.is_none() && self.registers.top() <= MAX_TOP
     }
 
-    /// Walks through a form of this frame; `back` is a tagbody with the number of tags that stand in front of the form.
+    /// Walks through a form of this frame. `back` is a tagbody and the number of its tags in front of the form.
     fn survey(&mut self, survey: &mut Survey, form: NodeId, back: Option<(TagbodyId, u32)>) {
         let core = self.core;
         let mut entered: FxHashSet<LambdaId> = FxHashSet::default();
@@ -81,7 +82,7 @@ impl Frame<'_, '_> {
                     }
                 }
                 NodeKind::Call(Callee::Local(function), _) => {
-                    let resolution = &self.builder.resolution;
+                    let resolution = &self.module.resolution;
                     let lambda = resolution.function(*function);
                     let inline =
                         lambda.filter(|lambda| resolution.function_kind(*lambda) == FunctionKind::Inline);
@@ -100,7 +101,7 @@ impl Frame<'_, '_> {
     fn note_literal(&mut self, survey: &mut Survey, literal: NodeId) {
         if survey.literals.len() < MAX_LITERALS
             && let Some(datum) = self.literal(literal).cloned()
-            && survey.entries.insert(self.builder.pool.datum(&datum))
+            && survey.entries.insert(self.module.pool.datum(&datum))
         {
             survey.literals.push(literal);
         }
@@ -113,7 +114,7 @@ impl Frame<'_, '_> {
         let mut loaded = FxHashMap::default();
         for literal in survey.literals {
             let Some(datum) = self.literal(literal).cloned() else { continue };
-            let entry = self.builder.pool.datum(&datum);
+            let entry = self.module.pool.datum(&datum);
             let register = self.registers.top();
             self.constant(&datum, Dest::Fresh(register));
             loaded.insert(entry, self.registers.take(1));
@@ -122,11 +123,11 @@ impl Frame<'_, '_> {
         true
     }
 
-    /// The register in which a loop keeps the literal `node`.
-    pub(super) fn loaded_literal(&mut self, node: NodeId) -> Option<u8> {
+    /// Returns the register in which a loop keeps the literal `node`.
+    pub(super) fn loaded_literal(&mut self, node: NodeId) -> Option<Reg> {
         self.literals.as_ref()?;
         let datum = self.literal(node).cloned()?;
-        let entry = self.builder.pool.datum(&datum);
+        let entry = self.module.pool.datum(&datum);
         self.literals.as_ref()?.get(&entry).copied()
     }
 }

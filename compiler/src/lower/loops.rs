@@ -1,7 +1,7 @@
 //! Calls that become jumps, assignments in parallel, and the shapes of loops that profit.
 //!
-//! A loop is best when each turn executes one jump, which is conditional and goes back. [`super::fuse`] brings this
-//! about for every loop that begins with a short test:
+//! A loop is best if each turn executes one jump, which is conditional and goes back. [`super::fuse`] achieves this for
+//! every loop that begins with a short test:
 //!
 //! ```lisp
 //! (tagbody                                 ; while
@@ -16,11 +16,11 @@
 //! ```
 //!
 //! Tests that can jump back by themselves are `x`, `(not x)`, `(null x)`, `(consp x)` with `x` a variable, and
-//! `(< a b)`, `(> a b)` and their negations with `a` and `b` variables: bind a limit to a variable, even a constant
-//! one, and end a loop that includes its limit by `(if (> i limit) (go end))`.
+//! `(< a b)`, `(> a b)` and their negations with `a` and `b` variables. So bind a limit to a variable, even a constant
+//! one, and end a loop that includes its limit with `(if (> i limit) (go end))`.
 //!
-//! Counting up is one instruction for the step, the comparison and the jump when the step, by a literal integer
-//! that fits a byte, comes right before the test, and the test that goes on is `(< i limit)`:
+//! Counting up takes one instruction for the step, the comparison and the jump if the step, by a literal integer that
+//! fits a byte, comes right before the test, and the test to continue is `(< i limit)`:
 //!
 //! ```lisp
 //! (let ((i 0) (limit n))                   ; dotimes
@@ -32,27 +32,22 @@
 //!    end))
 //! ```
 //!
-//! Variables that are both assigned and captured by a closure live in boxes and miss all this: bind a fresh variable to
-//! the counter around the body if the body may make closures.
+//! Variables that are both assigned and captured by a closure live in boxes and miss all this. So bind a fresh variable
+//! to the counter around the body if the body may make closures.
 //!
-//! Also recognised: `(let ((t1 e1) …) (setq v1 t1 …) …)`, as `psetq` and `do` make it, assigns in parallel without the
-//! temporaries; and tail calls of the running function and of inlined local functions are parallel assignments of the
-//! parameters and a jump.
+//! Two further shapes are recognised. `(let ((t1 e1) …) (setq v1 t1 …) …)`, as `psetq` and `do` expand to, assigns in
+//! parallel without the temporaries. Tail calls of the running function and of inlined local functions assign the
+//! parameters in parallel and jump.
 
+use esl_bytecode::operand::Reg;
+
+use super::builder::{FunctionBuilder, LoopHead};
 use super::dest::Dest;
-use super::frame::Frame;
 use super::graph::Label;
-use super::variable::Place;
+use super::variable::VariableLocation;
 use crate::core::*;
 
-/// An inlined function whose body is being lowered.
-#[derive(Clone, Copy)]
-pub(super) struct LoopState {
-    head: Label,
-    depth: usize,
-}
-
-impl<'a> Frame<'_, 'a> {
+impl<'a> FunctionBuilder<'_, 'a> {
     /// Enters an inlined function, or jumps to its head from inside.
     pub(super) fn call_inline(&mut self, lambda: LambdaId, arguments: &'a [NodeId], dest: Dest) {
         if let Some(state) = self.loops.get(&lambda).copied() {
@@ -61,17 +56,17 @@ impl<'a> Frame<'_, 'a> {
                 self.extents.len(),
                 "self calls of inlined functions are in tail position"
             );
-            return self.jump_to_function(lambda, state.head, arguments);
+            return self.jump_to_function(lambda, state.label, arguments);
         }
         let text = &self.core.lambdas[lambda.index()];
         let (top, spilled) = (self.registers.top(), self.spill_height());
         let depth = self.extents.len();
-        let is_loop = self.builder.resolution.is_self_called(lambda);
+        let is_loop = self.module.resolution.is_self_called(lambda);
         for (parameter, &argument) in text.required.iter().zip(arguments) {
-            if is_loop || parameter.is_special || self.builder.resolution.is_assigned(parameter.variable) {
+            if is_loop || parameter.is_special || self.module.resolution.is_assigned(parameter.variable) {
                 let register = self.registers.top();
                 self.form(argument, Dest::Fresh(register));
-                self.builder.variables[parameter.variable.index()] = self.registers.take(1);
+                self.module.variables[parameter.variable.index()] = self.registers.take(1);
             } else {
                 self.bind_lexical(parameter.variable, argument);
             }
@@ -80,10 +75,10 @@ impl<'a> Frame<'_, 'a> {
         if is_loop {
             let head = self.graph.label();
             self.graph.bind(head);
-            self.loops.insert(lambda, LoopState { head, depth });
+            self.loops.insert(lambda, LoopHead { label: head, depth });
         }
         for &parameter in &text.required {
-            if parameter.is_special || self.builder.resolution.is_assigned(parameter.variable) {
+            if parameter.is_special || self.module.resolution.is_assigned(parameter.variable) {
                 self.settle(parameter);
             }
         }
@@ -96,7 +91,7 @@ impl<'a> Frame<'_, 'a> {
         self.release_spilled(spilled);
     }
 
-    /// Gives the parameters of a function new values and jumps to `head`, in front of the code that boxes them.
+    /// Assigns new values to the parameters of a function and jumps to `head`, before the code that boxes them.
     pub(super) fn jump_to_function(&mut self, lambda: LambdaId, head: Label, arguments: &'a [NodeId]) {
         let text = &self.core.lambdas[lambda.index()];
         let targets: Vec<VarId> = text.required.iter().map(|parameter| parameter.variable).collect();
@@ -107,11 +102,11 @@ impl<'a> Frame<'_, 'a> {
     /// Sets the registers of `targets` to the values of forms, all of which are computed before the first is set.
     fn assign(&mut self, targets: &[VarId], values: &[NodeId]) {
         let top = self.registers.top();
-        let mut waiting: Vec<(u8, u8)> = Vec::new();
+        let mut waiting: Vec<(Reg, Reg)> = Vec::new();
         for (index, (&target, &value)) in targets.iter().zip(values).enumerate() {
             let register = self.register(target);
             let later = &values[index + 1..];
-            let resolution = &self.builder.resolution;
+            let resolution = &self.module.resolution;
             let is_set_later = resolution.is_set_in(target, later);
             if self.is_plain_read(value, target) && !is_set_later {
                 continue;
@@ -135,14 +130,14 @@ impl<'a> Frame<'_, 'a> {
     /// Whether `node` reads `variable` from its register.
     fn is_plain_read(&self, node: NodeId, variable: VarId) -> bool {
         matches!(self.core.nodes[node.index()].kind, NodeKind::Local(read) if read == variable)
-            && !self.builder.resolution.is_boxed(variable)
+            && !self.module.resolution.is_boxed(variable)
     }
 
-    /// Lowers `(let ((t1 e1) …) (setq v1 t1) … rest…)` without temporaries, if that is what the form is. The first
-    /// assignment may be one more, `(setq v e)`, whose value needed no temporary.
+    /// Lowers `(let ((t1 e1) …) (setq v1 t1) … rest…)` without temporaries. A further assignment `(setq v e)`, whose value
+    /// needs no temporary, may come first. Returns whether the form has this shape.
     pub(super) fn parallel_assignment(
         &mut self,
-        bindings: &'a [(Target, NodeId)],
+        bindings: &'a [(BoundVariable, NodeId)],
         body: NodeId,
         dest: Dest,
     ) -> bool {
@@ -151,14 +146,14 @@ impl<'a> Frame<'_, 'a> {
         let direct = forms.len() > bindings.len() && self.assigns_temporary(first, forms[0]).is_none();
         let sets = if direct { &forms[1..] } else { &forms[..] };
         let count = bindings.len() + usize::from(direct);
-        // With one assignment there is no temporary to save. If the last one gave the form's value, it would be wanted.
+        // With one assignment there is no temporary to save. The value of the last one must be unused.
         if count < 2 || forms.len() < count || (forms.len() == count && !matches!(dest, Dest::Effect)) {
             return false;
         }
         let mut targets = Vec::with_capacity(count);
         let mut values = Vec::with_capacity(count);
         for (binding, &form) in bindings.iter().zip(sets) {
-            // Values of a sequential `let` do not refer to the temporaries either, since each is read just once.
+            // Each temporary is read just once, so values of a sequential `let` do not refer to the temporaries either.
             let Some(variable) = self.assigns_temporary(binding, form) else { return false };
             targets.push(variable);
             values.push(binding.1);
@@ -170,7 +165,8 @@ impl<'a> Frame<'_, 'a> {
             targets.push(variable);
             values.push(value);
         }
-        let in_registers = targets.iter().all(|&target| matches!(self.place(target), Place::Register(_)));
+        let in_registers =
+            targets.iter().all(|&target| matches!(self.location(target), VariableLocation::Register(_)));
         let mut distinct = targets.clone();
         distinct.sort_unstable();
         distinct.dedup();
@@ -182,11 +178,11 @@ impl<'a> Frame<'_, 'a> {
         true
     }
 
-    /// The variable that `form` sets to the temporary of `binding`, which serves for this alone.
-    fn assigns_temporary(&self, binding: &(Target, NodeId), form: NodeId) -> Option<VarId> {
-        let Target::Lexical(temporary) = binding.0 else { return None };
+    /// Returns the variable that `form` sets to the temporary of `binding`, if the temporary has no other use.
+    fn assigns_temporary(&self, binding: &(BoundVariable, NodeId), form: NodeId) -> Option<VarId> {
+        let BoundVariable::Lexical(temporary) = binding.0 else { return None };
         let NodeKind::SetLocal(variable, read) = self.core.nodes[form.index()].kind else { return None };
-        let resolution = &self.builder.resolution;
+        let resolution = &self.module.resolution;
         let serves = matches!(self.core.nodes[read.index()].kind, NodeKind::Local(source) if source == temporary)
             && !resolution.is_assigned(temporary)
             && resolution.reads_of(temporary) == 1;

@@ -1,33 +1,22 @@
 //! Builtins that have instructions of their own.
 //!
-//! What is opened up here behaves as the function does, also when it fails: the operands are evaluated in order, and
-//! one instruction does the work, so that a value put in its place stands for the whole call. Sums and products of more
-//! than two numbers are the exception, and what sets a place: it gives what was to be stored.
+//! An opened builtin behaves as the function does, also when it fails: the operands are evaluated in order, and one
+//! instruction does the work, so that a value put in its place stands for the whole call. Exceptions are sums and products
+//! of more than two numbers, and builtins that set a place: these return the value that was to be stored.
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::opcode::{Instr, TypeCode};
 use esl_bytecode::operand::*;
 
-use super::arithmetic::{addend, has_literal_form, literal_int};
-use super::call::{MAX_DIRECT, Target};
+use super::arithmetic::{Binary, Comparison, addend, literal_int};
+use super::builder::FunctionBuilder;
+use super::call::{CallTarget, MAX_DIRECT};
 use super::dest::Dest;
-use super::frame::Frame;
 use crate::core::*;
 
 type Unary = fn(Dst, Reg) -> Instr;
-pub(super) type Binary = fn(Dst, Reg, Reg) -> Instr;
 
-/// A comparison of numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Comparison {
-    Equal,
-    Less,
-    LessEqual,
-    Greater,
-    GreaterEqual,
-}
-
-/// How a builtin is opened up, given that it has the number of arguments that it says.
+/// How a builtin is opened up, for a suitable number of arguments.
 #[derive(Clone, Copy)]
 enum Shape {
     /// One argument, one instruction.
@@ -46,17 +35,17 @@ enum Shape {
     Compare(Comparison),
     /// One number compared with a literal.
     CompareInt(Comparison, Int16),
-    /// The quotient, if nobody asks for the remainder.
+    /// The quotient, if the remainder is unused.
     Quotient(Binary),
     IsType(TypeCode),
     Not,
     Eq,
     Eql,
-    /// An instruction for effect on two arguments; the call gives the second.
+    /// An instruction for effect on two arguments; the call returns the second.
     Store(fn(Reg, Reg) -> Instr),
-    /// An instruction for effect on two arguments, if nobody asks for the value of the call.
+    /// An instruction for effect on two arguments, if the value of the call is unused.
     Change(fn(Reg, Reg) -> Instr),
-    /// As `Store` with three, of which it gives the last.
+    /// As `Store`, with three arguments, of which the call returns the last.
     StoreAt(fn(Reg, Reg, Reg) -> Instr),
     List,
     ListStar,
@@ -67,7 +56,7 @@ enum Shape {
     Apply,
 }
 
-/// How a call with `count` arguments is opened up, if at all.
+/// Returns how a call with `count` arguments is opened up, if at all.
 fn shape(builtin: Builtin, count: usize) -> Option<Shape> {
     use Builtin as B;
     use Shape::*;
@@ -147,7 +136,7 @@ pub(super) fn takes_literals(core: &Core, builtin: Builtin, arguments: &[NodeId]
     match shape(builtin, arguments.len()) {
         Some(Shape::Fold(_)) => addend(core, builtin, arguments[index]).is_none(),
         Some(Shape::Compare(comparison)) => {
-            !has_literal_form(comparison) || literal_int(core, arguments[index]).is_none()
+            !comparison.has_literal_form() || literal_int(core, arguments[index]).is_none()
         }
         Some(
             Shape::Binary(_) | Shape::Quotient(_) | Shape::Store(_) | Shape::Change(_) | Shape::StoreAt(_),
@@ -156,11 +145,12 @@ pub(super) fn takes_literals(core: &Core, builtin: Builtin, arguments: &[NodeId]
     }
 }
 
-impl<'a> Frame<'_, 'a> {
+impl<'a> FunctionBuilder<'_, 'a> {
+    /// Lowers a call of a builtin.
     pub(super) fn builtin(&mut self, builtin: Builtin, arguments: &'a [NodeId], dest: Dest) {
         let top = self.registers.top();
         let Some(shape) = shape(builtin, arguments.len()) else {
-            return self.emit_call(Target::Builtin(builtin), arguments, dest);
+            return self.emit_call(CallTarget::Builtin(builtin), arguments, dest);
         };
         match (shape, arguments) {
             (Shape::Unary(instr), [object]) => {
@@ -189,7 +179,7 @@ impl<'a> Frame<'_, 'a> {
             (Shape::CompareInt(comparison, value), [number]) => {
                 self.compare_int(comparison, *number, value, dest)
             }
-            (Shape::Quotient(instr), [_, ..]) if gives_one(dest) => match arguments {
+            (Shape::Quotient(instr), [_, ..]) if dest.is_single() => match arguments {
                 [number, divisor] => {
                     let (left, right) = self.operands(*number, *divisor);
                     self.registers.release(top);
@@ -205,7 +195,7 @@ impl<'a> Frame<'_, 'a> {
                 let (object, value) = self.operands(*object, *value);
                 self.emit(instr(object, value));
                 self.registers.release(top);
-                self.deliver(value.0, dest);
+                self.deliver(value, dest);
             }
             (Shape::Change(instr), [object, value]) if matches!(dest, Dest::Effect) => {
                 let (object, value) = self.operands(*object, *value);
@@ -217,7 +207,7 @@ impl<'a> Frame<'_, 'a> {
                 let (index, value) = self.operands(*index, *value);
                 self.emit(instr(object, index, value));
                 self.registers.release(top);
-                self.deliver(value.0, dest);
+                self.deliver(value, dest);
             }
             (Shape::List, _) => self.list(arguments, dest),
             (Shape::ListStar, _) => self.list_star(arguments, dest),
@@ -228,14 +218,14 @@ impl<'a> Frame<'_, 'a> {
             (Shape::Apply, [function, arguments @ ..]) => {
                 self.apply_form(|frame, dest| frame.form(*function, dest), arguments, dest);
             }
-            _ => self.emit_call(Target::Builtin(builtin), arguments, dest),
+            _ => self.emit_call(CallTarget::Builtin(builtin), arguments, dest),
         }
     }
 
-    /// Two operands, evaluated in order.
+    /// Returns two operands, evaluated in order.
     pub(super) fn operands(&mut self, left: NodeId, right: NodeId) -> (Reg, Reg) {
         if self.literal(left).is_some() {
-            // A literal has no effects: loaded late it takes no register while the other is computed.
+            // A literal has no effects. Loaded late, it takes no register while the other operand is computed.
             let second = self.operand(right, &[]);
             return (self.operand(left, &[]), second);
         }
@@ -243,14 +233,14 @@ impl<'a> Frame<'_, 'a> {
         (first, self.operand(right, &[]))
     }
 
-    /// One instruction on a form's value and a literal.
+    /// Lowers one instruction on a form's value and a literal.
     fn with_literal(&mut self, instr: Binary, form: NodeId, literal: i16, dest: Dest) {
         let top = self.registers.top();
         let operand = self.operand(form, &[]);
         let register = self.registers.take(1);
-        self.emit(Instr::LoadInt { dst: Dst(register), value: Int16(literal) });
+        self.emit(Instr::LoadInt { dst: register.into(), value: Int16(literal) });
         self.registers.release(top);
-        self.compute(dest, |dst| instr(dst, operand, Reg(register)));
+        self.compute(dest, |dst| instr(dst, operand, register));
     }
 
     fn list_star(&mut self, forms: &[NodeId], dest: Dest) {
@@ -260,17 +250,12 @@ impl<'a> Frame<'_, 'a> {
         let top = self.registers.top();
         self.arguments(forms);
         self.registers.release(top);
-        let mut rest = top.saturating_add(forms.len() as u8 - 1);
+        let mut rest = top.offset(forms.len() as u8 - 1);
         for offset in (1..forms.len() as u8 - 1).rev() {
-            let register = top.saturating_add(offset);
-            self.emit(Instr::Cons { dst: Dst(register), car: Reg(register), cdr: Reg(rest) });
+            let register = top.offset(offset);
+            self.emit(Instr::Cons { dst: register.into(), car: register, cdr: rest });
             rest = register;
         }
-        self.compute(dest, |dst| Instr::Cons { dst, car: Reg(top), cdr: Reg(rest) });
+        self.compute(dest, |dst| Instr::Cons { dst, car: top, cdr: rest });
     }
-}
-
-/// Whether a destination takes one value at most.
-fn gives_one(dest: Dest) -> bool {
-    !matches!(dest, Dest::All | Dest::Tail | Dest::Values(..))
 }

@@ -5,12 +5,12 @@ use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 use esl_bytecode::symbol::Symbol;
 
+use super::builder::{Extent, FunctionBuilder};
 use super::dest::Dest;
-use super::frame::{Extent, Frame};
 use super::graph::Cond;
 use crate::core::*;
 
-impl Frame<'_, '_> {
+impl FunctionBuilder<'_, '_> {
     /// A body with recovery procedures. Entering it takes two instructions and no memory: the function that runs the
     /// clauses is made by the first instruction at the landing, which the machine does when a failure needs it.
     ///
@@ -33,7 +33,7 @@ impl Frame<'_, '_> {
         self.graph.bind(again);
         let window = self.registers.top();
         self.registers.reserve(window, 2);
-        let push = Instr::PushRecovery { window: Base(window), state: Reg(state), to: Jump(0) };
+        let push = Instr::PushRecovery { window: window.into(), state, to: Jump(0) };
         self.push_entry(push, landing, Extent::Control);
         self.form_inside(body, dest, depth);
         self.join(end, dest);
@@ -42,7 +42,7 @@ impl Frame<'_, '_> {
         let result = self.registers.take(1);
         let function = self.registers.top();
         self.form(procedures, Dest::Fresh(function));
-        self.branch(Cond::Nil(Reg(kind)), aborted, retry);
+        self.branch(Cond::Nil(kind), aborted, retry);
         self.graph.bind(retry);
         self.move_to(state, kind);
         self.jump(again);
@@ -69,7 +69,7 @@ impl Frame<'_, '_> {
         let depth = self.extents.len();
         let [landing, end] = std::array::from_fn(|_| self.graph.label());
         let top = self.registers.top();
-        let push = Instr::PushFailureCleanup { window: Base(top), to: Jump(0) };
+        let push = Instr::PushFailureCleanup { window: top.into(), to: Jump(0) };
         self.push_entry(push, landing, Extent::Control);
         self.form_inside(body, dest, depth);
         self.join(end, dest);
@@ -81,7 +81,7 @@ impl Frame<'_, '_> {
         let window = self.registers.top();
         self.registers.take(2);
         let failure = self.registers.take(1);
-        self.emit(Instr::ValuesToList { dst: Dst(failure) });
+        self.emit(Instr::ValuesToList { dst: failure.into() });
         self.registers.release(top);
         self.call_in_window(&Symbol::esl("%FAIL-AGAIN"), window, 1, dest);
         if dest.goes_on() {

@@ -105,19 +105,7 @@ impl Splitter<'_> {
         let kind = std::mem::replace(&mut self.core.nodes[node.index()].kind, NodeKind::Hole);
         let body = self.node(kind, span);
         let lambda = LambdaId(self.core.lambdas.len() as u32);
-        self.core.lambdas.push(Lambda {
-            name: None,
-            lambda_list: None,
-            documentation: None,
-            parent: Some(self.lambda),
-            span,
-            required: Vec::new(),
-            optional: Vec::new(),
-            rest: None,
-            keys: None,
-            allow_other_keys: false,
-            body,
-        });
+        self.core.lambdas.push(Lambda::without_parameters(Some(self.lambda), span, body));
         let closure = self.node(NodeKind::Lambda(lambda), span);
         // A call of a plain lambda would be part of the frame again.
         let hidden = self.node(NodeKind::Progn(vec![closure]), span);
@@ -198,7 +186,8 @@ impl Splitter<'_> {
             return None;
         };
         // Names are resolved: one after another is as good as all at once, unless bindings are dynamic.
-        let in_order = *sequential || bindings.iter().all(|(target, _)| matches!(target, Target::Lexical(_)));
+        let in_order =
+            *sequential || bindings.iter().all(|(target, _)| matches!(target, BoundVariable::Lexical(_)));
         if bindings.len() <= self.limits.bindings || !in_order {
             return None;
         }
@@ -230,9 +219,9 @@ fn adopt(core: &mut Core, lambda: LambdaId) {
         let kind = &core.nodes[node.index()].kind;
         let variables = &mut core.variables;
         let mut own = |variable: VarId| variables[variable.index()].owner = lambda;
-        let mut own_target = |target: &Target| match target {
-            Target::Lexical(variable) => own(*variable),
-            Target::Special(_) => {}
+        let mut own_target = |target: &BoundVariable| match target {
+            BoundVariable::Lexical(variable) => own(*variable),
+            BoundVariable::Special(_) => {}
         };
         match kind {
             NodeKind::Let { bindings, .. } => bindings.iter().for_each(|(target, _)| own_target(target)),

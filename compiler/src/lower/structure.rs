@@ -6,14 +6,14 @@ use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 use esl_bytecode::symbol::Symbol;
 
+use super::builder::FunctionBuilder;
 use super::dest::Dest;
-use super::frame::Frame;
 use super::graph::Cond;
 use crate::core::NodeId;
 
-impl Frame<'_, '_> {
+impl FunctionBuilder<'_, '_> {
     fn class_index(&mut self, class: &Symbol) -> u16 {
-        let entry = self.builder.pool.class(class);
+        let entry = self.module.pool.class(class);
         self.constant_index(entry)
     }
 
@@ -45,22 +45,22 @@ impl Frame<'_, '_> {
         let class = WideClassIdx(u32::from(self.class_index(class)));
         self.emit(Instr::SetSlot { instance, slot: Index(narrow), value, class });
         self.registers.release(top);
-        self.deliver(value.0, dest);
+        self.deliver(value, dest);
     }
 
     /// A slot whose number does not fit the instruction.
     fn distant_slot(&mut self, builtin: Builtin, class: &Symbol, slot: u16, forms: &[NodeId], dest: Dest) {
         let window = self.registers.top();
         self.registers.take(2);
-        for entry in [self.builder.pool.symbol(class), self.builder.pool.integer(&BigInt::from(slot))] {
+        for entry in [self.module.pool.symbol(class), self.module.pool.integer(&BigInt::from(slot))] {
             let constant = ConstIdx(self.constant_index(entry));
             let register = self.registers.take(1);
-            self.emit(Instr::LoadConst { dst: Dst(register), constant });
+            self.emit(Instr::LoadConst { dst: register.into(), constant });
         }
         self.arguments(forms);
         let count = Count(2 + forms.len() as u8);
         let builtin = BuiltinIdx(builtin.number());
-        self.emit(Instr::CallBuiltin { window: Base(window), count, want: Want::ONE, builtin });
+        self.emit(Instr::CallBuiltin { window: window.into(), count, want: Want::ONE, builtin });
         self.registers.release(window);
         self.deliver(window, dest);
     }

@@ -1,13 +1,11 @@
 //! Conditionals. A form in test position never makes a boolean: it goes one way or the other.
 
-use esl_bytecode::operand::Reg;
-
+use super::builder::FunctionBuilder;
 use super::dest::Dest;
-use super::frame::Frame;
 use super::graph::Cond;
 use crate::core::NodeId;
 
-impl Frame<'_, '_> {
+impl FunctionBuilder<'_, '_> {
     pub(super) fn if_form(&mut self, test: NodeId, consequent: NodeId, alternative: NodeId, dest: Dest) {
         let (holds, fails, end) = (self.graph.label(), self.graph.label(), self.graph.label());
         self.form(test, Dest::Test { holds, fails });
@@ -61,9 +59,9 @@ impl Frame<'_, '_> {
                     let top = self.registers.top();
                     let value = self.operand(form, &[]);
                     let found = self.graph.label();
-                    self.branch(Cond::Nil(Reg(value.0)), next, found);
+                    self.branch(Cond::Nil(value), next, found);
                     self.graph.bind(found);
-                    self.deliver(value.0, dest);
+                    self.deliver(value, dest);
                     self.join(end, dest);
                     self.registers.release(top);
                 }

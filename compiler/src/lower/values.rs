@@ -4,12 +4,12 @@ use esl_bytecode::builtin::Builtin;
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 
+use super::builder::FunctionBuilder;
 use super::call::MAX_DIRECT;
 use super::dest::Dest;
-use super::frame::Frame;
 use crate::core::*;
 
-impl<'a> Frame<'_, 'a> {
+impl<'a> FunctionBuilder<'_, 'a> {
     /// `(values …)`
     pub(super) fn values(&mut self, forms: &[NodeId], dest: Dest) {
         let top = self.registers.top();
@@ -20,11 +20,11 @@ impl<'a> Frame<'_, 'a> {
                     self.end(Instr::Return { src });
                     return self.registers.release(top);
                 }
-                let (first, count) = (Base(top), Count(forms.len().min(255) as u8));
+                let (first, count) = (top.into(), Count(forms.len().min(255) as u8));
                 if forms.len() > MAX_DIRECT {
                     let list = self.target(Dest::Effect);
                     self.list(forms, Dest::Fresh(list));
-                    self.emit(Instr::ListToValues { src: Reg(list) });
+                    self.emit(Instr::ListToValues { src: list });
                     return self.finish(Dest::All, dest);
                 }
                 self.arguments(forms);
@@ -47,7 +47,7 @@ impl<'a> Frame<'_, 'a> {
                 self.move_range(base, top, wanted as u8);
                 let missing = count - wanted as u8;
                 if missing > 0 {
-                    let first = Base(base.saturating_add(wanted as u8));
+                    let first = Base::from(base.offset(wanted as u8));
                     self.emit(Instr::LoadNil { first, count: Count(missing) });
                 }
             }
@@ -62,7 +62,7 @@ impl<'a> Frame<'_, 'a> {
                     self.form(form, Dest::Effect);
                 }
                 self.registers.release(top);
-                self.deliver(register.0, dest);
+                self.deliver(register, dest);
             }
         }
     }
@@ -70,7 +70,7 @@ impl<'a> Frame<'_, 'a> {
     /// One value of a form, where the form itself would pass on more.
     pub(super) fn single(&mut self, form: NodeId, dest: Dest) {
         match dest {
-            Dest::All | Dest::Tail | Dest::Values(..) if !self.builder.resolution.is_single(form) => {
+            Dest::All | Dest::Tail | Dest::Values(..) if !self.module.resolution.is_single(form) => {
                 let register = self.target(Dest::Effect);
                 self.form(form, Dest::Fresh(register));
                 self.deliver(register, dest);
@@ -88,7 +88,7 @@ impl<'a> Frame<'_, 'a> {
         self.deliver_values(dest);
     }
 
-    pub(super) fn bind_values(&mut self, targets: &[Target], form: NodeId, body: NodeId, dest: Dest) {
+    pub(super) fn bind_values(&mut self, targets: &[BoundVariable], form: NodeId, body: NodeId, dest: Dest) {
         let top = self.registers.top();
         let depth = self.extents.len();
         let base = match targets.len() {
@@ -106,13 +106,13 @@ impl<'a> Frame<'_, 'a> {
             }
         };
         for (index, target) in targets.iter().enumerate() {
-            let register = base.saturating_add(index.min(255) as u8);
+            let register = base.offset(index.min(255) as u8);
             match target {
-                Target::Lexical(variable) => {
-                    self.builder.variables[variable.index()] = register;
+                BoundVariable::Lexical(variable) => {
+                    self.module.variables[variable.index()] = register;
                     self.box_variable(*variable);
                 }
-                Target::Special(symbol) => self.bind_special(symbol, register),
+                BoundVariable::Special(symbol) => self.bind_special(symbol, register),
             }
         }
         self.form_inside(body, dest, depth);
@@ -122,7 +122,7 @@ impl<'a> Frame<'_, 'a> {
     /// All values of the first form, after the second has been evaluated.
     pub(super) fn first_values(&mut self, first: NodeId, second: NodeId, dest: Dest) {
         let top = self.registers.top();
-        let is_single = self.builder.resolution.is_single(first);
+        let is_single = self.module.resolution.is_single(first);
         match dest {
             Dest::Effect => {
                 self.form(first, Dest::Effect);
@@ -138,9 +138,9 @@ impl<'a> Frame<'_, 'a> {
             Dest::All | Dest::Tail if !is_single => {
                 self.form(first, Dest::All);
                 let list = self.registers.take(1);
-                self.emit(Instr::ValuesToList { dst: Dst(list) });
+                self.emit(Instr::ValuesToList { dst: list.into() });
                 self.form(second, Dest::Effect);
-                self.emit(Instr::ListToValues { src: Reg(list) });
+                self.emit(Instr::ListToValues { src: list });
                 self.registers.release(top);
                 self.finish(Dest::All, dest);
             }
@@ -148,14 +148,14 @@ impl<'a> Frame<'_, 'a> {
                 let value = self.operand(first, &[second]);
                 self.form(second, Dest::Effect);
                 self.registers.release(top);
-                self.deliver(value.0, dest);
+                self.deliver(value, dest);
             }
         }
     }
 
     /// `(multiple-value-call function form…)`
     pub(super) fn call_values(&mut self, function: NodeId, forms: &'a [NodeId], dest: Dest) {
-        let resolution = &self.builder.resolution;
+        let resolution = &self.module.resolution;
         // Forms that give one value are ordinary arguments, up to the first that may give more.
         let plain = forms.iter().take_while(|form| resolution.is_single(**form)).count();
         if plain == forms.len() {
@@ -180,14 +180,14 @@ impl<'a> Frame<'_, 'a> {
             self.append(inner, Dest::Fresh(inner));
             self.registers.take(1);
         }
-        let count = self.registers.top().saturating_sub(window.saturating_add(2));
+        let count = self.registers.taken_since(window.offset(2));
         self.finish_apply(window, count, dest);
     }
 
     /// A fresh list of the values of a form, in the next register.
     fn value_list_of(&mut self, form: NodeId) {
         let register = self.registers.top();
-        if self.builder.resolution.is_single(form) {
+        if self.module.resolution.is_single(form) {
             self.list(&[form], Dest::Fresh(register));
         } else {
             self.form(form, Dest::All);

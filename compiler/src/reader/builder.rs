@@ -19,8 +19,8 @@ use crate::diagnostic::code;
 use super::MAX_ERRORS;
 use super::character;
 use super::literal;
-use super::name::{self, MAX_NAME, Name, Prefix, shorten};
-use super::number::{self, Fault, Number};
+use super::name::{self, MAX_NAME, NameParts, Prefix, shorten};
+use super::number::{self, Number, NumberError};
 use super::scan::label_number;
 
 /// An abbreviation of a list of two elements.
@@ -55,7 +55,7 @@ static NAMES: LazyLock<Names> = LazyLock::new(|| Names {
 });
 
 /// Builds the data of one text.
-pub(crate) struct Builder<'a> {
+pub(crate) struct DatumBuilder<'a> {
     environment: &'a mut dyn Environment,
     text: &'a str,
     source: SourceId,
@@ -67,15 +67,15 @@ pub(crate) struct Builder<'a> {
     pub(super) errors: Vec<Diagnostic>,
 }
 
-impl<'a> Builder<'a> {
+impl<'a> DatumBuilder<'a> {
     pub(super) fn new(
         environment: &'a mut dyn Environment,
         text: &'a str,
         source: SourceId,
         room: &'a mut usize,
-    ) -> Builder<'a> {
+    ) -> DatumBuilder<'a> {
         let (labels, errors) = (FxHashMap::default(), Vec::new());
-        Builder { environment, text, source, labels, room, buffer: String::new(), errors }
+        DatumBuilder { environment, text, source, labels, room, buffer: String::new(), errors }
     }
 
     fn span(&self, start: u32, end: u32) -> Span {
@@ -131,11 +131,11 @@ impl<'a> Builder<'a> {
     fn name(&mut self, start: u32, end: u32) -> Datum {
         let span = self.span(start, end);
         match name::parse(self.slice(start, end)) {
-            Ok(Name { prefix: Prefix::None, name }) => self.intern(None, &name, false, start, end),
-            Ok(Name { prefix: Prefix::Keyword, name }) => {
+            Ok(NameParts { prefix: Prefix::None, name }) => self.intern(None, &name, false, start, end),
+            Ok(NameParts { prefix: Prefix::Keyword, name }) => {
                 Datum::symbol(Symbol::new(&NAMES.keyword, &name), span)
             }
-            Ok(Name { prefix: Prefix::Package { package, internal }, name }) => {
+            Ok(NameParts { prefix: Prefix::Package { package, internal }, name }) => {
                 self.intern(Some(&package), &name, internal, start, end)
             }
             Err(message) => self.fail(code::INVALID_TOKEN.at(span, message)),
@@ -173,7 +173,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn number(&mut self, number: Result<Number, Fault>, start: u32, end: u32) -> Datum {
+    fn number(&mut self, number: Result<Number, NumberError>, start: u32, end: u32) -> Datum {
         let span = self.span(start, end);
         match number {
             Ok(Number::Integer(value)) => Datum::new(DatumKind::Integer(value), span),
@@ -181,14 +181,14 @@ impl<'a> Builder<'a> {
                 Datum::new(DatumKind::Ratio(numerator, denominator), span)
             }
             Ok(Number::Float(value)) => Datum::new(DatumKind::Float(value), span),
-            Err(Fault::ZeroDenominator) => {
+            Err(NumberError::ZeroDenominator) => {
                 self.fail(code::INVALID_TOKEN.at(span, "expected a denominator other than zero, found zero"))
             }
-            Err(Fault::OutOfRange) => {
+            Err(NumberError::OutOfRange) => {
                 let message = format!("expected a float of at most {:e}, found a larger one", f64::MAX);
                 self.fail(code::FLOAT_OUT_OF_RANGE.at(span, message))
             }
-            Err(Fault::TooLong(limit)) => {
+            Err(NumberError::TooLong(limit)) => {
                 let message = format!("expected a number of at most {limit} digits, found more");
                 self.fail(code::TOKEN_TOO_LONG.at(span, message))
             }
@@ -291,7 +291,7 @@ impl<'a> Builder<'a> {
         }
         let (mark, text) = (self.slice(start, start + 2), self.slice(start + 2, end));
         let found = match name::parse(text) {
-            Ok(Name { prefix: Prefix::None, name }) => return Ok(name),
+            Ok(NameParts { prefix: Prefix::None, name }) => return Ok(name),
             _ if text.is_empty() => "none".to_owned(),
             _ => format!("`{}`", shorten(text)),
         };

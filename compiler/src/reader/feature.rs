@@ -3,16 +3,15 @@
 //! An expression is a name, or `(and …)`, `(or …)`, `(not …)` over expressions. Names are compared without their
 //! package. They are evaluated on their tokens, with an explicit stack.
 
-use super::lexer::Token;
+use super::lexer::{Lexeme, Token};
 use super::name;
-use super::scan::Lexeme;
 
 /// The features of this implementation.
 pub const FEATURES: [&str; 2] = ["ESL", "COMMON-LISP"];
 
 /// Why an expression is none.
 #[derive(Debug)]
-pub(super) struct Fault {
+pub(super) struct FeatureError {
     pub(super) start: u32,
     pub(super) end: u32,
     pub(super) message: String,
@@ -33,7 +32,7 @@ enum Operator {
 }
 
 /// Whether the feature expression with these tokens, which is balanced, holds.
-pub(super) fn holds(text: &str, lexemes: &[Lexeme]) -> Result<bool, Fault> {
+pub(super) fn holds(text: &str, lexemes: &[Lexeme]) -> Result<bool, FeatureError> {
     let mut operations: Vec<Operation> = Vec::new();
     let mut lexemes = lexemes.iter();
     while let Some(lexeme) = lexemes.next() {
@@ -66,7 +65,7 @@ pub(super) fn holds(text: &str, lexemes: &[Lexeme]) -> Result<bool, Fault> {
             Operator::Not => !value,
         };
     }
-    Err(Fault { start: 0, end: 0, message: "expected a feature".into() })
+    Err(FeatureError { start: 0, end: 0, message: "expected a feature".into() })
 }
 
 fn operator(text: &str, lexeme: &Lexeme) -> Option<Operator> {
@@ -87,7 +86,7 @@ fn feature(text: &str, lexeme: &Lexeme) -> Option<String> {
     Some(parts.name)
 }
 
-fn fault(found: &Lexeme, expected: &str, text: &str) -> Fault {
+fn fault(found: &Lexeme, expected: &str, text: &str) -> FeatureError {
     let shown = name::shorten(&text[found.start as usize..found.end as usize]);
-    Fault { start: found.start, end: found.end, message: format!("{expected}, found `{shown}`") }
+    FeatureError { start: found.start, end: found.end, message: format!("{expected}, found `{shown}`") }
 }

@@ -128,7 +128,15 @@ pub enum Token {
     Unfinished,
 }
 
-/// Why there is no token: each is a text that ends too early.
+/// A token and its place, in bytes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lexeme {
+    pub(super) token: Token,
+    pub(super) start: u32,
+    pub(super) end: u32,
+}
+
+/// Why there is no token: the text ends too early.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LexError {
     /// The end comes within a string.

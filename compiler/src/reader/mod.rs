@@ -40,9 +40,9 @@ pub use number::{MAX_DIGITS, MAX_RATIO_DIGITS};
 pub use print::print;
 pub use scan::MAX_DEPTH;
 
-use builder::Builder;
-use lexer::Token;
-use scan::{Lexeme, Scan, Scanner};
+use builder::DatumBuilder;
+use lexer::{Lexeme, Token};
+use scan::{Scan, Scanner};
 
 /// After so many errors in one text, the rest is not read.
 const MAX_ERRORS: usize = 100;
@@ -189,7 +189,7 @@ fn read(
         Scan::End => return Read::End,
     };
     let source = scanner.source();
-    let mut builder = Builder::new(environment, text, source, room);
+    let mut builder = DatumBuilder::new(environment, text, source, room);
     let tokens = scanner.lexemes.iter().map(|lexeme| (lexeme.start, lexeme.token, lexeme.end));
     let parsed = grammar::DatumParser::new().parse(&mut builder, tokens);
     let mut errors = builder.errors;

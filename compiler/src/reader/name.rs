@@ -16,7 +16,7 @@ pub(super) enum Prefix {
 
 /// A name in its parts.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Name {
+pub(super) struct NameParts {
     pub(super) prefix: Prefix,
     pub(super) name: String,
 }
@@ -38,7 +38,7 @@ pub fn fold(c: char) -> char {
 ///
 /// # Errors
 /// What was expected and what was found, if colons are where they cannot be.
-pub(super) fn parse(text: &str) -> Result<Name, String> {
+pub(super) fn parse(text: &str) -> Result<NameParts, String> {
     let mut prefix = Prefix::None;
     let mut name = String::with_capacity(text.len());
     let mut chars = text.chars();
@@ -80,7 +80,7 @@ pub(super) fn parse(text: &str) -> Result<Name, String> {
     if !is_given {
         return Err(format!("expected a name after `{}`, found none", shorten(text)));
     }
-    Ok(Name { prefix, name })
+    Ok(NameParts { prefix, name })
 }
 
 /// The value of a row of decimal digits, if it is small enough.
@@ -103,9 +103,9 @@ mod tests {
 
     fn check(text: &str, expected: &str) {
         let shown = match parse(text) {
-            Ok(Name { prefix: Prefix::None, name }) => name,
-            Ok(Name { prefix: Prefix::Keyword, name }) => format!("keyword {name}"),
-            Ok(Name { prefix: Prefix::Package { package, internal }, name }) => {
+            Ok(NameParts { prefix: Prefix::None, name }) => name,
+            Ok(NameParts { prefix: Prefix::Keyword, name }) => format!("keyword {name}"),
+            Ok(NameParts { prefix: Prefix::Package { package, internal }, name }) => {
                 format!("{name} {} {package}", if internal { "in" } else { "of" })
             }
             Err(message) => message,

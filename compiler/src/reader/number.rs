@@ -22,7 +22,7 @@ pub(super) enum Number {
 
 /// Why a token that has the syntax of a number denotes none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Fault {
+pub(super) enum NumberError {
     /// The denominator is zero.
     ZeroDenominator,
     /// The float is larger than any double.
@@ -32,7 +32,7 @@ pub(super) enum Fault {
 }
 
 /// The number that `token` denotes in base ten; `None` if it has not the syntax of a number.
-pub(super) fn parse(token: &str) -> Option<Result<Number, Fault>> {
+pub(super) fn parse(token: &str) -> Option<Result<Number, NumberError>> {
     let unsigned = token.strip_prefix(['+', '-']).unwrap_or(token);
     // Most tokens are names: rule them out by their first character.
     if !unsigned.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
@@ -54,7 +54,7 @@ pub(super) fn parse(token: &str) -> Option<Result<Number, Fault>> {
 }
 
 /// The rational number that `token` denotes in base `radix`; `None` if it has not the syntax of one.
-pub(super) fn parse_radix(token: &str, radix: u32) -> Option<Result<Number, Fault>> {
+pub(super) fn parse_radix(token: &str, radix: u32) -> Option<Result<Number, NumberError>> {
     let unsigned = token.strip_prefix(['+', '-']).unwrap_or(token);
     match unsigned.split_once('/') {
         None => is_digits(unsigned, radix).then(|| integer(token, radix)),
@@ -69,15 +69,15 @@ fn is_digits(text: &str, radix: u32) -> bool {
     !text.is_empty() && text.chars().all(|c| c.is_digit(radix))
 }
 
-fn integer(digits: &str, radix: u32) -> Result<Number, Fault> {
+fn integer(digits: &str, radix: u32) -> Result<Number, NumberError> {
     big(digits, radix, MAX_DIGITS).map(Number::Integer)
 }
 
-fn ratio(numerator: &str, denominator: &str, radix: u32) -> Result<Number, Fault> {
+fn ratio(numerator: &str, denominator: &str, radix: u32) -> Result<Number, NumberError> {
     let numerator = big(numerator, radix, MAX_RATIO_DIGITS)?;
     let denominator = big(denominator, radix, MAX_RATIO_DIGITS)?;
     if denominator == BigInt::ZERO {
-        return Err(Fault::ZeroDenominator);
+        return Err(NumberError::ZeroDenominator);
     }
     let divisor = numerator.gcd(&denominator);
     let (numerator, denominator) = (numerator / &divisor, denominator / divisor);
@@ -88,9 +88,9 @@ fn ratio(numerator: &str, denominator: &str, radix: u32) -> Result<Number, Fault
     })
 }
 
-fn big(digits: &str, radix: u32, limit: usize) -> Result<BigInt, Fault> {
+fn big(digits: &str, radix: u32, limit: usize) -> Result<BigInt, NumberError> {
     if digits.len() > limit {
-        return Err(Fault::TooLong(limit));
+        return Err(NumberError::TooLong(limit));
     }
     if radix == 10 && digits.len() < 19 {
         // Nearly all integers of programs; `i64` takes a sign as well.
@@ -101,7 +101,7 @@ fn big(digits: &str, radix: u32, limit: usize) -> Result<BigInt, Fault> {
 }
 
 /// `[+-] digits* [. digits*] [marker [+-] digits+]`, with digits after the point or a marker.
-fn float(token: &str, unsigned: &str, whole: usize) -> Option<Result<Number, Fault>> {
+fn float(token: &str, unsigned: &str, whole: usize) -> Option<Result<Number, NumberError>> {
     let bytes = unsigned.as_bytes();
     let digits_from = |at: usize| bytes[at..].iter().take_while(|byte| byte.is_ascii_digit()).count();
     let mut at = whole;
@@ -128,16 +128,16 @@ fn float(token: &str, unsigned: &str, whole: usize) -> Option<Result<Number, Fau
 }
 
 /// Converts what Rust, too, takes for a float. Numbers too small for a double become zero.
-fn double(text: String) -> Result<Number, Fault> {
+fn double(text: String) -> Result<Number, NumberError> {
     let value: f64 = text.parse().expect("the syntax of a float");
-    if value.is_finite() { Ok(Number::Float(value)) } else { Err(Fault::OutOfRange) }
+    if value.is_finite() { Ok(Number::Float(value)) } else { Err(NumberError::OutOfRange) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn show(number: Option<Result<Number, Fault>>) -> String {
+    fn show(number: Option<Result<Number, NumberError>>) -> String {
         match number {
             None => "name".into(),
             Some(Err(fault)) => format!("{fault:?}"),

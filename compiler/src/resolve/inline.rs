@@ -20,7 +20,7 @@ pub(super) struct Inlining {
 
 /// A call of a local function: from which lambda, in tail position of it or not, with the right number of arguments.
 #[derive(Clone, Copy)]
-struct Site {
+struct CallSite {
     lambda: LambdaId,
     tail: bool,
     fits: bool,
@@ -30,7 +30,7 @@ struct Site {
 struct Survey {
     functions: FxHashMap<VarId, LambdaId>,
     order: Vec<VarId>,
-    sites: Vec<Vec<Site>>,
+    sites: Vec<Vec<CallSite>>,
     /// Functions that are used otherwise than by a call.
     values: Vec<bool>,
     /// Blocks that are left from another lambda or across a cleanup.
@@ -82,7 +82,7 @@ fn settle(mut lambda: LambdaId, mut tail: bool, hosts: &[Option<(LambdaId, bool)
 /// The one call from outside, if all other calls of the function are tail calls of itself.
 fn only_caller(
     lambda: LambdaId,
-    sites: &[Site],
+    sites: &[CallSite],
     hosts: &[Option<(LambdaId, bool)>],
 ) -> Option<(LambdaId, bool)> {
     let mut outside = None;
@@ -219,7 +219,7 @@ fn survey(core: &Core, escaping: &[bool]) -> Survey {
                     .functions
                     .get(name)
                     .is_some_and(|lambda| core.lambdas[lambda.index()].takes_exactly(arguments.len()));
-                survey.sites[name.index()].push(Site { lambda: at.lambda, tail: at.tail, fits });
+                survey.sites[name.index()].push(CallSite { lambda: at.lambda, tail: at.tail, fits });
             }
             NodeKind::Apply(Callee::Local(name), _) => survey.values[name.index()] = true,
             _ => {}
@@ -235,8 +235,8 @@ fn survey(core: &Core, escaping: &[bool]) -> Survey {
     survey
 }
 
-fn is_special(target: &Target) -> bool {
-    matches!(target, Target::Special(_))
+fn is_special(target: &BoundVariable) -> bool {
+    matches!(target, BoundVariable::Special(_))
 }
 
 fn enter_lambda(core: &Core, lambda: LambdaId, pending: &mut Vec<(NodeId, Visit)>) {

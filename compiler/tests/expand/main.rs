@@ -18,7 +18,7 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::SourceId;
 use esl_compiler::diagnostic::{Renderer, Sources};
-use esl_compiler::expand::{Chunk, Event, Expander, print::print};
+use esl_compiler::expand::{Chunk, Expander, Stop, print::print};
 use esl_compiler::reader::Reader;
 
 use host::FakeHost;
@@ -34,12 +34,12 @@ fn expand_form(expander: &mut Expander, host: &mut FakeHost, form: Datum) -> Vec
 fn finish_form(expander: &mut Expander, host: &mut FakeHost, chunks: &mut Vec<Chunk>) {
     loop {
         match expander.run(host, &mut |_| {}) {
-            Event::Done => return,
-            Event::Macro(call) => {
+            Stop::Done => return,
+            Stop::Macro(call) => {
                 let answer = host.expand(&call);
                 expander.answer(answer.map_or_else(Answer::Failed, Answer::Expansion));
             }
-            Event::Chunk(chunk) => {
+            Stop::Chunk(chunk) => {
                 if chunk.purpose.load {
                     let object = host.load(Default::default(), chunk.purpose.keep);
                     expander.answer(match object {

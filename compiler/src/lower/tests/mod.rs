@@ -1,8 +1,8 @@
 //! Tests of lowering, on core trees in a notation of their own.
 
 mod generate;
+mod interpreter;
 mod listing;
-mod machine;
 mod model;
 mod notation;
 mod random;
@@ -12,7 +12,7 @@ use esl_bytecode::disasm;
 use esl_bytecode::module::Module;
 use esl_bytecode::verify::verify;
 
-use super::{Builder, SourceLines, lower};
+use super::{ModuleBuilder, SourceLines, lower};
 use crate::core::Core;
 
 /// What a form is lowered to, verified.
@@ -36,10 +36,10 @@ fn verified(module: Module, text: &str) -> Module {
 /// What a core tree is lowered to when nearly all variables go to the heap.
 fn spilled_module_of(core: &Core, text: &str) -> Module {
     let lines = SourceLines::new();
-    let mut builder = Builder::new(core, &lines);
+    let mut builder = ModuleBuilder::new(core, &lines);
     builder.spills_from = Some(2);
     let functions = builder.functions();
-    assert!(builder.excesses.is_empty(), "{text}");
+    assert!(builder.oversized.is_empty(), "{text}");
     verified(builder.module(functions), text)
 }
 

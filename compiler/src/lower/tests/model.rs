@@ -10,13 +10,13 @@ use rustc_hash::FxHashMap;
 use super::value::Value as AnyValue;
 use crate::core::*;
 
-pub(super) enum Function {
+pub(super) enum ModelFunction {
     Lambda(LambdaId, Environment),
     Builtin(Builtin),
     Global(Symbol),
 }
 
-type Value = AnyValue<Function>;
+type Value = AnyValue<ModelFunction>;
 
 /// Lexical things by their numbers, innermost first.
 #[derive(Clone, Default)]
@@ -133,16 +133,16 @@ impl Model<'_> {
 
     fn bind_targets(
         &mut self,
-        targets: &[(Target, Value)],
+        targets: &[(BoundVariable, Value)],
         at: &Environment,
         inside: &mut dyn FnMut(&mut Self, &Environment) -> Outcome,
     ) -> Outcome {
         match targets.split_first() {
             None => inside(self, at),
-            Some(((Target::Lexical(variable), value), rest)) => {
+            Some(((BoundVariable::Lexical(variable), value), rest)) => {
                 self.bind_targets(rest, &at.bound(*variable, value.clone()), inside)
             }
-            Some(((Target::Special(symbol), value), rest)) => {
+            Some(((BoundVariable::Special(symbol), value), rest)) => {
                 self.special(symbol, value.clone(), |model| model.bind_targets(rest, at, inside))
             }
         }
@@ -168,9 +168,9 @@ impl Model<'_> {
                 self.globals.insert(symbol.clone(), value.clone());
                 value
             }
-            NodeKind::FunctionRef(symbol) => Value::Function(Rc::new(Function::Global(symbol.clone()))),
-            NodeKind::BuiltinRef(builtin) => Value::Function(Rc::new(Function::Builtin(*builtin))),
-            NodeKind::Lambda(lambda) => Value::Function(Rc::new(Function::Lambda(*lambda, at.clone()))),
+            NodeKind::FunctionRef(symbol) => Value::Function(Rc::new(ModelFunction::Global(symbol.clone()))),
+            NodeKind::BuiltinRef(builtin) => Value::Function(Rc::new(ModelFunction::Builtin(*builtin))),
+            NodeKind::Lambda(lambda) => Value::Function(Rc::new(ModelFunction::Lambda(*lambda, at.clone()))),
             NodeKind::If(test, consequent, alternative) => {
                 let way = if self.one(*test, at)?.is_true() { consequent } else { alternative };
                 return self.eval(*way, at);
@@ -208,7 +208,7 @@ impl Model<'_> {
                     inner = inner.bound(*variable, Value::Nil);
                 }
                 for (variable, lambda) in definitions {
-                    let closure = Value::Function(Rc::new(Function::Lambda(*lambda, inner.clone())));
+                    let closure = Value::Function(Rc::new(ModelFunction::Lambda(*lambda, inner.clone())));
                     *inner.cell(*variable).borrow_mut() = closure;
                 }
                 return self.eval(*body, &inner);
@@ -281,7 +281,7 @@ impl Model<'_> {
             NodeKind::Values(forms) => return self.all(forms, at),
             NodeKind::BindValues(targets, form, body) => {
                 let mut values = self.eval(*form, at)?.into_iter();
-                let targets: Vec<(Target, Value)> = targets
+                let targets: Vec<(BoundVariable, Value)> = targets
                     .iter()
                     .map(|target| (target.clone(), values.next().unwrap_or(Value::Nil)))
                     .collect();
@@ -329,7 +329,7 @@ impl Model<'_> {
                     let Value::Symbol(symbol) = symbol else {
                         return Err(Exit::Fail(Symbol::cl("TYPE-ERROR")));
                     };
-                    targets.push((Target::Special(symbol), value));
+                    targets.push((BoundVariable::Special(symbol), value));
                 }
                 return self.bind_targets(&targets, at, &mut |model, at| model.eval(*body, at));
             }
@@ -341,10 +341,10 @@ impl Model<'_> {
     fn let_form(
         &mut self,
         sequential: bool,
-        bindings: &[(Target, NodeId)],
+        bindings: &[(BoundVariable, NodeId)],
         body: NodeId,
         at: &Environment,
-        done: &mut Vec<(Target, Value)>,
+        done: &mut Vec<(BoundVariable, Value)>,
     ) -> Outcome {
         let Some(((target, value), rest)) = bindings.split_first() else {
             let done = std::mem::take(done);
@@ -386,8 +386,8 @@ impl Model<'_> {
 
     fn callee(&mut self, callee: &Callee, at: &Environment) -> Result<Value, Exit> {
         match callee {
-            Callee::Global(symbol) => Ok(Value::Function(Rc::new(Function::Global(symbol.clone())))),
-            Callee::Builtin(builtin) => Ok(Value::Function(Rc::new(Function::Builtin(*builtin)))),
+            Callee::Global(symbol) => Ok(Value::Function(Rc::new(ModelFunction::Global(symbol.clone())))),
+            Callee::Builtin(builtin) => Ok(Value::Function(Rc::new(ModelFunction::Builtin(*builtin)))),
             Callee::Local(variable) => Ok(at.cell(*variable).borrow().clone()),
             Callee::Value(node) => self.one(*node, at),
         }
@@ -433,9 +433,9 @@ impl Model<'_> {
     fn call(&mut self, function: &Value, arguments: Vec<Value>) -> Outcome {
         let Value::Function(function) = function else { return Err(Exit::Fail(Symbol::cl("TYPE-ERROR"))) };
         match &**function {
-            Function::Builtin(builtin) => self.call_builtin(*builtin, arguments),
-            Function::Global(symbol) => self.call_global(symbol, arguments),
-            Function::Lambda(lambda, at) => self.call_lambda(*lambda, at, arguments),
+            ModelFunction::Builtin(builtin) => self.call_builtin(*builtin, arguments),
+            ModelFunction::Global(symbol) => self.call_global(symbol, arguments),
+            ModelFunction::Lambda(lambda, at) => self.call_lambda(*lambda, at, arguments),
         }
     }
 
@@ -496,11 +496,11 @@ impl Model<'_> {
         })
     }
 
-    fn parameter_target(&self, parameter: Parameter) -> Target {
+    fn parameter_target(&self, parameter: Parameter) -> BoundVariable {
         if parameter.is_special {
-            Target::Special(self.core.variables[parameter.variable.index()].name.clone())
+            BoundVariable::Special(self.core.variables[parameter.variable.index()].name.clone())
         } else {
-            Target::Lexical(parameter.variable)
+            BoundVariable::Lexical(parameter.variable)
         }
     }
 }

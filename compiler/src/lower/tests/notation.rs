@@ -107,7 +107,7 @@ pub(super) fn core_in_big_stack(text: &str) -> Core {
 
 /// The core tree of a datum in the notation.
 fn core_of(datum: &Datum) -> Core {
-    let mut builder = Builder { core: Core::default(), scopes: Vec::new(), lambda: LambdaId(0) };
+    let mut builder = CoreBuilder { core: Core::default(), scopes: Vec::new(), lambda: LambdaId(0) };
     let hole = builder.node(NodeKind::Hole, datum.span());
     builder.core.lambdas.push(Lambda {
         name: None,
@@ -134,7 +134,7 @@ enum Meaning {
     Tag(TagbodyId, u32),
 }
 
-struct Builder {
+struct CoreBuilder {
     core: Core,
     scopes: Vec<FxHashMap<(u8, Symbol), Meaning>>,
     lambda: LambdaId,
@@ -145,7 +145,7 @@ const FUNCTION: u8 = 1;
 const BLOCK: u8 = 2;
 const TAG: u8 = 3;
 
-impl Builder {
+impl CoreBuilder {
     fn node(&mut self, kind: NodeKind, span: Span) -> NodeId {
         self.core.nodes.push(Node { kind, span });
         NodeId(self.core.nodes.len() as u32 - 1)
@@ -318,14 +318,14 @@ impl Builder {
         }
     }
 
-    fn target(&mut self, datum: &Datum) -> Target {
+    fn target(&mut self, datum: &Datum) -> BoundVariable {
         let symbol = symbol_of(datum);
         if symbol.name().starts_with('*') {
-            return Target::Special(symbol);
+            return BoundVariable::Special(symbol);
         }
         let variable = self.variable(&symbol, datum.span());
         self.bind(VARIABLE, &symbol, Meaning::Variable(variable));
-        Target::Lexical(variable)
+        BoundVariable::Lexical(variable)
     }
 
     fn let_form(&mut self, sequential: bool, rest: &[Datum], span: Span) -> NodeKind {
@@ -354,7 +354,7 @@ impl Builder {
             rest[0].elements().map(|function| function.elements().cloned().collect()).collect();
         let names: Vec<VarId> =
             parts.iter().map(|part| self.variable(&symbol_of(&part[0]), part[0].span())).collect();
-        let bind = |builder: &mut Builder| {
+        let bind = |builder: &mut CoreBuilder| {
             builder.scopes.push(FxHashMap::default());
             for (part, &name) in parts.iter().zip(&names) {
                 builder.bind(FUNCTION, &symbol_of(&part[0]), Meaning::Function(name));

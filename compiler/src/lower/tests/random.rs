@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::{generate, machine, model, module_of, notation, spilled_module_of};
+use super::{generate, interpreter, model, module_of, notation, spilled_module_of};
 use crate::core::{Core, LambdaId};
 use crate::lower::split;
 use esl_bytecode::disasm;
@@ -22,11 +22,13 @@ fn check_made(text: &str, make: &dyn Fn(&mut Core, &str) -> Module) {
     let mut core = notation::core_in_big_stack(&text);
     let Some(expected) = model::run(&core, 20_000) else { return };
     let module = make(&mut core, &text);
-    let found = std::panic::catch_unwind(|| machine::run(&module, 2_000_000));
+    let found = std::panic::catch_unwind(|| interpreter::run(&module, 2_000_000));
     match found {
         Ok(found) if found.as_ref() == Some(&expected) => {}
         Ok(found) => panic!("expected {expected:?}\nfound {found:?}\n{text}\n{}", disasm::module(&module)),
-        Err(_) => panic!("the machine panics, expected {expected:?}\n{text}\n{}", disasm::module(&module)),
+        Err(_) => {
+            panic!("the interpreter panics, expected {expected:?}\n{text}\n{}", disasm::module(&module))
+        }
     }
 }
 

@@ -16,12 +16,12 @@ impl Scanner {
         }
         let span = self.span(start, end);
         if self.backquotes == 0 {
-            let in_array = self.frames.iter().any(|frame| frame.open == Open::Array);
+            let in_array = self.levels.iter().any(|level| level.open == Open::Array);
             let place = if in_array { "in an array literal" } else { "outside of a backquote" };
             return self.error(code::COMMA_OUTSIDE_BACKQUOTE.at(span, format!("comma {place}")));
         }
         if token == Token::CommaAt {
-            let parent = self.frames.last().map(|frame| frame.open);
+            let parent = self.levels.last().map(|level| level.open);
             let after_dot = self.lexemes.last().is_some_and(|last| last.token == Token::Dot);
             if parent == Some(Open::Backquote) {
                 self.error(
@@ -53,7 +53,7 @@ impl Scanner {
             self.error(code::UNKNOWN_LABEL.at(span, format!("label `#{number}=` is defined twice")));
         }
         let open = Open::Label { number, deepest: self.deepest, tokens: self.tokens };
-        self.deepest = self.frames.len();
+        self.deepest = self.levels.len();
         open
     }
 
@@ -65,7 +65,7 @@ impl Scanner {
         let state = label_number(text, start, end).and_then(|number| self.labels.get(&number).copied());
         match state {
             Some(LabelState::Done { height, tokens }) => {
-                let depth = self.frames.len() + height;
+                let depth = self.levels.len() + height;
                 self.deepest = self.deepest.max(depth);
                 self.tokens = self.tokens.saturating_add(tokens);
                 if depth > MAX_DEPTH {

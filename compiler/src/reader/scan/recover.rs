@@ -1,9 +1,9 @@
 //! Texts that end too early, close too much or nest too deeply: what is said of them, and where to read on.
 
 use crate::diagnostic::{Code, code};
-use crate::reader::lexer::{LexError, Token};
+use crate::reader::lexer::{LexError, Lexeme, Token};
 
-use super::{Frame, Lexeme, MAX_DEPTH, NONE, Open, Scan, Scanner, Unclosed};
+use super::{Level, MAX_DEPTH, NONE, Open, Scan, Scanner, Unclosed};
 
 /// A string or name without an end makes the rest of the text unsure; after so many, reading ends.
 const MAX_RUNAWAYS: u32 = 8;
@@ -11,16 +11,16 @@ const MAX_RUNAWAYS: u32 = 8;
 impl Scanner {
     /// The end of the text.
     pub(super) fn end(&mut self, text: &str) -> Scan {
-        if self.frames.is_empty() {
+        if self.levels.is_empty() {
             return if self.errors.is_empty() { Scan::End } else { Scan::Errors(text.len()) };
         }
         if self.excess > 0 {
             return Scan::Errors(text.len());
         }
-        let lists: Vec<Frame> =
-            self.frames.iter().filter(|frame| frame.open == Open::List).copied().collect();
+        let lists: Vec<Level> =
+            self.levels.iter().filter(|level| level.open == Open::List).copied().collect();
         let Some(&outer) = lists.first() else {
-            let mark = self.frames[self.frames.len() - 1];
+            let mark = self.levels[self.levels.len() - 1];
             let span = self.span(mark.start, mark.end);
             let shown = &text[mark.start as usize..mark.end as usize];
             self.error(

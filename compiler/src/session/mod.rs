@@ -6,11 +6,11 @@
 //! of the text; an error in one form does not keep the others from being looked at.
 //!
 //! A form `(require "name")` of a text stops the compilation ([`Step::Require`]), and the forms of the module come in its
-//! place, or at least what they define at compile time; see `parts`.
+//! place, or at least what they define at compile time; see `queue`.
 //!
 //! Not here: running anything, finding modules. Whoever drives the compilation does that, see [`esl_bytecode::compile`].
 
-mod parts;
+mod queue;
 
 use std::sync::Arc;
 
@@ -23,11 +23,11 @@ use esl_bytecode::span::{SourceId, Span};
 
 use crate::diagnostic::{Renderer, Sources, code};
 use crate::expand::print::print;
-use crate::expand::{Chunk, Event, Expander};
+use crate::expand::{Chunk, Expander, Stop};
 use crate::lower::{SourceLines, lower};
 use crate::reader::read_datum;
 
-use parts::{Next, Parts, renumber_uninterned};
+use queue::{FormQueue, Next, renumber_uninterned};
 
 /// The compiler.
 #[derive(Debug, Default)]
@@ -53,33 +53,33 @@ impl Compiler {
 
     /// Begins to compile a whole text for the sake of what its macros expand to.
     pub fn expand_text(&self, name: &str, text: &str) -> Texts {
-        Texts(Session { listing: Some(String::new()), ..self.texts(&[(name, text)]) })
+        Texts(CompilationState { listing: Some(String::new()), ..self.texts(&[(name, text)]) })
     }
 
     /// Begins to compile texts, each with its name, to one module that runs them in order. To one another they are like
-    /// parts of one text, but each is read, and runs, in the package `ESL-USER` until it says otherwise. Diagnostics
+    /// queue of one text, but each is read, and runs, in the package `ESL-USER` until it says otherwise. Diagnostics
     /// number them from the compiler's source number on.
     pub fn compile_texts(&self, texts: &[(&str, &str)]) -> Texts {
         Texts(self.texts(texts))
     }
 
-    fn texts(&self, texts: &[(&str, &str)]) -> Session {
+    fn texts(&self, texts: &[(&str, &str)]) -> CompilationState {
         let mut sources = Sources::new();
         for _ in 0..self.source.0 {
             sources.add("", None);
         }
         let mut lines = SourceLines::new();
-        let mut parts = Parts::default();
+        let mut queue = FormQueue::default();
         for &(name, text) in texts {
             let text: Arc<str> = text.into();
             sources.add(name, Some(text.clone()));
-            parts.add(lines.add(name, text.clone()), text);
+            queue.add(lines.add(name, text.clone()), text);
         }
-        self.session(Input::Texts(parts), lines, sources)
+        self.session(Input::Texts(queue), lines, sources)
     }
 
-    fn session(&self, input: Input, lines: SourceLines, sources: Sources) -> Session {
-        Session {
+    fn session(&self, input: Input, lines: SourceLines, sources: Sources) -> CompilationState {
+        CompilationState {
             input,
             source: self.source,
             sources,
@@ -132,13 +132,13 @@ impl Compile for Compiler {
 #[derive(Debug)]
 enum Input {
     /// Texts, all forms of which are compiled.
-    Texts(Parts),
+    Texts(FormQueue),
     /// A form to be evaluated.
     Form(Option<Datum>),
 }
 
 /// A compilation under way.
-struct Session {
+struct CompilationState {
     input: Input,
     source: SourceId,
     /// The texts, for drawing diagnostics.
@@ -158,7 +158,7 @@ struct Session {
 }
 
 /// A compilation of whole texts.
-pub struct Texts(Session);
+pub struct Texts(CompilationState);
 
 impl Texts {
     /// The texts, those of required modules included.
@@ -187,7 +187,7 @@ impl Compilation for Texts {
     }
 }
 
-impl Compilation for Session {
+impl Compilation for CompilationState {
     fn step(
         &mut self,
         environment: &mut dyn Environment,
@@ -206,13 +206,13 @@ impl Compilation for Session {
         }
         loop {
             match self.expander.run(environment, charge) {
-                Event::Macro(call) => return Step::Expand(call),
-                Event::Chunk(chunk) => {
+                Stop::Macro(call) => return Step::Expand(call),
+                Stop::Chunk(chunk) => {
                     if let Some(step) = self.chunk(*chunk, charge) {
                         return step;
                     }
                 }
-                Event::Done => {
+                Stop::Done => {
                     self.diagnostics.extend(self.expander.take_diagnostics());
                     match self.next_form(environment) {
                         Next::Form => {}
@@ -241,7 +241,7 @@ impl Compilation for Session {
     }
 }
 
-impl Session {
+impl CompilationState {
     /// Begins the next form, if there is one.
     fn next_form(&mut self, environment: &mut dyn Environment) -> Next {
         match &mut self.input {
@@ -252,25 +252,25 @@ impl Session {
                 }
                 None => Next::End,
             },
-            Input::Texts(parts) => parts.next(environment, &mut self.expander, &mut self.diagnostics),
+            Input::Texts(queue) => queue.next(environment, &mut self.expander, &mut self.diagnostics),
         }
     }
 
     /// Puts the module that was asked for in the place of the form that requires it.
     fn take_module(&mut self, name: &str, span: Span, answer: Answer) {
-        let Input::Texts(parts) = &mut self.input else { return };
+        let Input::Texts(queue) = &mut self.input else { return };
         match answer {
             Answer::Module(Required::Source { name: path, text }) => {
                 self.sources.add(path.clone(), Some(text.clone()));
                 let source = self.lines.add(&path, text.clone());
-                parts.enter(name, span, source, text);
+                queue.enter(name, span, source, text);
             }
-            Answer::Module(Required::Compiled(module)) => parts.enter_compiled(name, span, *module),
+            Answer::Module(Required::Compiled(module)) => queue.enter_compiled(name, span, *module),
             Answer::Failed(reason) => {
                 let message = format!("the module `{name}` is not to be had: {reason}");
                 self.diagnostics.push(code::UNKNOWN_MODULE.at(span, message));
             }
-            _ => parts.add_call(name, span),
+            _ => queue.add_call(name, span),
         }
     }
 
@@ -289,7 +289,7 @@ impl Session {
 
     /// Whether what is being compiled stays outside of the program.
     fn is_outside(&self) -> bool {
-        self.apart && matches!(&self.input, Input::Texts(parts) if parts.is_inside_module())
+        self.apart && matches!(&self.input, Input::Texts(queue) if queue.is_inside_module())
     }
 
     /// Lowers a chunk, and keeps it or has it loaded, or both.
@@ -348,8 +348,8 @@ impl Session {
         }
         let has_failed = diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error);
         let mut module = (!has_failed).then(|| join(std::mem::take(&mut self.chunks)));
-        if let (Some(module), Input::Texts(parts)) = (&mut module, &mut self.input) {
-            module.requires = if self.apart { parts.take_apart() } else { Vec::new() };
+        if let (Some(module), Input::Texts(queue)) = (&mut module, &mut self.input) {
+            module.requires = if self.apart { queue.take_apart() } else { Vec::new() };
         }
         Step::Done(module, diagnostics)
     }

@@ -38,7 +38,7 @@ pub(super) enum Next {
 
 /// A part of the row.
 #[derive(Debug)]
-enum Part {
+enum Queued {
     /// The rest of a text.
     Text(Box<Reader>),
     /// A form that nobody has written.
@@ -55,8 +55,8 @@ enum Part {
 
 /// The row of forms.
 #[derive(Debug, Default)]
-pub(super) struct Parts {
-    row: VecDeque<Part>,
+pub(super) struct FormQueue {
+    row: VecDeque<Queued>,
     /// The modules whose texts are being read, the innermost last.
     inside: Vec<String>,
     /// All modules that were required, by their names in lower case.
@@ -65,41 +65,41 @@ pub(super) struct Parts {
     apart: Vec<String>,
 }
 
-impl Parts {
+impl FormQueue {
     /// Adds a text at the end.
     pub(super) fn add(&mut self, source: SourceId, text: Arc<str>) {
         if !self.row.is_empty() {
-            self.row.push_back(Part::Form(call(Symbol::cl("IN-PACKAGE"), USER_PACKAGE, Span::default())));
+            self.row.push_back(Queued::Form(call(Symbol::cl("IN-PACKAGE"), USER_PACKAGE, Span::default())));
         }
-        self.row.push_back(Part::Text(Box::new(Reader::new(source, text))));
+        self.row.push_back(Queued::Text(Box::new(Reader::new(source, text))));
     }
 
     /// Puts the text of a module before all that is left.
     pub(super) fn enter(&mut self, name: &str, span: Span, source: SourceId, text: Arc<str>) {
-        self.put_in(name, span, Part::Text(Box::new(Reader::new(source, text))));
+        self.put_in(name, span, Queued::Text(Box::new(Reader::new(source, text))));
     }
 
     /// Puts a module that comes compiled before all that is left.
     pub(super) fn enter_compiled(&mut self, name: &str, span: Span, module: Module) {
         let requires = module.requires.clone();
-        self.put_in(name, span, Part::Module(Box::new(module), span));
+        self.put_in(name, span, Queued::Module(Box::new(module), span));
         for name in requires.into_iter().rev() {
-            self.row.push_front(Part::Require(name, span));
+            self.row.push_front(Queued::Require(name, span));
         }
     }
 
-    fn put_in(&mut self, name: &str, span: Span, part: Part) {
+    fn put_in(&mut self, name: &str, span: Span, part: Queued) {
         self.add_call(name, span);
-        self.row.push_front(Part::Left);
-        self.row.push_front(Part::Form(call(Symbol::esl("%LEAVE-MODULE"), name, span)));
+        self.row.push_front(Queued::Left);
+        self.row.push_front(Queued::Form(call(Symbol::esl("%LEAVE-MODULE"), name, span)));
         self.row.push_front(part);
-        self.row.push_front(Part::Form(call(Symbol::esl("%ENTER-MODULE"), name, span)));
-        self.row.push_front(Part::Begun(name.to_lowercase()));
+        self.row.push_front(Queued::Form(call(Symbol::esl("%ENTER-MODULE"), name, span)));
+        self.row.push_front(Queued::Begun(name.to_lowercase()));
     }
 
     /// Puts a call of `require`, which finds the module when the program runs, before all that is left.
     pub(super) fn add_call(&mut self, name: &str, span: Span) {
-        self.row.push_front(Part::Form(call(Symbol::cl("REQUIRE"), name, span)));
+        self.row.push_front(Queued::Form(call(Symbol::cl("REQUIRE"), name, span)));
     }
 
     /// The modules that the texts themselves require.
@@ -121,33 +121,33 @@ impl Parts {
     ) -> Next {
         while let Some(part) = self.row.front_mut() {
             match part {
-                Part::Begun(name) => {
+                Queued::Begun(name) => {
                     self.inside.push(std::mem::take(name));
                     self.row.pop_front();
                 }
-                Part::Left => {
+                Queued::Left => {
                     self.row.pop_front();
                     self.inside.pop();
                 }
-                Part::Form(form) => {
+                Queued::Form(form) => {
                     let form = std::mem::replace(form, Datum::nil(Span::default()));
                     self.row.pop_front();
                     expander.begin_file_form(form);
                     return Next::Form;
                 }
-                Part::Require(name, span) => {
+                Queued::Require(name, span) => {
                     let (name, span) = (std::mem::take(name), *span);
                     self.row.pop_front();
                     if self.required.insert(name.to_lowercase()) {
                         return Next::Require(name, span);
                     }
                 }
-                Part::Module(module, span) => {
+                Queued::Module(module, span) => {
                     let next = Next::Module(std::mem::take(module), *span);
                     self.row.pop_front();
                     return next;
                 }
-                Part::Text(reader) => match reader.next(environment) {
+                Queued::Text(reader) => match reader.next(environment) {
                     None => {
                         self.row.pop_front();
                     }

@@ -9,9 +9,9 @@ use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 
 use super::super::value::Pair;
-use super::{Cell, Failed, Function, Kind, Machine, Unwinding, Value, divide, holds, simple};
+use super::{Cell, ExtentKind, Failed, Interpreter, LoadedFunction, Unwinding, Value, divide, holds, simple};
 
-impl Machine<'_> {
+impl Interpreter<'_> {
     /// Does one instruction; says whether the program goes on.
     pub(super) fn step(&mut self) -> Result<bool, Failed> {
         use Builtin as B;
@@ -202,7 +202,7 @@ impl Machine<'_> {
                 let (Value::Function(closure), value) = (self.get(closure.0), self.get(src.0)) else {
                     panic!("a function")
                 };
-                let Function::Closure(_, captures) = &*closure else { panic!("a closure") };
+                let LoadedFunction::Closure(_, captures) = &*closure else { panic!("a closure") };
                 captures.borrow_mut()[usize::from(index.0)] = Cell::Value(value);
             }
             Instr::CaptureRef { dst, index } => {
@@ -244,8 +244,8 @@ impl Machine<'_> {
             Instr::FunctionRef { dst, symbol } => {
                 let symbol = self.symbol(symbol.0.into());
                 let builtin = esl_bytecode::builtin::BUILTINS.iter().find(|info| info.name == symbol.name());
-                let function =
-                    builtin.map_or(Function::Global(symbol), |info| Function::Builtin(info.builtin));
+                let function = builtin
+                    .map_or(LoadedFunction::Global(symbol), |info| LoadedFunction::Builtin(info.builtin));
                 self.set(dst.0, Value::Function(Rc::new(function)));
             }
             Instr::Call { window, count, want, .. } => {
@@ -254,7 +254,7 @@ impl Machine<'_> {
             }
             Instr::CallGlobal { window, count, want, symbol } => {
                 let (symbol, arguments) = (self.symbol(symbol.0), self.range(window.0 + 2, count.0));
-                let function = Value::Function(Rc::new(Function::Global(symbol)));
+                let function = Value::Function(Rc::new(LoadedFunction::Global(symbol)));
                 return self.call(&function, arguments, window.0, want);
             }
             Instr::CallSelf { window, count, want, .. } => {
@@ -326,18 +326,18 @@ impl Machine<'_> {
             }
             Instr::PushCatch { window, tag, want, to } => {
                 let tag = self.get(tag.0);
-                return self.push(Kind::Catch(tag, want), window, to.0);
+                return self.push(ExtentKind::Catch(tag, want), window, to.0);
             }
-            Instr::PushCleanup { window, to } => return self.push(Kind::Cleanup, window, to.0),
+            Instr::PushCleanup { window, to } => return self.push(ExtentKind::Cleanup, window, to.0),
             Instr::PushHandlerCase { window, types, to } => {
                 let types = self.constant(types.0.into()).items().expect("a vector");
                 let types = types.into_iter().map(|of| match of {
                     Value::Symbol(symbol) => symbol,
                     _ => panic!("a symbol"),
                 });
-                return self.push(Kind::HandlerCase(types.collect()), window, to.0);
+                return self.push(ExtentKind::HandlerCase(types.collect()), window, to.0);
             }
-            Instr::PushScope { window } => return self.push(Kind::Scope, window, 0),
+            Instr::PushScope { window } => return self.push(ExtentKind::Scope, window, 0),
             Instr::PopControl { count } => {
                 for _ in 0..count.0 {
                     let entry = self.control.pop().expect("an entry");
@@ -348,11 +348,11 @@ impl Machine<'_> {
             Instr::EnterCleanup {} => {
                 let kept = std::mem::take(&mut self.values);
                 let entry = self.control.last_mut().expect("an entry");
-                entry.kind = Kind::Running(None, kept);
+                entry.kind = ExtentKind::Running(None, kept);
             }
             Instr::EndCleanup {} => {
                 let entry = self.control.pop().expect("an entry");
-                let Kind::Running(unwinding, kept) = entry.kind else { panic!("a running cleanup") };
+                let ExtentKind::Running(unwinding, kept) = entry.kind else { panic!("a running cleanup") };
                 match unwinding {
                     Some(unwinding) => self.unwind(unwinding),
                     None => self.values = kept,
@@ -363,7 +363,7 @@ impl Machine<'_> {
                 let target = self
                     .control
                     .iter()
-                    .rposition(|entry| matches!(&entry.kind, Kind::Catch(known, _) if known.is(&tag)))
+                    .rposition(|entry| matches!(&entry.kind, ExtentKind::Catch(known, _) if known.is(&tag)))
                     .ok_or(Failed("CONTROL-ERROR"))?;
                 let values = std::mem::take(&mut self.values);
                 self.unwind(Unwinding::Values(target, values));
@@ -374,7 +374,7 @@ impl Machine<'_> {
     }
 
     /// The pair of a vector's element: vectors are lists here, since only the compiler makes them.
-    fn element(&mut self, vector: Reg, index: Reg) -> Pair<Function> {
+    fn element(&mut self, vector: Reg, index: Reg) -> Pair<LoadedFunction> {
         let (mut rest, Value::Int(index)) = (self.get(vector.0), self.get(index.0)) else {
             panic!("an index")
         };

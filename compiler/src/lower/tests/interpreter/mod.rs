@@ -1,4 +1,4 @@
-//! A little machine for modules, to compare with [`super::model`]. It does what the opcode table says, and nothing fast:
+//! A little interpreter for modules, to compare with [`super::model`]. It does what the opcode table says, and nothing fast:
 //! frames do not overlap, and a register that a callee's frame would have covered holds nothing afterwards.
 
 mod step;
@@ -15,13 +15,13 @@ use rustc_hash::FxHashMap;
 
 use super::value::Value as AnyValue;
 
-pub(super) enum Function {
+pub(super) enum LoadedFunction {
     Closure(usize, RefCell<Vec<Cell>>),
     Builtin(Builtin),
     Global(Symbol),
 }
 
-type Value = AnyValue<Function>;
+type Value = AnyValue<LoadedFunction>;
 
 /// What a register or a capture holds.
 #[derive(Clone)]
@@ -32,9 +32,9 @@ pub(super) enum Cell {
     Box(Rc<RefCell<Value>>),
 }
 
-struct Frame {
+struct Activation {
     function: usize,
-    itself: Option<Rc<Function>>,
+    itself: Option<Rc<LoadedFunction>>,
     registers: Vec<Cell>,
     pc: usize,
     /// Where the caller wants the results.
@@ -42,7 +42,7 @@ struct Frame {
     want: Want,
 }
 
-enum Kind {
+enum ExtentKind {
     Catch(Value, Want),
     Cleanup,
     /// Runs; then goes on unwinding, or with the value list as it was.
@@ -51,8 +51,8 @@ enum Kind {
     Scope,
 }
 
-struct Entry {
-    kind: Kind,
+struct Extent {
+    kind: ExtentKind,
     frame: usize,
     window: u8,
     to: usize,
@@ -77,22 +77,22 @@ impl Unwinding {
 /// The condition that an instruction fails with.
 struct Failed(&'static str);
 
-pub(super) struct Machine<'a> {
+pub(super) struct Interpreter<'a> {
     module: &'a Module,
     log: Vec<String>,
     globals: FxHashMap<Symbol, Value>,
-    frames: Vec<Frame>,
-    control: Vec<Entry>,
+    frames: Vec<Activation>,
+    control: Vec<Extent>,
     bindings: Vec<(Symbol, Option<Value>)>,
     values: Vec<Value>,
     constants: FxHashMap<u32, Value>,
-    functions: FxHashMap<usize, Rc<Function>>,
+    functions: FxHashMap<usize, Rc<LoadedFunction>>,
     next: u64,
 }
 
 /// What a run has done, as [`super::model::run`] says it.
 pub(super) fn run(module: &Module, steps: u32) -> Option<(Vec<String>, String)> {
-    let mut machine = Machine {
+    let mut interpreter = Interpreter {
         module,
         log: Vec::new(),
         globals: FxHashMap::default(),
@@ -104,18 +104,21 @@ pub(super) fn run(module: &Module, steps: u32) -> Option<(Vec<String>, String)> 
         functions: FxHashMap::default(),
         next: 0,
     };
-    machine.enter(module.toplevel[0].0 as usize, None, Vec::new(), 0, Want::ALL).ok()?;
+    interpreter.enter(module.toplevel[0].0 as usize, None, Vec::new(), 0, Want::ALL).ok()?;
     for _ in 0..steps {
-        match machine.step() {
+        match interpreter.step() {
             Ok(true) => {}
             Ok(false) => {
-                assert!(machine.control.is_empty() && machine.bindings.is_empty(), "all extents are left");
-                let end = machine.values.iter().map(|value| format!("{value};")).collect();
-                return Some((machine.log, end));
+                assert!(
+                    interpreter.control.is_empty() && interpreter.bindings.is_empty(),
+                    "all extents are left"
+                );
+                let end = interpreter.values.iter().map(|value| format!("{value};")).collect();
+                return Some((interpreter.log, end));
             }
             Err(Failed(condition)) => {
-                if !machine.fail(Symbol::cl(condition)) {
-                    return Some((machine.log, format!("failed with {condition}")));
+                if !interpreter.fail(Symbol::cl(condition)) {
+                    return Some((interpreter.log, format!("failed with {condition}")));
                 }
             }
         }
@@ -123,8 +126,8 @@ pub(super) fn run(module: &Module, steps: u32) -> Option<(Vec<String>, String)> 
     None
 }
 
-impl Machine<'_> {
-    fn frame(&mut self) -> &mut Frame {
+impl Interpreter<'_> {
+    fn frame(&mut self) -> &mut Activation {
         self.frames.last_mut().expect("a frame")
     }
 
@@ -180,8 +183,8 @@ impl Machine<'_> {
         value
     }
 
-    fn closure(&mut self, function: usize, captures: Vec<Cell>) -> Rc<Function> {
-        let closure = || Rc::new(Function::Closure(function, RefCell::new(captures.clone())));
+    fn closure(&mut self, function: usize, captures: Vec<Cell>) -> Rc<LoadedFunction> {
+        let closure = || Rc::new(LoadedFunction::Closure(function, RefCell::new(captures.clone())));
         if self.module.functions[function].captures.is_empty() {
             return self.functions.entry(function).or_insert_with(closure).clone();
         }
@@ -191,7 +194,7 @@ impl Machine<'_> {
     fn enter(
         &mut self,
         function: usize,
-        itself: Option<Rc<Function>>,
+        itself: Option<Rc<LoadedFunction>>,
         arguments: Vec<Value>,
         window: u8,
         want: Want,
@@ -210,7 +213,7 @@ impl Machine<'_> {
         if parameters.rest {
             registers[most] = Cell::Value(Value::list(arguments[most.min(arguments.len())..].to_vec()));
         }
-        self.frames.push(Frame { function, itself, registers, pc: 0, window, want });
+        self.frames.push(Activation { function, itself, registers, pc: 0, window, want });
         Ok(())
     }
 
@@ -253,12 +256,12 @@ impl Machine<'_> {
             _ => return Err(Failed("TYPE-ERROR")),
         };
         let values = match &*function {
-            Function::Closure(number, _) => {
+            LoadedFunction::Closure(number, _) => {
                 self.enter(*number, Some(function.clone()), arguments, window, want)?;
                 return Ok(true);
             }
-            Function::Builtin(builtin) => self.builtin(*builtin, arguments)?,
-            Function::Global(symbol) => self.global(symbol, arguments)?,
+            LoadedFunction::Builtin(builtin) => self.builtin(*builtin, arguments)?,
+            LoadedFunction::Global(symbol) => self.global(symbol, arguments)?,
         };
         self.deliver(window, want, values);
         Ok(true)
@@ -269,7 +272,7 @@ impl Machine<'_> {
         let (window, want) = (frame.window, frame.want);
         match function {
             Value::Function(target) => match &**target {
-                Function::Closure(number, _) => {
+                LoadedFunction::Closure(number, _) => {
                     // A failure to enter belongs to the running frame.
                     self.enter(*number, Some(target.clone()), arguments, window, want)?;
                     let called = self.frames.pop().expect("the callee");
@@ -277,11 +280,11 @@ impl Machine<'_> {
                     self.frames.push(called);
                     Ok(true)
                 }
-                Function::Builtin(builtin) => {
+                LoadedFunction::Builtin(builtin) => {
                     let values = self.builtin(*builtin, arguments)?;
                     Ok(self.give(values))
                 }
-                Function::Global(symbol) => {
+                LoadedFunction::Global(symbol) => {
                     let values = self.global(symbol, arguments)?;
                     Ok(self.give(values))
                 }
@@ -348,14 +351,14 @@ impl Machine<'_> {
 
     fn capture(&mut self, Index(index): Index) -> Cell {
         let itself = self.frame().itself.clone();
-        let Some(Function::Closure(_, captures)) = itself.as_deref() else { panic!("a closure") };
+        let Some(LoadedFunction::Closure(_, captures)) = itself.as_deref() else { panic!("a closure") };
         captures.borrow()[usize::from(index)].clone()
     }
 
-    fn push(&mut self, kind: Kind, window: Base, distance: i32) -> Result<bool, Failed> {
+    fn push(&mut self, kind: ExtentKind, window: Base, distance: i32) -> Result<bool, Failed> {
         let to = self.frame().pc.checked_add_signed(distance as isize).expect("a landing inside");
         let (frame, bindings) = (self.frames.len(), self.bindings.len());
-        self.control.push(Entry { kind, frame, window: window.0, to, bindings });
+        self.control.push(Extent { kind, frame, window: window.0, to, bindings });
         Ok(true)
     }
 
@@ -377,7 +380,7 @@ impl Machine<'_> {
     fn fail(&mut self, condition: Symbol) -> bool {
         let mut found = None;
         for (index, entry) in self.control.iter().enumerate().rev() {
-            if let Kind::HandlerCase(types) = &entry.kind
+            if let ExtentKind::HandlerCase(types) = &entry.kind
                 && let Some(case) = types.iter().position(|of| of.is_cl("ERROR") || *of == condition)
             {
                 found = Some((index, case));
@@ -401,19 +404,19 @@ impl Machine<'_> {
                 self.frame().registers[register] = Cell::Nothing;
             }
             match entry.kind {
-                Kind::Cleanup => {
+                ExtentKind::Cleanup => {
                     self.frame().pc = entry.to;
-                    let kind = Kind::Running(Some(unwinding), Vec::new());
-                    self.control.push(Entry { kind, ..entry });
+                    let kind = ExtentKind::Running(Some(unwinding), Vec::new());
+                    self.control.push(Extent { kind, ..entry });
                     return;
                 }
-                Kind::Catch(_, want) if at_target => {
+                ExtentKind::Catch(_, want) if at_target => {
                     let Unwinding::Values(_, values) = &unwinding else { panic!("values for a catch") };
                     let values = values.clone();
                     self.frame().pc = entry.to;
                     self.deliver(entry.window, want, values);
                 }
-                Kind::HandlerCase(_) if at_target => {
+                ExtentKind::HandlerCase(_) if at_target => {
                     let Unwinding::Condition(_, case, condition) = &unwinding else { panic!("a condition") };
                     let (case, condition) = (*case, condition.clone());
                     self.frame().pc = entry.to;

@@ -172,8 +172,8 @@ struct Walk<'a> {
     function_references: Vec<(VarId, LambdaId)>,
     self_called: Vec<bool>,
     /// Frame and number of open cleanups at each block and tagbody.
-    block_places: Vec<Place>,
-    tagbody_places: Vec<Place>,
+    block_places: Vec<Site>,
+    tagbody_places: Vec<Site>,
     block_catches: Vec<bool>,
     tagbody_catches: Vec<bool>,
     /// Whether all exits from a block so far give one value.
@@ -183,23 +183,23 @@ struct Walk<'a> {
     reads: Vec<Vec<u32>>,
     sets: Vec<Vec<u32>>,
     clock: u32,
-    pending: Vec<Event>,
+    pending: Vec<WalkStep>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Place {
+struct Site {
     frame: LambdaId,
     cleanups: u32,
 }
 
-enum Event {
-    Enter(NodeId, Place),
+enum WalkStep {
+    Enter(NodeId, Site),
     Leave(NodeId),
 }
 
 impl<'a> Walk<'a> {
     fn new(core: &'a Core, inlining: inline::Inlining) -> Walk<'a> {
-        let root = Place { frame: LambdaId(0), cleanups: 0 };
+        let root = Site { frame: LambdaId(0), cleanups: 0 };
         let mut used = vec![false; core.lambdas.len()];
         if let Some(first) = used.first_mut() {
             *first = true;
@@ -227,17 +227,17 @@ impl<'a> Walk<'a> {
     }
 
     fn run(&mut self) {
-        self.push_lambda(LambdaId(0), Place { frame: LambdaId(0), cleanups: 0 });
+        self.push_lambda(LambdaId(0), Site { frame: LambdaId(0), cleanups: 0 });
         while let Some(event) = self.pending.pop() {
             self.clock += 1;
             match event {
-                Event::Leave(node) => {
+                WalkStep::Leave(node) => {
                     self.spans[node.index()].1 = self.clock;
                     self.single[node.index()] = self.gives_one(node);
                 }
-                Event::Enter(node, place) => {
+                WalkStep::Enter(node, place) => {
                     self.spans[node.index()].0 = self.clock;
-                    self.pending.push(Event::Leave(node));
+                    self.pending.push(WalkStep::Leave(node));
                     let from = self.pending.len();
                     self.enter(node, place);
                     self.pending[from..].reverse();
@@ -247,13 +247,15 @@ impl<'a> Walk<'a> {
     }
 
     /// Lists the nodes of a lambda to be walked next, in order.
-    fn push_lambda(&mut self, lambda: LambdaId, place: Place) {
+    fn push_lambda(&mut self, lambda: LambdaId, place: Site) {
         let pending = &mut self.pending;
-        lambda_nodes(&self.core.lambdas[lambda.index()], &mut |node| pending.push(Event::Enter(node, place)));
+        lambda_nodes(&self.core.lambdas[lambda.index()], &mut |node| {
+            pending.push(WalkStep::Enter(node, place))
+        });
     }
 
     /// Notes what a node does, and lists what is walked inside it, in order.
-    fn enter(&mut self, node: NodeId, place: Place) {
+    fn enter(&mut self, node: NodeId, place: Site) {
         let core = self.core;
         let kind = &core.nodes[node.index()].kind;
         match kind {
@@ -267,7 +269,7 @@ impl<'a> Walk<'a> {
                 for &(_, lambda) in definitions {
                     if self.frames[lambda.index()] == lambda {
                         self.captures.set_parent(lambda, place.frame);
-                        self.push_lambda(lambda, Place { frame: lambda, cleanups: 0 });
+                        self.push_lambda(lambda, Site { frame: lambda, cleanups: 0 });
                     }
                 }
             }
@@ -284,36 +286,36 @@ impl<'a> Walk<'a> {
                 self.capture(Lexical::Tagbody(*tagbody), place);
             }
             NodeKind::FailureCleanup(body, cleanup) => {
-                let inside = Place { cleanups: place.cleanups + 1, ..place };
-                self.pending.push(Event::Enter(*body, place));
-                return self.pending.push(Event::Enter(*cleanup, inside));
+                let inside = Site { cleanups: place.cleanups + 1, ..place };
+                self.pending.push(WalkStep::Enter(*body, place));
+                return self.pending.push(WalkStep::Enter(*cleanup, inside));
             }
             NodeKind::UnwindProtect(..) => {
-                let inside = Place { cleanups: place.cleanups + 1, ..place };
+                let inside = Site { cleanups: place.cleanups + 1, ..place };
                 let pending = &mut self.pending;
-                return children(kind, &mut |child| pending.push(Event::Enter(child, inside)));
+                return children(kind, &mut |child| pending.push(WalkStep::Enter(child, inside)));
             }
             _ => {}
         }
         let pending = &mut self.pending;
-        children(kind, &mut |child| pending.push(Event::Enter(child, place)));
+        children(kind, &mut |child| pending.push(WalkStep::Enter(child, place)));
     }
 
-    fn closure(&mut self, lambda: LambdaId, place: Place) {
+    fn closure(&mut self, lambda: LambdaId, place: Site) {
         self.used[lambda.index()] = true;
         self.captures.set_parent(lambda, place.frame);
-        self.push_lambda(lambda, Place { frame: lambda, cleanups: 0 });
+        self.push_lambda(lambda, Site { frame: lambda, cleanups: 0 });
     }
 
-    fn call(&mut self, callee: &Callee, arguments: &[NodeId], place: Place) {
+    fn call(&mut self, callee: &Callee, arguments: &[NodeId], place: Site) {
         let own = &self.core.lambdas[place.frame.index()];
         match callee {
             Callee::Value(function) => match self.core.nodes[function.index()].kind {
                 NodeKind::Lambda(lambda) if self.frames[lambda.index()] != lambda => {
-                    self.pending.extend(arguments.iter().map(|&child| Event::Enter(child, place)));
+                    self.pending.extend(arguments.iter().map(|&child| WalkStep::Enter(child, place)));
                     return self.push_lambda(lambda, place);
                 }
-                _ => self.pending.push(Event::Enter(*function, place)),
+                _ => self.pending.push(WalkStep::Enter(*function, place)),
             },
             Callee::Global(name) => {
                 if own.is_named(name) && own.takes_exactly(arguments.len()) {
@@ -323,7 +325,7 @@ impl<'a> Walk<'a> {
             Callee::Local(variable) => {
                 let target = self.functions.get(variable).copied();
                 if let Some(lambda) = target.filter(|lambda| self.frames[lambda.index()] != *lambda) {
-                    self.pending.extend(arguments.iter().map(|&child| Event::Enter(child, place)));
+                    self.pending.extend(arguments.iter().map(|&child| WalkStep::Enter(child, place)));
                     // The call from outside has the body in it; those from inside jump to it.
                     if std::mem::replace(&mut self.used[lambda.index()], true) {
                         self.self_called[lambda.index()] = true;
@@ -340,10 +342,10 @@ impl<'a> Walk<'a> {
             }
             Callee::Builtin(_) => {}
         }
-        self.pending.extend(arguments.iter().map(|&child| Event::Enter(child, place)));
+        self.pending.extend(arguments.iter().map(|&child| WalkStep::Enter(child, place)));
     }
 
-    fn read(&mut self, variable: VarId, place: Place) {
+    fn read(&mut self, variable: VarId, place: Site) {
         if let Some(&lambda) = self.functions.get(&variable) {
             self.used[lambda.index()] = true;
             self.function_references.push((variable, place.frame));
@@ -353,7 +355,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn capture(&mut self, lexical: Lexical, place: Place) {
+    fn capture(&mut self, lexical: Lexical, place: Site) {
         let owner = lexical.owner(self.core);
         self.captures.add(lexical, self.frames[owner.index()], place.frame, &mut |_| {});
     }

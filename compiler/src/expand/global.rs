@@ -1,94 +1,74 @@
-//! What can be said of a compilation unit only at its end: which of the functions and variables that it uses nobody
-//! has defined, and which calls do not fit their functions.
+//! Global names of a compilation unit: findings that are known only at its end, namely undefined functions and
+//! variables, undeclared causes, and calls with a wrong number of arguments.
 
 use esl_bytecode::compile::{Arity, Environment, GlobalFunction, GlobalVariable};
-use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::datum::Datum;
+use esl_bytecode::diagnostic::{Diagnostic, Label};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::form::name;
+use super::form::{name, plain};
+use super::function::FunctionName;
 use crate::diagnostic::code;
 
-/// How many uses of an undefined name are shown besides the first.
+/// Uses of an undefined name that are shown besides the first.
 const SHOWN: usize = 3;
-/// For how many undefined names a similar one is looked for, which takes a look at all names.
+/// Undefined names for which similar ones are suggested; each suggestion looks at all names.
 const COMPARED: usize = 50;
 
 /// A call of a global function.
 #[derive(Debug)]
 struct Call {
-    function: Name,
-    /// Number of arguments; `None` if it is not known, or the function is only referred to.
+    function: FunctionName,
+    /// Number of arguments; `None` if it is unknown, or the function is only referred to.
     arguments: Option<u32>,
-    /// Where the name was written.
+    /// Place of the name.
     name: Span,
-    /// Where the call was written.
+    /// Place of the call.
     span: Span,
-}
-
-/// The name of a global function.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Name {
-    /// The symbol, in the case of `(setf f)` the symbol `f`.
-    pub(super) symbol: Symbol,
-    /// Whether it is `(setf symbol)`.
-    pub(super) is_setf: bool,
-}
-
-impl Name {
-    pub(super) fn plain(symbol: &Symbol) -> Name {
-        Name { symbol: symbol.clone(), is_setf: false }
-    }
-
-    pub(super) fn setf(symbol: &Symbol) -> Name {
-        Name { symbol: symbol.clone(), is_setf: true }
-    }
-
-    /// The name as messages show it.
-    pub(super) fn shown(&self) -> String {
-        if self.is_setf {
-            format!("`(setf {})`", super::form::plain(&self.symbol))
-        } else {
-            name(&self.symbol)
-        }
-    }
 }
 
 /// Uses and definitions of global names in a compilation unit.
 #[derive(Debug, Default)]
-pub(super) struct Unit {
+pub(super) struct GlobalUses {
     calls: Vec<Call>,
     variables: Vec<(Symbol, Span)>,
-    /// Variables that forms of the unit define when they run.
+    /// Variables that forms of the unit define at run time.
     defined_variables: FxHashSet<Symbol>,
-    /// Causes of failures that are named.
+    /// Causes of failures that the unit names.
     causes: Vec<(Symbol, Span)>,
-    /// Functions that the unit defines; without an arity if there are several that differ.
-    functions: FxHashMap<Name, Option<Arity>>,
-    /// Macros whose definitions are wrong: calls of them are not looked at.
+    /// Functions that the unit defines; without an arity if several definitions differ in it.
+    functions: FxHashMap<FunctionName, Option<Arity>>,
+    /// Macros with faulty definitions, whose calls are not checked.
     broken_macros: FxHashSet<Symbol>,
 }
 
-impl Unit {
+impl GlobalUses {
     /// Notes a call or a reference.
-    pub(super) fn note_call(&mut self, function: Name, arguments: Option<usize>, name: Span, span: Span) {
+    pub(super) fn note_call(
+        &mut self,
+        function: FunctionName,
+        arguments: Option<usize>,
+        name: Span,
+        span: Span,
+    ) {
         let arguments = arguments.map(|count| u32::try_from(count).unwrap_or(u32::MAX));
         self.calls.push(Call { function, arguments, name, span });
     }
 
-    /// Notes a use of a variable that nobody has defined so far.
+    /// Notes a use of a variable that has no definition so far.
     pub(super) fn note_variable(&mut self, symbol: &Symbol, span: Span) {
         self.variables.push((symbol.clone(), span));
     }
 
-    /// Notes that a form of the unit defines a variable.
+    /// Notes that a form of the unit defines a variable at run time.
     pub(super) fn note_variable_definition(&mut self, symbol: &Symbol) {
         self.defined_variables.insert(symbol.clone());
     }
 
     /// Notes the definition of a function.
-    pub(super) fn note_definition(&mut self, function: Name, arity: Arity) {
+    pub(super) fn note_definition(&mut self, function: FunctionName, arity: Arity) {
         self.functions
             .entry(function)
             .and_modify(|known| {
@@ -99,37 +79,37 @@ impl Unit {
             .or_insert(Some(arity));
     }
 
-    /// Notes that the definition of a function is wrong: calls of it are not looked at.
-    pub(super) fn note_broken_function(&mut self, function: Name) {
+    /// Notes that the definition of a function is faulty, so that its calls are not checked.
+    pub(super) fn note_broken_function(&mut self, function: FunctionName) {
         self.functions.insert(function, None);
     }
 
-    /// Notes that a cause of failures is named.
+    /// Notes a use of a cause of failures.
     pub(super) fn note_cause(&mut self, cause: &Symbol, span: Span) {
         self.causes.push((cause.clone(), span));
     }
 
-    /// Notes that the definition of a macro is wrong.
+    /// Notes that the definition of a macro is faulty.
     pub(super) fn note_broken_macro(&mut self, symbol: &Symbol) {
         self.broken_macros.insert(symbol.clone());
     }
 
-    /// Whether the definition of this macro is wrong.
+    /// Whether the definition of this macro is faulty.
     pub(super) fn is_broken_macro(&self, symbol: &Symbol) -> bool {
         self.broken_macros.contains(symbol)
     }
 
-    /// What is to be said at the end of the unit.
+    /// Returns the findings at the end of the unit.
     pub(super) fn finish(&mut self, environment: &dyn Environment) -> Vec<Diagnostic> {
         let mut findings = Vec::new();
-        let mut undefined: Vec<(Name, Vec<Span>)> = Vec::new();
-        let mut known: FxHashMap<Name, usize> = FxHashMap::default();
+        let mut undefined: Vec<(FunctionName, Vec<Span>)> = Vec::new();
+        let mut known: FxHashMap<FunctionName, usize> = FxHashMap::default();
         for call in std::mem::take(&mut self.calls) {
             let arity = match self.functions.get(&call.function) {
                 Some(arity) => *arity,
                 None => match global(environment, &call.function) {
                     GlobalFunction::Function(arity) => arity,
-                    // A call made before the macro was defined; the call fails when it is made.
+                    // A call before the definition of the macro fails when it is made.
                     GlobalFunction::Macro => {
                         let message =
                             format!("{} is used as a function here, and a macro", call.function.shown());
@@ -158,7 +138,7 @@ impl Unit {
         }
         let mut reported = FxHashSet::default();
         for (cause, span) in std::mem::take(&mut self.causes) {
-            if let Some(warning) = super::recovery::undeclared(environment, &cause, span)
+            if let Some(warning) = undeclared(environment, &cause, span)
                 && reported.insert(cause)
             {
                 findings.push(warning);
@@ -202,7 +182,7 @@ impl Unit {
     }
 }
 
-fn global(environment: &dyn Environment, function: &Name) -> GlobalFunction {
+fn global(environment: &dyn Environment, function: &FunctionName) -> GlobalFunction {
     if function.is_setf {
         environment.setf_function(&function.symbol)
     } else {
@@ -210,15 +190,29 @@ fn global(environment: &dyn Environment, function: &Name) -> GlobalFunction {
     }
 }
 
-/// Finds names like those that nobody has defined.
+/// The warning about an undeclared cause, if the program declares causes at all.
+fn undeclared(environment: &dyn Environment, cause: &Symbol, span: Span) -> Option<Diagnostic> {
+    let property = |of: &Symbol, indicator: &str| -> Option<Datum> {
+        environment.property(of, &Symbol::esl(indicator)).filter(|value| !value.is_nil())
+    };
+    property(&Symbol::esl("DEFINE-CAUSE"), "%USED")?;
+    if cause.name() == "GENERAL-FAILURE" || property(cause, "%CAUSE").is_some() {
+        return None;
+    }
+    let message = format!("no cause is called {}", name(cause));
+    let help = format!("declare it with `(define-cause {} ())`", plain(cause));
+    Some(code::UNDECLARED_CAUSE.at(span, message).help(help))
+}
+
+/// Suggests names that resemble undefined ones.
 struct Similar<'a> {
     environment: &'a dyn Environment,
-    /// For how many more names.
+    /// Number of further suggestions.
     left: usize,
 }
 
 impl Similar<'_> {
-    fn undefined_function(&mut self, function: &Name, uses: &[Span]) -> Diagnostic {
+    fn undefined_function(&mut self, function: &FunctionName, uses: &[Span]) -> Diagnostic {
         if !function.is_setf
             && let Some(instead) = self.environment.global(&function.symbol).instead
         {
@@ -228,7 +222,7 @@ impl Similar<'_> {
         let message = format!("no function is called {}", function.shown());
         let diagnostic = with_uses(code::UNDEFINED_FUNCTION.at(uses[0], message), &uses[1..]);
         if function.is_setf {
-            let place = super::form::plain(&function.symbol);
+            let place = plain(&function.symbol);
             let help =
                 format!("define it with `(defun (setf {place}) (value …) …)` or `(defsetf {place} …)`");
             return diagnostic.help(help);
@@ -250,7 +244,7 @@ impl Similar<'_> {
 
 fn with_uses(mut diagnostic: Diagnostic, further: &[Span]) -> Diagnostic {
     for &span in further.iter().filter(|span| **span != diagnostic.primary.span).take(SHOWN) {
-        diagnostic.secondary.push(esl_bytecode::diagnostic::Label { span, text: "and here".into() });
+        diagnostic.secondary.push(Label { span, text: "and here".into() });
     }
     diagnostic
 }

@@ -5,7 +5,7 @@
 //! parses. On the way it does what depends on more than the grammar sees: it leaves out what `#+` and `#-` exclude,
 //! keeps nesting within bounds, and checks commas and labels.
 //!
-//! Guarantees: nesting is on a stack of frames of its own; after an error the scanner goes on at a place from which
+//! Guarantees: nesting is on a stack of levels of its own; after an error the scanner goes on at a place from which
 //! the following forms can be read, and all calls together look at each byte of the text a bounded number of times.
 //! Not here: dots, and marks with nothing after them (the grammar), what tokens denote (`builder`).
 
@@ -21,7 +21,7 @@ use crate::diagnostic::code;
 
 use super::MAX_ERRORS;
 use super::feature;
-use super::lexer::Token;
+use super::lexer::{Lexeme, Token};
 
 pub(super) use check::label_number;
 
@@ -30,14 +30,6 @@ pub const MAX_DEPTH: usize = 2000;
 
 /// No offset: texts are shorter.
 const NONE: u32 = u32::MAX;
-
-/// A token and where it is.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Lexeme {
-    pub(super) token: Token,
-    pub(super) start: u32,
-    pub(super) end: u32,
-}
 
 /// What is open around the current token.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +58,7 @@ enum Open {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Frame {
+struct Level {
     open: Open,
     /// Where its token is.
     start: u32,
@@ -111,14 +103,14 @@ pub(super) struct Scanner {
     pub(super) lexemes: Vec<Lexeme>,
     /// What is wrong with it so far.
     pub(super) errors: Vec<Diagnostic>,
-    frames: Vec<Frame>,
-    /// How many of the frames are lists.
+    levels: Vec<Level>,
+    /// How many of the levels are lists.
     lists: usize,
-    /// How many lists are open beyond [`MAX_DEPTH`]. They have no frames.
+    /// How many lists are open beyond [`MAX_DEPTH`]. They have no levels.
     excess: u64,
     /// Whether that has been reported.
     is_too_deep: bool,
-    /// How many of the frames are left out by a feature.
+    /// How many of the levels are left out by a feature.
     excluded: u32,
     backquotes: u32,
     labels: FxHashMap<u32, LabelState>,
@@ -166,7 +158,7 @@ impl Scanner {
                     false
                 }
                 Token::Close => {
-                    if self.frames.is_empty() && self.excess == 0 {
+                    if self.levels.is_empty() && self.excess == 0 {
                         return Scan::Errors(self.unexpected_close(text, start));
                     }
                     self.close(text, start, end)
@@ -191,7 +183,7 @@ impl Scanner {
     fn reset(&mut self) {
         self.lexemes.clear();
         self.errors.clear();
-        self.frames.clear();
+        self.levels.clear();
         self.lists = 0;
         self.excess = 0;
         self.is_too_deep = false;
@@ -254,27 +246,27 @@ impl Scanner {
     }
 
     fn push(&mut self, open: Open, token: Token, start: u32, end: u32) {
-        if self.frames.len() == MAX_DEPTH {
+        if self.levels.len() == MAX_DEPTH {
             self.too_deep(start, end);
             // Marks beyond the limit are dropped, lists are counted, so that the end of the datum is found.
             self.excess += u64::from(open == Open::List);
             return;
         }
         let (lexeme, backquotes) = (self.lexemes.len(), self.backquotes);
-        self.frames.push(Frame { open, start, end, lexeme, backquotes, column_0: NONE });
+        self.levels.push(Level { open, start, end, lexeme, backquotes, column_0: NONE });
         self.lists += usize::from(open == Open::List);
-        self.deepest = self.deepest.max(self.frames.len());
+        self.deepest = self.deepest.max(self.levels.len());
         self.add(token, start, end);
     }
 
-    fn pop(&mut self) -> Option<Frame> {
-        let frame = self.frames.pop()?;
-        self.lists -= usize::from(frame.open == Open::List);
-        self.backquotes = frame.backquotes;
-        if matches!(frame.open, Open::Feature { .. } | Open::Conditional { kept: false }) {
+    fn pop(&mut self) -> Option<Level> {
+        let level = self.levels.pop()?;
+        self.lists -= usize::from(level.open == Open::List);
+        self.backquotes = level.backquotes;
+        if matches!(level.open, Open::Feature { .. } | Open::Conditional { kept: false }) {
             self.excluded -= 1;
         }
-        Some(frame)
+        Some(level)
     }
 
     /// Takes a `)`. True if it completes the top-level datum.
@@ -284,17 +276,17 @@ impl Scanner {
             return self.complete(text);
         }
         self.add(Token::Close, start, end);
-        while let Some(frame) = self.pop() {
-            match frame.open {
+        while let Some(level) = self.pop() {
+            match level.open {
                 Open::List => return self.complete(text),
                 // What is excluded never reaches the grammar: its marks are checked here.
                 Open::Feature { .. } | Open::Conditional { .. } => {
-                    let mark = &text[frame.start as usize..frame.end as usize];
+                    let mark = &text[level.start as usize..level.end as usize];
                     let span = self.span(start, end);
                     self.error(
                         code::MISSING_DATUM
                             .at(span, format!("expected a datum for `{mark}`, found `)`"))
-                            .also(self.span(frame.start, frame.end), "this needs a feature and a datum"),
+                            .also(self.span(level.start, level.end), "this needs a feature and a datum"),
                     );
                 }
                 _ => {}
@@ -309,12 +301,12 @@ impl Scanner {
         if self.excess > 0 {
             return false;
         }
-        while let Some(&frame) = self.frames.last() {
-            match frame.open {
+        while let Some(&level) = self.levels.last() {
+            match level.open {
                 Open::List => return false,
                 Open::Feature { wanted } => {
                     self.pop();
-                    let test = &self.lexemes[frame.lexeme + 1..];
+                    let test = &self.lexemes[level.lexeme + 1..];
                     let kept = match feature::holds(text, test) {
                         Ok(holds) => holds == wanted,
                         Err(fault) => {
@@ -323,19 +315,19 @@ impl Scanner {
                             true
                         }
                     };
-                    self.lexemes.truncate(frame.lexeme);
-                    self.frames.push(Frame { open: Open::Conditional { kept }, ..frame });
+                    self.lexemes.truncate(level.lexeme);
+                    self.levels.push(Level { open: Open::Conditional { kept }, ..level });
                     self.excluded += u32::from(!kept);
                     return false;
                 }
                 Open::Conditional { kept: false } => {
                     self.pop();
-                    self.lexemes.truncate(frame.lexeme);
+                    self.lexemes.truncate(level.lexeme);
                     return false;
                 }
                 Open::Label { number, deepest, tokens } => {
                     self.pop();
-                    let height = self.deepest.saturating_sub(self.frames.len() + 1);
+                    let height = self.deepest.saturating_sub(self.levels.len() + 1);
                     self.labels.insert(number, LabelState::Done { height, tokens: self.tokens - tokens });
                     self.deepest = self.deepest.max(deepest);
                 }
@@ -347,11 +339,11 @@ impl Scanner {
         true
     }
 
-    /// Remembers for all open frames that have none yet that a `(` at the beginning of a line lies within them.
+    /// Remembers for all open levels that have none yet that a `(` at the beginning of a line lies within them.
     fn note_column_0(&mut self, start: u32) {
         // Frames that have one are below those that have none.
-        for frame in self.frames.iter_mut().rev().take_while(|frame| frame.column_0 == NONE) {
-            frame.column_0 = start;
+        for level in self.levels.iter_mut().rev().take_while(|level| level.column_0 == NONE) {
+            level.column_0 = start;
         }
     }
 

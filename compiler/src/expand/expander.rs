@@ -1,0 +1,369 @@
+//! The expander's state, and the loop over its jobs.
+//!
+//! Jobs stand on a stack. So a form of any depth takes no native stack, and the expander can stop at any macro call and
+//! continue when the answer comes.
+//!
+//! Invariants: jobs run in the order of the text, from left to right; exactly one job fills a hole; only jobs change the
+//! [`Scope`], never the code that looks at a form.
+
+use esl_bytecode::compile::{Answer, Environment, MacroCall, MacroRef};
+use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
+use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+use rustc_hash::FxHashSet;
+
+use super::chunk::{Chunk, OpenChunk, Purpose};
+use super::form::{Checked, Form, is_known, name};
+use super::global::GlobalUses;
+use super::job::{Job, To, Top, Waiting};
+use super::origin::{OriginId, Origins};
+use super::scope::Scope;
+use super::setf::SetfExpansion;
+use crate::core::NodeKind;
+use crate::diagnostic::code;
+
+/// Limit on the nesting of nodes.
+pub(super) const MAX_DEPTH: u32 = 5_000;
+
+/// Expands a form of an operator into a node.
+pub(super) type Operator = fn(&mut Expander, &mut dyn Environment, Form, To) -> Checked;
+
+/// Why the expander stopped.
+#[derive(Debug)]
+pub enum Stop {
+    /// A macro is to be run. Continue with [`Answer::Expansion`] or [`Answer::Failed`].
+    Macro(MacroCall),
+    /// A chunk is finished. If it is to be kept, continue with [`Answer::Object`] or [`Answer::Failed`]; if it is to be
+    /// loaded and that failed, with [`Answer::Failed`].
+    Chunk(Box<Chunk>),
+    /// All forms are expanded.
+    Done,
+}
+
+/// Expands the forms of one compilation unit, one after another.
+#[derive(Debug)]
+pub struct Expander {
+    /// Returns the operator of a name, if the compiler knows one.
+    pub(super) find_operator: fn(&Symbol) -> Option<Operator>,
+    /// Jobs to be done, the next one last.
+    pub(super) jobs: Vec<Job>,
+    /// Chunks under construction, the innermost last.
+    pub(super) open: Vec<OpenChunk>,
+    /// Meanings of local names.
+    pub(super) scope: Scope,
+    /// Macro calls of the current top-level form.
+    pub(super) origins: Origins,
+    /// Places that are found but not used yet.
+    pub(super) places: Vec<SetfExpansion>,
+    /// Functions of local macros that have no name yet; `None` for one whose definition failed.
+    pub(super) objects: Vec<Option<ObjectId>>,
+    /// What the next answer is about.
+    pub(super) waiting: Waiting,
+    /// Why the expander stops after the current job.
+    pub(super) stopped: Option<Stop>,
+    /// Findings that have not been taken yet.
+    diagnostics: Vec<Diagnostic>,
+    /// Code, place and message of all findings.
+    reported: FxHashSet<(&'static str, Span, String)>,
+    /// Number of errors so far.
+    pub(super) errors: usize,
+    /// Whether the limit on depth has been reported for the current top-level form.
+    is_too_deep: bool,
+    /// Uses and definitions of global names.
+    pub(super) globals: GlobalUses,
+}
+
+impl Expander {
+    /// Creates an expander that knows the operators that `find_operator` finds.
+    pub(super) fn with_operators(find_operator: fn(&Symbol) -> Option<Operator>) -> Expander {
+        Expander {
+            find_operator,
+            jobs: Vec::new(),
+            open: Vec::new(),
+            scope: Scope::default(),
+            origins: Origins::default(),
+            places: Vec::new(),
+            objects: Vec::new(),
+            waiting: Waiting::Nothing,
+            stopped: None,
+            diagnostics: Vec::new(),
+            reported: FxHashSet::default(),
+            errors: 0,
+            is_too_deep: false,
+            globals: GlobalUses::default(),
+        }
+    }
+
+    /// Begins a form of a file. The form before it must be finished ([`Stop::Done`]).
+    pub fn begin_file_form(&mut self, form: Datum) {
+        self.begin(form, Top::file());
+    }
+
+    /// Begins a form for `eval`. The value of the last chunk that is to be emitted is that of the form.
+    pub fn begin_evaluation(&mut self, form: Datum) {
+        self.begin(form, Top::evaluate());
+    }
+
+    fn begin(&mut self, form: Datum, top: Top) {
+        debug_assert!(self.jobs.is_empty() && self.open.is_empty(), "the last form is finished");
+        self.origins.clear();
+        self.is_too_deep = false;
+        self.jobs.push(Job::TopLevel(form, top));
+    }
+
+    /// Works until something is needed from outside. Calls `charge` with the number of jobs done.
+    pub fn run(&mut self, environment: &mut dyn Environment, charge: &mut dyn FnMut(u64)) -> Stop {
+        loop {
+            let Some(job) = self.jobs.pop() else { return Stop::Done };
+            charge(1);
+            self.work(environment, job);
+            if let Some(stop) = self.stopped.take() {
+                return stop;
+            }
+        }
+    }
+
+    /// Takes the findings so far.
+    pub fn take_diagnostics(&mut self) -> Vec<Diagnostic> {
+        std::mem::take(&mut self.diagnostics)
+    }
+
+    /// Finishes the unit: returns the findings so far, undefined names, and calls with a wrong number of arguments.
+    pub fn finish(&mut self, environment: &dyn Environment) -> Vec<Diagnostic> {
+        let mut findings = self.take_diagnostics();
+        findings.extend(self.globals.finish(environment));
+        findings
+    }
+
+    /// Whether an error has been found.
+    pub fn has_failed(&self) -> bool {
+        self.errors > 0
+    }
+
+    /// Whether the compiler itself expands forms of the operator `symbol`.
+    pub(super) fn is_operator(&self, symbol: &Symbol) -> bool {
+        (self.find_operator)(symbol).is_some()
+    }
+
+    // ---- jobs
+
+    /// Puts jobs on the stack so that they run in the order given, before all others.
+    pub(super) fn schedule<I>(&mut self, jobs: I)
+    where
+        I: IntoIterator<Item = Job>,
+        I::IntoIter: DoubleEndedIterator,
+    {
+        self.jobs.extend(jobs.into_iter().rev());
+    }
+
+    fn work(&mut self, environment: &mut dyn Environment, job: Job) {
+        match job {
+            Job::Expand(form, to) => {
+                let to = to.at(&form);
+                let outcome = self.expand(environment, form, to);
+                self.settle(outcome, to);
+            }
+            Job::Enter(entries) => {
+                let level = self.level();
+                for entry in entries {
+                    self.scope.enter(entry, level);
+                }
+            }
+            Job::Leave(count) => {
+                for _ in 0..count {
+                    if let Some(gone) = self.scope.leave() {
+                        self.check_use(&gone);
+                    }
+                }
+            }
+            Job::Lambda(text, lambda, to) => self.expand_lambda(environment, *text, lambda, to),
+            Job::Macro(form, to) => {
+                let purpose = Purpose { emit: false, load: true, keep: true };
+                let inside = self.begin_chunk(to.span, to.origin, purpose);
+                self.schedule([Job::Expand(form, inside), Job::FinishChunk]);
+            }
+            Job::CheckClause(to, is_empty) => self.check_clause(to, is_empty),
+            Job::CheckReturn(function, lambda) => self.check_return(function, lambda),
+            Job::EnterMacros(names) => self.enter_macros(names),
+            Job::TopLevel(form, top) => {
+                let top = top.at(&form);
+                let outcome = self.top_level(environment, form, top);
+                if let Err(diagnostic) = outcome {
+                    self.report(*diagnostic, top.origin);
+                }
+            }
+            Job::FinishChunk => self.finish_chunk(),
+            Job::Place(form, to) => {
+                let to = to.at(&form);
+                let outcome = self.find_place(environment, form, to);
+                self.settle_place(outcome, to);
+            }
+            Job::Use(usage, to) => {
+                let outcome = self.use_places(environment, *usage, to);
+                self.settle(outcome, to);
+            }
+        }
+    }
+
+    /// Reports a fault of a form, and puts `NIL` in its place so that its neighbours can be looked at.
+    fn settle(&mut self, outcome: Checked, to: To) {
+        if let Err(diagnostic) = outcome {
+            self.report(*diagnostic, to.origin);
+            self.fill_nil(to);
+        }
+    }
+
+    /// Reports a fault of a place, and puts a stand-in on the list of places.
+    fn settle_place(&mut self, outcome: Checked, to: To) {
+        if let Err(diagnostic) = outcome {
+            self.report(*diagnostic, to.origin);
+            self.places.push(SetfExpansion::broken(to.span));
+        }
+    }
+
+    fn expand(&mut self, environment: &mut dyn Environment, datum: Datum, to: To) -> Checked {
+        if to.depth > MAX_DEPTH {
+            return self.too_deep(to);
+        }
+        match datum.kind() {
+            DatumKind::Symbol(symbol) => {
+                let symbol = symbol.clone();
+                self.expand_variable(environment, &symbol, &datum, to)
+            }
+            DatumKind::Cons(head, _) => {
+                let form = Form::of(&datum, to.span)?;
+                match head.kind() {
+                    DatumKind::Symbol(_) => self.expand_operation(environment, form, to),
+                    _ => self.expand_lambda_call(environment, form, to),
+                }
+            }
+            _ => {
+                self.fill(to, NodeKind::Constant(datum));
+                Ok(())
+            }
+        }
+    }
+
+    fn too_deep(&mut self, to: To) -> Checked {
+        if self.is_too_deep {
+            self.errors += 1;
+            self.fill_nil(to);
+            return Ok(());
+        }
+        self.is_too_deep = true;
+        let message = format!("forms are nested more than {MAX_DEPTH} deep");
+        Err(Box::new(code::NESTED_TOO_DEEPLY.at(to.span, message)))
+    }
+
+    // ---- stops and answers
+
+    /// Stops for a call of `function` on `form`, which the call `around` made. `waiting` says what becomes of the answer,
+    /// given the origin of what the macro makes.
+    ///
+    /// # Errors
+    /// As [`Origins::enter`].
+    pub(super) fn stop_for_macro(
+        &mut self,
+        function: MacroRef,
+        form: &Form,
+        is_standard: bool,
+        around: Option<OriginId>,
+        waiting: impl FnOnce(Option<OriginId>) -> Waiting,
+    ) -> Checked {
+        let origin = self.origins.enter(&form.operator, form.span, is_standard, around)?;
+        self.waiting = waiting(origin);
+        let locals = self.scope.locals();
+        self.stopped = Some(Stop::Macro(MacroCall { function, form: form.datum.clone(), locals }));
+        Ok(())
+    }
+
+    /// Takes the answer to the last stop.
+    pub fn answer(&mut self, answer: Answer) {
+        let waiting = std::mem::replace(&mut self.waiting, Waiting::Nothing);
+        match (waiting, answer) {
+            (Waiting::Form(to), Answer::Expansion(form)) => self.jobs.push(Job::Expand(form, to)),
+            (Waiting::Call(call, to), Answer::Expansion(form)) => {
+                // A compiler macro declines by returning the form itself.
+                let form = if form.is_same(&call.datum) { call.globally() } else { form };
+                self.jobs.push(Job::Expand(form, to));
+            }
+            (Waiting::Call(call, to), _) => self.jobs.push(Job::Expand(call.globally(), to)),
+            (Waiting::Place(to), Answer::Expansion(form)) => self.jobs.push(Job::Place(form, to)),
+            (Waiting::SetfExpansion(place, to), Answer::Expansion(values)) => {
+                let outcome = SetfExpansion::from_values(&place, &values, to.span);
+                match outcome {
+                    Ok(place) => self.places.push(place),
+                    Err(fault) => self.settle_place(Err(fault), to),
+                }
+            }
+            (Waiting::TopLevel(top), Answer::Expansion(form)) => self.jobs.push(Job::TopLevel(form, top)),
+            (Waiting::Object(_), Answer::Object(object)) => self.objects.push(Some(object)),
+            (Waiting::Form(to), Answer::Failed(failure)) => {
+                self.macro_failed(&failure, to.origin, to.span);
+                self.fill_nil(to);
+            }
+            (Waiting::Place(to) | Waiting::SetfExpansion(_, to), Answer::Failed(failure)) => {
+                self.macro_failed(&failure, to.origin, to.span);
+                self.places.push(SetfExpansion::broken(to.span));
+            }
+            (Waiting::TopLevel(top), Answer::Failed(failure)) => {
+                self.macro_failed(&failure, top.origin, top.span);
+            }
+            (Waiting::Object(span), Answer::Failed(failure)) => {
+                let message = format!("the definition of a local macro failed: {failure}");
+                self.report(code::MACRO_FAILED.at(span, message), None);
+                self.objects.push(None);
+            }
+            (Waiting::Load(span), Answer::Failed(failure)) => {
+                let message = format!("this form failed at compile time: {failure}");
+                self.report(code::COMPILE_TIME_FAILURE.at(span, message), None);
+            }
+            (Waiting::Object(_), _) => self.objects.push(None),
+            // There is nothing to do, or the driver has mixed up its answers: the form stays as it is.
+            (Waiting::Form(to), _) => self.fill_nil(to),
+            (Waiting::Place(to) | Waiting::SetfExpansion(_, to), _) => {
+                self.places.push(SetfExpansion::broken(to.span));
+            }
+            (Waiting::Nothing | Waiting::TopLevel(_) | Waiting::Load(_), _) => {}
+        }
+    }
+
+    // ---- findings
+
+    fn macro_failed(&mut self, failure: &str, origin: Option<OriginId>, span: Span) {
+        let origin = origin.map(|origin| self.origins.get(origin));
+        let failed = origin.map_or_else(|| "a macro".to_string(), |origin| name(&origin.name));
+        let is_standard = origin.is_some_and(|origin| origin.is_standard);
+        // Checks of arguments begin with the name of the macro, which the message contains already.
+        let shown = origin.map(|origin| origin.name.to_string() + " ").unwrap_or_default();
+        let failure = failure.strip_prefix(&shown).unwrap_or(failure);
+        // A macro of the language fails only on a form that it cannot take.
+        let diagnostic = if is_standard {
+            code::MALFORMED_FORM.at(span, format!("{failed} {failure}"))
+        } else {
+            code::MACRO_FAILED.at(span, format!("{failed} failed while it was expanded: {failure}"))
+        };
+        self.report(diagnostic, None);
+    }
+
+    /// Reports a finding about a form that the macro call `origin`, if any, has made.
+    pub(super) fn report(&mut self, mut diagnostic: Diagnostic, origin: Option<OriginId>) {
+        if diagnostic.severity == Severity::Error {
+            self.errors += 1;
+            if let Some(origin) = origin.map(|origin| self.origins.get(origin)) {
+                let text = format!("in the expansion of {}", name(&origin.name));
+                if diagnostic.primary.span == origin.span && diagnostic.primary.text.is_empty() {
+                    diagnostic.primary.text = text;
+                } else if !origin.is_standard && is_known(origin.span) {
+                    diagnostic = diagnostic.also(origin.span, text);
+                }
+            }
+        }
+        // A macro may have used the same part twice.
+        let place = (diagnostic.code, diagnostic.primary.span, diagnostic.message.clone());
+        if self.reported.insert(place) {
+            self.diagnostics.push(diagnostic);
+        }
+    }
+}

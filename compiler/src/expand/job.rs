@@ -1,0 +1,131 @@
+//! Jobs: the steps in which the expander works, and the answers that it waits for.
+//!
+//! A job expands one form into one node, or does what has to happen between two forms. These types hold no behaviour:
+//! every file of the expander may use them, and they use none of the files that carry them out.
+
+use esl_bytecode::datum::Datum;
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+
+use super::form::{Form, is_known};
+use super::function::FunctionText;
+use super::origin::OriginId;
+use super::scope::ScopeEntry;
+use super::setf::PlaceUse;
+use crate::core::{LambdaId, NodeId, VarId};
+
+/// Destination of an expansion.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct To {
+    /// Node to be filled.
+    pub(super) node: NodeId,
+    /// Lambda around the node.
+    pub(super) lambda: LambdaId,
+    /// Nesting depth of the node.
+    pub(super) depth: u32,
+    /// Macro call that made the form.
+    pub(super) origin: Option<OriginId>,
+    /// Place of the form in the source, or of the form around it.
+    pub(super) span: Span,
+    /// Whether the value is unused.
+    pub(super) is_dropped: bool,
+}
+
+impl To {
+    /// Returns the same destination at the place of `form`, if that is known.
+    pub(super) fn at(self, form: &Datum) -> To {
+        if is_known(form.span()) { To { span: form.span(), ..self } } else { self }
+    }
+}
+
+/// How top-level forms are processed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mode {
+    /// For a file.
+    File {
+        /// Whether every form is evaluated at compile time, too.
+        now_too: bool,
+    },
+    /// For `eval`, or within an `eval-when` that applies at compile time only.
+    Evaluate,
+}
+
+/// Circumstances of a top-level form.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Top {
+    /// How the form is processed.
+    pub(super) mode: Mode,
+    /// Whether its value is the value of the whole.
+    pub(super) is_last: bool,
+    /// Macro call that made the form.
+    pub(super) origin: Option<OriginId>,
+    /// Place of the form in the source.
+    pub(super) span: Span,
+}
+
+impl Top {
+    /// Returns the circumstances of a form of a file.
+    pub(super) fn file() -> Top {
+        Top { mode: Mode::File { now_too: false }, is_last: false, origin: None, span: Span::default() }
+    }
+
+    /// Returns the circumstances of a form given to `eval`.
+    pub(super) fn evaluate() -> Top {
+        Top { mode: Mode::Evaluate, is_last: true, origin: None, span: Span::default() }
+    }
+
+    /// Returns the same circumstances at the place of `form`, if that is known.
+    pub(super) fn at(self, form: &Datum) -> Top {
+        if is_known(form.span()) { Top { span: form.span(), ..self } } else { self }
+    }
+}
+
+/// A step of the expander.
+#[derive(Debug)]
+pub(super) enum Job {
+    /// Expands a form.
+    Expand(Datum, To),
+    /// Enters names into the scope.
+    Enter(Vec<ScopeEntry>),
+    /// Takes the newest entries out of the scope.
+    Leave(usize),
+    /// Expands the text of a function.
+    Lambda(Box<FunctionText>, LambdaId, To),
+    /// Compiles the function of a local macro, given as a form.
+    Macro(Datum, To),
+    /// Enters local macros; their functions are the newest of the kept objects.
+    EnterMacros(Vec<Symbol>),
+    /// Checks the expanded body of a recovery clause; the flag says whether the body is empty.
+    CheckClause(To, bool),
+    /// Checks whether a local function, whose text is expanded, can return.
+    CheckReturn(VarId, LambdaId),
+    /// Processes a top-level form.
+    TopLevel(Datum, Top),
+    /// Finishes the innermost chunk.
+    FinishChunk,
+    /// Finds the five parts of a place.
+    Place(Datum, To),
+    /// Uses the newest places.
+    Use(Box<PlaceUse>, To),
+}
+
+/// What the next answer is about.
+#[derive(Debug)]
+pub(super) enum Waiting {
+    /// Nothing was asked.
+    Nothing,
+    /// The expansion of a form.
+    Form(To),
+    /// The replacement that a compiler macro gives for a call.
+    Call(Form, To),
+    /// The expansion of a place.
+    Place(To),
+    /// The five values of a `define-setf-expander`.
+    SetfExpansion(Datum, To),
+    /// The expansion of a top-level form.
+    TopLevel(Top),
+    /// The function of a local macro.
+    Object(Span),
+    /// Whether a chunk could be loaded.
+    Load(Span),
+}

@@ -1,0 +1,246 @@
+//! Lowering one function: its entry, and the dispatch over kinds of forms.
+
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::module::{Function, Parameters, PoolIdx};
+use esl_bytecode::opcode::Instr;
+use esl_bytecode::operand::{ConstIdx, Count, Reg};
+
+use super::arithmetic::small_integer;
+use super::assemble::assemble;
+use super::builder::{Excess, FunctionBuilder, ModuleBuilder, OversizedFunction};
+use super::dest::Dest;
+use super::fuse;
+use super::graph::Cond;
+use crate::core::*;
+use crate::diagnostic::code;
+
+/// Native stack that one form may take before [`FunctionBuilder::form`] is called again, in bytes.
+const RED_ZONE: usize = 96 * 1024;
+/// Native stack that is added when less than that is left, in bytes.
+const STACK: usize = 1024 * 1024;
+
+impl ModuleBuilder<'_> {
+    /// Lowers all functions, beginning with the form itself.
+    pub(super) fn functions(&mut self) -> Vec<Function> {
+        self.number(LambdaId(0));
+        let mut functions = Vec::new();
+        // Functions get their numbers when code that refers to them is lowered, and are lowered in that order.
+        while let Some(&lambda) = self.numbered.get(functions.len()) {
+            functions.push(self.function(lambda));
+        }
+        for (function, lambda) in functions.iter_mut().zip(&self.numbered) {
+            function.captures = std::mem::take(&mut self.captures[lambda.index()]);
+        }
+        functions
+    }
+
+    /// Lowers the function of a lambda. Its captures are left open.
+    fn function(&mut self, lambda: LambdaId) -> Function {
+        let text = &self.core.lambdas[lambda.index()];
+        let mut builder = FunctionBuilder::new(self, lambda);
+        let parameters = builder.parameters(text);
+        builder.form_inside(text.body, Dest::Tail, 0);
+        builder.finish_spill();
+        fuse::improve(&mut builder.graph);
+        // Even a function without registers has one, for instructions that name an empty range.
+        builder.registers.reserve(Reg(0), 1);
+        let assembled = assemble(&builder.graph, builder.module.lines);
+        if builder.registers.has_overflowed() {
+            builder.excess = Some(Excess::Registers);
+        }
+        let (code, lines) = assembled.unwrap_or_else(|_| {
+            builder.excess = builder.excess.or(Some(Excess::Instructions));
+            Default::default()
+        });
+        let (registers, constants, excess) = (builder.registers.used(), builder.constants, builder.excess);
+        if let Some(excess) = excess {
+            let diagnostic = code::FUNCTION_TOO_LARGE
+                .at(text.span, "this function is too large")
+                .label(format!("has too many {}", excess.what()))
+                .help("divide it into several functions");
+            self.oversized.push(OversizedFunction { lambda, diagnostic });
+        }
+        let mut datum = |datum: &Option<Datum>| datum.as_ref().map(|datum| self.pool.datum(datum));
+        Function {
+            name: datum(&text.name),
+            lambda_list: datum(&text.lambda_list),
+            documentation: datum(&text.documentation),
+            parameters,
+            registers,
+            captures: Vec::new(),
+            constants,
+            code,
+            lines,
+        }
+    }
+}
+
+impl<'a> FunctionBuilder<'_, 'a> {
+    /// Lowers a form inside the extents from `depth` on, which are closed after it.
+    pub(super) fn form_inside(&mut self, body: NodeId, dest: Dest, depth: usize) {
+        if self.extents.len() == depth {
+            return self.form(body, dest);
+        }
+        let inner = self.inner(dest, self.module.resolution.is_single(body));
+        self.form(body, inner);
+        self.close(depth);
+        self.finish(inner, dest);
+    }
+
+    /// Lowers a constant.
+    pub(super) fn constant(&mut self, datum: &Datum, dest: Dest) {
+        match datum.kind() {
+            DatumKind::Nil => self.deliver_nil(dest),
+            DatumKind::Symbol(symbol) if symbol.is_cl("T") => self.deliver_true(dest),
+            _ => match dest {
+                Dest::Effect => {}
+                Dest::Test { holds, .. } => self.jump(holds),
+                _ => {
+                    if let Some(value) = small_integer(datum) {
+                        return self.compute(dest, |dst| Instr::LoadInt { dst, value });
+                    }
+                    let entry = self.module.pool.datum(datum);
+                    let constant = ConstIdx(self.constant_index(entry));
+                    self.compute(dest, |dst| Instr::LoadConst { dst, constant });
+                }
+            },
+        }
+    }
+
+    /// Lowers `node` to `dest`. The registers in use are the same afterwards.
+    pub(super) fn form(&mut self, node: NodeId, dest: Dest) {
+        // The depth of the recursion is that of the core tree.
+        stacker::maybe_grow(RED_ZONE, STACK, || {
+            let node = &self.core.nodes[node.index()];
+            let span = std::mem::replace(&mut self.span, node.span);
+            let top = self.registers.top();
+            self.form_of(&node.kind, dest);
+            debug_assert_eq!(top, self.registers.top(), "registers are given back");
+            self.span = span;
+        });
+    }
+
+    fn form_of(&mut self, kind: &'a NodeKind, dest: Dest) {
+        match kind {
+            NodeKind::Hole => unreachable!("the expander fills every hole"),
+            NodeKind::Constant(datum) => self.constant(datum, dest),
+            NodeKind::Local(variable) => self.local(*variable, dest),
+            NodeKind::SetLocal(variable, value) => self.set_local(*variable, *value, dest),
+            NodeKind::Special(symbol) => self.special(symbol, dest),
+            NodeKind::SetSpecial(symbol, value) => self.set_special(symbol, *value, dest),
+            NodeKind::FunctionRef(symbol) => self.function_ref(symbol, dest),
+            NodeKind::BuiltinRef(builtin) => self.builtin_ref(*builtin, dest),
+            NodeKind::Lambda(lambda) => self.lambda(*lambda, dest),
+            NodeKind::If(test, consequent, alternative) => {
+                self.if_form(*test, *consequent, *alternative, dest)
+            }
+            NodeKind::Progn(forms) => self.progn(forms, dest),
+            NodeKind::And(forms) => self.and(forms, dest),
+            NodeKind::Or(forms) => self.or(forms, dest),
+            NodeKind::Let { sequential, bindings, body } => self.let_form(*sequential, bindings, *body, dest),
+            NodeKind::Functions { definitions, body } => self.functions(definitions, *body, dest),
+            NodeKind::Block(block, body) => self.block(*block, *body, dest),
+            NodeKind::ReturnFrom(block, value) => self.return_from(*block, *value, dest),
+            NodeKind::Tagbody(tagbody, items) => self.tagbody(*tagbody, items, dest),
+            NodeKind::Go(tagbody, tag) => self.go(*tagbody, *tag, dest),
+            NodeKind::Catch(tag, body) => self.catch(*tag, *body, dest),
+            NodeKind::Throw(tag, values) => self.throw(*tag, *values, dest),
+            NodeKind::UnwindProtect(protected, cleanup) => self.unwind_protect(*protected, *cleanup, dest),
+            NodeKind::Progv(symbols, values, body) => self.progv(*symbols, *values, *body, dest),
+            NodeKind::Call(callee, arguments) => self.call(callee, arguments, dest),
+            NodeKind::Apply(callee, arguments) => self.apply(callee, arguments, dest),
+            NodeKind::Values(forms) => self.values(forms, dest),
+            NodeKind::BindValues(targets, form, body) => self.bind_values(targets, *form, *body, dest),
+            NodeKind::CallValues(function, forms) => self.call_values(*function, forms, dest),
+            NodeKind::FirstValues(first, second) => self.first_values(*first, *second, dest),
+            NodeKind::HandlerCase(body, clauses) => self.handler_case(*body, clauses, dest),
+            NodeKind::Recovery { table, procedures, body } => self.recovery(table, *procedures, *body, dest),
+            NodeKind::FailureCleanup(body, cleanup) => self.failure_cleanup(*body, *cleanup, dest),
+            NodeKind::Handlers(handlers, body) => self.handlers(*handlers, *body, dest),
+            NodeKind::Mask(from, body) => self.mask(*from, *body, dest),
+            NodeKind::Slot(class, slot, instance) => self.slot(class, *slot, *instance, dest),
+            NodeKind::SetSlot(class, slot, instance, value) => {
+                self.set_slot(class, *slot, *instance, *value, dest)
+            }
+            NodeKind::IsInstance(class, object) => self.is_instance(class, *object, dest),
+        }
+    }
+
+    /// Lowers forms for effect, and the last one to `dest`.
+    pub(super) fn progn(&mut self, forms: &[NodeId], dest: Dest) {
+        let Some((&last, others)) = forms.split_last() else { return self.deliver_nil(dest) };
+        for &form in others {
+            self.form(form, Dest::Effect);
+        }
+        self.form(last, dest);
+    }
+
+    /// Assigns registers to the parameters and lowers the entry: defaults, boxes and special bindings, in order.
+    fn parameters(&mut self, text: &'a Lambda) -> Parameters {
+        let keys = text.keys.as_deref().unwrap_or_default();
+        let optional = text.optional.iter().map(|optional| optional.parameter);
+        let in_registers = (text.required.iter().copied()).chain(optional).chain(text.rest);
+        for parameter in in_registers.chain(keys.iter().map(|key| key.optional.parameter)) {
+            self.module.variables[parameter.variable.index()] = self.registers.take(1);
+        }
+        if self.module.spills_from.is_some() {
+            self.make_spill();
+        }
+        for &parameter in &text.required {
+            self.settle(parameter);
+        }
+        for optional in &text.optional {
+            self.optional(optional);
+        }
+        if let Some(rest) = text.rest {
+            self.settle(rest);
+        }
+        for key in keys {
+            self.optional(&key.optional);
+        }
+        let names = keys.iter().map(|key| self.module.pool.symbol(&key.key));
+        let names: Vec<PoolIdx> = names.collect();
+        Parameters {
+            required: text.required.len().min(255) as u8,
+            optional: text.optional.len().min(255) as u8,
+            rest: text.rest.is_some(),
+            keys: text.keys.is_some().then_some(names),
+            allow_other_keys: text.allow_other_keys,
+        }
+    }
+
+    fn optional(&mut self, optional: &OptionalParameter) {
+        let register = self.register(optional.parameter.variable);
+        let resolution = &self.module.resolution;
+        let supplied = optional.supplied.filter(|flag| flag.is_special || resolution.is_used(flag.variable));
+        let supplied = supplied.map(|supplied| {
+            let flag = self.registers.take(1);
+            self.module.variables[supplied.variable.index()] = flag;
+            self.emit(Instr::LoadTrue { dst: flag.into() });
+            (supplied, flag)
+        });
+        let (missing, end) = (self.graph.label(), self.graph.label());
+        self.branch(Cond::Supplied(register), end, missing);
+        self.graph.bind(missing);
+        self.form(optional.default, Dest::Keep(register));
+        if let Some((_, flag)) = supplied {
+            self.emit(Instr::LoadNil { first: flag.into(), count: Count(1) });
+        }
+        self.graph.bind(end);
+        self.settle(optional.parameter);
+        if let Some((supplied, _)) = supplied {
+            self.settle(supplied);
+        }
+    }
+
+    /// Boxes or binds a parameter that has its value.
+    pub(super) fn settle(&mut self, parameter: Parameter) {
+        let register = self.register(parameter.variable);
+        if parameter.is_special {
+            let name = &self.core.variables[parameter.variable.index()].name;
+            self.bind_special(name, register);
+        } else {
+            self.box_variable(parameter.variable);
+        }
+    }
+}
