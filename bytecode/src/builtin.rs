@@ -933,7 +933,7 @@ macro_rules! for_each_builtin {
             /// if known. A function that has no name is `(lambda)`, a form at top level `NIL`.
             Backtrace = failure::backtrace, internal "%BACKTRACE" ("limit");
             /// Calls the embedder's function with this number.
-            CallHost = embed::call_host, internal "%CALL-HOST" ("number &rest arguments");
+            CallHost = outside::call_host, internal "%CALL-HOST" ("number &rest arguments");
 
             // ---- symbols
             /// The name of a symbol, a string that is not to be changed.

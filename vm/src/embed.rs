@@ -3,20 +3,30 @@
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::sync::atomic::Ordering::Relaxed;
 
 use esl_bytecode::datum::Datum;
-use esl_bytecode::span::Span;
 
-use crate::datum::Unit;
-use crate::heap::HeapStats;
-use crate::host::Output;
-use crate::raise::{Exit, Outcome, Raised};
-use crate::schedule::Choices;
+use crate::builtins::NATIVES;
+use crate::compiler::Compiler;
+use crate::config::Config;
+use crate::cpu::Cpu;
+use crate::database::Database;
+use crate::datum;
+use crate::embedder::Embedder;
+use crate::exchange::Exchange;
+use crate::heap::{AllocError, HeapConfig, HeapStats};
+use crate::host::{Host, Output};
+use crate::interp::start::make_starter;
+use crate::observe::Watch;
+use crate::outside::Outside;
+use crate::raise::Exit;
+use crate::schedule::{Choices, Scheduler};
 use crate::task::TaskId;
+use crate::trust;
 use crate::value::Value;
-use crate::vm::{Config, Vm};
-use crate::world::class;
+use crate::vm::Vm;
+use crate::wait::event;
+use crate::world::{World, class};
 
 pub use crate::datum::DatumError as ExportError;
 pub use crate::outside::HostFunction;
@@ -41,43 +51,93 @@ impl fmt::Display for LibraryError {
 
 impl std::error::Error for LibraryError {}
 
-/// What the embedder holds on to, and its requests.
-#[derive(Default)]
-pub(crate) struct Embedder {
-    /// Values that are kept from being collected.
-    pub(crate) pinned: Vec<Value>,
-    /// Set from outside to abort the task named in `interruptible`.
-    pub(crate) interrupt: Arc<AtomicBool>,
-    /// Set from outside to have a run come back.
-    pub(crate) stop: Arc<AtomicBool>,
-    /// The task that an interrupt aborts.
-    pub(crate) interruptible: Option<TaskId>,
-    /// Whether an interrupt has aborted one.
-    pub(crate) was_interrupted: bool,
-    /// Text of a failure that ended a task while there was no library to deal with it.
-    pub(crate) last_words: Option<String>,
-}
-
-impl Embedder {
-    /// Takes an interrupt, and returns the task that it aborts.
-    pub(crate) fn take_interrupt(&self) -> Option<TaskId> {
-        let id = self.interruptible?;
-        take(&self.interrupt).then_some(id)
-    }
-
-    /// Takes a request to have the run come back.
-    pub(crate) fn take_stop(&self) -> bool {
-        take(&self.stop)
-    }
-}
-
-/// Takes a flag that is set from outside.
-fn take(flag: &AtomicBool) -> bool {
-    // A plain look first: it is done once a turn, and writing would cost more.
-    flag.load(Relaxed) && flag.swap(false, Relaxed)
-}
-
 impl Vm {
+    /// Creates a machine without a library.
+    ///
+    /// # Errors
+    /// [`AllocError`] if the limit of memory leaves no room for what every machine has.
+    pub fn new(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, AllocError> {
+        let heap_config = HeapConfig { limit: config.memory, ..HeapConfig::default() };
+        let mut heap = trust::new_heap(heap_config);
+        let world = World::new(&mut heap)?;
+        let starter = make_starter(&mut heap)?;
+        let any_event = event::make(&mut heap, Value::NIL)?;
+        Ok(Vm {
+            heap,
+            world,
+            compiler: Compiler::default(),
+            database: Database::default(),
+            scheduler: Scheduler::new(config.seed, starter, any_event),
+            outside: Outside::new(host),
+            cpu: Cpu::new(),
+            natives: &NATIVES,
+            exchange: Exchange::new(),
+            watch: Watch::default(),
+            embedder: Embedder { pinned: vec![starter, any_event], ..Embedder::default() },
+            config,
+        })
+    }
+
+    /// Creates a machine without a library and with a captured outside, for the unit tests of this crate.
+    #[cfg(test)]
+    pub(crate) fn for_tests() -> Vm {
+        let host = Box::new(crate::host::VirtualHost::new());
+        Vm::new(Config::default(), host).expect("there is room for an empty machine")
+    }
+
+    /// Limits and settings.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// A flag that makes the machine abort a task at the end of its slice when it is set.
+    pub fn interrupt_flag(&self) -> Arc<AtomicBool> {
+        self.embedder.interrupt.clone()
+    }
+
+    /// A flag that makes the run under way, or the next one, come back at the end of a slice when it is set.
+    pub fn stop_flag(&self) -> Arc<AtomicBool> {
+        self.embedder.stop.clone()
+    }
+
+    /// The status that the program has asked to end with.
+    pub fn exit_status(&self) -> Option<u8> {
+        self.outside.exit_status
+    }
+
+    /// Names the task that an interrupt aborts; reports call it the main task.
+    pub fn set_interruptible(&mut self, id: Option<TaskId>) {
+        self.embedder.interruptible = id;
+        if let Some(task) = id.and_then(|id| self.scheduler.tasks.get(id)) {
+            self.scheduler.main_number = Some(task.number);
+        }
+    }
+
+    /// Whether the embedder has interrupted the program.
+    pub fn was_interrupted(&self) -> bool {
+        self.embedder.was_interrupted
+    }
+
+    /// Decides how choices are made where the language leaves the order of tasks open.
+    pub fn set_choices(&mut self, choices: Choices) {
+        self.scheduler.choices = choices;
+    }
+
+    /// How choices are made, and those made so far.
+    pub fn choices(&self) -> &Choices {
+        &self.scheduler.choices
+    }
+
+    /// Keeps a value from being collected, until [`Vm::unpin`].
+    pub fn pin(&mut self, value: Value) {
+        self.embedder.pin(&mut self.heap, value);
+    }
+
+    /// Lets go of a pinned value.
+    pub fn unpin(&mut self, value: Value) {
+        self.embedder.unpin(value);
+    }
+
     /// Takes in a function of the embedder: its number, for `%call-host`.
     pub fn add_host_function(&mut self, function: HostFunction) -> usize {
         self.outside.functions.push(function);
@@ -90,9 +150,8 @@ impl Vm {
     /// # Errors
     /// [`ExportError`] if the value is circular, or too large.
     pub fn export(&mut self, value: Value) -> Result<Datum, ExportError> {
-        let mut unit = Unit::default();
-        let datum = unit.datum_of(&self.heap, &self.world, value, Span::default())?;
-        self.exchange.charge(unit.take_work() as usize);
+        let (datum, work) = datum::export(&self.heap, &self.world, value)?;
+        self.exchange.charge(work);
         Ok(datum)
     }
 
@@ -101,40 +160,9 @@ impl Vm {
     /// # Errors
     /// [`Exit::Collect`] without room.
     pub fn import(&mut self, datum: &Datum) -> Result<Value, Exit> {
-        let mut unit = Unit::default();
-        let value = unit.value_of(&mut self.heap, &mut self.world, datum)?;
-        self.exchange.charge(unit.take_work() as usize);
+        let (value, work) = datum::import(&mut self.heap, &mut self.world, datum)?;
+        self.exchange.charge(work);
         Ok(value)
-    }
-}
-
-/// `(%call-host number &rest arguments)`
-pub(crate) fn call_host(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let number = arguments[0].as_index().filter(|&number| number < vm.outside.functions.len());
-    let Some(number) = number else {
-        return vm.exchange.index_error(arguments[0], vm.outside.functions.len());
-    };
-    let mut data = Vec::with_capacity(arguments.len());
-    for &argument in &arguments[1..] {
-        match vm.export(argument) {
-            Ok(datum) => data.push(datum),
-            Err(error) => return vm.exchange.raise(Raised::Simple(error.to_string())),
-        }
-    }
-    // The function has effects that cannot be done twice, so what it gives is kept until there is room for it.
-    let answer = match vm.outside.answer.take() {
-        Some(answer) => answer,
-        None => (vm.outside.functions[number])(&data),
-    };
-    match answer {
-        Ok(datum) => match vm.import(&datum) {
-            Ok(value) => Ok(value),
-            Err(exit) => {
-                vm.outside.answer = Some(Ok(datum));
-                Err(exit)
-            }
-        },
-        Err(text) => vm.exchange.raise(Raised::Simple(text)),
     }
 }
 
@@ -145,7 +173,11 @@ impl Vm {
     /// [`LibraryError`] if the library has none, or there is no memory for its name.
     pub fn library_function(&mut self, name: &str) -> Result<Value, LibraryError> {
         let symbol = self.world.intern_esl(&mut self.heap, name).map_err(|_| LibraryError::NoMemory)?;
-        if self.is_defined(symbol) { Ok(symbol) } else { Err(LibraryError::Missing(name.into())) }
+        if self.world.is_defined(&self.heap, symbol) {
+            Ok(symbol)
+        } else {
+            Err(LibraryError::Missing(name.into()))
+        }
     }
 
     /// Makes a task that calls a function of the library.

@@ -7,6 +7,7 @@
 use crate::raise::{Arguments, Exit, Expected, Raised};
 use crate::saved_pc::SavedPc;
 use crate::value::Value;
+use crate::world::load::LoadError;
 
 /// Charges of builtins: ticks beside those of their calls, and whether the slice is to end.
 ///
@@ -126,6 +127,20 @@ impl Exchange {
     #[cold]
     pub(crate) fn program_error<T>(&mut self, text: impl Into<String>) -> Result<T, Exit> {
         self.raise(Raised::Program(text.into()))
+    }
+
+    /// Passes on what became of a load: for want of room, the builtin is done again after a collection.
+    ///
+    /// # Errors
+    /// [`Exit::Collect`] without room; [`Exit::Raise`] if the module was refused.
+    pub(crate) fn loaded<T>(&mut self, result: Result<T, LoadError>) -> Result<T, Exit> {
+        result.map_err(|error| match error {
+            LoadError::Alloc(error) => error.into(),
+            error => {
+                self.raised = Some(error.into());
+                Exit::Raise
+            }
+        })
     }
 
     /// Charges the running task units of work, 64 to a tick. A unit takes about as long as a step of arithmetic on limbs.

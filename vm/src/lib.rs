@@ -10,7 +10,6 @@ pub mod builtins;
 pub mod embed;
 pub mod explore;
 pub mod host;
-pub mod load;
 pub mod observe;
 pub mod raise;
 pub mod run;
@@ -18,10 +17,15 @@ pub mod schedule;
 pub mod task;
 pub mod vm;
 
+pub use world::load;
+
+mod compiler;
 mod config;
+mod cpu;
 mod database;
 mod datum;
 mod describe;
+mod embedder;
 mod environment;
 mod exchange;
 mod interp;
@@ -29,6 +33,8 @@ mod number;
 mod outside;
 mod report;
 mod shape;
+mod trust;
+mod types;
 mod wait;
 mod world;
 

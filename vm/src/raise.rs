@@ -9,6 +9,7 @@ use smallvec::{SmallVec, smallvec};
 use crate::heap::{AllocError, Heap};
 use crate::value::Value;
 use crate::world::World;
+use crate::world::load::LoadError;
 
 /// Arguments of a call.
 pub(crate) type Arguments = SmallVec<[Value; 16]>;
@@ -187,5 +188,11 @@ impl Raised {
             | Raised::Cause(_, value) => visit(*value),
             _ => {}
         }
+    }
+}
+
+impl From<LoadError> for Raised {
+    fn from(error: LoadError) -> Raised {
+        Raised::Program(error.to_string())
     }
 }

@@ -6,7 +6,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 use super::integer::radix;
-use super::types::is_string;
+use crate::types::is_string;
 
 /// The code of the character that `v` is; a type error for anything else.
 fn code(vm: &mut Vm, v: Value) -> Result<u32, Exit> {
@@ -37,7 +37,7 @@ pub(super) fn to_character(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if v.is_character() {
         return Ok(v);
     }
-    let is_designator = is_string(vm, v) || vm.world.is_symbol(&vm.heap, v);
+    let is_designator = is_string(&vm.heap, v) || vm.world.is_symbol(&vm.heap, v);
     let string = if is_designator { vm.string_designator(v)? } else { Value::NIL };
     match crate::equality::characters_of(&vm.heap, string) {
         Some(&[code]) => Ok(character_of(code)),

@@ -16,7 +16,7 @@ const STEP: usize = 1024;
 /// Makes what the database needs of the heap, when it is used first.
 fn prepare(vm: &mut Vm) -> Result<(), Exit> {
     if let Some(objects) = vm.database.prepare(&mut vm.heap)? {
-        vm.pin(objects);
+        vm.embedder.pin(&mut vm.heap, objects);
     }
     Ok(())
 }

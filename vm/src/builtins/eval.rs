@@ -25,12 +25,12 @@ use esl_bytecode::verify::verify;
 
 use crate::builtins::expect::optional;
 use crate::builtins::stream::Source;
+use crate::compiler::{ActiveCompilation, CompilerJob, FormText, JobId};
 use crate::datum::Unit;
-use crate::environment::{ActiveCompilation, CompilerJob, FormText, JobId};
-use crate::load::{Alone, load};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::world::load::{Alone, load};
 
 use super::expect::exactly;
 
@@ -91,7 +91,7 @@ impl Vm {
         let kind = match step {
             Step::Expand(call) => {
                 let prepared = self.macro_call(call);
-                match self.loaded(prepared)? {
+                match self.exchange.loaded(prepared)? {
                     Some(call) => results[1..].copy_from_slice(&call),
                     None => return self.exchange.program_error("the macro is not defined any more"),
                 }
@@ -99,7 +99,7 @@ impl Vm {
             }
             Step::Load { module, keep } => {
                 let functions = self.load_in_unit(module);
-                results[1] = self.loaded(functions)?;
+                results[1] = self.exchange.loaded(functions)?;
                 results[2] = Value::boolean(*keep);
                 "LOAD"
             }
@@ -110,7 +110,7 @@ impl Vm {
             Step::Done(module, diagnostics) => {
                 if let Some(module) = module {
                     let functions = self.load_in_unit(module);
-                    results[1] = self.loaded(functions)?;
+                    results[1] = self.exchange.loaded(functions)?;
                 }
                 results[2] = self.diagnostics(compilation, diagnostics)?;
                 "DONE"
@@ -203,7 +203,7 @@ pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match sound {
         Ok(module) => {
             let functions = load(&mut vm.heap, &mut vm.world, &module, &mut Alone::default());
-            vm.loaded(functions)
+            vm.exchange.loaded(functions)
         }
         Err(reason) => vm.exchange.raise(Raised::File(path, format!("it is no sound program: {reason}"))),
     }
@@ -259,18 +259,18 @@ fn step(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Valu
         Some(step) => step,
         None => {
             let answer = vm.answer(running, kind, outcome)?;
-            let outer = vm.world.unit.replace(std::mem::take(&mut running.unit));
+            let outer = vm.compiler.unit.replace(std::mem::take(&mut running.unit));
             let mut nodes = 0;
             let step = running.compilation.step(vm, answer, &mut |more| nodes += more);
-            running.unit = vm.world.unit.replace(outer);
+            running.unit = vm.compiler.unit.replace(outer);
             // A node is worth more than a cell of a list.
             vm.exchange.charge(nodes as usize * 16);
             step
         }
     };
-    let outer = vm.world.unit.replace(std::mem::take(&mut running.unit));
+    let outer = vm.compiler.unit.replace(std::mem::take(&mut running.unit));
     let told = vm.tell(&*running.compilation, &step);
-    running.unit = vm.world.unit.replace(outer);
+    running.unit = vm.compiler.unit.replace(outer);
     let work = running.unit.take_work();
     vm.exchange.charge(work as usize);
     running.keeps = matches!(step, Step::Load { keep: true, .. });

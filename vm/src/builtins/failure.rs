@@ -164,12 +164,12 @@ pub(super) fn backtrace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         let Some(code) = vm.heap.function_code(function) else { continue };
         let name = vm.heap.code(code).map_or(Value::NIL, |code| code.name);
         let is_top_level =
-            vm.heap.header(function).is_some_and(|header| header.aux == crate::load::TOP_LEVEL);
+            vm.heap.header(function).is_some_and(|header| header.aux == crate::world::load::TOP_LEVEL);
         let name =
             if name.is_nil() && !is_top_level { vm.heap.list(&[vm.world.known.lambda])? } else { name };
         // A caller stands behind its call.
         let word = if is_exact { word } else { word.saturating_sub(1) };
-        let row = match vm.source_place(code, word as u32) {
+        let row = match vm.world.source_place(&vm.heap, code, word as u32) {
             Some(place) => {
                 let source = vm.heap.alloc_str(&place.source)?;
                 let (line, column) = (Value::index(place.line as usize), Value::index(place.column as usize));

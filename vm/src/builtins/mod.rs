@@ -30,13 +30,9 @@
 //! [`Exit::Slowly`]: crate::raise::Exit::Slowly
 //! [`Exit::Collect`]: crate::raise::Exit::Collect
 
-use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::for_each_builtin;
 
-use crate::embed;
-use crate::raise::Outcome;
-use crate::value::Value;
-use crate::vm::Vm;
+use crate::vm::Natives;
 
 /// Units of work (list cells, elements, nodes) that one call of a builtin may do.
 pub const LIMIT: usize = 4096;
@@ -44,14 +40,11 @@ pub const LIMIT: usize = 4096;
 /// Elements that one call of a builtin may copy where that is little more than copying memory.
 pub(crate) const COPY_LIMIT: usize = 1 << 15;
 
-/// A function that is written in Rust. The number of arguments has been checked against the table.
-pub type Native = fn(&mut Vm, &[Value]) -> Outcome;
-
 macro_rules! define_natives {
     ($( $(#[doc = $doc:literal])* $id:ident = $native:path, $visibility:ident $name:literal
         ($lambda_list:literal) $(-> $results:ident)? $(slowly $slowly:literal)?; )*) => {
         /// The implementations, by the numbers of their rows. A row whose path names no function does not compile.
-        pub(crate) static NATIVES: [Native; BUILTINS.len()] = [$( $native ),*];
+        pub(crate) static NATIVES: Natives = [$( $native ),*];
     };
 }
 

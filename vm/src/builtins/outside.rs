@@ -1,6 +1,7 @@
-//! What a program asks of the outside: its arguments and the time.
+//! What a program asks of the outside: its arguments, the time, and the embedder's functions.
 
-use crate::raise::Outcome;
+use crate::datum;
+use crate::raise::{Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -28,4 +29,39 @@ pub(super) fn internal_real_time(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
 pub(super) fn universal_time(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     let seconds = vm.outside.host.wall_clock().div_euclid(1_000_000_000);
     Ok(Value::fixnum(seconds.saturating_add(UNIX_EPOCH)).unwrap_or(Value::NIL))
+}
+
+pub(super) fn call_host(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let number = arguments[0].as_index().filter(|&number| number < vm.outside.functions.len());
+    let Some(number) = number else {
+        return vm.exchange.index_error(arguments[0], vm.outside.functions.len());
+    };
+    let mut data = Vec::with_capacity(arguments.len());
+    for &argument in &arguments[1..] {
+        match datum::export(&vm.heap, &vm.world, argument) {
+            Ok((datum, work)) => {
+                vm.exchange.charge(work);
+                data.push(datum);
+            }
+            Err(error) => return vm.exchange.raise(Raised::Simple(error.to_string())),
+        }
+    }
+    // The function has effects that cannot be done twice, so what it gives is kept until there is room for it.
+    let answer = match vm.outside.answer.take() {
+        Some(answer) => answer,
+        None => (vm.outside.functions[number])(&data),
+    };
+    match answer {
+        Ok(datum) => match datum::import(&mut vm.heap, &mut vm.world, &datum) {
+            Ok((value, work)) => {
+                vm.exchange.charge(work);
+                Ok(value)
+            }
+            Err(error) => {
+                vm.outside.answer = Some(Ok(datum));
+                Err(error.into())
+            }
+        },
+        Err(text) => vm.exchange.raise(Raised::Simple(text)),
+    }
 }

@@ -16,7 +16,7 @@ use crate::vm::Vm;
 
 use super::COPY_LIMIT;
 use super::expect::{exactly, optional};
-use super::types::is_string;
+use crate::types::is_string;
 
 /// Length of a pattern times that of the string in which it may be looked for at once.
 const SEARCH_LIMIT: usize = 1 << 20;
@@ -59,7 +59,7 @@ pub(super) fn string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// The string and the index that `char` and its like are given.
 fn string_and_index(vm: &mut Vm, string: Value, index: Value) -> Result<usize, Exit> {
-    if !is_string(vm, string) {
+    if !is_string(&vm.heap, string) {
         return vm.exchange.type_error(string, "STRING");
     }
     // Like `aref`, it sees the characters behind a fill pointer.
@@ -174,7 +174,7 @@ fn converted(vm: &mut Vm, arguments: &[Value], case: Case) -> Outcome {
 
 /// The string itself, a part of it changed.
 fn converted_in_place(vm: &mut Vm, arguments: &[Value], case: Case) -> Outcome {
-    if !is_string(vm, arguments[0]) {
+    if !is_string(&vm.heap, arguments[0]) {
         return vm.exchange.type_error(arguments[0], "STRING");
     }
     let (string, start, end) = vm.designated_part(arguments[0], arguments[1], arguments[2])?;
@@ -261,7 +261,7 @@ pub(super) fn concat(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn search(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [pattern, string, start, end, from_end] = exactly(arguments);
     for v in [pattern, string] {
-        if !is_string(vm, v) {
+        if !is_string(&vm.heap, v) {
             return vm.exchange.type_error(v, "STRING");
         }
     }

@@ -238,11 +238,20 @@ pub(super) fn function_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn function_lambda_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(vm.texts_of_function(arguments[0])?.0)
+    Ok(texts(vm, arguments[0])?.0)
 }
 
 pub(super) fn function_documentation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok(vm.texts_of_function(arguments[0])?.1)
+    Ok(texts(vm, arguments[0])?.1)
+}
+
+/// The lambda list and the documentation of a function.
+fn texts(vm: &mut Vm, function: Value) -> Result<(Value, Value), Exit> {
+    let texts = vm.world.texts_of_function(&mut vm.heap, function);
+    match vm.exchange.loaded(texts)? {
+        Some(texts) => Ok(texts),
+        None => vm.exchange.type_error(function, "FUNCTION"),
+    }
 }
 
 pub(super) fn function_arity(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -7,7 +7,7 @@
 //!
 //! A goal names the goal that comes after it, so formulas in formulas become one graph.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use super::formula::{Formula, Pattern, TestForm};
 use super::relation::INDEXED_POSITIONS;
@@ -21,9 +21,9 @@ pub(super) type GoalId = u32;
 #[derive(Clone, Debug)]
 pub(super) enum Goal {
     /// Finds facts.
-    Match { pattern: Rc<Pattern>, relation: Option<u32>, next: GoalId },
+    Match { pattern: Arc<Pattern>, relation: Option<u32>, next: GoalId },
     /// Finds facts of a predicate that has rules.
-    Call { pattern: Rc<Pattern>, predicate: usize, next: GoalId },
+    Call { pattern: Arc<Pattern>, predicate: usize, next: GoalId },
     /// Tries one after the other. The ranks are those of the alternatives.
     Branch { alternatives: Vec<GoalId>, rank: usize, ranks_end: usize },
     /// Goes on if there is no answer inside.
@@ -114,7 +114,7 @@ impl Planner<'_> {
             true => self.database.find_relation(pattern.functor, pattern.arguments.len()),
             false => None,
         };
-        let shared = Rc::new(pattern.clone());
+        let shared = Arc::new(pattern.clone());
         let predicates: Vec<usize> = self.rules.matching(pattern).collect();
         if let (true, [predicate]) = (is_plain, predicates.as_slice()) {
             return self.add(Goal::Call { pattern: shared.clone(), predicate: *predicate, next });

@@ -2,7 +2,7 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use smallvec::SmallVec;
 
@@ -16,7 +16,7 @@ use super::term::Term;
 /// Where a search through several relations stands. It goes through their facts in the order of assertion.
 #[derive(Debug)]
 pub(super) struct RelationScan {
-    pattern: Rc<Pattern>,
+    pattern: Arc<Pattern>,
     /// The next relation to be opened.
     opening: u32,
     /// The next row of each relation, with the index along which it is found.
@@ -26,7 +26,7 @@ pub(super) struct RelationScan {
 }
 
 impl RelationScan {
-    pub(super) fn new(pattern: Rc<Pattern>) -> RelationScan {
+    pub(super) fn new(pattern: Arc<Pattern>) -> RelationScan {
         RelationScan { pattern, opening: 0, heads: BinaryHeap::new(), indexes: Vec::new(), is_opened: false }
     }
 

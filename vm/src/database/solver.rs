@@ -13,7 +13,6 @@
 //! Apt, Blair and Walker.
 
 use std::collections::VecDeque;
-use std::rc::Rc;
 use std::sync::Arc;
 
 use smallvec::SmallVec;
@@ -627,7 +626,7 @@ impl Query {
             self.sinks.push(Sink::Facts(table));
             self.bindings.clear();
             self.bindings.resize(width, Term::UNBOUND);
-            let pattern = Rc::new(pattern);
+            let pattern = Arc::new(pattern);
             self.goals.push(Goal::Match { pattern, relation: Some(relation), next: SOLVED });
             self.state = SolverState::Goal(self.goals.len() as GoalId - 1);
             return Ok(());

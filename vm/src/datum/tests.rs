@@ -10,7 +10,7 @@ struct Fixture {
 
 impl Fixture {
     fn new() -> Fixture {
-        let mut heap = crate::interp::trust::heap_for_tests();
+        let mut heap = crate::trust::heap_for_tests();
         let world = World::new(&mut heap).unwrap();
         Fixture { heap, world, unit: Unit::default() }
     }

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use esl_bytecode::compile::{CompileTimeHost, LocalDefinition, MacroCall, MacroRef};
+use esl_bytecode::compile::{Compile, CompileTimeHost, LocalDefinition, MacroCall, MacroRef};
 use esl_bytecode::datum::{Datum, ObjectId};
 use esl_bytecode::file::ModuleImage;
 use esl_bytecode::module::{Constant, Function, FunctionNumber, Module, Parameters, PoolIdx};
@@ -14,10 +14,11 @@ use esl_bytecode::operand::*;
 
 use crate::datum::Unit;
 use crate::heap::AllocError;
-use crate::load::{Alone, LoadError, load};
+use crate::raise::Exit;
 use crate::run::CallError;
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::world::load::{Alone, LoadError, load};
 
 /// Ticks that one macro call may take before it counts as one that never ends.
 const MACRO_TICKS: u64 = 50_000_000;
@@ -25,9 +26,30 @@ const MACRO_TICKS: u64 = 50_000_000;
 const LOAD_TICKS: u64 = 1_000_000_000;
 
 impl Vm {
+    /// Gives the machine a compiler, for `eval`, `load` and `read`.
+    pub fn set_compiler(&mut self, compiler: Box<dyn Compile>) {
+        self.compiler.compiler = Some(compiler);
+    }
+
+    /// Applies `work` to the compiler, which may ask about the program meanwhile.
+    ///
+    /// # Errors
+    /// A failure if the machine has no compiler.
+    pub(crate) fn with_compiler<T>(
+        &mut self,
+        work: impl FnOnce(&mut Vm, &dyn Compile) -> T,
+    ) -> Result<T, Exit> {
+        let Some(compiler) = self.compiler.compiler.take() else {
+            return self.exchange.program_error("this machine has no compiler");
+        };
+        let result = work(self, &*compiler);
+        self.compiler.compiler = Some(compiler);
+        Ok(result)
+    }
+
     /// Begins to compile another unit: objects and uninterned symbols of the last one are forgotten.
     pub fn begin_unit(&mut self) {
-        self.world.unit.replace(Unit::default());
+        self.compiler.unit.replace(Unit::default());
     }
 
     /// Loads a module that stands alone, such as one from a file, and gives the functions that run its top-level forms, in
@@ -44,9 +66,9 @@ impl Vm {
     /// # Errors
     /// [`LoadError`].
     pub(crate) fn load_in_unit(&mut self, module: &Module) -> Result<Value, LoadError> {
-        let mut unit = self.world.unit.take();
+        let mut unit = self.compiler.unit.take();
         let functions = load(&mut self.heap, &mut self.world, module, &mut unit);
-        self.world.unit.replace(unit);
+        self.compiler.unit.replace(unit);
         functions
     }
 
@@ -86,9 +108,9 @@ impl Vm {
 
     /// The function, form and environment of a macro call, as the program sees them.
     pub(crate) fn macro_call(&mut self, call: &MacroCall) -> Result<Option<[Value; 3]>, LoadError> {
-        let mut unit = self.world.unit.take();
+        let mut unit = self.compiler.unit.take();
         let prepared = self.prepare(call, &mut unit);
-        self.world.unit.replace(unit);
+        self.compiler.unit.replace(unit);
         prepared
     }
 
@@ -117,9 +139,9 @@ impl Vm {
     /// # Errors
     /// [`CallError`].
     pub fn run_toplevel(&mut self, functions: Value, ticks: u64) -> Result<Value, CallError> {
-        self.pin(functions);
+        self.embedder.pin(&mut self.heap, functions);
         let values = self.runner().and_then(|runner| self.call(runner, &[functions], ticks));
-        self.unpin(functions);
+        self.embedder.unpin(functions);
         Ok(values?.first().copied().unwrap_or(Value::NIL))
     }
 
@@ -187,7 +209,7 @@ impl CompileTimeHost for Vm {
         let values = self.call(function, &[form, environment], MACRO_TICKS);
         let values = values.map_err(|error| error.to_string())?;
         let expansion = values.first().copied().unwrap_or(Value::NIL);
-        let mut unit = self.world.unit.borrow_mut();
+        let mut unit = self.compiler.unit.borrow_mut();
         let datum = unit.datum_of(&self.heap, &self.world, expansion, call.form.span());
         datum.map_err(|error| error.to_string())
     }
@@ -195,6 +217,6 @@ impl CompileTimeHost for Vm {
     fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, String> {
         let functions = self.with_room(|vm| vm.load_in_unit(&module)).map_err(|error| error.to_string())?;
         let value = self.run_toplevel(functions, LOAD_TICKS).map_err(|error| error.to_string())?;
-        Ok(keep.then(|| self.world.unit.borrow_mut().pin(value)))
+        Ok(keep.then(|| self.compiler.unit.borrow_mut().pin(value)))
     }
 }

@@ -11,7 +11,7 @@ use esl_bytecode::file::{ImageBytes, ModuleImage, write};
 use esl_bytecode::module::{Constant, Function, FunctionNumber, Module, PoolIdx};
 
 use super::*;
-use crate::load::prepare;
+use crate::world::load::prepare;
 
 fn span() -> Span {
     Span::default()
@@ -154,7 +154,7 @@ fn a_kept_value_comes_back_as_itself() {
     let mut vm = Vm::for_tests();
     let module = call(Builtin::List, vec![Constant::True]);
     let kept = CompileTimeHost::load(&mut vm, module, true).unwrap().unwrap();
-    let value = vm.world.unit.borrow().pinned(kept).unwrap();
+    let value = vm.compiler.unit.borrow().pinned(kept).unwrap();
     assert_eq!(vm.heap.car(value), Some(Value::T));
 }
 

@@ -15,7 +15,6 @@ use super::live::Live;
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{Heap, Kind};
 use crate::interp::frames::{Frames, entry_word};
-use crate::load::image_origin;
 use crate::schedule::Due;
 use crate::shape::{Shape, Sort};
 use crate::table::Table;
@@ -25,6 +24,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{event, link};
 use crate::world::GivenMap;
+use crate::world::load::image_origin;
 
 /// Two hashes of 64 bits of a sequence of words, mixed apart from each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -11,10 +11,10 @@ use esl_bytecode::symbol::Symbol;
 use super::fingerprint::Fingerprints;
 use super::live::Live;
 use super::{Exploration, Settings, explore};
-use crate::load::{Alone, load};
 use crate::run::RunOutcome;
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::world::load::{Alone, load};
 
 fn words(code: &[Instr]) -> Vec<u32> {
     code.iter()

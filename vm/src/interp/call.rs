@@ -12,7 +12,6 @@ use super::substitute::{deliver, return_all, substitute};
 use super::{
     Operation, Signal, aux_at, code_of, constants_of, failure, operation, pc_as_value, stubs, word_at,
 };
-use crate::builtins::NATIVES;
 use crate::heap::layout::{Kind, Symbol};
 use crate::raise::Arguments;
 use crate::raise::{Exit, Raised};
@@ -23,13 +22,13 @@ use crate::vm::Vm;
 /// Where a call puts its frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FramePlace {
-    /// In the window that the instruction at `vm.cpu.pc` names; it returns behind the instruction.
+    /// In the window that the instruction at `vm.cpu.pc()` names; it returns behind the instruction.
     Window,
     /// In place of the running frame.
     Tail,
-    /// Above the running frame; its values take the place of those of the instruction at `vm.cpu.pc`.
+    /// Above the running frame; its values take the place of those of the instruction at `vm.cpu.pc()`.
     Above,
-    /// Above the running frame; the instruction at `vm.cpu.pc` comes after it.
+    /// Above the running frame; the instruction at `vm.cpu.pc()` comes after it.
     Interrupt,
 }
 
@@ -46,7 +45,7 @@ impl FramePlace {
     }
 }
 
-/// The call at `vm.cpu.pc`, whose tick has been taken.
+/// The call at `vm.cpu.pc()`, whose tick has been taken.
 ///
 /// # Safety
 /// The contract of [`super::settle`], at a call instruction.
@@ -54,7 +53,7 @@ pub(super) unsafe fn slow_call(vm: &mut Vm) -> Signal {
     // SAFETY: V1: the instruction has its aux word; V3: window and arguments are registers of the frame; V4:
     // the constant is there; F2: the running function is below the registers.
     unsafe {
-        let (pc, base) = (vm.cpu.pc, vm.cpu.base);
+        let (pc, base) = (vm.cpu.pc(), vm.cpu.base());
         let word = word_at(pc);
         let window = base.add(word.a());
         let given = std::slice::from_raw_parts(window.add(2), word.b());
@@ -109,25 +108,25 @@ pub(super) unsafe fn call(vm: &mut Vm, callee: Value, arguments: &[Value], place
         let nregs = (*code).nregs as usize;
         let frame = match place {
             FramePlace::Tail => 0,
-            FramePlace::Window => word_at(vm.cpu.pc).a() + 2,
-            FramePlace::Above | FramePlace::Interrupt => (*code_of(*vm.cpu.base.sub(2))).nregs as usize + 3,
+            FramePlace::Window => word_at(vm.cpu.pc()).a() + 2,
+            FramePlace::Above | FramePlace::Interrupt => (*code_of(*vm.cpu.base().sub(2))).nregs as usize + 3,
         };
         // The link and the saved pc of `FramePlace::Above` are counted in `frame`, the arguments in `nregs`.
-        let offset = vm.offset_of(vm.cpu.base) + frame;
+        let offset = vm.offset_of(vm.cpu.base()) + frame;
         if let Err(exit) = vm.reserve_stack(offset + nregs) {
             return Signal::Exit(exit);
         }
-        let registers = vm.cpu.base.add(frame);
+        let registers = vm.cpu.base().add(frame);
         // The window register, if the frame lies above the running one.
         let window = frame.wrapping_sub(2) as u8;
         let return_to = match place {
             FramePlace::Tail => None,
-            FramePlace::Window => Some(vm.cpu.pc.add(stubs::length(word_at(vm.cpu.pc)))),
+            FramePlace::Window => Some(vm.cpu.pc().add(stubs::length(word_at(vm.cpu.pc())))),
             FramePlace::Above => Some(stubs::error_return(window)),
             FramePlace::Interrupt => Some(stubs::interrupt_return(window)),
         };
         if matches!(place, FramePlace::Above | FramePlace::Interrupt) {
-            *registers.sub(3) = pc_as_value(vm.cpu.pc);
+            *registers.sub(3) = pc_as_value(vm.cpu.pc());
         }
         if let Some(return_to) = return_to {
             *registers.sub(1) = pc_as_value(return_to);
@@ -136,8 +135,8 @@ pub(super) unsafe fn call(vm: &mut Vm, callee: Value, arguments: &[Value], place
         for (i, &argument) in arranged.iter().enumerate() {
             *registers.add(i) = argument;
         }
-        vm.cpu.base = registers;
-        vm.cpu.pc = (*code).entry;
+        vm.cpu.set_base(registers);
+        vm.cpu.set_pc((*code).entry);
     }
     Signal::Reload
 }
@@ -155,7 +154,7 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Fram
         let text = format!("{text}; it takes {}", describe_arity(info.arity.min as usize, info.arity.max));
         return failure(vm, Raised::Program(text));
     }
-    match NATIVES[usize::from(number)](vm, arguments) {
+    match vm.natives[usize::from(number)](vm, arguments) {
         Ok(value) => {
             vm.exchange.values.clear();
             vm.exchange.values.push(value);
@@ -183,8 +182,8 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Fram
         match place {
             FramePlace::Tail => return_all(vm),
             FramePlace::Window => {
-                let word = word_at(vm.cpu.pc);
-                deliver(vm, vm.cpu.base.add(word.a()), word.c());
+                let word = word_at(vm.cpu.pc());
+                deliver(vm, vm.cpu.base().add(word.a()), word.c());
                 Signal::Next
             }
             FramePlace::Above => substitute(vm),
@@ -224,6 +223,17 @@ impl Vm {
         }
     }
 
+    /// Makes a function ready to be called: one that nobody has called yet is loaded.
+    ///
+    /// # Errors
+    /// [`Exit::Collect`] without room, or a failure if the image is damaged.
+    pub(crate) fn make_ready(&mut self, function: Value) -> Result<(), Exit> {
+        let words = self.world.make_ready(&mut self.heap, function);
+        let words = self.exchange.loaded(words)?;
+        self.exchange.charge(words);
+        Ok(())
+    }
+
     /// Returns the library's function that takes over from a builtin with too much to do at once.
     ///
     /// # Errors
@@ -231,7 +241,7 @@ impl Vm {
     pub(super) fn twin_of(&mut self, builtin: &BuiltinInfo) -> Result<Value, Exit> {
         if let Some(name) = builtin.slowly
             && let Ok(symbol) = self.world.intern_esl(&mut self.heap, name)
-            && self.is_defined(symbol)
+            && self.world.is_defined(&self.heap, symbol)
         {
             return Ok(symbol);
         }

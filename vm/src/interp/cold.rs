@@ -10,13 +10,13 @@ use esl_bytecode::opcode::TypeCode;
 
 use super::arguments::MAX_SPREAD;
 use super::{Operation, Signal, aux_at, code_of, constant, constants_of, failure, operation, word_at};
-use crate::builtins::{NATIVES, Native, types};
 use crate::heap::layout::{Code, Function, Kind};
 use crate::number;
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::shape::capture_source;
+use crate::types;
 use crate::value::Value;
-use crate::vm::Vm;
+use crate::vm::{Native, Vm};
 use crate::world::class;
 
 /// Puts an outcome into register `dst`.
@@ -60,8 +60,8 @@ fn builtin(operation: Operation) -> Builtin {
 }
 
 /// The implementation of the builtin that does what an instruction does.
-fn native(operation: Operation) -> Native {
-    NATIVES[builtin(operation) as usize]
+fn native(vm: &Vm, operation: Operation) -> Native {
+    vm.natives[builtin(operation) as usize]
 }
 
 /// Has the ESL twin of a builtin do what is too much work for one instruction: its call takes the instruction's place.
@@ -94,7 +94,7 @@ pub(super) unsafe fn arithmetic(vm: &mut Vm, pc: *const u32, base: *mut Value) -
             Operation::NumEq => number::num_equal(vm, left, right).map(Value::boolean),
             Operation::Less => number::less(vm, left, right).map(Value::boolean),
             Operation::LessEq => number::less_or_equal(vm, left, right).map(Value::boolean),
-            operation => native(operation)(vm, &[left, right]),
+            operation => native(vm, operation)(vm, &[left, right]),
         };
         let outcome = match outcome {
             // Of quotient and remainder the instruction wants the first.
@@ -163,7 +163,7 @@ pub(super) fn is_type(vm: &Vm, value: Value, code: u8) -> bool {
         Some(TypeCode::Null) => value.is_nil(),
         Some(TypeCode::Fixnum) => value.is_fixnum(),
         Some(TypeCode::Character) => value.is_character(),
-        Some(code) => types::has_type_code(vm, value, code),
+        Some(code) => types::has_type_code(&vm.heap, value, code),
         None => false,
     }
 }
@@ -239,10 +239,10 @@ pub(super) unsafe fn array(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sig
         let (x, y, z) = (*base.add(a), *base.add(b), *base.add(c));
         match operation(word) {
             operation @ (Operation::VectorRef | Operation::ArrayRef) => {
-                let outcome = native(operation)(vm, &[y, z]);
+                let outcome = native(vm, operation)(vm, &[y, z]);
                 finish(base, a, outcome)
             }
-            operation => match native(operation)(vm, &[x, y, z]) {
+            operation => match native(vm, operation)(vm, &[x, y, z]) {
                 Ok(_) => Signal::Next,
                 Err(exit) => Signal::Exit(exit),
             },

@@ -5,7 +5,7 @@
 //! the marker gets to it or just before the task runs, whichever is first.
 
 use super::{Leave, code_of};
-use crate::environment::Compiler;
+use crate::compiler::Compiler;
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Phase, SLICE_VISITS, SliceOutcome};
 use crate::saved_pc::SavedPc;
@@ -175,8 +175,8 @@ impl Vm {
 
     /// Notes where the running task stands, for a scan or a switch.
     pub(crate) fn save_cpu(&mut self) {
-        let offset = self.offset_of(self.cpu.base);
-        let pc = SavedPc::new(self.cpu.pc);
+        let offset = self.offset_of(self.cpu.base());
+        let pc = SavedPc::new(self.cpu.pc());
         let task = self.scheduler.task_mut();
         task.base = offset as u32;
         task.pc = pc;

@@ -28,7 +28,7 @@ pub(super) unsafe fn exit(vm: &mut Vm, exit: Exit) -> Signal {
             Exit::Slowly => take_over(vm),
             Exit::Call => {
                 let (function, arguments) = vm.exchange.take_requested_call();
-                let place = FramePlace::for_instruction(word_at(vm.cpu.pc));
+                let place = FramePlace::for_instruction(word_at(vm.cpu.pc()));
                 call(vm, function, &arguments, place)
             }
             Exit::Park => Signal::Park,
@@ -46,12 +46,12 @@ unsafe fn take_over(vm: &mut Vm) -> Signal {
     // SAFETY: V1, V5: the aux word is the number of the builtin; V3: the arguments are registers of the
     // frame.
     unsafe {
-        let word = word_at(vm.cpu.pc);
-        let function = match vm.twin_of(&BUILTINS[aux_at(vm.cpu.pc) as usize]) {
+        let word = word_at(vm.cpu.pc());
+        let function = match vm.twin_of(&BUILTINS[aux_at(vm.cpu.pc()) as usize]) {
             Ok(function) => function,
             Err(exit) => return Signal::Exit(exit),
         };
-        let given = std::slice::from_raw_parts(vm.cpu.base.add(word.a() + 2), word.b());
+        let given = std::slice::from_raw_parts(vm.cpu.base().add(word.a() + 2), word.b());
         call(vm, function, given, FramePlace::for_instruction(word))
     }
 }
@@ -69,7 +69,7 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
     };
     vm.exchange.raised = None;
     let function = vm.world.known.raise;
-    if !vm.is_defined(function) {
+    if !vm.world.is_defined(&vm.heap, function) {
         // Without a library nobody can handle it.
         let words: Vec<String> = arguments.iter().map(|&v| describe(&vm.heap, v)).collect();
         vm.embedder.last_words = Some(words.join(" "));
@@ -80,20 +80,20 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
     unsafe { call(vm, function, &arguments, FramePlace::Above) }
 }
 
-/// Collects, so that the instruction at `vm.cpu.pc` is done again with more room; if that did not help the last time, the
+/// Collects, so that the instruction at `vm.cpu.pc()` is done again with more room; if that did not help the last time, the
 /// heap is exhausted.
 ///
 /// # Safety
 /// The contract of [`super::settle`].
 unsafe fn collect(vm: &mut Vm) -> Signal {
     // SAFETY: V1: `pc` is at an instruction.
-    let word = unsafe { word_at(vm.cpu.pc) };
+    let word = unsafe { word_at(vm.cpu.pc()) };
     let is_call = FramePlace::for_instruction(word) != FramePlace::Above;
     if is_call {
         // Its tick will be taken again.
         vm.cpu.ticks += 1;
     }
-    let place = (SavedPc::new(vm.cpu.pc), vm.scheduler.task().ticks, vm.cpu.ticks);
+    let place = (SavedPc::new(vm.cpu.pc()), vm.scheduler.task().ticks, vm.cpu.ticks);
     if vm.exchange.collected_at == Some(place) {
         vm.exchange.collected_at = None;
         if is_call {

@@ -151,7 +151,7 @@ impl Vm {
     pub(crate) fn frames(&self) -> impl Iterator<Item = Frame<'_>> {
         let task = self.scheduler.running.as_ref();
         // SAFETY: F1: `vm.cpu` describes the running task, which is borrowed for as long.
-        task.map(|task| unsafe { Frames::new(task.stack.start(), self.cpu.pc, self.cpu.base) })
+        task.map(|task| unsafe { Frames::new(task.stack.start(), self.cpu.pc(), self.cpu.base()) })
             .into_iter()
             .flatten()
     }

@@ -14,7 +14,7 @@ use crate::vm::Vm;
 /// # Safety
 /// The contract of [`super::settle`], at an instruction that has had no effect yet.
 pub(super) unsafe fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]) -> Signal {
-    let base = vm.offset_of(vm.cpu.base) as u32;
+    let base = vm.offset_of(vm.cpu.base()) as u32;
     let task = vm.scheduler.task_mut();
     let wait = std::mem::replace(&mut task.wait, Value::NIL);
     let bindings = task.control.bindings.len() as u32;

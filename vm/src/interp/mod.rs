@@ -44,7 +44,6 @@ pub(crate) mod stubs;
 mod substitute;
 #[cfg(test)]
 mod tests;
-pub(crate) mod trust;
 mod unwind;
 mod variable;
 
@@ -52,7 +51,7 @@ pub(crate) use collect::top_of_task;
 use esl_bytecode::for_each_opcode;
 use esl_bytecode::word::Word;
 
-use crate::builtins::NATIVES;
+use crate::cpu::Cpu;
 use crate::heap::layout::{Boxed, Code, Function, Kind, Structure, Symbol, Vector};
 use crate::raise::{Exit, Raised};
 use crate::value::Value;
@@ -113,52 +112,6 @@ pub(crate) enum Leave {
     /// It waits.
     Parked,
 }
-
-/// The machine's registers while the loop is left.
-pub(crate) struct Cpu {
-    /// The next instruction, or the one that was given up.
-    pc: *const u32,
-    /// First register of the running frame.
-    base: *mut Value,
-    /// End of the running task's stack.
-    stack_end: *mut Value,
-    /// Whether the call of the builtin that runs wants its first value only.
-    pub wants_one: bool,
-    /// Ticks left until the next safepoint.
-    pub ticks: i32,
-    /// Ticks kept back so that the collector has its turn at the next tick.
-    pub reserve: i32,
-    /// Ticks of this slice that were given out at its beginning.
-    pub granted: i32,
-    /// Turns of the collector in this slice.
-    pub collections: u32,
-}
-
-impl Cpu {
-    pub(crate) const fn new() -> Cpu {
-        Cpu {
-            pc: std::ptr::null(),
-            base: std::ptr::null_mut(),
-            stack_end: std::ptr::null_mut(),
-            wants_one: false,
-            ticks: 0,
-            reserve: 0,
-            granted: 0,
-            collections: 0,
-        }
-    }
-
-    /// Takes the ticks of the slice that were used.
-    pub(crate) fn take_used(&mut self) -> u64 {
-        let left = i64::from(self.reserve) + i64::from(self.ticks);
-        self.reserve = 0;
-        (i64::from(self.granted) - left).max(0) as u64
-    }
-}
-
-// SAFETY: the pointers lead into the running task's stack and into code; the machine owns both and moves with
-// them.
-unsafe impl Send for Cpu {}
 
 /// The code of a function.
 ///
@@ -263,7 +216,8 @@ pub(crate) fn load(vm: &mut Vm, ticks: i32) {
     // SAFETY: F3: the base of the task lies in its stack.
     let base = unsafe { task.stack.start().add(task.base as usize) };
     let stack_end = vm.stack_end();
-    vm.cpu = Cpu { pc, base, stack_end, wants_one: false, ticks, reserve: 0, granted: ticks, collections: 0 };
+    // SAFETY: the task stands at `pc` in the frame at `base`, and may use its stack up to `stack_end`.
+    vm.cpu = unsafe { Cpu::at(pc, base, stack_end, ticks) };
     vm.arm();
 }
 
@@ -313,8 +267,8 @@ unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
             signal = match signal {
                 Signal::Reload => return Ok(()),
                 Signal::Next => {
-                    let words = stubs::length(word_at(vm.cpu.pc));
-                    vm.cpu.pc = vm.cpu.pc.add(words);
+                    let words = stubs::length(word_at(vm.cpu.pc()));
+                    vm.cpu.set_pc(vm.cpu.pc().add(words));
                     return Ok(());
                 }
                 Signal::Tick => match vm.safepoint() {
@@ -344,8 +298,8 @@ unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
 /// The contract of [`settle`]; the code at `pc` has passed the verifier, or is a stub.
 #[allow(clippy::too_many_lines, reason = "one arm for each row of the opcode table")]
 unsafe fn dispatch(vm: &mut Vm) -> Signal {
-    let mut pc = vm.cpu.pc;
-    let mut base = vm.cpu.base;
+    let mut pc = vm.cpu.pc();
+    let mut base = vm.cpu.base();
     let mut ticks = vm.cpu.ticks;
     // SAFETY: F2: below the base is the function of the frame, which keeps its code alive.
     let mut k = unsafe { constants_of(code_of(*base.sub(2))) };
@@ -525,7 +479,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 ($window:expr, $function:expr, $code:expr, $return_to:expr) => {{
                     let (window, code): (*mut Value, *mut Code) = ($window, $code);
                     let registers = window.add(2);
-                    if registers.add((*code).nregs as usize) > vm.cpu.stack_end {
+                    if registers.add((*code).nregs as usize) > vm.cpu.stack_end() {
                         break Signal::Call;
                     }
                     *window = $function;
@@ -1054,8 +1008,10 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     let arguments = std::slice::from_raw_parts(window.add(2), word.b());
                     // SAFETY: V5: the number is in the table, the number of arguments right. The slice of
                     // arguments stays good, since no builtin writes to the stack or moves it.
-                    let native = *NATIVES.get_unchecked(aux!() as usize);
-                    (vm.cpu.pc, vm.cpu.base, vm.cpu.wants_one) = (pc, base, word.c() == 0);
+                    let native = *vm.natives.get_unchecked(aux!() as usize);
+                    vm.cpu.set_pc(pc);
+                    vm.cpu.set_base(base);
+                    vm.cpu.wants_one = word.c() == 0;
                     match native(vm, arguments) {
                         Ok(value) if word.c() == 0 => {
                             *window = value;
@@ -1093,7 +1049,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     if function.is_object() && (*function.object_ptr()).kind == Kind::Function {
                         let code = code_of(function);
                         if (*code).arity == word.b() as u32
-                            && base.add((*code).nregs as usize) <= vm.cpu.stack_end
+                            && base.add((*code).nregs as usize) <= vm.cpu.stack_end()
                         {
                             for i in 0..word.b() {
                                 *base.add(i) = *window.add(2 + i);
@@ -1112,7 +1068,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     let function = (*symbol).function;
                     let code = code_of(function);
                     if (*code).arity == word.b() as u32
-                        && base.add((*code).nregs as usize) <= vm.cpu.stack_end
+                        && base.add((*code).nregs as usize) <= vm.cpu.stack_end()
                     {
                         let window = base.add(word.a());
                         for i in 0..word.b() {
@@ -1128,8 +1084,10 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 Operation::TailCallBuiltin => {
                     tick!();
                     let arguments = std::slice::from_raw_parts(base.add(word.a() + 2), word.b());
-                    let native = *NATIVES.get_unchecked(aux!() as usize);
-                    (vm.cpu.pc, vm.cpu.base, vm.cpu.wants_one) = (pc, base, false);
+                    let native = *vm.natives.get_unchecked(aux!() as usize);
+                    vm.cpu.set_pc(pc);
+                    vm.cpu.set_base(base);
+                    vm.cpu.wants_one = false;
                     match native(vm, arguments) {
                         Ok(value) => {
                             if vm.wants_safepoint() {
@@ -1190,16 +1148,19 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         interrupt::interrupt_return(vm, base)
                     };
                     // It has found the place to go on at.
-                    pc = vm.cpu.pc;
-                    base = vm.cpu.base;
+                    pc = vm.cpu.pc();
+                    base = vm.cpu.base();
                     break signal;
                 }
                 Operation::TaskExit => break Signal::TaskExit,
             }
         }
     };
-    vm.cpu.pc = pc;
-    vm.cpu.base = base;
+    // SAFETY: the loop stands at `pc` in the frame at `base`.
+    unsafe {
+        vm.cpu.set_pc(pc);
+        vm.cpu.set_base(base);
+    }
     vm.cpu.ticks = ticks;
     signal
 }

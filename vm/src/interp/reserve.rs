@@ -26,6 +26,13 @@ impl Vm {
         unsafe { stack.start().add(stack.capacity().min(self.stack_limit())) }
     }
 
+    /// Notes up to where the running task's stack may be used, after that has changed.
+    fn update_stack_end(&mut self) {
+        let stack_end = self.stack_end();
+        // SAFETY: it is that of the running task's stack.
+        unsafe { self.cpu.set_stack_end(stack_end) };
+    }
+
     /// Makes room in the running task's stack for `words` words in all.
     ///
     /// # Errors
@@ -37,27 +44,31 @@ impl Vm {
                 return Err(Exit::Unwind);
             }
             self.scheduler.task_mut().flags.set_uses_reserve(true);
-            self.cpu.stack_end = self.stack_end();
+            self.update_stack_end();
             return self.exchange.raise(Raised::StackExhausted);
         }
         if words <= self.scheduler.task().stack.capacity() {
             return Ok(());
         }
-        let offset = self.offset_of(self.cpu.base);
+        let offset = self.offset_of(self.cpu.base());
         self.scheduler.task_mut().stack.grow(words);
         // SAFETY: the offset was inside of the stack, which has grown.
-        self.cpu.base = unsafe { self.scheduler.task().stack.start().add(offset) };
-        self.cpu.stack_end = self.stack_end();
+        unsafe {
+            let base = self.scheduler.task().stack.start().add(offset);
+            self.cpu.set_base(base);
+        }
+        self.update_stack_end();
         Ok(())
     }
 
     /// Closes the reserves of stack and heap once the handling of their exhaustion is over: an unwinding has landed.
     pub(super) fn close_reserves(&mut self) {
         self.heap.close_reserve();
-        if self.scheduler.task().flags.uses_reserve() && self.offset_of(self.cpu.base) < self.config.stack / 2
+        if self.scheduler.task().flags.uses_reserve()
+            && self.offset_of(self.cpu.base()) < self.config.stack / 2
         {
             self.scheduler.task_mut().flags.set_uses_reserve(false);
-            self.cpu.stack_end = self.stack_end();
+            self.update_stack_end();
         }
     }
 

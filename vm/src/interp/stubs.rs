@@ -8,7 +8,6 @@
 //! A return reads the call word two words before the return address, so each stub is a call word, its aux word, and
 //! then the operation that goes on.
 
-use esl_bytecode::builtin::Builtin;
 use esl_bytecode::opcode::Opcode;
 use esl_bytecode::operand::Want;
 use esl_bytecode::word::Word;
@@ -19,17 +18,6 @@ pub(super) const TASK_EXIT: u8 = 0;
 pub(super) const ERROR_RETURN: u8 = 0xC3;
 /// Number of the operation after a function that ran where its task was interrupted.
 pub(super) const INTERRUPT_RETURN: u8 = 0xC4;
-
-/// The code of a symbol without a function; the symbol is capture 0 of the function. The interpreter goes by the shape
-/// and never comes here, nor to the next two.
-pub(crate) const UNDEFINED_WORD: u32 = 0xC1;
-/// The code of a function that nobody has called yet: the loader puts its real code in place of this.
-pub(crate) const LAZY_WORD: u32 = 0xC2;
-
-/// Returns the code of a builtin, its number above the operation.
-pub(crate) const fn native_word(builtin: Builtin) -> u32 {
-    0xC0 | (builtin as u32) << 16
-}
 
 /// A call word whose window is register `window` and that wants all values.
 const fn call_word(window: u8) -> u32 {

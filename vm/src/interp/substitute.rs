@@ -38,19 +38,19 @@ pub(super) unsafe fn return_all(vm: &mut Vm) -> Signal {
     // SAFETY: F2: the link leads behind a call word whose window begins with the link; V3: the window has the
     // registers that the call wants.
     unsafe {
-        let base = vm.cpu.base;
+        let base = vm.cpu.base();
         let return_to = pc_from_value(*base.sub(1));
         let call = word_at(return_to.sub(2));
         let window = base.sub(2);
-        vm.cpu.base = window.sub(call.a());
-        vm.cpu.pc = return_to;
+        vm.cpu.set_base(window.sub(call.a()));
+        vm.cpu.set_pc(return_to);
         // A return to a wanted number of values may be to fewer registers than there are values.
         deliver(vm, window, call.c());
     }
     Signal::Reload
 }
 
-/// Puts the value list in the place of the result of the instruction at `vm.cpu.pc`, and goes on behind it.
+/// Puts the value list in the place of the result of the instruction at `vm.cpu.pc()`, and goes on behind it.
 ///
 /// # Safety
 /// The contract of [`super::settle`], at an instruction.
@@ -58,7 +58,7 @@ pub(super) unsafe fn substitute(vm: &mut Vm) -> Signal {
     // SAFETY: V1, V2: the instruction has an aux word and a target if its row says so; V3: its operand and
     // its window are registers of the frame.
     unsafe {
-        let (pc, base) = (vm.cpu.pc, vm.cpu.base);
+        let (pc, base) = (vm.cpu.pc(), vm.cpu.base());
         let word = word_at(pc);
         let value = vm.exchange.values.first().copied().unwrap_or(Value::NIL);
         let Some(opcode) = word.opcode() else { return Signal::Next };
@@ -69,7 +69,7 @@ pub(super) unsafe fn substitute(vm: &mut Vm) -> Signal {
             Substitute::Never => return Signal::Reload,
             Substitute::Test => {
                 if vm.exchange.values.first().is_some_and(|v| v.is_true()) == jumps_when(word) {
-                    vm.cpu.pc = pc.add(2).offset(aux_at(pc) as i32 as isize);
+                    vm.cpu.set_pc(pc.add(2).offset(aux_at(pc) as i32 as isize));
                     return Signal::Reload;
                 }
             }
@@ -80,7 +80,7 @@ pub(super) unsafe fn substitute(vm: &mut Vm) -> Signal {
                 _ => deliver(vm, base.add(word.a()), word.c()),
             },
         }
-        vm.cpu.pc = pc.add(stubs::length(word));
+        vm.cpu.set_pc(pc.add(stubs::length(word)));
         Signal::Reload
     }
 }
@@ -124,7 +124,7 @@ pub(super) unsafe fn resume_below(vm: &mut Vm, base: *mut Value) {
     // SAFETY: F3: by the contract the pc is in the word behind the registers.
     unsafe {
         let registers = (*code_of(*base.sub(2))).nregs as usize;
-        vm.cpu.base = base;
-        vm.cpu.pc = pc_from_value(*base.add(registers));
+        vm.cpu.set_base(base);
+        vm.cpu.set_pc(pc_from_value(*base.add(registers)));
     }
 }

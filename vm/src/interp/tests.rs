@@ -6,11 +6,11 @@ use esl_bytecode::operand::*;
 use esl_bytecode::symbol::Symbol;
 
 use crate::host::VirtualHost;
-use crate::load::{Alone, load};
 use crate::run::{CallError, RunOutcome};
 use crate::task::TaskResult;
 use crate::value::Value;
 use crate::vm::{Config, Vm};
+use crate::world::load::{Alone, load};
 
 /// A machine without a library.
 fn machine(config: Config) -> Vm {

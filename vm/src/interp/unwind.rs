@@ -255,7 +255,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
                 task.control.bindings.truncate_from(base);
                 vm.exchange.values = unwinding.values;
                 // SAFETY: the base is that of a frame that the task has not left, so it lies in the stack.
-                vm.cpu.base = unsafe { vm.scheduler.task().stack.start().add(base as usize) };
+                unsafe { vm.cpu.set_base(vm.scheduler.task().stack.start().add(base as usize)) };
                 vm.close_reserves();
                 return Signal::ReturnAll;
             }
@@ -340,7 +340,7 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
     // and asks for no more than the registers below the window.
     unsafe {
         vm.resume_at(&entry);
-        let window = vm.cpu.base.add(usize::from(entry.window));
+        let window = vm.cpu.base().add(usize::from(entry.window));
         deliver(vm, window, usize::from(entry.want));
     }
     vm.close_reserves();
@@ -379,9 +379,11 @@ impl Vm {
     /// # Safety
     /// The entry belongs to the running task, and its frame is live.
     unsafe fn resume_at(&mut self, entry: &Entry) {
-        self.cpu.pc = entry.pc.get();
-        // SAFETY: by the contract, the base of the entry lies in the stack.
-        self.cpu.base = unsafe { self.scheduler.task().stack.start().add(entry.base as usize) };
+        // SAFETY: by the contract, the base of the entry lies in the stack, and the address in the code of the frame there.
+        unsafe {
+            self.cpu.set_pc(entry.pc.get());
+            self.cpu.set_base(self.scheduler.task().stack.start().add(entry.base as usize));
+        }
     }
 
     /// Binds the symbols of a list to the items of another, for the frame with this base.

@@ -130,7 +130,10 @@ impl Vm {
 /// program, that of the tail call in the function with which the task began, or of its beginning if there are several.
 fn program_place(vm: &Vm, task: &Task) -> Option<String> {
     let place = |code: Value, word: usize| {
-        let place = vm.source_place(code, word as u32).filter(|place| !is_of_library(&place.source))?;
+        let place = vm
+            .world
+            .source_place(&vm.heap, code, word as u32)
+            .filter(|place| !is_of_library(&place.source))?;
         Some(format!("{}:{}:{}", place.source, place.line, place.column))
     };
     let in_frame = |frame: Frame<'_>| {

@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     fn world() -> (Heap, World) {
-        let mut heap = crate::interp::trust::heap_for_tests();
+        let mut heap = crate::trust::heap_for_tests();
         let world = World::new(&mut heap).unwrap();
         (heap, world)
     }

@@ -12,9 +12,9 @@ use esl_bytecode::symbol::Symbol;
 
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{AllocError, Heap, Kind};
-use crate::load::{self, LoadError};
 use crate::value::Value;
 use crate::world::World;
+use crate::world::load::{self, LoadError};
 
 impl World {
     /// Takes an image in: a list of the functions that run its top-level forms.

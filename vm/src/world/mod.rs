@@ -18,17 +18,17 @@ use esl_bytecode::builtin::{BUILTINS, Builtin, Visibility};
 use esl_bytecode::package::{PackageId, Packages};
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
-use crate::datum::Unit;
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{AllocError, Heap, Kind};
-use crate::interp::{stubs, trust};
-use crate::load::Images;
 use crate::shape::{Shape, Sort};
+use crate::trust;
 use crate::value::Value;
+use load::Images;
 
 pub(crate) mod class;
 mod defined;
 mod known;
+pub mod load;
 mod package;
 pub(crate) mod stream;
 
@@ -93,8 +93,6 @@ pub(crate) struct World {
     is_defining: bool,
     /// Modules that are loaded piece by piece.
     pub(crate) images: Images,
-    /// What the compilation that is under way remembers.
-    pub(crate) unit: RefCell<Unit>,
     /// Structure and condition classes by the address of their names.
     classes: GivenMap<u64, Value>,
 }
@@ -106,7 +104,7 @@ impl World {
     /// [`AllocError`] when the heap is too small for it.
     pub(crate) fn new(heap: &mut Heap) -> Result<World, AllocError> {
         let shape = Shape::other(Sort::Undefined, 0);
-        let undefined = trust::alloc_stub(heap, Value::NIL, Value::NIL, shape, 1, stubs::UNDEFINED_WORD)?;
+        let undefined = trust::alloc_stub(heap, Value::NIL, Value::NIL, shape, 1, trust::UNDEFINED_WORD)?;
         let mut world = World {
             known: Known::NONE,
             is_open: true,
@@ -124,7 +122,6 @@ impl World {
             undefined_yet: Vec::new(),
             is_defining: false,
             images: Images::default(),
-            unit: RefCell::default(),
             classes: GivenMap::default(),
         };
         world.nil = world.make_constant(heap, &Symbol::cl("NIL"), Value::NIL)?;
@@ -256,7 +253,7 @@ impl World {
     fn make_builtin(&mut self, heap: &mut Heap, builtin: Builtin, name: Value) -> Result<Value, AllocError> {
         let number = builtin.number();
         let shape = Shape::other(Sort::Native, number as u16);
-        let code = trust::alloc_stub(heap, name, Value::NIL, shape, 0, stubs::native_word(builtin))?;
+        let code = trust::alloc_stub(heap, name, Value::NIL, shape, 0, trust::native_word(builtin))?;
         trust::alloc_function(heap, code, &[])
     }
 
@@ -307,6 +304,11 @@ impl World {
         if self.is_undefined(heap, function) { None } else { Some(function) }
     }
 
+    /// Returns whether a symbol has a global function.
+    pub(crate) fn is_defined(&self, heap: &Heap, symbol: Value) -> bool {
+        self.function_of(heap, symbol).is_some()
+    }
+
     /// Whether `function` is what a symbol without a function holds.
     #[inline]
     pub(crate) fn is_undefined(&self, heap: &Heap, function: Value) -> bool {
@@ -343,7 +345,6 @@ impl World {
         self.symbols.values().copied().for_each(&mut *visit);
         self.package_objects.values().copied().for_each(&mut *visit);
         self.images.roots(visit);
-        self.unit.borrow().roots(visit);
         self.classes.values().copied().for_each(&mut *visit);
     }
 }
@@ -426,7 +427,7 @@ mod tests {
 
     #[test]
     fn a_symbol_has_one_object_and_a_builtin_its_function() {
-        let mut heap = crate::interp::trust::heap_for_tests();
+        let mut heap = crate::trust::heap_for_tests();
         let mut world = World::new(&mut heap).unwrap();
         let car = world.intern_cl(&mut heap, "CAR").unwrap();
         assert_eq!(world.intern(&mut heap, &Symbol::cl("CAR")), Ok(car));
@@ -449,7 +450,7 @@ mod tests {
 
     #[test]
     fn nil_and_t_are_immediates_with_companions() {
-        let mut heap = crate::interp::trust::heap_for_tests();
+        let mut heap = crate::trust::heap_for_tests();
         let mut world = World::new(&mut heap).unwrap();
         assert_eq!(world.intern_cl(&mut heap, "NIL"), Ok(Value::NIL));
         assert_eq!(world.intern_cl(&mut heap, "T"), Ok(Value::T));

@@ -4,13 +4,10 @@
 
 use std::sync::Arc;
 
-use esl_bytecode::compile::InternError;
 use esl_bytecode::package::{PackageId, Packages};
-use esl_bytecode::symbol::Symbol;
 
 use crate::heap::{AllocError, Heap, Kind};
 use crate::value::Value;
-use crate::vm::Vm;
 use crate::world::World;
 
 impl World {
@@ -70,42 +67,5 @@ impl World {
     /// The packages and their rules, to be changed.
     pub(crate) fn packages_mut(&mut self) -> &mut Packages {
         &mut self.packages
-    }
-}
-
-impl Vm {
-    /// The current package: what `*package*` is in the running task. When a program has put something else there, it is
-    /// `ESL-USER`.
-    pub(crate) fn current_package(&self) -> PackageId {
-        let value = self.symbol_value(self.world.known.package);
-        value.and_then(|value| self.world.package_of(&self.heap, value)).unwrap_or(PackageId::USER)
-    }
-
-    /// Names of all symbols that a person can write in the current package without a prefix, sorted.
-    pub fn accessible_names(&self) -> Vec<String> {
-        let names = self.world.packages().accessible_names(self.current_package());
-        names.into_iter().filter(|name| !name.starts_with('%')).map(String::from).collect()
-    }
-
-    /// Makes the package of this name the value of `*package*` outside of all bindings; false if there is none.
-    ///
-    /// # Errors
-    /// [`AllocError`] without room.
-    pub fn enter_package(&mut self, name: &str) -> Result<bool, AllocError> {
-        let Some(package) = self.world.packages.named(name) else { return Ok(false) };
-        let object = self.world.package_object(&mut self.heap, package)?;
-        self.heap.symbol_set_value(self.world.known.package, object);
-        Ok(true)
-    }
-
-    /// The symbol that a name denotes when it is read.
-    pub(crate) fn read_symbol(
-        &mut self,
-        prefix: Option<&str>,
-        name: &str,
-        internal: bool,
-    ) -> Result<Symbol, InternError> {
-        let current = self.current_package();
-        self.world.packages.read(current, prefix, name, internal)
     }
 }

@@ -23,12 +23,10 @@ use esl_bytecode::verify::VerifyError;
 
 use crate::heap::layout::Code;
 use crate::heap::{AllocError, CodeParts, Heap, Kind};
-use crate::interp::stubs::LAZY_WORD;
-use crate::interp::trust::{self, Verified};
-use crate::raise::{Exit, Raised};
 use crate::shape::{Shape, Sort, capture_word};
+use crate::trust::LAZY_WORD;
+use crate::trust::{self, Verified};
 use crate::value::Value;
-use crate::vm::Vm;
 use crate::world::World;
 
 mod data;
@@ -287,6 +285,17 @@ pub(crate) fn integer(heap: &mut Heap, value: &BigInt) -> Result<Value, AllocErr
     heap.alloc_bignum(value.sign() == num_bigint::Sign::Minus, &limbs)
 }
 
+/// Returns the integer that a value is, of any size; `None` for what is no integer.
+pub(crate) fn integer_of(heap: &Heap, v: Value) -> Option<BigInt> {
+    if let Some(n) = v.as_fixnum() {
+        return Some(n.into());
+    }
+    let big = heap.bignum(v)?;
+    let bytes: Vec<u8> = big.limbs.iter().flat_map(|limb| limb.to_le_bytes()).collect();
+    let sign = if big.negative { num_bigint::Sign::Minus } else { num_bigint::Sign::Plus };
+    Some(BigInt::from_bytes_le(sign, &bytes))
+}
+
 /// The value of a ratio in lowest terms.
 ///
 /// # Errors
@@ -307,58 +316,47 @@ pub(crate) fn array(heap: &mut Heap, dimensions: &[u32], items: &[Value]) -> Res
     heap.alloc_array(0, data, Value::NIL, &dimensions)
 }
 
-impl From<LoadError> for Raised {
-    fn from(error: LoadError) -> Raised {
-        Raised::Program(error.to_string())
-    }
-}
-
-impl Vm {
-    /// Where in the source word `pc` of a code was written.
-    pub(crate) fn source_place(&self, code: Value, pc: u32) -> Option<SourcePlace> {
-        let parts = self.heap.code(code)?;
+impl World {
+    /// Returns the place in the source where word `pc` of a code was written.
+    pub(crate) fn source_place(&self, heap: &Heap, code: Value, pc: u32) -> Option<SourcePlace> {
+        let parts = heap.code(code)?;
         if parts.owner.is_fixnum() {
-            return image::place_of(&self.heap, &self.world, code, pc);
+            return image::place_of(heap, self, code, pc);
         }
-        debug::place_of(&self.heap, parts.debug, pc)
+        debug::place_of(heap, parts.debug, pc)
     }
 
-    /// Lambda list and documentation of a function; `NIL` for what it has not.
+    /// Returns the lambda list and the documentation of a function, `NIL` for what it has not. `None` if `function` is no
+    /// function.
     ///
     /// # Errors
-    /// `type-error` for what is no function, [`Exit::Collect`] without room.
-    pub(crate) fn texts_of_function(&mut self, function: Value) -> Result<(Value, Value), Exit> {
-        if let Some((image, number)) = image_origin(&self.heap, function) {
-            let texts = image::texts(&mut self.heap, &mut self.world, image, number);
-            return self.loaded(texts);
+    /// [`LoadError`] if an image is damaged, or there is no room.
+    pub(crate) fn texts_of_function(
+        &mut self,
+        heap: &mut Heap,
+        function: Value,
+    ) -> Result<Option<(Value, Value)>, LoadError> {
+        if let Some((image, number)) = image_origin(heap, function) {
+            return image::texts(heap, self, image, number).map(Some);
         }
-        let code = self.heap.function_code(function).and_then(|code| self.heap.code(code)).copied();
-        let Some(code) = code else { return self.exchange.type_error(function, "FUNCTION") };
+        let code = heap.function_code(function).and_then(|code| heap.code(code)).copied();
+        let Some(code) = code else { return Ok(None) };
         let shape = Shape::unpack(code.spare[0]);
         if shape.sort == Sort::Native
             && let Some(info) = BUILTINS.get(usize::from(shape.number))
         {
             let documentation: Vec<&str> = info.doc.iter().map(|line| line.trim()).collect();
-            let documentation = self.heap.alloc_str(&documentation.join(" "))?;
+            let documentation = heap.alloc_str(&documentation.join(" "))?;
             let mut parameters = Vec::new();
             for word in info.lambda_list.split_whitespace() {
                 let word = word.to_uppercase();
-                let known = self.world.packages().find(PackageId::ESL, &word);
+                let known = self.packages().find(PackageId::ESL, &word);
                 let symbol = known.map_or_else(|| Symbol::esl(&word), |(symbol, _)| symbol);
-                parameters.push(self.world.intern(&mut self.heap, &symbol)?);
+                parameters.push(self.intern(heap, &symbol)?);
             }
-            return Ok((self.heap.list(&parameters)?, documentation));
+            return Ok(Some((heap.list(&parameters)?, documentation)));
         }
-        Ok(debug::texts(&self.heap, code.debug).unwrap_or((Value::NIL, Value::NIL)))
-    }
-
-    /// Gives what became of a load to the program: no room means that the operation is done again after a collection.
-    pub(crate) fn loaded<T>(&mut self, result: Result<T, LoadError>) -> Result<T, Exit> {
-        match result {
-            Ok(value) => Ok(value),
-            Err(LoadError::Alloc(error)) => Err(error.into()),
-            Err(error) => self.exchange.raise(error.into()),
-        }
+        Ok(Some(debug::texts(heap, code.debug).unwrap_or((Value::NIL, Value::NIL))))
     }
 }
 

@@ -22,9 +22,8 @@ use esl_bytecode::symbol::{Home, Symbol};
 
 use crate::heap::layout::Array;
 use crate::heap::{AllocError, Heap, Kind};
-use crate::load::{Shared, array, character, integer, ratio};
-use crate::number::Int;
 use crate::value::Value;
+use crate::world::load::{Shared, array, character, integer, integer_of, ratio};
 use crate::world::{GivenMap, GivenSet, World};
 
 /// The most nodes that an object may have to become a datum.
@@ -343,12 +342,11 @@ impl Unit {
         if world.is_symbol(heap, object) {
             return Some(DatumKind::Symbol(self.symbol_name(heap, world, object)?));
         }
-        if let Some(n) = Int::of(heap, object) {
-            return Some(DatumKind::Integer(n.to_big()));
+        if let Some(n) = integer_of(heap, object) {
+            return Some(DatumKind::Integer(n));
         }
         if let Some((numerator, denominator)) = heap.ratio(object) {
-            let (numerator, denominator) = (Int::of(heap, numerator)?, Int::of(heap, denominator)?);
-            return Some(DatumKind::Ratio(numerator.to_big(), denominator.to_big()));
+            return Some(DatumKind::Ratio(integer_of(heap, numerator)?, integer_of(heap, denominator)?));
         }
         if let Some(x) = heap.as_double(object) {
             return Some(DatumKind::Float(x));
@@ -449,6 +447,30 @@ fn is_equivalent(a: &Datum, b: &Datum) -> bool {
             (DatumKind::Object(a), DatumKind::Object(b)) => a == b,
             _ => false,
         }
+}
+
+/// Returns a value as data, and the work that it took.
+///
+/// # Errors
+/// [`DatumError`].
+pub(crate) fn export(heap: &Heap, world: &World, value: Value) -> Result<(Datum, usize), DatumError> {
+    let mut unit = Unit::default();
+    let datum = unit.datum_of(heap, world, value, Span::default())?;
+    Ok((datum, unit.take_work() as usize))
+}
+
+/// Returns data as a value, and the work that it took.
+///
+/// # Errors
+/// As for every allocation.
+pub(crate) fn import(
+    heap: &mut Heap,
+    world: &mut World,
+    datum: &Datum,
+) -> Result<(Value, usize), AllocError> {
+    let mut unit = Unit::default();
+    let value = unit.value_of(heap, world, datum)?;
+    Ok((value, unit.take_work() as usize))
 }
 
 #[cfg(test)]

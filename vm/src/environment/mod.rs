@@ -20,10 +20,8 @@ use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::{World, find_builtin};
 
-pub(crate) use compiler::{ActiveCompilation, Compiler, CompilerJob, FormText, JobId};
-
-mod compiler;
 mod host;
+mod package;
 mod similar;
 
 impl Environment for Vm {
@@ -65,7 +63,7 @@ impl Environment for Vm {
             return self.world.images.datum(image, value);
         };
         let value = property(&self.heap, object, self.value_for(indicator)?)?;
-        let unit = &mut self.world.unit.borrow_mut();
+        let unit = &mut self.compiler.unit.borrow_mut();
         Some(unit.datum_or_object(&self.heap, &self.world, value, Span::default()))
     }
 
@@ -144,7 +142,7 @@ impl Vm {
     fn value_for(&self, symbol: &Symbol) -> Option<Value> {
         match symbol.package() {
             Some(_) => self.world.find(symbol),
-            None => self.world.unit.borrow().find_uninterned(symbol),
+            None => self.compiler.unit.borrow().find_uninterned(symbol),
         }
     }
 
@@ -171,7 +169,7 @@ impl Vm {
             Sort::Native => BUILTINS.get(usize::from(shape.number)).map(|info| info.arity),
             Sort::Undefined => None,
             Sort::Lazy => {
-                let (image, number) = crate::load::image_origin(&self.heap, function)?;
+                let (image, number) = crate::world::load::image_origin(&self.heap, function)?;
                 Some(arity_of(&self.world.images.decode(image, number)?.parameters))
             }
             Sort::Bytecode => {
@@ -185,7 +183,7 @@ impl Vm {
     fn variable_info(&self, object: Value) -> GlobalVariable {
         let Some(cell) = self.heap.symbol(object) else { return GlobalVariable::Undefined };
         if cell.header.flags & SymbolObject::CONSTANT != 0 {
-            let unit = &mut self.world.unit.borrow_mut();
+            let unit = &mut self.compiler.unit.borrow_mut();
             let value = unit.datum_or_object(&self.heap, &self.world, cell.value, Span::default());
             return GlobalVariable::Constant(value);
         }

@@ -18,12 +18,10 @@ use esl_bytecode::symbol::Symbol;
 use super::definitions::{Definitions, ImageDefinition, name_of};
 use super::{FunctionParts, LoadError, character, data, debug, integer, make_code, own_constants, ratio};
 use crate::heap::{AllocError, Heap};
-use crate::interp::stubs::LAZY_WORD;
-use crate::interp::trust::{self, Verified};
-use crate::raise::Exit;
 use crate::shape::{Shape, Sort};
+use crate::trust::LAZY_WORD;
+use crate::trust::{self, Verified};
 use crate::value::Value;
-use crate::vm::Vm;
 use crate::world::World;
 
 /// The images that a machine runs from.
@@ -360,24 +358,21 @@ pub(crate) fn origin(heap: &Heap, function: Value) -> Option<(usize, u32)> {
     Some((image, number as u32))
 }
 
-impl Vm {
-    /// Puts the code of a function of an image in place of its stub.
+impl World {
+    /// Puts the code of a function of an image in place of its stub. Returns the number of words that were decoded, 0 if the
+    /// function was ready.
     ///
     /// # Errors
-    /// [`Exit::Collect`] without room, or a failure if the image is damaged.
-    pub(crate) fn make_ready(&mut self, function: Value) -> Result<(), Exit> {
-        let is_lazy = self
-            .heap
+    /// [`LoadError`] if the image is damaged, or there is no room.
+    pub(crate) fn make_ready(&mut self, heap: &mut Heap, function: Value) -> Result<usize, LoadError> {
+        let is_lazy = heap
             .function_code(function)
-            .and_then(|code| self.heap.code(code))
+            .and_then(|code| heap.code(code))
             .is_some_and(|code| Shape::unpack(code.spare[0]).sort == Sort::Lazy);
-        let Some((image, number)) = origin(&self.heap, function).filter(|_| is_lazy) else { return Ok(()) };
-        let mut loader = ImageLoader { heap: &mut self.heap, world: &mut self.world, image };
-        let code = loader.code(FunctionNumber(number));
-        let code = self.loaded(code)?;
-        trust::replace_stub(&mut self.heap, function, code);
-        self.exchange.charge(self.heap.code_words(code).map_or(0, <[u32]>::len));
-        Ok(())
+        let Some((image, number)) = origin(heap, function).filter(|_| is_lazy) else { return Ok(0) };
+        let code = ImageLoader { heap, world: self, image }.code(FunctionNumber(number))?;
+        trust::replace_stub(heap, function, code);
+        Ok(heap.code_words(code).map_or(0, <[u32]>::len))
     }
 }
 

@@ -9,6 +9,7 @@ use esl_bytecode::module::{
 use esl_bytecode::symbol::Symbol;
 
 use super::*;
+use crate::vm::Vm;
 
 /// A function with these constants and this code.
 fn function(registers: u8, constants: &[u32], code: &str) -> Function {
@@ -75,13 +76,13 @@ fn check_loaded(vm: &mut Vm, toplevel: Value) {
     assert_eq!(use_adder(vm), Value::small(42));
     let name = vm.world.intern_esl(&mut vm.heap, "ADDER").unwrap();
     let function = vm.world.function_of(&vm.heap, name).unwrap();
-    let (_, documentation) = vm.texts_of_function(function).unwrap();
+    let (_, documentation) = vm.world.texts_of_function(&mut vm.heap, function).unwrap().unwrap();
     assert_eq!(vm.heap.string_text(documentation).as_deref(), Some("Makes an adder."));
     let adder = vm.call(name, &[Value::small(2)], 1_000).unwrap()[0];
     let code = vm.heap.function_code(adder).unwrap();
-    let place = vm.source_place(code, 2).unwrap();
+    let place = vm.world.source_place(&vm.heap, code, 2).unwrap();
     assert_eq!((place.source.as_str(), place.line, place.column), ("adder.esl", 7, 3));
-    assert_eq!(vm.source_place(code, 0), None);
+    assert_eq!(vm.world.source_place(&vm.heap, code, 0), None);
 }
 
 #[test]

@@ -5,6 +5,9 @@
 //!
 //! Not here: the verifier (`esl_bytecode::verify`), whose theorem V1 to V13 is what [`Verified`] stands for.
 
+#![allow(unsafe_code)]
+
+use esl_bytecode::builtin::Builtin;
 use esl_bytecode::module::Module;
 use esl_bytecode::verify::{VerifyError, verify};
 
@@ -12,6 +15,17 @@ use crate::heap::layout::Code;
 use crate::heap::{AllocError, CodeParts, Heap, HeapConfig};
 use crate::shape::{Shape, Sort};
 use crate::value::Value;
+
+/// The code of a symbol without a function; the symbol is capture 0 of the function. As the next two, it never runs: the
+/// interpreter goes by the shape.
+pub(crate) const UNDEFINED_WORD: u32 = 0xC1;
+/// The code of a function that nobody has called yet: the loader puts its real code in place of this.
+pub(crate) const LAZY_WORD: u32 = 0xC2;
+
+/// Returns the code of a builtin, its number above the operation.
+pub(crate) const fn native_word(builtin: Builtin) -> u32 {
+    0xC0 | (builtin as u32) << 16
+}
 
 /// Creates the heap of a machine.
 pub(crate) fn new_heap(config: HeapConfig) -> Heap {

@@ -5,15 +5,14 @@
 //!
 //! Not here: the steps of a compilation, which are builtins (`builtins::eval`).
 
+use std::cell::RefCell;
 use std::sync::Arc;
 
 use esl_bytecode::compile::{Compilation, Compile, Part, Step};
 use slotmap::{Key, KeyData, SlotMap, new_key_type};
 
 use crate::datum::Unit;
-use crate::raise::Exit;
 use crate::value::Value;
-use crate::vm::Vm;
 
 new_key_type! {
     /// Key of a job in the table.
@@ -78,13 +77,18 @@ pub(crate) struct ActiveCompilation {
 /// The compiler of a machine, and the jobs of its programs.
 #[derive(Default)]
 pub(crate) struct Compiler {
-    compiler: Option<Box<dyn Compile>>,
+    /// The compiler, unless a builtin works with it.
+    pub(crate) compiler: Option<Box<dyn Compile>>,
+    /// Jobs of programs.
     jobs: SlotMap<JobId, CompilerJob>,
+    /// Objects and uninterned symbols of the compilation under way.
+    pub(crate) unit: RefCell<Unit>,
 }
 
 impl Compiler {
     /// Calls `visit` with every object that compilations keep alive.
     pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
+        self.unit.borrow().roots(visit);
         for job in self.jobs.values() {
             if let CompilerJob::Compilation(running) = job {
                 running.unit.roots(visit);
@@ -124,28 +128,5 @@ impl Compiler {
         if let Some(id) = self.find(handle) {
             self.jobs.remove(id);
         }
-    }
-}
-
-impl Vm {
-    /// Gives the machine a compiler, for `eval`, `load` and `read`.
-    pub fn set_compiler(&mut self, compiler: Box<dyn Compile>) {
-        self.compiler.compiler = Some(compiler);
-    }
-
-    /// Applies `work` to the compiler, which may ask about the program meanwhile.
-    ///
-    /// # Errors
-    /// A failure if the machine has no compiler.
-    pub(crate) fn with_compiler<T>(
-        &mut self,
-        work: impl FnOnce(&mut Vm, &dyn Compile) -> T,
-    ) -> Result<T, Exit> {
-        let Some(compiler) = self.compiler.compiler.take() else {
-            return self.exchange.program_error("this machine has no compiler");
-        };
-        let result = work(self, &*compiler);
-        self.compiler.compiler = Some(compiler);
-        Ok(result)
     }
 }
