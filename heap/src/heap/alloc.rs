@@ -43,6 +43,17 @@ pub enum AllocError {
     },
 }
 
+impl std::fmt::Display for AllocError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            AllocError::NeedCollection => f.write_str("there is no room before a collection"),
+            AllocError::TooLarge { .. } => f.write_str("the object would be larger than the heap may be"),
+        }
+    }
+}
+
+impl std::error::Error for AllocError {}
+
 /// Which region.
 #[derive(Copy, Clone, PartialEq, Eq)]
 enum Which {
