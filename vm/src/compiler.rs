@@ -1,7 +1,7 @@
 //! The compiler of a machine, and the compilations that its programs run with it.
 //!
-//! A program names a compilation, or a text of which it compiles form by form, by a handle. A job is out of the table
-//! while a builtin works on it, since the compiler may ask about the program meanwhile.
+//! A program names a compilation, or a text of which it compiles form by form, by a handle. A job is out of
+//! the table while a builtin works on it, since the compiler may ask about the program meanwhile.
 //!
 //! Not here: the steps of a compilation, which are builtins (`builtins::eval`).
 
@@ -80,7 +80,7 @@ pub(crate) struct Compiler {
     /// The compiler, unless a builtin works with it.
     pub(crate) compiler: Option<Box<dyn Compile>>,
     /// Jobs of programs.
-    jobs: SlotMap<JobId, CompilerJob>,
+    pub(crate) jobs: SlotMap<JobId, CompilerJob>,
     /// Objects and uninterned symbols of the compilation under way.
     pub(crate) unit: RefCell<Unit>,
 }
@@ -109,7 +109,8 @@ impl Compiler {
         self.jobs.contains_key(id).then_some(id)
     }
 
-    /// Takes the job that `handle` names out of the table, until [`Compiler::put_back`]; `None` if it has ended.
+    /// Takes the job that `handle` names out of the table, until [`Compiler::put_back`]; `None` if it has
+    /// ended.
     pub(crate) fn take(&mut self, handle: Value) -> Option<(JobId, CompilerJob)> {
         let id = self.find(handle)?;
         let job = self.jobs.get_mut(id)?;

@@ -33,6 +33,7 @@ mod number;
 mod outside;
 mod report;
 mod shape;
+mod state;
 mod trust;
 mod types;
 mod wait;

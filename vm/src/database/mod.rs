@@ -35,6 +35,8 @@ mod tests;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
+use esl_heap::list_state;
+
 use crate::heap::{AllocError, Heap};
 use crate::value::Value;
 use bucket::{Buckets, finish, mix};
@@ -88,6 +90,23 @@ pub(crate) struct Database {
     retired: VecDeque<(u64, Vec<Term>)>,
     cells: Vec<Term>,
 }
+
+list_state! { Database {
+    terms: Run,
+    relations: Run,
+    by_name: Derived,
+    rules: Run,
+    time: Run,
+    facts: Derived,
+    bytes: Derived,
+    queries: Run,
+    serial: Run,
+    ended: Derived,
+    unlinked: Derived,
+    released: Derived,
+    retired: Derived,
+    cells: Derived,
+} }
 
 fn name_hash(functor: Term, width: usize) -> u32 {
     finish(mix(mix(9, functor.bits()), width as u64))
@@ -472,22 +491,42 @@ impl Database {
 
     /// Calls `visit` with words and objects that say which facts and rules there are, and in which order they came.
     pub(crate) fn visit_state(&self, visit: &mut dyn FnMut(Result<u64, Value>)) {
+        // Without `..`: a new field does not compile before somebody has thought of it here.
+        let Database {
+            terms,
+            relations,
+            rules,
+            // Numbers of changes and of queries: how the facts came, not which there are.
+            time: _,
+            serial: _,
+            // While one is open, the caller takes no other state to be like this one.
+            queries: _,
+            // These follow from the facts and rules, or wait to be given up.
+            by_name: _,
+            facts: _,
+            bytes: _,
+            ended: _,
+            unlinked: _,
+            released: _,
+            retired: _,
+            cells: _,
+        } = self;
         let mut rows: Vec<(u64, &Relation, u32)> = Vec::new();
-        for relation in &self.relations {
+        for relation in relations {
             rows.extend(relation.live_rows().map(|row| (relation.born(row), relation, row)));
         }
         rows.sort_unstable_by_key(|&(born, ..)| born);
         for (_, relation, row) in rows {
             visit(Ok(relation.width as u64));
             for &term in [&relation.functor].into_iter().chain(relation.row(row)) {
-                self.terms.visit_state(term, visit);
+                terms.visit_state(term, visit);
             }
         }
-        for rule in self.rules.predicates.iter().flat_map(|predicate| &predicate.rules) {
-            self.terms.visit_state(rule.source, visit);
+        for rule in rules.predicates.iter().flat_map(|predicate| &predicate.rules) {
+            terms.visit_state(rule.source, visit);
         }
-        for relation in self.relations.iter().filter(|relation| relation.is_property()) {
-            self.terms.visit_state(relation.functor, visit);
+        for relation in relations.iter().filter(|relation| relation.is_property()) {
+            terms.visit_state(relation.functor, visit);
         }
     }
 

@@ -1,25 +1,25 @@
 //! Fingerprints of states: what a program may still do depends on what is hashed here, and on the schedule.
 //!
-//! A state consists of the tasks that have not ended (frames, control stacks, bindings, waits, what is noted of them), the values,
-//! functions and properties of symbols, facts and rules, timers, and all objects that can be reached from there. Objects have no
-//! addresses in it: each is the number of those that were met before it, in an order that depends on the state alone. Tables are
-//! hashed in the order of their entries, facts in that of their assertion, times relative to now.
+//! A state consists of the tasks that have not ended (frames, control stacks, bindings, waits, what is noted
+//! of them), the values, functions and properties of symbols, facts and rules, timers, and all objects that
+//! can be reached from there. Objects have no addresses in it: each is the number of those that were met
+//! before it, in an order that depends on the state alone. Tables are hashed in the order of their entries,
+//! facts in that of their assertion, times relative to now.
 //!
-//! Not part of a state: ticks (but for budgets), the numbers of tasks, the order of queues, registers that will not be read
-//! (`live`), what is reachable from code only, and the outside. While a query is open at a point, each state is another one.
+//! Not part of a state: ticks (but for budgets), the numbers of tasks, the order of queues, registers that
+//! will not be read (`live`), what is reachable from code only, and the outside. While a query is open at a
+//! point, each state is another one.
 
 use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::live::Live;
-use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{Heap, Kind};
-use crate::interp::frames::{Frames, entry_word};
-use crate::schedule::Due;
+use crate::interp::frames::Frames;
 use crate::shape::{Shape, Sort};
+use crate::state::VisitVm;
 use crate::table::Table;
-use crate::task::{Control, End, Entry, Target, Unwinding};
-use crate::task::{Task, TaskState};
+use crate::task::{End, Target, Task, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{event, link};
@@ -39,7 +39,7 @@ impl Digest {
         self.1 ^= self.1 >> 29;
     }
 
-    fn add_all(&mut self, words: impl ExactSizeIterator<Item = u64>) {
+    pub(super) fn add_all(&mut self, words: impl ExactSizeIterator<Item = u64>) {
         self.add(words.len() as u64);
         words.for_each(|word| self.add(word));
     }
@@ -85,8 +85,9 @@ impl Fingerprints {
             met: Vec::new(),
             next: 0,
             now,
+            task: None,
         };
-        walk.machine();
+        walk.machine(walk.vm);
         while let Some(&object) = walk.met.get(walk.next) {
             walk.next += 1;
             walk.object(object);
@@ -96,22 +97,25 @@ impl Fingerprints {
 }
 
 /// What sort of code a function has.
-fn sort_of(heap: &Heap, function: Value) -> Option<Sort> {
+pub(super) fn sort_of(heap: &Heap, function: Value) -> Option<Sort> {
     let code = heap.code(heap.function_code(function)?)?;
     Some(Shape::unpack(code.spare[0]).sort)
 }
 
 /// One walk through a state.
-struct Walk<'a> {
-    vm: &'a Vm,
+pub(super) struct Walk<'a> {
+    pub(super) vm: &'a Vm,
     known: &'a mut Fingerprints,
-    digest: Digest,
+    pub(super) digest: Digest,
     /// The numbers of the objects that were met, by address.
     numbers: GivenMap<u64, u32>,
     /// These objects, and how many of them were looked into.
     met: Vec<Value>,
     next: usize,
+    /// The time to which others are relative.
     now: u64,
+    /// The task that is being visited.
+    pub(super) task: Option<&'a Task>,
 }
 
 impl Walk<'_> {
@@ -119,12 +123,12 @@ impl Walk<'_> {
         &self.vm.heap
     }
 
-    fn word(&mut self, word: u64) {
+    pub(super) fn word(&mut self, word: u64) {
         self.digest.add(word);
     }
 
     /// A value: the word that it is, or the number of the object.
-    fn value(&mut self, v: Value) {
+    pub(super) fn value(&mut self, v: Value) {
         if !v.is_address() {
             self.word(0);
             return self.word(v.bits());
@@ -138,59 +142,22 @@ impl Walk<'_> {
         self.word(u64::from(number));
     }
 
-    fn values(&mut self, values: &[Value]) {
+    pub(super) fn values(&mut self, values: &[Value]) {
         self.word(values.len() as u64);
         values.iter().for_each(|&v| self.value(v));
     }
 
-    fn time(&mut self, time: u64) {
+    pub(super) fn time(&mut self, time: u64) {
         self.word(time.wrapping_sub(self.now));
     }
 
-    /// Everything from which the rest is reached.
-    fn machine(&mut self) {
-        let vm = self.vm;
-        let mut tasks: Vec<&Task> =
-            vm.scheduler.tasks.iter().filter(|task| task.state != TaskState::Ended).collect();
-        tasks.sort_unstable_by_key(|task| task.number);
-        self.word(tasks.len() as u64);
-        for task in &tasks {
-            // All tasks first, so that their numbers are their places in this order.
-            self.value(task.object);
-        }
-        for task in &tasks {
-            self.task(task);
-        }
-        self.timers();
-        self.symbols();
-        self.facts();
-        self.word(vm.outside.exit_status.map_or(0, |status| 1 + u64::from(status)));
-        self.word(vm.outside.console.noted());
+    /// Makes this state another one than all others.
+    pub(super) fn unlike_any_other(&mut self) {
+        self.word(self.vm.scheduler.serial.0);
+        self.word(self.vm.scheduler.spent);
     }
 
-    fn task(&mut self, task: &Task) {
-        self.word(u64::from(task.flags.bits()));
-        self.word(u64::from(task.priority) << 16 | u64::from(task.critical) << 8 | task.state as u64);
-        self.value(task.wait);
-        self.value(task.notify);
-        self.frames(task);
-        if let Some(control) = task.control.get() {
-            self.control(task, control);
-        }
-        let mut words = Vec::new();
-        self.vm.scheduler.accounts.visit_left(task.account, &mut |left| words.push(left));
-        self.digest.add_all(words.into_iter());
-        if let Some(extra) = &task.extra {
-            self.word(extra.limits.len() as u64);
-            for limit in &extra.limits {
-                self.word(limit.entry as u64);
-                self.value(limit.expired.unwrap_or(Value::NIL));
-            }
-            self.values(&extra.interrupts);
-        }
-    }
-
-    fn frames(&mut self, task: &Task) {
+    pub(super) fn frames(&mut self, task: &Task) {
         let mut is_innermost = true;
         for frame in Frames::of_task(task) {
             self.word(frame.word as u64);
@@ -211,32 +178,7 @@ impl Walk<'_> {
         }
     }
 
-    fn control(&mut self, task: &Task, control: &Control) {
-        self.word(control.entries.len() as u64);
-        for entry in &control.entries {
-            let Entry { data, base, bindings, window, want, kind, .. } = *entry;
-            self.word(u64::from(base) << 32 | u64::from(bindings));
-            self.word(u64::from(window) << 16 | u64::from(want) << 8 | kind as u64);
-            self.word(entry_word(task, entry).map_or(u64::MAX, |word| word as u64));
-            self.value(data);
-        }
-        self.word(control.running.len() as u64);
-        for running in &control.running {
-            self.unwinding(running.pending.as_ref());
-            self.values(&running.values);
-            match running.allowance {
-                Some(allowance) => self.time(allowance.time),
-                None => self.word(0),
-            }
-        }
-        self.unwinding(control.unwinding.as_ref());
-        for binding in control.bindings.iter() {
-            self.value(binding.symbol);
-            self.value(binding.value);
-        }
-    }
-
-    fn unwinding(&mut self, unwinding: Option<&Unwinding>) {
+    pub(super) fn unwinding(&mut self, unwinding: Option<&Unwinding>) {
         let Some(Unwinding { target, values }) = unwinding else { return self.word(0) };
         match *target {
             Target::Root(End::Succeeded) => self.word(1),
@@ -255,68 +197,6 @@ impl Walk<'_> {
             }
         }
         self.values(values);
-    }
-
-    /// What is to happen, in order: when, to whom, and what.
-    fn timers(&mut self) {
-        let scheduler = &self.vm.scheduler;
-        for timer in scheduler.timers.in_order() {
-            let Some(task) = scheduler.tasks.at(timer.index) else { continue };
-            if !scheduler.is_wanted(timer) {
-                continue;
-            }
-            self.time(timer.time);
-            self.value(task.object);
-            match timer.due {
-                Due::Wait(_) => self.word(0),
-                Due::Cleanup => self.word(1),
-                Due::Limit(number) => {
-                    let limits = task.extra.iter().flat_map(|extra| &extra.limits);
-                    let position = limits.take_while(|limit| limit.number != number).count();
-                    self.word(2 + position as u64);
-                }
-            }
-        }
-    }
-
-    /// What symbols of packages have that is not the language's from the beginning.
-    fn symbols(&mut self) {
-        let vm = self.vm;
-        let mut named = Vec::new();
-        vm.world.each_symbol(&mut |symbol, v| {
-            let Some(object) = vm.heap.symbol(v) else { return };
-            let has_value = object.value != Value::UNBOUND
-                && object.header.flags & (SymbolObject::CONSTANT | SymbolObject::KEYWORD) == 0;
-            let has_function = image_origin(&vm.heap, object.function).is_none()
-                && sort_of(&vm.heap, object.function) == Some(Sort::Bytecode);
-            if has_value || has_function || object.plist.is_true() {
-                named.push((symbol.clone(), *object, has_value, has_function));
-            }
-        });
-        named.sort_unstable_by(|(a, ..), (b, ..)| (a.package(), a.name()).cmp(&(b.package(), b.name())));
-        for (symbol, object, has_value, has_function) in named {
-            self.digest.add_text(symbol.name());
-            if has_value {
-                self.value(object.value);
-            }
-            if has_function {
-                self.value(object.function);
-            }
-            self.value(object.plist);
-        }
-    }
-
-    fn facts(&mut self) {
-        let vm = self.vm;
-        if !vm.database.is_quiet() {
-            // Where a query stands is not looked into: no other state is like this one.
-            self.word(vm.scheduler.serial.0);
-            self.word(vm.scheduler.spent);
-        }
-        vm.database.visit_state(&mut |item| match item {
-            Ok(word) => self.word(word),
-            Err(v) => self.value(v),
-        });
     }
 
     /// What an object holds.
@@ -451,7 +331,7 @@ impl Walk<'_> {
     }
 
     /// The registers that a function may still read, by place.
-    fn live(&mut self, function: Value) -> Rc<Live> {
+    pub(super) fn live(&mut self, function: Value) -> Rc<Live> {
         let digest = self.code_of_function(function);
         if let Some(live) = self.known.live.get(&digest) {
             return live.clone();

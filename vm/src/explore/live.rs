@@ -1,5 +1,5 @@
-//! Which registers of a frame may still be read from a place of its code on: only these belong to a state. The others
-//! hold what is left of earlier work, and would make two states of one.
+//! Which registers of a frame may still be read from a place of its code on: only these belong to a state.
+//! The others hold what is left of earlier work, and would make two states of one.
 //!
 //! A register that may be read is never said not to be. It may be the other way round: what a landing of a
 //! control entry reads counts everywhere in its function.

@@ -1,34 +1,40 @@
-//! Exploring: running a program under every schedule, to find those that end badly or to show that there is none.
+//! Exploring: running a program under every schedule, to find those that end badly or to show that there is
+//! none.
 //!
 //! ```text
 //! point         where a task may have to let others go first, and running from point to point
 //! fingerprint   telling states apart           live   which registers of a frame belong to a state
 //! ```
 //!
-//! **Points.** A task is taken to run undisturbed from one *point* to the next. It stands at a point just before it does
-//! something that other tasks can see, or looks at what they do: before it begins a wait, signals, passes a checkpoint,
-//! changes the database, enters a critical section, asks for an abort, and before its end; with [`Grain::Reads`] also
-//! before it counts signals, asks what became of a task, or queries the database. Nothing that happens between two points
-//! is visible to other tasks by these means, so any schedule of the machine does what one of those explored does. What
-//! tasks share in another way (variables, tables, structures) is not looked at: programs protect that by critical sections,
-//! which are one step each. A task that comes to no point is stopped after [`Settings::turn`] ticks.
+//! **Points.** A task is taken to run undisturbed from one *point* to the next. It stands at a point just
+//! before it does something that other tasks can see, or looks at what they do: before it begins a wait,
+//! signals, passes a checkpoint, changes the database, enters a critical section, asks for an abort, and
+//! before its end; with [`Grain::Reads`] also before it counts signals, asks what became of a task, or
+//! queries the database. Nothing that happens between two points is visible to other tasks by these means, so
+//! any schedule of the machine does what one of those explored does. What tasks share in another way
+//! (variables, tables, structures) is not looked at: programs protect that by critical sections, which are
+//! one step each. A task that comes to no point is stopped after [`Settings::turn`] ticks.
 //!
-//! **Choices.** At each point any runnable task may go on, whatever its priority (every one has its turns sometimes). First
-//! comes the task that has just run, then the others from the oldest to the newest; a choice is an index into that order, and a list
-//! of choices gives a schedule: [`Vm::follow`] runs it again. Time is virtual, and moves when all tasks wait.
+//! **Choices.** At each point any runnable task may go on, whatever its priority (every one has its turns
+//! sometimes). First comes the task that has just run, then the others from the oldest to the newest; a
+//! choice is an index into that order, and a list of choices gives a schedule: [`Vm::follow`] runs it again.
+//! Time is virtual, and moves when all tasks wait.
 //!
-//! **Search.** Going back is starting again: a machine is begun anew, follows the choices that lead to a place where another
-//! one was possible, and goes on with that one until it ends or comes to a state that is known. So nothing has to be copied or undone, and
-//! every schedule that is reported has been run from its beginning. Places are taken in the order of how
-//! often a task had to give way that could have gone on, so the first schedule that leads to an ending is one with the fewest such switches.
+//! **Search.** Going back is starting again: a machine is begun anew, follows the choices that lead to a
+//! place where another one was possible, and goes on with that one until it ends or comes to a state that is
+//! known. So nothing has to be copied or undone, and every schedule that is reported has been run from its
+//! beginning. Places are taken in the order of how often a task had to give way that could have gone on, so
+//! the first schedule that leads to an ending is one with the fewest such switches.
 //!
-//! **States** are told apart by fingerprints of 128 bits (see `fingerprint`). That two states are confused can be
-//! neglected; one state that is taken for two costs time only.
+//! **States** are told apart by fingerprints of 128 bits (see `fingerprint`). That two states are confused
+//! can be neglected; one state that is taken for two costs time only.
 //!
-//! Not here: the outside (what is in files, what was read). What a command will do: begin machines as for `run`, with a captured outside;
-//! write the numbers of states and schedules, and for each ending its first schedule; `run` with that list shows it again, with traces.
-//! Source: Musuvathi and Qadeer 2007 for the order by preemptions; state hashes are as old as SPIN (Holzmann 1988).
+//! Not here: the outside (what is in files, what was read). What a command will do: begin machines as for
+//! `run`, with a captured outside; write the numbers of states and schedules, and for each ending its first
+//! schedule; `run` with that list shows it again, with traces. Source: Musuvathi and Qadeer 2007 for the
+//! order by preemptions; state hashes are as old as SPIN (Holzmann 1988).
 
+mod content;
 mod fingerprint;
 mod live;
 mod point;
@@ -52,8 +58,8 @@ pub struct Settings {
     pub turn: u32,
     /// States after which to give up.
     pub states: usize,
-    /// Whether states are told apart by what was written to standard output, too. Without, an ending stands for all
-    /// runs that came to the same states on the way, whatever they had written by then.
+    /// Whether states are told apart by what was written to standard output, too. Without, an ending stands
+    /// for all runs that came to the same states on the way, whatever they had written by then.
     pub output: bool,
 }
 
@@ -79,13 +85,15 @@ pub struct Ending<T> {
 pub struct Exploration<T> {
     /// Different states at points.
     pub states: usize,
-    /// Runs: one for each choice that led to a state from which something was left to be seen, and for each ending.
+    /// Runs: one for each choice that led to a state from which something was left to be seen, and for each
+    /// ending.
     pub runs: usize,
     /// The ways to end, the one with the fewest switches first.
     pub endings: Vec<Ending<T>>,
     /// Choices that lead to a state from which no schedule leads to an end, if there is one.
     pub endless: Option<Vec<u32>>,
-    /// Whether a schedule comes back to a state in which it has been: it can go on for ever, be it that tasks are treated unfairly.
+    /// Whether a schedule comes back to a state in which it has been: it can go on for ever, be it that tasks
+    /// are treated unfairly.
     pub has_cycle: bool,
     /// Whether all states were seen; otherwise there were more than [`Settings::states`].
     pub is_complete: bool,
@@ -165,7 +173,8 @@ impl Search {
         Some(self.choices(self.places[stuck]))
     }
 
-    /// Whether steps lead from a state back to it: what is left when states without a step to them are taken away.
+    /// Whether steps lead from a state back to it: what is left when states without a step to them are taken
+    /// away.
     fn has_cycle(&self) -> bool {
         let mut after = vec![Vec::new(); self.places.len()];
         let mut steps_to = vec![0_u32; self.places.len()];
@@ -189,8 +198,8 @@ impl Search {
     }
 }
 
-/// Runs under all schedules the program that each machine of `begin` is about to run: its main task has been made. `judge` says how a
-/// run has ended.
+/// Runs under all schedules the program that each machine of `begin` is about to run: its main task has been
+/// made. `judge` says how a run has ended.
 ///
 /// The machines have to be alike: the same program, settings and outside. The clock of their host is virtual.
 ///

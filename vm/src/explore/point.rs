@@ -24,8 +24,8 @@ impl Vm {
         self.outside.console.note_all(settings.output);
     }
 
-    /// Runs the program from point to point along a list of choices that [`super::explore`] has found with the same settings; beyond its end
-    /// the first choice is taken.
+    /// Runs the program from point to point along a list of choices that [`super::explore`] has found with
+    /// the same settings; beyond its end the first choice is taken.
     pub fn follow(&mut self, settings: &Settings, choices: &[u32]) -> RunOutcome {
         self.explore_by(settings);
         let mut choices = choices.iter().copied();
@@ -34,8 +34,8 @@ impl Vm {
         outcome.unwrap_or(RunOutcome::Done)
     }
 
-    /// Runs from point to point; at each, `choose` says which task goes on, or that the run is given up. How the
-    /// run has ended, unless it was given up.
+    /// Runs from point to point; at each, `choose` says which task goes on, or that the run is given up. How
+    /// the run has ended, unless it was given up.
     pub(super) fn run_by_points(
         &mut self,
         choose: &mut dyn FnMut(&mut Vm, Runnable) -> Option<u32>,

@@ -1,4 +1,5 @@
-//! Exploring programs assembled by hand, and the parts of it. What it finds of programs in ESL is in `conformance/tests/explore.rs`.
+//! Exploring programs assembled by hand, and the parts of it. What it finds of programs in ESL is in
+//! `conformance/tests/explore.rs`.
 
 use std::convert::Infallible;
 
@@ -25,7 +26,8 @@ fn words(code: &[Instr]) -> Vec<u32> {
         .collect()
 }
 
-/// A machine with a task for each of these codes, which may use eight registers and the symbol `F` as constant 0.
+/// A machine with a task for each of these codes, which may use eight registers and the symbol `F` as
+/// constant 0.
 fn machine(tasks: &[&[Instr]]) -> Vm {
     let mut vm = Vm::for_tests();
     for code in tasks {

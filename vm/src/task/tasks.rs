@@ -1,5 +1,7 @@
 //! The table of a machine's tasks.
 
+use esl_heap::list_state;
+
 use super::{Task, TaskIndex};
 use crate::value::Value;
 
@@ -38,6 +40,8 @@ pub(crate) struct Tasks {
     /// The collector has yet to meet the tasks before this place.
     unmet: usize,
 }
+
+list_state! { Tasks { places: Run, free: Run, spare: Derived, unmet: Derived } }
 
 impl Tasks {
     /// A task that has yet to be given a frame, with at least so many words of stack.
@@ -162,7 +166,8 @@ impl Tasks {
         self.unmet = self.places.len();
     }
 
-    /// The next place for the collector to look at: its task, if there is one that does not run. `None` at the end.
+    /// The next place for the collector to look at: its task, if there is one that does not run. `None` at
+    /// the end.
     pub(crate) fn next_unmet(&mut self) -> Option<Option<&mut Task>> {
         self.unmet = self.unmet.checked_sub(1)?;
         Some(self.places[self.unmet].task.as_deref_mut())

@@ -68,33 +68,35 @@ pub(crate) struct World {
     /// Whether the library is being loaded: only then may names of the language be defined.
     pub(crate) is_open: bool,
     /// The objects of symbols that have a package.
-    symbols: GivenMap<Symbol, Value>,
+    pub(crate) symbols: GivenMap<Symbol, Value>,
     /// The names of symbol objects, by address: filled when somebody asks.
-    names: RefCell<GivenMap<u64, Symbol>>,
+    pub(crate) names: RefCell<GivenMap<u64, Symbol>>,
     /// The next number for an uninterned symbol of the compiler.
-    fresh: Cell<u32>,
+    pub(crate) fresh: Cell<u32>,
     /// The rules of packages.
-    packages: Packages,
+    pub(crate) packages: Packages,
     /// The objects of packages.
-    package_objects: BTreeMap<PackageId, Value>,
+    pub(crate) package_objects: BTreeMap<PackageId, Value>,
     /// Packages in which symbols are at home, by name.
-    homes: BTreeMap<Arc<str>, (PackageId, Value)>,
+    pub(crate) homes: BTreeMap<Arc<str>, (PackageId, Value)>,
     /// The function that runs the top-level functions of a module, once it was needed.
     pub(crate) runner: Value,
     /// Standard input, output and error.
     pub(crate) streams: [Value; 3],
-    /// The companions of `NIL` and `T`.
-    nil: Value,
-    t: Value,
+    /// The companion of `NIL`.
+    pub(crate) nil: Value,
+    /// The companion of `T`.
+    pub(crate) t: Value,
     /// The code of every symbol without a function.
-    undefined: Value,
+    pub(crate) undefined: Value,
     /// Symbols that have an object, but not yet what the images define them as.
-    undefined_yet: Vec<Symbol>,
-    is_defining: bool,
+    pub(crate) undefined_yet: Vec<Symbol>,
+    /// Whether symbols are being defined.
+    pub(crate) is_defining: bool,
     /// Modules that are loaded piece by piece.
     pub(crate) images: Images,
     /// Structure and condition classes by the address of their names.
-    classes: GivenMap<u64, Value>,
+    pub(crate) classes: GivenMap<u64, Value>,
 }
 
 impl World {

@@ -1,0 +1,245 @@
+//! The content of a state, as the fingerprint visits it: a method for each field that the list of all state
+//! calls content.
+
+use super::fingerprint::{Walk, sort_of};
+use crate::compiler::Compiler;
+use crate::heap::layout::Symbol as SymbolObject;
+use crate::interp::frames::entry_word;
+use crate::outside::Outside;
+use crate::schedule::{Due, Scheduler};
+use crate::shape::Sort;
+use crate::state::{
+    VisitCompiler, VisitControl, VisitExtra, VisitOutside, VisitRunning, VisitScheduler, VisitTask, VisitVm,
+    VisitWorld,
+};
+use crate::task::{Control, Entry, Extra, Running, Task, TaskState};
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::world::World;
+use crate::world::load::image_origin;
+
+impl VisitVm for Walk<'_> {
+    fn scheduler(&mut self, vm: &Vm) {
+        self.scheduler_content(&vm.scheduler);
+    }
+
+    fn world(&mut self, vm: &Vm) {
+        self.world_content(&vm.world);
+    }
+
+    fn database(&mut self, vm: &Vm) {
+        if !vm.database.is_quiet() {
+            // Where a query stands is not looked into.
+            self.unlike_any_other();
+        }
+        vm.database.visit_state(&mut |item| match item {
+            Ok(word) => self.word(word),
+            Err(v) => self.value(v),
+        });
+    }
+
+    fn compiler(&mut self, vm: &Vm) {
+        self.compiler_content(&vm.compiler);
+    }
+
+    fn outside(&mut self, vm: &Vm) {
+        self.outside_content(&vm.outside);
+    }
+}
+
+impl VisitScheduler for Walk<'_> {
+    fn tasks(&mut self, _: &Scheduler) {
+        let all = self.vm.scheduler.tasks.iter();
+        let mut tasks: Vec<&Task> = all.filter(|task| task.state != TaskState::Ended).collect();
+        tasks.sort_unstable_by_key(|task| task.number);
+        self.word(tasks.len() as u64);
+        for task in &tasks {
+            // All tasks first, so that their numbers are their places in this order.
+            self.value(task.object);
+        }
+        for task in tasks {
+            self.task = Some(task);
+            self.task_content(task);
+        }
+    }
+
+    /// What is to happen, in order: when, to whom, and what.
+    fn timers(&mut self, scheduler: &Scheduler) {
+        for timer in scheduler.timers.in_order() {
+            let Some(task) = scheduler.tasks.at(timer.index) else { continue };
+            if !scheduler.is_wanted(timer) {
+                continue;
+            }
+            self.time(timer.time);
+            self.value(task.object);
+            match timer.due {
+                Due::Wait(_) => self.word(0),
+                Due::Cleanup => self.word(1),
+                Due::Limit(number) => {
+                    let limits = task.extra.iter().flat_map(|extra| &extra.limits);
+                    let position = limits.take_while(|limit| limit.number != number).count();
+                    self.word(2 + position as u64);
+                }
+            }
+        }
+    }
+}
+
+impl VisitTask for Walk<'_> {
+    fn flags(&mut self, task: &Task) {
+        self.word(u64::from(task.flags.bits()));
+    }
+
+    fn priority(&mut self, task: &Task) {
+        self.word(u64::from(task.priority));
+    }
+
+    fn critical(&mut self, task: &Task) {
+        self.word(u64::from(task.critical));
+    }
+
+    fn state(&mut self, task: &Task) {
+        self.word(task.state as u64);
+    }
+
+    fn wait(&mut self, task: &Task) {
+        self.value(task.wait);
+    }
+
+    fn notify(&mut self, task: &Task) {
+        self.value(task.notify);
+    }
+
+    fn stack(&mut self, task: &Task) {
+        self.frames(task);
+    }
+
+    fn control(&mut self, task: &Task) {
+        if let Some(control) = task.control.get() {
+            self.control_content(control);
+        }
+    }
+
+    fn account(&mut self, task: &Task) {
+        let mut words = Vec::new();
+        self.vm.scheduler.accounts.visit_left(task.account, &mut |left| words.push(left));
+        self.digest.add_all(words.into_iter());
+    }
+
+    fn extra(&mut self, task: &Task) {
+        if let Some(extra) = &task.extra {
+            self.extra_content(extra);
+        }
+    }
+}
+
+impl VisitExtra for Walk<'_> {
+    fn limits(&mut self, extra: &Extra) {
+        self.word(extra.limits.len() as u64);
+        for limit in &extra.limits {
+            self.word(u64::from(limit.entry));
+            self.value(limit.expired.unwrap_or(Value::NIL));
+        }
+    }
+
+    fn interrupts(&mut self, extra: &Extra) {
+        self.values(&extra.interrupts);
+    }
+}
+
+impl VisitControl for Walk<'_> {
+    fn entries(&mut self, control: &Control) {
+        self.word(control.entries.len() as u64);
+        for entry in &control.entries {
+            let Entry { data, base, bindings, window, want, kind, .. } = *entry;
+            self.word(u64::from(base) << 32 | u64::from(bindings));
+            self.word(u64::from(window) << 16 | u64::from(want) << 8 | kind as u64);
+            let landing = self.task.and_then(|task| entry_word(task, entry));
+            self.word(landing.map_or(u64::MAX, |word| word as u64));
+            self.value(data);
+        }
+    }
+
+    fn running(&mut self, control: &Control) {
+        self.word(control.running.len() as u64);
+        for running in &control.running {
+            self.running_content(running);
+        }
+    }
+
+    fn unwinding(&mut self, control: &Control) {
+        Walk::unwinding(self, control.unwinding.as_ref());
+    }
+
+    fn bindings(&mut self, control: &Control) {
+        for binding in control.bindings.iter() {
+            self.value(binding.symbol);
+            self.value(binding.value);
+        }
+    }
+}
+
+impl VisitRunning for Walk<'_> {
+    fn pending(&mut self, running: &Running) {
+        Walk::unwinding(self, running.pending.as_ref());
+    }
+
+    fn values(&mut self, running: &Running) {
+        Walk::values(self, &running.values);
+    }
+
+    fn allowance(&mut self, running: &Running) {
+        match running.allowance {
+            Some(allowance) => self.time(allowance.time),
+            None => self.word(0),
+        }
+    }
+}
+
+impl VisitWorld for Walk<'_> {
+    /// What symbols of packages have that is not the language's from the beginning.
+    fn symbols(&mut self, world: &World) {
+        let vm = self.vm;
+        let mut named = Vec::new();
+        world.each_symbol(&mut |symbol, v| {
+            let Some(object) = vm.heap.symbol(v) else { return };
+            let has_value = object.value != Value::UNBOUND
+                && object.header.flags & (SymbolObject::CONSTANT | SymbolObject::KEYWORD) == 0;
+            let has_function = image_origin(&vm.heap, object.function).is_none()
+                && sort_of(&vm.heap, object.function) == Some(Sort::Bytecode);
+            if has_value || has_function || object.plist.is_true() {
+                named.push((symbol.clone(), *object, has_value, has_function));
+            }
+        });
+        named.sort_unstable_by(|(a, ..), (b, ..)| (a.package(), a.name()).cmp(&(b.package(), b.name())));
+        for (symbol, object, has_value, has_function) in named {
+            self.digest.add_text(symbol.name());
+            if has_value {
+                self.value(object.value);
+            }
+            if has_function {
+                self.value(object.function);
+            }
+            self.value(object.plist);
+        }
+    }
+}
+
+impl VisitCompiler for Walk<'_> {
+    fn jobs(&mut self, compiler: &Compiler) {
+        if !compiler.jobs.is_empty() {
+            // How far a compilation is, is not looked into.
+            self.unlike_any_other();
+        }
+    }
+}
+
+impl VisitOutside for Walk<'_> {
+    fn exit_status(&mut self, outside: &Outside) {
+        self.word(outside.exit_status.map_or(0, |status| 1 + u64::from(status)));
+    }
+
+    fn console(&mut self, outside: &Outside) {
+        self.word(outside.console.noted());
+    }
+}

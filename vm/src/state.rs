@@ -1,0 +1,212 @@
+//! The list of all state: what each field of a machine is to a run.
+//!
+//! Every struct that a machine is made of is taken apart here without `..` (the heap's in its own crate, the
+//! database in `database`), so a new field does not compile until it is listed in one of these groups:
+//!
+//! * `content`: state of the run that decides what programs may still do, so it belongs to every fingerprint.
+//!   The list makes a trait with a method for each of these fields, which whoever visits a state implements:
+//!   a field that is not visited does not compile either.
+//! * `course`: state of the run that says how it came here, and decides when things happen: ticks, numbers,
+//!   the order of queues. It is saved and compared strictly, but two states that differ here only are one to
+//!   the explorer.
+//! * `parts`: made of structs that are listed themselves.
+//! * `transient`: without meaning while no task runs. A state is one between two turns.
+//! * `derived`: follows from other fields, and is kept to save time.
+//! * `process`: belongs to the process: an address, a handle, a setting of those who watch.
+
+use esl_heap::list_state;
+
+use crate::compiler::Compiler;
+use crate::embedder::Embedder;
+use crate::exchange::Exchange;
+use crate::observe::{Figures, Observers, Watch};
+use crate::outside::Outside;
+use crate::schedule::{Accounts, Clock, Counts, EndOfAll, Points, RunQueues, Scheduler, Timers, Turn};
+use crate::task::{Control, Extra, Running, Task};
+use crate::vm::Vm;
+use crate::wait::Deliveries;
+use crate::world::World;
+
+/// Lists the fields of a struct by groups, and declares the trait of those who visit its content.
+macro_rules! state {
+    ($(#[$doc:meta])* $owner:ident by $visitor:ident :: $visit:ident {
+        content { $($content:ident),* $(,)? }
+        $(course { $($course:ident),* $(,)? })?
+        $(parts { $($part:ident),* $(,)? })?
+        $(transient { $($transient:ident),* $(,)? })?
+        $(derived { $($derived:ident),* $(,)? })?
+        $(process { $($process:ident),* $(,)? })?
+    }) => {
+        list_state! { $owner {
+            $($content: Run,)*
+            $($($course: Run,)*)?
+            $($($part: Parts,)*)?
+            $($($transient: Derived,)*)?
+            $($($derived: Derived,)*)?
+            $($($process: Process,)*)?
+        } }
+
+        $(#[$doc])*
+        pub(crate) trait $visitor {
+            $(
+                #[doc = concat!("Visits the field `", stringify!($content), "`.")]
+                fn $content(&mut self, whole: &$owner);
+            )*
+
+            /// Visits the content, in the order of the list.
+            fn $visit(&mut self, whole: &$owner) {
+                $(self.$content(whole);)*
+            }
+        }
+    };
+}
+
+state! {
+    /// Visits the content of a machine.
+    Vm by VisitVm :: machine {
+        content { scheduler, world, database, compiler, outside }
+        course { config }
+        parts { heap, embedder, exchange, watch }
+        transient { cpu }
+        process { natives }
+    }
+}
+
+state! {
+    /// Visits the content of a scheduler.
+    Scheduler by VisitScheduler :: scheduler_content {
+        content { tasks, timers }
+        course { choices, readers, end_of_all, main, main_number, serial, spent, any_event, starter }
+        parts { queues, accounts, deliveries, counts, clock, points, turn }
+        transient { running }
+    }
+}
+
+state! {
+    /// Visits the content of a task.
+    Task by VisitTask :: task_content {
+        content { flags, priority, critical, state, wait, notify, stack, control, account, extra }
+        course { object, ticks, serial, number, turns, pc, base }
+        derived { scanned }
+    }
+}
+
+state! {
+    /// Visits the content of the rarely used parts of a task.
+    Extra by VisitExtra :: extra_content {
+        content { limits, interrupts }
+        course { report, end, values }
+    }
+}
+
+state! {
+    /// Visits the content of a control stack.
+    Control by VisitControl :: control_content {
+        content { entries, running, unwinding, bindings }
+    }
+}
+
+state! {
+    /// Visits the content of a running cleanup.
+    Running by VisitRunning :: running_content {
+        content { pending, values, allowance }
+    }
+}
+
+state! {
+    /// Visits the content of a world of names.
+    World by VisitWorld :: world_content {
+        content { symbols }
+        course { fresh, packages, package_objects, classes, is_open, images, undefined_yet }
+        transient { is_defining }
+        derived { known, names, homes, runner, streams, nil, t, undefined }
+    }
+}
+
+state! {
+    /// Visits the content of a compiler.
+    Compiler by VisitCompiler :: compiler_content {
+        content { jobs }
+        transient { unit }
+        process { compiler }
+    }
+}
+
+state! {
+    /// Visits the content of the outside.
+    Outside by VisitOutside :: outside_content {
+        content { exit_status, console }
+        transient { answer }
+        process { host, functions, complaints }
+    }
+}
+
+list_state! { RunQueues { queues: Run, occupied: Derived, urgent: Run, turns: Run } }
+list_state! { Timers { heap: Run, sequence: Run, sweep_at: Run } }
+list_state! { Accounts { accounts: Run, free: Run } }
+list_state! { Deliveries { signals: Run, held: Run } }
+list_state! { EndOfAll { next: Run, newest: Run, except: Run } }
+list_state! { Counts { alive: Run, foreground: Run, made: Run, turns: Run, switches: Run } }
+list_state! { Clock { now: Run, looked_at: Run, moved_at: Run, more_is_due: Run } }
+list_state! { Points { grain: Process, is_open: Run } }
+list_state! { Turn {
+    index: Run,
+    end: Derived,
+    critical_left: Run,
+    critical_is_new: Run,
+    had_attention: Derived,
+    parking: Derived,
+    ending: Derived,
+} }
+list_state! { Exchange {
+    values: Derived,
+    raised: Derived,
+    requested_call: Derived,
+    last_lookup: Derived,
+    charges: Derived,
+    collected_at: Derived,
+} }
+list_state! { Embedder {
+    pinned: Run,
+    interrupt: Process,
+    stop: Process,
+    interruptible: Run,
+    was_interrupted: Run,
+    last_words: Run,
+} }
+list_state! { Watch { is_watched: Derived, observers: Process, figures: Process, traces_tasks: Process } }
+list_state! { Observers {
+    list: Process,
+    is_virtual: Process,
+    start: Process,
+    latest: Process,
+    unsaid: Process,
+    collects: Process,
+} }
+list_state! { Figures { pauses: Process, are_wanted: Process, of_tasks: Process, ended: Process } }
+
+#[cfg(test)]
+mod tests {
+    use esl_heap::state::{Field, Listed, Role};
+
+    use super::*;
+
+    /// Counts the fields of a list that are state of a run, and of the lists below it.
+    fn fields_of_run(fields: &[Field]) -> usize {
+        fields
+            .iter()
+            .map(|field| match field.role {
+                Role::Run => 1,
+                Role::Parts(parts) => fields_of_run(parts),
+                Role::Derived | Role::Process => 0,
+            })
+            .sum()
+    }
+
+    #[test]
+    fn the_list_is_a_tree_from_the_machine_down() {
+        let names: Vec<&str> = Vm::FIELDS.iter().map(|field| field.name).collect();
+        assert!(names.contains(&"heap") && names.contains(&"scheduler"));
+        assert!(fields_of_run(Vm::FIELDS) > 20 && fields_of_run(Scheduler::FIELDS) > 20);
+    }
+}
