@@ -1,7 +1,8 @@
 //! The interpreter's registers, while its loop is left.
 //!
-//! Invariant: `pc` is the address of an instruction of the function of the frame at `base`, or of a stub; `base` lies in the
-//! running task's stack, which may be used up to `stack_end`. So to set one of them is unsafe.
+//! Invariant: `pc` is the address of an instruction of the function of the frame at `base`, or of a stub;
+//! `base` lies in the running task's stack, which may be used up to `stack_end`. So to set one of them is
+//! unsafe.
 
 #![allow(unsafe_code)]
 

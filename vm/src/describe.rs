@@ -1,7 +1,7 @@
 //! Values as short texts, for messages of the machine itself.
 //!
-//! The printer that programs use is written in ESL; this one is for failures that are put into words before any ESL can
-//! run, such as a wrong number of arguments. It shows a few elements and levels and no more.
+//! The printer that programs use is written in ESL; this one is for failures that are put into words before
+//! any ESL can run, such as a wrong number of arguments. It shows a few elements and levels and no more.
 
 use num_bigint::BigInt;
 

@@ -144,8 +144,8 @@ impl Vm {
         self.outside.functions.len() - 1
     }
 
-    /// A value as data. Objects that no data stands for, such as functions and hash tables, come out as a string that
-    /// describes them.
+    /// A value as data. Objects that no data stands for, such as functions and hash tables, come out as a
+    /// string that describes them.
     ///
     /// # Errors
     /// [`ExportError`] if the value is circular, or too large.

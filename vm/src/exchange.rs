@@ -1,8 +1,8 @@
 //! What passes between the interpreter and builtins beside arguments and results.
 //!
-//! A builtin gets the machine and its arguments and returns an [`Outcome`](crate::raise::Outcome). Whatever else it has to say
-//! (the failure behind an [`Exit::Raise`], the values behind an [`Exit::Values`], the call behind an [`Exit::Call`], and what
-//! its work has cost) waits here until the interpreter takes it.
+//! A builtin gets the machine and its arguments and returns an [`Outcome`](crate::raise::Outcome). Whatever
+//! else it has to say (the failure behind an [`Exit::Raise`], the values behind an [`Exit::Values`], the call
+//! behind an [`Exit::Call`], and what its work has cost) waits here until the interpreter takes it.
 
 use crate::raise::{Arguments, Exit, Expected, Raised};
 use crate::saved_pc::SavedPc;
@@ -11,7 +11,8 @@ use crate::world::load::LoadError;
 
 /// Charges of builtins: ticks beside those of their calls, and whether the slice is to end.
 ///
-/// One word, so that the interpreter finds out by one test after each builtin whether there is anything to see to.
+/// One word, so that the interpreter finds out by one test after each builtin whether there is anything to
+/// see to.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Charges(u64);
 
@@ -31,8 +32,8 @@ impl Charges {
         self.0 += ticks;
     }
 
-    /// Has the slice of the running task end at the next tick, because what the slice may take has changed. The task goes on with
-    /// another slice, unless its turn is to end otherwise.
+    /// Has the slice of the running task end at the next tick, because what the slice may take has changed.
+    /// The task goes on with another slice, unless its turn is to end otherwise.
     #[inline]
     pub(crate) fn end_slice(&mut self) {
         self.0 |= Charges::END;
@@ -143,14 +144,15 @@ impl Exchange {
         })
     }
 
-    /// Charges the running task units of work, 64 to a tick. A unit takes about as long as a step of arithmetic on limbs.
+    /// Charges the running task units of work, 64 to a tick. A unit takes about as long as a step of
+    /// arithmetic on limbs.
     #[inline]
     pub(crate) fn charge(&mut self, units: usize) {
         self.charges.add(units as u64 / 64);
     }
 
-    /// Charges the running task for list cells, elements or characters that were walked over, compared, copied or filled:
-    /// a tick for each 16. Each takes a few nanoseconds, as they come from memory.
+    /// Charges the running task for list cells, elements or characters that were walked over, compared,
+    /// copied or filled: a tick for each 16. Each takes a few nanoseconds, as they come from memory.
     #[inline]
     pub(crate) fn charge_elements(&mut self, count: usize) {
         self.charges.add(count as u64 / 16);

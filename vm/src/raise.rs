@@ -1,8 +1,9 @@
 //! What a builtin or an instruction says when it cannot do its work.
 //!
 //! A failure leaves Rust as data: a [`Raised`] waits in the exchange while the builtin returns
-//! [`Exit::Raise`]. The interpreter then calls the library function `%raise` at the point of failure, in a frame above
-//! the failed instruction; nothing has been unwound. What `%raise` returns takes the place of the operation's result.
+//! [`Exit::Raise`]. The interpreter then calls the library function `%raise` at the point of failure, in a
+//! frame above the failed instruction; nothing has been unwound. What `%raise` returns takes the place of the
+//! operation's result.
 
 use smallvec::{SmallVec, smallvec};
 
@@ -78,8 +79,8 @@ pub enum Exit {
     Raise,
     /// It gives other than one value: they are in the value list.
     Values,
-    /// The work is above its limit: the ESL function in its row of the table takes over with the same arguments. It
-    /// has had no effect.
+    /// The work is above its limit: the ESL function in its row of the table takes over with the same
+    /// arguments. It has had no effect.
     Slowly,
     /// It asks for a call in its place: the exchange holds the function and the arguments.
     Call,

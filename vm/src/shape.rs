@@ -1,15 +1,17 @@
 //! What the interpreter has to know of a Code beside its words: which sort it is, and what it takes.
 //!
-//! A [`Shape`] is packed into `Code::spare[0]`; `Code::spare[1]` is the number of captures. The loader lays a Code out so:
+//! A [`Shape`] is packed into `Code::spare[0]`; `Code::spare[1]` is the number of captures. The loader lays a
+//! Code out so:
 //!
 //! ```text
 //! constants   | the function's constants ... | names of its keys ... |
 //! words       | instructions ...             | one word for each capture: where it comes from |
 //! ```
 //!
-//! A constant operand of `make-closure` is, for a function without captures, its Function; for one with captures, its
-//! Code, ready to run. `Code::arity` is the exact number of arguments of bytecode that takes just required ones, and
-//! [`Code::ANY_ARITY`] for everything else, so that only the slow way of a call looks at the shape.
+//! A constant operand of `make-closure` is, for a function without captures, its Function; for one with
+//! captures, its Code, ready to run. `Code::arity` is the exact number of arguments of bytecode that takes
+//! just required ones, and [`Code::ANY_ARITY`] for everything else, so that only the slow way of a call looks
+//! at the shape.
 //!
 //! [`Code::ANY_ARITY`]: crate::heap::layout::Code::ANY_ARITY
 

@@ -16,8 +16,8 @@ use crate::heap::{AllocError, CodeParts, Heap, HeapConfig};
 use crate::shape::{Shape, Sort};
 use crate::value::Value;
 
-/// The code of a symbol without a function; the symbol is capture 0 of the function. As the next two, it never runs: the
-/// interpreter goes by the shape.
+/// The code of a symbol without a function; the symbol is capture 0 of the function. As the next two, it
+/// never runs: the interpreter goes by the shape.
 pub(crate) const UNDEFINED_WORD: u32 = 0xC1;
 /// The code of a function that nobody has called yet: the loader puts its real code in place of this.
 pub(crate) const LAZY_WORD: u32 = 0xC2;

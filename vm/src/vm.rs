@@ -25,8 +25,8 @@ pub(crate) type Natives = [Native; BUILTINS.len()];
 
 /// A virtual machine.
 ///
-/// The values that it hands out belong to it: they are of no use to another machine, and good until it runs again,
-/// unless they are pinned.
+/// The values that it hands out belong to it: they are of no use to another machine, and good until it runs
+/// again, unless they are pinned.
 pub struct Vm {
     /// Objects.
     pub(crate) heap: Heap,

@@ -1,16 +1,17 @@
 //! Between the data of the compiler and the objects of the program, both ways, with identity.
 //!
-//! A [`Unit`] is what one compilation remembers: which object was made from which datum and the other way round, so that
+//! A [`Unit`] is what one compilation remembers: which object was made from which datum and the other way
+//! round, so that
 //!
 //! * parts of a form that a macro passes through come back as the data that they were, with their spans;
 //! * what is shared stays shared, and an uninterned symbol stays the same symbol, whichever way it goes;
 //! * an object that no datum can describe goes as a number, and comes back as itself.
 //!
-//! A macro may have changed its form in place. So an object is given back as the datum that it was made from only if
-//! its parts still are; else it becomes a new datum at the old place.
+//! A macro may have changed its form in place. So an object is given back as the datum that it was made from
+//! only if its parts still are; else it becomes a new datum at the old place.
 //!
-//! Guarantees: walks use no native stack in proportion to the depth. Circular and oversized structure is refused with
-//! a text.
+//! Guarantees: walks use no native stack in proportion to the depth. Circular and oversized structure is
+//! refused with a text.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -65,8 +66,8 @@ pub(crate) struct Unit {
     data: GivenMap<u64, (Value, Datum)>,
     /// By the address of the datum: the datum, and its object.
     values: GivenMap<u64, (Datum, Value)>,
-    /// The addresses of objects whose data were made of them, not the other way round: their place is that of the
-    /// macro call that they came from last.
+    /// The addresses of objects whose data were made of them, not the other way round: their place is that of
+    /// the macro call that they came from last.
     made: GivenSet<u64>,
     /// Nodes that were walked over since this was last asked.
     work: u64,
@@ -280,7 +281,8 @@ impl Unit {
         Ok(made.pop().unwrap_or_else(|| Datum::nil(span)))
     }
 
-    /// The datum of an object with these parts: the one that it was made from, unless its parts are others now.
+    /// The datum of an object with these parts: the one that it was made from, unless its parts are others
+    /// now.
     fn compound(&mut self, heap: &Heap, object: Value, parts: Vec<Datum>, span: Span) -> Datum {
         let known = self.data.get(&object.bits()).map(|(_, datum)| datum.clone());
         // A literal that a macro gives again and again is at another place each time.
@@ -403,7 +405,8 @@ fn parts_of(heap: &Heap, object: Value) -> Option<ObjectParts<'_>> {
         Kind::Array => {
             let dimensions = heap.array_dimensions(object)?;
             let array = heap.array(object)?;
-            // Fill pointers and adjustability are beyond what a datum says, and so are elements that are no values.
+            // Fill pointers and adjustability are beyond what a datum says, and so are elements that are no
+            // values.
             let is_plain = array.header.flags & (Array::HAS_FILL_POINTER | Array::ADJUSTABLE) == 0;
             let items = heap.vector(array.data).filter(|_| is_plain && dimensions.len() != 1)?;
             Some(ObjectParts::Items(Some(dimensions), items))

@@ -1,7 +1,7 @@
 //! Running the compile-time parts of a program for a compiler outside of the machine.
 //!
-//! A unit is compiled at a time: [`Vm::begin_unit`] forgets what was remembered of the last one. Between calls the unit
-//! keeps everything alive that its data refer to.
+//! A unit is compiled at a time: [`Vm::begin_unit`] forgets what was remembered of the last one. Between
+//! calls the unit keeps everything alive that its data refer to.
 
 use std::sync::Arc;
 
@@ -52,8 +52,8 @@ impl Vm {
         self.compiler.unit.replace(Unit::default());
     }
 
-    /// Loads a module that stands alone, such as one from a file, and gives the functions that run its top-level forms, in
-    /// order, as a list.
+    /// Loads a module that stands alone, such as one from a file, and gives the functions that run its
+    /// top-level forms, in order, as a list.
     ///
     /// # Errors
     /// [`LoadError`].
@@ -72,8 +72,8 @@ impl Vm {
         functions
     }
 
-    /// Takes in an image, such as that of the library, and gives the functions that run its top-level forms, in order,
-    /// as a list. The image counts as verified.
+    /// Takes in an image, such as that of the library, and gives the functions that run its top-level forms,
+    /// in order, as a list. The image counts as verified.
     ///
     /// # Errors
     /// [`LoadError`].

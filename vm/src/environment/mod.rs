@@ -1,8 +1,8 @@
 //! What names mean, for a compiler that works on the program of this machine.
 //!
-//! Guarantees: no question is answered by running the program, and none makes an object, so asking is cheap and can be
-//! done in the middle of a builtin.
-//! Not here: running macros for a compiler outside of the machine (`host`), compiling at run time (`builtins::eval`).
+//! Guarantees: no question is answered by running the program, and none makes an object, so asking is cheap
+//! and can be done in the middle of a builtin. Not here: running macros for a compiler outside of the machine
+//! (`host`), compiling at run time (`builtins::eval`).
 
 use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::compile::{

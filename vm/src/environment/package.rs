@@ -8,8 +8,8 @@ use crate::heap::AllocError;
 use crate::vm::Vm;
 
 impl Vm {
-    /// The current package: what `*package*` is in the running task. When a program has put something else there, it is
-    /// `ESL-USER`.
+    /// The current package: what `*package*` is in the running task. When a program has put something else
+    /// there, it is `ESL-USER`.
     pub(crate) fn current_package(&self) -> PackageId {
         let value = self.symbol_value(self.world.known.package);
         value.and_then(|value| self.world.package_of(&self.heap, value)).unwrap_or(PackageId::USER)
@@ -21,7 +21,8 @@ impl Vm {
         names.into_iter().filter(|name| !name.starts_with('%')).map(String::from).collect()
     }
 
-    /// Makes the package of this name the value of `*package*` outside of all bindings; false if there is none.
+    /// Makes the package of this name the value of `*package*` outside of all bindings; false if there is
+    /// none.
     ///
     /// # Errors
     /// [`AllocError`] without room.

@@ -68,8 +68,8 @@ fn is_defined(vm: &Vm, value: Value, variable: bool) -> bool {
     flags & (SymbolObject::SPECIAL | SymbolObject::CONSTANT) != 0
 }
 
-/// The number of characters to insert, delete, replace or swap with their neighbour to make `a` into `b`, if it is at
-/// most `limit`.
+/// The number of characters to insert, delete, replace or swap with their neighbour to make `a` into `b`, if
+/// it is at most `limit`.
 fn distance(a: &str, b: &str, limit: usize) -> Option<usize> {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
     if a.len().abs_diff(b.len()) > limit {

@@ -1,5 +1,5 @@
-//! Figures of a run that cost something to gather, and are gathered on request: how long the collector's turns took, and what each
-//! task has used.
+//! Figures of a run that cost something to gather, and are gathered on request: how long the collector's
+//! turns took, and what each task has used.
 //!
 //! Of the tasks that have ended only those that used most are kept, so a million of them take no room.
 

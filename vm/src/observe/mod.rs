@@ -1,6 +1,7 @@
 //! Watching a run: who is told of it, and the figures that are gathered of it.
 //!
-//! Whether a run is watched changes nothing in the run. Not here: the words in which tasks and events are spoken of (`report`).
+//! Whether a run is watched changes nothing in the run. Not here: the words in which tasks and events are
+//! spoken of (`report`).
 
 mod figures;
 mod observer;

@@ -1,10 +1,10 @@
 //! Observers: what they are told, and what they have yet to be told.
 //!
-//! Guarantees: what an observer is told comes in the order of time, and depends on the run alone. A turn that follows on one of the
-//! same task, with nothing between them, is one turn. Nothing is kept of what was told.
+//! Guarantees: what an observer is told comes in the order of time, and depends on the run alone. A turn that
+//! follows on one of the same task, with nothing between them, is one turn. Nothing is kept of what was told.
 //!
-//! Times are in nanoseconds since the first observer came. Where time is virtual, and stands still while tasks run, each tick
-//! counts as one nanosecond more, so that work has a length.
+//! Times are in nanoseconds since the first observer came. Where time is virtual, and stands still while
+//! tasks run, each tick counts as one nanosecond more, so that work has a length.
 
 use crate::host::Host;
 use crate::schedule::Scheduler;

@@ -19,8 +19,8 @@ impl Vm {
         self.watch.figures.pauses
     }
 
-    /// Returns the tasks that have used most, most first: of those that have ended and of those that have not, a hundred at
-    /// most.
+    /// Returns the tasks that have used most, most first: of those that have ended and of those that have
+    /// not, a hundred at most.
     pub fn task_figures(&self) -> Vec<TaskFigures> {
         let mut tasks = self.watch.figures.ended.clone();
         let living = self.scheduler.tasks.iter().filter(|task| task.state != TaskState::Ended);

@@ -15,7 +15,8 @@ pub(crate) fn task_label(vm: &Vm, object: Value) -> String {
     label_of(vm, vm.heap.slot_or_nil(object, event::NAME), number)
 }
 
-/// Returns what reports call a task of this name and number. The number is [`TaskNumber::NONE`] if the task has ended.
+/// Returns what reports call a task of this name and number. The number is [`TaskNumber::NONE`] if the task
+/// has ended.
 pub(crate) fn label_of(vm: &Vm, name: Value, number: TaskNumber) -> String {
     if name.is_true() {
         format!("task {}", describe(&vm.heap, name))
@@ -80,7 +81,8 @@ pub(crate) fn end_label(vm: &Vm, task: &Task) -> &'static str {
     }
 }
 
-/// Returns what a condition is called where it is said that it was signalled: its cause, or the name of its type.
+/// Returns what a condition is called where it is said that it was signalled: its cause, or the name of its
+/// type.
 pub(crate) fn cause_label(heap: &Heap, condition: Value) -> String {
     let Some(class) = heap.structure_class(condition) else { return describe(heap, condition) };
     let name = describe(heap, class::name_of(heap, class));

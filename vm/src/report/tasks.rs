@@ -1,4 +1,5 @@
-//! What is said of tasks: when no task can ever run again, who waits, for what, and where; and the tree of all of them.
+//! What is said of tasks: when no task can ever run again, who waits, for what, and where; and the tree of
+//! all of them.
 
 use std::collections::BTreeMap;
 
@@ -41,8 +42,8 @@ fn tail_call_in(words: &[u32]) -> Option<usize> {
     found
 }
 
-/// The order in which tasks are shown, each after its maker, and how deep below the first of them. `tasks` are the numbers of each task
-/// and of its maker, in the order of the former.
+/// The order in which tasks are shown, each after its maker, and how deep below the first of them. `tasks`
+/// are the numbers of each task and of its maker, in the order of the former.
 fn depths(tasks: impl Iterator<Item = (u64, u64)>) -> Vec<(usize, usize)> {
     let mut made: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
     let mut numbers = Vec::new();
@@ -68,8 +69,8 @@ fn depths(tasks: impl Iterator<Item = (u64, u64)>) -> Vec<(usize, usize)> {
 }
 
 impl Vm {
-    /// A text that names the tasks that wait, what they wait for, and the lines where they do. Those of the library are
-    /// left out.
+    /// A text that names the tasks that wait, what they wait for, and the lines where they do. Those of the
+    /// library are left out.
     pub fn deadlock_report(&self) -> String {
         let mut tasks: Vec<&Task> = self
             .scheduler
@@ -92,8 +93,8 @@ impl Vm {
         text
     }
 
-    /// A text that shows the tasks of the program: each below the one that made it, what it does and where, and the ticks that
-    /// it has used.
+    /// A text that shows the tasks of the program: each below the one that made it, what it does and where,
+    /// and the ticks that it has used.
     pub fn task_report(&self) -> String {
         let mut tasks: Vec<&Task> = self
             .scheduler
@@ -126,8 +127,9 @@ impl Vm {
     }
 }
 
-/// The innermost place of the program, not of the library, at which a task stands; if tail calls have left no frame of the
-/// program, that of the tail call in the function with which the task began, or of its beginning if there are several.
+/// The innermost place of the program, not of the library, at which a task stands; if tail calls have left no
+/// frame of the program, that of the tail call in the function with which the task began, or of its beginning
+/// if there are several.
 fn program_place(vm: &Vm, task: &Task) -> Option<String> {
     let place = |code: Value, word: usize| {
         let place = vm

@@ -1,5 +1,5 @@
-//! What happens to tasks, for those who watch; and the trace of tasks: a line for each beginning, wait, going on, request of an
-//! abort, and end.
+//! What happens to tasks, for those who watch; and the trace of tasks: a line for each beginning, wait, going
+//! on, request of an abort, and end.
 
 use super::{label_of, reason_of, show, task_label};
 use crate::describe::describe;

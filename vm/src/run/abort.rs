@@ -10,8 +10,8 @@ use crate::vm::Vm;
 const AT_ONCE: usize = 1000;
 
 impl Vm {
-    /// Asks a task to end, wherever it is. It unwinds, and runs its cleanups, within two slices; inside a cleanup or a
-    /// critical section the request waits for its end.
+    /// Asks a task to end, wherever it is. It unwinds, and runs its cleanups, within two slices; inside a
+    /// cleanup or a critical section the request waits for its end.
     pub fn abort(&mut self, id: TaskId) {
         if !self.scheduler.tasks.contains(id) {
             return;
@@ -31,8 +31,8 @@ impl Vm {
     }
 }
 
-/// Asks every task but the running one to end. Where there are many, the rest are asked between turns, and only those that are
-/// being ended have turns until then.
+/// Asks every task but the running one to end. Where there are many, the rest are asked between turns, and
+/// only those that are being ended have turns until then.
 pub(crate) fn abort_others(vm: &mut Vm) {
     let except = vm.scheduler.running_number();
     let newest = TaskNumber(vm.scheduler.counts.made);

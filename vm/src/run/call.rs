@@ -109,8 +109,8 @@ impl Vm {
         self.scheduler.spent
     }
 
-    /// Returns the number of tasks made, of their turns, and of the turns that came after one of another task, since
-    /// the program began.
+    /// Returns the number of tasks made, of their turns, and of the turns that came after one of another
+    /// task, since the program began.
     pub fn tasks_turns_and_switches(&self) -> (u64, u64, u64) {
         let counts = &self.scheduler.counts;
         (counts.made, counts.turns, counts.switches)

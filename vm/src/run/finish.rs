@@ -66,8 +66,8 @@ pub(super) fn finish_task(vm: &mut Vm) {
     end_run_if_over(vm, end);
 }
 
-/// Allocates where an instruction cannot be done again, at the end of a task or between turns: with a collection if need be, and
-/// with the reserve of the heap.
+/// Allocates where an instruction cannot be done again, at the end of a task or between turns: with a
+/// collection if need be, and with the reserve of the heap.
 pub(super) fn allocate_without_retry(
     vm: &mut Vm,
     mut allocate: impl FnMut(&mut Vm) -> Result<Value, Exit>,

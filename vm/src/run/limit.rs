@@ -8,8 +8,8 @@ use crate::task::{AccountId, EntryKind, Limit, LimitNumber, TaskIndex};
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// Makes the innermost catch of the running task, whose tag is `tag`, a limit of time, in nanoseconds from now, and of ticks.
-/// Returns whether there is such a catch.
+/// Makes the innermost catch of the running task, whose tag is `tag`, a limit of time, in nanoseconds from
+/// now, and of ticks. Returns whether there is such a catch.
 pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, ticks: Option<u64>) -> bool {
     let scheduler = &mut vm.scheduler;
     let number = scheduler.next_limit();
@@ -27,7 +27,8 @@ pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, ticks: Opti
     if let Some(ticks) = ticks {
         limit.account = scheduler.accounts.open(parent, ticks, AccountOwner::Form(index, number));
         scheduler.task_mut().account = limit.account;
-        // What the slice has used so far is not charged to it, and the next one is to be no longer than it allows.
+        // What the slice has used so far is not charged to it, and the next one is to be no longer than it
+        // allows.
         vm.exchange.charges.end_slice();
     }
     scheduler.task_mut().extra_mut().limits.push(limit);

@@ -9,9 +9,10 @@
 //! call      calling a function from outside, and what became of a task
 //! ```
 //!
-//! A runnable task has a slice of ticks and goes to the end of its queue; `schedule` says whose turn it is. The machine's own
-//! budget is counted to the tick: a run that is given the same budget ends at the same place. When no task is
-//! runnable the machine sleeps in the host until the first timer, or until something comes from outside.
+//! A runnable task has a slice of ticks and goes to the end of its queue; `schedule` says whose turn it is.
+//! The machine's own budget is counted to the tick: a run that is given the same budget ends at the same
+//! place. When no task is runnable the machine sleeps in the host until the first timer, or until something
+//! comes from outside.
 
 mod abort;
 mod call;
@@ -55,8 +56,8 @@ pub enum RunOutcome {
 }
 
 impl Vm {
-    /// Runs tasks in turn until all have ended or wait for what cannot come, the budget of the run is spent, or `ticks`
-    /// are used up.
+    /// Runs tasks in turn until all have ended or wait for what cannot come, the budget of the run is spent,
+    /// or `ticks` are used up.
     pub fn run(&mut self, ticks: u64) -> RunOutcome {
         run_tasks(self, None, ticks, true)
     }
@@ -72,7 +73,8 @@ impl Vm {
     }
 }
 
-/// Runs tasks in turn, at most for `ticks`, until the named one has ended. `may_wait` says whether to sleep while all of them wait.
+/// Runs tasks in turn, at most for `ticks`, until the named one has ended. `may_wait` says whether to sleep
+/// while all of them wait.
 fn run_tasks(vm: &mut Vm, id: Option<TaskId>, ticks: u64, may_wait: bool) -> RunOutcome {
     let end = vm.scheduler.spent.saturating_add(ticks);
     loop {

@@ -1,9 +1,10 @@
 //! Delivering what is pending for a task: aborts, expired limits, interrupts by guards.
 //!
-//! None of these acts at once. They are noted in the task, which gets the flag `attention`, and are delivered just before it
-//! next runs, where [`deliver_pending`] turns them into an unwinding or a call. While a cleanup runs they wait,
-//! and the cleanup has an allowance from then on; the unwinding of an abort or of an expired limit gives one to each cleanup
-//! that it meets. A cleanup that outruns its allowance is left, and the unwinding goes on outward: no task is unkillable.
+//! None of these acts at once. They are noted in the task, which gets the flag `attention`, and are delivered
+//! just before it next runs, where [`deliver_pending`] turns them into an unwinding or a call. While a
+//! cleanup runs they wait, and the cleanup has an allowance from then on; the unwinding of an abort or of an
+//! expired limit gives one to each cleanup that it meets. A cleanup that outruns its allowance is left, and
+//! the unwinding goes on outward: no task is unkillable.
 
 use super::wake::call_attention;
 use crate::interp::{self, Leave};
@@ -30,7 +31,8 @@ pub(crate) fn interrupt_by(vm: &mut Vm, guard: Value) {
     }
 }
 
-/// Delivers what is pending for the running task, which is loaded: it may begin to unwind, or find itself in another function.
+/// Delivers what is pending for the running task, which is loaded: it may begin to unwind, or find itself in
+/// another function.
 ///
 /// # Errors
 /// What takes the task off the processor before it runs.
@@ -47,8 +49,8 @@ pub(super) fn deliver_pending(vm: &mut Vm) -> Result<(), Leave> {
     }
 }
 
-/// Turns what is pending for the running task into an unwinding, or returns a function to be called where the task stands. What has
-/// to wait for the end of a cleanup, or of a critical section, stays noted.
+/// Turns what is pending for the running task into an unwinding, or returns a function to be called where the
+/// task stands. What has to wait for the end of a cleanup, or of a critical section, stays noted.
 fn take_pending(vm: &mut Vm) -> Option<Value> {
     let scheduler = &mut vm.scheduler;
     if scheduler.task().account != AccountId::NONE && scheduler.is_task_spent() {
@@ -156,7 +158,8 @@ fn allow_cleanups(vm: &mut Vm) {
     }
 }
 
-/// Begins to leave the outermost cleanup of the running task that has outrun its allowance. Returns whether there is one.
+/// Begins to leave the outermost cleanup of the running task that has outrun its allowance. Returns whether
+/// there is one.
 fn cut_off_cleanup(vm: &mut Vm) -> bool {
     let scheduler = &mut vm.scheduler;
     let now = scheduler.clock.read(&mut *vm.outside.host);

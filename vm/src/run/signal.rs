@@ -1,10 +1,11 @@
 //! Signals, and handing them to those who wait.
 //!
-//! A signal is one step for the program, but it may have a million waiters. Those beyond the first thousand become a
-//! [`Delivery`], which is worked off between turns, a thousand waiters at a time. Until that is done the task that signals is held
-//! back, and so is any task that would begin a wait, let one time out, or signal; the latter try again then
-//! ([`Exit::Again`]). So no task can tell the difference: whoever waits when the signal is given gets it, and goes on before
-//! the task that has given it; whoever begins later does not.
+//! A signal is one step for the program, but it may have a million waiters. Those beyond the first thousand
+//! become a [`Delivery`], which is worked off between turns, a thousand waiters at a time. Until that is done
+//! the task that signals is held back, and so is any task that would begin a wait, let one time out, or
+//! signal; the latter try again then ([`Exit::Again`]). So no task can tell the difference: whoever waits
+//! when the signal is given gets it, and goes on before the task that has given it; whoever begins later does
+//! not.
 
 use super::finish::allocate_without_retry;
 use super::limit::charge_account;
@@ -30,8 +31,8 @@ impl Vm {
         Ok(event::make(&mut self.heap, name)?)
     }
 
-    /// Signals an event, as if the running task had called `signal`: every task that waits for it becomes runnable, in the
-    /// order in which they began to wait.
+    /// Signals an event, as if the running task had called `signal`: every task that waits for it becomes
+    /// runnable, in the order in which they began to wait.
     ///
     /// # Errors
     /// [`Exit::Collect`] without room; then nothing has happened.
@@ -84,7 +85,8 @@ pub(crate) fn signal(vm: &mut Vm, event: Value, arguments: Value) -> Result<(), 
     Ok(())
 }
 
-/// Returns how many of the waits for `event` keep signals; `None` if there are too many waits to see to in one step.
+/// Returns how many of the waits for `event` keep signals; `None` if there are too many waits to see to in
+/// one step.
 fn keepers_if_few(heap: &Heap, event: Value) -> Option<usize> {
     let (mut keepers, mut count) = (0, 0);
     let mut link = link::first(heap, event);
@@ -108,8 +110,8 @@ fn cells(heap: &mut Heap, count: usize, item: Value) -> Result<Value, Exit> {
     Ok(cells)
 }
 
-/// Hands a signal to every wait for `event`, and returns how many there are. `cells` is a list of as many conses as there are
-/// waits that keep signals.
+/// Hands a signal to every wait for `event`, and returns how many there are. `cells` is a list of as many
+/// conses as there are waits that keep signals.
 fn deliver(vm: &mut Vm, event: Value, arguments: Value, mut cells: Value) -> usize {
     event::count_signal(&mut vm.heap, event);
     let mut link = link::first(&vm.heap, event);
@@ -176,8 +178,8 @@ fn release_held(vm: &mut Vm) {
     }
 }
 
-/// Hands a signal, an event and the task that gave it, to the wait that `link` belongs to. A wait that keeps signals
-/// gets the first of `cells`.
+/// Hands a signal, an event and the task that gave it, to the wait that `link` belongs to. A wait that keeps
+/// signals gets the first of `cells`.
 fn hand_over(vm: &mut Vm, link: Value, signal: (Value, TaskNumber), arguments: Value, cells: &mut Value) {
     let wait = link::wait_of(&vm.heap, link);
     if link::keeps(&vm.heap, wait) {
@@ -191,7 +193,8 @@ fn hand_over(vm: &mut Vm, link: Value, signal: (Value, TaskNumber), arguments: V
     wake_waiter(vm, wait, signal);
 }
 
-/// Adds `cell`, a cons or `NIL`, to the queue of a wait as a signal of `event`, and lets the waiting task go on.
+/// Adds `cell`, a cons or `NIL`, to the queue of a wait as a signal of `event`, and lets the waiting task go
+/// on.
 pub(super) fn keep(vm: &mut Vm, wait: Value, cell: Value, event: Value) {
     if cell.is_cons() {
         link::enqueue(&mut vm.heap, wait, cell);

@@ -1,7 +1,7 @@
 //! Making tasks, and dropping them.
 //!
-//! A task is made of a function and its arguments. It begins with copies of its maker's bindings of special variables, and
-//! charges the same account.
+//! A task is made of a function and its arguments. It begins with copies of its maker's bindings of special
+//! variables, and charges the same account.
 
 use crate::heap::Kind;
 use crate::interp;
@@ -44,8 +44,8 @@ impl Default for SpawnOptions {
 }
 
 impl Vm {
-    /// Makes a task that will call `function`, a function or a symbol that names one, and puts it at the end of its
-    /// queue. What became of it is kept until [`Vm::forget`].
+    /// Makes a task that will call `function`, a function or a symbol that names one, and puts it at the end
+    /// of its queue. What became of it is kept until [`Vm::forget`].
     ///
     /// # Errors
     /// [`Exit::Collect`] if there is no room for it.
@@ -87,7 +87,8 @@ fn try_spawn(vm: &mut Vm, function: Value, arguments: &[Value]) -> Result<TaskId
     make_task(vm, function, list, SpawnOptions::default())
 }
 
-/// Makes a task that will call `function` with a list of arguments. It has copies of the bindings of the running task.
+/// Makes a task that will call `function` with a list of arguments. It has copies of the bindings of the
+/// running task.
 ///
 /// # Errors
 /// [`Exit::Collect`] if there is no room for it; then nothing has happened.
@@ -107,8 +108,8 @@ pub(crate) fn make_task(
     let words = interp::start::first_words(heap, function, arguments);
     let mut task = scheduler.tasks.make(object, words);
     interp::start::first_frame(heap, &mut task, scheduler.starter, function, arguments);
-    // A new task holds nothing that was not found in a cycle under way: what it is made of is in hands of a task
-    // that has been scanned, or of the host.
+    // A new task holds nothing that was not found in a cycle under way: what it is made of is in hands of a
+    // task that has been scanned, or of the host.
     heap.log_if_marking(function);
     heap.log_if_marking(arguments);
     heap.log_if_marking(options.notify);

@@ -1,7 +1,7 @@
 //! Time: when the clock is read, firing timers, and sleeping while nothing can run.
 //!
-//! Virtual time stands still while tasks run. It moves when all of them wait, to the first time for which one does, and when
-//! so many ticks have run that something else must be meant to happen.
+//! Virtual time stands still while tasks run. It moves when all of them wait, to the first time for which one
+//! does, and when so many ticks have run that something else must be meant to happen.
 
 use super::limit::expire;
 use super::wake::{call_attention, make_runnable};

@@ -12,8 +12,8 @@ use crate::schedule::{Due, Parking, TurnEnd};
 use crate::task::{AccountId, Task, TaskIndex, TaskState};
 use crate::vm::Vm;
 
-/// Gives a runnable task its turn: one slice, or as many as it takes to leave a critical section. `end` is the number of ticks
-/// of the run at which it is over in any case.
+/// Gives a runnable task its turn: one slice, or as many as it takes to leave a critical section. `end` is
+/// the number of ticks of the run at which it is over in any case.
 pub(crate) fn give_turn(vm: &mut Vm, index: TaskIndex, end: u64) {
     loop {
         let limit = end.saturating_sub(vm.scheduler.spent);
@@ -97,8 +97,8 @@ fn begin_slice(vm: &mut Vm, index: TaskIndex, mut task: Box<Task>) {
     vm.scan_before_running();
 }
 
-/// Does what has to be done before the first instruction of the slice: delivers what is pending, and ends a critical section that has
-/// taken too long.
+/// Does what has to be done before the first instruction of the slice: delivers what is pending, and ends a
+/// critical section that has taken too long.
 ///
 /// # Errors
 /// What takes the task off the processor before it runs.

@@ -11,8 +11,8 @@ pub(crate) fn make_runnable(vm: &mut Vm, index: TaskIndex, urgent: bool) {
     }
 }
 
-/// Has what was noted of a task seen to before the task goes on, whatever it does: a parked task becomes runnable, the running one
-/// ends its slice.
+/// Has what was noted of a task seen to before the task goes on, whatever it does: a parked task becomes
+/// runnable, the running one ends its slice.
 pub(super) fn call_attention(vm: &mut Vm, index: TaskIndex) {
     if vm.scheduler.is_running(index) {
         vm.scheduler.task_mut().flags.set_attention(true);

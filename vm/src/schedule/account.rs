@@ -1,8 +1,8 @@
 //! Accounts of ticks: budgets of forms and of tasks.
 //!
-//! A form with a budget opens an account under that of its task, and tasks made inside charge it too, so nobody gains
-//! ticks by making tasks. When it is spent, the form ends, and so do tasks made inside that outlive its owner; the
-//! account of a task's own budget has no form, and ends all tasks that charge it.
+//! A form with a budget opens an account under that of its task, and tasks made inside charge it too, so
+//! nobody gains ticks by making tasks. When it is spent, the form ends, and so do tasks made inside that
+//! outlive its owner; the account of a task's own budget has no form, and ends all tasks that charge it.
 
 use crate::task::{AccountId, LimitNumber, TaskIndex};
 
@@ -64,7 +64,8 @@ impl Accounts {
         }
     }
 
-    /// Closes the account of a form that is left, and returns the account above it. `None` if there is no such account.
+    /// Closes the account of a form that is left, and returns the account above it. `None` if there is no
+    /// such account.
     pub(crate) fn close_form(&mut self, id: AccountId) -> Option<AccountId> {
         let account = self.get_mut(id)?;
         // Tasks made inside that have not had their turn since it was spent are still to end.
@@ -130,7 +131,8 @@ impl Accounts {
         false
     }
 
-    /// Calls `visit` with the ticks left of an account and of those above it, where their end would end something.
+    /// Calls `visit` with the ticks left of an account and of those above it, where their end would end
+    /// something.
     pub(crate) fn visit_left(&self, id: AccountId, visit: &mut dyn FnMut(u64)) {
         let mut id = id;
         while let Some(account) = self.get(id) {

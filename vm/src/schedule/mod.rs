@@ -7,8 +7,8 @@
 //! point     places at which a task lets others go first, while schedules are explored
 //! ```
 //!
-//! Guarantees: a task that has not ended is running, in a run queue, held or parked, and only one of these. Everything here is
-//! data with its own operations; what happens to tasks while the machine runs is in `run`.
+//! Guarantees: a task that has not ended is running, in a run queue, held or parked, and only one of these.
+//! Everything here is data with its own operations; what happens to tasks while the machine runs is in `run`.
 
 mod account;
 mod choices;
@@ -226,7 +226,8 @@ impl Scheduler {
         }
     }
 
-    /// Leaves the wait at which the running task was parked. Its signal has come, so it is in no list any more.
+    /// Leaves the wait at which the running task was parked. Its signal has come, so it is in no list any
+    /// more.
     pub(crate) fn leave_signalled(&mut self, heap: &mut Heap) {
         let wait = std::mem::replace(&mut self.task_mut().wait, Value::NIL);
         heap.log_if_marking(wait);
@@ -252,7 +253,8 @@ impl Scheduler {
         self.accounts.is_spent_for(self.task().account, self.turn.index)
     }
 
-    /// Returns the allowance of a cleanup of the running task that an abort or an expired limit meets now, and sets its timer.
+    /// Returns the allowance of a cleanup of the running task that an abort or an expired limit meets now,
+    /// and sets its timer.
     pub(crate) fn new_allowance(&mut self, host: &mut dyn Host, config: &Config) -> Allowance {
         let time = self.clock.read(host).saturating_add(config.cleanup_time);
         self.timers.push(time, self.turn.index, Due::Cleanup);

@@ -1,7 +1,8 @@
 //! Points: places at which a task lets others go first, while schedules are explored.
 //!
-//! A builtin that stands at a point gives up ([`Exit::Again`]) before it has had any effect, its task leaves the processor, and when
-//! the task goes on the builtin is done again and let through. Unless schedules are explored that costs a test.
+//! A builtin that stands at a point gives up ([`Exit::Again`]) before it has had any effect, its task leaves
+//! the processor, and when the task goes on the builtin is done again and let through. Unless schedules are
+//! explored that costs a test.
 
 use super::{Scheduler, TurnEnd};
 use crate::raise::Exit;
@@ -28,8 +29,8 @@ pub(crate) struct Points {
 }
 
 impl Scheduler {
-    /// Stops the running task at a point before something that other tasks can see. For builtins, once each time that they
-    /// are done.
+    /// Stops the running task at a point before something that other tasks can see. For builtins, once each
+    /// time that they are done.
     ///
     /// # Errors
     /// [`Exit::Again`] if others are to be given the choice to go first; the builtin will be done again.
@@ -58,8 +59,8 @@ impl Scheduler {
         true
     }
 
-    /// Stops the running task, which has come to its end with these values, before the last step of the unwinding that ends it.
-    /// Returns whether it stops.
+    /// Stops the running task, which has come to its end with these values, before the last step of the
+    /// unwinding that ends it. Returns whether it stops.
     pub(crate) fn stops_before_end(&mut self, values: &mut Vec<Value>) -> bool {
         if self.points.grain.is_none() || !self.stops_here() {
             return false;

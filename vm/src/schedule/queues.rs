@@ -1,15 +1,16 @@
 //! Whose turn it is, and for how long.
 //!
-//! Eight priorities, the highest first, round-robin within one; of 64 turns each priority that has a runnable task gets at
-//! least one. Beside them a queue for what must not wait: tasks that are being ended, and those that wait for that. It
-//! is served in turn with the others, so that an abort is delivered within two slices however many tasks there are.
+//! Eight priorities, the highest first, round-robin within one; of 64 turns each priority that has a runnable
+//! task gets at least one. Beside them a queue for what must not wait: tasks that are being ended, and those
+//! that wait for that. It is served in turn with the others, so that an abort is delivered within two slices
+//! however many tasks there are.
 //!
-//! A schedule is legal if it keeps to this; where the order is open, between runnable tasks of the same priority, and in the
-//! length of a slice, choices are made in one place, [`Choices`]: always the first, from a seed, or from a given list. A
-//! run can note its choices, and the list of them reproduces it.
+//! A schedule is legal if it keeps to this; where the order is open, between runnable tasks of the same
+//! priority, and in the length of a slice, choices are made in one place, [`Choices`]: always the first, from
+//! a seed, or from a given list. A run can note its choices, and the list of them reproduces it.
 //!
-//! A place in a queue is good as long as the task's serial number is the one that it had when it was put there, so a task
-//! changes queues without being looked for.
+//! A place in a queue is good as long as the task's serial number is the one that it had when it was put
+//! there, so a task changes queues without being looked for.
 
 use std::collections::VecDeque;
 

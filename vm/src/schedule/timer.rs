@@ -1,8 +1,8 @@
 //! Timers: waits that end at a time, limits that expire, cleanups that have run for too long.
 //!
-//! Guarantees: timers fire in the order of time, and of two with the same time the one that was set first. A timer that is no longer
-//! wanted is not searched for but recognised by its serial number when it fires; when more than half are no longer
-//! wanted, all of these are dropped at once.
+//! Guarantees: timers fire in the order of time, and of two with the same time the one that was set first. A
+//! timer that is no longer wanted is not searched for but recognised by its serial number when it fires; when
+//! more than half are no longer wanted, all of these are dropped at once.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -18,7 +18,8 @@ pub(crate) enum TurnEnd {
     /// The ticks are used up: the task goes to the end of its queue.
     #[default]
     Spent,
-    /// The slice was cut short, because its length or its account is no longer right: the task goes on with another slice.
+    /// The slice was cut short, because its length or its account is no longer right: the task goes on with
+    /// another slice.
     Cut,
     /// The task lets others go first: it goes to the end of its queue.
     Passed,

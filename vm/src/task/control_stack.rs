@@ -1,12 +1,12 @@
 //! The control stack of a task: what stands between a point of the program and its root.
 //!
-//! Entries are pushed and popped by instructions; a throw, a handler that takes a condition, and an abort unwind them.
-//! Unwinding is a state of the task, not a Rust stack: entries are popped one by one, a tick each, a cleanup runs as
-//! ordinary code and goes on with the unwinding when it ends. So a cleanup can be preempted, and 10^6 entries unwind
-//! without holding anybody up.
+//! Entries are pushed and popped by instructions; a throw, a handler that takes a condition, and an abort
+//! unwind them. Unwinding is a state of the task, not a Rust stack: entries are popped one by one, a tick
+//! each, a cleanup runs as ordinary code and goes on with the unwinding when it ends. So a cleanup can be
+//! preempted, and 10^6 entries unwind without holding anybody up.
 //!
-//! Invariant: an entry of a frame is popped before the frame is left (the verifier's V9), so every entry's `base` is
-//! that of a live frame.
+//! Invariant: an entry of a frame is popped before the frame is left (the verifier's V9), so every entry's
+//! `base` is that of a live frame.
 
 use std::cell::OnceCell;
 use std::ops::{Deref, DerefMut};
@@ -23,13 +23,16 @@ pub(crate) enum EntryKind {
     Catch,
     /// A cleanup that waits for an unwinding to pass.
     Cleanup,
-    /// A cleanup that runs; `data` is its index in [`Control::running`], whose top belongs to the innermost of these.
+    /// A cleanup that runs; `data` is its index in [`Control::running`], whose top belongs to the innermost
+    /// of these.
     Running,
     /// Cases for conditions, which unwind to here; `data` is the vector of their types.
     HandlerCase,
-    /// Functions for conditions, which run at the point of signalling; `data` is a list of `(type . function)`.
+    /// Functions for conditions, which run at the point of signalling; `data` is a list of `(type .
+    /// function)`.
     Handlers,
-    /// Recovery procedures; `data` is their table, or after the first failure that they were for the state made of it.
+    /// Recovery procedures; `data` is their table, or after the first failure that they were for the state
+    /// made of it.
     Recovery,
     /// A cleanup for failures: the search for handlers ends there, and goes on outside when it has run.
     FailureCleanup,
@@ -37,9 +40,11 @@ pub(crate) enum EntryKind {
     Mask,
     /// A place down to which bindings are undone.
     Scope,
-    /// A limit of time or ticks; `data` is the tag of the catch that it was. It belongs to the innermost of the task's limits.
+    /// A limit of time or ticks; `data` is the tag of the catch that it was. It belongs to the innermost of
+    /// the task's limits.
     Limit,
-    /// A function that runs where the task was interrupted; `data` is the wait at which it was parked, or `NIL`.
+    /// A function that runs where the task was interrupted; `data` is the wait at which it was parked, or
+    /// `NIL`.
     Interrupt,
 }
 
@@ -86,8 +91,8 @@ pub(crate) enum Target {
     Limit(usize),
     /// At the entry with this index, a running cleanup that is cut off.
     Cleanup(usize),
-    /// At the frame with this base, which returns the values. Its entries and those of frames inside it are popped, so
-    /// that so many are left.
+    /// At the frame with this base, which returns the values. Its entries and those of frames inside it are
+    /// popped, so that so many are left.
     Return {
         /// Entries that are left.
         entries: usize,
@@ -102,7 +107,8 @@ impl Target {
         matches!(self, Target::Root(End::Aborted | End::Spent) | Target::Limit(_) | Target::Cleanup(_))
     }
 
-    /// Whether nothing that runs on the way can cancel the unwinding: the task ends, or is made to leave a form.
+    /// Whether nothing that runs on the way can cancel the unwinding: the task ends, or is made to leave a
+    /// form.
     pub(crate) fn is_final(self) -> bool {
         self.is_forced() || matches!(self, Target::Root(_))
     }
@@ -127,8 +133,9 @@ pub(crate) struct Unwinding {
 }
 
 impl Unwinding {
-    /// Which of two goes on when a cleanup is left: this one, with which it is left, or the one that it interrupted. An
-    /// exit of the program replaces another, but not the end of the task, nor an expired limit.
+    /// Which of two goes on when a cleanup is left: this one, with which it is left, or the one that it
+    /// interrupted. An exit of the program replaces another, but not the end of the task, nor an expired
+    /// limit.
     pub(crate) fn or_interrupted(self, interrupted: Option<Unwinding>) -> Unwinding {
         let Some(interrupted) = interrupted else { return self };
         let is_further = interrupted.target.depth() < self.target.depth();
@@ -232,7 +239,8 @@ impl Control {
         self.entries.iter().rposition(|entry| entry.kind == EntryKind::Running && entry.data == data)
     }
 
-    /// Where the unwinding goes that a cleanup which runs has interrupted, if nothing that the cleanup does can cancel it.
+    /// Where the unwinding goes that a cleanup which runs has interrupted, if nothing that the cleanup does
+    /// can cancel it.
     pub(crate) fn final_unwinding(&self) -> Option<Target> {
         let pending = self.running.iter().rev().filter_map(|running| running.pending.as_ref());
         pending.map(|unwinding| unwinding.target).find(|target| target.is_final())
@@ -244,9 +252,9 @@ impl Control {
         self.entries.iter().rposition(|entry| entry.data == tag && catches(entry))
     }
 
-    /// The innermost handlers below `height` that no mask hides, for a failure also recovery procedures and cleanups. A
-    /// failure in a cleanup that runs because the task ends, or leaves an expired limit, finds nothing outside of it.
-    /// Counts the entries that it looked at in `steps`.
+    /// The innermost handlers below `height` that no mask hides, for a failure also recovery procedures and
+    /// cleanups. A failure in a cleanup that runs because the task ends, or leaves an expired limit, finds
+    /// nothing outside of it. Counts the entries that it looked at in `steps`.
     pub(crate) fn find_handlers(&self, height: usize, is_failure: bool, steps: &mut usize) -> Option<Found> {
         let mut end = height.min(self.entries.len());
         while end > 0 {

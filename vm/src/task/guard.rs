@@ -9,7 +9,8 @@ pub(crate) const TASK: usize = 0;
 pub(crate) const FUNCTION: usize = 1;
 /// Slot: whether it still may.
 pub(crate) const IS_OPEN: usize = 2;
-/// Slot: the height of the control stack where it was made; it acts inside a cleanup only if it was made there.
+/// Slot: the height of the control stack where it was made; it acts inside a cleanup only if it was made
+/// there.
 pub(crate) const HEIGHT: usize = 3;
 /// `aux` of such a record.
 pub(crate) const AUX: u16 = 1;

@@ -1,10 +1,12 @@
 //! A task: a thread of control of the program, with its own stack.
 //!
-//! A task has two parts. What programs hold is an object of the heap, an event too, that knows its name, how it ended and
-//! the checkpoints that it passed. What runs is a `Task`, a small record in `Tasks`, which goes away at its end.
+//! A task has two parts. What programs hold is an object of the heap, an event too, that knows its name, how
+//! it ended and the checkpoints that it passed. What runs is a `Task`, a small record in `Tasks`, which goes
+//! away at its end.
 //!
 //! While a task runs, its record is taken out of the table into `Vm::running` and `pc` and `base` are kept by
-//! the interpreter; at a safepoint they are put back, and the record is all there is: no Rust frame holds any state.
+//! the interpreter; at a safepoint they are put back, and the record is all there is: no Rust frame holds any
+//! state.
 
 mod binding;
 mod control_stack;
@@ -57,7 +59,8 @@ pub(crate) struct Task {
     pub notify: Value,
     /// Ticks that it has used.
     pub ticks: u64,
-    /// Changes whenever it is queued or parked, so that older places in queues and timers are told from the present one.
+    /// Changes whenever it is queued or parked, so that older places in queues and timers are told from the
+    /// present one.
     pub serial: Serial,
     /// Ordinal, counted from the machine's first task.
     pub number: TaskNumber,
@@ -121,7 +124,8 @@ define_flags! {
     kept set_kept = 4;
     /// Its turns come before those of others: it is being ended, or waited for that.
     urgent set_urgent = 5;
-    /// A limit of it has expired, its cleanups have run out, or an interrupt waits: to be looked at before it goes on.
+    /// A limit of it has expired, its cleanups have run out, or an interrupt waits: to be looked at before it
+    /// goes on.
     attention set_attention = 6;
     /// It has waited twice with a stack that is much too large.
     oversized set_oversized = 7;
@@ -257,14 +261,14 @@ impl Task {
         self.control.unwinding = Some(Unwinding { target: Target::Root(end), values: Vec::new() });
     }
 
-    /// Returns the unwinding that goes on when the entry of a cleanup that was cut off has been popped. `interrupted` is the unwinding
-    /// that the cleanup has interrupted.
+    /// Returns the unwinding that goes on when the entry of a cleanup that was cut off has been popped.
+    /// `interrupted` is the unwinding that the cleanup has interrupted.
     pub(crate) fn after_cut_off(&mut self, interrupted: Option<Unwinding>) -> Unwinding {
         if let Some(interrupted) = interrupted {
             return interrupted;
         }
-        // It followed a form that had returned. What made it end is for the whole task or for a form further out; with a
-        // cleanup around it that one is what ends.
+        // It followed a form that had returned. What made it end is for the whole task or for a form further
+        // out; with a cleanup around it that one is what ends.
         if let Some(entry) = self.control.innermost_cleanup() {
             return Unwinding { target: Target::Cleanup(entry), values: Vec::new() };
         }

@@ -1,7 +1,8 @@
 //! Signals under delivery.
 //!
-//! A signal that more tasks wait for than are seen to in one step is delivered between turns, a part at a time. Until then no task
-//! may notice that others have not got it yet: the task that signals is held back, and operations on waits try again.
+//! A signal that more tasks wait for than are seen to in one step is delivered between turns, a part at a
+//! time. Until then no task may notice that others have not got it yet: the task that signals is held back,
+//! and operations on waits try again.
 
 use std::collections::VecDeque;
 

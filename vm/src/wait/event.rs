@@ -1,6 +1,7 @@
 //! Events: objects of the heap with a count of their signals and a list of the waits for them.
 //!
-//! A task is an event too, which its checkpoints and its end signal; its slots are those of an event and a few more.
+//! A task is an event too, which its checkpoints and its end signal; its slots are those of an event and a
+//! few more.
 
 use crate::heap::{AllocError, Heap, Kind};
 use crate::task::TaskIndex;

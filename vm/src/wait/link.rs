@@ -1,7 +1,7 @@
 //! Waits: objects of the heap, one *link* for each event that the wait is for.
 //!
-//! The first link stands for the wait. Links of the same event form a list, in the order in which the waits began; links of the same
-//! wait form a chain through [`MORE`].
+//! The first link stands for the wait. Links of the same event form a list, in the order in which the waits
+//! began; links of the same wait form a chain through [`MORE`].
 
 use super::{Deliveries, event};
 use crate::heap::{AllocError, Heap, Kind};
@@ -17,7 +17,8 @@ const PREVIOUS: usize = 2;
 const NEXT: usize = 3;
 /// Slot: next link of the same wait; in the last link, what is waited for, for reports.
 const MORE: usize = 4;
-/// Slot: arguments of the signal; in a wait that keeps signals, a pair of the first and the last cell of a list of them.
+/// Slot: arguments of the signal; in a wait that keeps signals, a pair of the first and the last cell of a
+/// list of them.
 const QUEUE: usize = 5;
 /// Slot: time at which the wait ends by itself, in nanoseconds, or `NIL`.
 pub(crate) const DEADLINE: usize = 6;

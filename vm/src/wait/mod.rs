@@ -6,9 +6,10 @@
 //! link  | owner | event | previous | next | more | queue | deadline |
 //! ```
 //!
-//! Guarantees: to look at a count and to begin to wait is one step; a wait that has ended is in no list. A wait is either for one signal,
-//! and over with it, or keeps signals: they are queued until it is closed, and none is lost.
-//! Not here: handing out signals (`run::signal`), and what ends a wait from outside (`run::pending`).
+//! Guarantees: to look at a count and to begin to wait is one step; a wait that has ended is in no list. A
+//! wait is either for one signal, and over with it, or keeps signals: they are queued until it is closed, and
+//! none is lost. Not here: handing out signals (`run::signal`), and what ends a wait from outside
+//! (`run::pending`).
 
 mod delivery;
 pub(crate) mod event;

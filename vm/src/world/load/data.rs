@@ -8,8 +8,8 @@ use esl_bytecode::module::PoolIdx;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
-/// The datum that a constant describes; `None` for functions and classes, and for what contains them. Data refer to
-/// earlier constants only, so this ends.
+/// The datum that a constant describes; `None` for functions and classes, and for what contains them. Data
+/// refer to earlier constants only, so this ends.
 pub(super) fn datum(image: &ModuleImage, packages: &[Arc<str>], index: PoolIdx) -> Option<Datum> {
     enum Todo {
         Visit(PoolIdx),

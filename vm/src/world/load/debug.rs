@@ -1,7 +1,8 @@
-//! What is known of a function beside its code: lambda list, documentation, and where in the source it was written.
+//! What is known of a function beside its code: lambda list, documentation, and where in the source it was
+//! written.
 //!
-//! The `debug` slot of a Code is a Record of four slots: lambda list, documentation, names of the sources (a simple
-//! vector, shared by the functions of a module), and the places: words, four for each entry.
+//! The `debug` slot of a Code is a Record of four slots: lambda list, documentation, names of the sources (a
+//! simple vector, shared by the functions of a module), and the places: words, four for each entry.
 
 use esl_bytecode::module::{Function, LineEntry, PoolIdx};
 

@@ -1,12 +1,13 @@
 //! The definitions of an image: what symbols are in it, as a table instead of code that runs.
 //!
-//! The table is the last constant of the image, a vector: the symbol `ESL::%DEFINITIONS`; a vector of the symbols that
-//! the package `ESL` exports; then rows of four: a symbol, its function, its macro function, and its *data* (`NIL` for
-//! none of these). Data are a vector: flags, the value, then indicators and values of properties, the first as they
-//! come first in the property list.
+//! The table is the last constant of the image, a vector: the symbol `ESL::%DEFINITIONS`; a vector of the
+//! symbols that the package `ESL` exports; then rows of four: a symbol, its function, its macro function, and
+//! its *data* (`NIL` for none of these). Data are a vector: flags, the value, then indicators and values of
+//! properties, the first as they come first in the property list.
 //!
-//! The number of rows is a power of two. A symbol is in the row that its hash says, or in the next free one; rows
-//! without a symbol begin with `NIL`. So finding a symbol takes about one look, and taking the table in takes none.
+//! The number of rows is a power of two. A symbol is in the row that its hash says, or in the next free one;
+//! rows without a symbol begin with `NIL`. So finding a symbol takes about one look, and taking the table in
+//! takes none.
 //!
 //! [`super::prepare()`] makes the table when the library is built.
 

@@ -1,12 +1,12 @@
 //! The image of the library: a module that is loaded piece by piece.
 //!
-//! A function of the image is a stub with its number until it is called for the first time; then its code is decoded,
-//! and with it those constants that it names and nobody has named before. What was made is kept in simple vectors of the
-//! heap, by number, so that everybody gets the same.
+//! A function of the image is a stub with its number until it is called for the first time; then its code is
+//! decoded, and with it those constants that it names and nobody has named before. What was made is kept in
+//! simple vectors of the heap, by number, so that everybody gets the same.
 //!
-//! The image may come with *definitions*: instead of a top-level form that runs when the machine starts, a row in a
-//! table that is looked at when a symbol object is made. So a start does nothing for functions that a program does not
-//! use. [`super::prepare`] makes the rows when the library is built.
+//! The image may come with *definitions*: instead of a top-level form that runs when the machine starts, a
+//! row in a table that is looked at when a symbol object is made. So a start does nothing for functions that
+//! a program does not use. [`super::prepare`] makes the rows when the library is built.
 
 use std::sync::Arc;
 
@@ -39,8 +39,8 @@ struct Image {
     pool: Value,
     /// Functions by number, likewise: for one without captures its Function, for one with captures its Code.
     functions: Value,
-    /// The code of functions that were not called yet. Its owner is the number of the image; capture 0 of the function
-    /// is its number in the image.
+    /// The code of functions that were not called yet. Its owner is the number of the image; capture 0 of the
+    /// function is its number in the image.
     lazy: Value,
 }
 
@@ -202,8 +202,8 @@ impl ImageLoader<'_> {
         Ok(object)
     }
 
-    /// The value of a constant other than a function with captures. Data refer to earlier entries only, so a stack of
-    /// what is being made comes to an end.
+    /// The value of a constant other than a function with captures. Data refer to earlier entries only, so a
+    /// stack of what is being made comes to an end.
     fn constant(&mut self, index: PoolIdx) -> Result<Value, LoadError> {
         let table = self.image().pool;
         if let Some(value) = self.made(table, index.0) {
@@ -275,8 +275,8 @@ impl ImageLoader<'_> {
         })
     }
 
-    /// The Code of a function, ready to run. Functions with captures that it makes closures of are made ready with it,
-    /// and those inside them.
+    /// The Code of a function, ready to run. Functions with captures that it makes closures of are made ready
+    /// with it, and those inside them.
     fn code(&mut self, number: FunctionNumber) -> Result<Value, LoadError> {
         let module = self.module();
         let first = self.start(&module, number)?;
@@ -359,8 +359,8 @@ pub(crate) fn origin(heap: &Heap, function: Value) -> Option<(usize, u32)> {
 }
 
 impl World {
-    /// Puts the code of a function of an image in place of its stub. Returns the number of words that were decoded, 0 if the
-    /// function was ready.
+    /// Puts the code of a function of an image in place of its stub. Returns the number of words that were
+    /// decoded, 0 if the function was ready.
     ///
     /// # Errors
     /// [`LoadError`] if the image is damaged, or there is no room.

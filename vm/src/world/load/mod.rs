@@ -1,14 +1,15 @@
 //! From compiled modules to functions in the heap.
 //!
-//! A module that is read or compiled while the machine runs is verified and loaded as a whole; nothing of it stays
-//! outside of the heap, so what a program has forgotten is collected. The image of the library is trusted and loaded
-//! piece by piece (`image`): a function is a stub until it is called for the first time.
+//! A module that is read or compiled while the machine runs is verified and loaded as a whole; nothing of it
+//! stays outside of the heap, so what a program has forgotten is collected. The image of the library is
+//! trusted and loaded piece by piece (`image`): a function is a stub until it is called for the first time.
 //!
-//! Guarantees: one value for each entry of a module's pool, so that literal data keep their identity; a Code is laid out
-//! as `shape` says.
+//! Guarantees: one value for each entry of a module's pool, so that literal data keep their identity; a Code
+//! is laid out as `shape` says.
 //!
-//! A constant that names a structure class is its symbol here. The machine puts the class in its place when an
-//! instruction first needs it, so code may be loaded before the class is defined, and sees the class as it is then.
+//! A constant that names a structure class is its symbol here. The machine puts the class in its place when
+//! an instruction first needs it, so code may be loaded before the class is defined, and sees the class as it
+//! is then.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -80,8 +81,8 @@ impl From<ReadError> for LoadError {
     }
 }
 
-/// The objects that the constants of a module may refer to, beside those that they describe: what modules of one
-/// compilation have in common.
+/// The objects that the constants of a module may refer to, beside those that they describe: what modules of
+/// one compilation have in common.
 pub(crate) trait Shared {
     /// The symbol object for an uninterned symbol's number, if there is one.
     fn uninterned(&self, id: u32) -> Option<Value>;
@@ -138,7 +139,8 @@ struct Loader<'a> {
 
 impl Loader<'_> {
     fn load(mut self) -> Result<Value, LoadError> {
-        // Data may contain functions, and functions each other, so functions are made before they have their code.
+        // Data may contain functions, and functions each other, so functions are made before they have their
+        // code.
         let shape = Shape::other(Sort::Lazy, 0);
         let stub = trust::alloc_stub(self.heap, Value::NIL, Value::NIL, shape, 0, LAZY_WORD)?;
         for function in &self.module.functions {
@@ -326,8 +328,8 @@ impl World {
         debug::place_of(heap, parts.debug, pc)
     }
 
-    /// Returns the lambda list and the documentation of a function, `NIL` for what it has not. `None` if `function` is no
-    /// function.
+    /// Returns the lambda list and the documentation of a function, `NIL` for what it has not. `None` if
+    /// `function` is no function.
     ///
     /// # Errors
     /// [`LoadError`] if an image is damaged, or there is no room.

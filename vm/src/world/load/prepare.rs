@@ -1,9 +1,9 @@
-//! Makes the table of definitions of an image: top-level forms that do nothing but define are run here, as far as
-//! constants go, and noted instead of kept.
+//! Makes the table of definitions of an image: top-level forms that do nothing but define are run here, as
+//! far as constants go, and noted instead of kept.
 //!
-//! A form is a short piece of code of a few kinds of instructions and builtins. Anything else, or a value that is no
-//! constant, and the form stays a form. The forms that stay run after all that are noted; a library must not depend on
-//! the order between the two.
+//! A form is a short piece of code of a few kinds of instructions and builtins. Anything else, or a value
+//! that is no constant, and the form stays a form. The forms that stay run after all that are noted; a
+//! library must not depend on the order between the two.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -51,8 +51,8 @@ struct Noted {
     exports: Vec<PoolIdx>,
 }
 
-/// Turns the top-level forms of `module` that do nothing but define into a table, for an image: functions, macros,
-/// special variables, constants, properties and exports. Those that do nothing at all go.
+/// Turns the top-level forms of `module` that do nothing but define into a table, for an image: functions,
+/// macros, special variables, constants, properties and exports. Those that do nothing at all go.
 ///
 /// The module must stay the only one in its file: its last constant becomes the table.
 #[must_use]

@@ -21,7 +21,8 @@ fn function(registers: u8, constants: &[u32], code: &str) -> Function {
     }
 }
 
-/// `(%set-function 'adder (lambda (n) (lambda (x) (+ n x))))` and `(quote #1=(a "text" . #1#))`-like shared data.
+/// `(%set-function 'adder (lambda (n) (lambda (x) (+ n x))))` and `(quote #1=(a "text" . #1#))`-like shared
+/// data.
 fn module() -> Module {
     let set_function = Builtin::SetFunction.number();
     let define = format!(
