@@ -2,7 +2,7 @@
 
 /// Ticks that a cleanup may take once an abort or an expired limit is pending.
 const CLEANUP_TICKS: u64 = 1_000_000;
-/// Nanoseconds that it may take.
+/// Nanoseconds that it may take then.
 const CLEANUP_TIME: u64 = 60_000_000_000;
 
 /// Limits and settings of a virtual machine.
@@ -16,9 +16,9 @@ pub struct Config {
     pub slice: u32,
     /// Ticks that the whole run may take; `None` without a limit.
     pub budget: Option<u64>,
-    /// Seed of everything that is chosen at random.
+    /// Seed of all random choices.
     pub seed: u64,
-    /// Collect at every safepoint. For tests: what is not rooted is found soon.
+    /// Whether every safepoint collects. For tests: an object that nothing keeps alive is found soon.
     pub collect_always: bool,
     /// Ticks that a critical section may take.
     pub critical_ticks: u32,
@@ -29,7 +29,7 @@ pub struct Config {
 }
 
 impl Config {
-    /// What holds where nothing else is said.
+    /// Default limits and settings.
     pub const DEFAULT: Config = Config {
         memory: 1 << 30,
         stack: 1 << 16,

@@ -1,4 +1,5 @@
-//! What an embedder does with a machine beside running it: data in and out, and functions of its own.
+//! The embedder's API beside running tasks: making a machine, data in and out, functions of the embedder's,
+//! settings.
 
 use std::fmt;
 use std::sync::Arc;
@@ -31,7 +32,7 @@ use crate::world::{World, class};
 pub use crate::datum::DatumError as ExportError;
 pub use crate::outside::HostFunction;
 
-/// Why a function of the library could not be called.
+/// Reason why a function of the library could not be called.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LibraryError {
     /// The library has no function of this name.
@@ -85,22 +86,24 @@ impl Vm {
         Vm::new(Config::default(), host).expect("there is room for an empty machine")
     }
 
-    /// Limits and settings.
+    /// Returns the limits and settings.
     pub fn config(&self) -> &Config {
         &self.config
     }
 
-    /// A flag that makes the machine abort a task at the end of its slice when it is set.
+    /// Returns a flag that makes the machine abort the task of [`Vm::set_interruptible`] when it is set, at
+    /// the end of a slice.
     pub fn interrupt_flag(&self) -> Arc<AtomicBool> {
         self.embedder.interrupt.clone()
     }
 
-    /// A flag that makes the run under way, or the next one, come back at the end of a slice when it is set.
+    /// Returns a flag that makes the run under way, or the next one, come back when it is set, at the end of
+    /// a slice.
     pub fn stop_flag(&self) -> Arc<AtomicBool> {
         self.embedder.stop.clone()
     }
 
-    /// The status that the program has asked to end with.
+    /// Returns the status that the program has asked to end with.
     pub fn exit_status(&self) -> Option<u8> {
         self.outside.exit_status
     }
@@ -113,17 +116,17 @@ impl Vm {
         }
     }
 
-    /// Whether the embedder has interrupted the program.
+    /// Returns whether the embedder has interrupted the program.
     pub fn was_interrupted(&self) -> bool {
         self.embedder.was_interrupted
     }
 
-    /// Decides how choices are made where the language leaves the order of tasks open.
+    /// Sets how choices are made where the language leaves the order of tasks open.
     pub fn set_choices(&mut self, choices: Choices) {
         self.scheduler.choices = choices;
     }
 
-    /// How choices are made, and those made so far.
+    /// Returns how choices are made, with those made so far.
     pub fn choices(&self) -> &Choices {
         &self.scheduler.choices
     }
@@ -138,13 +141,13 @@ impl Vm {
         self.embedder.unpin(value);
     }
 
-    /// Takes in a function of the embedder: its number, for `%call-host`.
+    /// Adds a function of the embedder's, and returns its number, for `%call-host`.
     pub fn add_host_function(&mut self, function: HostFunction) -> usize {
         self.outside.functions.push(function);
         self.outside.functions.len() - 1
     }
 
-    /// A value as data. Objects that no data stands for, such as functions and hash tables, come out as a
+    /// Returns a value as data. Objects that no data stands for, such as functions and hash tables, become a
     /// string that describes them.
     ///
     /// # Errors
@@ -155,7 +158,7 @@ impl Vm {
         Ok(datum)
     }
 
-    /// Data as a value.
+    /// Returns data as a value.
     ///
     /// # Errors
     /// [`Exit::Collect`] without room.
@@ -167,7 +170,7 @@ impl Vm {
 }
 
 impl Vm {
-    /// The function of the library with this name, internal to the package `ESL`.
+    /// Returns the function of the library with this name, internal to the package `ESL`.
     ///
     /// # Errors
     /// [`LibraryError`] if the library has none, or there is no memory for its name.
@@ -189,7 +192,7 @@ impl Vm {
         self.spawn(function, arguments).map_err(|_| LibraryError::NoMemory)
     }
 
-    /// Settings that count from here on; ticks are counted anew.
+    /// Sets limits and settings from here on, except the limit of memory. Ticks are counted anew.
     pub fn begin_program(&mut self, config: Config) {
         self.config = Config { memory: self.config.memory, ..config };
         self.scheduler.choices = Choices::seeded(self.config.seed);
@@ -218,7 +221,7 @@ impl Vm {
         self.outside.complain(text);
     }
 
-    /// Whether a condition that ended a task says that the memory is exhausted.
+    /// Returns whether a condition that ended a task says that the memory is exhausted.
     pub fn is_heap_exhausted(&self, condition: Value) -> bool {
         if condition == self.world.known.heap_exhausted {
             return true;
@@ -229,7 +232,7 @@ impl Vm {
             .is_some_and(|name| name == "HEAP-EXHAUSTED")
     }
 
-    /// Figures of the heap.
+    /// Returns figures of the heap.
     pub fn heap_stats(&self) -> HeapStats {
         self.heap.stats()
     }

@@ -1,4 +1,4 @@
-//! What the embedder holds on to, and its requests.
+//! Values that the embedder holds, and its requests.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -8,7 +8,7 @@ use crate::heap::Heap;
 use crate::task::TaskId;
 use crate::value::Value;
 
-/// What the embedder holds on to, and its requests.
+/// Values that the embedder holds, and its requests.
 #[derive(Default)]
 pub(crate) struct Embedder {
     /// Values that are kept from being collected.

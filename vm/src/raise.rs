@@ -1,4 +1,4 @@
-//! What a builtin or an instruction says when it cannot do its work.
+//! Failures of builtins and instructions, and other reasons why they give no value.
 //!
 //! A failure leaves Rust as data: a [`Raised`] waits in the exchange while the builtin returns
 //! [`Exit::Raise`]. The interpreter then calls the library function `%raise` at the point of failure, in a
@@ -15,7 +15,7 @@ use crate::world::load::LoadError;
 /// Arguments of a call.
 pub(crate) type Arguments = SmallVec<[Value; 16]>;
 
-/// What was expected in place of a datum: a type specifier.
+/// Type that was expected of a datum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Expected {
     /// The type of this name in `COMMON-LISP`.
@@ -26,7 +26,7 @@ pub enum Expected {
     Specifier(Value),
 }
 
-/// A failure of an operation, before it is made into a condition.
+/// Failure of an operation, before it becomes a condition.
 #[derive(Clone, Debug)]
 pub enum Raised {
     /// `type-error`: the datum is not of the expected type.
@@ -71,13 +71,14 @@ pub enum Raised {
     HeapExhausted,
 }
 
-/// Why a builtin gives no value. As wide as a value, so that an [`Outcome`] comes back in two registers.
+/// Reason why a builtin returns no value. As wide as a value, so that an [`Outcome`] comes back in two
+/// registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Exit {
     /// It failed; the exchange holds the [`Raised`].
     Raise,
-    /// It gives other than one value: they are in the value list.
+    /// It returns other than one value: they are in the value list.
     Values,
     /// The work is above its limit: the ESL function in its row of the table takes over with the same
     /// arguments. It has had no effect.
@@ -94,7 +95,7 @@ pub enum Exit {
     Unwind,
 }
 
-/// What a builtin gives: one value, or the reason why not.
+/// Result of a builtin: one value, or the reason why there is none.
 pub type Outcome = Result<Value, Exit>;
 
 impl From<AllocError> for Exit {

@@ -6,9 +6,10 @@
 //! before it, in an order that depends on the state alone. Tables are hashed in the order of their entries,
 //! facts in that of their assertion, times relative to now.
 //!
-//! Not part of a state: ticks (but for budgets), the numbers of tasks, the order of queues, registers that
-//! will not be read (`live`), what is reachable from code only, and the outside. While a query is open at a
-//! point, each state is another one.
+//! Which fields of the machine belong to it is said by `state`, and visited in `content`. Not part of a
+//! state: ticks (but for budgets), the numbers of tasks, the order of queues, registers that will not be read
+//! (`live`), what is reachable from code only, and the outside. While a query or a compilation is under way
+//! at a point, the state equals no other.
 
 use std::collections::HashMap;
 use std::rc::Rc;

@@ -1,5 +1,4 @@
-//! What is said of tasks: when no task can ever run again, who waits, for what, and where; and the tree of
-//! all of them.
+//! Reports on tasks: the deadlock report, when no task can ever run again, and the tree of all tasks.
 
 use std::collections::BTreeMap;
 
@@ -13,19 +12,19 @@ use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
 
-/// Tasks that a report names.
+/// Maximal number of tasks that a deadlock report names.
 const SHOWN: usize = 20;
-/// Tasks that the tree of them shows.
+/// Maximal number of tasks that the tree shows.
 const SHOWN_IN_TREE: usize = 1000;
-/// Frames in which the line of the program is looked for.
+/// Maximal number of frames searched for a line of the program.
 const FRAMES: usize = 50;
 
-/// Whether a source is one of the library, by the name that its build gives it.
+/// Returns whether a source belongs to the library, by the name that its build gives it.
 fn is_of_library(source: &str) -> bool {
     source.starts_with("stdlib/") && source.ends_with(".esl")
 }
 
-/// The word of the one tail call in some code; none if there are several.
+/// Returns the word of the one tail call in some code; `None` if there are several.
 fn tail_call_in(words: &[u32]) -> Option<usize> {
     let mut found = None;
     let mut at = 0;
@@ -42,7 +41,7 @@ fn tail_call_in(words: &[u32]) -> Option<usize> {
     found
 }
 
-/// The order in which tasks are shown, each after its maker, and how deep below the first of them. `tasks`
+/// Returns the order in which tasks are shown, each after its maker, with their depths in the tree. `tasks`
 /// are the numbers of each task and of its maker, in the order of the former.
 fn depths(tasks: impl Iterator<Item = (u64, u64)>) -> Vec<(usize, usize)> {
     let mut made: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
@@ -69,8 +68,8 @@ fn depths(tasks: impl Iterator<Item = (u64, u64)>) -> Vec<(usize, usize)> {
 }
 
 impl Vm {
-    /// A text that names the tasks that wait, what they wait for, and the lines where they do. Those of the
-    /// library are left out.
+    /// Returns a text that names the waiting tasks of the program, what they wait for, and the lines where
+    /// they do.
     pub fn deadlock_report(&self) -> String {
         let mut tasks: Vec<&Task> = self
             .scheduler
@@ -93,7 +92,7 @@ impl Vm {
         text
     }
 
-    /// A text that shows the tasks of the program: each below the one that made it, what it does and where,
+    /// Returns a text that shows the tasks of the program: each below its maker, with what it does and where,
     /// and the ticks that it has used.
     pub fn task_report(&self) -> String {
         let mut tasks: Vec<&Task> = self
@@ -127,9 +126,9 @@ impl Vm {
     }
 }
 
-/// The innermost place of the program, not of the library, at which a task stands; if tail calls have left no
-/// frame of the program, that of the tail call in the function with which the task began, or of its beginning
-/// if there are several.
+/// Returns the innermost place of the program, not of the library, at which a task stands. If tail calls have
+/// left no frame of the program, it is that of the tail call in the function with which the task began, or of
+/// its beginning if there are several.
 fn program_place(vm: &Vm, task: &Task) -> Option<String> {
     let place = |code: Value, word: usize| {
         let place = vm

@@ -1,8 +1,8 @@
-//! The choices of a run where the language leaves an order open.
+//! Choices of a run where the language leaves an order open.
 
 use std::collections::VecDeque;
 
-/// How choices are made.
+/// Source of choices.
 #[derive(Clone, Debug, Default)]
 enum Source {
     /// Always the first.
@@ -14,7 +14,7 @@ enum Source {
     Given(VecDeque<u32>),
 }
 
-/// The choices of a run where the language leaves an order open.
+/// Choices of a run where the language leaves an order open.
 #[derive(Clone, Debug, Default)]
 pub struct Choices {
     source: Source,
@@ -22,30 +22,30 @@ pub struct Choices {
 }
 
 impl Choices {
-    /// Always the first: plain round-robin with whole slices.
+    /// Creates choices that are always the first: plain round-robin with whole slices.
     pub fn first() -> Choices {
         Choices::default()
     }
 
-    /// Choices that follow from a seed; those of the seed 0 are always the first.
+    /// Creates choices that follow from a seed; those of the seed 0 are always the first.
     pub fn seeded(seed: u64) -> Choices {
         let source = if seed == 0 { Source::First } else { Source::Seeded(seed) };
         Choices { source, record: None }
     }
 
-    /// The given choices, then always the first.
+    /// Creates choices that are as given, then always the first.
     pub fn given(list: &[u32]) -> Choices {
         Choices { source: Source::Given(list.iter().copied().collect()), record: None }
     }
 
-    /// Notes the choices that are made.
+    /// Has the choices noted that are made, so that the list of them reproduces the run.
     #[must_use]
     pub fn recorded(mut self) -> Choices {
         self.record = Some(Vec::new());
         self
     }
 
-    /// The choices made so far, if they were noted.
+    /// Returns the choices made so far, if they were noted.
     pub fn made(&self) -> &[u32] {
         self.record.as_deref().unwrap_or(&[])
     }
@@ -55,7 +55,7 @@ impl Choices {
         matches!(self.source, Source::First)
     }
 
-    /// A number below `count`.
+    /// Chooses a number below `count`.
     pub(crate) fn choose(&mut self, count: usize) -> usize {
         if count <= 1 {
             return 0;
@@ -71,7 +71,7 @@ impl Choices {
         choice
     }
 
-    /// The length of a slice of at most `slice` ticks.
+    /// Chooses the length of a slice of at most `slice` ticks.
     #[inline]
     pub(crate) fn slice(&mut self, slice: u32) -> u32 {
         if self.is_first() { slice } else { slice - self.choose(slice as usize) as u32 }

@@ -1,26 +1,25 @@
-//! Whose turn it is, and for how long.
+//! Run queues: whose turn it is.
 //!
-//! Eight priorities, the highest first, round-robin within one; of 64 turns each priority that has a runnable
-//! task gets at least one. Beside them a queue for what must not wait: tasks that are being ended, and those
-//! that wait for that. It is served in turn with the others, so that an abort is delivered within two slices
-//! however many tasks there are.
+//! There are eight priorities, the highest first, round-robin within one; of 64 turns each priority that has
+//! a runnable task gets at least one. Beside them there is a queue of urgent tasks: those that are being
+//! ended, and those that wait for that. It is served in turn with the others, so an abort is delivered within
+//! two slices however many tasks there are.
 //!
-//! A schedule is legal if it keeps to this; where the order is open, between runnable tasks of the same
-//! priority, and in the length of a slice, choices are made in one place, [`Choices`]: always the first, from
-//! a seed, or from a given list. A run can note its choices, and the list of them reproduces it.
+//! A schedule is legal if it keeps to this. The order of runnable tasks of the same priority is open, and so
+//! is the length of a slice: both are chosen by [`Choices`].
 //!
-//! A place in a queue is good as long as the task's serial number is the one that it had when it was put
-//! there, so a task changes queues without being looked for.
+//! A place in a queue is good while the task has the serial number that it had when it was put there, so a
+//! task changes queues without a search.
 
 use std::collections::VecDeque;
 
 use super::Choices;
 use crate::task::{PRIORITIES, Serial, TaskIndex, TaskState, Tasks};
 
-/// Runnable tasks among which a choice is made, at most.
+/// Maximal number of runnable tasks among which a choice is made.
 const CHOICE: usize = 8;
 
-/// A place in a queue.
+/// Place in a queue.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Queued {
     index: TaskIndex,
@@ -53,12 +52,12 @@ impl RunQueues {
         }
     }
 
-    /// Takes out the first of those that are being ended, or wait for that.
+    /// Takes the first urgent task.
     pub(crate) fn next_urgent(&mut self, tasks: &Tasks) -> Option<TaskIndex> {
         pop(&mut self.urgent, tasks, &mut Choices::first())
     }
 
-    /// Takes out the task whose turn it is.
+    /// Takes the task whose turn it is.
     pub(crate) fn next(&mut self, tasks: &Tasks, choices: &mut Choices) -> Option<TaskIndex> {
         self.turns += 1;
         if self.turns & 1 == 0
@@ -91,7 +90,7 @@ fn is_valid(queued: Queued, tasks: &Tasks) -> bool {
         .is_some_and(|task| task.serial == queued.serial && task.state == TaskState::Runnable)
 }
 
-/// Takes a task out of a queue, and drops places that are no longer good.
+/// Takes a task from a queue, and drops places that are no longer good.
 #[inline]
 fn pop(queue: &mut VecDeque<Queued>, tasks: &Tasks, choices: &mut Choices) -> Option<TaskIndex> {
     while let Some(&first) = queue.front() {

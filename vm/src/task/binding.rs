@@ -11,17 +11,17 @@
 use crate::value::Value;
 use crate::world::GivenMap;
 
-/// The bindings that are searched one by one; at most twice as many.
+/// Number of bindings searched one by one; at most twice as many.
 const NEAR: usize = 32;
 
 /// A dynamic binding.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Binding {
-    /// The symbol.
+    /// Symbol of the variable.
     pub symbol: Value,
-    /// Its value in this task.
+    /// Value of the variable in this task.
     pub value: Value,
-    /// Offset in the stack of the base of the frame that has made it.
+    /// Offset in the stack of the base of the frame that made it.
     pub base: u32,
 }
 
@@ -32,7 +32,7 @@ pub(crate) struct Bindings {
     table: Option<Box<Table>>,
 }
 
-/// How the older bindings are found.
+/// Table of the older bindings.
 #[derive(Default)]
 struct Table {
     newest: GivenMap<u64, u32>,
@@ -40,18 +40,18 @@ struct Table {
 }
 
 impl Bindings {
-    /// How many there are.
+    /// Returns the number of bindings.
     #[inline]
     pub(crate) fn len(&self) -> usize {
         self.all.len()
     }
 
-    /// All of them, oldest first.
+    /// Returns all bindings, oldest first.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Binding> {
         self.all.iter()
     }
 
-    /// The newest binding of each symbol but those of `without`, for another task.
+    /// Returns a copy for another task: the newest binding of each symbol but those of `without`.
     pub(crate) fn copy(&self, without: &[Value]) -> Bindings {
         let mut seen = GivenMap::default();
         seen.extend(without.iter().map(|symbol| (symbol.bits(), ())));
@@ -64,7 +64,7 @@ impl Bindings {
         copy
     }
 
-    /// Adds one.
+    /// Adds a binding.
     #[inline]
     pub(crate) fn push(&mut self, binding: Binding) {
         self.all.push(binding);
@@ -73,7 +73,7 @@ impl Bindings {
         }
     }
 
-    /// Undoes all but the oldest `length`.
+    /// Undoes all bindings but the oldest `length`.
     #[inline]
     pub(crate) fn truncate(&mut self, length: usize) {
         if length < self.covered() {
@@ -82,19 +82,19 @@ impl Bindings {
         self.all.truncate(length);
     }
 
-    /// Undoes those of the frame with this base and of frames inside it.
+    /// Undoes the bindings of the frame with this base and of frames inside it.
     pub(crate) fn truncate_from(&mut self, base: u32) {
         let length = self.all.iter().rposition(|binding| binding.base < base).map_or(0, |last| last + 1);
         self.truncate(length);
     }
 
-    /// The value of the newest binding of `symbol`.
+    /// Returns the value of the newest binding of `symbol`.
     #[inline]
     pub(crate) fn get(&self, symbol: Value) -> Option<Value> {
         self.find(symbol).map(|index| self.all[index].value)
     }
 
-    /// The value of the newest binding of `symbol`, to be set.
+    /// Returns the value of the newest binding of `symbol`, to be set.
     #[inline]
     pub(crate) fn get_mut(&mut self, symbol: Value) -> Option<&mut Value> {
         self.find(symbol).map(|index| &mut self.all[index].value)
@@ -111,7 +111,7 @@ impl Bindings {
         }
     }
 
-    /// How many of the oldest are in the table.
+    /// Returns the number of the oldest bindings that are in the table.
     #[inline]
     fn covered(&self) -> usize {
         self.table.as_ref().map_or(0, |table| table.previous.len())

@@ -16,7 +16,7 @@ use crate::task::Allowance;
 use crate::task::Bindings;
 use crate::value::Value;
 
-/// What an entry is.
+/// Kind of an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum EntryKind {
     /// A catch; `data` is the tag.
@@ -48,12 +48,12 @@ pub(crate) enum EntryKind {
     Interrupt,
 }
 
-/// An entry.
+/// Entry of a control stack.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Entry {
-    /// What goes with the kind.
+    /// Datum that belongs to the kind.
     pub data: Value,
-    /// Where control goes when an unwinding ends, or a cleanup begins, here.
+    /// Address at which control goes on when an unwinding ends, or a cleanup begins, here.
     pub pc: SavedPc,
     /// Offset of the frame's base in the stack.
     pub base: u32,
@@ -61,13 +61,13 @@ pub(crate) struct Entry {
     pub bindings: u32,
     /// First register that the landing may write.
     pub window: u8,
-    /// How many values the landing wants, as in [`esl_bytecode::operand::Want`].
+    /// Number of values that the landing wants, as in [`esl_bytecode::operand::Want`].
     pub want: u8,
-    /// What the entry is.
+    /// Kind of the entry.
     pub kind: EntryKind,
 }
 
-/// How a task ends.
+/// Way a task ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum End {
     /// Its function returned.
@@ -80,7 +80,7 @@ pub(crate) enum End {
     Spent,
 }
 
-/// Where an unwinding ends.
+/// Target of an unwinding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Target {
     /// At the entry with this index.
@@ -102,18 +102,18 @@ pub(crate) enum Target {
 }
 
 impl Target {
-    /// Whether nothing that the program does may cancel an unwinding to it.
+    /// Returns whether nothing that the program does may cancel an unwinding to it.
     pub(crate) fn is_forced(self) -> bool {
         matches!(self, Target::Root(End::Aborted | End::Spent) | Target::Limit(_) | Target::Cleanup(_))
     }
 
-    /// Whether nothing that runs on the way can cancel the unwinding: the task ends, or is made to leave a
-    /// form.
+    /// Returns whether nothing that runs on the way can cancel the unwinding: the task ends, or is made to
+    /// leave a form.
     pub(crate) fn is_final(self) -> bool {
         self.is_forced() || matches!(self, Target::Root(_))
     }
 
-    /// How far inside it is: the greater, the further.
+    /// Returns its depth: the greater, the further inside.
     fn depth(self) -> usize {
         match self {
             Target::Root(_) => 0,
@@ -126,16 +126,16 @@ impl Target {
 /// An unwinding under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Unwinding {
-    /// Where it ends.
+    /// Target.
     pub target: Target,
-    /// The values that it carries.
+    /// Values that it carries.
     pub values: Vec<Value>,
 }
 
 impl Unwinding {
-    /// Which of two goes on when a cleanup is left: this one, with which it is left, or the one that it
-    /// interrupted. An exit of the program replaces another, but not the end of the task, nor an expired
-    /// limit.
+    /// Returns the unwinding that goes on when a cleanup is left: this one, by which it is left, or the one
+    /// that the cleanup interrupted. An exit of the program replaces another, but not the end of the task,
+    /// nor an expired limit.
     pub(crate) fn or_interrupted(self, interrupted: Option<Unwinding>) -> Unwinding {
         let Some(interrupted) = interrupted else { return self };
         let is_further = interrupted.target.depth() < self.target.depth();
@@ -147,42 +147,42 @@ impl Unwinding {
     }
 }
 
-/// What a running cleanup has interrupted.
+/// Running cleanup: what it has interrupted, and what it may use.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Running {
-    /// The unwinding that goes on when it ends; `None` if the protected form returned.
+    /// Unwinding that goes on when it ends; `None` if the protected form returned.
     pub pending: Option<Unwinding>,
-    /// The value list of the protected form.
+    /// Value list of the protected form.
     pub values: Vec<Value>,
-    /// What it may still use, once something waits for its end.
+    /// Ticks and time that it may still use, once something waits for its end.
     pub allowance: Option<Allowance>,
 }
 
-/// The control stack of a task, with its bindings.
+/// Control stack of a task, with its bindings.
 #[derive(Default)]
 pub(crate) struct Control {
-    /// The entries, innermost last.
+    /// Entries, innermost last.
     pub entries: Vec<Entry>,
-    /// What the running cleanups have interrupted, innermost last.
+    /// Running cleanups, innermost last.
     pub running: Vec<Running>,
-    /// The dynamic bindings.
+    /// Dynamic bindings.
     pub bindings: Bindings,
-    /// The unwinding that is being worked on.
+    /// Unwinding under way.
     pub unwinding: Option<Unwinding>,
 }
 
-/// A control stack that is made when it is first wanted: many tasks never want one.
+/// Control stack that is made when it is first used: many tasks never use one.
 #[derive(Default)]
 pub(crate) struct LazyControl(OnceCell<Box<Control>>);
 
 impl LazyControl {
-    /// The control stack, if there is one.
+    /// Returns the control stack, if there is one.
     #[inline(always)]
     pub(crate) fn get(&self) -> Option<&Control> {
         self.0.get().map(|control| &**control)
     }
 
-    /// Whether an unwinding is being worked on.
+    /// Returns whether an unwinding is under way.
     #[inline(always)]
     pub(crate) fn is_unwinding(&self) -> bool {
         self.get().is_some_and(|control| control.unwinding.is_some())
@@ -208,19 +208,19 @@ impl DerefMut for LazyControl {
     }
 }
 
-/// The next handlers that a search has found.
+/// Handlers found by a search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Found {
     /// Index of the entry.
     pub index: usize,
-    /// Its kind: cases, handlers, recovery procedures or a cleanup for failures.
+    /// Kind of the entry: cases, handlers, recovery procedures or a cleanup for failures.
     pub kind: EntryKind,
-    /// Its data.
+    /// Datum of the entry.
     pub data: Value,
 }
 
 impl Control {
-    /// Makes the cleanup `entry` a running one, on top of the stack, which has interrupted `running`.
+    /// Begins to run the cleanup `entry`, on top of the stack. `running` is what it interrupts.
     pub(crate) fn run_cleanup(&mut self, entry: Entry, running: Running) {
         let data = Value::index(self.running.len());
         self.bindings.truncate(entry.bindings as usize);
@@ -228,33 +228,32 @@ impl Control {
         self.running.push(running);
     }
 
-    /// Index of the entry of the innermost cleanup that runs.
+    /// Returns the index of the entry of the innermost running cleanup.
     pub(crate) fn innermost_cleanup(&self) -> Option<usize> {
         self.cleanup_entry(self.running.len().checked_sub(1)?)
     }
 
-    /// Index of the entry of the cleanup whose place in `running` this is.
+    /// Returns the index of the entry of the cleanup at this position of `running`.
     pub(crate) fn cleanup_entry(&self, position: usize) -> Option<usize> {
         let data = Value::index(position);
         self.entries.iter().rposition(|entry| entry.kind == EntryKind::Running && entry.data == data)
     }
 
-    /// Where the unwinding goes that a cleanup which runs has interrupted, if nothing that the cleanup does
-    /// can cancel it.
+    /// Returns the target of an interrupted unwinding that the running cleanup cannot cancel.
     pub(crate) fn final_unwinding(&self) -> Option<Target> {
         let pending = self.running.iter().rev().filter_map(|running| running.pending.as_ref());
         pending.map(|unwinding| unwinding.target).find(|target| target.is_final())
     }
 
-    /// Index of the innermost entry that catches `tag`.
+    /// Returns the index of the innermost entry that catches `tag`.
     pub(crate) fn find_catch(&self, tag: Value) -> Option<usize> {
         let catches = |entry: &Entry| matches!(entry.kind, EntryKind::Catch | EntryKind::Recovery);
         self.entries.iter().rposition(|entry| entry.data == tag && catches(entry))
     }
 
-    /// The innermost handlers below `height` that no mask hides, for a failure also recovery procedures and
-    /// cleanups. A failure in a cleanup that runs because the task ends, or leaves an expired limit, finds
-    /// nothing outside of it. Counts the entries that it looked at in `steps`.
+    /// Returns the innermost handlers below `height` that no mask hides, for a failure also recovery
+    /// procedures and cleanups. A failure in a cleanup that runs because the task ends, or leaves an expired
+    /// limit, finds nothing outside of it. Counts the entries looked at in `steps`.
     pub(crate) fn find_handlers(&self, height: usize, is_failure: bool, steps: &mut usize) -> Option<Found> {
         let mut end = height.min(self.entries.len());
         while end > 0 {

@@ -1,11 +1,11 @@
-//! A task: a thread of control of the program, with its own stack.
+//! Tasks: threads of control of the program, each with its own stack.
 //!
-//! A task has two parts. What programs hold is an object of the heap, an event too, that knows its name, how
-//! it ended and the checkpoints that it passed. What runs is a `Task`, a small record in `Tasks`, which goes
-//! away at its end.
+//! A task has two parts. Programs hold an object of the heap, which is an event too, and knows the task's
+//! name, how it ended, and the checkpoints that it passed. The machine runs a `Task`, a small record in
+//! `Tasks`, which goes away at the task's end.
 //!
-//! While a task runs, its record is taken out of the table into `Vm::running` and `pc` and `base` are kept by
-//! the interpreter; at a safepoint they are put back, and the record is all there is: no Rust frame holds any
+//! While a task runs, its record is out of the table, in `Scheduler::running`, and the interpreter keeps `pc`
+//! and `base`. At a safepoint they are put back, and the record is all there is: no Rust frame holds any
 //! state.
 
 mod binding;
@@ -27,10 +27,10 @@ use crate::saved_pc::SavedPc;
 use crate::stack::Stack;
 use crate::value::Value;
 
-/// Whether a task can run.
+/// State of a task with regard to running.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TaskState {
-    /// It can, and is in a run queue or running.
+    /// It can run, and is in a run queue or running.
     Runnable,
     /// It waits for a signal or for a time.
     Waiting,
@@ -40,45 +40,44 @@ pub(crate) enum TaskState {
     Ended,
 }
 
-/// The running part of a task. There may be a million of them, so what few tasks need is in [`Extra`] and in
-/// [`LazyControl`], behind pointers.
+/// Record of a task. There may be a million of them, so rarely used parts are behind pointers: [`Extra`] and
+/// [`LazyControl`].
 pub(crate) struct Task {
-    /// Its registers.
+    /// Registers of its frames.
     pub stack: Stack,
-    /// The next instruction, while it does not run.
+    /// Next instruction, while it does not run.
     pub pc: SavedPc,
-    /// Its control stack and bindings.
+    /// Control stack and bindings.
     pub control: LazyControl,
-    /// What few tasks need.
+    /// Rarely used parts.
     pub extra: Option<Box<Extra>>,
-    /// The object that programs know it by.
+    /// Object that programs hold.
     pub object: Value,
-    /// The wait at which it is parked, from then until it goes on; otherwise `NIL`.
+    /// Wait at which it is parked, until it goes on; otherwise `NIL`.
     pub wait: Value,
-    /// Who is told of its end beside those who wait for it: the wait of a net, a guard, or `NIL`.
+    /// Told of its end, beside the waits for it: the wait of a net, a guard, or `NIL`.
     pub notify: Value,
-    /// Ticks that it has used.
+    /// Ticks used.
     pub ticks: u64,
-    /// Changes whenever it is queued or parked, so that older places in queues and timers are told from the
-    /// present one.
+    /// Serial number of its state, see [`Serial`].
     pub serial: Serial,
     /// Ordinal, counted from the machine's first task.
     pub number: TaskNumber,
-    /// The collector's cycle in which the stack was last scanned.
+    /// Cycle of the collector in which the stack was last scanned.
     pub scanned: u64,
     /// Offset of the running frame's base, while it does not run.
     pub base: u32,
-    /// How many turns it has had.
+    /// Number of its turns.
     pub turns: u32,
-    /// The account that its ticks are charged to.
+    /// Account that its ticks are charged to.
     pub account: AccountId,
     /// Whether it can run.
     pub state: TaskState,
-    /// From 0 to 7, most urgent last.
+    /// Priority from 0 to 7, most urgent last.
     pub priority: u8,
-    /// How many critical sections it is in.
+    /// Number of critical sections that it is in.
     pub critical: u8,
-    /// See [`Flags`].
+    /// Properties that are true or false.
     pub flags: Flags,
 }
 
@@ -89,7 +88,7 @@ pub(crate) struct Flags(u16);
 macro_rules! define_flags {
     ($( $(#[doc = $doc:literal])* $name:ident $set:ident = $bit:literal ; )*) => {
         impl Flags {
-            /// All of them, as a word.
+            /// Returns all flags as a word.
             pub(crate) const fn bits(self) -> u16 {
                 self.0
             }
@@ -118,14 +117,14 @@ define_flags! {
     uses_reserve set_uses_reserve = 1;
     /// It does not keep the run from ending.
     daemon set_daemon = 2;
-    /// It is no part of the program, but of the library.
+    /// It belongs to the library, not to the program.
     hidden set_hidden = 3;
     /// Its record stays after its end, for the embedder.
     kept set_kept = 4;
     /// Its turns come before those of others: it is being ended, or waited for that.
     urgent set_urgent = 5;
-    /// A limit of it has expired, its cleanups have run out, or an interrupt waits: to be looked at before it
-    /// goes on.
+    /// Something is pending that is delivered before it goes on: an expired limit, cleanups that have run
+    /// out, an interrupt.
     attention set_attention = 6;
     /// It has waited twice with a stack that is much too large.
     oversized set_oversized = 7;
@@ -133,12 +132,12 @@ define_flags! {
     at_point set_at_point = 8;
 }
 
-/// What is to be said of a failure.
+/// Report of a failure.
 #[derive(Clone, Debug)]
 pub(crate) struct FailureReport {
-    /// What has happened, and where.
+    /// Account of what happened, and where.
     pub story: String,
-    /// The line that says that there is no recovery.
+    /// Line that says that there is no recovery.
     pub ending: String,
 }
 
@@ -149,24 +148,24 @@ impl FailureReport {
         self.story.push_str(story);
     }
 
-    /// All of it.
+    /// Returns the whole report.
     pub(crate) fn text(&self) -> String {
         format!("{}{}Aborted\n", self.story, self.ending)
     }
 }
 
-/// What few tasks need.
+/// Rarely used parts.
 #[derive(Default)]
 pub(crate) struct Extra {
-    /// What is to be said of the failure that ends it.
+    /// Report of the failure that ends it.
     pub report: Option<FailureReport>,
-    /// How it ended, for the embedder.
+    /// Way it ended, for the embedder.
     pub end: Option<End>,
-    /// What it returned, for the embedder.
+    /// Values that it returned, for the embedder.
     pub values: Vec<Value>,
-    /// The open limits, outermost first: one for each entry of the control stack of that kind.
+    /// Open limits, outermost first: one for each entry of the control stack of that kind.
     pub limits: Vec<Limit>,
-    /// Functions that are to run in it as soon as may be, with the guards that they come from.
+    /// Guards that interrupt it as soon as may be.
     pub interrupts: Vec<Value>,
 }
 
@@ -181,7 +180,7 @@ impl Extra {
     }
 }
 
-/// What became of a task, for the embedder.
+/// Result of a task, for the embedder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TaskResult {
     /// It has not ended.
@@ -195,7 +194,7 @@ pub enum TaskResult {
 }
 
 impl Task {
-    /// A task that has yet to be given a frame.
+    /// Creates a task that has yet to be given a frame.
     pub(crate) fn new(object: Value, words: usize) -> Task {
         Task::with_stack(object, Stack::new(words))
     }
@@ -223,7 +222,7 @@ impl Task {
         }
     }
 
-    /// Makes a task that has ended, and holds nothing any more, a new one.
+    /// Makes a new task of one that has ended and holds nothing any more.
     fn renew(&mut self, object: Value) {
         let stack = std::mem::replace(&mut self.stack, Stack::none());
         *self = Task::with_stack(object, stack);
@@ -283,7 +282,7 @@ impl Task {
         Unwinding { target: Target::Root(end), values: Vec::new() }
     }
 
-    /// What became of it.
+    /// Returns its result, as far as that is kept for the embedder.
     pub(crate) fn result(&self) -> TaskResult {
         let Some(extra) = &self.extra else { return TaskResult::Running };
         match extra.end {
@@ -296,9 +295,9 @@ impl Task {
     }
 }
 
-/// The priority of a task that is given none.
+/// Priority of a task that is given none.
 pub(crate) const DEFAULT_PRIORITY: u8 = 4;
-/// How many priorities there are.
+/// Number of priorities.
 pub(crate) const PRIORITIES: usize = 8;
 
 const _: () = assert!(size_of::<Task>() <= 120, "there may be a million tasks");

@@ -5,7 +5,7 @@ use esl_heap::list_state;
 use super::{Task, TaskIndex};
 use crate::value::Value;
 
-/// Names a task for as long as the machine lives.
+/// Name of a task, good for as long as the machine lives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct TaskId {
     /// Index in the table.
@@ -14,22 +14,22 @@ pub struct TaskId {
     generation: u32,
 }
 
-/// Records that are kept to be used again.
+/// Maximal number of records kept to be used again.
 const SPARE: usize = 64;
-/// The most words of stack that a record is kept with.
+/// Maximal number of words of stack that a record is kept with.
 const SPARE_WORDS: usize = 64;
-/// A place for a task.
+/// Place of a task in the table.
 #[derive(Default)]
 struct TaskPlace {
-    /// The task; not there while it runs, nor when the place is free.
+    /// Task; `None` while it runs, and when the place is free.
     task: Option<Box<Task>>,
-    /// How often the place was taken.
+    /// Number of tasks that have had the place.
     generation: u32,
     /// Whether a task has the place.
     taken: bool,
 }
 
-/// The tasks of a machine. The running one's record is out of its place while it runs.
+/// Table of a machine's tasks. The record of the running task is out of its place.
 #[derive(Default)]
 pub(crate) struct Tasks {
     places: Vec<TaskPlace>,
@@ -37,14 +37,14 @@ pub(crate) struct Tasks {
     /// Records of tasks that have ended, to be used again.
     #[allow(clippy::vec_box, reason = "the boxes are what is kept: they go into places as they are")]
     spare: Vec<Box<Task>>,
-    /// The collector has yet to meet the tasks before this place.
+    /// Number of places, from the first on, that the collector has yet to look at.
     unmet: usize,
 }
 
 list_state! { Tasks { places: Run, free: Run, spare: Derived, unmet: Derived } }
 
 impl Tasks {
-    /// A task that has yet to be given a frame, with at least so many words of stack.
+    /// Creates a task that has yet to be given a frame, with at least so many words of stack.
     pub(crate) fn make(&mut self, object: Value, words: usize) -> Box<Task> {
         match self.spare.pop() {
             Some(mut task) if task.stack.capacity() >= words => {
@@ -63,7 +63,7 @@ impl Tasks {
         }
     }
 
-    /// Takes in a task.
+    /// Adds a task, and returns its name.
     pub(crate) fn insert(&mut self, task: Box<Task>) -> TaskId {
         let index = self.free.pop().unwrap_or_else(|| {
             self.places.push(TaskPlace::default());
@@ -81,23 +81,23 @@ impl Tasks {
         self.places.get(id.index.as_usize()).filter(|place| place.taken && place.generation == id.generation)
     }
 
-    /// The name of the task at a place that is taken.
+    /// Returns the name of the task with this index.
     pub(crate) fn id_at(&self, index: TaskIndex) -> Option<TaskId> {
         let place = self.places.get(index.as_usize()).filter(|place| place.taken)?;
         Some(TaskId { index, generation: place.generation })
     }
 
-    /// Whether the task is still there.
+    /// Returns whether the task is still there.
     pub(crate) fn contains(&self, id: TaskId) -> bool {
         self.place(id).is_some()
     }
 
-    /// A task that does not run.
+    /// Returns a task, unless it runs.
     pub(crate) fn get(&self, id: TaskId) -> Option<&Task> {
         self.place(id)?.task.as_deref()
     }
 
-    /// A task that does not run.
+    /// Returns a task, unless it runs.
     pub(crate) fn get_mut(&mut self, id: TaskId) -> Option<&mut Task> {
         self.places
             .get_mut(id.index.as_usize())
@@ -106,13 +106,13 @@ impl Tasks {
             .as_deref_mut()
     }
 
-    /// The task at a place, if it does not run.
+    /// Returns the task with this index, unless it runs.
     #[inline]
     pub(crate) fn at(&self, index: TaskIndex) -> Option<&Task> {
         self.places.get(index.as_usize())?.task.as_deref()
     }
 
-    /// The task at a place, if it does not run.
+    /// Returns the task with this index, unless it runs.
     #[inline]
     pub(crate) fn at_mut(&mut self, index: TaskIndex) -> Option<&mut Task> {
         self.places.get_mut(index.as_usize())?.task.as_deref_mut()
@@ -141,22 +141,22 @@ impl Tasks {
         place.task.take()
     }
 
-    /// How many places there are; each task that has not ended has one.
+    /// Returns the number of places; each task that has not ended has one.
     pub(crate) fn places(&self) -> usize {
         self.places.len()
     }
 
-    /// The names of all tasks, in the order of their places.
+    /// Returns the names of all tasks, by index.
     pub(crate) fn ids(&self) -> Vec<TaskId> {
         (0..self.places.len() as u32).filter_map(|index| self.id_at(TaskIndex(index))).collect()
     }
 
-    /// All tasks but the running one.
+    /// Returns all tasks but the running one.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Task> {
         self.places.iter().filter_map(|place| place.task.as_deref())
     }
 
-    /// All tasks but the running one.
+    /// Returns all tasks but the running one.
     pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = &mut Task> {
         self.places.iter_mut().filter_map(|place| place.task.as_deref_mut())
     }
@@ -166,8 +166,7 @@ impl Tasks {
         self.unmet = self.places.len();
     }
 
-    /// The next place for the collector to look at: its task, if there is one that does not run. `None` at
-    /// the end.
+    /// Returns the task at the next place for the collector to look at, unless it runs. `None` at the end.
     pub(crate) fn next_unmet(&mut self) -> Option<Option<&mut Task>> {
         self.unmet = self.unmet.checked_sub(1)?;
         Some(self.places[self.unmet].task.as_deref_mut())
