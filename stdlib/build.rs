@@ -1,8 +1,8 @@
-//! Compiles the library, file by file in the order of `load-order`, to its image.
+//! Compiles the library to its image, file by file in the order of `load-order`.
 //!
-//! One machine runs the macros and takes in each file once that is compiled, so that each may use what the ones before it
-//! define. An error in the library is an error of the build; a warning is a warning, unless it is about a name that a
-//! later file defines.
+//! One machine runs the macros and loads each file after its compilation, so that files can use the
+//! definitions of earlier ones. An error in the library is an error of the build. A warning is a warning of the
+//! build, unless it is about a name that a later file defines.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a build step talks to cargo")]
 
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ fn main() {
     }
 }
 
-/// The bytes of the image.
+/// Returns the bytes of the image.
 fn build(folder: &Path) -> Result<Vec<u8>, String> {
     let order = read(&folder.join("load-order"))?;
     let machine =
@@ -55,7 +55,7 @@ fn read(path: &Path) -> Result<String, String> {
     std::fs::read_to_string(path).map_err(|error| format!("{} cannot be read: {error}", path.display()))
 }
 
-/// What has been compiled so far.
+/// State of the compilation.
 struct Library {
     machine: Vm,
     sources: Sources,
@@ -65,7 +65,7 @@ struct Library {
 }
 
 impl Library {
-    /// Compiles a file, and runs it in the machine.
+    /// Compiles a file and runs it in the machine.
     fn add(&mut self, name: &str, text: Arc<str>) -> Result<(), String> {
         self.machine.enter_package(ESL_PACKAGE).map_err(|error| format!("{error:?}"))?;
         self.machine.begin_unit();
@@ -94,10 +94,10 @@ impl Library {
         Ok(())
     }
 
-    /// Reports the uses of names that no file has defined.
+    /// Reports uses of names that no file defines.
     fn report_doubts(&mut self) {
         for doubt in std::mem::take(&mut self.doubts) {
-            // The name is what the message quotes.
+            // The message quotes the name.
             let quoted = doubt.message.split('`').nth(1).unwrap_or("").to_uppercase();
             let setf = quoted.strip_prefix("(SETF ").and_then(|rest| rest.strip_suffix(')'));
             let (package, name) = match setf.unwrap_or(&quoted).split_once(':') {

@@ -1,7 +1,7 @@
 //! The ESL library, written in ESL, as a compiled image.
 //!
-//! The build step compiles the files of this package to one module, which is part of every executable. A machine maps it and
-//! makes a function ready when it is first called.
+//! The build step compiles the files of this package to one module, which is embedded in every executable. A
+//! machine maps it, and decodes a function at its first call.
 #![forbid(unsafe_code)]
 
 use esl_bytecode::file::{ImageBytes, ModuleImage};
@@ -11,10 +11,10 @@ use esl_vm::vm::Vm;
 /// The image: the bytes of an `.eslb` file.
 pub static IMAGE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/image.eslb"));
 
-/// Takes the library into a machine that has none.
+/// Loads the library into a machine that has none.
 ///
 /// # Errors
-/// A text, if the machine's limit of memory leaves no room for it.
+/// Returns a text if the machine's memory limit leaves no room for the library.
 pub fn load(machine: &mut Vm) -> Result<(), String> {
     let image = ModuleImage::open_trusted(ImageBytes::Static(IMAGE)).map_err(|error| error.to_string())?;
     let no_room = "there is no memory for the library";

@@ -137,7 +137,7 @@ fn a_module_that_is_not_found_is_reported() {
     let (status, output, errors) = folder.run(ESLVM, &["run", "main.eslb"], "");
     assert_eq!((status, &*output), (1, "BEFORE"));
     assert!(
-        errors.starts_with("there is no module shapes: no file shapes.esl or shapes.eslb in ."),
+        errors.starts_with("There is no module shapes: found no file shapes.esl or shapes.eslb in ."),
         "{errors}"
     );
     assert!(errors.contains("main.esl:3:1"), "{errors}");
