@@ -1,10 +1,11 @@
-//! The core language: what is left of a top-level form when macros are expanded and names are resolved.
+//! The core language: a top-level form after macros are expanded and names are resolved.
 //!
-//! The expander builds a [`Core`], the lowering turns it into code. Nodes live in one arena and name each other by
-//! number, so that building, walking and dropping them needs no native recursion. Lexical names are gone: a variable,
-//! block, tag or local function is a number, and the lambda that owns it is recorded, so that captures can be found.
+//! The expander builds a [`Core`], the lowering turns it into code. Nodes live in one arena and refer to each
+//! other by number, so that building, walking and dropping them needs no native recursion. Lexical names are
+//! gone: a variable, block, tag or local function is a number, and the lambda that owns it is recorded, so
+//! that captures can be found.
 //!
-//! Invariants: a node is referred to by exactly one other node or lambda; no [`NodeKind::Hole`] is left when the
+//! Invariants: exactly one other node or lambda refers to a node; no [`NodeKind::Hole`] is left when the
 //! expander has finished; parents have lower numbers than their children.
 
 use esl_bytecode::builtin::Builtin;
@@ -19,7 +20,7 @@ macro_rules! id {
         pub struct $name(pub u32);
 
         impl $name {
-            /// As an index into its table.
+            /// Returns the index into its table.
             pub fn index(self) -> usize {
                 self.0 as usize
             }
@@ -29,7 +30,7 @@ macro_rules! id {
 
 id!(/** A node of the tree. */ NodeId);
 id!(/** A lexical variable, or a local function's variable. */ VarId);
-id!(/** A function's text. */ LambdaId);
+id!(/** The text of a function. */ LambdaId);
 id!(/** A lexical block. */ BlockId);
 id!(/** A tagbody. */ TagbodyId);
 
@@ -48,58 +49,58 @@ pub struct Core {
     pub tagbodies: Vec<Tagbody>,
 }
 
-/// A node: an expression and where it was written.
+/// A node: an expression and its place in the source.
 #[derive(Clone, Debug)]
 pub struct Node {
-    /// What it is.
+    /// The expression.
     pub kind: NodeKind,
-    /// Where it was written; for what a macro made, the macro call.
+    /// Place in the source; of an expression that a macro made, that of the macro call.
     pub span: Span,
 }
 
 /// A lexical variable.
 #[derive(Clone, Debug)]
 pub struct Variable {
-    /// Its name, for messages.
+    /// Name, for messages.
     pub name: Symbol,
-    /// Where it is bound.
+    /// Place of the binding.
     pub span: Span,
-    /// The lambda in which it is bound.
+    /// Lambda in which it is bound.
     pub owner: LambdaId,
-    /// Whether some `setq` sets it after it is bound.
+    /// Whether a `setq` sets it after it is bound.
     pub is_assigned: bool,
     /// Whether a lambda inside its owner refers to it.
     pub is_captured: bool,
     /// Whether anything reads it, or uses the value of an assignment to it.
     pub is_read: bool,
-    /// Whether it is a local function that can be seen never to return.
+    /// Whether it is a local function that evidently never returns.
     pub never_returns: bool,
 }
 
-/// A function's text.
+/// The text of a function.
 #[derive(Clone, Debug)]
 pub struct Lambda {
-    /// Its name: a symbol, or a list such as `(SETF X)`, `(FLET X)`.
+    /// Name: a symbol, or a list such as `(SETF X)`, `(FLET X)`.
     pub name: Option<Datum>,
-    /// The lambda list as written.
+    /// Lambda list as written.
     pub lambda_list: Option<Datum>,
-    /// The documentation string.
+    /// Documentation string.
     pub documentation: Option<Datum>,
-    /// The lambda around it.
+    /// Lambda around it.
     pub parent: Option<LambdaId>,
-    /// Where it was written.
+    /// Place in the source.
     pub span: Span,
-    /// The required parameters.
+    /// Required parameters.
     pub required: Vec<Parameter>,
-    /// The optional parameters.
+    /// Optional parameters.
     pub optional: Vec<OptionalParameter>,
-    /// The rest parameter.
+    /// Rest parameter.
     pub rest: Option<Parameter>,
-    /// The key parameters; `None` without `&key`.
+    /// Key parameters; `None` without `&key`.
     pub keys: Option<Vec<KeyParameter>>,
     /// Whether other keys are allowed.
     pub allow_other_keys: bool,
-    /// The body.
+    /// Body.
     pub body: NodeId,
 }
 
@@ -126,7 +127,7 @@ impl Lambda {
         self.optional.is_empty() && self.rest.is_none() && self.keys.is_none()
     }
 
-    /// Whether it takes just `count` arguments.
+    /// Whether it takes exactly `count` arguments.
     pub fn takes_exactly(&self, count: usize) -> bool {
         self.is_exact() && self.required.len() == count
     }
@@ -140,10 +141,10 @@ impl Lambda {
 /// A parameter. Parameters become visible, and special ones bound, one after another from left to right.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter {
-    /// The variable that receives the argument.
+    /// Variable that receives the argument.
     pub variable: VarId,
-    /// Whether the argument is also bound to the special variable of the parameter's name. The lexical variable is
-    /// then anonymous.
+    /// Whether the argument is also bound to the special variable of the parameter's name. The lexical
+    /// variable is then anonymous.
     pub is_special: bool,
 }
 
@@ -152,16 +153,16 @@ pub struct Parameter {
 pub struct OptionalParameter {
     /// The parameter.
     pub parameter: Parameter,
-    /// The default's form.
+    /// Form of the default.
     pub default: NodeId,
-    /// The parameter that tells whether an argument was given.
+    /// Parameter that says whether an argument was given.
     pub supplied: Option<Parameter>,
 }
 
 /// A key parameter.
 #[derive(Clone, Debug)]
 pub struct KeyParameter {
-    /// The symbol that selects it in a call, usually a keyword.
+    /// Symbol that selects it in a call, usually a keyword.
     pub key: Symbol,
     /// Parameter, default and supplied-p.
     pub optional: OptionalParameter,
@@ -170,11 +171,11 @@ pub struct KeyParameter {
 /// A block.
 #[derive(Clone, Debug)]
 pub struct Block {
-    /// Its name, for messages.
+    /// Name, for messages.
     pub name: Option<Symbol>,
-    /// The lambda that it is in.
+    /// Lambda around it.
     pub owner: LambdaId,
-    /// Whether a lambda inside returns from it.
+    /// Whether a lambda inside it returns from it.
     pub is_captured: bool,
     /// Whether anything returns from it.
     pub is_used: bool,
@@ -183,13 +184,13 @@ pub struct Block {
 /// A tagbody.
 #[derive(Clone, Debug)]
 pub struct Tagbody {
-    /// The lambda that it is in.
+    /// Lambda around it.
     pub owner: LambdaId,
-    /// Whether a lambda inside goes to one of its tags.
+    /// Whether a lambda inside it goes to one of its tags.
     pub is_captured: bool,
 }
 
-/// What a binding form binds.
+/// A variable that a form binds.
 #[derive(Clone, Debug)]
 pub enum BoundVariable {
     /// A lexical variable.
@@ -198,44 +199,44 @@ pub enum BoundVariable {
     Special(Symbol),
 }
 
-/// What is called.
+/// Function of a call.
 #[derive(Clone, Debug)]
 pub enum Callee {
-    /// The global function kept in this symbol; for `(setf x)`, in the symbol that [`crate::expand`] assigns to it.
+    /// The global function kept in this symbol. A function `(setf x)` has a symbol of its own for that.
     Global(Symbol),
-    /// A function that is written in Rust; the number of arguments has been checked.
+    /// A function written in Rust. The number of arguments has been checked.
     Builtin(Builtin),
     /// A local function.
     Local(VarId),
-    /// What the node evaluates to: a function or a symbol that names one.
+    /// The value of the node: a function or a symbol that names one.
     Value(NodeId),
 }
 
 /// A clause of [`NodeKind::HandlerCase`].
 #[derive(Clone, Debug)]
 pub struct HandlerClause {
-    /// The type of conditions that it takes.
+    /// Type of the conditions that it takes.
     pub condition_type: Datum,
-    /// The variable that receives the condition.
+    /// Variable that receives the condition.
     pub variable: VarId,
-    /// What it does, after unwinding.
+    /// Body, which runs after unwinding.
     pub body: NodeId,
 }
 
-/// What a node is. Unless said otherwise a node passes on all values of the form in its last position.
+/// Kind of a node. Unless said otherwise, the values of a node are those of the form in its last position.
 #[derive(Clone, Debug)]
 pub enum NodeKind {
-    /// A place that the expander has yet to fill.
+    /// A node that the expander has not filled yet.
     Hole,
     /// A constant.
     Constant(Datum),
     /// Reads a lexical variable.
     Local(VarId),
-    /// Sets a lexical variable; its value is that value.
+    /// Sets a lexical variable; the value of the node is the new value.
     SetLocal(VarId, NodeId),
     /// Reads a special variable.
     Special(Symbol),
-    /// Sets a special variable; its value is that value.
+    /// Sets a special variable; the value of the node is the new value.
     SetSpecial(Symbol, NodeId),
     /// The global function kept in this symbol.
     FunctionRef(Symbol),
@@ -251,19 +252,20 @@ pub enum NodeKind {
     And(Vec<NodeId>),
     /// The first that is not `NIL` (one value), or the values of the last; `NIL` if there is none.
     Or(Vec<NodeId>),
-    /// Binds variables around a body. In parallel: every value is computed before the first binding; otherwise one
-    /// after another.
+    /// Binds variables around a body: either one after another, or in parallel, every value before the first
+    /// binding.
     Let {
-        /// Whether one after another.
+        /// Whether variables are bound one after another.
         sequential: bool,
-        /// What is bound to what.
+        /// Variables and their values.
         bindings: Vec<(BoundVariable, NodeId)>,
         /// The body.
         body: NodeId,
     },
-    /// Binds local functions around a body. Scope is resolved already: the same node serves `flet` and `labels`.
+    /// Binds local functions around a body. Scope is resolved already, so the same node serves `flet` and
+    /// `labels`.
     Functions {
-        /// The functions. Their variables are never assigned.
+        /// Functions. Their variables are never assigned.
         definitions: Vec<(VarId, LambdaId)>,
         /// The body.
         body: NodeId,
@@ -272,15 +274,15 @@ pub enum NodeKind {
     Block(BlockId, NodeId),
     /// Leaves a block with the values of the form.
     ReturnFrom(BlockId, NodeId),
-    /// A tagbody: forms, among which the tags stand. Its value is `NIL`.
+    /// A tagbody: tags and forms. Its value is `NIL`.
     Tagbody(TagbodyId, Vec<TagbodyItem>),
-    /// Goes to a tag: its number among the tags of the tagbody.
+    /// Goes to a tag, given by its number in the tagbody.
     Go(TagbodyId, u32),
     /// A catch: tag, body.
     Catch(NodeId, NodeId),
     /// A throw: tag, values.
     Throw(NodeId, NodeId),
-    /// Protected form, cleanup. Gives the values of the protected form.
+    /// Protected form, cleanup. The values are those of the protected form.
     UnwindProtect(NodeId, NodeId),
     /// Symbols, values, body.
     Progv(NodeId, NodeId, NodeId),
@@ -290,37 +292,40 @@ pub enum NodeKind {
     Apply(Callee, Vec<NodeId>),
     /// Multiple values.
     Values(Vec<NodeId>),
-    /// Binds variables to the values of a form around a body: targets, form, body.
+    /// Binds variables to the values of a form around a body: variables, form, body.
     BindValues(Vec<BoundVariable>, NodeId, NodeId),
     /// Calls a function with all values of the forms.
     CallValues(NodeId, Vec<NodeId>),
-    /// All values of the first form, after which the second has been evaluated.
+    /// All values of the first form, after the second has been evaluated.
     FirstValues(NodeId, NodeId),
-    /// Runs a body; a condition of a clause's type that is signalled in it unwinds to here and runs the clause.
+    /// Runs a body. A condition of a clause's type that is signalled in it unwinds to here and runs the
+    /// clause.
     HandlerCase(NodeId, Vec<HandlerClause>),
     /// Runs a body with recovery procedures.
     Recovery {
         /// A vector: `NIL`, then for each clause its cause and how often it may run, then `NIL`.
         table: Datum,
-        /// The function that runs the clauses, always a lambda: of the form's state, the place of the clause in it, and the
-        /// list of the failure's arguments. Throws to the state: it with `NIL` to run the body again, `T` with a result
-        /// to leave the form.
+        /// The function that runs the clauses, always a lambda. It takes the form's state, the position of
+        /// the clause in the state, and the list of the failure's arguments. To run the body again it throws
+        /// the state and `NIL` to the state; to leave the form, `NIL` and a result.
         procedures: NodeId,
         /// The body.
         body: NodeId,
     },
-    /// Runs a body; if a failure, an abort or an expired limit leaves it, the second form is evaluated, and a failure then
-    /// goes on from there.
+    /// Runs a body. If a failure, an abort or an expired limit leaves it, the second form is evaluated; a
+    /// failure then continues from there.
     FailureCleanup(NodeId, NodeId),
-    /// Runs a body (second) with the list of `(type . function)` that the first form gives as handlers.
+    /// Runs a body (second) with handlers: the first form returns a list of `(type . function)`.
     Handlers(NodeId, NodeId),
-    /// Runs a body (second) in which entries of the control stack from the height that the first form gives are masked.
+    /// Runs a body (second) within which entries of the control stack are masked, from the height that the
+    /// first form returns.
     Mask(NodeId, NodeId),
     /// Reads a slot of a structure: class, number of the slot, instance.
     Slot(Symbol, u16, NodeId),
-    /// Sets a slot of a structure: class, number of the slot, instance, value. Its value is that value.
+    /// Sets a slot of a structure: class, number of the slot, instance, value. The value of the node is the
+    /// new value.
     SetSlot(Symbol, u16, NodeId, NodeId),
-    /// Whether a form's value is an instance of a structure class.
+    /// Tests whether a form's value is an instance of a structure class.
     IsInstance(Symbol, NodeId),
 }
 

@@ -1,5 +1,5 @@
-//! Layers: the folders of the compiler, and the files within each folder, can be put in an order in which each uses only
-//! those before it.
+//! Layers: the folders of the compiler, and the files within each folder, can be put in an order in which
+//! each uses only those before it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -1,12 +1,12 @@
-//! The table of diagnostic codes: each with its severity, what it means, a program that has it and the same program
+//! The table of diagnostic codes: each with its severity, its meaning, a failing program and the same program
 //! repaired.
 //!
-//! Each row defines a constant. Every diagnostic is made by [`Code::at`] of such a constant, so no code is reported
-//! that the table lacks; a test in `tests/diagnostics/table.rs` looks through the sources for other ways.
-//! `docs/diagnostics.md` is generated from the table. To add a code, add a row, run
+//! Each row defines a constant. Every diagnostic is made by [`Code::at`] of such a constant, so no code is
+//! reported that the table lacks; a test in `tests/diagnostics/table.rs` looks through the sources for other
+//! ways. `docs/diagnostics.md` is generated from the table. To add a code, add a row, run
 //! `ESL_BLESS=1 cargo test -p esl-compiler --test diagnostics`, and look at the difference.
 //!
-//! The programs are complete files. Where no short program shows the fault, they are empty.
+//! The programs are complete files. They are empty if no short program shows the fault.
 
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::span::Span;
@@ -14,22 +14,22 @@ use esl_bytecode::span::Span;
 /// A kind of diagnostic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Code {
-    /// The code itself, such as `unclosed-list`. Codes are never renamed: programs and tools look for them.
+    /// The code itself, such as `unclosed-list`. Programs and tools look for codes, so they are not renamed.
     pub name: &'static str,
     /// Error or warning.
     pub severity: Severity,
-    /// The part of the compiler that reports it.
+    /// Part of the compiler that reports it.
     pub stage: Stage,
-    /// What it means, in one line.
+    /// Meaning, in one line.
     pub summary: &'static str,
-    /// A program that has it; empty if no short one does.
+    /// A program that has the fault; empty if no short one does.
     pub failing: &'static str,
-    /// The same program without it.
+    /// The same program without the fault.
     pub repaired: &'static str,
 }
 
 impl Code {
-    /// A diagnostic of this code and its severity at `span`.
+    /// Returns a diagnostic of this code at `span`.
     pub fn at(&self, span: Span, message: impl Into<String>) -> Diagnostic {
         Diagnostic::new(self.name, self.severity, message, span)
     }
@@ -47,10 +47,10 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// All of them, in order.
+    /// All stages, in order.
     pub const ALL: [Stage; 3] = [Stage::Reader, Stage::Expander, Stage::Lowering];
 
-    /// What the stage does, as a heading.
+    /// Returns the heading for diagnostics of the stage.
     pub fn title(self) -> &'static str {
         match self {
             Stage::Reader => "Reading the text",
@@ -60,7 +60,7 @@ impl Stage {
     }
 }
 
-/// The code called `name`.
+/// Returns the code called `name`.
 pub fn find(name: &str) -> Option<&'static Code> {
     ALL.iter().copied().find(|code| code.name == name)
 }
@@ -149,7 +149,7 @@ INVALID_CHARACTER = "invalid-character" Error
     repaired: "(print 1)\n"
 
 INVALID_CHARACTER_NAME = "invalid-character-name" Error
-    /// `#\` before a name that no character has.
+    /// `#\` before an unknown name of a character.
     fails: "(print #\\Blank)\n"
     repaired: "(print #\\Space)\n"
 
@@ -174,12 +174,12 @@ MISSING_DATUM = "missing-datum" Error
     repaired: "(print (list 1 'a))\n"
 
 COMMA_OUTSIDE_BACKQUOTE = "comma-outside-backquote" Error
-    /// A comma with no backquote around it that it belongs to.
+    /// A comma without a backquote around it to which it belongs.
     fails: "(print '(1 ,(+ 1 1)))\n"
     repaired: "(print `(1 ,(+ 1 1)))\n"
 
 MISPLACED_SPLICE = "misplaced-splice" Error
-    /// `,@` where there is no list that it could insert elements into.
+    /// `,@` outside of a list into which it could insert elements.
     fails: "(print `,@(list 1 2))\n"
     repaired: "(print `(,@(list 1 2)))\n"
 
@@ -204,17 +204,17 @@ CIRCULAR_LITERAL = "circular-literal" Error
     repaired: "(print '(a a a))\n"
 
 LITERAL_TOO_LARGE = "literal-too-large" Error
-    /// A few `#n#` or `#n(` that stand for millions of elements.
+    /// A literal whose `#n#` or `#n(` stand for millions of elements.
     fails: "(print #99999999(a))\n"
     repaired: "(print (make-array 99999999 :initial-element 'a))\n"
 
 UNKNOWN_PACKAGE = "unknown-package" Error
-    /// The part of a name before `:` is not the name of a package.
+    /// A prefix before `:` that is not the name of a package.
     fails: "(print (lisp:list 1 2))\n"
     repaired: "(print (cl:list 1 2))\n"
 
 NOT_EXTERNAL = "not-external" Error
-    /// `package:name` where the package offers no such name.
+    /// `package:name` with a name that the package does not export.
     fails: "(print (cl:lst 1 2))\n"
     repaired: "(print (cl:list 1 2))\n"
 
@@ -227,12 +227,87 @@ NOT_IN_SUBSET = "not-in-subset" Error
 Expander {
 
 MALFORMED_FORM = "malformed-form" Error
-    /// A special form or standard macro whose parts are not what it takes.
+    /// A special form or standard macro with unsuitable parts, where no other code tells more.
+    fails: "(eval-when (:compile-time)\n  (print 1))\n"
+    repaired: "(eval-when (:compile-toplevel)\n  (print 1))\n"
+
+MISSING_PART = "missing-part" Error
+    /// A special form or standard macro that ends before a part that it needs.
+    fails: "(defun area)\n"
+    repaired: "(defun area (width height)\n  (* width height))\n"
+
+EXTRA_PART = "extra-part" Error
+    /// A special form or standard macro with more parts than it takes.
+    fails: "(defun sign (x)\n  (if (< x 0)\n      -1\n      0\n      1))\n"
+    repaired: "(defun sign (x)\n  (cond ((< x 0) -1)\n        ((= x 0) 0)\n        (t 1)))\n"
+
+NOT_A_NAME = "not-a-name" Error
+    /// Something else where the name of a variable, function, block or the like is needed.
+    fails: "(defun \"area\" (width height)\n  (* width height))\n"
+    repaired: "(defun area (width height)\n  (* width height))\n"
+
+NOT_AN_OPERATOR = "not-an-operator" Error
+    /// A form that begins with something other than the name of an operator or a `lambda` expression.
+    fails: "(defun call-first (functions)\n  ((car functions) 1))\n"
+    repaired: "(defun call-first (functions)\n  (funcall (car functions) 1))\n"
+
+DOTTED_FORM = "dotted-form" Error
+    /// A form to be evaluated that ends in a dot and something.
+    fails: "(print (list 1 . 2))\n"
+    repaired: "(print (list 1 2))\n"
+
+NOT_A_PLACE = "not-a-place" Error
+    /// Something that cannot be set where a place is needed.
+    fails: "(defun reset (counter)\n  (setf 0 counter))\n"
+    repaired: "(defun reset (counter)\n  (setf counter 0))\n"
+
+READ_ONLY_SLOT = "read-only-slot" Error
+    /// An assignment to a slot that its structure declares read-only.
+    fails: "(defstruct point (x 0 :read-only t))\n(setf (point-x (make-point)) 1)\n"
+    repaired: "(defstruct point (x 0))\n(setf (point-x (make-point)) 1)\n"
+
+MALFORMED_BINDING = "malformed-binding" Error
+    /// A form that binds variables, whose bindings are not lists of a name and a value.
     fails: "(let (x 1)\n  (print x))\n"
     repaired: "(let ((x 1))\n  (print x))\n"
 
+MALFORMED_CLAUSE = "malformed-clause" Error
+    /// A clause that does not have the shape which its form needs.
+    fails: "(defun sign (x)\n  (cond (minusp x) -1))\n"
+    repaired: "(defun sign (x)\n  (cond ((minusp x) -1)))\n"
+
+MALFORMED_DEFINITION = "malformed-definition" Error
+    /// A local definition that is not a list of a name, a lambda list and forms.
+    fails: "(flet (square (x) (* x x))\n  (print (square 3)))\n"
+    repaired: "(flet ((square (x) (* x x)))\n  (print (square 3)))\n"
+
+MALFORMED_DECLARATION = "malformed-declaration" Error
+    /// A declaration that is not a list of specifiers, each a list.
+    fails: "(defun area (side)\n  (declare fixnum)\n  (* side side))\n"
+    repaired: "(defun area (side)\n  (declare (fixnum side))\n  (* side side))\n"
+
+MISPLACED_DECLARATION = "misplaced-declaration" Error
+    /// `declare` in a place other than the beginning of a body.
+    fails: "(defun area (side)\n  (print side)\n  (declare (fixnum side)))\n"
+    repaired: "(defun area (side)\n  (declare (fixnum side))\n  (print side))\n"
+
+MACRO_AS_FUNCTION = "macro-as-function" Error
+    /// `#'` before the name of a macro or special form.
+    fails: "(print (apply #'and '(t nil)))\n"
+    repaired: "(print (every #'identity '(t nil)))\n"
+
+RUN_TIME_ONLY = "run-time-only" Error
+    /// Code of a local macro that refers to a variable, function or block which exists only at run time.
+    fails: "(let ((x 1))\n  (macrolet ((value () x))\n    (print (value))))\n"
+    repaired: "(let ((x 1))\n  (macrolet ((value () 'x))\n    (print (value))))\n"
+
+DUPLICATE_TAG = "duplicate-tag" Error
+    /// A tag that occurs twice in one `tagbody`.
+    fails: "(tagbody\n  (go end)\n end\n end)\n"
+    repaired: "(tagbody\n  (go end)\n end)\n"
+
 MALFORMED_LAMBDA_LIST = "malformed-lambda-list" Error
-    /// A parameter list that is none.
+    /// A lambda list that is not one.
     fails: "(defun area (width 4)\n  (* width 4))\n"
     repaired: "(defun area (width &optional (height 4))\n  (* width height))\n"
 
@@ -243,8 +318,10 @@ DUPLICATE_PARAMETER = "duplicate-parameter" Error
 
 UNKNOWN_BLOCK = "unknown-block" Error
     /// `return` or `return-from` with no block of that name around it.
-    fails: "(defun first-even (numbers)\n  (dolist (n numbers)\n    (when (evenp n) (return-from first-evn n))))\n"
-    repaired: "(defun first-even (numbers)\n  (dolist (n numbers)\n    (when (evenp n) (return-from first-even n))))\n"
+    fails: "(defun first-even (numbers)\n  (dolist (n numbers)\n    \
+              (when (evenp n) (return-from first-evn n))))\n"
+    repaired: "(defun first-even (numbers)\n  (dolist (n numbers)\n    \
+              (when (evenp n) (return-from first-even n))))\n"
 
 UNKNOWN_TAG = "unknown-tag" Error
     /// `go` to a tag that no `tagbody` around it has.
@@ -252,7 +329,7 @@ UNKNOWN_TAG = "unknown-tag" Error
     repaired: "(tagbody\n  (go end)\n end)\n"
 
 UNDEFINED_FUNCTION = "undefined-function" Warning
-    /// A call of a function that is defined nowhere so far. It may be defined by the time the call is made.
+    /// A call of a function that the program does not define. It may be defined by the time the call is made.
     fails: "(print (squar 3))\n"
     repaired: "(defun square (x)\n  (* x x))\n(print (square 3))\n"
 
@@ -262,7 +339,7 @@ NAME_NOT_IN_SUBSET = "name-not-in-subset" Warning
     repaired: "(defun point (x y)\n  (list x y))\n(print (point 3 4))\n"
 
 UNDEFINED_VARIABLE = "undefined-variable" Warning
-    /// A variable that is bound or defined nowhere so far.
+    /// A variable that the program neither binds nor defines.
     fails: "(defun area (width)\n  (* width heigth))\n"
     repaired: "(defun area (width height)\n  (* width height))\n"
 
@@ -277,7 +354,7 @@ UNUSED_VARIABLE = "unused-variable" Warning
     repaired: "(defun area (width height)\n  (* width height))\n"
 
 UNREACHABLE_CODE = "unreachable-code" Warning
-    /// Code that cannot run, since what comes before it always leaves.
+    /// Code that control cannot reach, since the form before it always leaves.
     fails: "(defun sign (x)\n  (return-from sign (signum x))\n  (print x))\n"
     repaired: "(defun sign (x)\n  (print x)\n  (signum x))\n"
 
@@ -297,12 +374,12 @@ COMPILE_TIME_FAILURE = "compile-time-failure" Error
     repaired: "(eval-when (:compile-toplevel :load-toplevel :execute)\n  (car '(table)))\n"
 
 LITERAL_OBJECT = "literal-object" Error
-    /// A form that a macro has made contains an object that cannot be written to a file, such as a function or a table.
+    /// An expansion that contains an object which cannot be written to a file, such as a table.
     fails: "(defmacro table ()\n  (make-hash-table))\n(print (hash-table-count (table)))\n"
     repaired: "(defmacro table ()\n  '(make-hash-table))\n(print (hash-table-count (table)))\n"
 
 UNKNOWN_DECLARATION = "unknown-declaration" Warning
-    /// A declaration that means nothing.
+    /// A declaration of an unknown kind.
     fails: "(defun area (side)\n  (declare (ignorabel side))\n  0)\n"
     repaired: "(defun area (side)\n  (declare (ignorable side))\n  0)\n"
 
@@ -312,27 +389,32 @@ CLAUSE_FALLS_OFF = "clause-falls-off" Warning
     repaired: "(with-recovery-procedures\n    ((:broken (print 'repairing) (retry)))\n  (fail :broken))\n"
 
 UNREACHABLE_CLAUSE = "unreachable-clause" Warning
-    /// A clause of a recovery form or a method of a goal that never has its turn.
-    fails: "(with-recovery-procedures\n    ((:general-failure :retries :infinite (retry))\n     (:broken (abort)))\n  (print 1))\n"
-    repaired: "(with-recovery-procedures\n    ((:broken (abort))\n     (:general-failure :retries :infinite (retry)))\n  (print 1))\n"
+    /// A clause of a recovery form, or a method of a goal, that never applies.
+    fails: "(with-recovery-procedures\n    ((:general-failure :retries :infinite (retry))\n     \
+              (:broken (abort)))\n  (print 1))\n"
+    repaired: "(with-recovery-procedures\n    ((:broken (abort))\n     \
+              (:general-failure :retries :infinite (retry)))\n  (print 1))\n"
 
 UNDECLARED_CAUSE = "undeclared-cause" Warning
     /// A cause that is not declared, in a program that declares causes.
-    fails: "(define-cause :broken ())\n(with-recovery-procedures\n    ((:brocken (abort)))\n  (fail :broken))\n"
-    repaired: "(define-cause :broken ())\n(with-recovery-procedures\n    ((:broken (abort)))\n  (fail :broken))\n"
+    fails: "(define-cause :broken ())\n(with-recovery-procedures\n    ((:brocken (abort)))\n  \
+              (fail :broken))\n"
+    repaired: "(define-cause :broken ())\n(with-recovery-procedures\n    ((:broken (abort)))\n  \
+              (fail :broken))\n"
 
 OUTSIDE_CLAUSE = "outside-clause" Error
     /// `retry` or `abort` outside of a recovery clause.
     fails: "(defun again ()\n  (retry))\n"
-    repaired: "(defun again (step)\n  (with-recovery-procedures\n      ((:broken (retry)))\n    (funcall step)))\n"
+    repaired: "(defun again (step)\n  (with-recovery-procedures\n      ((:broken (retry)))\n    \
+              (funcall step)))\n"
 
 UNKNOWN_MODULE = "unknown-module" Error
-    /// A `require` of a module of which no file is found in the folders of the library.
+    /// A `require` of a module that has no file in the folders of the library.
     fails: "(require \"colours\")\n(print (paint 3))\n"
     repaired: "(defun paint (n)\n  (nth n '(red green blue)))\n(print (paint 3))\n"
 
 CIRCULAR_MODULE = "circular-module" Error
-    /// A module that requires itself, maybe by way of others.
+    /// A module that requires itself, perhaps by way of others.
     fails: ""
     repaired: ""
 
@@ -345,7 +427,7 @@ LOCKED_NAME = "locked-name" Error
 Lowering {
 
 FUNCTION_TOO_LARGE = "function-too-large" Error
-    /// A function whose code passes the limits of the virtual machine.
+    /// A function whose code exceeds the limits of the virtual machine.
     fails: ""
     repaired: ""
 

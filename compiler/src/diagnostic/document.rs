@@ -6,12 +6,12 @@ use esl_bytecode::diagnostic::Severity;
 
 use super::code::{ALL, Stage};
 
-/// The text of `docs/diagnostics.md`.
+/// Returns the text of `docs/diagnostics.md`.
 pub fn markdown() -> String {
     let mut page = String::from(
         "# Diagnostics\n\n\
-         What the compiler says about a program, by code. An *error* means that the program does not compile, a\n\
-         *warning* that it does, but probably not to what was meant.\n\n\
+         The compiler's findings about a program, by code. An *error* means that the program does not\n\
+         compile, a *warning* that it compiles, but probably does not do what was meant.\n\n\
          This page is generated from `compiler/src/diagnostic/code.rs`.\n",
     );
     for stage in Stage::ALL {
@@ -36,7 +36,7 @@ fn section(page: &mut String, stage: Stage) {
     }
 }
 
-/// A page is read by people: what they could not see in a program is shown by its number.
+/// Returns a program with invisible characters replaced by their numbers, for people.
 fn visible(program: &str) -> String {
     program.trim_end().replace('\u{a0}', "⟨U+00A0⟩")
 }

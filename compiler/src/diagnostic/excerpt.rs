@@ -1,7 +1,8 @@
 //! The part of a source that a diagnostic shows.
 //!
-//! A text may have a million lines, and a line a million characters: an excerpt holds the lines that have labels and
-//! those between them, unless they are far apart, and of a very long line the neighbourhood of its labels.
+//! A text may have a million lines, and a line a million characters. So an excerpt holds the lines with
+//! labels and those between them, unless they are far apart; and of a very long line, the neighbourhood of
+//! its labels.
 
 use std::ops::Range;
 
@@ -10,21 +11,21 @@ use esl_bytecode::span::{SourceId, Span};
 
 use super::source::Sources;
 
-/// Labels at most this many lines apart share an excerpt.
+/// Lines between labels that share an excerpt, at most.
 const MAX_GAP: u32 = 50;
-/// A label that covers more lines than this is shown at its first line only.
+/// Lines of a label that is shown in full. A longer one is shown at its first line only.
 const MAX_LABEL_LINES: usize = 8;
-/// Lines of more bytes than this are cut.
+/// Bytes of a line that is shown in full.
 const MAX_LINE: usize = 1000;
-/// Bytes that are left of a cut line around the label, on either side.
+/// Bytes of a cut line that are kept on either side of the label.
 const CUT_CONTEXT: usize = 60;
-/// Bytes that are left of a label in a cut line.
+/// Bytes of a label that are kept in a cut line.
 const CUT_LABEL: usize = 120;
 
 /// A label within an excerpt.
 #[derive(Debug)]
 pub(super) struct Mark<'a> {
-    /// Where in the excerpt's text.
+    /// Range in the text of the excerpt.
     pub(super) range: Range<usize>,
     pub(super) text: &'a str,
     pub(super) is_primary: bool,
@@ -38,11 +39,11 @@ pub(super) struct Excerpt<'a> {
     /// Number of the first line, from 1.
     pub(super) line: u32,
     pub(super) marks: Vec<Mark<'a>>,
-    /// The true column of the first mark, if that line was cut: `(line, column in the excerpt, true column)`.
+    /// Column of the first mark, if its line is cut: `(line, column in the excerpt, column in the source)`.
     pub(super) cut: Option<(u32, u32, u32)>,
 }
 
-/// A label whose place is known.
+/// A label with its place in the text.
 struct Placed<'a> {
     start: usize,
     end: usize,
@@ -52,7 +53,7 @@ struct Placed<'a> {
     is_primary: bool,
 }
 
-/// Excerpts for those labels whose source has a text; the one with the primary label comes first.
+/// Returns excerpts for the labels whose source has a text. The one with the primary label comes first.
 pub(super) fn excerpts<'a>(
     primary: &'a Label,
     secondary: &'a [Label],
@@ -72,7 +73,7 @@ pub(super) fn excerpts<'a>(
     excerpts
 }
 
-/// Fits a label into its text: ends moved to character boundaries, many lines reduced to the first.
+/// Fits a label into its text: moves its ends to character boundaries, and reduces many lines to the first.
 fn place<'a>(label: &'a Label, is_primary: bool, sources: &Sources) -> Option<Placed<'a>> {
     let text = sources.text(label.span.source)?;
     let start = text.floor_char_boundary(label.span.start as usize);
@@ -88,12 +89,12 @@ fn place<'a>(label: &'a Label, is_primary: bool, sources: &Sources) -> Option<Pl
 
 fn excerpt<'a>(group: &[Placed<'a>], sources: &Sources) -> Excerpt<'a> {
     let source = group[0].label.span.source;
-    let text = sources.text(source).expect("only labels with a text are placed");
+    let text = sources.text(source).expect("labels have a text");
     let end = group.iter().map(|placed| placed.end).max().unwrap_or(0);
     let lines_start = text[..group[0].start].rfind('\n').map_or(0, |at| at + 1);
     let lines_end = text[end..].find('\n').map_or(text.len(), |at| end + at);
     let mut shown = String::new();
-    // For each piece of the source that is shown: its range there, and where it begins in `shown`.
+    // For each piece of the source that is shown: its range in the source, and its start in `shown`.
     let mut pieces: Vec<(Range<usize>, usize)> = Vec::new();
     let mut line_start = lines_start;
     for line in text[lines_start..lines_end].split_inclusive('\n') {
@@ -137,7 +138,7 @@ fn excerpt<'a>(group: &[Placed<'a>], sources: &Sources) -> Excerpt<'a> {
     }
 }
 
-/// The part of a long line to keep: around its first label, or its beginning.
+/// Returns the part of a long line to keep: the neighbourhood of its first label, or its beginning.
 fn cut(text: &str, line: &Range<usize>, group: &[Placed<'_>]) -> Range<usize> {
     let label = group.iter().find(|placed| placed.start < line.end && placed.end >= line.start);
     let (start, end) = label.map_or((line.start, line.start), |placed| {

@@ -1,7 +1,7 @@
 //! Diagnostics as JSON: one object on one line, for editors and other tools.
 //!
-//! Lines and columns count from 1, columns in characters, offsets in bytes from 0; an end is the position after the
-//! last character. Line and column are null where the text is not known.
+//! Lines count from 1, columns in characters from 1, offsets in bytes from 0. An end is the position after
+//! the last character. Line and column are null if the text is unknown.
 
 use std::fmt::Write;
 
@@ -10,7 +10,7 @@ use esl_bytecode::span::Span;
 
 use super::source::Sources;
 
-/// The object for `diagnostic`, without a newline at its end.
+/// Returns the object for `diagnostic`, without a newline at its end.
 pub(super) fn object(diagnostic: &Diagnostic, sources: &Sources) -> String {
     let mut out = String::from("{\"code\":");
     string(&mut out, diagnostic.code);

@@ -1,7 +1,8 @@
-//! What the compiler says about a source text.
+//! Diagnostics: the compiler's findings about a source text.
 //!
-//! [`code`] is the one list of everything that it can say, and makes the diagnostics; [`render`] is the one place that
-//! draws them. The type itself, [`Diagnostic`], is in `esl_bytecode`, since the virtual machine passes it on.
+//! [`code`] is the only list of findings, and makes the diagnostics; [`render`] is the only place that draws
+//! them. The type [`Diagnostic`] itself is in `esl_bytecode`, since the virtual machine passes diagnostics
+//! on.
 
 pub mod code;
 pub mod document;

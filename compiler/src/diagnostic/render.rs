@@ -1,6 +1,6 @@
 //! Diagnostics as text: the only place that draws carets.
 //!
-//! The look is rustc's, by way of `annotate-snippets`, which no other file names.
+//! The look is that of rustc, drawn by `annotate-snippets`, which no other file uses.
 
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer as Carets, Snippet};
 
@@ -10,7 +10,7 @@ use super::excerpt::{Excerpt, excerpts};
 use super::json;
 use super::source::Sources;
 
-/// For whom diagnostics are drawn.
+/// Format of drawn diagnostics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
     /// For people: message, excerpt, carets, help.
@@ -23,14 +23,14 @@ pub enum Format {
 /// Draws diagnostics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Renderer {
-    /// Whether to use the colours of a terminal; only for people.
+    /// Whether to use the colours of a terminal, in the format for people.
     pub color: bool,
-    /// For whom.
+    /// Format.
     pub format: Format,
 }
 
 impl Renderer {
-    /// The text for `diagnostic`, without a newline at its end.
+    /// Returns the text for `diagnostic`, without a newline at its end.
     ///
     /// ```
     /// use esl_compiler::diagnostic::{Renderer, Sources, code};
@@ -38,7 +38,8 @@ impl Renderer {
     ///
     /// let mut sources = Sources::new();
     /// let source = sources.add("sum.esl", Some("(+ 1 2))".into()));
-    /// let diagnostic = code::UNEXPECTED_CLOSE.at(Span::new(source, 7, 8), "unexpected `)`: no list is open");
+    /// let span = Span::new(source, 7, 8);
+    /// let diagnostic = code::UNEXPECTED_CLOSE.at(span, "unexpected `)`: no list is open");
     /// let text = Renderer::default().render(&diagnostic, &sources);
     /// assert_eq!(text.lines().next(), Some("error[unexpected-close]: unexpected `)`: no list is open"));
     /// assert_eq!(text.lines().nth(1), Some(" --> sum.esl:1:8"));
@@ -71,7 +72,8 @@ impl Renderer {
         let renderer = if self.color { Carets::styled() } else { Carets::plain() };
         let mut text = renderer.render(&[group]);
         for excerpt in &excerpts {
-            // The library takes columns from the excerpt; where a long line was cut, put the true one back.
+            // The library counts columns in the excerpt. If a long line was cut, replace that by the column
+            // in the source.
             if let Some((line, shown, column)) = excerpt.cut {
                 let name = sources.name(excerpt.source).unwrap_or_default();
                 text =
@@ -97,12 +99,12 @@ fn snippet<'a>(
         .annotations(annotations)
 }
 
-/// What can be said of a place in a text that is not at hand.
+/// Returns the position of a label whose text is unknown.
 fn position(label: &Label, name: &str) -> String {
     format!("{name}, byte {}", label.span.start)
 }
 
-/// A message may quote the source: nothing in it may break the line or steer the terminal.
+/// Returns a message without characters that break the line or steer the terminal: it may quote the source.
 fn visible(text: &str) -> String {
     let hidden = |c: char| {
         c.is_control()

@@ -10,9 +10,9 @@ use esl_bytecode::span::{SourceId, Span};
 struct Source {
     name: String,
     text: Option<Arc<str>>,
-    /// The part of the text that is of interest, and the line in which it begins.
+    /// Part of the text that is compiled, and the line in which it begins.
     part: (Range<usize>, u32),
-    /// Made when it is first asked for: most texts have no diagnostics.
+    /// Computed on demand, since most texts have no diagnostics.
     lines: OnceLock<LineIndex>,
 }
 
@@ -23,18 +23,19 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// No sources.
+    /// Creates an empty list.
     pub fn new() -> Sources {
         Sources::default()
     }
 
-    /// Adds a source and gives its number, the next one. Without a text, its diagnostics are shown without excerpts.
+    /// Adds a source and returns its number, the next one. Diagnostics of a source without a text have no
+    /// excerpts.
     pub fn add(&mut self, name: impl Into<String>, text: Option<Arc<str>>) -> SourceId {
         let length = text.as_ref().map_or(0, |text| text.len());
         self.add_source(name.into(), text, (0..length, 0))
     }
 
-    /// Adds a source of which only a part is looked at.
+    /// Adds a source of which only a part is compiled.
     pub fn add_part(&mut self, part: &Part<'_>) -> SourceId {
         self.add_source(part.name.into(), Some(part.text.clone()), (part.range.clone(), part.line))
     }
@@ -45,17 +46,17 @@ impl Sources {
         id
     }
 
-    /// The name that `id` was added with.
+    /// Returns the name of a source.
     pub fn name(&self, id: SourceId) -> Option<&str> {
         self.get(id).map(|source| source.name.as_str())
     }
 
-    /// The text of `id`, if it is known.
+    /// Returns the text of a source, if it is known.
     pub fn text(&self, id: SourceId) -> Option<&Arc<str>> {
         self.get(id)?.text.as_ref()
     }
 
-    /// Line and column at which `span` begins; `None` without a text, or outside of it.
+    /// Returns the line and column at which `span` begins; `None` without a text, or outside of it.
     pub fn place(&self, span: Span) -> Option<Place> {
         let source = self.get(span.source)?;
         let text = source.text.as_ref()?;
@@ -66,7 +67,7 @@ impl Sources {
         inside.then(|| source.lines.get_or_init(lines).place(text, span))
     }
 
-    /// Line and column of the position after `span`.
+    /// Returns the line and column of the position after `span`.
     pub(super) fn end_place(&self, span: Span) -> Option<Place> {
         self.place(Span::new(span.source, span.end, span.end))
     }

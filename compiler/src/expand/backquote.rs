@@ -1,9 +1,10 @@
 //! Backquote: templates of lists and vectors.
 //!
-//! The reader represents `` `x `` as `(%backquote x)`, `,x` as `(%unquote x)` and `,@x` as `(%unquote-splicing x)`. A
-//! template becomes calls of `list`, `list*`, `cons`, `append` and `vector` that build it. Parts without a comma stay
-//! constants, shared by everything that the template makes. A backquote within a backquote is data of the outer one,
-//! except for commas that belong to the outer one.
+//! The reader represents `` `x `` as `(%backquote x)`, `,x` as `(%unquote
+//! x)` and `,@x` as `(%unquote-splicing
+//! x)`. A template becomes calls of `list`, `list*`, `cons`, `append` and `vector` that build it. Parts
+//! without a comma stay constants, shared by everything that the template makes. A backquote within a
+//! backquote is data of the outer one, except for commas that belong to the outer one.
 //!
 //! Templates are walked with an explicit stack, since they may be as deep as the reader allows.
 
@@ -21,7 +22,8 @@ use crate::diagnostic::code;
 enum Piece {
     /// The part itself.
     Constant(Datum),
-    /// The values of these forms: one form, except after `,` with several arguments within a nested backquote.
+    /// The values of these forms: one form, except after `,` with several arguments within a nested
+    /// backquote.
     Forms(Vec<Datum>),
     /// The elements of the lists that these forms return.
     Splices(Vec<Datum>),
@@ -121,7 +123,8 @@ fn visit_list(datum: &Datum, level: usize, inner: usize, steps: &mut Vec<Templat
     let mut rest = datum;
     let mut tail = None;
     while let Some((item, next)) = rest.as_cons() {
-        // `(a . ,b)` reads as `(a %unquote b)`: from the second element on, such a rest is the tail behind a dot.
+        // `(a . ,b)` reads as `(a %unquote b)`: from the second element on, such a rest is the tail behind a
+        // dot.
         let is_tail =
             ["%UNQUOTE", "%UNQUOTE-SPLICING", "%BACKQUOTE"].iter().any(|name| is_operation(rest, name))
                 && next.as_cons().is_some_and(|(_, end)| end.is_nil());

@@ -5,13 +5,14 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::Symbol;
 
 use super::expander::Expander;
-use super::form::{Checked, Form, check_distinct, name};
+use super::form::{Checked, Form, check_distinct, name, on_one_line, quoted};
 use super::function::Body;
 use super::job::{Job, To};
 use super::origin::OriginId;
 use super::scope::{ScopeEntry, VariableMeaning};
 use super::variable::Deed;
 use crate::core::{BoundVariable, NodeKind};
+use crate::diagnostic::code;
 
 impl Expander {
     /// Whether a binding of `symbol` binds the special variable, given the declarations of the binding form.
@@ -62,11 +63,10 @@ fn bindings(
     form: &Form,
     shape: &str,
 ) -> Checked<Vec<Binding>> {
-    let Some(list) = form.args.first() else {
-        return Err(form.malformed(shape));
-    };
+    let Some(list) = form.args.first() else { return Err(form.missing(shape)) };
     let Some(items) = list.as_list() else {
-        return Err(form.malformed_at(list.span(), shape));
+        let what = format!("{shape}, not {}", quoted(list));
+        return Err(form.fault(code::MALFORMED_BINDING, list.span(), &what));
     };
     let mut bindings = Vec::with_capacity(items.len());
     for item in items {
@@ -76,12 +76,20 @@ fn bindings(
                 Some([]) => (datum, None),
                 Some([value]) => (datum, Some((*value).clone())),
                 _ => {
-                    return Err(
-                        form.malformed_at(item.span(), "needs one name and one value in each binding")
-                    );
+                    let what = format!("needs one name and one value in each binding, not {}", quoted(item));
+                    return Err(form.fault(code::MALFORMED_BINDING, item.span(), &what));
                 }
             },
         };
+        if item.as_cons().is_none() && item.as_symbol().is_none() && !item.is_nil() {
+            let what = format!("needs bindings of a name and a value, not {}", quoted(item));
+            let fault = form.fault(code::MALFORMED_BINDING, item.span(), &what);
+            // `(let (x 1) …)` lacks the parentheses around its only binding.
+            let is_bare =
+                list.as_list().is_some_and(|parts| parts.len() == 2 && parts[0].as_symbol().is_some());
+            let help = format!("a list of one binding is written `({})`", on_one_line(list, 40));
+            return Err(if is_bare { Box::new(fault.help(help)) } else { fault });
+        }
         let symbol = expander.variable_name(environment, datum, form, Deed::Bind)?;
         let value = value.unwrap_or_else(|| Datum::nil(form.at(datum.span())));
         bindings.push(Binding { datum: datum.clone(), symbol, value });
@@ -162,7 +170,8 @@ pub(super) fn multiple_value_bind(
     let shape = "needs a list of names and a form";
     form.takes(2..=usize::MAX, shape)?;
     let Some(items) = form.args[0].as_list() else {
-        return Err(form.malformed_at(form.args[0].span(), shape));
+        let what = format!("{shape}, not {}", quoted(&form.args[0]));
+        return Err(form.fault(code::MALFORMED_BINDING, form.args[0].span(), &what));
     };
     let mut names = Vec::new();
     for item in items {
@@ -214,7 +223,8 @@ pub(super) fn symbol_macros(
     let found = bindings(expander, environment, form, shape)?;
     let items = form.args[0].as_list().unwrap_or_default();
     if let Some(item) = items.iter().find(|item| item.as_list().is_none_or(|parts| parts.len() != 2)) {
-        return Err(form.malformed_at(item.span(), "needs a name and an expansion in each definition"));
+        let what = "needs a name and an expansion in each definition";
+        return Err(form.fault(code::MALFORMED_BINDING, item.span(), what));
     }
     check_distinct(found.iter().map(|binding| (&binding.symbol, binding.datum.span())), form)?;
     let body = expander.take_body(&form.args[1..], false, form, origin)?;

@@ -4,7 +4,7 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::symbol::CL_PACKAGE;
 
 use super::expander::Expander;
-use super::form::{Checked, Form, arguments, is_cl_form, is_known, name, operator, plain};
+use super::form::{Checked, Form, arguments, is_cl_form, is_known, name, operator, plain, quoted};
 use super::function::Body;
 use super::job::{Job, To};
 use super::origin::OriginId;
@@ -39,7 +39,8 @@ impl Expander {
         while let Some((first, others)) = rest.split_first() {
             if is_cl_form(first, "DECLARE") {
                 let Some(specifiers) = arguments(first) else {
-                    return Err(form.malformed_at(first.span(), "has a declaration that is no list"));
+                    let what = "needs a proper list of specifiers in a declaration";
+                    return Err(form.fault(code::MALFORMED_DECLARATION, first.span(), what));
                 };
                 for specifier in &specifiers {
                     self.declaration(specifier, &mut body, form, origin)?;
@@ -70,7 +71,8 @@ impl Expander {
     ) -> Checked {
         let items = specifier.as_list();
         let Some((head, names)) = items.as_deref().and_then(<[&Datum]>::split_first) else {
-            return Err(form.malformed_at(specifier.span(), "has a declaration that is no list"));
+            let what = format!("needs lists as specifiers of a declaration, not {}", quoted(specifier));
+            return Err(form.fault(code::MALFORMED_DECLARATION, specifier.span(), &what));
         };
         let Some(symbol) = head.as_symbol() else {
             // A type specifier such as `(integer 0 9)` declares a type.
@@ -81,9 +83,8 @@ impl Expander {
                 match name.as_symbol().filter(|symbol| !symbol.is_keyword() && !symbol.is_cl("T")) {
                     Some(symbol) => body.specials.push(symbol.clone()),
                     None => {
-                        return Err(
-                            form.malformed_at(name.span(), "declares something special that is no variable")
-                        );
+                        let what = format!("needs names of variables after `special`, not {}", quoted(name));
+                        return Err(form.fault(code::MALFORMED_DECLARATION, name.span(), &what));
                     }
                 }
             }
@@ -91,9 +92,9 @@ impl Expander {
             // `(function f)` declares a function, and unused functions are not reported.
             body.ignored.extend(names.iter().filter_map(|name| name.as_symbol().cloned()));
         } else if !(symbol.is_in(CL_PACKAGE) || WITHOUT_EFFECT.contains(&symbol.name())) {
-            let message = format!("{} is no declaration", name(symbol));
+            let message = format!("there is no declaration {}", name(symbol));
             let help = format!("a type is declared with `(type {} …)`", plain(symbol));
-            self.report(code::UNKNOWN_DECLARATION.at(form.at(specifier.span()), message).help(help), origin);
+            self.report(code::UNKNOWN_DECLARATION.at(form.at(head.span()), message).help(help), origin);
         }
         Ok(())
     }

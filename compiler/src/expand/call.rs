@@ -13,6 +13,7 @@ use super::job::{Job, To, Waiting};
 use super::lambda_list::{LambdaList, LambdaListKind};
 use super::scope::{FunctionMeaning, Visible};
 use crate::core::{Callee, NodeId, NodeKind, VarId};
+use crate::diagnostic::code;
 
 /// Arguments that a call passes in registers. Further arguments are passed as a list.
 pub(super) const DIRECT_ARGUMENTS: usize = 60;
@@ -49,7 +50,7 @@ impl Expander {
                 Ok(())
             }
             Visible::OutOfReach => {
-                let named = Make(form.span).symbol(&form.operator);
+                let named = Make(form.head()).symbol(&form.operator);
                 Err(WrittenName::symbol(&form.operator, named).out_of_reach(&form))
             }
             Visible::No => match (self.find_operator)(&form.operator) {
@@ -96,7 +97,8 @@ impl Expander {
         self.stop_for_macro(function, form, is_standard, to.origin, waiting)
     }
 
-    /// Opens up calls that have nodes of their own: accessors of structures, and the functions they are defined with.
+    /// Opens up calls that have nodes of their own: accessors of structures, and the functions they are
+    /// defined with.
     fn inline(&mut self, global: &Global, form: &Form, to: To) -> bool {
         let kind = match (&global.accessor, form.args.as_slice()) {
             (Some(accessor), [instance]) => {
@@ -174,7 +176,8 @@ impl Expander {
         Ok(())
     }
 
-    /// Returns the global function `function` as a callee. `count` is the number of arguments, if that is known.
+    /// Returns the global function `function` as a callee. `count` is the number of arguments, if that is
+    /// known.
     fn global_callee(
         &mut self,
         environment: &mut dyn Environment,
@@ -227,7 +230,7 @@ impl Expander {
     ) -> Checked {
         let parts = arguments(lambda).unwrap_or_default();
         let Some((list, body)) = parts.split_first() else {
-            return Err(form.malformed_at(lambda.span(), "needs a lambda list"));
+            return Err(form.fault(code::MISSING_PART, lambda.span(), "needs a lambda list"));
         };
         let parsed = LambdaList::parse(list, LambdaListKind::Ordinary, form.at(list.span()))?;
         let arity = parsed.arity();
@@ -402,12 +405,8 @@ pub(super) fn call_global(
     to: To,
 ) -> Checked {
     let shape = "needs the name of a function";
-    let Some((named, args)) = form.args.split_first() else {
-        return Err(form.malformed(shape));
-    };
-    let Some(function) = WrittenName::of(named) else {
-        return Err(form.malformed_at(named.span(), shape));
-    };
+    let Some((named, args)) = form.args.split_first() else { return Err(form.missing(shape)) };
+    let Some(function) = WrittenName::of(named) else { return Err(form.not_a_name(named, shape)) };
     if !function.name.is_setf {
         let call = Form { operator: function.cell.clone(), args: args.to_vec(), ..form.clone() };
         let global = environment.global(&function.cell);
@@ -427,7 +426,7 @@ pub(super) fn apply_global(
 ) -> Checked {
     form.takes(2..=DIRECT_ARGUMENTS, "needs the name of a function and a list of arguments")?;
     let Some(function) = WrittenName::of(&form.args[0]) else {
-        return Err(form.malformed_at(form.args[0].span(), "needs the name of a function"));
+        return Err(form.not_a_name(&form.args[0], "needs the name of a function"));
     };
     let callee = expander.global_callee(environment, &function, None, &form, to)?;
     let (nodes, jobs): (Vec<NodeId>, Vec<Job>) = expander.children(form.args[1..].to_vec(), to);

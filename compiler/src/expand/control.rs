@@ -78,8 +78,8 @@ pub(super) fn or(expander: &mut Expander, _: &mut dyn Environment, form: Form, t
     Ok(())
 }
 
-/// Clauses of a `cond` that become nested conditionals. A longer one becomes a block that its clauses leave, so that
-/// the depth of nodes does not grow with the length of a form.
+/// Clauses of a `cond` that become nested conditionals. A longer one becomes a block that its clauses leave,
+/// so that the depth of nodes does not grow with the length of a form.
 const NESTED_CLAUSES: usize = 100;
 
 /// `(cond (test . body)*)`
@@ -91,9 +91,8 @@ pub(super) fn cond(expander: &mut Expander, _: &mut dyn Environment, form: Form,
                 clauses.push(parts.into_iter().cloned().collect::<Vec<Datum>>());
             }
             _ => {
-                return Err(
-                    form.malformed_at(clause.span(), "needs clauses, each a list of a test and forms")
-                );
+                let what = format!("needs clauses, each a list of a test and forms, not {}", quoted(clause));
+                return Err(form.fault(code::MALFORMED_CLAUSE, clause.span(), &what));
             }
         }
     }
@@ -188,11 +187,12 @@ fn leave_if(expander: &mut Expander, block: BlockId, to: To, test: NodeId) -> To
 
 /// Returns the first argument as the name of a block: a symbol, `NIL` included.
 fn block_name(form: &Form) -> Checked<Symbol> {
-    match form.args.first().map(Datum::kind) {
-        Some(DatumKind::Nil) => Ok(Symbol::cl("NIL")),
-        Some(DatumKind::Symbol(symbol)) => Ok(symbol.clone()),
-        Some(_) => Err(form.malformed_at(form.args[0].span(), "needs the name of a block")),
-        None => Err(form.malformed("needs the name of a block")),
+    let shape = "needs the name of a block";
+    let Some(named) = form.args.first() else { return Err(form.missing(shape)) };
+    match named.kind() {
+        DatumKind::Nil => Ok(Symbol::cl("NIL")),
+        DatumKind::Symbol(symbol) => Ok(symbol.clone()),
+        _ => Err(form.not_a_name(named, shape)),
     }
 }
 
@@ -225,7 +225,7 @@ fn leave(expander: &mut Expander, form: &Form, block: &Symbol, value: Option<&Da
         Visible::OutOfReach => {
             let what =
                 format!("cannot leave the block {}: this code runs when macros are expanded", name(block));
-            return Err(form.malformed(&what));
+            return Err(form.fault(code::RUN_TIME_ONLY, form.span, &what));
         }
         Visible::No => return Err(unknown_block(expander, form, block)),
     };
@@ -241,10 +241,11 @@ fn leave(expander: &mut Expander, form: &Form, block: &Symbol, value: Option<&Da
 fn unknown_block(expander: &Expander, form: &Form, block: &Symbol) -> Box<Diagnostic> {
     if block.is_cl("NIL") {
         let message = format!("{} needs a loop or a `(block nil …)` around it", name(&form.operator));
-        return Box::new(code::UNKNOWN_BLOCK.at(form.span, message));
+        return Box::new(code::UNKNOWN_BLOCK.at(form.head(), message));
     }
     let message = format!("there is no block called {} around this {}", name(block), name(&form.operator));
-    let diagnostic = code::UNKNOWN_BLOCK.at(form.span, message);
+    let named = form.args.first().map_or(form.span, Datum::span);
+    let diagnostic = code::UNKNOWN_BLOCK.at(form.at(named), message);
     let mut around: Vec<String> = expander
         .scope
         .block_names()
@@ -275,9 +276,8 @@ pub(super) fn tagbody(expander: &mut Expander, _: &mut dyn Environment, form: Fo
                     if item.is_nil() {
                         continue;
                     }
-                    return Err(
-                        form.malformed_at(item.span(), &format!("has the tag {} twice", quoted(item)))
-                    );
+                    let what = format!("has the tag {} twice", quoted(item));
+                    return Err(form.fault(code::DUPLICATE_TAG, item.span(), &what));
                 }
                 items.push(TagbodyItem::Tag);
                 entries.push(ScopeEntry::Tag(tag, tagbody, entries.len() as u32));
@@ -288,10 +288,8 @@ pub(super) fn tagbody(expander: &mut Expander, _: &mut dyn Environment, form: Fo
                 jobs.push(job);
             }
             None => {
-                return Err(form.malformed_at(
-                    item.span(),
-                    &format!("has {}, which is no tag and no form", quoted(item)),
-                ));
+                let what = format!("needs tags and forms, not {}", quoted(item));
+                return Err(form.malformed_at(item.span(), &what));
             }
         }
     }
@@ -308,7 +306,7 @@ pub(super) fn tagbody(expander: &mut Expander, _: &mut dyn Environment, form: Fo
 pub(super) fn go(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(1..=1, "takes one tag")?;
     let Some(tag) = Tag::of(&form.args[0]) else {
-        return Err(form.malformed("needs a symbol or an integer as the tag"));
+        return Err(form.not_a_name(&form.args[0], "needs a symbol or an integer as the tag"));
     };
     match expander.scope.tag(&tag, expander.level()) {
         Visible::Is((tagbody, number)) => {
@@ -319,7 +317,7 @@ pub(super) fn go(expander: &mut Expander, _: &mut dyn Environment, form: Form, t
         }
         Visible::OutOfReach | Visible::No => {
             let message = format!("there is no tag {} around this `go`", quoted(&form.args[0]));
-            Err(Box::new(code::UNKNOWN_TAG.at(form.span, message)))
+            Err(Box::new(code::UNKNOWN_TAG.at(form.at(form.args[0].span()), message)))
         }
     }
 }
@@ -421,7 +419,7 @@ pub(super) fn multiple_value_setq(
 ) -> Checked {
     form.takes(2..=2, "takes a list of names and a form")?;
     let Some(names) = form.args[0].as_list() else {
-        return Err(form.malformed("needs a list of names"));
+        return Err(form.not_a_name(&form.args[0], "needs a list of names"));
     };
     let make = Make(to.span);
     let places = make.cl("VALUES", names.into_iter().cloned());
@@ -464,8 +462,10 @@ pub(super) struct Situations {
 
 /// Returns the situations of an `eval-when`.
 pub(super) fn situations(form: &Form) -> Checked<Situations> {
-    let Some(items) = form.args.first().and_then(Datum::as_list) else {
-        return Err(form.malformed("needs a list of situations"));
+    let shape = "needs a list of situations";
+    let Some(list) = form.args.first() else { return Err(form.missing(shape)) };
+    let Some(items) = list.as_list() else {
+        return Err(form.malformed_at(list.span(), &format!("{shape}, not {}", quoted(list))));
     };
     let mut situations = Situations::default();
     for item in items {
@@ -474,8 +474,11 @@ pub(super) fn situations(form: &Form) -> Checked<Situations> {
             Some("LOAD-TOPLEVEL" | "LOAD") => situations.load = true,
             Some("EXECUTE" | "EVAL") => situations.execute = true,
             _ => {
-                let what = "takes the situations `:compile-toplevel`, `:load-toplevel` and `:execute`";
-                return Err(form.malformed_at(item.span(), what));
+                let what = format!(
+                    "takes the situations `:compile-toplevel`, `:load-toplevel` and `:execute`, not {}",
+                    quoted(item)
+                );
+                return Err(form.malformed_at(item.span(), &what));
             }
         }
     }
@@ -493,5 +496,5 @@ pub(super) fn eval_when(expander: &mut Expander, _: &mut dyn Environment, form: 
 
 /// `(declare …)` outside of the places for declarations.
 pub(super) fn misplaced_declare(_: &mut Expander, _: &mut dyn Environment, form: Form, _: To) -> Checked {
-    Err(form.malformed("can only stand at the beginning of a body"))
+    Err(form.fault(code::MISPLACED_DECLARATION, form.head(), "can only stand at the beginning of a body"))
 }

@@ -1,5 +1,5 @@
-//! Definitions: `defun`, `defmacro`, `declaim`, `load-time-value`; and the rule that programs cannot redefine names of
-//! the language.
+//! Definitions: `defun`, `defmacro`, `declaim`, `load-time-value`; and the rule that programs cannot redefine
+//! names of the language.
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::{Environment, InternError};
@@ -44,8 +44,8 @@ impl Expander {
         }
     }
 
-    /// Refuses calls of the defining functions with a name of the language. Notes variables that they define inside other
-    /// forms, which matters at the end of the unit.
+    /// Refuses calls of the defining functions with a name of the language. Notes variables that they define
+    /// inside other forms, which matters at the end of the unit.
     pub(super) fn check_defining(
         &mut self,
         environment: &dyn Environment,
@@ -83,9 +83,9 @@ pub(super) fn defun(
     to: To,
 ) -> Checked {
     let shape = "needs a name and a lambda list";
-    let Some(function) = form.args.first().and_then(WrittenName::of) else {
-        let span = form.args.first().map_or(form.span, Datum::span);
-        return Err(form.malformed_at(span, shape));
+    let Some(named) = form.args.first() else { return Err(form.missing(shape)) };
+    let Some(function) = WrittenName::of(named) else {
+        return Err(form.not_a_name(named, "needs a name as its first part"));
     };
     let outcome = define_function(expander, environment, &form, &function, to);
     if outcome.is_err() {
@@ -135,7 +135,7 @@ pub(super) fn defmacro(
     form: Form,
     to: To,
 ) -> Checked {
-    let symbol = form.symbol(0, "needs a name and a lambda list")?;
+    let symbol = form.symbol(0, "needs a symbol as its first part, and a lambda list")?;
     expander.check_definable(environment, &symbol, form.at(form.args[0].span()))?;
     expander.note_macro(&symbol);
     form.takes(2..=usize::MAX, "needs a name and a lambda list")?;
@@ -201,7 +201,9 @@ pub(super) fn package_change(environment: &mut dyn Environment, form: &Form) -> 
         _ => None,
     };
     let Some(named) = named else {
-        return Err(form.malformed("takes the name of one package"));
+        let shape = "takes the name of one package";
+        form.takes(1..=1, shape)?;
+        return Err(form.not_a_name(&form.args[0], shape));
     };
     // Looking up any name in the package shows whether the package exists.
     if let Err(InternError::NoPackage(_)) = environment.intern(Some(&named), "NIL", false) {
@@ -219,8 +221,8 @@ fn always(make: Make) -> Datum {
     make.items(situations.map(|situation| make.symbol(&Symbol::keyword(situation))))
 }
 
-/// `(%compiler-warning code message where . body)`: expands to the body; reports a finding, of a code in the table of
-/// codes, at the place of the datum `where`.
+/// `(%compiler-warning code message where . body)`: expands to the body; reports a finding, of a code in the
+/// table of codes, at the place of the datum `where`.
 pub(super) fn compiler_warning(
     expander: &mut Expander,
     _: &mut dyn Environment,
@@ -228,7 +230,7 @@ pub(super) fn compiler_warning(
     to: To,
 ) -> Checked {
     let [named, message, place, body @ ..] = form.args.as_slice() else {
-        return Err(form.malformed("takes a code, a message, a datum and forms"));
+        return Err(form.missing("takes a code, a message, a datum and forms"));
     };
     let (DatumKind::String(named), DatumKind::String(message)) = (named.kind(), message.kind()) else {
         return Err(form.malformed("needs strings as code and message"));
@@ -243,8 +245,8 @@ pub(super) fn compiler_warning(
     Ok(())
 }
 
-/// `(load-time-value form [read-only])`: reads a variable with a fresh name, which a separate chunk sets before the chunk
-/// around the form runs.
+/// `(load-time-value form [read-only])`: reads a variable with a fresh name, which a separate chunk sets
+/// before the chunk around the form runs.
 pub(super) fn load_time_value(
     expander: &mut Expander,
     environment: &mut dyn Environment,

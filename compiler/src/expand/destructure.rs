@@ -1,14 +1,16 @@
 //! Taking lists apart by pattern: macro lambda lists and `destructuring-bind`.
 //!
-//! A pattern becomes a row of bindings of a `let*`, each variable bound to a piece of the list. Functions of the library,
-//! all internal to the package `ESL`, check the number of elements first; `context` is the name of the macro, or the
-//! pattern, for their messages:
+//! A pattern becomes a row of bindings of a `let*`, each variable bound to a piece of the list. Functions of
+//! the library, all internal to the package `ESL`, check the number of elements first; `context` is the name
+//! of the macro, or the pattern, for their messages:
 //!
-//! * `(%check-arguments list minimum maximum context)` returns `list`, or fails with a `program-error` if it is not a
-//!   list of that many elements. Without a maximum (`NIL`) it looks at the first `minimum` conses only.
-//! * `(%check-keys list keys allow-other-keys context)` returns `list`, or fails with a `program-error` if it is not a
-//!   list of keys and values, or contains other keys than the list `keys` without allowing them.
-//! * `(%key-tail list key)` returns the tail of a list of keys and values that begins with the value of `key`, or `NIL`.
+//! * `(%check-arguments list minimum maximum context)` returns `list`, or fails with a `program-error` if it
+//!   is not a list of that many elements. Without a maximum (`NIL`) it looks at the first `minimum` conses
+//!   only.
+//! * `(%check-keys list keys allow-other-keys context)` returns `list`, or fails with a `program-error` if it
+//!   is not a list of keys and values, or contains other keys than the list `keys` without allowing them.
+//! * `(%key-tail list key)` returns the tail of a list of keys and values that begins with the value of
+//!   `key`, or `NIL`.
 
 use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::Datum;
@@ -45,8 +47,8 @@ impl Row<'_> {
         self.bindings.push((variable.clone(), form));
     }
 
-    /// Takes all patterns apart, from left to right, each in its place; returns the bindings, now of variables only.
-    /// Nesting takes no native stack.
+    /// Takes all patterns apart, from left to right, each in its place; returns the bindings, now of
+    /// variables only. Nesting takes no native stack.
     fn finish(mut self, form: &Form) -> Checked<Vec<Binding>> {
         let mut finished: Vec<Binding> = Vec::new();
         let mut waiting: Vec<Binding> = std::mem::take(&mut self.bindings);
@@ -67,7 +69,8 @@ impl Row<'_> {
         Ok(finished)
     }
 
-    /// Binds the variables of `list`. `whole` is the value of `&whole`, `arguments` the form of the list to take apart.
+    /// Binds the variables of `list`. `whole` is the value of `&whole`, `arguments` the form of the list to
+    /// take apart.
     fn pattern(&mut self, list: &LambdaList, whole: &Datum, arguments: &Datum) {
         let make = self.make;
         if let Some(variable) = &list.whole {
@@ -156,8 +159,8 @@ pub(super) fn destructuring_bind(
     Ok(())
 }
 
-/// `(%macro-lambda shown name lambda-list . body)`: the function of the macro `name`, which takes a form and an
-/// environment and is shown to people as `shown`.
+/// `(%macro-lambda shown name lambda-list . body)`: the function of the macro `name`, which takes a form and
+/// an environment and is shown to people as `shown`.
 pub(super) fn macro_lambda(
     expander: &mut Expander,
     environment: &mut dyn Environment,

@@ -1,10 +1,10 @@
 //! The expander's state, and the loop over its jobs.
 //!
-//! Jobs stand on a stack. So a form of any depth takes no native stack, and the expander can stop at any macro call and
-//! continue when the answer comes.
+//! Jobs stand on a stack. So a form of any depth takes no native stack, and the expander can stop at any
+//! macro call and continue when the answer comes.
 //!
-//! Invariants: jobs run in the order of the text, from left to right; exactly one job fills a hole; only jobs change the
-//! [`Scope`], never the code that looks at a form.
+//! Invariants: jobs run in the order of the text, from left to right; exactly one job fills a hole; only jobs
+//! change the [`Scope`], never the code that looks at a form.
 
 use esl_bytecode::compile::{Answer, Environment, MacroCall, MacroRef};
 use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
@@ -34,8 +34,8 @@ pub(super) type Operator = fn(&mut Expander, &mut dyn Environment, Form, To) -> 
 pub enum Stop {
     /// A macro is to be run. Continue with [`Answer::Expansion`] or [`Answer::Failed`].
     Macro(MacroCall),
-    /// A chunk is finished. If it is to be kept, continue with [`Answer::Object`] or [`Answer::Failed`]; if it is to be
-    /// loaded and that failed, with [`Answer::Failed`].
+    /// A chunk is finished. If it is to be kept, continue with [`Answer::Object`] or [`Answer::Failed`]; if
+    /// it is to be loaded and that failed, with [`Answer::Failed`].
     Chunk(Box<Chunk>),
     /// All forms are expanded.
     Done,
@@ -129,7 +129,8 @@ impl Expander {
         std::mem::take(&mut self.diagnostics)
     }
 
-    /// Finishes the unit: returns the findings so far, undefined names, and calls with a wrong number of arguments.
+    /// Finishes the unit: returns the findings so far, undefined names, and calls with a wrong number of
+    /// arguments.
     pub fn finish(&mut self, environment: &dyn Environment) -> Vec<Diagnostic> {
         let mut findings = self.take_diagnostics();
         findings.extend(self.globals.finish(environment));
@@ -258,8 +259,8 @@ impl Expander {
 
     // ---- stops and answers
 
-    /// Stops for a call of `function` on `form`, which the call `around` made. `waiting` says what becomes of the answer,
-    /// given the origin of what the macro makes.
+    /// Stops for a call of `function` on `form`, which the call `around` made. `waiting` says what becomes of
+    /// the answer, given the origin of what the macro makes.
     ///
     /// # Errors
     /// As [`Origins::enter`].

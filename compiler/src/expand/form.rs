@@ -1,5 +1,7 @@
 //! Forms: taking them apart, making them, and quoting them in messages.
 
+use std::ops::RangeInclusive;
+
 use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
@@ -7,7 +9,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{ESL_PACKAGE, Symbol};
 use rustc_hash::FxHashMap;
 
-use crate::diagnostic::code;
+use crate::diagnostic::{Code, code};
 
 /// Outcome of a check of a form.
 pub(super) type Checked<T = ()> = Result<T, Box<Diagnostic>>;
@@ -25,28 +27,28 @@ pub(super) struct Form {
 
 impl Form {
     /// Takes a compound form apart. `span` is its place, or that of the form around it.
+    ///
+    /// # Errors
+    /// `not-an-operator`, `dotted-form`.
     pub(super) fn of(datum: &Datum, span: Span) -> Checked<Form> {
-        let malformed = |what: String| Box::new(code::MALFORMED_FORM.at(span, what));
         let Some((head, rest)) = datum.as_cons() else {
-            return Err(malformed(format!("{} is no compound form", quoted(datum))));
+            let message = format!("expected a compound form, found {}", quoted(datum));
+            return Err(Box::new(code::MALFORMED_FORM.at(span, message)));
         };
         // Messages call a call of a `lambda` expression by the name `lambda`.
         let operator = match head.as_symbol() {
             Some(symbol) => symbol.clone(),
             None if is_cl_form(head, "LAMBDA") => Symbol::cl("LAMBDA"),
-            None => {
-                let message =
-                    format!("a form begins with the name of an operator, not with {}", quoted(head));
-                return Err(malformed(message));
-            }
+            None => return Err(not_an_operator(datum, head, span)),
         };
-        match rest.as_list() {
-            Some(args) => {
-                let args = args.into_iter().cloned().collect();
-                Ok(Form { datum: datum.clone(), operator, args, span })
-            }
-            None => Err(malformed(format!("{} ends in a dot and something that is no list", quoted(datum)))),
+        let mut elements = rest.elements();
+        let args = elements.by_ref().cloned().collect();
+        let tail = elements.tail();
+        if !tail.is_nil() {
+            let message = format!("expected `)` at the end of a form, found a dot and {}", quoted(tail));
+            return Err(Box::new(code::DOTTED_FORM.at(span_of(tail, span), message)));
         }
+        Ok(Form { datum: datum.clone(), operator, args, span })
     }
 
     /// Returns the form as a call of the global function, whatever else the operator means.
@@ -54,20 +56,57 @@ impl Form {
         Make(self.datum.span()).call(&self.operator, self.args.iter().cloned())
     }
 
-    /// Returns the error about this form. The message is its operator, followed by `what`.
+    /// Returns the error that `what` follows the name of the operator, at the operator.
     pub(super) fn malformed(&self, what: &str) -> Box<Diagnostic> {
-        self.malformed_at(self.span, what)
+        self.fault(code::MALFORMED_FORM, self.head(), what)
     }
 
-    /// Returns the error about the part of this form at `span`. The message is its operator, followed by `what`.
+    /// Returns the error that `what` follows the name of the operator, at `span`.
     pub(super) fn malformed_at(&self, span: Span, what: &str) -> Box<Diagnostic> {
-        let span = if is_known(span) { span } else { self.span };
-        Box::new(code::MALFORMED_FORM.at(span, format!("{} {what}", name(&self.operator))))
+        self.fault(code::MALFORMED_FORM, span, what)
     }
 
-    /// Checks the number of arguments.
-    pub(super) fn takes(&self, count: std::ops::RangeInclusive<usize>, what: &str) -> Checked {
-        if count.contains(&self.args.len()) { Ok(()) } else { Err(self.malformed(what)) }
+    /// Returns an error of this code at `span`. The message is the name of the operator, followed by `what`.
+    pub(super) fn fault(&self, code: &Code, span: Span, what: &str) -> Box<Diagnostic> {
+        Box::new(code.at(self.at(span), format!("{} {what}", name(&self.operator))))
+    }
+
+    /// Returns the error for a form that ends before a part that it needs. `what` says what the form takes.
+    pub(super) fn missing(&self, what: &str) -> Box<Diagnostic> {
+        let count = match self.args.len() {
+            0 => "no parts".to_string(),
+            1 => "1 part only".to_string(),
+            count => format!("{count} parts only"),
+        };
+        self.fault(code::MISSING_PART, self.head(), &format!("{what}, but has {count}"))
+    }
+
+    /// Returns the error for something other than a name as a part of this form.
+    pub(super) fn not_a_name(&self, found: &Datum, what: &str) -> Box<Diagnostic> {
+        self.fault(code::NOT_A_NAME, found.span(), &format!("{what}, not {}", quoted(found)))
+    }
+
+    /// Checks the number of arguments. `what` says what the form takes.
+    ///
+    /// # Errors
+    /// `missing-part`, at the operator; `extra-part`, at the arguments beyond the last one that the form
+    /// takes.
+    pub(super) fn takes(&self, count: RangeInclusive<usize>, what: &str) -> Checked {
+        if self.args.len() < *count.start() {
+            return Err(self.missing(what));
+        }
+        let Some([first, others @ ..]) = self.args.get(*count.end()..) else { return Ok(()) };
+        let last = others.last().unwrap_or(first);
+        let is_known = is_known(first.span()) && is_known(last.span());
+        let span = if is_known { first.span().to(last.span()) } else { self.span };
+        let found = quoted(first);
+        let found = if others.is_empty() { found } else { format!("{found} and more") };
+        Err(self.fault(code::EXTRA_PART, span, &format!("{what}; {found} is too much")))
+    }
+
+    /// Returns the place of the operator.
+    pub(super) fn head(&self) -> Span {
+        self.datum.as_cons().map_or(self.span, |(head, _)| self.at(head.span()))
     }
 
     /// Returns `span` if it is known, and the place of the form otherwise.
@@ -76,15 +115,28 @@ impl Form {
     }
 
     /// Returns argument `index` as a name. `NIL` does not count as one.
+    ///
+    /// # Errors
+    /// `missing-part`, `not-a-name`.
     pub(super) fn symbol(&self, index: usize, what: &str) -> Checked<Symbol> {
-        match self.args.get(index).and_then(Datum::as_symbol) {
-            Some(symbol) => Ok(symbol.clone()),
-            None => {
-                let span = self.args.get(index).map_or(self.span, Datum::span);
-                Err(self.malformed_at(span, what))
-            }
-        }
+        let Some(arg) = self.args.get(index) else { return Err(self.missing(what)) };
+        arg.as_symbol().cloned().ok_or_else(|| self.not_a_name(arg, what))
     }
+}
+
+/// The error for a form that begins with something other than the name of an operator.
+fn not_an_operator(form: &Datum, head: &Datum, span: Span) -> Box<Diagnostic> {
+    let message =
+        format!("expected the name of an operator at the beginning of a form, found {}", quoted(head));
+    let diagnostic = code::NOT_AN_OPERATOR.at(span_of(head, span), message);
+    Box::new(match head.kind() {
+        DatumKind::Cons(..) => {
+            let call = on_one_line(head, QUOTED);
+            diagnostic.help(format!("to call its value, write `(funcall {call} …)`"))
+        }
+        _ if form.as_list().is_some() => diagnostic.help("to make a list, write `(list …)` or quote it"),
+        _ => diagnostic,
+    })
 }
 
 /// Whether a span is a place in a source. Data made by a program have an empty span.
@@ -113,8 +165,8 @@ pub(super) fn quoted(datum: &Datum) -> String {
     if short.len() < text.len() { format!("`{short}…`") } else { format!("`{short}`") }
 }
 
-/// Returns a datum on one line, in lower case. A form may be as long as a file, so the text is cut soon after `limit`
-/// characters.
+/// Returns a datum on one line, in lower case. A form may be as long as a file, so the text is cut soon after
+/// `limit` characters.
 pub(super) fn on_one_line(datum: &Datum, limit: usize) -> String {
     enum Part<'a> {
         Datum(&'a Datum),

@@ -77,11 +77,11 @@ impl WrittenName {
     /// Rejects `t` as the name of a global function, since the module format does not treat it as a symbol.
     ///
     /// # Errors
-    /// `malformed-form`.
+    /// `not-an-operator`.
     pub(super) fn check_callable(&self, form: &Form) -> Checked {
         if self.cell.is_cl("T") {
             let message = "`t` is a constant and cannot be called";
-            return Err(Box::new(code::MALFORMED_FORM.at(form.at(self.datum.span()), message)));
+            return Err(Box::new(code::NOT_AN_OPERATOR.at(form.at(self.datum.span()), message)));
         }
         Ok(())
     }
@@ -90,7 +90,7 @@ impl WrittenName {
     pub(super) fn out_of_reach(&self, form: &Form) -> Box<Diagnostic> {
         let message =
             format!("the local function {} does not exist when macros are expanded", self.name.shown());
-        Box::new(code::MALFORMED_FORM.at(form.span, message))
+        Box::new(code::RUN_TIME_ONLY.at(form.at(self.datum.span()), message))
     }
 }
 

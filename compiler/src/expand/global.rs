@@ -1,5 +1,5 @@
-//! Global names of a compilation unit: findings that are known only at its end, namely undefined functions and
-//! variables, undeclared causes, and calls with a wrong number of arguments.
+//! Global names of a compilation unit: findings that are known only at its end, namely undefined functions
+//! and variables, undeclared causes, and calls with a wrong number of arguments.
 
 use esl_bytecode::compile::{Arity, Environment, GlobalFunction, GlobalVariable};
 use esl_bytecode::datum::Datum;

@@ -5,14 +5,15 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::symbol::Symbol;
 
 use super::expander::Expander;
-use super::form::{Checked, Form, Make, fresh};
+use super::form::{Checked, Form, Make, fresh, quoted};
 use super::job::{Job, To};
 use super::scope::{ScopeEntry, VariableMeaning};
 use super::variable::Deed;
 use crate::core::{HandlerClause, NodeKind};
+use crate::diagnostic::code;
 
-/// `(%handler-case form (type ([variable]) . body)*)`: runs `form`. A condition of a clause's type that is signalled in
-/// it unwinds to here and runs the body.
+/// `(%handler-case form (type ([variable]) . body)*)`: runs `form`. A condition of a clause's type that is
+/// signalled in it unwinds to here and runs the body.
 pub(super) fn handler_case(
     expander: &mut Expander,
     environment: &mut dyn Environment,
@@ -27,18 +28,18 @@ pub(super) fn handler_case(
         let shape = "needs clauses of a type, a list of at most one variable, and forms";
         let parts = clause.as_list().unwrap_or_default();
         let [condition_type, variables, body @ ..] = parts.as_slice() else {
-            return Err(form.malformed_at(clause.span(), shape));
+            return Err(form.fault(code::MALFORMED_CLAUSE, clause.span(), shape));
         };
         if !matches!(condition_type.kind(), DatumKind::Symbol(_) | DatumKind::Cons(..) | DatumKind::Nil) {
-            return Err(
-                form.malformed_at(condition_type.span(), "needs a type at the beginning of each clause")
-            );
+            let what =
+                format!("needs a type at the beginning of each clause, not {}", quoted(condition_type));
+            return Err(form.fault(code::MALFORMED_CLAUSE, condition_type.span(), &what));
         }
         let variables = variables.as_list();
         let bound: Option<Datum> = match variables.as_deref() {
             Some([]) => None,
             Some([variable]) => Some((*variable).clone()),
-            _ => return Err(form.malformed_at(clause.span(), shape)),
+            _ => return Err(form.fault(code::MALFORMED_CLAUSE, clause.span(), shape)),
         };
         let forms: Vec<Datum> = body.iter().map(|&form| form.clone()).collect();
         let mut body = expander.take_body(&forms, false, &form, to.origin)?;

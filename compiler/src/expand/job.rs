@@ -1,7 +1,7 @@
 //! Jobs: the steps in which the expander works, and the answers that it waits for.
 //!
-//! A job expands one form into one node, or does what has to happen between two forms. These types hold no behaviour:
-//! every file of the expander may use them, and they use none of the files that carry them out.
+//! A job expands one form into one node, or does what has to happen between two forms. These types hold no
+//! behaviour: every file of the expander may use them, and they use none of the files that carry them out.
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;

@@ -8,7 +8,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
 use super::expander::Expander;
-use super::form::{Checked, Form, check_distinct, is_cl_form, is_esl, quoted, span_of};
+use super::form::{Checked, Form, check_distinct, is_cl_form, is_esl, operator, plain, span_of};
 use super::function::{Body, FunctionParts, FunctionText, WrittenName};
 use super::job::{Job, To};
 use super::lambda_list::{LambdaList, LambdaListKind, OptionalSpec};
@@ -165,12 +165,10 @@ impl Expander {
 }
 
 fn no_function(form: &Form, function: &WrittenName) -> Box<Diagnostic> {
-    let message = format!("{} is no function, but a macro or special form", function.name.shown());
-    let diagnostic = code::MALFORMED_FORM.at(form.span, message);
-    Box::new(diagnostic.help(format!(
-        "write a `lambda` around it: `(lambda (…) ({} …))`",
-        super::form::plain(&function.name.symbol)
-    )))
+    let message = format!("expected a function, found the macro or special form {}", function.name.shown());
+    let diagnostic = code::MACRO_AS_FUNCTION.at(form.at(function.datum.span()), message);
+    let operator = plain(&function.name.symbol);
+    Box::new(diagnostic.help(format!("write a `lambda` around it: `(lambda (…) ({operator} …))`")))
 }
 
 /// A lambda whose parameters are being filled in.
@@ -267,19 +265,19 @@ pub(super) fn function(
     form: Form,
     to: To,
 ) -> Checked {
-    let [named] = form.args.as_slice() else {
-        return Err(form.malformed("needs the name of one function, or a `lambda` expression"));
-    };
+    let shape = "takes the name of one function, or a `lambda` expression";
+    form.takes(1..=1, shape)?;
+    let named = &form.args[0];
     if let Some(name) = WrittenName::of(named) {
         return expander.function_reference(environment, &name, &form, to);
     }
-    let is_named_lambda = super::form::operator(named)
+    let is_named_lambda = operator(named)
         .is_some_and(|symbol| is_esl(symbol, "%NAMED-LAMBDA") || is_esl(symbol, "%MACRO-LAMBDA"));
     if is_cl_form(named, "LAMBDA") || is_named_lambda {
         expander.schedule([Job::Expand(named.clone(), to)]);
         return Ok(());
     }
-    Err(form.malformed(&format!("needs the name of a function, not {}", quoted(named))))
+    Err(form.not_a_name(named, shape))
 }
 
 /// `(lambda lambda-list . body)`
@@ -296,7 +294,8 @@ pub(super) fn lambda(
     Ok(())
 }
 
-/// `(%named-lambda name lambda-list . body)`: a function that is shown as `name`, with a block if that names a function.
+/// `(%named-lambda name lambda-list . body)`: a function that is shown as `name`, with a block if that names
+/// a function.
 pub(super) fn named_lambda(
     expander: &mut Expander,
     environment: &mut dyn Environment,

@@ -1,7 +1,7 @@
 //! Lambda lists: ordinary ones, those of macros, and those of `destructuring-bind`.
 //!
-//! One parser reads all three. Where an ordinary lambda list has a variable, the other two may have a pattern, which is a
-//! lambda list itself; [`super::destructure`] takes patterns apart.
+//! One parser reads all three. Where an ordinary lambda list has a variable, the other two may have a
+//! pattern, which is a lambda list itself; [`super::destructure`] takes patterns apart.
 
 use esl_bytecode::compile::Arity;
 use esl_bytecode::datum::{Datum, DatumKind};
@@ -125,13 +125,14 @@ impl Parser {
                 || self.parsed.rest.is_some()
                 || self.section > Section::Optional
             {
-                return Err(self.wrong(tail, "the lambda list ends in a dot and something that is no list"));
+                return Err(self.wrong(tail, "expected `)` at the end of a lambda list, found a dot"));
             }
             self.variable(tail)?;
             self.parsed.rest = Some(tail.clone());
         }
         if self.section == Section::Rest {
-            return Err(self.wrong(list, "`&rest` needs the name of a variable after it"));
+            let keyword = list.elements().last().unwrap_or(list);
+            return Err(self.wrong(keyword, "`&rest` needs the name of a variable after it"));
         }
         Ok(self.parsed)
     }
@@ -169,7 +170,7 @@ impl Parser {
                 return Err(self.wrong(item, &message).with_order(self.kind));
             }
             _ => {
-                let message = format!("`{}` is no lambda list keyword", plain(keyword));
+                let message = format!("there is no lambda list keyword `{}`", plain(keyword));
                 return Err(self.wrong(item, &message).with_order(self.kind));
             }
         };

@@ -6,12 +6,13 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
 use super::expander::Expander;
-use super::form::{Checked, Form, Make, check_distinct, span_of};
+use super::form::{Checked, Form, Make, check_distinct, quoted, span_of};
 use super::function::{Body, FunctionParts, FunctionText, WrittenName};
 use super::job::{Job, To};
 use super::origin::OriginId;
 use super::scope::{FunctionMeaning, ScopeEntry};
 use crate::core::NodeKind;
+use crate::diagnostic::code;
 
 /// A local definition taken apart.
 struct Definition {
@@ -27,20 +28,26 @@ fn definitions(
     origin: Option<OriginId>,
 ) -> Checked<Vec<Definition>> {
     let shape = "needs a list of definitions, such as `((f (x) (* x x)))`";
-    let Some(items) = form.args.first().and_then(Datum::as_list) else {
-        return Err(form.malformed(shape));
+    let Some(list) = form.args.first() else { return Err(form.missing(shape)) };
+    let malformed = |span, what: &str| form.fault(code::MALFORMED_DEFINITION, span, what);
+    let Some(items) = list.as_list() else {
+        return Err(malformed(list.span(), &format!("{shape}, not {}", quoted(list))));
     };
     let mut definitions = Vec::new();
     for item in items {
         let Some((head, rest)) = item.as_cons() else {
-            return Err(form.malformed_at(item.span(), shape));
+            let fault = malformed(item.span(), &format!("{shape}, not {}", quoted(item)));
+            // `(flet (f (x) …) …)` lacks the parentheses around its only definition.
+            let is_bare = list.as_list().is_some_and(|parts| parts.len() > 1 && item.is_same(parts[0]));
+            let help = "put the definition into a list of definitions";
+            return Err(if is_bare { Box::new(fault.help(help)) } else { fault });
         };
         let Some(name) = WrittenName::of(head) else {
-            return Err(form.malformed_at(head.span(), "needs a name at the beginning of each definition"));
+            return Err(form.not_a_name(head, "needs a name at the beginning of each definition"));
         };
         let Some(parts) = rest.as_list().filter(|parts| !parts.is_empty()) else {
             let what = format!("needs a lambda list after the name {}", name.name.shown());
-            return Err(form.malformed_at(item.span(), &what));
+            return Err(malformed(item.span(), &what));
         };
         if !name.name.is_setf {
             let span = form.at(head.span());
@@ -124,8 +131,8 @@ fn local_functions(
     Ok(())
 }
 
-/// Returns the jobs that define the macros of a `macrolet`, the number of names that they bring into scope, and the
-/// body.
+/// Returns the jobs that define the macros of a `macrolet`, the number of names that they bring into scope,
+/// and the body.
 pub(super) fn local_macros(
     expander: &mut Expander,
     environment: &mut dyn Environment,
@@ -137,7 +144,7 @@ pub(super) fn local_macros(
     let mut names = Vec::new();
     for Definition { name, lambda_list, body } in definitions(expander, environment, form, to.origin)? {
         if name.name.is_setf {
-            return Err(form.malformed_at(name.datum.span(), "needs a symbol as the name of a macro"));
+            return Err(form.not_a_name(&name.datum, "needs a symbol as the name of a macro"));
         }
         // The definition keeps its place in the source, so that its unused variables are reported.
         let definition = Make(form.datum.span());

@@ -1,7 +1,9 @@
-//! Forms that set places: `setf`, `psetf`, `incf`, `push` and their like, and `%modify`, of which others are made.
+//! Forms that set places: `setf`, `psetf`, `incf`, `push` and their like, and `%modify`, of which others are
+//! made.
 //!
-//! The order of evaluation is the standard's: subforms of the place from left to right, then further arguments; then
-//! the old value is read, and the new one stored. Only `push` and `pushnew` evaluate their item first.
+//! The order of evaluation is the standard's: subforms of the place from left to right, then further
+//! arguments; then the old value is read, and the new one stored. Only `push` and `pushnew` evaluate their
+//! item first.
 
 use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::{Datum, DatumKind};
@@ -12,7 +14,9 @@ use super::form::{Checked, Form, Make, arguments, is_cl_form, is_constant};
 use super::job::{Job, To};
 use super::scope::{VariableMeaning, Visible};
 use super::setf::{Change, PlaceUse, SetfExpansion};
+use super::variable::value_missing;
 use crate::core::NodeKind;
+use crate::diagnostic::code;
 
 impl Expander {
     /// Uses the newest places.
@@ -151,8 +155,8 @@ struct StoreStep<'a> {
 
 /// Returns a form that makes all bindings in order around a body.
 fn bind_in_order(steps: Vec<StoreStep<'_>>, mut body: Vec<Datum>, make: Make) -> Datum {
-    // From the last step to the first, so that a step with several values can enclose the steps after it. The bindings
-    // around the body are gathered from the last to the first, too.
+    // From the last step to the first, so that a step with several values can enclose the steps after it. The
+    // bindings around the body are gathered from the last to the first, too.
     let mut bindings: Vec<(Datum, Datum)> = Vec::new();
     for StoreStep { before, stores, value } in steps.into_iter().rev() {
         if let [store] = stores {
@@ -193,7 +197,8 @@ fn rotate(places: &[SetfExpansion], make: Make) -> Datum {
     bind_in_order(steps, body.collect(), make)
 }
 
-/// As [`rotate`], except that the last place takes the value of a form, and the first one's old value is returned.
+/// As [`rotate`], except that the last place takes the value of a form, and the first one's old value is
+/// returned.
 fn shift(places: &[SetfExpansion], value: Datum, old: Datum, make: Make) -> Datum {
     let [first, others @ ..] = places else { return value };
     let is_single = first.stores.len() == 1;
@@ -227,7 +232,7 @@ pub(super) fn setf(expander: &mut Expander, _: &mut dyn Environment, form: Form,
             let usage = PlaceUse::Setf(value.clone());
             expander.schedule([Job::Place(place.clone(), to), Job::Use(Box::new(usage), to)]);
         }
-        args if args.len() % 2 == 1 => return Err(form.malformed("needs a value for each place")),
+        args if args.len() % 2 == 1 => return Err(value_missing(&form)),
         args => {
             let pairs: Vec<Datum> =
                 args.chunks(2).map(|pair| make.cl("SETF", pair.iter().cloned())).collect();
@@ -248,7 +253,7 @@ pub(super) fn place_parts(expander: &mut Expander, _: &mut dyn Environment, form
 /// `(psetf {place form}*)`
 pub(super) fn psetf(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     if form.args.len() % 2 == 1 {
-        return Err(form.malformed("needs a value for each place"));
+        return Err(value_missing(&form));
     }
     let mut jobs: Vec<Job> = form.args.iter().step_by(2).map(|place| Job::Place(place.clone(), to)).collect();
     let values = form.args.iter().skip(1).step_by(2).cloned().collect();
@@ -306,8 +311,8 @@ fn add(expander: &mut Expander, form: &Form, function: &str, to: To) -> Checked 
     change(expander, &form.args[0], Change::Call(Symbol::cl(function), vec![delta]), to)
 }
 
-/// Returns the call that adds to the value of a key in a hash table with one search. Counting in tables is so common
-/// that it has a builtin of its own.
+/// Returns the call that adds to the value of a key in a hash table with one search. Counting in tables is so
+/// common that it has a builtin of its own.
 fn counter(expander: &Expander, place: &Datum, function: &str, delta: &Datum, to: To) -> Option<Datum> {
     let gethash = Symbol::cl("GETHASH");
     let is_global = matches!(expander.scope.function(&gethash, expander.level()), Visible::No);
@@ -348,16 +353,16 @@ pub(super) fn remf(expander: &mut Expander, _: &mut dyn Environment, form: Form,
     change(expander, &form.args[0], Change::Remf(form.args[1].clone()), to)
 }
 
-/// `(%modify (old (name form)*) place new [result])`: evaluates the subforms of the place, then binds the names to the
-/// forms one after another, then `old` to the old value, and stores the value of `new`. Returns that value, or the
-/// values of `result`, which is evaluated last.
+/// `(%modify (old (name form)*) place new [result])`: evaluates the subforms of the place, then binds the
+/// names to the forms one after another, then `old` to the old value, and stores the value of `new`. Returns
+/// that value, or the values of `result`, which is evaluated last.
 pub(super) fn modify(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(3..=4, "takes names, a place, the new value and at most one result")?;
     let names = form.args[0].as_list().unwrap_or_default();
     let Some((old, further)) =
         names.split_first().filter(|(old, _)| matches!(old.kind(), DatumKind::Symbol(_)))
     else {
-        return Err(form.malformed("needs a name for the old value"));
+        return Err(form.not_a_name(&form.args[0], "needs a list that begins with a name for the old value"));
     };
     let mut bindings = Vec::new();
     for binding in further {
@@ -365,7 +370,10 @@ pub(super) fn modify(expander: &mut Expander, _: &mut dyn Environment, form: For
             Some([name, value]) if name.as_symbol().is_some() => {
                 bindings.push(((*name).clone(), (*value).clone()))
             }
-            _ => return Err(form.malformed_at(binding.span(), "needs one name and one form in each binding")),
+            _ => {
+                let what = "needs one name and one form in each binding";
+                return Err(form.fault(code::MALFORMED_BINDING, binding.span(), what));
+            }
         }
     }
     let result = form.args.get(3).cloned();

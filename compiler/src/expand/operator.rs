@@ -1,5 +1,5 @@
-//! The table of operators that the compiler itself expands: special forms, the standard macros that are written in Rust,
-//! and the library's internal operators.
+//! The table of operators that the compiler itself expands: special forms, the standard macros that are
+//! written in Rust, and the library's internal operators.
 //!
 //! A row is a name and the function that expands a form of it. This table is the only list of operators.
 
@@ -105,8 +105,8 @@ fn find(symbol: &Symbol) -> Option<Operator> {
     TABLE.get(symbol).copied()
 }
 
-/// Returns the names of all operators that the compiler itself expands. Of these, `funcall`, `apply` and `values` are
-/// functions too.
+/// Returns the names of all operators that the compiler itself expands. Of these, `funcall`, `apply` and
+/// `values` are functions too.
 pub fn names() -> impl Iterator<Item = Symbol> {
     TABLE.keys().cloned()
 }

@@ -1,7 +1,7 @@
 //! Origins: which macro call made a form.
 //!
-//! Everything that a macro makes has the place of its call. So the author of the program wrote a form if the place of
-//! the form is known and differs from that of the call that made it ([`Origins::written`]).
+//! Everything that a macro makes has the place of its call. So the author of the program wrote a form if the
+//! place of the form is known and differs from that of the call that made it ([`Origins::written`]).
 
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
@@ -18,7 +18,8 @@ const MAX_CHAIN: u32 = 10_000;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct OriginId(u32);
 
-/// A macro call that made a form. Of several calls at one place, the outermost, which the source contains, is named.
+/// A macro call that made a form. Of several calls at one place, the outermost, which the source contains, is
+/// named.
 #[derive(Clone, Debug)]
 pub(super) struct Origin {
     /// Name of the macro.
@@ -80,7 +81,8 @@ impl Origins {
         Ok(Some(OriginId(self.calls.len() as u32 - 1)))
     }
 
-    /// Returns `span` if a form at this place was written there, and the empty span if the call `origin` made it.
+    /// Returns `span` if a form at this place was written there, and the empty span if the call `origin` made
+    /// it.
     pub(super) fn written(&self, span: Span, origin: Option<OriginId>) -> Span {
         let is_made = origin.is_some_and(|origin| self.get(origin).span == span);
         if is_made { Span::default() } else { span }

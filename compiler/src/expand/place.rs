@@ -1,12 +1,12 @@
 //! Places: what `setf` and its relatives can set.
 //!
-//! [`Job::Place`] finds the setf expansion of one place, expanding macros as needed, and puts it on the expander's list
-//! of places; [`super::modify`] makes forms of them.
+//! [`Job::Place`] finds the setf expansion of one place, expanding macros as needed, and puts it on the
+//! expander's list of places; [`super::modify`] makes forms of them.
 //!
 //! How a call `(f …)` is set is looked up in this order: local functions and macros; the forms of
-//! [`super::standard_place`]; accessors of structures; the property `%setf` of `f`, which `defsetf` and its like record;
-//! a builtin `%set-f` that takes the new value last; a macro `f`; and last the function `(setf f)`, which takes the new
-//! value first.
+//! [`super::standard_place`]; accessors of structures; the property `%setf` of `f`, which `defsetf` and its
+//! like record; a builtin `%set-f` that takes the new value last; a macro `f`; and last the function
+//! `(setf f)`, which takes the new value first.
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::{Accessor, Environment, GlobalFunction, MacroRef};
@@ -27,7 +27,6 @@ use crate::diagnostic::code;
 impl Expander {
     /// Finds the five parts of a place.
     pub(super) fn find_place(&mut self, environment: &mut dyn Environment, datum: Datum, to: To) -> Checked {
-        let make = Make(to.span);
         match datum.kind() {
             DatumKind::Symbol(symbol) => {
                 let symbol = symbol.clone();
@@ -52,7 +51,7 @@ impl Expander {
                         Ok(())
                     }
                     Visible::OutOfReach => {
-                        let named = make.symbol(&form.operator);
+                        let named = Make(form.head()).symbol(&form.operator);
                         Err(WrittenName::symbol(&form.operator, named).out_of_reach(&form))
                     }
                     Visible::No => self.global_place(environment, form, to),
@@ -154,7 +153,8 @@ impl Expander {
         self.places.push(SetfExpansion { temporaries, ..place });
     }
 
-    /// Adds a place that the form `(prefix… argument… value)` sets, which takes only the first `taken` arguments.
+    /// Adds a place that the form `(prefix… argument… value)` sets, which takes only the first `taken`
+    /// arguments.
     pub(super) fn update_place(
         &mut self,
         environment: &mut dyn Environment,
@@ -185,8 +185,9 @@ impl Expander {
         to: To,
     ) -> Checked {
         if accessor.read_only {
-            let message = format!("the slot that {} reads is read-only", name(&form.operator));
-            return Err(Box::new(code::MALFORMED_FORM.at(to.span, message)));
+            let message =
+                format!("the slot that {} reads is read-only and cannot be set", name(&form.operator));
+            return Err(Box::new(code::READ_ONLY_SLOT.at(form.head(), message)));
         }
         let make = Make(to.span);
         let prefix = vec![
@@ -210,8 +211,8 @@ impl Expander {
     }
 }
 
-/// Returns variables bound to the subforms of a place that are not constant, and the subforms with these variables in
-/// their place.
+/// Returns variables bound to the subforms of a place that are not constant, and the subforms with these
+/// variables in their place.
 pub(super) fn arguments(
     environment: &mut dyn Environment,
     args: &[Datum],
@@ -277,10 +278,7 @@ pub(super) fn update_of(environment: &dyn Environment, symbol: &Symbol) -> Optio
 
 /// Returns the error about a form that is used as a place.
 pub(super) fn no_place(datum: &Datum, span: Span) -> Box<Diagnostic> {
-    let message = format!("{} is no place that can be set", quoted(datum));
-    Box::new(
-        code::MALFORMED_FORM
-            .at(span, message)
-            .help("a place is a variable or a call of an accessor, such as `(car x)`"),
-    )
+    let message = format!("expected a place that can be set, found {}", quoted(datum));
+    let help = "a place is a variable or a call of an accessor, such as `(car x)`";
+    Box::new(code::NOT_A_PLACE.at(span, message).help(help))
 }

@@ -1,7 +1,8 @@
 //! The core language as text, for `eslc expand` and for tests.
 //!
-//! The text is Lisp with the meaning of the core tree, as far as that can be written: a second variable of the same name
-//! gets a number, tags are numbered, and operators of the library appear under their internal names.
+//! The text is Lisp with the meaning of the core tree, as far as that can be written: a second variable of
+//! the same name gets a number, tags are numbered, and operators of the library appear under their internal
+//! names.
 
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::{SourceId, Span};
@@ -68,7 +69,8 @@ fn block_names(core: &Core) -> Vec<Datum> {
 
 impl Printer<'_> {
     fn form(&self) -> Datum {
-        // Children have higher numbers than their parents: going backward, all parts of a node are printed before it.
+        // Children have higher numbers than their parents: going backward, all parts of a node are printed
+        // before it.
         let mut forms: Vec<Datum> = vec![MAKE.nil(); self.core.nodes.len()];
         for index in (0..forms.len()).rev() {
             forms[index] = self.node(&self.core.nodes[index].kind, &forms);

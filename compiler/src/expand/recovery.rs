@@ -103,7 +103,7 @@ fn leave(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -
     if !matches!(expander.scope.variable(&state, expander.level()), Visible::Is(_)) {
         let message = format!("{} stands outside of a recovery clause", name(&form.operator));
         let help = "only clauses of `with-recovery-procedures` can contain it";
-        return Err(Box::new(code::OUTSIDE_CLAUSE.at(form.span, message).help(help)));
+        return Err(Box::new(code::OUTSIDE_CLAUSE.at(form.head(), message).help(help)));
     }
     let make = Make(to.span);
     let is_retry = form.operator.name() == "RETRY";
@@ -118,10 +118,10 @@ impl Expander {
     /// Warns if control can reach the end of a recovery clause that does not say that its value is meant.
     pub(super) fn check_clause(&mut self, to: To, is_empty: bool) {
         if is_empty || !ends(self.core(), to.node, End::LeavesOrResumes) {
-            let message = "this clause can end without saying how to go on, and its value then stands for that of \
-                           the operation that failed";
-            let help = "end it with `(retry)`, `(abort …)` or `(fail …)`, or with `(values …)` to go on behind \
-                        the failure";
+            let message = "this clause can end without saying how to go on, and its value then stands for \
+                           that of the operation that failed";
+            let help = "end it with `(retry)`, `(abort …)` or `(fail …)`, or with `(values …)` to go on \
+                        behind the failure";
             self.report(code::CLAUSE_FALLS_OFF.at(to.span, message.to_string()).help(help), to.origin);
         }
     }
@@ -143,8 +143,9 @@ enum End {
     Leaves(VarId),
 }
 
-/// Answers a question about the end of a form. A `NIL` that a macro has put at the end of its expansion, as `dolist`
-/// does, does not say that it is meant. A function that calls itself at its end does not return there.
+/// Answers a question about the end of a form. A `NIL` that a macro has put at the end of its expansion, as
+/// `dolist` does, does not say that it is meant. A function that calls itself at its end does not return
+/// there.
 fn ends(core: &Core, node: NodeId, end: End) -> bool {
     let leaves = matches!(end, End::Leaves(_));
     let mut inside: FxHashSet<BlockId> = FxHashSet::default();
@@ -169,7 +170,10 @@ fn ends(core: &Core, node: NodeId, end: End) -> bool {
             }
             NodeKind::If(_, consequent, alternative) => {
                 // A branch that `when` or `cond` leaves out does not say that its value is meant.
-                let is_left_out = |node: &NodeId| matches!(&core.nodes[node.index()].kind, NodeKind::Constant(constant) if constant.is_nil());
+                let is_left_out = |node: &NodeId| match &core.nodes[node.index()].kind {
+                    NodeKind::Constant(constant) => constant.is_nil(),
+                    _ => false,
+                };
                 if is_left_out(consequent) || is_left_out(alternative) {
                     return false;
                 }

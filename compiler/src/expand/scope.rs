@@ -1,11 +1,12 @@
 //! The local names in scope at the point that the expander has reached.
 //!
-//! Jobs run in the order of the text, so one table with a log of replaced meanings is enough: [`Scope::enter`] adds a
-//! meaning, [`Scope::leave`] takes the newest one back. Every look-up is one step, however deep the nesting.
+//! Jobs run in the order of the text, so one table with a log of replaced meanings is enough:
+//! [`Scope::enter`] adds a meaning, [`Scope::leave`] takes the newest one back. Every look-up is one step,
+//! however deep the nesting.
 //!
-//! A chunk within a chunk (the function of a `macrolet`) runs at compile time. It sees the macros and symbol macros around
-//! it, but no variables, functions, blocks or tags. Every meaning knows the level of its chunk; see
-//! [`Visible::OutOfReach`].
+//! A chunk within a chunk (the function of a `macrolet`) runs at compile time. It sees the macros and symbol
+//! macros around it, but no variables, functions, blocks or tags. Every meaning knows the level of its chunk;
+//! see [`Visible::OutOfReach`].
 
 use std::sync::Arc;
 

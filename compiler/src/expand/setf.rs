@@ -1,7 +1,8 @@
 //! Setf expansions: the five parts of a place, and what is done with places once they are found.
 //!
-//! All forms that set places are made from these parts: variables and the subforms that they are bound to (evaluated
-//! once and in order), variables for the new values, a form that stores them, and a form that reads the old value.
+//! All forms that set places are made from these parts: variables and the subforms that they are bound to
+//! (evaluated once and in order), variables for the new values, a form that stores them, and a form that
+//! reads the old value.
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;

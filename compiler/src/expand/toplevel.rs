@@ -1,11 +1,11 @@
 //! Top-level forms: which of them run at compile time, and in which chunks.
 //!
-//! A file is compiled form by form. The forms in a top-level `progn`, `locally`, `macrolet`, `symbol-macrolet` and
-//! `eval-when` are top-level forms again. Functions and macros are also defined at compile time, so that macros may
-//! call them; `eval-when` is as in Common Lisp.
+//! A file is compiled form by form. The forms in a top-level `progn`, `locally`, `macrolet`,
+//! `symbol-macrolet` and `eval-when` are top-level forms again. Functions and macros are also defined at
+//! compile time, so that macros may call them; `eval-when` is as in Common Lisp.
 //!
-//! A form given to `eval` is treated likewise, except that each of its top-level forms is evaluated before the next one
-//! is expanded. The last one is left to the caller, who wants its value.
+//! A form given to `eval` is treated likewise, except that each of its top-level forms is evaluated before
+//! the next one is expanded. The last one is left to the caller, who wants its value.
 
 use esl_bytecode::compile::{Environment, MacroRef};
 use esl_bytecode::datum::{Datum, DatumKind};

@@ -2,11 +2,12 @@
 
 use esl_bytecode::compile::{Environment, GlobalVariable};
 use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
 use super::expander::Expander;
-use super::form::{Checked, Form, Make, fresh, is_known, name, quoted};
+use super::form::{Checked, Form, Make, fresh, is_known, name};
 use super::job::{Job, To};
 use super::origin::OriginId;
 use super::scope::{VariableMeaning, Visible};
@@ -42,7 +43,7 @@ impl Expander {
             Visible::Is(meaning) => return Ok(Some(Meaning::Variable(meaning))),
             Visible::OutOfReach => {
                 let message = format!("the variable {} has no value when macros are expanded", name(symbol));
-                return Err(Box::new(code::MALFORMED_FORM.at(span, message)));
+                return Err(Box::new(code::RUN_TIME_ONLY.at(span, message)));
             }
             Visible::No => {}
         }
@@ -131,10 +132,7 @@ impl Expander {
         let symbol = match datum.kind() {
             DatumKind::Symbol(symbol) => symbol.clone(),
             DatumKind::Nil => Symbol::cl("NIL"),
-            _ => {
-                let what = format!("needs the name of a variable here, not {}", quoted(datum));
-                return Err(form.malformed_at(datum.span(), &what));
-            }
+            _ => return Err(form.not_a_name(datum, "needs the name of a variable here")),
         };
         let is_local = matches!(self.scope.variable(&symbol, self.level()), Visible::Is(_));
         if deed == Deed::Bind || !is_local {
@@ -145,8 +143,8 @@ impl Expander {
 }
 
 impl Expander {
-    /// Returns the place at which an unused variable of this name, bound by a form at `form`, is reported. `None` if a
-    /// macro made one of them: variables that macros bind for their own use may be unused.
+    /// Returns the place at which an unused variable of this name, bound by a form at `form`, is reported.
+    /// `None` if a macro made one of them: variables that macros bind for their own use may be unused.
     pub(super) fn report_unused(
         &self,
         symbol: &Symbol,
@@ -161,6 +159,12 @@ impl Expander {
     }
 }
 
+/// The error for a form of pairs whose last part has no value.
+pub(super) fn value_missing(form: &Form) -> Box<Diagnostic> {
+    let span = form.args.last().map_or(form.head(), |last| form.at(last.span()));
+    form.fault(code::MISSING_PART, span, "needs a value after this")
+}
+
 /// `(setq {name form}*)`
 pub(super) fn setq(
     expander: &mut Expander,
@@ -169,7 +173,7 @@ pub(super) fn setq(
     to: To,
 ) -> Checked {
     if form.args.len() % 2 == 1 {
-        return Err(form.malformed("needs a value for each variable"));
+        return Err(value_missing(&form));
     }
     if form.args.len() != 2 {
         let make = Make(to.span);
@@ -211,7 +215,7 @@ pub(super) fn psetq(
     to: To,
 ) -> Checked {
     if form.args.len() % 2 == 1 {
-        return Err(form.malformed("needs a value for each variable"));
+        return Err(value_missing(&form));
     }
     let make = Make(to.span);
     let mut names = Vec::new();
@@ -230,8 +234,8 @@ pub(super) fn psetq(
         expander.fill(to, NodeKind::Constant(make.nil()));
         return Ok(());
     };
-    // The last variable can take its value at once, since all other values are computed by then; except if it is named
-    // twice, because the later assignment has to prevail.
+    // The last variable can take its value at once, since all other values are computed by then; except if it
+    // is named twice, because the later assignment has to prevail.
     let direct = !names[..last].contains(&names[last]);
     let mut bindings = Vec::new();
     let mut body = Vec::new();

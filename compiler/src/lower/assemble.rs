@@ -1,4 +1,5 @@
-//! Turns a finished graph into words and line entries: chooses jump instructions and fills in distances.
+//! Assembly: from a finished graph to words and line entries. Chooses jump instructions and fills in
+//! distances.
 
 use esl_bytecode::module::{LineEntry, MAX_CODE};
 use esl_bytecode::opcode::{Instr, Substitute};
@@ -8,25 +9,25 @@ use esl_bytecode::span::Span;
 use super::graph::{Cond, Exit, Graph, Label};
 use super::lines::SourceLines;
 
-/// A function's code is longer than [`MAX_CODE`].
+/// The code of a function is longer than [`MAX_CODE`].
 #[derive(Debug)]
 pub(crate) struct TooLong;
 
-/// An instruction in its place, with the segment to which it jumps.
+/// An instruction in its final order, with the segment to which it jumps.
 struct Placed {
     instr: Instr,
     target: Option<Label>,
     span: Span,
 }
 
-/// The words and line entries of `graph`.
+/// Returns the words and line entries of `graph`.
 ///
 /// # Errors
 /// [`TooLong`] if there are too many words.
 pub(crate) fn assemble(graph: &Graph, lines: &SourceLines) -> Result<(Vec<u32>, Vec<LineEntry>), TooLong> {
     let positions = graph.positions();
     let mut placed: Vec<Placed> = Vec::new();
-    // Index into `placed` at which each segment begins, by position.
+    // The index into `placed` at which each segment begins, by position.
     let mut starts = Vec::with_capacity(graph.order.len());
     for (position, label) in graph.order.iter().enumerate() {
         starts.push(placed.len());
@@ -51,7 +52,7 @@ pub(crate) fn assemble(graph: &Graph, lines: &SourceLines) -> Result<(Vec<u32>, 
                 }
             }
             Exit::Branch { cond, holds, fails } => {
-                // The edge that gets the conditional jump: the one that is not next, or that has a jump of its own.
+                // The conditional jump goes to the edge that is not next, or that has a jump of its own.
                 let prefers_fails = Some(holds) == next
                     || (Some(fails) != next && jump(cond, true, is_back(holds)).is_none())
                     || (Some(fails) != next && is_back(fails) && !is_back(holds) && cond.loops(false));
@@ -66,7 +67,7 @@ pub(crate) fn assemble(graph: &Graph, lines: &SourceLines) -> Result<(Vec<u32>, 
                     put(instr, other);
                     put(go(taken), taken);
                 } else {
-                    // Both go back, or the sense is missing: over a jump to what follows it.
+                    // Both edges go back, or there is no jump of this sense: jump over an unconditional jump.
                     let instr = jump(cond, !sense, false).or_else(|| jump(cond, sense, false));
                     let (over, first, second) = match jump(cond, !sense, false) {
                         Some(_) => (instr, taken, other),
@@ -120,7 +121,7 @@ fn encode(
     Ok((code, entries))
 }
 
-/// Whether a backtrace may point at the instruction: it can fail, call, or end the task's slice.
+/// Whether a backtrace may point at the instruction, since it can fail, call, or end the task's slice.
 fn shows_its_line(instr: &Instr) -> bool {
     instr.opcode().substitute() != Substitute::Silent
         || matches!(
@@ -133,7 +134,7 @@ fn shows_its_line(instr: &Instr) -> bool {
 }
 
 fn note_line(entries: &mut Vec<LineEntry>, pc: usize, span: Span, lines: &SourceLines) {
-    // What the compiler made up has an empty span, and counts to the code before it.
+    // Code that the compiler added has an empty span, and counts as part of the code before it.
     if span == Span::default() && !entries.is_empty() {
         return;
     }
@@ -145,7 +146,8 @@ fn note_line(entries: &mut Vec<LineEntry>, pc: usize, span: Span, lines: &Source
     entries.push(LineEntry { pc: pc as u32, source, line, column });
 }
 
-/// The instruction that jumps, forward or back, when `cond` holds (`sense`) or fails; `None` if there is none.
+/// Returns the instruction that jumps, forward or back, if `cond` holds (`sense`) or fails; `None` if there
+/// is none.
 fn jump(cond: Cond, sense: bool, is_back: bool) -> Option<Instr> {
     if is_back {
         return loop_back(cond, sense);
@@ -197,7 +199,7 @@ fn loop_back(cond: Cond, sense: bool) -> Option<Instr> {
     })
 }
 
-/// The instruction with its jump's distance set.
+/// Returns the instruction with the distance of its jump.
 fn retarget(instr: Instr, distance: i32) -> Instr {
     let near = Jump16(distance as i16);
     let back = Back16(distance as i16);
@@ -243,7 +245,7 @@ fn retarget(instr: Instr, distance: i32) -> Instr {
         Instr::LoopLess { to, .. } | Instr::LoopNotLess { to, .. } | Instr::LoopCount { to, .. } => {
             *to = Back(distance)
         }
-        _ => unreachable!("only jumps and pushes have targets"),
+        _ => unreachable!("only jumps and pushes have a destination"),
     }
     instr
 }

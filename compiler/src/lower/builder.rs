@@ -240,7 +240,8 @@ impl<'b, 'a> FunctionBuilder<'b, 'a> {
         }
     }
 
-    /// Leaves the extents down to `depth`, in code that goes elsewhere. They stay open for the code that follows.
+    /// Leaves the extents down to `depth`, in code that goes elsewhere. They stay open for the code that
+    /// follows.
     pub(super) fn leave(&mut self, depth: usize) {
         let inside = &self.extents[depth..];
         let entries = inside.iter().filter(|&&extent| extent != Extent::Binding).count();

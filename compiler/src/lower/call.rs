@@ -1,7 +1,6 @@
 //! Calls: windows, arguments, and the delivery of results.
 
 use esl_bytecode::builtin::Builtin;
-use esl_bytecode::datum::DatumKind;
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 use esl_bytecode::symbol::Symbol;
@@ -12,7 +11,8 @@ use super::variable::VariableLocation;
 use crate::core::*;
 use crate::resolve::FunctionKind;
 
-/// Arguments that a call passes in registers. With more, it makes a list of them and applies the function to that.
+/// Arguments that a call passes in registers. With more, it makes a list of them and applies the function to
+/// that.
 pub(super) const MAX_DIRECT: usize = 100;
 /// Items of a list that one instruction makes. A longer list is put together from parts.
 const MAX_LIST: usize = 64;
@@ -106,11 +106,10 @@ impl<'a> FunctionBuilder<'_, 'a> {
             NodeKind::BuiltinRef(builtin) if takes(*builtin, arguments.len()) => {
                 self.builtin(*builtin, arguments, dest);
             }
-            NodeKind::Constant(datum) if matches!(datum.kind(), DatumKind::Symbol(name) if !name.is_cl("T")) =>
-            {
-                let DatumKind::Symbol(name) = datum.kind() else { unreachable!("just matched") };
-                self.emit_call(CallTarget::Global(name), arguments, dest);
-            }
+            NodeKind::Constant(datum) => match datum.as_symbol().filter(|name| !name.is_cl("T")) {
+                Some(name) => self.emit_call(CallTarget::Global(name), arguments, dest),
+                None => self.emit_call(CallTarget::Form(function), arguments, dest),
+            },
             NodeKind::Local(variable) if self.keeps_its_value(*variable, arguments) => {
                 let location = self.location(*variable);
                 self.emit_call(CallTarget::Variable(location), arguments, dest);
@@ -187,7 +186,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
             return self.call_with_list(target, arguments, dest);
         }
         let top = self.registers.top();
-        // The window begins at the destination if all registers above that are free by the time it is written.
+        // The window begins at the destination if all registers above that are free by the time it is
+        // written.
         let window = match dest {
             Dest::Fresh(first) | Dest::Values(first, _)
                 if self.registers.taken_since(first) <= target.slack() =>
@@ -237,7 +237,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
         self.results(window, dest);
     }
 
-    /// Whether a tail call keeps the frame: that of a top-level form is kept, so that backtraces show the form.
+    /// Whether a tail call keeps the frame: that of a top-level form is kept, so that backtraces show the
+    /// form.
     fn keeps_its_frame(&self, dest: Dest) -> bool {
         matches!(dest, Dest::Tail) && self.lambda == LambdaId(0)
     }

@@ -64,8 +64,9 @@ impl<'a> FunctionBuilder<'_, 'a> {
         }
     }
 
-    /// Notes the sources of the captures of a lambda whose closure is made here. Returns the captures that are among
-    /// `unmade`, local functions whose closures do not exist yet. Takes registers for variables without one.
+    /// Notes the sources of the captures of a lambda whose closure is made here. Returns the captures that
+    /// are among `unmade`, local functions whose closures do not exist yet. Takes registers for variables
+    /// without one.
     fn set_captures(&mut self, lambda: LambdaId, unmade: &[VarId]) -> Vec<(Index, VarId)> {
         let core = self.core;
         let mut late = Vec::new();

@@ -8,7 +8,8 @@ use super::dest::Dest;
 use super::graph::{Cond, Exit, Label};
 
 impl FunctionBuilder<'_, '_> {
-    /// Returns the register in which a single value for `dest` is best computed. It is free, unless `dest` names it.
+    /// Returns the register in which a single value for `dest` is best computed. It is free, unless `dest`
+    /// names it.
     pub(super) fn target(&mut self, dest: Dest) -> Reg {
         let register = match dest {
             Dest::Fresh(register) | Dest::Keep(register) | Dest::Values(register, _) => register,
@@ -110,8 +111,8 @@ impl FunctionBuilder<'_, '_> {
         }
     }
 
-    /// Returns the destination for a form inside a dynamic extent whose own destination is `dest`. It can be reached
-    /// before the extent is left, and no register in use lies behind it.
+    /// Returns the destination for a form inside a dynamic extent whose own destination is `dest`. It can be
+    /// reached before the extent is left, and no register in use lies behind it.
     pub(super) fn inner(&mut self, dest: Dest, is_single: bool) -> Dest {
         let top = self.registers.top();
         match dest {

@@ -9,13 +9,14 @@ use super::graph::Label;
 pub(super) enum Dest {
     /// Nowhere.
     Effect,
-    /// One value, to a register. No register from this one on is needed afterwards, so a call may lay its window over
-    /// them. Variables of the form itself may be among them, so only its last instruction writes there, unless the
-    /// register is the first free one.
+    /// One value, to a register. No register from this one on is needed afterwards, so a call may lay its
+    /// window over them. Variables of the form itself may be among them, so only its last instruction writes
+    /// there, unless the register is the first free one.
     Fresh(Reg),
     /// One value, to the register of a variable: only the last instruction of the form writes there.
     Keep(Reg),
-    /// This number of values, at least two, to consecutive registers; missing values are `NIL`. Otherwise as `Fresh`.
+    /// This number of values, at least two, to consecutive registers; missing values are `NIL`. Otherwise as
+    /// `Fresh`.
     Values(Reg, u8),
     /// All values, to the value list.
     All,

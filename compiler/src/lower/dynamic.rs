@@ -1,4 +1,4 @@
-//! Forms that stand on the control stack while their body runs: cleanups, handlers, masks and scopes.
+//! Forms with an entry on the control stack while their body runs: cleanups, handlers, masks and scopes.
 
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
@@ -9,7 +9,8 @@ use super::graph::{Cond, Exit};
 use crate::core::*;
 
 impl FunctionBuilder<'_, '_> {
-    /// The protected form and its cleanup, which control enters from it and unwindings enter from anywhere in it:
+    /// Lowers a protected form and its cleanup, which control enters behind the form, and unwindings from
+    /// anywhere in it:
     ///
     /// ```text
     ///       push-cleanup landing at `cleanup`
@@ -21,7 +22,7 @@ impl FunctionBuilder<'_, '_> {
     pub(super) fn unwind_protect(&mut self, protected: NodeId, cleanup: NodeId, dest: Dest) {
         let top = self.registers.top();
         let is_single = self.module.resolution.is_single(protected);
-        // A single value waits in a register below the window, all of them in the value list.
+        // A single value waits in a register below the window, several in the value list.
         let inner = match dest {
             Dest::Effect => Dest::Effect,
             Dest::All | Dest::Values(..) => Dest::All,
@@ -42,7 +43,7 @@ impl FunctionBuilder<'_, '_> {
         self.extents.truncate(depth);
         self.registers.release(top);
         match (inner, dest) {
-            // Control never comes back from the cleanup either.
+            // Control never leaves the cleanup either.
             _ if !returns => self.deliver_nil(dest),
             (Dest::Keep(register), _) => self.deliver(register, dest),
             (Dest::All, Dest::Values(..)) => self.deliver_values(dest),
@@ -50,6 +51,7 @@ impl FunctionBuilder<'_, '_> {
         }
     }
 
+    /// Lowers `progv`.
     pub(super) fn progv(&mut self, symbols: NodeId, values: NodeId, body: NodeId, dest: Dest) {
         let top = self.registers.top();
         let depth = self.extents.len();
@@ -63,6 +65,7 @@ impl FunctionBuilder<'_, '_> {
         self.registers.release(top);
     }
 
+    /// Lowers a body with handlers.
     pub(super) fn handlers(&mut self, handlers: NodeId, body: NodeId, dest: Dest) {
         let top = self.registers.top();
         let depth = self.extents.len();
@@ -73,6 +76,7 @@ impl FunctionBuilder<'_, '_> {
         self.form_inside(body, dest, depth);
     }
 
+    /// Lowers a body within which control entries are masked.
     pub(super) fn mask(&mut self, from: NodeId, body: NodeId, dest: Dest) {
         let top = self.registers.top();
         let depth = self.extents.len();
@@ -83,6 +87,7 @@ impl FunctionBuilder<'_, '_> {
         self.form_inside(body, dest, depth);
     }
 
+    /// Lowers a body with clauses for conditions.
     pub(super) fn handler_case(&mut self, body: NodeId, clauses: &[HandlerClause], dest: Dest) {
         if clauses.is_empty() {
             return self.form(body, dest);
@@ -117,7 +122,7 @@ impl FunctionBuilder<'_, '_> {
             self.join(end, dest);
             self.graph.bind(next);
         }
-        // What follows the last clause is not reached.
+        // Control does not reach the code behind the last clause.
         self.graph.leave(Exit::Jump(end), self.span);
         self.registers.release(window);
         if dest.goes_on() {

@@ -1,7 +1,8 @@
 //! Blocks, tagbodies, and exits from them; catch and throw.
 //!
-//! An exit to a place in the same frame, with no cleanup in between, pops the control entries in between and jumps.
-//! Otherwise the place makes a tag of its own, which the code that leaves has at hand or captures, and catches it.
+//! An exit to a place in the same frame, with no cleanup in between, pops the control entries in between and
+//! jumps. Otherwise the place makes a tag of its own, which the code that leaves has at hand or captures, and
+//! catches it.
 
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
@@ -115,7 +116,8 @@ impl FunctionBuilder<'_, '_> {
         self.tagbodies.remove(&tagbody);
     }
 
-    /// A tagbody with a catch. The number of a tag that is thrown goes to a register, and control back to the push:
+    /// A tagbody with a catch. The number of a tag that is thrown goes to a register, and control back to the
+    /// push:
     ///
     /// ```text
     ///       number := -1
@@ -173,8 +175,9 @@ impl FunctionBuilder<'_, '_> {
         self.throw_to_own(Lexical::Tagbody(tagbody), register, ThrowKind::Go, dest);
     }
 
-    /// Throws the value list to the tag of a block or tagbody, which is in `register` if this frame owns it. The throw
-    /// fails if the place has been left before; the form then has the value with which the program recovers.
+    /// Throws the value list to the tag of a block or tagbody, which is in `register` if this frame owns it.
+    /// The throw fails if the place has been left before; the form then has the value with which the program
+    /// recovers.
     fn throw_to_own(&mut self, lexical: Lexical, register: Reg, kind: ThrowKind, dest: Dest) {
         let mut tag = register;
         if self.module.resolution.frame(lexical.owner(self.core)) != self.lambda {

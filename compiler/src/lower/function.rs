@@ -24,7 +24,8 @@ impl ModuleBuilder<'_> {
     pub(super) fn functions(&mut self) -> Vec<Function> {
         self.number(LambdaId(0));
         let mut functions = Vec::new();
-        // Functions get their numbers when code that refers to them is lowered, and are lowered in that order.
+        // Functions get their numbers when code that refers to them is lowered, and are lowered in that
+        // order.
         while let Some(&lambda) = self.numbered.get(functions.len()) {
             functions.push(self.function(lambda));
         }
@@ -175,7 +176,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
         self.form(last, dest);
     }
 
-    /// Assigns registers to the parameters and lowers the entry: defaults, boxes and special bindings, in order.
+    /// Assigns registers to the parameters and lowers the entry: defaults, boxes and special bindings, in
+    /// order.
     fn parameters(&mut self, text: &'a Lambda) -> Parameters {
         let keys = text.keys.as_deref().unwrap_or_default();
         let optional = text.optional.iter().map(|optional| optional.parameter);

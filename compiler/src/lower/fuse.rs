@@ -1,20 +1,21 @@
-//! Improves a function's graph: what takes instructions in a hot loop is worth most.
+//! Improvement of a function's graph. Instructions saved in a hot loop matter most.
 //!
-//! - Threading: an edge to an empty segment goes where that goes.
-//! - Rotation: a jump to the short test of a loop becomes a copy of the test, be it at the head of the loop or at its
-//!   end, so that each turn executes one conditional jump back. See [`super::loops`] for the shapes that profit.
-//! - Counting: an addition to a counter right before its comparison with a limit becomes one instruction with it.
-//! - Segments that control cannot get to are dropped.
+//! - Threading: an edge to an empty segment goes to the destination of that segment.
+//! - Rotation: a jump to the short test of a loop, at its head or at its end, becomes a copy of the test, so
+//!   that each turn executes one conditional jump back. See [`super::loops`] for the shapes that profit.
+//! - Counting: an addition to a counter right before its comparison with a limit becomes one instruction with
+//!   it.
+//! - Segments that control cannot reach are dropped.
 
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::Reg;
 
 use super::graph::{Cond, Exit, Graph, Label};
 
-/// A test of at most so many instructions is copied to the jumps back to it.
+/// Instructions of a test that is copied to the jumps to it, at most.
 const ROTATED_LENGTH: usize = 8;
 
-/// Improves `graph`. Afterwards its order lists just the segments that control can get to.
+/// Improves `graph`. Afterwards its order lists only the segments that control can reach.
 pub(crate) fn improve(graph: &mut Graph) {
     thread(graph);
     drop_unreachable(graph);
@@ -31,7 +32,7 @@ fn thread(graph: &mut Graph) {
         let index = graph.order[position].index();
         let resolve = |label: Label| resolve(graph, label);
         let is_back = |label: Label| positions[label.index()] <= position;
-        // Where a conditional edge would turn back it must have an instruction that can.
+        // A conditional edge may turn into one that goes back only if there is an instruction for it.
         let follow = |label: Label, cond: Cond, sense: bool| {
             let end = resolve(label);
             if is_back(end) && !is_back(label) && !cond.loops(sense) { label } else { end }
@@ -52,7 +53,7 @@ fn thread(graph: &mut Graph) {
     }
 }
 
-/// Whether leaving the question out changes nothing.
+/// Whether evaluating the condition has no effect and cannot fail.
 fn cannot_fail(cond: Cond) -> bool {
     matches!(
         cond,
@@ -66,10 +67,10 @@ fn cannot_fail(cond: Cond) -> bool {
     )
 }
 
-/// Where control ends up that goes to `label`.
+/// Returns the segment that control reaches from `label` by way of empty segments.
 fn resolve(graph: &Graph, label: Label) -> Label {
     let mut end = label;
-    // An empty loop has no end: after so many steps it is one.
+    // An empty loop has no end. After this many steps the segments count as one.
     for _ in 0..64 {
         let segment = &graph.segments[end.index()];
         match segment.exit {
@@ -109,8 +110,8 @@ fn rotate(graph: &mut Graph) {
         }
         let test = &graph.segments[head.index()];
         let Exit::Branch { cond, holds, fails } = test.exit else { continue };
-        // The copy pays if a test can then jump back by itself: this one, from the end of a loop to its body, or, when
-        // the test stands at the end already, that one, now joined with what comes before it.
+        // The copy pays if a test can then jump back by itself: the copy, from the end of a loop to its body;
+        // or the original, if it is at the end already, joined with the code before it.
         let from = position.max(positions[head.index()]);
         let is_back = |label: Label| positions[label.index()] <= from;
         let pays = (is_back(holds) && cond.loops(true)) || (is_back(fails) && cond.loops(false));

@@ -1,9 +1,9 @@
-//! The code of a function while it is being made: straight segments and the edges between them.
+//! The graph of a function's code: straight segments and the edges between them.
 //!
-//! Lowering appends instructions to the open segment and ends it with an [`Exit`]; jumps name segments by [`Label`]s,
-//! which may be bound later. Segments keep the order in which they were bound: that is the order of the finished code,
-//! so an edge to a segment at or before its own is a turn of a loop. Code that is emitted while no segment is open
-//! cannot be reached and vanishes.
+//! Lowering appends instructions to the open segment and ends it with an [`Exit`]. Jumps refer to segments by
+//! [`Label`]s, which may be bound later. The order in which segments are bound is the order of the finished
+//! code, so an edge to its own segment or an earlier one is a turn of a loop. Code that is emitted while no
+//! segment is open is unreachable and vanishes.
 //!
 //! Not here: improving the graph ([`super::fuse`]), choosing jump instructions ([`super::assemble`]).
 
@@ -16,14 +16,14 @@ use esl_bytecode::span::Span;
 pub(crate) struct Label(u32);
 
 impl Label {
-    /// As an index into the segments.
+    /// Returns the index into the segments.
     pub(crate) fn index(self) -> usize {
         self.0 as usize
     }
 }
 
-/// What a branch asks. Failing and substituted comparisons mean the same for both senses of the jump, so a condition
-/// is never replaced by the negation of another.
+/// Condition of a branch. A comparison that fails, or has a value put in its place, means the same for both
+/// senses of the jump. So a condition is never replaced by the negation of another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cond {
     /// The register is `NIL`.
@@ -60,13 +60,13 @@ pub(crate) enum Cond {
         counter: Reg,
         /// Its limit.
         limit: Reg,
-        /// What is added first.
+        /// Step that is added first.
         step: Int8,
     },
 }
 
 impl Cond {
-    /// Whether a loop instruction jumps back when this holds (`sense`) or fails.
+    /// Whether a loop instruction jumps back if this holds (`sense`) or fails.
     pub(crate) fn loops(self, sense: bool) -> bool {
         match self {
             Cond::Nil(_) | Cond::Less(..) => true,
@@ -76,33 +76,33 @@ impl Cond {
     }
 }
 
-/// An instruction, and where it lands if it pushes a control entry.
+/// An instruction, and the landing of the control entry that it pushes, if any.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Op {
-    /// The instruction; its jump, if any, is still open.
+    /// The instruction. The distance of its jump, if any, is still open.
     pub(crate) instr: Instr,
-    /// The segment at which an unwinding to the pushed entry goes on.
+    /// Segment at which an unwinding to the pushed entry continues.
     pub(crate) landing: Option<Label>,
-    /// Where it was written.
+    /// Place in the source.
     pub(crate) span: Span,
 }
 
 /// How control leaves a segment.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Exit {
-    /// The last instruction does not let it past: a return or a tail call.
+    /// Not at all: the last instruction is a return or a tail call.
     End,
     /// To a segment.
     Jump(Label),
-    /// To the segment that must come next: the last instruction is `enter-cleanup`.
+    /// To the segment that must come next. The last instruction is `enter-cleanup`.
     Fall(Label),
     /// To one of two segments.
     Branch {
-        /// What decides.
+        /// Condition.
         cond: Cond,
-        /// Where control goes if the condition holds.
+        /// Segment if the condition holds.
         holds: Label,
-        /// Where it goes if not.
+        /// Segment if it fails.
         fails: Label,
     },
 }
@@ -110,26 +110,26 @@ pub(crate) enum Exit {
 /// Straight code and its exit.
 #[derive(Clone, Debug)]
 pub(crate) struct Segment {
-    /// The instructions.
+    /// Instructions.
     pub(crate) ops: Vec<Op>,
-    /// The way out.
+    /// Exit.
     pub(crate) exit: Exit,
-    /// Where the exit was written.
+    /// Place of the exit in the source.
     pub(crate) span: Span,
 }
 
 /// The code of one function.
 #[derive(Debug)]
 pub(crate) struct Graph {
-    /// The segments, by label.
+    /// Segments, by label.
     pub(crate) segments: Vec<Segment>,
-    /// The bound segments in the order of the finished code; the first is the entry.
+    /// Bound segments in the order of the finished code. The first is the entry.
     pub(crate) order: Vec<Label>,
     open: Option<Label>,
 }
 
 impl Graph {
-    /// An empty function with its entry open, and the entry.
+    /// Creates the graph of an empty function, with its entry open. Returns the graph and the entry.
     pub(crate) fn new() -> (Graph, Label) {
         let mut graph = Graph { segments: Vec::new(), order: Vec::new(), open: None };
         let entry = graph.label();
@@ -138,14 +138,14 @@ impl Graph {
         (graph, entry)
     }
 
-    /// A label to be bound later.
+    /// Creates a label, to be bound later.
     pub(crate) fn label(&mut self) -> Label {
         let label = Label(self.segments.len() as u32);
         self.segments.push(Segment { ops: Vec::new(), exit: Exit::End, span: Span::default() });
         label
     }
 
-    /// Whether control can get here.
+    /// Whether control can reach the next instruction.
     pub(crate) fn is_open(&self) -> bool {
         self.open.is_some()
     }
@@ -166,14 +166,15 @@ impl Graph {
         }
     }
 
-    /// Opens the segment of `label`, which is bound here and only here. Control that arrives from above goes on in it.
+    /// Opens the segment of `label`, which is bound here and only here. Control continues in it from the open
+    /// segment.
     pub(crate) fn bind(&mut self, label: Label) {
         self.leave(Exit::Jump(label), Span::default());
         self.order.push(label);
         self.open = Some(label);
     }
 
-    /// The position of each bound segment in the finished code, by label.
+    /// Returns the position of each bound segment in the finished code, by label.
     pub(crate) fn positions(&self) -> Vec<usize> {
         let mut positions = vec![usize::MAX; self.segments.len()];
         for (position, label) in self.order.iter().enumerate() {

@@ -1,8 +1,8 @@
 //! Literals in loops: loaded once, in front of the loop, into registers of their own.
 //!
-//! Only literals that an instruction takes from a register profit. Literals that become part of an instruction stay where
-//! they are, and so do arguments of calls, which need a register of the window anyway. The outermost loop of a frame
-//! loads the literals of all loops inside it.
+//! Only literals that an instruction takes from a register profit. Literals that become part of an
+//! instruction stay where they are, and so do arguments of calls, which need a register of the window anyway.
+//! The outermost loop of a frame loads the literals of all loops inside it.
 
 use esl_bytecode::module::PoolIdx;
 use esl_bytecode::operand::Reg;
@@ -29,7 +29,8 @@ struct Survey {
 }
 
 impl FunctionBuilder<'_, '_> {
-    /// Loads the literals of a tagbody, if it is a loop. Returns whether it is, so that the caller forgets them later.
+    /// Loads the literals of a tagbody, if it is a loop. Returns whether it is, so that the caller forgets
+    /// them later.
     pub(super) fn load_tagbody_literals(&mut self, tagbody: TagbodyId, items: &[TagbodyItem]) -> bool {
         if !self.may_load_literals() {
             return false;
@@ -59,7 +60,8 @@ impl FunctionBuilder<'_, '_> {
         self.literals.is_none() && self.registers.top() <= MAX_TOP
     }
 
-    /// Walks through a form of this frame. `back` is a tagbody and the number of its tags in front of the form.
+    /// Walks through a form of this frame. `back` is a tagbody and the number of its tags in front of the
+    /// form.
     fn survey(&mut self, survey: &mut Survey, form: NodeId, back: Option<(TagbodyId, u32)>) {
         let core = self.core;
         let mut entered: FxHashSet<LambdaId> = FxHashSet::default();

@@ -1,7 +1,7 @@
 //! Calls that become jumps, assignments in parallel, and the shapes of loops that profit.
 //!
-//! A loop is best if each turn executes one jump, which is conditional and goes back. [`super::fuse`] achieves this for
-//! every loop that begins with a short test:
+//! A loop is best if each turn executes one jump, which is conditional and goes back. [`super::fuse`]
+//! achieves this for every loop that begins with a short test:
 //!
 //! ```lisp
 //! (tagbody                                 ; while
@@ -15,12 +15,12 @@
 //!  test (if test (go top)))
 //! ```
 //!
-//! Tests that can jump back by themselves are `x`, `(not x)`, `(null x)`, `(consp x)` with `x` a variable, and
-//! `(< a b)`, `(> a b)` and their negations with `a` and `b` variables. So bind a limit to a variable, even a constant
-//! one, and end a loop that includes its limit with `(if (> i limit) (go end))`.
+//! Tests that can jump back by themselves are `x`, `(not x)`, `(null x)`, `(consp x)` with `x` a variable,
+//! and `(< a b)`, `(> a b)` and their negations with `a` and `b` variables. So bind a limit to a variable,
+//! even a constant one, and end a loop that includes its limit with `(if (> i limit) (go end))`.
 //!
-//! Counting up takes one instruction for the step, the comparison and the jump if the step, by a literal integer that
-//! fits a byte, comes right before the test, and the test to continue is `(< i limit)`:
+//! Counting up takes one instruction for the step, the comparison and the jump if the step, by a literal
+//! integer that fits a byte, comes right before the test, and the test to continue is `(< i limit)`:
 //!
 //! ```lisp
 //! (let ((i 0) (limit n))                   ; dotimes
@@ -32,12 +32,12 @@
 //!    end))
 //! ```
 //!
-//! Variables that are both assigned and captured by a closure live in boxes and miss all this. So bind a fresh variable
-//! to the counter around the body if the body may make closures.
+//! Variables that are both assigned and captured by a closure live in boxes and miss all this. So bind a
+//! fresh variable to the counter around the body if the body may make closures.
 //!
-//! Two further shapes are recognised. `(let ((t1 e1) …) (setq v1 t1 …) …)`, as `psetq` and `do` expand to, assigns in
-//! parallel without the temporaries. Tail calls of the running function and of inlined local functions assign the
-//! parameters in parallel and jump.
+//! Two further shapes are recognised. `(let ((t1 e1) …) (setq v1 t1 …) …)`, as `psetq` and `do` expand to,
+//! assigns in parallel without the temporaries. Tail calls of the running function and of inlined local
+//! functions assign the parameters in parallel and jump.
 
 use esl_bytecode::operand::Reg;
 
@@ -91,7 +91,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
         self.release_spilled(spilled);
     }
 
-    /// Assigns new values to the parameters of a function and jumps to `head`, before the code that boxes them.
+    /// Assigns new values to the parameters of a function and jumps to `head`, before the code that boxes
+    /// them.
     pub(super) fn jump_to_function(&mut self, lambda: LambdaId, head: Label, arguments: &'a [NodeId]) {
         let text = &self.core.lambdas[lambda.index()];
         let targets: Vec<VarId> = text.required.iter().map(|parameter| parameter.variable).collect();
@@ -99,7 +100,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
         self.jump(head);
     }
 
-    /// Sets the registers of `targets` to the values of forms, all of which are computed before the first is set.
+    /// Sets the registers of `targets` to the values of forms, all of which are computed before the first is
+    /// set.
     fn assign(&mut self, targets: &[VarId], values: &[NodeId]) {
         let top = self.registers.top();
         let mut waiting: Vec<(Reg, Reg)> = Vec::new();
@@ -133,8 +135,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
             && !self.module.resolution.is_boxed(variable)
     }
 
-    /// Lowers `(let ((t1 e1) …) (setq v1 t1) … rest…)` without temporaries. A further assignment `(setq v e)`, whose value
-    /// needs no temporary, may come first. Returns whether the form has this shape.
+    /// Lowers `(let ((t1 e1) …) (setq v1 t1) … rest…)` without temporaries. A further assignment
+    /// `(setq v e)`, whose value needs no temporary, may come first. Returns whether the form has this shape.
     pub(super) fn parallel_assignment(
         &mut self,
         bindings: &'a [(BoundVariable, NodeId)],
@@ -153,7 +155,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
         let mut targets = Vec::with_capacity(count);
         let mut values = Vec::with_capacity(count);
         for (binding, &form) in bindings.iter().zip(sets) {
-            // Each temporary is read just once, so values of a sequential `let` do not refer to the temporaries either.
+            // Each temporary is read just once, so values of a sequential `let` do not refer to the
+            // temporaries either.
             let Some(variable) = self.assigns_temporary(binding, form) else { return false };
             targets.push(variable);
             values.push(binding.1);
@@ -178,12 +181,14 @@ impl<'a> FunctionBuilder<'_, 'a> {
         true
     }
 
-    /// Returns the variable that `form` sets to the temporary of `binding`, if the temporary has no other use.
+    /// Returns the variable that `form` sets to the temporary of `binding`, if the temporary has no other
+    /// use.
     fn assigns_temporary(&self, binding: &(BoundVariable, NodeId), form: NodeId) -> Option<VarId> {
         let BoundVariable::Lexical(temporary) = binding.0 else { return None };
         let NodeKind::SetLocal(variable, read) = self.core.nodes[form.index()].kind else { return None };
         let resolution = &self.module.resolution;
-        let serves = matches!(self.core.nodes[read.index()].kind, NodeKind::Local(source) if source == temporary)
+        let read = &self.core.nodes[read.index()].kind;
+        let serves = matches!(read, NodeKind::Local(source) if *source == temporary)
             && !resolution.is_assigned(temporary)
             && resolution.reads_of(temporary) == 1;
         serves.then_some(variable)

@@ -1,18 +1,18 @@
 //! Lowering: the core language to bytecode.
 //!
-//! Destinations drive the code generator: every form is told where its value is wanted (`dest::Dest`) and puts it
-//! there, so that few moves are needed and tests never make a boolean. Each function becomes a graph of segments, which is
-//! improved (`fuse`) and then written out (`assemble`).
+//! Destinations drive the code generator: every form is told where its value is wanted (`dest::Dest`) and
+//! puts it there, so that few moves are needed and tests never make a boolean. Each function becomes a graph
+//! of segments, which is improved (`fuse`) and then written out (`assemble`).
 //!
-//! Guarantees: the emitted code passes the verifier. A form that is too large for the format gives a diagnostic.
-//! Not here: the meaning of names (the expander), linking modules (`esl_bytecode::link`).
+//! Guarantees: the emitted code passes the verifier. A form that is too large for the format gives a
+//! diagnostic. Not here: the meaning of names (the expander), linking modules (`esl_bytecode::link`).
 //!
-//! The walk recurses on the native stack, which is extended as needed (`builder::FunctionBuilder::form`); its depth is
-//! the depth of the core tree, which the expander bounds.
+//! The walk recurses on the native stack, which is extended as needed (`builder::FunctionBuilder::form`); its
+//! depth is the depth of the core tree, which the expander bounds.
 //!
-//! Layers: `graph`, `dest`, `regalloc`, `pool` and `lines`; then the state of lowering (`builder`), then one file for
-//! each family of forms, whose methods are methods of the `builder::FunctionBuilder`, and last `function` with the
-//! dispatch over forms. A file uses only files before it; `tests/layers.rs` holds that.
+//! Layers: `graph`, `dest`, `regalloc`, `pool` and `lines`; then the state of lowering (`builder`), then one
+//! file for each family of forms, whose methods are methods of the `builder::FunctionBuilder`, and last
+//! `function` with the dispatch over forms. A file uses only files before it; `tests/layers.rs` holds that.
 //!
 //! Source: Dybvig, Hieb and Butler 1990, "Destination-driven code generation".
 

@@ -1,8 +1,9 @@
 //! Builtins that have instructions of their own.
 //!
-//! An opened builtin behaves as the function does, also when it fails: the operands are evaluated in order, and one
-//! instruction does the work, so that a value put in its place stands for the whole call. Exceptions are sums and products
-//! of more than two numbers, and builtins that set a place: these return the value that was to be stored.
+//! An opened builtin behaves as the function does, also when it fails: the operands are evaluated in order,
+//! and one instruction does the work, so that a value put in its place stands for the whole call. Exceptions
+//! are sums and products of more than two numbers, and builtins that set a place: these return the value that
+//! was to be stored.
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::opcode::{Instr, TypeCode};
@@ -225,7 +226,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
     /// Returns two operands, evaluated in order.
     pub(super) fn operands(&mut self, left: NodeId, right: NodeId) -> (Reg, Reg) {
         if self.literal(left).is_some() {
-            // A literal has no effects. Loaded late, it takes no register while the other operand is computed.
+            // A literal has no effects. Loaded late, it takes no register while the other operand is
+            // computed.
             let second = self.operand(right, &[]);
             return (self.operand(left, &[]), second);
         }

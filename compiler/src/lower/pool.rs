@@ -1,8 +1,8 @@
 //! The constant pool of the module that is being made.
 //!
-//! Guarantees: the same datum node becomes one entry, so that sharing in a literal is kept; equal symbols, numbers and
-//! characters become one entry; entries refer to earlier entries only. A datum of any depth is converted without
-//! native recursion.
+//! Guarantees: the same datum node becomes one entry, so that sharing in a literal is kept; equal symbols,
+//! numbers and characters become one entry; entries refer to earlier entries only. Data of any depth are
+//! converted without native recursion.
 
 use esl_bytecode::BigInt;
 use esl_bytecode::datum::{Datum, DatumKind};
@@ -27,7 +27,8 @@ enum Key {
     Node(usize),
 }
 
-/// A constant pool. The data given to it must live until it is finished, since nodes are told apart by address.
+/// A constant pool. The data given to it must live until it is finished, since nodes are distinguished by
+/// address.
 #[derive(Debug, Default)]
 pub(crate) struct Pool {
     constants: Vec<Constant>,
@@ -35,12 +36,12 @@ pub(crate) struct Pool {
 }
 
 impl Pool {
-    /// The constants.
+    /// Returns the constants.
     pub(crate) fn finish(self) -> Vec<Constant> {
         self.constants
     }
 
-    /// The entry for `symbol`, which may be `NIL` or `T`.
+    /// Returns the entry for `symbol`, which may be `NIL` or `T`.
     pub(crate) fn symbol(&mut self, symbol: &Symbol) -> PoolIdx {
         if symbol.is_cl("NIL") {
             self.enter(Key::Nil, Constant::Nil)
@@ -51,29 +52,29 @@ impl Pool {
         }
     }
 
-    /// The entry for an integer.
+    /// Returns the entry for an integer.
     pub(crate) fn integer(&mut self, value: &BigInt) -> PoolIdx {
         self.enter(Key::Integer(value.clone()), Constant::Integer(value.clone()))
     }
 
-    /// The entry for a function of the module.
+    /// Returns the entry for a function of the module.
     pub(crate) fn function(&mut self, function: FunctionNumber) -> PoolIdx {
         self.enter(Key::Function(function), Constant::Function(function))
     }
 
-    /// The entry for the structure class named `name`.
+    /// Returns the entry for the structure class named `name`.
     pub(crate) fn class(&mut self, name: &Symbol) -> PoolIdx {
         self.enter(Key::Class(name.clone()), Constant::Class(name.clone()))
     }
 
-    /// A new entry for a vector of entries, which is nobody else's.
+    /// Adds an entry for a vector of entries, which is not shared.
     pub(crate) fn vector(&mut self, items: Vec<PoolIdx>) -> PoolIdx {
         self.push(Constant::Vector(items))
     }
 
-    /// The entry for a datum.
+    /// Returns the entry for a datum.
     pub(crate) fn datum(&mut self, datum: &Datum) -> PoolIdx {
-        // A datum is on the stack until its parts have entries.
+        // A datum stays on the stack until its parts have entries.
         let mut pending = vec![datum];
         while let Some(&top) = pending.last() {
             if self.lookup(top).is_some() {

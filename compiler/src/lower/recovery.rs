@@ -11,8 +11,9 @@ use super::graph::Cond;
 use crate::core::*;
 
 impl FunctionBuilder<'_, '_> {
-    /// A body with recovery procedures. Entering it takes two instructions and no memory: the function that runs the
-    /// clauses is made by the first instruction at the landing, which the machine does when a failure needs it.
+    /// Lowers a body with recovery procedures. Entering it takes two instructions and no memory: the first
+    /// instruction at the landing makes the function that runs the clauses, and the machine executes it when
+    /// a failure needs it.
     ///
     /// ```text
     ///       state := the table
@@ -55,7 +56,7 @@ impl FunctionBuilder<'_, '_> {
         }
     }
 
-    /// A body with a cleanup for failures:
+    /// Lowers a body with a cleanup for failures:
     ///
     /// ```text
     ///       push-failure-cleanup landing at `landing`

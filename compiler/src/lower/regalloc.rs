@@ -1,6 +1,8 @@
-//! Registers of a function, handed out as a stack: variables and temporaries in the order in which they come to life.
+//! Registers of a function, handed out as a stack: variables and temporaries in the order in which they come
+//! to life.
 //!
-//! Invariant: at each point of the code, the registers below `top` are in use and those from `top` on are free.
+//! Invariant: at each point of the code, the registers below `top` are in use and those from `top` on are
+//! free.
 
 use esl_bytecode::module::MAX_REGISTERS;
 use esl_bytecode::operand::Reg;

@@ -1,8 +1,9 @@
 //! Variables that find no room in the registers of a frame: they live in a vector on the heap.
 //!
-//! This happens only in forms that do not fit otherwise. The frame makes a vector when it is entered, and variables that
-//! are bound while many registers are in use get places in it. Variables in boxes keep their registers, since boxes must
-//! not get into other objects; closures take copies, as of all variables that are never assigned.
+//! This happens only in forms that do not fit otherwise. The frame makes a vector when it is entered, and
+//! variables that are bound while many registers are in use get places in it. Variables in boxes keep their
+//! registers, since boxes must not get into other objects; closures take copies, as of all variables that are
+//! never assigned.
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::opcode::Instr;
@@ -45,8 +46,8 @@ impl FunctionBuilder<'_, '_> {
         }
     }
 
-    /// Moves a variable whose value is in the first free register into the vector, if it belongs there. Returns whether it
-    /// did.
+    /// Moves a variable whose value is in the first free register into the vector, if it belongs there.
+    /// Returns whether it did.
     pub(super) fn spill_variable(&mut self, variable: VarId) -> bool {
         let is_boxed = self.module.resolution.is_boxed(variable);
         let value = self.registers.top();
@@ -88,7 +89,8 @@ impl FunctionBuilder<'_, '_> {
         self.emit(Instr::VectorRef { dst: register.into(), vector, index: register });
     }
 
-    /// Returns the number of places in use, for [`FunctionBuilder::release_spilled`] when variables go out of scope.
+    /// Returns the number of places in use, for [`FunctionBuilder::release_spilled`] when variables go out of
+    /// scope.
     pub(super) fn spill_height(&self) -> i16 {
         self.spill.as_ref().map_or(0, |spill| spill.next)
     }

@@ -1,27 +1,27 @@
-//! Divides functions that are too large for the format: parts of their text become functions of their own, which take
-//! what they need as captures and are called in place.
+//! Division of functions that are too large for the format: parts of their text become functions of their
+//! own, which capture the variables that they need and are called in place.
 //!
-//! The parts keep their meaning, since everything lexical may cross a function's border: assigned variables get boxes,
-//! exits become throws. They are slower, which is the price of a function with thousands of forms, hundreds of
-//! variables, or expressions a hundred levels deep.
+//! The parts keep their meaning, since everything lexical may cross the border of a function: assigned
+//! variables get boxes, exits become throws. The parts are slower, which is the price of a function with
+//! thousands of forms, hundreds of variables, or expressions a hundred levels deep.
 
 use esl_bytecode::span::Span;
 
 use crate::core::*;
 use crate::resolve::{children, lambda_nodes};
 
-/// How large a part may become.
+/// Limits on the size of a part.
 #[derive(Clone, Copy)]
 pub(super) struct Limits {
     /// In nodes.
     weight: usize,
-    /// In nodes on top of each other.
+    /// In levels of nodes.
     height: usize,
     /// In variables of one `let`.
     bindings: usize,
 }
 
-/// What is tried, one after the other, until all functions fit.
+/// Limits that are tried, one after the other, until all functions fit.
 pub(super) const LIMITS: [Limits; 4] = [
     Limits { weight: 3000, height: 100, bindings: 60 },
     Limits { weight: 1000, height: 50, bindings: 40 },
@@ -29,11 +29,11 @@ pub(super) const LIMITS: [Limits; 4] = [
     Limits { weight: 100, height: 12, bindings: 20 },
 ];
 
-/// So small that tests can see every form taken out.
+/// Limits so small that every form is taken out, for tests.
 #[cfg(test)]
 pub(super) const TINY: Limits = Limits { weight: 12, height: 5, bindings: 2 };
 
-/// Parts smaller than this are not worth a call.
+/// Weight below which a part is not worth a call.
 const MIN_WEIGHT: usize = 6;
 
 /// Divides the texts of `lambdas`.
@@ -55,7 +55,7 @@ struct Splitter<'a> {
     limits: Limits,
 }
 
-/// How large a form is, parts that were taken out of it apart.
+/// Size of a form without the parts that were taken out of it.
 #[derive(Clone, Copy, Default)]
 struct Size {
     weight: usize,
@@ -99,7 +99,7 @@ impl Splitter<'_> {
         NodeId(self.core.nodes.len() as u32 - 1)
     }
 
-    /// Makes a function of a form, and a call of it in its place.
+    /// Makes a function of a form, and puts a call of it in its place.
     fn take_out(&mut self, node: NodeId) {
         let span = self.core.nodes[node.index()].span;
         let kind = std::mem::replace(&mut self.core.nodes[node.index()].kind, NodeKind::Hole);
@@ -107,12 +107,12 @@ impl Splitter<'_> {
         let lambda = LambdaId(self.core.lambdas.len() as u32);
         self.core.lambdas.push(Lambda::without_parameters(Some(self.lambda), span, body));
         let closure = self.node(NodeKind::Lambda(lambda), span);
-        // A call of a plain lambda would be part of the frame again.
+        // A call of a plain lambda would become part of the frame again.
         let hidden = self.node(NodeKind::Progn(vec![closure]), span);
         self.core.nodes[node.index()].kind = NodeKind::Call(Callee::Value(hidden), Vec::new());
     }
 
-    /// Takes out runs of consecutive forms. `None` if the node has none.
+    /// Takes out runs of consecutive forms; returns the new size, or `None` if the node has no such forms.
     fn divide_forms(&mut self, node: NodeId, sizes: &[Size]) -> Option<Size> {
         let span = self.core.nodes[node.index()].span;
         let mut size = Size::default();
@@ -178,14 +178,14 @@ impl Splitter<'_> {
         Some(node)
     }
 
-    /// Binds the later variables of a long `let` in a function of their own.
+    /// Binds the later variables of a long `let` in functions of their own; returns the new size if it did.
     fn divide_bindings(&mut self, node: NodeId, sizes: &[Size]) -> Option<Size> {
         let Node { kind: NodeKind::Let { sequential, bindings, body }, span } =
             &mut self.core.nodes[node.index()]
         else {
             return None;
         };
-        // Names are resolved: one after another is as good as all at once, unless bindings are dynamic.
+        // Names are resolved, so variables may be bound one after another, unless bindings are dynamic.
         let in_order =
             *sequential || bindings.iter().all(|(target, _)| matches!(target, BoundVariable::Lexical(_)));
         if bindings.len() <= self.limits.bindings || !in_order {
@@ -212,7 +212,7 @@ impl Size {
     }
 }
 
-/// Makes `lambda` the owner of what its text binds.
+/// Makes `lambda` the owner of everything that its text binds.
 fn adopt(core: &mut Core, lambda: LambdaId) {
     let mut pending = vec![core.lambdas[lambda.index()].body];
     while let Some(node) = pending.pop() {

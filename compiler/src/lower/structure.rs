@@ -17,6 +17,7 @@ impl FunctionBuilder<'_, '_> {
         self.constant_index(entry)
     }
 
+    /// Reads a slot.
     pub(super) fn slot(&mut self, class: &Symbol, slot: u16, instance: NodeId, dest: Dest) {
         let top = self.registers.top();
         let Ok(narrow) = u8::try_from(slot) else {
@@ -28,6 +29,7 @@ impl FunctionBuilder<'_, '_> {
         self.compute(dest, |dst| Instr::Slot { dst, instance, slot: Index(narrow), class });
     }
 
+    /// Sets a slot.
     pub(super) fn set_slot(
         &mut self,
         class: &Symbol,
@@ -48,7 +50,7 @@ impl FunctionBuilder<'_, '_> {
         self.deliver(value, dest);
     }
 
-    /// A slot whose number does not fit the instruction.
+    /// Lowers access to a slot whose number does not fit the instruction.
     fn distant_slot(&mut self, builtin: Builtin, class: &Symbol, slot: u16, forms: &[NodeId], dest: Dest) {
         let window = self.registers.top();
         self.registers.take(2);
@@ -65,6 +67,7 @@ impl FunctionBuilder<'_, '_> {
         self.deliver(window, dest);
     }
 
+    /// Tests for an instance of a class.
     pub(super) fn is_instance(&mut self, class: &Symbol, object: NodeId, dest: Dest) {
         let top = self.registers.top();
         let object = self.operand(object, &[]);

@@ -1,4 +1,4 @@
-//! Conditionals. A form in test position never makes a boolean: it goes one way or the other.
+//! Conditionals. A form in test position never makes a boolean: it jumps to one segment or the other.
 
 use super::builder::FunctionBuilder;
 use super::dest::Dest;
@@ -6,6 +6,7 @@ use super::graph::Cond;
 use crate::core::NodeId;
 
 impl FunctionBuilder<'_, '_> {
+    /// Lowers `if`.
     pub(super) fn if_form(&mut self, test: NodeId, consequent: NodeId, alternative: NodeId, dest: Dest) {
         let (holds, fails, end) = (self.graph.label(), self.graph.label(), self.graph.label());
         self.form(test, Dest::Test { holds, fails });
@@ -19,6 +20,7 @@ impl FunctionBuilder<'_, '_> {
         }
     }
 
+    /// Lowers `and`.
     pub(super) fn and(&mut self, forms: &[NodeId], dest: Dest) {
         let Some((&last, others)) = forms.split_last() else { return self.deliver_true(dest) };
         let end = self.graph.label();
@@ -47,6 +49,7 @@ impl FunctionBuilder<'_, '_> {
         }
     }
 
+    /// Lowers `or`.
     pub(super) fn or(&mut self, forms: &[NodeId], dest: Dest) {
         let Some((&last, others)) = forms.split_last() else { return self.deliver_nil(dest) };
         let end = self.graph.label();

@@ -10,7 +10,7 @@ use super::dest::Dest;
 use crate::core::*;
 
 impl<'a> FunctionBuilder<'_, 'a> {
-    /// `(values …)`
+    /// Lowers `(values …)`.
     pub(super) fn values(&mut self, forms: &[NodeId], dest: Dest) {
         let top = self.registers.top();
         match dest {
@@ -36,7 +36,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
                 }
             }
             Dest::Values(base, count) => {
-                // Variables of the forms themselves may be in the way.
+                // The destination may contain variables of the forms themselves.
                 let wanted = forms.len().min(usize::from(count));
                 self.arguments(&forms[..wanted]);
                 for &form in &forms[wanted..] {
@@ -67,7 +67,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
         }
     }
 
-    /// One value of a form, where the form itself would pass on more.
+    /// Lowers a form to one value, though it may have several.
     pub(super) fn single(&mut self, form: NodeId, dest: Dest) {
         match dest {
             Dest::All | Dest::Tail | Dest::Values(..) if !self.module.resolution.is_single(form) => {
@@ -79,7 +79,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
         }
     }
 
-    /// `(values-list …)`
+    /// Lowers `(values-list …)`.
     pub(super) fn values_list(&mut self, list: NodeId, dest: Dest) {
         let top = self.registers.top();
         let src = self.operand(list, &[]);
@@ -88,6 +88,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
         self.deliver_values(dest);
     }
 
+    /// Binds variables to the values of a form around a body.
     pub(super) fn bind_values(&mut self, targets: &[BoundVariable], form: NodeId, body: NodeId, dest: Dest) {
         let top = self.registers.top();
         let depth = self.extents.len();
@@ -119,7 +120,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
         self.registers.release(top);
     }
 
-    /// All values of the first form, after the second has been evaluated.
+    /// Lowers a form for all its values, and then a second one for effect.
     pub(super) fn first_values(&mut self, first: NodeId, second: NodeId, dest: Dest) {
         let top = self.registers.top();
         let is_single = self.module.resolution.is_single(first);
@@ -153,10 +154,10 @@ impl<'a> FunctionBuilder<'_, 'a> {
         }
     }
 
-    /// `(multiple-value-call function form…)`
+    /// Lowers `(multiple-value-call function form…)`.
     pub(super) fn call_values(&mut self, function: NodeId, forms: &'a [NodeId], dest: Dest) {
         let resolution = &self.module.resolution;
-        // Forms that give one value are ordinary arguments, up to the first that may give more.
+        // Forms with one value are ordinary arguments, up to the first form that may have more.
         let plain = forms.iter().take_while(|form| resolution.is_single(**form)).count();
         if plain == forms.len() {
             return self.call_value(function, forms, dest);
@@ -184,7 +185,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
         self.finish_apply(window, count, dest);
     }
 
-    /// A fresh list of the values of a form, in the next register.
+    /// Makes a list of the values of a form, in the next register.
     fn value_list_of(&mut self, form: NodeId) {
         let register = self.registers.top();
         if self.module.resolution.is_single(form) {

@@ -115,7 +115,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
         }
     }
 
-    /// Returns a register that holds the value of `node` until the forms `later` have been evaluated. May take a register.
+    /// Returns a register that holds the value of `node` until the forms `later` have been evaluated. May
+    /// take a register.
     pub(super) fn operand(&mut self, node: NodeId, later: &[NodeId]) -> Reg {
         if let Some(register) = self.plain_variable(node, later).or_else(|| self.loaded_literal(node)) {
             return register;
@@ -125,7 +126,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
         self.registers.take(1)
     }
 
-    /// Returns the register of the variable that `node` reads, if it keeps its value while the forms `later` are evaluated.
+    /// Returns the register of the variable that `node` reads, if it keeps its value while the forms `later`
+    /// are evaluated.
     fn plain_variable(&mut self, node: NodeId, later: &[NodeId]) -> Option<Reg> {
         let NodeKind::Local(variable) = self.core.nodes[node.index()].kind else { return None };
         if !self.keeps_its_value(variable, later) {
@@ -228,7 +230,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
         }
     }
 
-    /// Whether `next` begins with reading `variable`, and nothing else refers to it. The value may then be computed there.
+    /// Whether `next` begins with reading `variable`, and nothing else refers to it. The value may then be
+    /// computed there.
     fn is_used_at_once(&self, variable: VarId, next: NodeId) -> bool {
         let resolution = &self.module.resolution;
         if resolution.is_assigned(variable)

@@ -1,4 +1,4 @@
-//! Reading without a program around it: for tests, fuzzing and tools.
+//! Reading without a program: for tests, fuzzing and tools.
 
 use esl_bytecode::compile::{Environment, Global, GlobalFunction, InternError};
 use esl_bytecode::datum::Datum;
@@ -8,7 +8,7 @@ use esl_bytecode::symbol::Symbol;
 
 use super::{Reader, decode};
 
-/// An environment with the standard packages, in `ESL-USER`, in which nothing is defined.
+/// An environment with the standard packages and no definitions. The current package is `ESL-USER`.
 #[derive(Clone, Debug)]
 pub struct BareEnvironment {
     packages: Packages,
@@ -16,7 +16,7 @@ pub struct BareEnvironment {
 }
 
 impl BareEnvironment {
-    /// An environment in which the standard packages are as at the start of a program.
+    /// Creates an environment with the standard packages as at the start of a program.
     pub fn new() -> BareEnvironment {
         BareEnvironment { packages: Packages::standard(), uninterned: 0 }
     }
@@ -55,8 +55,8 @@ impl Environment for BareEnvironment {
     }
 }
 
-/// Reads bytes as a file, whatever they are, and gives the numbers of data and of diagnostics: the entry point for
-/// fuzzing, which looks for panics.
+/// Reads any bytes as a file; returns the number of data and of diagnostics. Entry point for fuzzing, which
+/// looks for panics.
 pub fn read_anything(bytes: &[u8]) -> (usize, usize) {
     let Ok(text) = decode(SourceId::default(), bytes.to_vec()) else { return (0, 1) };
     let mut reader = Reader::new(SourceId::default(), text);

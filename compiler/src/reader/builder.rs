@@ -1,9 +1,9 @@
 //! Data from tokens: the actions of the grammar.
 //!
-//! Guarantees: every datum carries the span of its text. A token that denotes nothing is reported, and the empty list
-//! stands in for it, so that one faulty name does not hide the next.
-//! Not here: what counts as which token (`lexer`), where a datum ends (`scan`), what backquote means (the expander,
-//! which finds `(esl::%backquote …)`, `(esl::%unquote …)` and `(esl::%unquote-splicing …)`).
+//! Guarantees: every datum has the span of its text. A faulty token is reported, and the empty list stands in
+//! for it, so that one faulty name does not hide the next. Not here: the kinds of tokens (`lexer`), the end
+//! of a datum (`scan`), the meaning of backquote (the expander, which gets `(esl::%backquote …)`,
+//! `(esl::%unquote …)` and `(esl::%unquote-splicing …)`).
 
 use std::sync::{Arc, LazyLock};
 
@@ -18,12 +18,12 @@ use crate::diagnostic::code;
 
 use super::MAX_ERRORS;
 use super::character;
-use super::literal;
+use super::literal::{self, ArrayError, VectorError};
 use super::name::{self, MAX_NAME, NameParts, Prefix, shorten};
 use super::number::{self, Number, NumberError};
 use super::scan::label_number;
 
-/// An abbreviation of a list of two elements.
+/// A mark that abbreviates a list of two elements.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Mark {
     Quote,
@@ -60,10 +60,10 @@ pub(crate) struct DatumBuilder<'a> {
     text: &'a str,
     source: SourceId,
     labels: FxHashMap<u32, Datum>,
-    /// How many more elements `#n(…)` may fill in.
+    /// Elements that `#n(…)` may still fill in.
     room: &'a mut usize,
     buffer: String,
-    /// What was wrong so far.
+    /// Faults found so far.
     pub(super) errors: Vec<Diagnostic>,
 }
 
@@ -86,7 +86,7 @@ impl<'a> DatumBuilder<'a> {
         &self.text[start as usize..end as usize]
     }
 
-    /// Reports a fault; the empty list stands in for the datum.
+    /// Reports a fault; returns the empty list, which stands in for the datum.
     fn fail(&mut self, diagnostic: Diagnostic) -> Datum {
         let span = diagnostic.primary.span;
         if self.errors.len() < MAX_ERRORS {
@@ -138,7 +138,10 @@ impl<'a> DatumBuilder<'a> {
             Ok(NameParts { prefix: Prefix::Package { package, internal }, name }) => {
                 self.intern(Some(&package), &name, internal, start, end)
             }
-            Err(message) => self.fail(code::INVALID_TOKEN.at(span, message)),
+            Err(error) => {
+                let message = error.message(self.slice(start, end));
+                self.fail(code::INVALID_TOKEN.at(span, message))
+            }
         }
     }
 
@@ -302,7 +305,7 @@ impl<'a> DatumBuilder<'a> {
     /// `#<…>`
     pub(super) fn unreadable(&mut self, start: u32, end: u32) -> Datum {
         let message = format!("expected a datum, found `{}`", shorten(self.slice(start, end)));
-        let help = "objects that print like this cannot be read; name them by a variable";
+        let help = "objects that print like this cannot be read; refer to them by a variable";
         self.fail(code::INVALID_TOKEN.at(self.span(start, end), message).help(help))
     }
 
@@ -313,7 +316,7 @@ impl<'a> DatumBuilder<'a> {
         self.fail(code::INVALID_TOKEN.at(self.span(start, end), message))
     }
 
-    /// A list of a mark's symbol and `datum`; the mark ends before `middle`.
+    /// Returns the list of a mark's symbol and `datum`. The mark ends before `middle`.
     pub(super) fn marked(&mut self, mark: Mark, start: u32, middle: u32, datum: Datum) -> Datum {
         let symbol = match mark {
             Mark::Quote => &NAMES.quote,
@@ -337,15 +340,22 @@ impl<'a> DatumBuilder<'a> {
     pub(super) fn vector(&mut self, start: u32, middle: u32, items: Vec<Datum>, end: u32) -> Datum {
         let span = self.span(start, end);
         let length = self.slice(start + 1, middle - 1);
-        let fault = match (length, name::digits(length)) {
+        let vector = match (length, name::digits(length)) {
             ("", _) => literal::vector(None, items, self.room),
             (_, Some(length)) => literal::vector(Some(length), items, self.room),
-            _ => Err(None),
+            _ => Err(VectorError::NoRoom),
         };
-        match fault {
+        match vector {
             Ok(items) => Datum::new(DatumKind::Vector(items), span),
-            Err(Some(message)) => self.fail(code::MALFORMED_LITERAL.at(span, message)),
-            Err(None) => {
+            Err(VectorError::TooLong { length, count }) => {
+                let message = format!("expected a length of at least {count}, found {length}");
+                self.fail(code::MALFORMED_LITERAL.at(span, message))
+            }
+            Err(VectorError::NothingToFill { length }) => {
+                let message = format!("expected an element to fill {length} places, found none");
+                self.fail(code::MALFORMED_LITERAL.at(span, message))
+            }
+            Err(VectorError::NoRoom) => {
                 let message = "expected a vector of moderate length, found too many elements to fill in";
                 self.fail(
                     code::LITERAL_TOO_LARGE
@@ -367,13 +377,21 @@ impl<'a> DatumBuilder<'a> {
         };
         match literal::array(rank, contents) {
             Ok(kind) => Datum::new(kind, span),
-            Err((place, message)) => self.fail(code::MALFORMED_LITERAL.at(place, message)),
+            Err(ArrayError { span, axis, found, expected }) => {
+                let message = match (expected, found) {
+                    (Some(expected), Some(found)) => {
+                        format!("expected {expected} elements in axis {axis}, found {found}")
+                    }
+                    _ => format!("expected a list or vector in axis {axis}, found something else"),
+                };
+                self.fail(code::MALFORMED_LITERAL.at(span, message))
+            }
         }
     }
 
     /// `#n=` before its datum; it ends before `middle`.
     pub(super) fn label(&mut self, start: u32, middle: u32, datum: Datum) -> Datum {
-        // The scanner has seen to it that the number is one.
+        // The scanner has checked the number.
         if let Some(number) = label_number(self.text, start, middle) {
             self.labels.insert(number, datum.clone());
         }
@@ -383,7 +401,7 @@ impl<'a> DatumBuilder<'a> {
     /// `#n#`
     pub(super) fn reference(&mut self, start: u32, end: u32) -> Datum {
         let found = label_number(self.text, start, end).and_then(|number| self.labels.get(&number));
-        // The scanner has seen to it that there is one.
+        // The scanner has checked that the label exists.
         found.cloned().unwrap_or_else(|| Datum::nil(self.span(start, end)))
     }
 }

@@ -1,7 +1,7 @@
 //! Characters by name: `#\Space`, `#\U+00E9`.
 
-/// Names of characters that cannot be seen, without regard to case. Where a character has several, the first is the
-/// one that is printed.
+/// Names of invisible characters; case does not matter. If a character has several names, the first is
+/// printed.
 pub const CHARACTER_NAMES: &[(&str, char)] = &[
     ("Nul", '\0'),
     ("Null", '\0'),
@@ -46,7 +46,7 @@ pub const CHARACTER_NAMES: &[(&str, char)] = &[
     ("No-break_space", '\u{a0}'),
 ];
 
-/// The character that is written `#\` and this text, which is not empty.
+/// Returns the character that `#\` and this text denote. The text is not empty.
 pub(super) fn parse(text: &str) -> Option<char> {
     let mut chars = text.chars();
     let first = chars.next()?;
@@ -57,7 +57,7 @@ pub(super) fn parse(text: &str) -> Option<char> {
     named.map(|&(_, c)| c).or_else(|| by_number(text))
 }
 
-/// `U+00E9` or `U00E9`: hexadecimal digits.
+/// Parses `U+00E9` or `U00E9`: hexadecimal digits.
 fn by_number(text: &str) -> Option<char> {
     let digits = text.strip_prefix(['U', 'u'])?;
     let digits = digits.strip_prefix('+').unwrap_or(digits);
@@ -65,7 +65,7 @@ fn by_number(text: &str) -> Option<char> {
     is_number.then(|| u32::from_str_radix(digits, 16).ok().and_then(char::from_u32)).flatten()
 }
 
-/// Names that are probably meant by one that no character has.
+/// Returns the name that an unknown name probably stands for.
 pub(super) fn similar(text: &str) -> Option<&'static str> {
     const MISTAKEN: &[(&str, &str)] = &[
         ("blank", "Space"),

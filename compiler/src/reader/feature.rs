@@ -1,7 +1,7 @@
-//! Feature expressions: what stands between `#+` or `#-` and the datum that is read or left out.
+//! Feature expressions: the condition between `#+` or `#-` and the datum that is read or left out.
 //!
-//! An expression is a name, or `(and …)`, `(or …)`, `(not …)` over expressions. Names are compared without their
-//! package. They are evaluated on their tokens, with an explicit stack.
+//! An expression is a name, or `(and …)`, `(or …)`, `(not …)` of expressions. Names are compared without
+//! their package. Expressions are evaluated on their tokens, with an explicit stack.
 
 use super::lexer::{Lexeme, Token};
 use super::name;
@@ -9,7 +9,7 @@ use super::name;
 /// The features of this implementation.
 pub const FEATURES: [&str; 2] = ["ESL", "COMMON-LISP"];
 
-/// Why an expression is none.
+/// A fault of a feature expression, and its place.
 #[derive(Debug)]
 pub(super) struct FeatureError {
     pub(super) start: u32,
@@ -17,7 +17,7 @@ pub(super) struct FeatureError {
     pub(super) message: String,
 }
 
-/// `(and …)`, `(or …)` or `(not …)` so far.
+/// The part of `(and …)`, `(or …)` or `(not …)` that has been evaluated.
 struct Operation {
     operator: Operator,
     value: bool,
@@ -31,7 +31,10 @@ enum Operator {
     Not,
 }
 
-/// Whether the feature expression with these tokens, which is balanced, holds.
+/// Whether the feature expression with these tokens holds. The tokens are balanced.
+///
+/// # Errors
+/// The first fault.
 pub(super) fn holds(text: &str, lexemes: &[Lexeme]) -> Result<bool, FeatureError> {
     let mut operations: Vec<Operation> = Vec::new();
     let mut lexemes = lexemes.iter();
@@ -77,7 +80,7 @@ fn operator(text: &str, lexeme: &Lexeme) -> Option<Operator> {
     }
 }
 
-/// The name of a feature or operator.
+/// Returns the name of a feature or operator.
 fn feature(text: &str, lexeme: &Lexeme) -> Option<String> {
     if !matches!(lexeme.token, Token::Atom | Token::Escaped) {
         return None;

@@ -1,16 +1,17 @@
 //! Tokens: the smallest pieces of source text, found by a generated lexer.
 //!
-//! Guarantees: the tokens of a text do not overlap, nothing but blanks and comments lies between them, and finding the
-//! next one takes no native recursion and time in proportion to its length. A token knows only its kind: what it
-//! denotes is worked out from its text, and only if it is not skipped by `#+` or `#-`.
-//! Not here: what the tokens denote (`number`, `name`, `character`), how they nest (`scan`, the grammar).
+//! Guarantees: the tokens of a text do not overlap, only blanks and comments lie between them, and finding
+//! the next one takes no native recursion and time in proportion to its length. A token knows only its kind:
+//! its meaning is computed from its text, and only if `#+` or `#-` does not skip it. Not here: the meaning of
+//! tokens (`number`, `name`, `character`), their nesting (`scan`, the grammar).
 
 use logos::{FilterResult, Lexer, Logos};
 
 /// The kind of a token.
 ///
-/// A *constituent* is a character that can be part of a name as it is. Blanks other than the usual ones, control
-/// characters and marks that reverse the direction of text are not, because nobody can see them.
+/// A *constituent* is a character that can be part of a name without an escape. Blanks other than the usual
+/// ones, control characters and marks that reverse the direction of text are not constituents, because they
+/// are invisible.
 #[derive(Logos, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[logos(skip r"[ \t\n\r\f]+")]
 #[logos(skip(r";[^\n]*", allow_greedy = true))]
@@ -85,7 +86,7 @@ pub enum Token {
     /// `#-`
     #[token("#-", priority = 100)]
     FeatureAbsent,
-    /// `#.`, which evaluates while reading: not in the subset.
+    /// `#.`, evaluation while reading: not in the subset.
     #[token("#.", priority = 100)]
     ReadEval,
     /// `#S`, a literal structure: not in the subset.
@@ -110,10 +111,10 @@ pub enum Token {
     /// Characters that are allowed only in strings, comments and bars.
     #[regex(r"(?&stray)+", priority = 1)]
     Stray,
-    /// `#| … |#`, which is skipped; never the kind of a token that is given out.
+    /// `#| … |#`, which is skipped: never the kind of a returned token.
     #[token("#|", block_comment, priority = 200)]
     BlockComment,
-    /// A name that has no end; never the kind of a token that is given out.
+    /// A name without an end: never the kind of a returned token.
     #[regex(
         r"((#:|#\?|(?&first)|(?&escaped))((?&constituent)|(?&escaped))*)?\|",
         unclosed_bar,
@@ -139,21 +140,21 @@ pub(super) struct Lexeme {
 /// Why there is no token: the text ends too early.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LexError {
-    /// The end comes within a string.
+    /// The text ends within a string.
     UnclosedString,
-    /// The end comes within `#| … |#`.
+    /// The text ends within `#| … |#`.
     UnclosedComment,
-    /// The end comes within `| … |`.
+    /// The text ends within `| … |`.
     UnclosedBar,
-    /// Nothing comes after `\` or `#\`.
+    /// The text ends after `\` or `#\`.
     UnfinishedEscape,
-    /// Nothing matches; the rules above leave no such text.
+    /// No rule matches, which the rules above exclude.
     #[default]
     Unknown,
 }
 
-/// Finds the end of a string. A backslash takes the next character with it; both are ASCII, so that looking at bytes
-/// is enough.
+/// Finds the end of a string. A backslash takes the next character with it. Quote and backslash are ASCII, so
+/// looking at bytes is enough.
 fn string(lexer: &mut Lexer<'_, Token>) -> Result<(), LexError> {
     let rest = lexer.remainder().as_bytes();
     let mut at = 0;
@@ -170,7 +171,7 @@ fn string(lexer: &mut Lexer<'_, Token>) -> Result<(), LexError> {
     Err(LexError::UnclosedString)
 }
 
-/// Finds the end of a block comment; they nest.
+/// Finds the end of a block comment. Block comments nest.
 fn block_comment(lexer: &mut Lexer<'_, Token>) -> FilterResult<(), LexError> {
     let rest = lexer.remainder().as_bytes();
     let mut depth = 1;
@@ -197,7 +198,7 @@ fn block_comment(lexer: &mut Lexer<'_, Token>) -> FilterResult<(), LexError> {
     FilterResult::Error(LexError::UnclosedComment)
 }
 
-/// Reached when the rule for whole names found no closing bar.
+/// Takes the rest of the text, when the rule for whole names has found no closing bar.
 fn unclosed_bar(lexer: &mut Lexer<'_, Token>) -> Result<(), LexError> {
     lexer.bump(lexer.remainder().len());
     Err(LexError::UnclosedBar)

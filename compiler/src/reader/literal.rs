@@ -5,14 +5,46 @@ use std::sync::Arc;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 
-/// Arrays have at most so many dimensions.
+/// Dimensions of an array, at most.
 pub const MAX_RANK: u32 = 8;
 
-/// An array of `rank` dimensions with these contents: lists, vectors or strings, nested `rank` deep.
+/// A part of an array's contents that does not fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ArrayError {
+    /// Place of the part.
+    pub(super) span: Span,
+    /// Axis of the array, from 0.
+    pub(super) axis: u32,
+    /// Number of elements that the part must have; `None` if it is not a sequence.
+    pub(super) expected: Option<usize>,
+    /// Number of elements that it has.
+    pub(super) found: Option<usize>,
+}
+
+/// Why the elements of `#n(…)` do not form a vector.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum VectorError {
+    /// There are more elements than the length says.
+    TooLong {
+        /// Length as written.
+        length: usize,
+        /// Number of elements.
+        count: usize,
+    },
+    /// There is no element to fill the vector with.
+    NothingToFill {
+        /// Length as written.
+        length: usize,
+    },
+    /// Too many elements would have to be filled in.
+    NoRoom,
+}
+
+/// Returns the array of `rank` dimensions with these contents: lists, vectors or strings, nested `rank` deep.
 ///
 /// # Errors
-/// The place and the fault, if the contents do not form a block.
-pub(super) fn array(rank: u32, contents: Datum) -> Result<DatumKind, (Span, String)> {
+/// [`ArrayError`], if the contents do not form a block.
+pub(super) fn array(rank: u32, contents: Datum) -> Result<DatumKind, ArrayError> {
     let mut level = vec![contents];
     let mut dimensions = Vec::new();
     for axis in 0..rank {
@@ -21,18 +53,13 @@ pub(super) fn array(rank: u32, contents: Datum) -> Result<DatumKind, (Span, Stri
         for part in &level {
             let before = next.len();
             if !extend(&mut next, part) {
-                return Err((
-                    part.span(),
-                    format!("expected a list or vector in axis {axis}, found something else"),
-                ));
+                return Err(ArrayError { span: part.span(), axis, expected: None, found: None });
             }
             let found = next.len() - before;
             let expected = *length.get_or_insert(found);
             if found != expected {
-                return Err((
-                    part.span(),
-                    format!("expected {expected} elements in axis {axis}, found {found}"),
-                ));
+                let (expected, found) = (Some(expected), Some(found));
+                return Err(ArrayError { span: part.span(), axis, expected, found });
             }
         }
         dimensions.push(u32::try_from(length.unwrap_or(0)).expect("texts are shorter than 4 GiB"));
@@ -45,7 +72,7 @@ pub(super) fn array(rank: u32, contents: Datum) -> Result<DatumKind, (Span, Stri
     })
 }
 
-/// Adds the elements of a sequence. False if it is none.
+/// Adds the elements of a sequence. Returns whether it is one.
 fn extend(items: &mut Vec<Datum>, sequence: &Datum) -> bool {
     match sequence.kind() {
         DatumKind::Vector(elements) => items.extend(elements.iter().cloned()),
@@ -61,31 +88,29 @@ fn extend(items: &mut Vec<Datum>, sequence: &Datum) -> bool {
     true
 }
 
-/// The elements of `#n(…)`: the last one fills what is left of the length. `room` is how many elements may be filled
-/// in, and is reduced.
+/// Returns the elements of `#n(…)`, in which the last one fills the rest of the length. `room` is the number
+/// of elements that may be filled in, and is reduced.
 ///
 /// # Errors
-/// The fault, or `None` if there is no room.
+/// [`VectorError`].
 pub(super) fn vector(
     length: Option<u32>,
     mut items: Vec<Datum>,
     room: &mut usize,
-) -> Result<Arc<[Datum]>, Option<String>> {
+) -> Result<Arc<[Datum]>, VectorError> {
     if let Some(length) = length {
         let length = length as usize;
         if items.len() > length {
-            return Err(Some(format!("expected a length of at least {}, found {length}", items.len())));
+            return Err(VectorError::TooLong { length, count: items.len() });
         }
         let missing = length - items.len();
         if missing > *room {
-            return Err(None);
+            return Err(VectorError::NoRoom);
         }
         *room -= missing;
         match items.last().cloned() {
             Some(last) => items.resize(length, last),
-            None if length > 0 => {
-                return Err(Some(format!("expected an element to fill {length} places, found none")));
-            }
+            None if length > 0 => return Err(VectorError::NothingToFill { length }),
             None => {}
         }
     }

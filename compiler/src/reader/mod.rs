@@ -1,13 +1,13 @@
 //! The reader: source text to data.
 //!
-//! Text goes through four steps. The [`lexer`] finds tokens; `scan` collects those of the next top-level datum; the
-//! grammar (`grammar.lalrpop`) parses them; `builder` makes the datum. One datum is read at a time, since the one
-//! before may have changed the package in which its names are looked up.
+//! Reading has four steps. The [`lexer`] finds tokens; `scan` collects the tokens of the next top-level
+//! datum; the grammar (`grammar.lalrpop`) parses them; `builder` makes the datum. One datum is read at a
+//! time, since the previous form may have changed the package in which its names are looked up.
 //!
-//! Guarantees: whatever the text, reading ends, in time in proportion to its length, without native recursion and
-//! with a datum or a diagnostic for every part of it. After an error it goes on behind the faulty datum or, if that has
-//! no end, at the next form that begins in column 0.
-//! Not here: reader macros, which ESL does not have; `read` on streams (the library, over [`read_datum`]).
+//! Guarantees: reading any text ends, in time in proportion to its length, without native recursion, and with
+//! a datum or a diagnostic for every part of it. After an error, reading continues behind the faulty datum
+//! or, if that has no end, at the next form that begins in column 0. Not here: reader macros, which ESL does
+//! not have; `read` on streams (the library, over [`read_datum`]).
 
 mod bare;
 mod builder;
@@ -44,10 +44,10 @@ use builder::DatumBuilder;
 use lexer::{Lexeme, Token};
 use scan::{Scan, Scanner};
 
-/// After so many errors in one text, the rest is not read.
+/// Errors in one text after which the rest is not read.
 const MAX_ERRORS: usize = 100;
 
-/// So many elements may be filled into the vectors `#n(…)` of one text.
+/// Elements that may be filled into the vectors `#n(…)` of one text.
 const MAX_FILL: usize = 1 << 20;
 
 /// Reads a text, one top-level datum at a time.
@@ -57,13 +57,14 @@ pub struct Reader {
     position: usize,
     scanner: Scanner,
     room: usize,
-    /// Diagnostics to be given out before reading on, the first one last.
+    /// Diagnostics to be returned before reading continues, the first one last.
     waiting: Vec<Diagnostic>,
     errors: usize,
 }
 
 impl Reader {
-    /// A reader at the beginning of `text`. A byte order mark, and a first line that begins with `#!`, are skipped.
+    /// Creates a reader at the beginning of `text`, behind a byte order mark and a first line that begins
+    /// with `#!`.
     pub fn new(source: SourceId, text: impl Into<Arc<str>>) -> Reader {
         let text = text.into();
         let position = preamble(&text);
@@ -74,13 +75,13 @@ impl Reader {
         Reader { text, position, scanner: Scanner::new(source), room: MAX_FILL, waiting, errors: 0 }
     }
 
-    /// The byte from which the next datum is looked for.
+    /// Returns the byte from which the next datum is read.
     pub fn position(&self) -> usize {
         self.position
     }
 
-    /// The next datum, or a diagnostic about it; `None` at the end of the text. One faulty datum may give several
-    /// diagnostics in a row.
+    /// Returns the next datum, or a diagnostic about it; `None` at the end of the text. One faulty datum may
+    /// have several diagnostics in a row.
     pub fn next(&mut self, environment: &mut dyn Environment) -> Option<Result<Datum, Box<Diagnostic>>> {
         if self.waiting.is_empty() {
             if !is_readable(&self.text) {
@@ -112,12 +113,12 @@ impl Reader {
     }
 }
 
-/// Reads one datum of `text` from byte `start` on: the datum, `None` at the end of the text, and the offset after it.
-/// A blank after the datum is not part of it.
+/// Reads one datum of `text` from byte `start` on. Returns the datum, or `None` at the end of the text, and
+/// the offset after it. A blank after the datum is not part of it.
 ///
 /// # Errors
-/// The first fault of the datum. [`is_unfinished`] tells whether more text could mend it: that is reported only if
-/// nothing else is wrong.
+/// The first fault of the datum. A fault that more text could mend ([`is_unfinished`]) is reported only if
+/// there is no other.
 pub fn read_datum(
     environment: &mut dyn Environment,
     text: &str,
@@ -138,7 +139,8 @@ pub fn read_datum(
     }
 }
 
-/// Whether a diagnostic of this code says only that the text ends too early, so that a REPL waits for another line.
+/// Whether a diagnostic of this code says only that the text ends too early. A REPL then waits for another
+/// line.
 pub fn is_unfinished(code: &str) -> bool {
     let codes = [
         code::UNCLOSED_LIST,
@@ -151,7 +153,7 @@ pub fn is_unfinished(code: &str) -> bool {
     codes.iter().any(|unfinished| unfinished.name == code)
 }
 
-/// The text of a file.
+/// Returns the text of a file.
 ///
 /// # Errors
 /// `invalid-utf-8`, with the offset of the first byte that is not UTF-8; `source-too-large`.
@@ -168,10 +170,10 @@ pub fn decode(source: SourceId, bytes: Vec<u8>) -> Result<String, Box<Diagnostic
     if is_readable(&text) { Ok(text) } else { Err(Box::new(too_large(source))) }
 }
 
-/// What came of reading one datum.
+/// Outcome of reading one datum.
 enum Read {
     Datum(Datum, usize),
-    /// What is wrong, in order, at least one; and where to go on.
+    /// Faults in order, at least one, and the offset at which to continue.
     Errors(Vec<Diagnostic>, usize),
     End,
 }
@@ -201,7 +203,8 @@ fn read(
     Read::Errors(errors, end)
 }
 
-/// What the grammar found wrong. The tokens are balanced, so that it is about dots, or about a mark before a `)`.
+/// Returns the diagnostic for a fault that the grammar found. The tokens are balanced, so the fault concerns
+/// a dot, or a mark before a `)`.
 fn explain<E>(
     error: &ParseError<u32, Token, E>,
     lexemes: &[Lexeme],
@@ -232,7 +235,7 @@ fn explain<E>(
             let found_shown = if found_token == Token::Dot { "a dot" } else { "`)`" };
             code::MISSING_DATUM
                 .at(span(found), format!("expected a datum after `{shown}`, found {found_shown}"))
-                .also(span(mark), "this stands before nothing")
+                .also(span(mark), "this mark needs a datum after it")
         }
         (Token::Dot, _) => code::DOTTED_LIST
             .at(span(found), "expected a dot only before the last element of a list, found one elsewhere"),
@@ -246,14 +249,14 @@ fn is_mark(token: Token) -> bool {
     matches!(token, Quote | Backquote | Comma | CommaAt | Function | Array | Label)
 }
 
-/// The length of what is skipped at the beginning of a text.
+/// Returns the number of bytes to be skipped at the beginning of a text.
 fn preamble(text: &str) -> usize {
     let mark = if text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 };
     let rest = &text[mark..];
     if rest.starts_with("#!") { mark + rest.find('\n').unwrap_or(rest.len()) } else { mark }
 }
 
-/// Spans have offsets of 32 bits; the last one is kept free.
+/// Whether spans, whose offsets have 32 bits, can refer to all of a text. The last offset is kept free.
 fn is_readable(text: &str) -> bool {
     text.len() < u32::MAX as usize
 }

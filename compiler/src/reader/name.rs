@@ -1,12 +1,12 @@
-//! Names: from the text of a token to package and name, with case folded and escapes resolved.
+//! Names: the package and name that the text of a token denotes, with case folded and escapes resolved.
 
-/// Names of more bytes than this are refused.
+/// Bytes of a name, at most.
 pub const MAX_NAME: usize = 1 << 16;
 
-/// Which package a name is looked up in.
+/// Package in which a name is looked up.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Prefix {
-    /// The current one.
+    /// The current package.
     None,
     /// `:name`
     Keyword,
@@ -14,15 +14,37 @@ pub(super) enum Prefix {
     Package { package: String, internal: bool },
 }
 
-/// A name in its parts.
+/// A name taken apart.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct NameParts {
     pub(super) prefix: Prefix,
     pub(super) name: String,
 }
 
-/// The upper case of a letter, if that is one character; all others stay as they are. So `ß` stays, since it has no
-/// upper case of one character.
+/// A fault in the text of a name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NameError {
+    /// There is a second package prefix.
+    SecondPrefix,
+    /// There is no name behind the prefix.
+    Missing,
+}
+
+impl NameError {
+    /// Returns the message about this fault of `text`.
+    pub(super) fn message(self, text: &str) -> String {
+        let shown = shorten(text);
+        match self {
+            NameError::SecondPrefix => {
+                format!("expected at most one package prefix, found another `:` in `{shown}`")
+            }
+            NameError::Missing => format!("expected a name after `{shown}`, found none"),
+        }
+    }
+}
+
+/// Returns the upper case of a letter, if that is one character, and any other character itself. So `ß` is
+/// unchanged, since its upper case has two characters.
 pub fn fold(c: char) -> char {
     if c.is_ascii() {
         return c.to_ascii_uppercase();
@@ -37,12 +59,12 @@ pub fn fold(c: char) -> char {
 /// Takes the text of a name apart.
 ///
 /// # Errors
-/// What was expected and what was found, if colons are where they cannot be.
-pub(super) fn parse(text: &str) -> Result<NameParts, String> {
+/// [`NameError`], if colons are misplaced.
+pub(super) fn parse(text: &str) -> Result<NameParts, NameError> {
     let mut prefix = Prefix::None;
     let mut name = String::with_capacity(text.len());
     let mut chars = text.chars();
-    // Whether a part of the name has been seen that may be empty otherwise: `||` is the name of no characters.
+    // Whether the current part of the name was given, perhaps as the empty name `||`.
     let mut is_given = false;
     let mut in_bars = false;
     while let Some(c) = chars.next() {
@@ -57,10 +79,7 @@ pub(super) fn parse(text: &str) -> Result<NameParts, String> {
             }
             ':' if !in_bars => {
                 if prefix != Prefix::None {
-                    return Err(format!(
-                        "expected at most one package prefix, found another `:` in `{}`",
-                        shorten(text)
-                    ));
+                    return Err(NameError::SecondPrefix);
                 }
                 let mut rest = chars.clone();
                 let internal = rest.next() == Some(':');
@@ -78,17 +97,17 @@ pub(super) fn parse(text: &str) -> Result<NameParts, String> {
         }
     }
     if !is_given {
-        return Err(format!("expected a name after `{}`, found none", shorten(text)));
+        return Err(NameError::Missing);
     }
     Ok(NameParts { prefix, name })
 }
 
-/// The value of a row of decimal digits, if it is small enough.
+/// Returns the value of a row of decimal digits, if it is small enough.
 pub(super) fn digits(text: &str) -> Option<u32> {
     text.parse().ok()
 }
 
-/// The beginning of a text, to be quoted in a message.
+/// Returns the beginning of a text, for messages.
 pub(super) fn shorten(text: &str) -> String {
     const LENGTH: usize = 40;
     match text.char_indices().nth(LENGTH) {
@@ -108,7 +127,7 @@ mod tests {
             Ok(NameParts { prefix: Prefix::Package { package, internal }, name }) => {
                 format!("{name} {} {package}", if internal { "in" } else { "of" })
             }
-            Err(message) => message,
+            Err(error) => error.message(text),
         };
         assert_eq!(shown, expected, "{text}");
     }

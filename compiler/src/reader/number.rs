@@ -1,14 +1,15 @@
-//! Numbers: which tokens are numbers, and which.
+//! Numbers: the tokens that are numbers, and their values.
 //!
-//! The syntax is that of Common Lisp in base ten; what only resembles a number, such as `1+` or `1/2/3`, is a name.
-//! Work is bounded: digits are counted before they are converted, since conversion takes quadratic time.
+//! The syntax is that of Common Lisp in base ten. A token that only resembles a number, such as `1+` or
+//! `1/2/3`, is a name. Work is bounded: digits are counted before they are converted, since conversion takes
+//! quadratic time.
 
 use esl_bytecode::BigInt;
 use num_integer::Integer;
 
-/// Integers of more digits than this are refused.
+/// Digits of an integer, at most.
 pub const MAX_DIGITS: usize = 100_000;
-/// Ratios whose parts have more digits than this are refused: reducing them takes longer than reading an integer.
+/// Digits of either part of a ratio, at most. Reducing a ratio takes longer than reading an integer.
 pub const MAX_RATIO_DIGITS: usize = 10_000;
 
 /// A number.
@@ -20,7 +21,7 @@ pub(super) enum Number {
     Float(f64),
 }
 
-/// Why a token that has the syntax of a number denotes none.
+/// Why a token with the syntax of a number has no value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NumberError {
     /// The denominator is zero.
@@ -31,10 +32,10 @@ pub(super) enum NumberError {
     TooLong(usize),
 }
 
-/// The number that `token` denotes in base ten; `None` if it has not the syntax of a number.
+/// Returns the number that `token` denotes in base ten; `None` if it does not have the syntax of a number.
 pub(super) fn parse(token: &str) -> Option<Result<Number, NumberError>> {
     let unsigned = token.strip_prefix(['+', '-']).unwrap_or(token);
-    // Most tokens are names: rule them out by their first character.
+    // Most tokens are names, which the first character rules out.
     if !unsigned.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
         return None;
     }
@@ -53,7 +54,8 @@ pub(super) fn parse(token: &str) -> Option<Result<Number, NumberError>> {
     }
 }
 
-/// The rational number that `token` denotes in base `radix`; `None` if it has not the syntax of one.
+/// Returns the rational number that `token` denotes in base `radix`; `None` if it does not have the syntax of
+/// one.
 pub(super) fn parse_radix(token: &str, radix: u32) -> Option<Result<Number, NumberError>> {
     let unsigned = token.strip_prefix(['+', '-']).unwrap_or(token);
     match unsigned.split_once('/') {
@@ -93,14 +95,14 @@ fn big(digits: &str, radix: u32, limit: usize) -> Result<BigInt, NumberError> {
         return Err(NumberError::TooLong(limit));
     }
     if radix == 10 && digits.len() < 19 {
-        // Nearly all integers of programs; `i64` takes a sign as well.
+        // Nearly all integers of programs. The parser of `i64` accepts a sign.
         let small: i64 = digits.parse().expect("digits with an optional sign");
         return Ok(BigInt::from(small));
     }
     Ok(BigInt::parse_bytes(digits.as_bytes(), radix).expect("digits with an optional sign"))
 }
 
-/// `[+-] digits* [. digits*] [marker [+-] digits+]`, with digits after the point or a marker.
+/// Parses `[+-] digits* [. digits*] [marker [+-] digits+]`, with digits after the point or a marker.
 fn float(token: &str, unsigned: &str, whole: usize) -> Option<Result<Number, NumberError>> {
     let bytes = unsigned.as_bytes();
     let digits_from = |at: usize| bytes[at..].iter().take_while(|byte| byte.is_ascii_digit()).count();
@@ -127,7 +129,7 @@ fn float(token: &str, unsigned: &str, whole: usize) -> Option<Result<Number, Num
     Some(double(format!("{}e{}", &token[..marker], &token[marker + 1..])))
 }
 
-/// Converts what Rust, too, takes for a float. Numbers too small for a double become zero.
+/// Converts a text in the float syntax of Rust. Numbers too small for a double become zero.
 fn double(text: String) -> Result<Number, NumberError> {
     let value: f64 = text.parse().expect("the syntax of a float");
     if value.is_finite() { Ok(Number::Float(value)) } else { Err(NumberError::OutOfRange) }

@@ -1,7 +1,7 @@
 //! Data as text that reads back.
 //!
-//! For people who look at expansions, and for tests: what a running program prints is the library's matter. All on one
-//! line; sharing and the identity of symbols without a package are not shown. No native recursion.
+//! For people who look at expansions, and for tests; running programs print by the library. The text is one
+//! line, which does not show sharing and the identity of symbols without a package. No native recursion.
 
 use std::fmt::Write;
 
@@ -15,18 +15,18 @@ use super::lexer::Token;
 use super::name::fold;
 use super::number;
 
-/// What is left to print.
+/// A part that is still to be printed.
 enum Work<'a> {
-    /// A datum, with so many backquotes around it, in a place where `,@` can stand or not.
+    /// A datum, the number of backquotes around it, and whether `,@` can stand in its place.
     Datum(&'a Datum, u32, bool),
     /// The elements of a list from this pair or tail on, then `)`.
     Rest(&'a Datum, u32),
-    /// The items of one part of an array: along this axis, from this offset.
+    /// The items of one part of an array, along the first of these axes, from this offset on.
     Axis(&'a [u32], &'a [Datum], usize),
     Text(&'static str),
 }
 
-/// The text of `datum`. What stands before the name of a symbol is up to `qualifier`, usually
+/// Returns the text of `datum`. `qualifier` chooses the prefix of a symbol; it is usually
 /// [`Packages::qualifier`](esl_bytecode::package::Packages::qualifier).
 pub fn print(datum: &Datum, qualifier: &dyn Fn(&Symbol) -> Qualifier) -> String {
     let mut out = String::new();
@@ -151,7 +151,8 @@ fn print_axis<'a>(
     print_items(parts, "(", out, work);
 }
 
-/// The mark that abbreviates the list of `car` and one more element, that element, and the backquotes around it.
+/// Returns the mark that abbreviates the list of `car` and one more element, that element, and the number of
+/// backquotes around it.
 fn mark<'a>(
     car: &Datum,
     cdr: &'a Datum,

@@ -1,7 +1,7 @@
-//! What closures capture.
+//! The captures of closures.
 //!
-//! Closures are flat: whoever makes one must have all that it captures, so a capture belongs to every lambda between
-//! the place that refers to a thing and the frame that owns it.
+//! Closures are flat: the code that makes one must have all that it captures. So a capture belongs to every
+//! lambda between the code that refers to a variable and the frame that owns it.
 
 use rustc_hash::FxHashMap;
 
@@ -12,14 +12,14 @@ use crate::core::*;
 pub(crate) enum Lexical {
     /// A variable, or a local function.
     Variable(VarId),
-    /// The tag by which a block is left.
+    /// The tag of the catch of a block.
     Block(BlockId),
-    /// The tag by which the tags of a tagbody are gone to.
+    /// The tag of the catch of a tagbody.
     Tagbody(TagbodyId),
 }
 
 impl Lexical {
-    /// The lambda that it is bound in.
+    /// Returns the lambda in which it is bound.
     pub(crate) fn owner(self, core: &Core) -> LambdaId {
         match self {
             Lexical::Variable(variable) => core.variables[variable.index()].owner,
@@ -32,7 +32,7 @@ impl Lexical {
 /// The captures of every lambda.
 #[derive(Debug)]
 pub(super) struct Captures {
-    /// The frame in which the closure of each lambda is made.
+    /// Frame in which the closure of each lambda is made.
     parents: Vec<Option<LambdaId>>,
     of: Vec<Vec<Lexical>>,
     indexes: FxHashMap<(LambdaId, Lexical), usize>,
@@ -49,17 +49,17 @@ impl Captures {
         }
     }
 
-    /// Says in which frame the closure of `lambda` is made.
+    /// Sets the frame in which the closure of `lambda` is made.
     pub(super) fn set_parent(&mut self, lambda: LambdaId, parent: LambdaId) {
         self.parents[lambda.index()] = Some(parent);
     }
 
-    /// The captures of a lambda, in order.
+    /// Returns the captures of a lambda, in order.
     pub(super) fn of(&self, lambda: LambdaId) -> &[Lexical] {
         &self.of[lambda.index()]
     }
 
-    /// The number of a capture.
+    /// Returns the index of a capture.
     pub(super) fn index(&self, lambda: LambdaId, lexical: Lexical) -> Option<usize> {
         self.indexes.get(&(lambda, lexical)).copied()
     }
@@ -69,8 +69,8 @@ impl Captures {
         self.captured[variable.index()]
     }
 
-    /// Notes that code in the frame `user` refers to `lexical`, which the frame `home` owns. Calls `first` with each
-    /// lambda that captured nothing before.
+    /// Notes that code in the frame `user` refers to `lexical`, which the frame `home` owns. Calls `first`
+    /// with each lambda that captured nothing before.
     pub(super) fn add(
         &mut self,
         lexical: Lexical,
@@ -82,7 +82,7 @@ impl Captures {
         while frame != home {
             let captures = &mut self.of[frame.index()];
             if self.indexes.contains_key(&(frame, lexical)) {
-                // Those further out have it too.
+                // The lambdas further out capture it too.
                 return;
             }
             self.indexes.insert((frame, lexical), captures.len());
@@ -94,14 +94,15 @@ impl Captures {
                 self.captured[variable.index()] = true;
             }
             let Some(parent) = self.parents[frame.index()] else {
-                unreachable!("a lexical thing is referred to inside the lambda that owns it");
+                unreachable!("references to a variable lie inside the lambda that owns it");
             };
             frame = parent;
         }
     }
 
-    /// Adds the captures of local functions. A function that captures nothing is a constant and needs no capture;
-    /// one that refers to a function that does capture something captures that function, and is no constant either.
+    /// Adds the captures of local functions. A function that captures nothing is a constant and is never
+    /// captured. A function that refers to one that captures something captures that function, and is not a
+    /// constant either.
     pub(super) fn add_functions(
         &mut self,
         core: &Core,
@@ -120,7 +121,7 @@ impl Captures {
             .filter(|(_, lambda)| !self.of(**lambda).is_empty())
             .map(|(&name, _)| name)
             .collect();
-        // The order of a hash table must not show in the code.
+        // The order of a hash table must not affect the code.
         pending.sort_unstable();
         while let Some(function) = pending.pop() {
             let home = frames[core.variables[function.index()].owner.index()];

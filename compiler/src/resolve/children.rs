@@ -1,8 +1,8 @@
-//! The nodes right inside a node, and inside a lambda, in the order of evaluation.
+//! The immediate children of a node, and the nodes of a lambda, in the order of evaluation.
 
 use crate::core::*;
 
-/// Calls `visit` with the nodes right inside `kind`. The texts of lambdas are not inside.
+/// Calls `visit` with the immediate children of a node. The nodes of a lambda are not children.
 pub(crate) fn children(kind: &NodeKind, visit: &mut dyn FnMut(NodeId)) {
     let mut all = |nodes: &[NodeId]| nodes.iter().for_each(|&node| visit(node));
     match kind {

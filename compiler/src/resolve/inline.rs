@@ -1,49 +1,55 @@
-//! Decides which local functions become part of the frame that calls them.
+//! The decision which local functions become part of the frame that calls them.
 //!
-//! A function is inlined if it takes just required parameters, is only called, with the right number of arguments, and
-//! all its calls but one are tail calls of itself: then these are jumps, and the one from outside enters the loop. A
-//! function of a `let` over lambda, `((lambda (x) …) 1)`, is the case without jumps; a named loop is the case with
-//! them. Functions that tail-call each other become one loop when each but one is called from one place only.
+//! A function is inlined if it takes required parameters only, all its uses are calls with the right number
+//! of arguments, and all calls but one are tail calls of itself. Those become jumps, and the call from
+//! outside enters the loop. `((lambda (x) …) 1)` is the case without jumps; a named loop is the case with
+//! them. Functions that tail-call each other become one loop if each but one is called from one place only.
 
 use rustc_hash::FxHashMap;
 
 use super::children::{children, lambda_nodes};
 use crate::core::*;
 
-/// Who runs where.
+/// The frames of all lambdas.
 pub(super) struct Inlining {
-    /// The lambda in whose frame each lambda runs.
+    /// Lambda in whose frame each lambda runs.
     pub(super) frames: Vec<LambdaId>,
-    /// The lambda of each local function.
+    /// Lambda of each local function.
     pub(super) functions: FxHashMap<VarId, LambdaId>,
 }
 
-/// A call of a local function: from which lambda, in tail position of it or not, with the right number of arguments.
+/// A call of a local function.
 #[derive(Clone, Copy)]
 struct CallSite {
+    /// Lambda that contains the call.
     lambda: LambdaId,
+    /// Whether it is a tail call.
     tail: bool,
+    /// Whether the number of arguments is right.
     fits: bool,
 }
 
-/// All that the decision depends on.
+/// Facts on which the decision depends.
 struct Survey {
     functions: FxHashMap<VarId, LambdaId>,
+    /// The functions in the order of their definitions.
     order: Vec<VarId>,
     sites: Vec<Vec<CallSite>>,
-    /// Functions that are used otherwise than by a call.
+    /// Whether each function has uses other than calls.
     values: Vec<bool>,
-    /// Blocks that are left from another lambda or across a cleanup.
+    /// Whether control leaves each block from another lambda or across a cleanup.
     escaping: Vec<bool>,
-    /// Lambdas that are called where they are written, and from where.
+    /// For lambdas that are called where they are written: the lambda around the call, and whether it is a
+    /// tail call.
     hosts: Vec<Option<(LambdaId, bool)>>,
 }
 
-/// How often the decision is repeated, since one function may become inlinable by another.
+/// Repetitions of the decision, since inlining one function may make another one inlinable.
 const ROUNDS: usize = 8;
 
+/// Decides in which frame each lambda runs.
 pub(super) fn decide(core: &Core) -> Inlining {
-    // Which blocks escape decides what is in tail position.
+    // Whether a form is in tail position depends on the blocks that escape.
     let escaping = survey(core, &vec![false; core.blocks.len()]).escaping;
     let survey = survey(core, &escaping);
     let mut hosts = survey.hosts;
@@ -70,7 +76,8 @@ pub(super) fn decide(core: &Core) -> Inlining {
     Inlining { frames, functions: survey.functions }
 }
 
-/// The lambda that a lambda runs in, and whether a place in tail position of it still is.
+/// Returns the lambda in whose frame `lambda` runs, and whether a tail position of `lambda` is one of that
+/// frame.
 fn settle(mut lambda: LambdaId, mut tail: bool, hosts: &[Option<(LambdaId, bool)>]) -> (LambdaId, bool) {
     while let Some((host, host_tail)) = hosts[lambda.index()] {
         lambda = host;
@@ -79,7 +86,8 @@ fn settle(mut lambda: LambdaId, mut tail: bool, hosts: &[Option<(LambdaId, bool)
     (lambda, tail)
 }
 
-/// The one call from outside, if all other calls of the function are tail calls of itself.
+/// Returns the call from outside, if it is the only one and all other calls of the function are tail calls of
+/// itself.
 fn only_caller(
     lambda: LambdaId,
     sites: &[CallSite],
@@ -102,12 +110,15 @@ fn only_caller(
     outside
 }
 
-/// A node to be visited: in which lambda, in tail position or not, under how many dynamic extents and cleanups.
+/// Circumstances of a node to be visited.
 #[derive(Clone, Copy)]
 struct Visit {
     lambda: LambdaId,
+    /// Whether the node is in tail position.
     tail: bool,
+    /// Number of dynamic extents around the node.
     extents: u32,
+    /// Number of cleanups around the node.
     cleanups: u32,
 }
 
@@ -136,14 +147,13 @@ fn survey(core: &Core, escaping: &[bool]) -> Survey {
     enter_lambda(core, LambdaId(0), &mut pending);
     while let Some((node, at)) = pending.pop() {
         let kind = &core.nodes[node.index()].kind;
-        // Whether the last child is in tail position when the node is.
+        // Circumstances of the last child, and of the others.
         let mut last = at.no_tail();
         let mut rest = at.no_tail();
         match kind {
             NodeKind::Local(variable) => survey.values[variable.index()] = true,
             NodeKind::Lambda(lambda) => enter_lambda(core, *lambda, &mut pending),
-            NodeKind::If(..) => {
-                let NodeKind::If(test, consequent, alternative) = kind else { unreachable!("just matched") };
+            NodeKind::If(test, consequent, alternative) => {
                 pending.extend([(*test, rest), (*consequent, at), (*alternative, at)]);
                 continue;
             }
@@ -195,7 +205,7 @@ fn survey(core: &Core, escaping: &[bool]) -> Survey {
                 continue;
             }
             NodeKind::Tagbody(..) => {
-                // Its tags may need an entry that stands while the forms run.
+                // Its tags may need a control entry while the forms run.
                 last = at.inside();
                 rest = at.inside();
             }

@@ -1,13 +1,15 @@
-//! What lowering must know of a whole form before it writes the first instruction.
+//! Resolution: facts about a whole form that lowering needs before it writes the first instruction.
 //!
-//! - Which lambda's frame each piece of text runs in: a local function that is called from one place only, apart from
-//!   tail calls of itself, becomes part of the frame of that place ([`inline`]).
-//! - What each closure captures, transitively, since closures are flat; which variables live in boxes, because they
-//!   are captured and assigned; which local functions capture nothing, so that they are constants ([`Captures`]).
-//! - Which blocks and tagbodies are left from inside a closure or across a cleanup, so that they need a catch.
-//! - In which order the form is evaluated: every node has an interval of positions, every variable the positions at
-//!   which it is read and set, so that lowering can ask whether an operand changes before it is used.
-//! - Which nodes give exactly one value.
+//! - The lambda in whose frame each piece of text runs: a local function that is called from one site only,
+//!   apart from tail calls of itself, becomes part of the frame of that site ([`inline`]).
+//! - The captures of each closure, transitively, since closures are flat; the variables that live in boxes,
+//!   because they are captured and assigned; the local functions that capture nothing, so that they are
+//!   constants ([`Captures`]).
+//! - The blocks and tagbodies that control leaves from inside a closure or across a cleanup, so that they
+//!   need a catch.
+//! - The order of evaluation: every node has an interval of positions, every variable the positions at which
+//!   it is read and set, so that lowering can ask whether an operand changes before it is used.
+//! - The nodes that have exactly one value.
 //!
 //! All walks use explicit stacks and are linear in the form, apart from the number of captures.
 
@@ -24,10 +26,10 @@ use capture::Captures;
 pub(crate) use capture::Lexical;
 pub(crate) use children::{children, lambda_nodes};
 
-/// What a local function is in the code.
+/// Representation of a local function in the code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FunctionKind {
-    /// Nobody refers to it.
+    /// Nothing refers to it.
     Unused,
     /// Part of the frame that calls it.
     Inline,
@@ -37,16 +39,16 @@ pub(crate) enum FunctionKind {
     Closure,
 }
 
-/// What is known of a form.
+/// Facts about a form.
 #[derive(Debug)]
 pub(crate) struct Resolution {
-    /// The lambda in whose frame each lambda runs; its own unless it is inlined.
+    /// Lambda in whose frame each lambda runs: itself, unless it is inlined.
     frames: Vec<LambdaId>,
-    /// The lambda of each variable that stands for a local function.
+    /// Lambda of each variable that is a local function.
     functions: FxHashMap<VarId, LambdaId>,
     used: Vec<bool>,
     captures: Captures,
-    /// Whether tail calls of a frame's own function may turn into jumps, which assign its parameters.
+    /// Whether tail calls of a frame's own function may become jumps, which assign its parameters.
     self_called: Vec<bool>,
     block_catches: Vec<bool>,
     tagbody_catches: Vec<bool>,
@@ -57,17 +59,17 @@ pub(crate) struct Resolution {
 }
 
 impl Resolution {
-    /// The lambda in whose frame the text of `lambda` runs.
+    /// Returns the lambda in whose frame the text of `lambda` runs.
     pub(crate) fn frame(&self, lambda: LambdaId) -> LambdaId {
         self.frames[lambda.index()]
     }
 
-    /// The lambda that the local function `variable` stands for; `None` if it is an ordinary variable.
+    /// Returns the lambda of the local function `variable`; `None` for an ordinary variable.
     pub(crate) fn function(&self, variable: VarId) -> Option<LambdaId> {
         self.functions.get(&variable).copied()
     }
 
-    /// What the local function `variable`, with the text `lambda`, is in the code.
+    /// Returns the representation of the local function with the text `lambda`.
     pub(crate) fn function_kind(&self, lambda: LambdaId) -> FunctionKind {
         if self.frame(lambda) != lambda {
             FunctionKind::Inline
@@ -80,12 +82,12 @@ impl Resolution {
         }
     }
 
-    /// What the closure of `lambda` captures, in order.
+    /// Returns the captures of the closure of `lambda`, in order.
     pub(crate) fn captures(&self, lambda: LambdaId) -> &[Lexical] {
         self.captures.of(lambda)
     }
 
-    /// The number of `lexical` among the captures of `lambda`.
+    /// Returns the index of `lexical` among the captures of `lambda`.
     pub(crate) fn capture_index(&self, lambda: LambdaId, lexical: Lexical) -> Option<usize> {
         self.captures.index(lambda, lexical)
     }
@@ -110,7 +112,7 @@ impl Resolution {
         !self.reads[variable.index()].is_empty() || self.is_assigned(variable)
     }
 
-    /// How often the variable is read in the text.
+    /// Returns the number of reads of the variable in the text.
     pub(crate) fn reads_of(&self, variable: VarId) -> usize {
         self.reads[variable.index()].len()
     }
@@ -120,17 +122,17 @@ impl Resolution {
         self.self_called[lambda.index()]
     }
 
-    /// Whether the block is left from inside a closure or across a cleanup.
+    /// Whether control leaves the block from inside a closure or across a cleanup.
     pub(crate) fn block_needs_catch(&self, block: BlockId) -> bool {
         self.block_catches[block.index()]
     }
 
-    /// Whether a tag of the tagbody is gone to from inside a closure or across a cleanup.
+    /// Whether control goes to a tag of the tagbody from inside a closure or across a cleanup.
     pub(crate) fn tagbody_needs_catch(&self, tagbody: TagbodyId) -> bool {
         self.tagbody_catches[tagbody.index()]
     }
 
-    /// Whether the node always gives exactly one value, if it gives any at all.
+    /// Whether the node has exactly one value whenever control passes it.
     pub(crate) fn is_single(&self, node: NodeId) -> bool {
         self.single[node.index()]
     }
@@ -161,22 +163,22 @@ pub(crate) fn resolve(core: &Core) -> Resolution {
     walk.finish()
 }
 
-/// The walk over the form in the order of evaluation, local functions placed where they run.
+/// The walk over the form in the order of evaluation. Inlined functions are walked where they run.
 struct Walk<'a> {
     core: &'a Core,
     frames: Vec<LambdaId>,
     functions: FxHashMap<VarId, LambdaId>,
     used: Vec<bool>,
     captures: Captures,
-    /// References to local functions, from which frame.
+    /// References to local functions, and the frames that contain them.
     function_references: Vec<(VarId, LambdaId)>,
     self_called: Vec<bool>,
-    /// Frame and number of open cleanups at each block and tagbody.
-    block_places: Vec<Site>,
-    tagbody_places: Vec<Site>,
+    /// Site of each block.
+    block_sites: Vec<Site>,
+    tagbody_sites: Vec<Site>,
     block_catches: Vec<bool>,
     tagbody_catches: Vec<bool>,
-    /// Whether all exits from a block so far give one value.
+    /// Whether all exits from a block so far have one value.
     block_singles: Vec<bool>,
     single: Vec<bool>,
     spans: Vec<(u32, u32)>,
@@ -186,12 +188,14 @@ struct Walk<'a> {
     pending: Vec<WalkStep>,
 }
 
+/// The frame in which a node runs, and the number of cleanups open around it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Site {
     frame: LambdaId,
     cleanups: u32,
 }
 
+/// A step of the walk.
 enum WalkStep {
     Enter(NodeId, Site),
     Leave(NodeId),
@@ -212,8 +216,8 @@ impl<'a> Walk<'a> {
             captures: Captures::new(core),
             function_references: Vec::new(),
             self_called: vec![false; core.lambdas.len()],
-            block_places: vec![root; core.blocks.len()],
-            tagbody_places: vec![root; core.tagbodies.len()],
+            block_sites: vec![root; core.blocks.len()],
+            tagbody_sites: vec![root; core.tagbodies.len()],
             block_catches: vec![false; core.blocks.len()],
             tagbody_catches: vec![false; core.tagbodies.len()],
             block_singles: vec![true; core.blocks.len()],
@@ -235,132 +239,132 @@ impl<'a> Walk<'a> {
                     self.spans[node.index()].1 = self.clock;
                     self.single[node.index()] = self.gives_one(node);
                 }
-                WalkStep::Enter(node, place) => {
+                WalkStep::Enter(node, site) => {
                     self.spans[node.index()].0 = self.clock;
                     self.pending.push(WalkStep::Leave(node));
                     let from = self.pending.len();
-                    self.enter(node, place);
+                    self.enter(node, site);
                     self.pending[from..].reverse();
                 }
             }
         }
     }
 
-    /// Lists the nodes of a lambda to be walked next, in order.
-    fn push_lambda(&mut self, lambda: LambdaId, place: Site) {
+    /// Schedules the nodes of a lambda, in order.
+    fn push_lambda(&mut self, lambda: LambdaId, site: Site) {
         let pending = &mut self.pending;
         lambda_nodes(&self.core.lambdas[lambda.index()], &mut |node| {
-            pending.push(WalkStep::Enter(node, place))
+            pending.push(WalkStep::Enter(node, site))
         });
     }
 
-    /// Notes what a node does, and lists what is walked inside it, in order.
-    fn enter(&mut self, node: NodeId, place: Site) {
+    /// Notes the effects of a node and schedules the nodes inside it, in order.
+    fn enter(&mut self, node: NodeId, site: Site) {
         let core = self.core;
         let kind = &core.nodes[node.index()].kind;
         match kind {
-            NodeKind::Local(variable) => self.read(*variable, place),
+            NodeKind::Local(variable) => self.read(*variable, site),
             NodeKind::SetLocal(variable, _) => {
                 self.sets[variable.index()].push(self.clock);
-                self.capture(Lexical::Variable(*variable), place);
+                self.capture(Lexical::Variable(*variable), site);
             }
-            NodeKind::Lambda(lambda) => return self.closure(*lambda, place),
+            NodeKind::Lambda(lambda) => return self.closure(*lambda, site),
             NodeKind::Functions { definitions, .. } => {
                 for &(_, lambda) in definitions {
                     if self.frames[lambda.index()] == lambda {
-                        self.captures.set_parent(lambda, place.frame);
+                        self.captures.set_parent(lambda, site.frame);
                         self.push_lambda(lambda, Site { frame: lambda, cleanups: 0 });
                     }
                 }
             }
-            NodeKind::Call(callee, arguments) => return self.call(callee, arguments, place),
-            NodeKind::Apply(Callee::Local(variable), _) => self.read(*variable, place),
-            NodeKind::Block(block, _) => self.block_places[block.index()] = place,
-            NodeKind::ReturnFrom(block, _) if self.block_places[block.index()] != place => {
+            NodeKind::Call(callee, arguments) => return self.call(callee, arguments, site),
+            NodeKind::Apply(Callee::Local(variable), _) => self.read(*variable, site),
+            NodeKind::Block(block, _) => self.block_sites[block.index()] = site,
+            NodeKind::ReturnFrom(block, _) if self.block_sites[block.index()] != site => {
                 self.block_catches[block.index()] = true;
-                self.capture(Lexical::Block(*block), place);
+                self.capture(Lexical::Block(*block), site);
             }
-            NodeKind::Tagbody(tagbody, _) => self.tagbody_places[tagbody.index()] = place,
-            NodeKind::Go(tagbody, _) if self.tagbody_places[tagbody.index()] != place => {
+            NodeKind::Tagbody(tagbody, _) => self.tagbody_sites[tagbody.index()] = site,
+            NodeKind::Go(tagbody, _) if self.tagbody_sites[tagbody.index()] != site => {
                 self.tagbody_catches[tagbody.index()] = true;
-                self.capture(Lexical::Tagbody(*tagbody), place);
+                self.capture(Lexical::Tagbody(*tagbody), site);
             }
             NodeKind::FailureCleanup(body, cleanup) => {
-                let inside = Site { cleanups: place.cleanups + 1, ..place };
-                self.pending.push(WalkStep::Enter(*body, place));
+                let inside = Site { cleanups: site.cleanups + 1, ..site };
+                self.pending.push(WalkStep::Enter(*body, site));
                 return self.pending.push(WalkStep::Enter(*cleanup, inside));
             }
             NodeKind::UnwindProtect(..) => {
-                let inside = Site { cleanups: place.cleanups + 1, ..place };
+                let inside = Site { cleanups: site.cleanups + 1, ..site };
                 let pending = &mut self.pending;
                 return children(kind, &mut |child| pending.push(WalkStep::Enter(child, inside)));
             }
             _ => {}
         }
         let pending = &mut self.pending;
-        children(kind, &mut |child| pending.push(WalkStep::Enter(child, place)));
+        children(kind, &mut |child| pending.push(WalkStep::Enter(child, site)));
     }
 
-    fn closure(&mut self, lambda: LambdaId, place: Site) {
+    fn closure(&mut self, lambda: LambdaId, site: Site) {
         self.used[lambda.index()] = true;
-        self.captures.set_parent(lambda, place.frame);
+        self.captures.set_parent(lambda, site.frame);
         self.push_lambda(lambda, Site { frame: lambda, cleanups: 0 });
     }
 
-    fn call(&mut self, callee: &Callee, arguments: &[NodeId], place: Site) {
-        let own = &self.core.lambdas[place.frame.index()];
+    fn call(&mut self, callee: &Callee, arguments: &[NodeId], site: Site) {
+        let own = &self.core.lambdas[site.frame.index()];
         match callee {
             Callee::Value(function) => match self.core.nodes[function.index()].kind {
                 NodeKind::Lambda(lambda) if self.frames[lambda.index()] != lambda => {
-                    self.pending.extend(arguments.iter().map(|&child| WalkStep::Enter(child, place)));
-                    return self.push_lambda(lambda, place);
+                    self.pending.extend(arguments.iter().map(|&child| WalkStep::Enter(child, site)));
+                    return self.push_lambda(lambda, site);
                 }
-                _ => self.pending.push(WalkStep::Enter(*function, place)),
+                _ => self.pending.push(WalkStep::Enter(*function, site)),
             },
             Callee::Global(name) => {
                 if own.is_named(name) && own.takes_exactly(arguments.len()) {
-                    self.self_called[place.frame.index()] = true;
+                    self.self_called[site.frame.index()] = true;
                 }
             }
             Callee::Local(variable) => {
                 let target = self.functions.get(variable).copied();
                 if let Some(lambda) = target.filter(|lambda| self.frames[lambda.index()] != *lambda) {
-                    self.pending.extend(arguments.iter().map(|&child| WalkStep::Enter(child, place)));
-                    // The call from outside has the body in it; those from inside jump to it.
+                    self.pending.extend(arguments.iter().map(|&child| WalkStep::Enter(child, site)));
+                    // The call from outside contains the body; calls from inside jump to it.
                     if std::mem::replace(&mut self.used[lambda.index()], true) {
                         self.self_called[lambda.index()] = true;
                     } else {
-                        self.push_lambda(lambda, place);
+                        self.push_lambda(lambda, site);
                     }
                     return;
                 }
-                if target == Some(place.frame) && own.takes_exactly(arguments.len()) {
-                    self.self_called[place.frame.index()] = true;
+                if target == Some(site.frame) && own.takes_exactly(arguments.len()) {
+                    self.self_called[site.frame.index()] = true;
                 } else {
-                    self.read(*variable, place);
+                    self.read(*variable, site);
                 }
             }
             Callee::Builtin(_) => {}
         }
-        self.pending.extend(arguments.iter().map(|&child| WalkStep::Enter(child, place)));
+        self.pending.extend(arguments.iter().map(|&child| WalkStep::Enter(child, site)));
     }
 
-    fn read(&mut self, variable: VarId, place: Site) {
+    fn read(&mut self, variable: VarId, site: Site) {
         if let Some(&lambda) = self.functions.get(&variable) {
             self.used[lambda.index()] = true;
-            self.function_references.push((variable, place.frame));
+            self.function_references.push((variable, site.frame));
         } else {
             self.reads[variable.index()].push(self.clock);
-            self.capture(Lexical::Variable(variable), place);
+            self.capture(Lexical::Variable(variable), site);
         }
     }
 
-    fn capture(&mut self, lexical: Lexical, place: Site) {
+    fn capture(&mut self, lexical: Lexical, site: Site) {
         let owner = lexical.owner(self.core);
-        self.captures.add(lexical, self.frames[owner.index()], place.frame, &mut |_| {});
+        self.captures.add(lexical, self.frames[owner.index()], site.frame, &mut |_| {});
     }
 
-    /// Whether a node gives exactly one value, now that this is known of everything inside it.
+    /// Whether a node has exactly one value, once this is known of the nodes inside it.
     fn gives_one(&mut self, node: NodeId) -> bool {
         let core = self.core;
         let of = |id: &NodeId| self.single[id.index()];
@@ -386,7 +390,8 @@ impl<'a> Walk<'a> {
             NodeKind::HandlerCase(body, clauses) => of(body) && clauses.iter().all(|clause| of(&clause.body)),
             NodeKind::Values(forms) => forms.len() == 1,
             NodeKind::Call(Callee::Builtin(builtin), _) => builtin.info().returns_one,
-            // What recovers from the failure gives the values of a form with a cleanup for failures.
+            // A form with a cleanup for failures has the values with which the program recovers from the
+            // failure.
             NodeKind::Call(..)
             | NodeKind::Apply(..)
             | NodeKind::CallValues(..)

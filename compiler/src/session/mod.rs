@@ -1,14 +1,15 @@
 //! Compilations: from a text, or from a form, to a module.
 //!
-//! A compilation takes one top-level form after another through the reader, the expander and the lowering. Each becomes
-//! a chunk, a small module; those that are needed at compile time are loaded at once ([`Step::Load`]), and all that
-//! belong to the program are joined at the end. Everything that is found on the way is reported together, in the order
-//! of the text; an error in one form does not keep the others from being looked at.
+//! A compilation takes one top-level form after another through the reader, the expander and the lowering.
+//! Each becomes one or more chunks, small modules. Chunks that are needed at compile time are loaded at once
+//! ([`Step::Load`]), and all chunks of the program are joined at the end. All findings are reported together,
+//! in the order of the text; an error in one form does not keep the others from being checked.
 //!
-//! A form `(require "name")` of a text stops the compilation ([`Step::Require`]), and the forms of the module come in its
-//! place, or at least what they define at compile time; see `queue`.
+//! A form `(require "name")` of a text stops the compilation ([`Step::Require`]). The forms of the module
+//! come in its place, or at least their definitions at compile time; see `queue`.
 //!
-//! Not here: running anything, finding modules. Whoever drives the compilation does that, see [`esl_bytecode::compile`].
+//! Not here: running code, finding modules. The driver of the compilation does that, see
+//! [`esl_bytecode::compile`].
 
 mod queue;
 
@@ -32,33 +33,33 @@ use queue::{FormQueue, Next, renumber_uninterned};
 /// The compiler.
 #[derive(Debug, Default)]
 pub struct Compiler {
-    /// The number that diagnostics give to the first source.
+    /// Number of the first source in diagnostics.
     source: SourceId,
-    /// Whether modules stay outside of the program, to be found when it runs.
+    /// Whether modules stay outside of the program, which finds them at run time.
     apart: bool,
 }
 
 impl Compiler {
-    /// A compiler whose diagnostics call the text that it is given source number `source`.
+    /// Creates a compiler whose diagnostics number the text `source`.
     pub fn for_source(source: SourceId) -> Compiler {
         Compiler { source, ..Compiler::default() }
     }
 
-    /// A compiler that leaves required modules out of the program, which finds them when it runs.
+    /// Leaves required modules out of the program, which finds them at run time.
     #[must_use]
     pub fn apart(mut self) -> Compiler {
         self.apart = true;
         self
     }
 
-    /// Begins to compile a whole text for the sake of what its macros expand to.
+    /// Begins to compile a whole text for the sake of its expansion.
     pub fn expand_text(&self, name: &str, text: &str) -> Texts {
         Texts(CompilationState { listing: Some(String::new()), ..self.texts(&[(name, text)]) })
     }
 
-    /// Begins to compile texts, each with its name, to one module that runs them in order. To one another they are like
-    /// queue of one text, but each is read, and runs, in the package `ESL-USER` until it says otherwise. Diagnostics
-    /// number them from the compiler's source number on.
+    /// Begins to compile texts, each with its name, to one module that runs them in order. To one another
+    /// they are like queue of one text, but each is read, and runs, in the package `ESL-USER` until it says
+    /// otherwise. Diagnostics number them from the compiler's source number on.
     pub fn compile_texts(&self, texts: &[(&str, &str)]) -> Texts {
         Texts(self.texts(texts))
     }
@@ -128,7 +129,7 @@ impl Compile for Compiler {
     }
 }
 
-/// Where forms come from.
+/// Source of forms.
 #[derive(Debug)]
 enum Input {
     /// Texts, all forms of which are compiled.
@@ -141,19 +142,19 @@ enum Input {
 struct CompilationState {
     input: Input,
     source: SourceId,
-    /// The texts, for drawing diagnostics.
+    /// Texts, for drawing diagnostics.
     sources: Sources,
     apart: bool,
-    /// The module that was asked for, and the form that requires it.
+    /// Module that was asked for, and the place of the form that requires it.
     asked: Option<(String, Span)>,
-    /// The form that requires the compiled module that is being loaded.
+    /// Place of the form that requires the compiled module that is being loaded.
     loading: Option<Span>,
     lines: SourceLines,
     expander: Expander,
-    /// What belongs to the program.
+    /// Chunks of the program.
     chunks: Vec<Module>,
     diagnostics: Vec<Diagnostic>,
-    /// What the forms were expanded to, if that is wanted.
+    /// Expansion of the forms, if that is wanted.
     listing: Option<String>,
 }
 
@@ -161,12 +162,12 @@ struct CompilationState {
 pub struct Texts(CompilationState);
 
 impl Texts {
-    /// The texts, those of required modules included.
+    /// Returns the texts, those of required modules included.
     pub fn sources(&self) -> &Sources {
         &self.0.sources
     }
 
-    /// The program so far with its macros expanded, form by form, if it is compiled for the sake of that.
+    /// Returns the expansion so far, form by form, if the text is compiled for the sake of that.
     pub fn expansion(&self) -> &str {
         self.0.listing.as_deref().unwrap_or_default()
     }
@@ -267,14 +268,14 @@ impl CompilationState {
             }
             Answer::Module(Required::Compiled(module)) => queue.enter_compiled(name, span, *module),
             Answer::Failed(reason) => {
-                let message = format!("the module `{name}` is not to be had: {reason}");
+                let message = format!("the module `{name}` is not available: {reason}");
                 self.diagnostics.push(code::UNKNOWN_MODULE.at(span, message));
             }
             _ => queue.add_call(name, span),
         }
     }
 
-    /// Makes the sources of a compiled module sources of this compilation, though their texts are not at hand.
+    /// Adds the sources of a compiled module to those of the compilation, without their texts.
     fn take_sources(&mut self, module: &mut Module) {
         let first = self.lines.names().count() as u32;
         for name in &module.sources {
@@ -287,12 +288,12 @@ impl CompilationState {
         module.sources = self.lines.names().map(String::from).collect();
     }
 
-    /// Whether what is being compiled stays outside of the program.
+    /// Whether the current form stays outside of the program.
     fn is_outside(&self) -> bool {
         self.apart && matches!(&self.input, Input::Texts(queue) if queue.is_inside_module())
     }
 
-    /// Lowers a chunk, and keeps it or has it loaded, or both.
+    /// Lowers a chunk; keeps it for the program, asks for it to be loaded, or both.
     fn chunk(&mut self, chunk: Chunk, charge: &mut dyn FnMut(u64)) -> Option<Step> {
         let Chunk { core, mut purpose } = chunk;
         purpose.emit &= !self.is_outside();
@@ -354,7 +355,8 @@ impl CompilationState {
         Step::Done(module, diagnostics)
     }
 
-    /// Within the compilation, its first source has the number 0.
+    /// Numbers the sources of a diagnostic from the compiler's source number on. Within the compilation they
+    /// begin at 0.
     fn renumber(&self, diagnostic: &mut Diagnostic) {
         diagnostic.primary.span.source.0 += self.source.0;
         for label in &mut diagnostic.secondary {

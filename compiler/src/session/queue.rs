@@ -1,12 +1,13 @@
-//! The texts of a compilation, and the modules that they require, as one row of forms.
+//! The queue of forms of a compilation: its texts, and the modules that they require.
 //!
-//! Each text is read, and runs, in the package `ESL-USER` until it says otherwise. A form `(require "name")` of a text is
-//! not a form like others: whoever reads the row is told, and may put a module in its place. The text of a module stands between
-//! `(%enter-module "name")` and `(%leave-module "name")`, which see to the package and note that the module is there; what it
-//! requires itself is put in its place likewise. A module is put in once, wherever it is required.
+//! Each text is read, and runs, in the package `ESL-USER` until it says otherwise. At a form
+//! `(require "name")` of a text the queue asks for the module ([`Next::Require`]), which may be put in the
+//! place of the form. The text of a module stands between `(%enter-module "name")` and
+//! `(%leave-module "name")`, which set the package and note that the module is present. Modules that it
+//! requires itself are put in likewise. Each module is put in once, wherever it is required.
 //!
-//! Only a form that stands by itself at top level counts, with a name that is written out. All others are calls of the function,
-//! which finds modules when the program runs.
+//! Only a form that stands by itself at top level counts, with a literal name. All others are calls of the
+//! function, which finds modules at run time.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -16,52 +17,52 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::module::{Constant, Module};
 use esl_bytecode::span::{SourceId, Span};
-use esl_bytecode::symbol::{Home, Symbol, USER_PACKAGE};
+use esl_bytecode::symbol::{CL_PACKAGE, Home, Symbol, USER_PACKAGE};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::diagnostic::code;
 use crate::expand::Expander;
 use crate::reader::Reader;
 
-/// What comes next in a row of forms.
+/// Next item of the queue.
 #[derive(Debug)]
 pub(super) enum Next {
-    /// A form, which the expander has.
+    /// A form, which the expander has received.
     Form,
-    /// This module is required, by the form at this place.
+    /// A module that the form at this place requires.
     Require(String, Span),
-    /// A module that comes compiled, for the form at this place.
+    /// A compiled module, which the form at this place requires.
     Module(Module, Span),
-    /// Nothing.
+    /// The end of the queue.
     End,
 }
 
-/// A part of the row.
+/// An item in the queue.
 #[derive(Debug)]
 enum Queued {
     /// The rest of a text.
     Text(Box<Reader>),
-    /// A form that nobody has written.
+    /// A form that no text contains.
     Form(Datum),
-    /// A module that a compiled one requires, for the form at this place.
+    /// A module that a compiled one requires; the form at this place requires that one.
     Require(String, Span),
-    /// A module that comes compiled, and the form that requires it.
+    /// A compiled module, and the place of the form that requires it.
     Module(Box<Module>, Span),
-    /// The module of this name begins.
+    /// The beginning of the module of this name.
     Begun(String),
-    /// The innermost module is over.
+    /// The end of the innermost module.
     Left,
 }
 
-/// The row of forms.
+/// The forms that are still to be compiled.
 #[derive(Debug, Default)]
 pub(super) struct FormQueue {
     row: VecDeque<Queued>,
-    /// The modules whose texts are being read, the innermost last.
+    /// Modules whose texts are being read, the innermost last.
     inside: Vec<String>,
-    /// All modules that were required, by their names in lower case.
+    /// Modules that were required, by their names in lower case.
     required: FxHashSet<String>,
-    /// Those that the texts themselves require, not modules within them.
+    /// Modules that the texts themselves require.
     apart: Vec<String>,
 }
 
@@ -74,12 +75,12 @@ impl FormQueue {
         self.row.push_back(Queued::Text(Box::new(Reader::new(source, text))));
     }
 
-    /// Puts the text of a module before all that is left.
+    /// Puts the text of a module at the front.
     pub(super) fn enter(&mut self, name: &str, span: Span, source: SourceId, text: Arc<str>) {
         self.put_in(name, span, Queued::Text(Box::new(Reader::new(source, text))));
     }
 
-    /// Puts a module that comes compiled before all that is left.
+    /// Puts a compiled module at the front.
     pub(super) fn enter_compiled(&mut self, name: &str, span: Span, module: Module) {
         let requires = module.requires.clone();
         self.put_in(name, span, Queued::Module(Box::new(module), span));
@@ -88,6 +89,7 @@ impl FormQueue {
         }
     }
 
+    /// Puts a module at the front, between the forms that enter and leave it.
     fn put_in(&mut self, name: &str, span: Span, part: Queued) {
         self.add_call(name, span);
         self.row.push_front(Queued::Left);
@@ -97,12 +99,12 @@ impl FormQueue {
         self.row.push_front(Queued::Begun(name.to_lowercase()));
     }
 
-    /// Puts a call of `require`, which finds the module when the program runs, before all that is left.
+    /// Puts a call of `require`, which finds the module at run time, at the front.
     pub(super) fn add_call(&mut self, name: &str, span: Span) {
         self.row.push_front(Queued::Form(call(Symbol::cl("REQUIRE"), name, span)));
     }
 
-    /// The modules that the texts themselves require.
+    /// Takes the modules that the texts themselves require.
     pub(super) fn take_apart(&mut self) -> Vec<String> {
         std::mem::take(&mut self.apart)
     }
@@ -112,7 +114,7 @@ impl FormQueue {
         !self.inside.is_empty()
     }
 
-    /// Gives the next form to the expander.
+    /// Begins the next form in the expander, or returns what has to be done before.
     pub(super) fn next(
         &mut self,
         environment: &mut dyn Environment,
@@ -178,11 +180,11 @@ impl FormQueue {
     }
 }
 
-/// The name of the module that a form requires, as that of a file: symbols are in lower case there.
+/// Returns the name of the module that a form requires. As in names of files, symbols are in lower case.
 fn required(form: &Datum) -> Option<String> {
     let [operator, name] = form.as_list()?[..] else { return None };
     let operator = operator.as_symbol()?;
-    if !operator.is_in(esl_bytecode::symbol::CL_PACKAGE) || operator.name() != "REQUIRE" {
+    if !operator.is_in(CL_PACKAGE) || operator.name() != "REQUIRE" {
         return None;
     }
     match name.kind() {
@@ -207,12 +209,12 @@ fn circular(modules: &[String], span: Span) -> Box<Diagnostic> {
     Box::new(code::CIRCULAR_MODULE.at(span, message).help(help))
 }
 
-/// A call with a name.
+/// Returns a call with a name as its argument.
 fn call(operator: Symbol, name: &str, span: Span) -> Datum {
     Datum::list([Datum::symbol(operator, span), Datum::string(name, span)], span)
 }
 
-/// Gives the uninterned symbols of a module numbers that nothing else in the compilation has.
+/// Gives the uninterned symbols of a module numbers that are unique in the compilation.
 pub(super) fn renumber_uninterned(module: &mut Module, environment: &mut dyn Environment) {
     let mut fresh: FxHashMap<Symbol, Symbol> = FxHashMap::default();
     for constant in &mut module.constants {

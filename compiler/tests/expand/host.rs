@@ -1,4 +1,5 @@
-//! A compile-time host without a virtual machine: macros are Rust functions on data, modules are only counted.
+//! A compile-time host without a virtual machine: macros are Rust functions on data, modules are only
+//! counted.
 
 use std::collections::HashMap;
 
@@ -120,7 +121,8 @@ impl FakeHost {
         self.properties.insert(key, value);
     }
 
-    /// A macro by template: `#0` stands for the form, `#1` for the first argument, `(… . #2...)` for those from the second on.
+    /// A macro by template: `#0` stands for the form, `#1` for the first argument, `(… . #2...)` for those
+    /// from the second on.
     pub(crate) fn define_macro(&mut self, name: &str, template: &str) {
         let symbol = self.symbol(name);
         self.globals.entry(symbol.clone()).or_default().function = GlobalFunction::Macro;

@@ -1,6 +1,7 @@
 //! The expander and compilations: what forms become, and what is said of wrong ones.
 //!
-//! `INSTA_UPDATE=always cargo test -p esl-compiler --test expand` regenerates the snapshots; look at the difference.
+//! `INSTA_UPDATE=always cargo test -p esl-compiler --test expand` regenerates the snapshots; look at the
+//! difference.
 
 mod errors;
 mod flags;

@@ -33,7 +33,7 @@ fn errors_of_all_phases_are_reported_in_the_order_of_the_text() {
     assert!(module.is_none());
     let codes: Vec<&str> = found.iter().map(|finding| finding.code).collect();
     let expected = [
-        "malformed-form",
+        "malformed-binding",
         "comma-outside-backquote",
         "undefined-function",
         "wrong-argument-count",

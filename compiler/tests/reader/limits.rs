@@ -1,4 +1,5 @@
-//! Large and hostile texts: each is read, or refused with a message, on a small native stack and in bounded time.
+//! Large and hostile texts: each is read, or refused with a message, on a small native stack and in bounded
+//! time.
 
 use std::time::Instant;
 
@@ -6,8 +7,8 @@ use esl_compiler::reader::{MAX_DEPTH, MAX_DIGITS, MAX_NAME, MAX_RATIO_DIGITS, re
 
 use crate::{codes, read_all, read_one};
 
-/// Runs `check` on a stack of 256 KiB and fails if it takes far too long, as it would if work grew with the square of
-/// the text.
+/// Runs `check` on a stack of 256 KiB and fails if it takes far too long, as it would if work grew with the
+/// square of the text.
 fn small(check: impl FnOnce() + Send + 'static) {
     let start = Instant::now();
     let thread = std::thread::Builder::new().stack_size(256 << 10).spawn(check).expect("a thread");

@@ -1,6 +1,7 @@
 //! The reader: tokens, data, errors, limits, and properties that hold of all texts.
 //!
-//! `INSTA_UPDATE=always cargo test -p esl-compiler --test reader` regenerates the snapshots; look at the difference.
+//! `INSTA_UPDATE=always cargo test -p esl-compiler --test reader` regenerates the snapshots; look at the
+//! difference.
 
 mod data;
 mod errors;
@@ -61,7 +62,8 @@ fn read_and_render(text: &str) -> String {
     shown
 }
 
-/// Compares `output` for `source` with the snapshot called `name`. Characters that cannot be seen are shown by number.
+/// Compares `output` for `source` with the snapshot called `name`. Characters that cannot be seen are shown
+/// by number.
 fn snapshot(name: &str, source: &str, output: &str) {
     let is_hidden = |c: char| c != '\n' && c.escape_debug().nth(1).is_some() && !"\"'\\".contains(c);
     let show = |c: char| if is_hidden(c) { c.escape_debug().to_string() } else { c.to_string() };

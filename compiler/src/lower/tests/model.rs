@@ -439,8 +439,8 @@ impl Model<'_> {
         }
     }
 
-    /// The global functions of random programs: `NOTE` writes its arguments to the log, `TWO` gives two values, `FAIL`
-    /// fails.
+    /// The global functions of random programs: `NOTE` writes its arguments to the log, `TWO` gives two
+    /// values, `FAIL` fails.
     fn call_global(&mut self, symbol: &Symbol, arguments: Vec<Value>) -> Outcome {
         let arguments_text: String = arguments.iter().map(|argument| format!(" {argument}")).collect();
         self.log.push(format!("{symbol}{arguments_text}"));

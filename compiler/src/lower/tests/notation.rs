@@ -1,7 +1,8 @@
 //! A notation for core trees, so that tests can be read: Lisp, as far as it needs no macros.
 //!
-//! Names between stars are special variables, `(special x)` in a lambda list makes a special parameter; names that are
-//! not bound are special variables as well. A call of a name that is neither bound nor a builtin is a global call.
+//! Names between stars are special variables, `(special x)` in a lambda list makes a special parameter; names
+//! that are not bound are special variables as well. A call of a name that is neither bound nor a builtin is
+//! a global call.
 
 use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::datum::{Datum, DatumKind};
@@ -86,7 +87,8 @@ impl Reader<'_> {
     }
 }
 
-/// A symbol: builtins and the constants are at home where the table says, all others in `COMMON-LISP` for brevity.
+/// A symbol: builtins and the constants are at home where the table says, all others in `COMMON-LISP` for
+/// brevity.
 fn name(token: &str) -> Symbol {
     let upper = token.to_uppercase();
     match BUILTINS.iter().find(|info| info.name == upper) {

@@ -1,4 +1,5 @@
-//! Random programs are lowered, verified, and do what the tree says; so they do when everything is divided or spilled.
+//! Random programs are lowered, verified, and do what the tree says; so they do when everything is divided or
+//! spilled.
 
 use proptest::prelude::*;
 

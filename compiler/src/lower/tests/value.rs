@@ -87,7 +87,8 @@ impl<F> Value<F> {
         }
     }
 
-    /// What the simple builtins do, or the name of the condition with which they fail. `None` for other builtins.
+    /// What the simple builtins do, or the name of the condition with which they fail. `None` for other
+    /// builtins.
     pub(super) fn apply_builtin(
         builtin: esl_bytecode::builtin::Builtin,
         arguments: &[Value<F>],

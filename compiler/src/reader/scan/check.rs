@@ -1,4 +1,5 @@
-//! What depends on more of a datum than the grammar sees: commas, labels, and what the subset leaves out.
+//! Checks that depend on more of a datum than the grammar sees: commas, labels, and syntax that the subset
+//! leaves out.
 
 use crate::diagnostic::code;
 use crate::reader::lexer::Token;
@@ -6,7 +7,7 @@ use crate::reader::name;
 
 use super::{LabelState, MAX_DEPTH, Open, Scanner};
 
-/// A datum with labels may stand for a tree of so many tokens.
+/// Tokens of the tree that a datum with labels stands for, at most.
 const MAX_TREE: u64 = 1 << 24;
 
 impl Scanner {
@@ -18,7 +19,9 @@ impl Scanner {
         if self.backquotes == 0 {
             let in_array = self.levels.iter().any(|level| level.open == Open::Array);
             let place = if in_array { "in an array literal" } else { "outside of a backquote" };
-            return self.error(code::COMMA_OUTSIDE_BACKQUOTE.at(span, format!("comma {place}")));
+            return self.error(
+                code::COMMA_OUTSIDE_BACKQUOTE.at(span, format!("expected no comma {place}, found one")),
+            );
         }
         if token == Token::CommaAt {
             let parent = self.levels.last().map(|level| level.open);
@@ -45,12 +48,16 @@ impl Scanner {
         }
         let Some(number) = label_number(text, start, end) else {
             let span = self.span(start, end);
-            self.error(code::INVALID_TOKEN.at(span, "the number of a label is too large"));
+            self.error(
+                code::INVALID_TOKEN.at(span, "expected the number of a label, found one that is too large"),
+            );
             return Open::Prefix;
         };
         if self.labels.insert(number, LabelState::Open).is_some() {
             let span = self.span(start, end);
-            self.error(code::UNKNOWN_LABEL.at(span, format!("label `#{number}=` is defined twice")));
+            self.error(
+                code::UNKNOWN_LABEL.at(span, format!("expected a new label, found another `#{number}=`")),
+            );
         }
         let open = Open::Label { number, deepest: self.deepest, tokens: self.tokens };
         self.deepest = self.levels.len();
@@ -79,13 +86,14 @@ impl Scanner {
             }
             Some(LabelState::Open) => self.error(
                 code::CIRCULAR_LITERAL
-                    .at(span, "a literal cannot contain itself")
+                    .at(span, "expected a finished label, found one whose literal contains this")
                     .help("build circular structure at run time, with `setf` or `nconc`"),
             ),
             None => {
                 let label = &text[start as usize..end as usize];
                 self.error(
-                    code::UNKNOWN_LABEL.at(span, format!("no label before `{label}` has this number")),
+                    code::UNKNOWN_LABEL
+                        .at(span, format!("expected the number of a label before this, found `{label}`")),
                 );
             }
         }
@@ -110,7 +118,7 @@ impl Scanner {
     }
 }
 
-/// The number in `#n=` or `#n#`.
+/// Returns the number in `#n=` or `#n#`.
 pub(in crate::reader) fn label_number(text: &str, start: u32, end: u32) -> Option<u32> {
     name::digits(&text[start as usize + 1..end as usize - 1])
 }

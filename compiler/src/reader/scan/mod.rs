@@ -1,13 +1,13 @@
-//! Finding the extent of the next datum on the token stream.
+//! Finding the extent of the next datum in the token stream.
 //!
-//! The meaning of a name depends on the current package, which the form before it may have changed; so the reader
-//! works through a text one top-level datum at a time. The scanner collects the tokens of one, which the grammar then
-//! parses. On the way it does what depends on more than the grammar sees: it leaves out what `#+` and `#-` exclude,
-//! keeps nesting within bounds, and checks commas and labels.
+//! The meaning of a name depends on the current package, which the previous form may have changed. So the
+//! reader works through a text one top-level datum at a time. The scanner collects the tokens of one, which
+//! the grammar then parses. On the way it does the work that depends on more than the grammar sees: it leaves
+//! out data that `#+` and `#-` exclude, keeps nesting within bounds, and checks commas and labels.
 //!
-//! Guarantees: nesting is on a stack of levels of its own; after an error the scanner goes on at a place from which
-//! the following forms can be read, and all calls together look at each byte of the text a bounded number of times.
-//! Not here: dots, and marks with nothing after them (the grammar), what tokens denote (`builder`).
+//! Guarantees: nesting is on a stack of its own; after an error the scanner continues at an offset from which
+//! the following forms can be read; all calls together look at each byte of the text a bounded number of
+//! times. Not here: dots, marks without a datum (the grammar), the meaning of tokens (`builder`).
 
 mod check;
 mod recover;
@@ -25,13 +25,13 @@ use super::lexer::{Lexeme, Token};
 
 pub(super) use check::label_number;
 
-/// Lists within lists, marks and vectors included, can be so deep.
+/// Nesting of lists, vectors and marks, at most.
 pub const MAX_DEPTH: usize = 2000;
 
-/// No offset: texts are shorter.
+/// Stands for no offset, since texts are shorter.
 const NONE: u32 = u32::MAX;
 
-/// What is open around the current token.
+/// A list or mark that is open around the current token.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Open {
     /// A list or vector, until its `)`.
@@ -41,7 +41,7 @@ enum Open {
     Backquote,
     Comma,
     Array,
-    /// `#n=`; the number, and what [`Scanner::deepest`] and [`Scanner::tokens`] were outside.
+    /// `#n=`: the number, and the values of [`Scanner::deepest`] and [`Scanner::tokens`] outside.
     Label {
         number: u32,
         deepest: usize,
@@ -51,7 +51,7 @@ enum Open {
     Feature {
         wanted: bool,
     },
-    /// `#+` or `#-` after it: the datum that it is about.
+    /// `#+` or `#-` after its feature expression, before its datum.
     Conditional {
         kept: bool,
     },
@@ -60,18 +60,18 @@ enum Open {
 #[derive(Clone, Copy, Debug)]
 struct Level {
     open: Open,
-    /// Where its token is.
+    /// Start of its token.
     start: u32,
     end: u32,
     /// Index of its token in [`Scanner::lexemes`].
     lexeme: usize,
-    /// Backquotes less commas around it.
+    /// Number of backquotes around it, minus that of commas.
     backquotes: u32,
     /// The first `(` within it that is in column 0.
     column_0: u32,
 }
 
-/// A list without an end, and where the next form probably begins.
+/// A list without an end, and the offset at which the next form probably begins.
 #[derive(Clone, Copy, Debug)]
 struct Unclosed {
     start: u32,
@@ -84,41 +84,41 @@ enum LabelState {
     Done { height: usize, tokens: u64 },
 }
 
-/// What a scan found.
+/// Outcome of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scan {
-    /// A datum, whose tokens are [`Scanner::lexemes`]; it ends before this offset.
+    /// A datum, whose tokens are in [`Scanner::lexemes`]. It ends before this offset.
     Datum(usize),
-    /// No datum but [`Scanner::errors`]; go on at this offset.
+    /// No datum, but [`Scanner::errors`]. Scanning continues at this offset.
     Errors(usize),
     /// The end of the text.
     End,
 }
 
-/// The scanner. It is kept from one datum to the next for its buffers and for what it learnt about the text.
+/// The scanner. It is kept from one datum to the next, for its buffers and for facts about the text.
 #[derive(Debug, Default)]
 pub(super) struct Scanner {
     source: SourceId,
-    /// The tokens of the datum.
+    /// Tokens of the datum.
     pub(super) lexemes: Vec<Lexeme>,
-    /// What is wrong with it so far.
+    /// Faults of the datum so far.
     pub(super) errors: Vec<Diagnostic>,
     levels: Vec<Level>,
-    /// How many of the levels are lists.
+    /// Number of levels that are lists.
     lists: usize,
-    /// How many lists are open beyond [`MAX_DEPTH`]. They have no levels.
+    /// Number of lists open beyond [`MAX_DEPTH`], which have no levels.
     excess: u64,
-    /// Whether that has been reported.
+    /// Whether excessive nesting has been reported.
     is_too_deep: bool,
-    /// How many of the levels are left out by a feature.
+    /// Number of levels that a feature excludes.
     excluded: u32,
     backquotes: u32,
     labels: FxHashMap<u32, LabelState>,
-    /// The deepest nesting since the innermost label.
+    /// Deepest nesting since the innermost label.
     deepest: usize,
-    /// Tokens that the datum would have if all labels were written out.
+    /// Number of tokens that the datum would have if all labels were written out.
     tokens: u64,
-    /// The lists that are known not to be closed before the end of the text, in order.
+    /// Lists that are known to be unclosed at the end of the text, in order.
     unclosed: Vec<Unclosed>,
     runaways: u32,
 }
@@ -145,7 +145,7 @@ impl Scanner {
             let is_done = match token {
                 Token::Open | Token::Vector => {
                     if self.lists == 0 {
-                        // Scanned before, up to the end of the text: do not go there again.
+                        // The list was scanned before, up to the end of the text.
                         if let Ok(known) = self.unclosed.binary_search_by_key(&start, |list| list.start) {
                             let list = self.unclosed[known];
                             return Scan::Errors(self.unclosed_list(list.start, end, list.column_0, text));
@@ -194,7 +194,7 @@ impl Scanner {
         self.tokens = 0;
     }
 
-    /// Takes a token other than a parenthesis. True if it completes the top-level datum.
+    /// Takes a token other than a parenthesis. Returns whether it completes the top-level datum.
     fn token(&mut self, token: Token, text: &str, start: u32, end: u32) -> bool {
         match token {
             Token::Quote | Token::Function => self.push(Open::Prefix, token, start, end),
@@ -248,7 +248,7 @@ impl Scanner {
     fn push(&mut self, open: Open, token: Token, start: u32, end: u32) {
         if self.levels.len() == MAX_DEPTH {
             self.too_deep(start, end);
-            // Marks beyond the limit are dropped, lists are counted, so that the end of the datum is found.
+            // Marks beyond the limit are dropped; lists are counted, so that the end of the datum is found.
             self.excess += u64::from(open == Open::List);
             return;
         }
@@ -269,7 +269,7 @@ impl Scanner {
         Some(level)
     }
 
-    /// Takes a `)`. True if it completes the top-level datum.
+    /// Takes a `)`. Returns whether it completes the top-level datum.
     fn close(&mut self, text: &str, start: u32, end: u32) -> bool {
         if self.excess > 0 {
             self.excess -= 1;
@@ -279,7 +279,7 @@ impl Scanner {
         while let Some(level) = self.pop() {
             match level.open {
                 Open::List => return self.complete(text),
-                // What is excluded never reaches the grammar: its marks are checked here.
+                // Excluded data never reach the grammar, so their marks are checked here.
                 Open::Feature { .. } | Open::Conditional { .. } => {
                     let mark = &text[level.start as usize..level.end as usize];
                     let span = self.span(start, end);
@@ -292,11 +292,11 @@ impl Scanner {
                 _ => {}
             }
         }
-        // Only marks were open: the grammar says what is wrong with the datum.
+        // Only marks were open, a fault that the grammar reports.
         true
     }
 
-    /// A datum is complete: so are the marks before it. True if nothing is left open.
+    /// Completes a datum and the marks before it. Returns whether nothing is left open.
     fn complete(&mut self, text: &str) -> bool {
         if self.excess > 0 {
             return false;
@@ -339,7 +339,7 @@ impl Scanner {
         true
     }
 
-    /// Remembers for all open levels that have none yet that a `(` at the beginning of a line lies within them.
+    /// Notes for all open levels without one that a `(` at the beginning of a line lies within them.
     fn note_column_0(&mut self, start: u32) {
         // Frames that have one are below those that have none.
         for level in self.levels.iter_mut().rev().take_while(|level| level.column_0 == NONE) {

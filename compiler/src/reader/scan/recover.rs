@@ -1,15 +1,16 @@
-//! Texts that end too early, close too much or nest too deeply: what is said of them, and where to read on.
+//! Texts that end too early, close too much or nest too deeply: the diagnostics, and the offset at which
+//! reading continues.
 
 use crate::diagnostic::{Code, code};
 use crate::reader::lexer::{LexError, Lexeme, Token};
 
 use super::{Level, MAX_DEPTH, NONE, Open, Scan, Scanner, Unclosed};
 
-/// A string or name without an end makes the rest of the text unsure; after so many, reading ends.
+/// Strings and names without an end after which reading stops: each makes the rest of the text less certain.
 const MAX_RUNAWAYS: u32 = 8;
 
 impl Scanner {
-    /// The end of the text.
+    /// Takes the end of the text.
     pub(super) fn end(&mut self, text: &str) -> Scan {
         if self.levels.is_empty() {
             return if self.errors.is_empty() { Scan::End } else { Scan::Errors(text.len()) };
@@ -33,16 +34,16 @@ impl Scanner {
         Scan::Errors(self.unclosed_list(outer.start, outer.end, outer.column_0, text))
     }
 
-    /// Reports the list at `start` and gives the place to go on at.
+    /// Reports the unclosed list at `start`; returns the offset at which to continue.
     pub(super) fn unclosed_list(&mut self, start: u32, end: u32, column_0: u32, text: &str) -> usize {
         let mut diagnostic = code::UNCLOSED_LIST
             .at(self.span(start, end), "expected `)`, found the end of the text")
             .label("this list is not closed");
-        // Lists beyond the first form in column 0 are open only because this one is.
+        // Lists behind the first form in column 0 are open only because this one is.
         let inner = self.unclosed.iter().rfind(|list| list.start > start && list.start < column_0);
         if let Some(inner) = inner {
-            diagnostic =
-                diagnostic.also(self.span(inner.start, inner.start + 1), "nor is this one within it");
+            diagnostic = diagnostic
+                .also(self.span(inner.start, inner.start + 1), "this list within it is not closed either");
         }
         if column_0 == NONE {
             self.error(diagnostic);
@@ -83,7 +84,7 @@ impl Scanner {
         );
     }
 
-    /// Reports something that has no end, and gives the place to go on at.
+    /// Reports a token without an end; returns the offset at which to continue.
     pub(super) fn runaway(&mut self, error: LexError, text: &str, start: u32, end: u32) -> usize {
         let (code, width, what): (&Code, u32, _) = match error {
             LexError::UnclosedString => (code::UNCLOSED_STRING, 1, "the `\"` that ends this string"),
@@ -97,14 +98,14 @@ impl Scanner {
             }
             LexError::Unknown => {
                 let span = self.span(start, end);
-                self.error(code::INVALID_TOKEN.at(span, "expected a token"));
+                self.error(code::INVALID_TOKEN.at(span, "expected a token, found other characters"));
                 return end as usize;
             }
         };
         let span = self.span(start, start + width);
         let mut diagnostic = code.at(span, format!("expected {what}, found the end of the text"));
-        // A quote missed long before turns code into strings and strings into code. The first string of this form that
-        // runs over the beginning of another is the likely place.
+        // A quote that was missed long before turns code into strings and strings into code. The first string
+        // of this form that runs over the beginning of another form is the likely place.
         let is_suspect = |lexeme: &&Lexeme| {
             lexeme.token == Token::String && text[lexeme.start as usize..lexeme.end as usize].contains("\n(")
         };
@@ -116,7 +117,7 @@ impl Scanner {
         }
         self.error(diagnostic);
         self.runaways += 1;
-        // Nobody knows where the comment was meant to end, and its text would be taken for code.
+        // The intended end of the comment is unknown, and its text would be taken for code.
         if error == LexError::UnclosedComment || self.runaways > MAX_RUNAWAYS {
             return text.len();
         }

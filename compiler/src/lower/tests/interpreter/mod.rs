@@ -1,5 +1,6 @@
-//! A little interpreter for modules, to compare with [`super::model`]. It does what the opcode table says, and nothing fast:
-//! frames do not overlap, and a register that a callee's frame would have covered holds nothing afterwards.
+//! A little interpreter for modules, to compare with [`super::model`]. It does what the opcode table says,
+//! and nothing fast: frames do not overlap, and a register that a callee's frame would have covered holds
+//! nothing afterwards.
 
 mod step;
 
