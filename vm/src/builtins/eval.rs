@@ -27,6 +27,7 @@ use crate::builtins::expect::optional;
 use crate::builtins::stream::Source;
 use crate::compiler::{ActiveCompilation, CompilerJob, FormText, JobId};
 use crate::datum::Unit;
+use crate::environment;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -90,7 +91,7 @@ impl Vm {
         let mut results = [Value::NIL; 4];
         let kind = match step {
             Step::Expand(call) => {
-                let prepared = self.macro_call(call);
+                let prepared = environment::macro_call(self, call);
                 match self.exchange.loaded(prepared)? {
                     Some(call) => results[1..].copy_from_slice(&call),
                     None => return self.exchange.program_error("the macro is not defined any more"),
@@ -98,7 +99,7 @@ impl Vm {
                 "EXPAND"
             }
             Step::Load { module, keep } => {
-                let functions = self.load_in_unit(module);
+                let functions = environment::load_in_unit(self, module);
                 results[1] = self.exchange.loaded(functions)?;
                 results[2] = Value::boolean(*keep);
                 "LOAD"
@@ -109,7 +110,7 @@ impl Vm {
             }
             Step::Done(module, diagnostics) => {
                 if let Some(module) = module {
-                    let functions = self.load_in_unit(module);
+                    let functions = environment::load_in_unit(self, module);
                     results[1] = self.exchange.loaded(functions)?;
                 }
                 results[2] = self.diagnostics(compilation, diagnostics)?;
@@ -140,7 +141,7 @@ impl Vm {
 
     /// Reads a datum of `text`, which may have a name, from byte `start` on.
     fn read_datum(&mut self, text: &str, start: usize, name: Option<&str>) -> Result<Read, Exit> {
-        let read = self.with_compiler(|vm, compiler| {
+        let read = environment::with_compiler(self, |vm, compiler| {
             let read = compiler.read(vm, text, start);
             read.map_err(|diagnostic| {
                 (is_unfinished(diagnostic.code), compiler.render(&diagnostic, name, text))
@@ -178,7 +179,7 @@ enum Read {
 pub(super) fn begin_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut unit = Unit::default();
     let form = vm.as_form(&mut unit, arguments[0], Span::default())?;
-    let compilation = vm.with_compiler(|_, compiler| compiler.compile_form(form, None))?;
+    let compilation = environment::with_compiler(vm, |_, compiler| compiler.compile_form(form, None))?;
     Ok(vm.begin(compilation, unit))
 }
 
@@ -187,7 +188,7 @@ pub(super) fn begin_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let name = vm.designated_text(name)?;
     let Some(text) = vm.text_of(text) else { return vm.exchange.type_error(text, "STRING") };
     vm.exchange.charge(text.len());
-    let compilation = vm.with_compiler(|_, compiler| compiler.compile_text(&name, &text))?;
+    let compilation = environment::with_compiler(vm, |_, compiler| compiler.compile_text(&name, &text))?;
     Ok(vm.begin(compilation, Unit::default()))
 }
 
@@ -236,7 +237,8 @@ fn begin_form(vm: &mut Vm, text: &mut FormText) -> Outcome {
         Read::Unfinished(what) => vm.exchange.raise(Raised::Reader(what)),
         Read::Datum(datum, end) => {
             let part = text.part(end);
-            let compilation = vm.with_compiler(|_, compiler| compiler.compile_form(datum, part))?;
+            let compilation =
+                environment::with_compiler(vm, |_, compiler| compiler.compile_form(datum, part))?;
             text.pass(end);
             Ok(vm.begin(compilation, Unit::default()))
         }

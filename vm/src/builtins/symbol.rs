@@ -4,6 +4,7 @@ use esl_bytecode::symbol::setf_cell;
 
 use crate::builtins::expect::optional;
 use crate::builtins::lookup;
+use crate::environment;
 use crate::equality::characters_of;
 use crate::heap::Kind;
 use crate::heap::layout::Symbol;
@@ -256,7 +257,7 @@ fn texts(vm: &mut Vm, function: Value) -> Result<(Value, Value), Exit> {
 
 pub(super) fn function_arity(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.code_of_function(arguments[0])?;
-    match vm.arity(arguments[0]) {
+    match environment::arity(vm, arguments[0]) {
         Some(arity) => {
             let max = arity.max.map_or(Value::NIL, |max| Value::index(max as usize));
             vm.give_values(&[Value::index(arity.min as usize), max])

@@ -31,22 +31,6 @@ impl Vm {
         self.compiler.compiler = Some(compiler);
     }
 
-    /// Applies `work` to the compiler, which may ask about the program meanwhile.
-    ///
-    /// # Errors
-    /// A failure if the machine has no compiler.
-    pub(crate) fn with_compiler<T>(
-        &mut self,
-        work: impl FnOnce(&mut Vm, &dyn Compile) -> T,
-    ) -> Result<T, Exit> {
-        let Some(compiler) = self.compiler.compiler.take() else {
-            return self.exchange.program_error("this machine has no compiler");
-        };
-        let result = work(self, &*compiler);
-        self.compiler.compiler = Some(compiler);
-        Ok(result)
-    }
-
     /// Begins to compile another unit: objects and uninterned symbols of the last one are forgotten.
     pub fn begin_unit(&mut self) {
         self.compiler.unit.replace(Unit::default());
@@ -58,18 +42,7 @@ impl Vm {
     /// # Errors
     /// [`LoadError`].
     pub fn load_module(&mut self, module: &Module) -> Result<Value, LoadError> {
-        self.with_room(|vm| load(&mut vm.heap, &mut vm.world, module, &mut Alone::default()))
-    }
-
-    /// Loads a module of the unit that is being compiled.
-    ///
-    /// # Errors
-    /// [`LoadError`].
-    pub(crate) fn load_in_unit(&mut self, module: &Module) -> Result<Value, LoadError> {
-        let mut unit = self.compiler.unit.take();
-        let functions = load(&mut self.heap, &mut self.world, module, &mut unit);
-        self.compiler.unit.replace(unit);
-        functions
+        with_room(self, |vm| load(&mut vm.heap, &mut vm.world, module, &mut Alone::default()))
     }
 
     /// Takes in an image, such as that of the library, and gives the functions that run its top-level forms,
@@ -79,7 +52,7 @@ impl Vm {
     /// [`LoadError`].
     pub fn open_image(&mut self, image: ModuleImage) -> Result<Value, LoadError> {
         let image = Arc::new(image);
-        self.with_room(|vm| vm.world.open_image(&mut vm.heap, image.clone()))
+        with_room(self, |vm| vm.world.open_image(&mut vm.heap, image.clone()))
     }
 
     /// Closes the language: from here on, its names cannot be defined again.
@@ -92,70 +65,94 @@ impl Vm {
         self.world.is_open = true;
     }
 
-    /// Does something outside of all tasks that may find no room: then once more, after a collection.
-    fn with_room<T>(
-        &mut self,
-        mut work: impl FnMut(&mut Vm) -> Result<T, LoadError>,
-    ) -> Result<T, LoadError> {
-        match work(self) {
-            Err(LoadError::Alloc(AllocError::NeedCollection)) => {
-                self.collect_fully();
-                work(self)
-            }
-            result => result,
-        }
-    }
-
-    /// The function, form and environment of a macro call, as the program sees them.
-    pub(crate) fn macro_call(&mut self, call: &MacroCall) -> Result<Option<[Value; 3]>, LoadError> {
-        let mut unit = self.compiler.unit.take();
-        let prepared = self.prepare(call, &mut unit);
-        self.compiler.unit.replace(unit);
-        prepared
-    }
-
-    fn prepare(&mut self, call: &MacroCall, unit: &mut Unit) -> Result<Option<[Value; 3]>, LoadError> {
-        let function = match &call.function {
-            MacroRef::Local(id) => unit.pinned(*id),
-            MacroRef::Global(symbol) => {
-                let symbol = unit.symbol_object(&mut self.heap, &mut self.world, symbol)?;
-                self.world.macro_function_of(&self.heap, symbol)
-            }
-        };
-        let Some(function) = function else { return Ok(None) };
-        let form = unit.value_of(&mut self.heap, &mut self.world, &call.form)?;
-        let mut environment = Value::NIL;
-        for LocalDefinition { name, expander } in call.locals.iter().rev() {
-            let name = unit.symbol_object(&mut self.heap, &mut self.world, name)?;
-            let expander = expander.and_then(|id| unit.pinned(id)).unwrap_or(Value::NIL);
-            let entry = self.heap.cons(name, expander)?;
-            environment = self.heap.cons(entry, environment)?;
-        }
-        Ok(Some([function, form, environment]))
-    }
-
     /// Runs the functions of a loaded module one after the other, in one task: the value of the last.
     ///
     /// # Errors
     /// [`CallError`].
     pub fn run_toplevel(&mut self, functions: Value, ticks: u64) -> Result<Value, CallError> {
         self.embedder.pin(&mut self.heap, functions);
-        let values = self.runner().and_then(|runner| self.call(runner, &[functions], ticks));
+        let values = runner(self).and_then(|runner| self.call(runner, &[functions], ticks));
         self.embedder.unpin(functions);
         Ok(values?.first().copied().unwrap_or(Value::NIL))
     }
+}
 
-    /// The function that calls the functions of a list.
-    fn runner(&mut self) -> Result<Value, CallError> {
-        if self.world.runner.is_nil() {
-            // The module is the machine's own, so all it can lack is room.
-            let toplevel = self.load_module(&runner_module()).map_err(|_| CallError::NoMemory)?;
-            let toplevel = self.heap.car(toplevel).unwrap_or(Value::NIL);
-            let runner = self.call(toplevel, &[], LOAD_TICKS)?;
-            self.world.runner = runner.first().copied().unwrap_or(Value::NIL);
+/// Applies `work` to the compiler, which may ask about the program meanwhile.
+///
+/// # Errors
+/// A failure if the machine has no compiler.
+pub(crate) fn with_compiler<T>(
+    vm: &mut Vm,
+    work: impl FnOnce(&mut Vm, &dyn Compile) -> T,
+) -> Result<T, Exit> {
+    let Some(compiler) = vm.compiler.compiler.take() else {
+        return vm.exchange.program_error("this machine has no compiler");
+    };
+    let result = work(vm, &*compiler);
+    vm.compiler.compiler = Some(compiler);
+    Ok(result)
+}
+
+/// Loads a module of the unit that is being compiled.
+///
+/// # Errors
+/// [`LoadError`].
+pub(crate) fn load_in_unit(vm: &mut Vm, module: &Module) -> Result<Value, LoadError> {
+    let mut unit = vm.compiler.unit.take();
+    let functions = load(&mut vm.heap, &mut vm.world, module, &mut unit);
+    vm.compiler.unit.replace(unit);
+    functions
+}
+
+/// Does something outside of all tasks that may find no room: then once more, after a collection.
+fn with_room<T>(vm: &mut Vm, mut work: impl FnMut(&mut Vm) -> Result<T, LoadError>) -> Result<T, LoadError> {
+    match work(vm) {
+        Err(LoadError::Alloc(AllocError::NeedCollection)) => {
+            vm.collect_fully();
+            work(vm)
         }
-        Ok(self.world.runner)
+        result => result,
     }
+}
+
+/// The function, form and environment of a macro call, as the program sees them.
+pub(crate) fn macro_call(vm: &mut Vm, call: &MacroCall) -> Result<Option<[Value; 3]>, LoadError> {
+    let mut unit = vm.compiler.unit.take();
+    let prepared = prepare(vm, call, &mut unit);
+    vm.compiler.unit.replace(unit);
+    prepared
+}
+
+fn prepare(vm: &mut Vm, call: &MacroCall, unit: &mut Unit) -> Result<Option<[Value; 3]>, LoadError> {
+    let function = match &call.function {
+        MacroRef::Local(id) => unit.pinned(*id),
+        MacroRef::Global(symbol) => {
+            let symbol = unit.symbol_object(&mut vm.heap, &mut vm.world, symbol)?;
+            vm.world.macro_function_of(&vm.heap, symbol)
+        }
+    };
+    let Some(function) = function else { return Ok(None) };
+    let form = unit.value_of(&mut vm.heap, &mut vm.world, &call.form)?;
+    let mut environment = Value::NIL;
+    for LocalDefinition { name, expander } in call.locals.iter().rev() {
+        let name = unit.symbol_object(&mut vm.heap, &mut vm.world, name)?;
+        let expander = expander.and_then(|id| unit.pinned(id)).unwrap_or(Value::NIL);
+        let entry = vm.heap.cons(name, expander)?;
+        environment = vm.heap.cons(entry, environment)?;
+    }
+    Ok(Some([function, form, environment]))
+}
+
+/// The function that calls the functions of a list.
+fn runner(vm: &mut Vm) -> Result<Value, CallError> {
+    if vm.world.runner.is_nil() {
+        // The module is the machine's own, so all it can lack is room.
+        let toplevel = vm.load_module(&runner_module()).map_err(|_| CallError::NoMemory)?;
+        let toplevel = vm.heap.car(toplevel).unwrap_or(Value::NIL);
+        let runner = vm.call(toplevel, &[], LOAD_TICKS)?;
+        vm.world.runner = runner.first().copied().unwrap_or(Value::NIL);
+    }
+    Ok(vm.world.runner)
 }
 
 /// A module that gives a function that calls the functions of a list, and returns what the last one returned.
@@ -202,7 +199,7 @@ fn runner_module() -> Module {
 
 impl CompileTimeHost for Vm {
     fn expand(&mut self, call: &MacroCall) -> Result<Datum, String> {
-        let prepared = self.with_room(|vm| vm.macro_call(call)).map_err(|error| error.to_string())?;
+        let prepared = with_room(self, |vm| macro_call(vm, call)).map_err(|error| error.to_string())?;
         let Some([function, form, environment]) = prepared else {
             return Err("the macro is not defined any more".into());
         };
@@ -215,7 +212,7 @@ impl CompileTimeHost for Vm {
     }
 
     fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, String> {
-        let functions = self.with_room(|vm| vm.load_in_unit(&module)).map_err(|error| error.to_string())?;
+        let functions = with_room(self, |vm| load_in_unit(vm, &module)).map_err(|error| error.to_string())?;
         let value = self.run_toplevel(functions, LOAD_TICKS).map_err(|error| error.to_string())?;
         Ok(keep.then(|| self.compiler.unit.borrow_mut().pin(value)))
     }

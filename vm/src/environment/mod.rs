@@ -13,6 +13,8 @@ use esl_bytecode::module::Parameters;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol, setf_cell};
 
+pub(crate) use host::{load_in_unit, macro_call, with_compiler};
+
 use crate::heap::Heap;
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::shape::{Shape, Sort};
@@ -27,24 +29,24 @@ mod similar;
 impl Environment for Vm {
     fn global(&self, symbol: &Symbol) -> Global {
         let is_locked = symbol.package().is_some_and(|home| is_of_language(home)) && !self.world.is_open;
-        let Some(object) = self.object_for(symbol) else {
+        let Some(object) = object_for(self, symbol) else {
             return Global {
                 function: function_so_far(&self.world, symbol),
                 variable: variable_so_far(&self.world, symbol),
                 accessor: None,
                 locked: is_locked,
-                instead: self.instead_of(symbol),
+                instead: instead_of(self, symbol),
             };
         };
-        let function = self.function_info(object);
+        let function = function_info(self, object);
         let instead = match function {
-            GlobalFunction::Undefined => self.instead_of(symbol),
+            GlobalFunction::Undefined => instead_of(self, symbol),
             _ => None,
         };
         Global {
             function,
-            variable: self.variable_info(object),
-            accessor: self.accessor_info(object),
+            variable: variable_info(self, object),
+            accessor: accessor_info(self, object),
             locked: is_locked,
             instead,
         }
@@ -55,14 +57,14 @@ impl Environment for Vm {
     }
 
     fn property(&self, symbol: &Symbol, indicator: &Symbol) -> Option<Datum> {
-        let Some(object) = self.object_for(symbol) else {
+        let Some(object) = object_for(self, symbol) else {
             let (image, definition) = self.world.images.definition(symbol)?;
             let wanted = (&**indicator.package()?, indicator.name());
             let has_name = |index| self.world.images.symbol(image, index) == Some(wanted);
             let &(_, value) = definition.properties.iter().find(|&&(indicator, _)| has_name(indicator))?;
             return self.world.images.datum(image, value);
         };
-        let value = property(&self.heap, object, self.value_for(indicator)?)?;
+        let value = property(&self.heap, object, value_for(self, indicator)?)?;
         let unit = &mut self.compiler.unit.borrow_mut();
         Some(unit.datum_or_object(&self.heap, &self.world, value, Span::default()))
     }
@@ -137,86 +139,83 @@ pub(crate) fn property(heap: &Heap, object: Value, indicator: Value) -> Option<V
     None
 }
 
-impl Vm {
-    /// The symbol, as the program sees it, if there is an object of it already.
-    fn value_for(&self, symbol: &Symbol) -> Option<Value> {
-        match symbol.package() {
-            Some(_) => self.world.find(symbol),
-            None => self.compiler.unit.borrow().find_uninterned(symbol),
-        }
+/// The symbol, as the program sees it, if there is an object of it already.
+fn value_for(vm: &Vm, symbol: &Symbol) -> Option<Value> {
+    match symbol.package() {
+        Some(_) => vm.world.find(symbol),
+        None => vm.compiler.unit.borrow().find_uninterned(symbol),
     }
+}
 
-    /// The object of a symbol, if there is one already.
-    fn object_for(&self, symbol: &Symbol) -> Option<Value> {
-        self.world.object_of(&self.heap, self.value_for(symbol)?)
+/// The object of a symbol, if there is one already.
+fn object_for(vm: &Vm, symbol: &Symbol) -> Option<Value> {
+    vm.world.object_of(&vm.heap, value_for(vm, symbol)?)
+}
+
+fn function_info(vm: &Vm, object: Value) -> GlobalFunction {
+    if vm.world.macro_function_of(&vm.heap, object).is_some() {
+        return GlobalFunction::Macro;
     }
-
-    fn function_info(&self, object: Value) -> GlobalFunction {
-        if self.world.macro_function_of(&self.heap, object).is_some() {
-            return GlobalFunction::Macro;
-        }
-        match self.world.function_of(&self.heap, object) {
-            Some(function) => GlobalFunction::Function(self.arity(function)),
-            None => GlobalFunction::Undefined,
-        }
+    match vm.world.function_of(&vm.heap, object) {
+        Some(function) => GlobalFunction::Function(arity(vm, function)),
+        None => GlobalFunction::Undefined,
     }
+}
 
-    /// How many arguments a function takes, if that is known without decoding damaged code.
-    pub(crate) fn arity(&self, function: Value) -> Option<Arity> {
-        let code = self.heap.code(self.heap.function_code(function)?)?;
-        let shape = Shape::unpack(code.spare[0]);
-        match shape.sort {
-            Sort::Native => BUILTINS.get(usize::from(shape.number)).map(|info| info.arity),
-            Sort::Undefined => None,
-            Sort::Lazy => {
-                let (image, number) = crate::world::load::image_origin(&self.heap, function)?;
-                Some(arity_of(&self.world.images.decode(image, number)?.parameters))
-            }
-            Sort::Bytecode => {
-                let min = u32::from(shape.required);
-                let has_more = shape.rest || shape.takes_keys;
-                Some(Arity { min, max: if has_more { None } else { Some(min + u32::from(shape.optional)) } })
-            }
+/// How many arguments a function takes, if that is known without decoding damaged code.
+pub(crate) fn arity(vm: &Vm, function: Value) -> Option<Arity> {
+    let code = vm.heap.code(vm.heap.function_code(function)?)?;
+    let shape = Shape::unpack(code.spare[0]);
+    match shape.sort {
+        Sort::Native => BUILTINS.get(usize::from(shape.number)).map(|info| info.arity),
+        Sort::Undefined => None,
+        Sort::Lazy => {
+            let (image, number) = crate::world::load::image_origin(&vm.heap, function)?;
+            Some(arity_of(&vm.world.images.decode(image, number)?.parameters))
         }
-    }
-
-    fn variable_info(&self, object: Value) -> GlobalVariable {
-        let Some(cell) = self.heap.symbol(object) else { return GlobalVariable::Undefined };
-        if cell.header.flags & SymbolObject::CONSTANT != 0 {
-            let unit = &mut self.compiler.unit.borrow_mut();
-            let value = unit.datum_or_object(&self.heap, &self.world, cell.value, Span::default());
-            return GlobalVariable::Constant(value);
-        }
-        if cell.header.flags & SymbolObject::SPECIAL != 0 {
-            GlobalVariable::Special
-        } else {
-            GlobalVariable::Undefined
-        }
-    }
-
-    /// What `%define-accessor` has recorded.
-    fn accessor_info(&self, object: Value) -> Option<Accessor> {
-        let record = property(&self.heap, object, self.world.known.accessor)?;
-        let class = self.heap.as_cons(record)?;
-        let slot = self.heap.as_cons(class.cdr)?;
-        Some(Accessor {
-            class: self.world.name_of(&self.heap, class.car)?,
-            slot: u16::try_from(slot.car.as_index()?).ok()?,
-            read_only: slot.cdr.is_true(),
-        })
-    }
-
-    /// What the library says of a name of Common Lisp that it leaves out.
-    fn instead_of(&self, symbol: &Symbol) -> Option<String> {
-        if !symbol.is_in(CL_PACKAGE) {
-            return None;
-        }
-        match self.property(symbol, &Symbol::esl("%INSTEAD"))?.kind() {
-            DatumKind::String(text) => Some(text.to_string()),
-            _ => None,
+        Sort::Bytecode => {
+            let min = u32::from(shape.required);
+            let has_more = shape.rest || shape.takes_keys;
+            Some(Arity { min, max: if has_more { None } else { Some(min + u32::from(shape.optional)) } })
         }
     }
 }
 
+fn variable_info(vm: &Vm, object: Value) -> GlobalVariable {
+    let Some(cell) = vm.heap.symbol(object) else { return GlobalVariable::Undefined };
+    if cell.header.flags & SymbolObject::CONSTANT != 0 {
+        let unit = &mut vm.compiler.unit.borrow_mut();
+        let value = unit.datum_or_object(&vm.heap, &vm.world, cell.value, Span::default());
+        return GlobalVariable::Constant(value);
+    }
+    if cell.header.flags & SymbolObject::SPECIAL != 0 {
+        GlobalVariable::Special
+    } else {
+        GlobalVariable::Undefined
+    }
+}
+
+/// What `%define-accessor` has recorded.
+fn accessor_info(vm: &Vm, object: Value) -> Option<Accessor> {
+    let record = property(&vm.heap, object, vm.world.known.accessor)?;
+    let class = vm.heap.as_cons(record)?;
+    let slot = vm.heap.as_cons(class.cdr)?;
+    Some(Accessor {
+        class: vm.world.name_of(&vm.heap, class.car)?,
+        slot: u16::try_from(slot.car.as_index()?).ok()?,
+        read_only: slot.cdr.is_true(),
+    })
+}
+
+/// What the library says of a name of Common Lisp that it leaves out.
+fn instead_of(vm: &Vm, symbol: &Symbol) -> Option<String> {
+    if !symbol.is_in(CL_PACKAGE) {
+        return None;
+    }
+    match vm.property(symbol, &Symbol::esl("%INSTEAD"))?.kind() {
+        DatumKind::String(text) => Some(text.to_string()),
+        _ => None,
+    }
+}
 #[cfg(test)]
 mod tests;

@@ -48,6 +48,7 @@ use crate::run::RunOutcome;
 pub use crate::schedule::Grain;
 use crate::vm::Vm;
 use fingerprint::Fingerprints;
+use point::{explore_by, run_by_points};
 
 /// How to explore.
 #[derive(Clone, Copy, Debug)]
@@ -221,7 +222,7 @@ pub fn explore<T: PartialEq, E>(
             break;
         }
         let mut machine = begin()?;
-        machine.explore_by(settings);
+        explore_by(&mut machine, settings);
         fingerprints.begin_machine();
         runs += 1;
         let choices = search.choices(place);
@@ -229,7 +230,7 @@ pub fn explore<T: PartialEq, E>(
         // Where the run is: the choices so far, and the state in which the last step began.
         let mut node = place;
         let mut before = (place != ROOT).then(|| search.nodes[place as usize].state);
-        let outcome = machine.run_by_points(&mut |vm, runnable| {
+        let outcome = run_by_points(&mut machine, &mut |vm, runnable| {
             if runnable.count > 1
                 && let Some(choice) = given.next()
             {

@@ -32,12 +32,6 @@ impl Captured {
         String::from_utf8_lossy(&self.contents().error).into_owned()
     }
 
-    /// What was written to standard output since this was last asked.
-    pub fn take_output(&self) -> String {
-        let bytes = std::mem::take(&mut self.contents().output);
-        String::from_utf8_lossy(&bytes).into_owned()
-    }
-
     pub(super) fn append(&self, output: Output, bytes: &[u8]) {
         let mut contents = self.contents();
         match output {
