@@ -3,7 +3,8 @@
 //!
 //! ```text
 //! point         where a task may have to let others go first, and running from point to point
-//! fingerprint   telling states apart           live   which registers of a frame belong to a state
+//! fingerprint   telling states apart           content  visiting the fields that belong to a state
+//! live          which registers of a frame belong to a state
 //! ```
 //!
 //! **Points.** A task is taken to run undisturbed from one *point* to the next. It stands at a point just
@@ -26,13 +27,14 @@
 //! beginning. Places are taken in the order of how often a task had to give way that could have gone on, so
 //! the first schedule that leads to an ending is one with the fewest such switches.
 //!
-//! **States** are told apart by fingerprints of 128 bits (see `fingerprint`). That two states are confused
-//! can be neglected; one state that is taken for two costs time only.
+//! **States** are told apart by fingerprints of 128 bits (see `fingerprint`). We accept the risk of a
+//! fingerprint collision; exploring a state twice only costs time.
 //!
 //! Not here: the outside (what is in files, what was read). What a command will do: begin machines as for
 //! `run`, with a captured outside; write the numbers of states and schedules, and for each ending its first
-//! schedule; `run` with that list shows it again, with traces. Source: Musuvathi and Qadeer 2007 for the
-//! order by preemptions; state hashes are as old as SPIN (Holzmann 1988).
+//! schedule; `run` with that list shows it again, with traces.
+//! Source: Musuvathi and Qadeer 2007 for the order by preemptions; state hashes are as old as SPIN (Holzmann
+//! 1988).
 
 mod content;
 mod fingerprint;
