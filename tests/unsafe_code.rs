@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The only places with unsafe code.
-const ALLOWED: [&str; 2] = ["heap/", "vm/src/interp/"];
+/// The only places with unsafe code: the heap, the loop, and what both rely on.
+const ALLOWED: [&str; 4] = ["heap/", "vm/src/interp/", "vm/src/cpu.rs", "vm/src/trust.rs"];
 /// Crates that do not forbid unsafe code, since they have such a place.
 const WITH_UNSAFE_CODE: [&str; 2] = ["heap", "vm"];
 /// Documents that say where unsafe code stands.
@@ -49,7 +49,7 @@ fn is_unsafe(line: &str) -> bool {
 }
 
 #[test]
-fn unsafe_code_stands_in_two_places() {
+fn unsafe_code_stands_inside_the_fence() {
     let mut outside = Vec::new();
     for (path, text) in sources() {
         // This file has the word in its strings.
