@@ -20,21 +20,17 @@
               ffloor fceiling ftruncate fround))
 (setf *print-pretty* nil *read-default-float-format* 'double-float)
 ;; Since there is one float type, the constants of the other types are those of the double.
-(dolist (name '(most-positive most-negative least-positive least-negative least-positive-normalized
-                least-negative-normalized))
-  (dolist (type '("SINGLE" "SHORT" "LONG"))
-    (let ((constant (format nil "~a-~a-FLOAT" name type)))
-      (shadow constant)
-      (setf (symbol-value (intern constant))
-            (symbol-value (find-symbol (format nil "~a-DOUBLE-FLOAT" name) "COMMON-LISP")))
-      (proclaim (list 'special (intern constant))))))
-(dolist (name '("" "-NEGATIVE"))
-  (dolist (type '("SINGLE" "SHORT" "LONG"))
-    (let ((constant (format nil "~a-FLOAT~a-EPSILON" type name)))
-      (shadow constant)
-      (setf (symbol-value (intern constant))
-            (symbol-value (find-symbol (format nil "DOUBLE-FLOAT~a-EPSILON" name) "COMMON-LISP")))
-      (proclaim (list 'special (intern constant))))))
+(flet ((define-as-of-double (control)
+         (dolist (type '("SINGLE" "SHORT" "LONG"))
+           (let ((constant (format nil control type)))
+             (shadow constant)
+             (setf (symbol-value (intern constant))
+                   (symbol-value (find-symbol (format nil control "DOUBLE") "COMMON-LISP")))
+             (proclaim (list 'special (intern constant)))))))
+  (mapc #'define-as-of-double
+        '("MOST-POSITIVE-~a-FLOAT" "MOST-NEGATIVE-~a-FLOAT" "LEAST-POSITIVE-~a-FLOAT" "LEAST-NEGATIVE-~a-FLOAT"
+          "LEAST-POSITIVE-NORMALIZED-~a-FLOAT" "LEAST-NEGATIVE-NORMALIZED-~a-FLOAT"
+          "~a-FLOAT-EPSILON" "~a-FLOAT-NEGATIVE-EPSILON")))
 (proclaim '(optimize (safety 3) (debug 1)))
 (setf *error-output* (make-broadcast-stream))
 (dolist (path (last sb-ext:*posix-argv* 2))

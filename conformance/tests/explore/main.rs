@@ -98,12 +98,19 @@ fn a_counter_tested_by_the_wait_does_not_deadlock() {
     }
 }
 
-/// Two tasks that want different values of a property, and a change from outside: the case model-checked in
-/// 1997.
-pub(crate) const TWO_TASKS: &str = "
+/// A property that can be achieved at once.
+pub(crate) const POWER: &str = "
   (define-property power (device))
   (to-achieve (power device value)
-    (t (assert (list 'power device value))))
+    (t (assert (list 'power device value))))";
+
+/// Returns a program with two tasks that want different values of a property, and a change from outside: the case
+/// model-checked in 1997.
+pub(crate) fn two_tasks() -> String {
+    format!("{POWER} {TWO_TASKS}")
+}
+
+const TWO_TASKS: &str = "
   (defvar *outcomes* (list nil nil))
   (defvar *ended* 0)
   (defun want (number value)
@@ -134,16 +141,13 @@ pub(crate) const TWO_TASKS_ENDINGS: &[&str] = &[
 fn two_tasks_a_change_and_the_daemon() {
     // The holder of the lock finds the value that it wants or is told of the violation; the other task fails
     // at once. The single change never violates the locks of both tasks, and no lock is left at the end.
-    check(TWO_TASKS, Grain::Changes, TWO_TASKS_ENDINGS);
+    check(&two_tasks(), Grain::Changes, TWO_TASKS_ENDINGS);
 }
 
 #[test]
 fn no_lock_is_held_by_a_task_that_has_ended() {
     // The last task looks once; under some schedule it looks at each reachable state.
     let text = "
-      (define-property power (device))
-      (to-achieve (power device value)
-        (t (assert (list 'power device value))))
       (defun held-by-the-dead ()
         (without-interrupts
           (let ((found nil))
@@ -156,15 +160,12 @@ fn no_lock_is_held_by_a_task_that_has_ended() {
       (let ((task (spawn (with-maintained-property (power 'camera :on) (sleep 0)))))
         (spawn (abort-task task))
         (spawn (print (held-by-the-dead))))";
-    check(text, Grain::Reads, &["NIL"]);
+    check(&format!("{POWER} {text}"), Grain::Reads, &["NIL"]);
 }
 
 #[test]
 fn a_violated_subscriber_recovers() {
     let text = "
-      (define-property power (device))
-      (to-achieve (power device value)
-        (t (assert (list 'power device value))))
       (spawn
         (with-automatic-recoveries
           (with-maintained-property (power 'camera :on)
@@ -173,7 +174,7 @@ fn a_violated_subscriber_recovers() {
       (assert '(power camera :off))";
     // The read happens before the change or after the recovery. If the change comes between the acquisition
     // of the lock and the read, the interrupt waits for the end of the critical section.
-    check(text, Grain::Changes, &[":ON"]);
+    check(&format!("{POWER} {text}"), Grain::Changes, &[":ON"]);
 }
 
 #[test]
