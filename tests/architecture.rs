@@ -1,0 +1,90 @@
+//! `ARCHITECTURE.md` maps the code completely: its tables list exactly the modules that exist, and each type in its
+//! glossary exists.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Sections of the code map, and the folders whose modules their tables list.
+const SECTIONS: [(&str, &str); 6] = [
+    ("### `bytecode/`", "bytecode/src"),
+    ("### `compiler/`", "compiler/src"),
+    ("### `heap/`", "heap/src"),
+    ("### `vm/`", "vm/src"),
+    ("### `src/`", "src"),
+    ("### The other folders", "conformance/src"),
+];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn document() -> String {
+    fs::read_to_string(root().join("ARCHITECTURE.md")).expect("the document can be read")
+}
+
+/// Returns the part of a text from `heading` to the next heading.
+fn section<'a>(text: &'a str, heading: &str) -> &'a str {
+    let (_, rest) = text.split_once(heading).unwrap_or_else(|| panic!("no section {heading}"));
+    rest.split("\n#").next().unwrap_or(rest)
+}
+
+/// Returns the names in backticks in the first column of all tables of a text.
+fn names_of_rows(text: &str) -> BTreeSet<String> {
+    let rows = text.lines().filter_map(|line| line.strip_prefix("| "));
+    let cells = rows.filter_map(|row| row.split(" | ").next());
+    cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).map(String::from).collect()
+}
+
+/// Returns the names of the files and folders in `folder`, without `lib.rs`.
+fn modules(folder: &Path) -> BTreeSet<String> {
+    let entries = fs::read_dir(folder).expect("the sources can be listed");
+    let paths = entries.map(|entry| entry.expect("the sources can be listed").path());
+    let names = paths.map(|path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned());
+    names.filter(|name| name != "lib").collect()
+}
+
+#[test]
+fn the_map_lists_every_module() {
+    let document = document();
+    for (heading, folder) in SECTIONS {
+        assert_eq!(names_of_rows(section(&document, heading)), modules(&root().join(folder)), "{heading}");
+    }
+}
+
+/// Returns the names of all types that the Rust files below `folder` declare.
+fn declared_types(folder: PathBuf) -> BTreeSet<String> {
+    let mut types = BTreeSet::new();
+    let mut folders = vec![folder];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("the sources can be listed") {
+            let path = entry.expect("the sources can be listed").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                let text = fs::read_to_string(path).expect("a source can be read");
+                for keyword in ["struct ", "enum ", "trait ", "type "] {
+                    let names = text.split(keyword).skip(1).map(|rest| {
+                        rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap_or_default()
+                    });
+                    types.extend(names.map(String::from));
+                }
+            }
+        }
+    }
+    types
+}
+
+#[test]
+fn each_type_in_the_glossary_exists() {
+    let document = document();
+    let (_, glossary) = document.split_once("## 7. Glossary").expect("there is a glossary");
+    let types: BTreeSet<String> =
+        SECTIONS.iter().flat_map(|(_, folder)| declared_types(root().join(folder))).collect();
+    let named = names_of_rows(glossary);
+    let is_type = |name: &str| name.starts_with(|c: char| c.is_ascii_uppercase());
+    let named: Vec<&str> = named.iter().filter_map(|name| name.split("::").last()).collect();
+    let missing: Vec<&&str> = named.iter().filter(|name| is_type(name) && !types.contains(**name)).collect();
+    assert!(named.len() > 40, "the glossary names {} types", named.len());
+    assert!(missing.is_empty(), "no type is called {missing:?}");
+}
