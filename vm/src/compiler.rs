@@ -1,6 +1,6 @@
 //! The compiler of a machine, and the compilations that its programs run with it.
 //!
-//! A program names a compilation, or a text of which it compiles form by form, by a handle. A job is out of
+//! A program refers by a handle to a compilation, or to a text that it compiles form by form. A job is out of
 //! the table while a builtin works on it, since the compiler may ask about the program meanwhile.
 //!
 //! Not here: the steps of a compilation, which are builtins (`builtins::eval`).
@@ -68,7 +68,7 @@ pub(crate) struct ActiveCompilation {
     pub(crate) compilation: Box<dyn Compilation>,
     /// Objects and uninterned symbols of its data.
     pub(crate) unit: Unit,
-    /// A step of which the program has not been told yet, since there was no room.
+    /// A step that the program has not received yet, for lack of room.
     pub(crate) step: Option<Step>,
     /// Whether it waits for the value of a module that was to be loaded.
     pub(crate) keeps: bool,
@@ -109,7 +109,7 @@ impl Compiler {
         self.jobs.contains_key(id).then_some(id)
     }
 
-    /// Takes the job that `handle` names out of the table, until [`Compiler::put_back`]; `None` if it has
+    /// Takes the job that `handle` names out of the table, until [`Compiler::put_back`]. `None` if it has
     /// ended.
     pub(crate) fn take(&mut self, handle: Value) -> Option<(JobId, CompilerJob)> {
         let id = self.find(handle)?;

@@ -1,8 +1,10 @@
-//! Numbers found by hash: the buckets of a hash table whose entries are kept by somebody else.
+//! Buckets of numbered entries, found by hash; the entries themselves are kept elsewhere.
 //!
-//! Guarantees: no operation takes time in proportion to the number of entries. A new entry adds one bucket, and that takes
-//! its share from one other.
-//! Not here: what the entries are; who looks for one says which is the same.
+//! Guarantees: no operation takes time in proportion to the number of entries. A new entry adds one bucket,
+//! which takes its share from one other.
+//!
+//! Not here: the entries. Searches are given a function that compares them.
+//!
 //! Source: Larson, "Dynamic hash tables", 1988, as in `crate::table`.
 
 /// No entry.
@@ -14,7 +16,7 @@ struct BucketLink {
     next: u32,
 }
 
-/// Buckets of numbered entries. Numbers are small: there is a link for each up to the largest.
+/// Buckets of numbered entries. Numbers should be small: there is a link for each number up to the largest.
 #[derive(Debug, Default)]
 pub(super) struct Buckets {
     heads: Vec<u32>,
@@ -28,7 +30,7 @@ pub(super) fn mix(hash: u64, word: u64) -> u64 {
     (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15)
 }
 
-/// Spreads what is in the upper bits of a product over the lower ones.
+/// Returns the upper half of a product, which depends on all bits of its factors.
 #[inline]
 pub(super) fn finish(hash: u64) -> u32 {
     (hash >> 32) as u32
@@ -42,7 +44,7 @@ impl Buckets {
         if bucket < self.heads.len() { bucket } else { bucket & (mask >> 1) }
     }
 
-    /// An entry with this hash of which `same` is true.
+    /// Returns an entry with this hash for which `same` holds.
     #[inline]
     pub(super) fn find(&self, hash: u32, mut same: impl FnMut(u32) -> bool) -> Option<u32> {
         if self.heads.is_empty() {
@@ -59,7 +61,7 @@ impl Buckets {
         None
     }
 
-    /// Adds an entry, which is in no bucket yet.
+    /// Adds an entry that is in no bucket yet.
     pub(super) fn add(&mut self, entry: u32, hash: u32) {
         if self.count >= self.heads.len() {
             self.split();
@@ -74,7 +76,7 @@ impl Buckets {
         self.count += 1;
     }
 
-    /// Removes an entry that was added.
+    /// Removes an entry, which must be there.
     pub(super) fn remove(&mut self, entry: u32) {
         let BucketLink { hash, next } = self.links[entry as usize];
         let bucket = self.bucket(hash);
@@ -95,7 +97,7 @@ impl Buckets {
         }
     }
 
-    /// Adds a bucket, and moves what belongs there from the one that has held it so far.
+    /// Adds a bucket, and moves its entries there from the bucket that held them so far.
     fn split(&mut self) {
         let new = self.heads.len();
         self.heads.push(NONE);

@@ -1,13 +1,13 @@
-//! Queries as they are written, and facts, as terms.
+//! Queries and facts as written by a program, as terms.
 //!
 //! ```text
 //! formula   (and formula*)  (or formula*)  (not formula)  (test function variable*)  pattern
 //! pattern   (term term* [. variable])
 //! ```
 //!
-//! The library has put a function in place of the form of a test. The words are known by their names, whatever their
-//! package, since `test` is a name that programs use themselves. A variable is a symbol whose name begins with `?`; `?`
-//! alone is another variable each time.
+//! The library has replaced the form of a test by a function. The words are recognized by name in any
+//! package, since programs use names such as `test` themselves. A variable is a symbol whose name begins with
+//! `?`; each `?` alone is a different variable.
 
 use std::collections::BTreeMap;
 
@@ -17,19 +17,19 @@ use super::term::{MAX_SIZE, Term, TermError, Terms};
 use crate::heap::{AllocError, Heap};
 use crate::value::Value;
 
-/// Formulas within formulas.
+/// Greatest depth of formulas within formulas.
 const MOST_NESTED: usize = 100;
-/// Atoms and pairs in a query.
+/// Greatest number of atoms and pairs in a query.
 const MOST_PARTS: usize = 1 << 13;
 
-/// What is wrong with a query or a fact.
+/// Why a query or a fact was refused.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum FormulaError {
-    /// No room.
+    /// There is no room.
     Room(AllocError),
-    /// A fact has variables.
+    /// The fact has variables.
     Variable(Value),
-    /// This is not what it should be: a text that begins with what was expected.
+    /// The value is not what was expected; the text names what was.
     Malformed(Value, &'static str),
 }
 
@@ -39,47 +39,47 @@ impl From<AllocError> for FormulaError {
     }
 }
 
-/// Facts of a certain form.
+/// A pattern of facts.
 #[derive(Clone, Debug)]
 pub(super) struct Pattern {
-    /// Its place among the generators of its query, in the order of the text.
+    /// Position among the generators of its query, in the order of the text.
     pub(super) rank: usize,
     pub(super) functor: Term,
     pub(super) arguments: SmallVec<[Term; 6]>,
-    /// What is matched with the list of all further arguments; `NIL` for none.
+    /// Pattern for the list of all further arguments; `NIL` for none.
     pub(super) tail: Term,
 }
 
-/// A condition that the program computes.
+/// A condition computed by the program.
 #[derive(Clone, Debug)]
 pub(super) struct TestForm {
     pub(super) function: Term,
-    /// The variables that it looks at.
+    /// Numbers of the variables that the condition uses.
     pub(super) variables: Vec<u32>,
 }
 
-/// What a query asks, or the body of a rule.
+/// The question of a query, or the body of a rule.
 #[derive(Clone, Debug)]
 pub(super) enum Formula {
     Pattern(Pattern),
     And(Vec<Formula>),
-    /// Alternatives, its rank, and the rank after those in it.
+    /// Alternatives, the rank of the disjunction, and the rank after those in it.
     Or(Vec<Formula>, usize, usize),
     Not(Box<Formula>),
     Test(TestForm),
 }
 
-/// Whether `v` is a logical variable, and whether it is one without a name.
+/// Returns `None` unless `v` is a logical variable, else whether it has no name.
 #[inline]
 fn variable_name(heap: &Heap, v: Value) -> Option<bool> {
     let name = heap.string(heap.symbol(v)?.name)?;
     if name.first() == Some(&u32::from(b'?')) { Some(name.len() == 1) } else { None }
 }
 
-/// Gives the term of a symbol, held, if it is a variable.
+/// Returns the term of a symbol, held, if the symbol is a variable.
 type OfSymbol<'a> = dyn FnMut(&mut Terms, &mut Heap, Value) -> Result<Option<Term>, FormulaError> + 'a;
 
-/// The term of an object; `symbol` gives the terms of symbols that are variables.
+/// Returns the term of an object, held; `symbol` supplies the terms of variables.
 fn convert(
     terms: &mut Terms,
     heap: &mut Heap,
@@ -140,7 +140,8 @@ fn formula_error(error: TermError, v: Value) -> FormulaError {
     }
 }
 
-/// The terms of a fact, each held: its functor and its arguments. `work` is what that took.
+/// Appends the terms of a fact to `cells`, each held: its functor and its arguments. Adds the work done to
+/// `work`.
 pub(super) fn fact(
     terms: &mut Terms,
     heap: &mut Heap,
@@ -182,13 +183,13 @@ pub(super) fn fact(
     outcome
 }
 
-/// Makes formulas of what a program has written.
+/// A parser of formulas from objects of the program.
 pub(super) struct FormulaParser<'a> {
     pub(super) terms: &'a mut Terms,
     pub(super) heap: &'a mut Heap,
-    /// Terms that the formulas hold.
+    /// Terms held by the formulas.
     pub(super) held: Vec<Term>,
-    /// The names of the variables, by their numbers; unbound for those without a name.
+    /// Names of the variables, by number; unbound for those without a name.
     pub(super) names: Vec<Term>,
     /// Number of patterns and alternatives.
     pub(super) ranks: usize,
@@ -214,7 +215,7 @@ impl<'a> FormulaParser<'a> {
         }
     }
 
-    /// Gives variables the values of an association list; the first one counts.
+    /// Binds variables to the values of an association list; the first one counts.
     pub(super) fn inherit(&mut self, bindings: Value) -> Result<(), FormulaError> {
         let mut rest = bindings;
         let mut parts = MAX_SIZE as usize;
@@ -232,7 +233,7 @@ impl<'a> FormulaParser<'a> {
         Ok(())
     }
 
-    /// How much of what a query may have was used.
+    /// Returns the number of atoms and pairs parsed so far.
     pub(super) fn work(&self) -> usize {
         MOST_PARTS - self.parts
     }
@@ -267,7 +268,7 @@ impl<'a> FormulaParser<'a> {
         Ok(Term::variable(number))
     }
 
-    /// The term of a part of a pattern; held by what is parsed.
+    /// Returns the term of a part of a pattern; `held` holds it.
     fn term(&mut self, v: Value) -> Result<Term, FormulaError> {
         self.spend()?;
         let term = match v.is_cons() {
@@ -282,7 +283,7 @@ impl<'a> FormulaParser<'a> {
     }
 
     fn compound(&mut self, v: Value) -> Result<Term, FormulaError> {
-        // The variables are found first, since the conversion has the terms to itself.
+        // Variables are found first, because the conversion borrows the terms exclusively.
         let mut open = vec![v];
         let mut known: BTreeMap<u64, Term> = BTreeMap::new();
         while let Some(part) = open.pop() {
@@ -317,7 +318,7 @@ impl<'a> FormulaParser<'a> {
         outcome
     }
 
-    /// A pattern.
+    /// Parses a pattern.
     pub(super) fn pattern(&mut self, v: Value) -> Result<Pattern, FormulaError> {
         let Some(pair) = self.heap.as_cons(v) else { return self.malformed(v, "a pattern, which is a list") };
         let rank = self.ranks;
@@ -336,7 +337,7 @@ impl<'a> FormulaParser<'a> {
         Ok(Pattern { rank, functor, arguments, tail })
     }
 
-    /// The term of a text as it is, variables and all.
+    /// Returns the term of an object as it is, including its variables.
     pub(super) fn text(&mut self, v: Value) -> Result<Term, FormulaError> {
         let term = convert(self.terms, self.heap, v, &mut self.parts, &mut |_, _, _| Ok(None))?;
         self.held.push(term);
@@ -360,7 +361,7 @@ impl<'a> FormulaParser<'a> {
         ["AND", "OR", "NOT", "TEST"].into_iter().find(|word| is(word))
     }
 
-    /// A formula.
+    /// Parses a formula.
     pub(super) fn formula(&mut self, v: Value, depth: usize) -> Result<Formula, FormulaError> {
         if depth > MOST_NESTED {
             return self.malformed(v, "fewer formulas within formulas");

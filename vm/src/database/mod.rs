@@ -1,22 +1,24 @@
 //! The logical database: facts, rules, and queries over them.
 //!
 //! ```text
-//! term      what facts consist of        relation   facts and their indexes     bucket   hashing
-//! formula   queries as written           rule       rules and their strata      plan     the order of goals
-//! query     from question to answers     machine    running goals               scan     facts of many relations
+//! term      contents of facts          relation   facts and their indexes    bucket   hashing
+//! formula   queries as written         rule       rules and their strata     plan     the order of goals
+//! query     from question to answers   solver     running goals              scan     several relations
 //! tuple     sets of answers
 //! ```
 //!
-//! Guarantees: a query sees the facts that there were when it began, whatever happens meanwhile; nothing takes a time in
-//! proportion to the number of facts at once, what does (making an index, a query) is done in steps; facts cost the
-//! collector nothing (see `term`), and their bytes count against the limit of the heap.
+//! Guarantees: a query sees the facts as they were when it began, whatever happens meanwhile. No single
+//! operation takes time in proportion to the number of facts; what does (making an index, a query) is done in
+//! steps. Facts cost the collector nothing (see `term`), and their bytes count against the limit of the heap.
 //!
-//! Every change has a number, and a fact those of the changes that made and ended it. A fact that has ended stays until all
-//! queries have closed that were open then; then it leaves its chains, and when all have closed that were open at that time,
-//! nobody stands on it any more, and its place is free.
+//! Changes are numbered, and a fact has the numbers of the changes that made and ended it. A fact that has
+//! ended stays until all queries that were open then have closed; then it leaves its chains. When all queries
+//! that were open at that moment have closed, none has its cursor on the fact any more, and its row is free.
 //!
 //! Not here: the language's forms and the event of changes, which are ESL in `stdlib/database.esl`.
-//! Source: Gat 1997, section 5. The view of queries is the logical update view of Prolog (Lindholm and O'Keefe 1987).
+//!
+//! Source: Gat 1997, section 5. The view of a query is the logical update view of Prolog (Lindholm and
+//! O'Keefe 1987).
 
 mod bucket;
 mod formula;
@@ -48,12 +50,13 @@ use rule::{Rule, Rules};
 pub(crate) use term::Term;
 use term::Terms;
 
-/// Answers that one step gives at most.
+/// Greatest number of answers taken in one step.
 const PORTION: usize = 128;
-/// Places that one operation frees at most.
+/// Greatest number of rows freed by one operation.
 const FREED_AT_ONCE: usize = 8;
 
-/// A fact that has ended, and the query before which no open one may know it.
+/// A fact that has ended, and the number of the query to be opened next at that time. Open queries with
+/// smaller numbers may see it.
 #[derive(Clone, Copy, Debug)]
 struct EndedFact {
     relation: u32,
@@ -61,7 +64,7 @@ struct EndedFact {
     serial: u64,
 }
 
-/// See the module documentation.
+/// The facts and rules of a machine, and its open queries.
 #[derive(Debug, Default)]
 pub(crate) struct Database {
     terms: Terms,
@@ -69,24 +72,24 @@ pub(crate) struct Database {
     /// Relations by functor and width.
     by_name: Buckets,
     rules: Arc<Rules>,
-    /// The number of the latest change.
+    /// Number of the latest change.
     time: u64,
     facts: usize,
-    /// Bytes of facts, about.
+    /// Bytes of facts, approximately.
     bytes: usize,
 
     // ---- queries
-    /// Those that are open, by number; out of its place while it uses the database.
+    /// Open queries, by number; `None` while a query works on the database.
     queries: BTreeMap<u64, Option<Box<Query>>>,
-    /// The number of the next query.
+    /// Number of the query to be opened next.
     serial: u64,
-    /// Facts that have ended and are still in their chains.
+    /// Facts that have ended, still in their chains.
     ended: VecDeque<EndedFact>,
-    /// Those that have left their chains.
+    /// Facts that have ended and left their chains.
     unlinked: VecDeque<EndedFact>,
-    /// Terms to be given up, of queries that were closed.
+    /// Terms of closed queries, to be released.
     released: Vec<Vec<Term>>,
-    /// Terms of rules that were replaced, and the query before which no open one may know them.
+    /// Terms of replaced rules, each with the number of the query to be opened next at that time.
     retired: VecDeque<(u64, Vec<Term>)>,
     cells: Vec<Term>,
 }
@@ -113,12 +116,13 @@ fn name_hash(functor: Term, width: usize) -> u32 {
 }
 
 impl Database {
-    /// Number of facts.
+    /// Returns the number of facts.
     fn facts(&self) -> usize {
         self.facts
     }
 
-    /// Makes what the database needs of the heap; gives what is to be kept from being collected.
+    /// Makes the table of objects if there is none yet; the caller keeps the returned object from being
+    /// collected.
     pub(crate) fn prepare(&mut self, heap: &mut Heap) -> Result<Option<Value>, AllocError> {
         self.terms.make_object_table(heap)
     }
@@ -130,10 +134,11 @@ impl Database {
         })
     }
 
-    /// Adds a fact; `T` if it is new, or the fact that it replaces, as the value of a property. `work` is what that took.
+    /// Adds a fact. Returns `T` if it is new, `NIL` if it is there already, and the replaced fact if it is
+    /// the value of a property. Adds the work done to `work`.
     ///
     /// # Errors
-    /// [`FormulaError`] if it is no fact, or there is no room; then nothing has changed.
+    /// [`FormulaError`] unless it is a fact and there is room; then nothing has changed.
     pub(crate) fn assert(
         &mut self,
         heap: &mut Heap,
@@ -155,7 +160,7 @@ impl Database {
             return number;
         }
         let number = self.relations.len() as u32;
-        // A relation stays, and holds its functor.
+        // A relation is permanent, and holds its functor.
         self.terms.retain(functor);
         self.relations.push(Relation::new(functor, width));
         self.by_name.add(number, name_hash(functor, width));
@@ -194,7 +199,7 @@ impl Database {
         Ok(outcome)
     }
 
-    /// The fact of a row as a list.
+    /// Returns the fact of a row as a list.
     fn fact_value(
         &self,
         heap: &mut Heap,
@@ -210,8 +215,8 @@ impl Database {
         heap.list(&parts)
     }
 
-    /// From now on the last of the `width` arguments of facts of this name is unique for given others; false if there are
-    /// rules for them.
+    /// Makes the last of the `width` arguments of facts of this name unique for given others. Returns false
+    /// if there are rules for such facts.
     ///
     /// # Errors
     /// As for every allocation.
@@ -232,7 +237,7 @@ impl Database {
         Ok(true)
     }
 
-    /// The value of a property for given arguments, unbound if there is none.
+    /// Returns the value of a property for given arguments, unbound if there is none.
     ///
     /// # Errors
     /// As for [`Database::assert`].
@@ -265,7 +270,7 @@ impl Database {
         value
     }
 
-    /// Removes a fact; whether it was there.
+    /// Removes a fact. Returns whether it was there.
     ///
     /// # Errors
     /// As for [`Database::assert`].
@@ -300,10 +305,10 @@ impl Database {
         self.ended.push_back(EndedFact { relation, row, serial: self.serial });
     }
 
-    /// Adds a rule, unless the very rule is there.
+    /// Adds a rule; it replaces a rule made from the same source.
     ///
     /// # Errors
-    /// [`FormulaError`] if it is no rule, or there is no room.
+    /// [`FormulaError`] unless it is a rule and there is room.
     pub(crate) fn define_rule(
         &mut self,
         heap: &mut Heap,
@@ -336,12 +341,12 @@ impl Database {
         Ok(())
     }
 
-    // Queries.
+    // ---- queries
 
-    /// Begins a query; see [`Query::begin`].
+    /// Begins a query (see [`Query::begin`]) and returns its number.
     ///
     /// # Errors
-    /// [`FormulaError`] if it is no query, or there is no room.
+    /// [`FormulaError`] unless it is a query and there is room.
     pub(crate) fn open(
         &mut self,
         heap: &mut Heap,
@@ -360,7 +365,7 @@ impl Database {
         Ok(number)
     }
 
-    /// Works on a query.
+    /// Runs a query until `work` is used up or the query needs something. `None` if it is not open.
     pub(crate) fn step(&mut self, key: u64, work: &mut usize) -> Option<Result<Progress, QueryError>> {
         let mut query = self.queries.get_mut(&key)?.take()?;
         let before = query.bytes();
@@ -371,17 +376,18 @@ impl Database {
         Some(progress)
     }
 
-    /// Tells a query the outcome of the test that it has asked for.
+    /// Gives a query the outcome of the test that it has requested.
     pub(crate) fn tell(&mut self, key: u64, holds: bool) {
         if let Some(Some(query)) = self.queries.get_mut(&key) {
             query.tell(holds);
         }
     }
 
-    /// The next answers: lists of bindings. `None` for a query that is not open; an empty list at the end.
+    /// Returns the next answers, as lists of bindings; the empty list at the end. `None` if the query is not
+    /// open.
     ///
     /// # Errors
-    /// As for every allocation; then none is taken.
+    /// As for every allocation; then no answer is taken.
     pub(crate) fn answers(
         &mut self,
         heap: &mut Heap,
@@ -415,8 +421,8 @@ impl Database {
         Some(taken.map(|(list, _)| list))
     }
 
-    /// Removes the next fact that a query has found and that is still there, and gives it; `NIL` at the end, `T` to be asked
-    /// again.
+    /// Removes the next fact that a query has found, if it is still there, and returns it; `NIL` at the end,
+    /// `T` if there is more to be looked at. `None` if the query is not open.
     ///
     /// # Errors
     /// As for every allocation; then nothing is removed.
@@ -445,14 +451,14 @@ impl Database {
             let fact = self.fact_value(heap, number, row, work);
             match fact {
                 Ok(_) => self.end(number, row),
-                // It is the next one still.
+                // The fact remains the next one.
                 Err(_) => self.queries.get_mut(&key)?.as_mut()?.taken -= 1,
             }
             return Some(fact);
         }
     }
 
-    /// Whether all answers that a query has found were taken.
+    /// Returns whether all answers found by a query were taken.
     pub(crate) fn has_all_given(&self, key: u64) -> bool {
         let query = self.queries.get(&key).and_then(Option::as_ref);
         query.is_none_or(|query| query.taken == query.tuples.len())
@@ -466,7 +472,7 @@ impl Database {
         self.tidy(heap);
     }
 
-    /// The object of a term.
+    /// Returns the object of a term.
     ///
     /// # Errors
     /// As for every allocation.
@@ -474,7 +480,7 @@ impl Database {
         self.terms.value(heap, term, &mut 0)
     }
 
-    /// Whether there is room for what the database has.
+    /// Checks that there is room for the database's bytes.
     ///
     /// # Errors
     /// As for every allocation.
@@ -482,14 +488,14 @@ impl Database {
         heap.set_external(self.footprint())
     }
 
-    // For those who look at states.
+    // ---- telling states apart
 
-    /// Whether no query is open.
+    /// Returns whether no query is open.
     pub(crate) fn is_quiet(&self) -> bool {
         self.queries.is_empty()
     }
 
-    /// Calls `visit` with words and objects that say which facts and rules there are, and in which order they came.
+    /// Calls `visit` with words and objects that determine the facts and rules, and their order.
     pub(crate) fn visit_state(&self, visit: &mut dyn FnMut(Result<u64, Value>)) {
         // Without `..`: a new field does not compile before somebody has thought of it here.
         let Database {
@@ -530,14 +536,14 @@ impl Database {
         }
     }
 
-    // Keeping order.
+    // ---- upkeep
 
-    /// Bytes that the database takes, about.
+    /// Returns the bytes that the database takes, approximately.
     fn footprint(&self) -> usize {
         self.bytes + self.terms.bytes
     }
 
-    /// Does a little of what is to be done sometime: gives back places and terms.
+    /// Releases some rows and terms that are no longer needed. Each change does a little of this.
     fn tidy(&mut self, heap: &mut Heap) {
         let oldest = self.queries.keys().next().copied().unwrap_or(u64::MAX);
         for _ in 0..FREED_AT_ONCE {

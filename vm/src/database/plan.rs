@@ -1,11 +1,11 @@
-//! In which order the parts of a conjunction are looked up, and the goals that a query is run by.
+//! The goals of a query, and their order.
 //!
-//! Of the patterns of a conjunction that one comes next for which there are fewest facts to be expected, given what is
-//! bound by then, unless the order of the text is about as good. A test comes as soon as its variables are bound and the
-//! patterns before it in the text have been seen to, a negation as soon as the variables are bound that it shares with
-//! patterns. The answers do not depend on the order, and neither does their order, for which see `query`.
+//! The next pattern of a conjunction is the one with the fewest expected facts, given the variables bound so
+//! far, unless the order of the text is about as good. A test comes as soon as its variables are bound and
+//! the patterns before it in the text are done; a negation, as soon as the variables that it shares with
+//! patterns are bound. Neither the answers nor their order (see `query`) depend on the order of the goals.
 //!
-//! A goal names the goal that comes after it, so formulas in formulas become one graph.
+//! A goal names its successor, so that nested formulas become one graph.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use super::relation::INDEXED_POSITIONS;
 use super::term::{Term, Terms};
 use super::{Database, rule::Rules};
 
-/// The number of a goal.
+/// Number of a goal.
 pub(super) type GoalId = u32;
 
 /// A step of a query.
@@ -22,32 +22,33 @@ pub(super) type GoalId = u32;
 pub(super) enum Goal {
     /// Finds facts.
     Match { pattern: Arc<Pattern>, relation: Option<u32>, next: GoalId },
-    /// Finds facts of a predicate that has rules.
+    /// Finds facts of a predicate with rules.
     Call { pattern: Arc<Pattern>, predicate: usize, next: GoalId },
-    /// Tries one after the other. The ranks are those of the alternatives.
+    /// Tries one alternative after the other. The ranks are those of the alternatives.
     Branch { alternatives: Vec<GoalId>, rank: usize, ranks_end: usize },
-    /// Goes on if there is no answer inside.
+    /// Continues if there is no answer inside.
     Not { inside: GoalId, next: GoalId },
-    /// There is an answer inside.
+    /// An answer inside a negation.
     Proved,
-    /// Goes on if the program says so.
+    /// Continues if the program's condition holds.
     Test { test: TestForm, next: GoalId },
-    /// An answer.
+    /// An answer of the query or rule.
     Solved,
 }
 
-/// Patterns of a conjunction that are put into order by what they cost; more than that stay as they are.
+/// Greatest number of patterns in a conjunction that are ordered by cost; longer conjunctions keep the order
+/// of the text.
 const MOST_ORDERED: usize = 64;
-/// By how much another order must be better than that of the text.
+/// Factor by which another order must be better than that of the text.
 const WORTHWHILE: f64 = 4.0;
-/// How many facts a predicate with rules is taken to have, when no argument is known, and when some are.
+/// Assumed number of facts of a predicate with rules: without any known argument, and with some.
 const MANY: f64 = 1e6;
 const SOME: f64 = 1e3;
 
-/// Which variables are bound.
+/// Whether each variable is bound, by number.
 type Bound = Vec<bool>;
 
-/// A formula, put into order.
+/// A formula with its parts in the order of evaluation.
 enum Arranged<'f> {
     Pattern(&'f Pattern),
     And(Vec<Arranged<'f>>),
@@ -56,12 +57,12 @@ enum Arranged<'f> {
     Test(&'f TestForm),
 }
 
-/// Makes goals of formulas.
+/// The planner: makes goals of formulas.
 pub(super) struct Planner<'a> {
     pub(super) database: &'a Database,
     pub(super) rules: &'a Rules,
     pub(super) goals: &'a mut Vec<Goal>,
-    /// Whether generators are in another order than in the text.
+    /// Whether generators are in an order other than that of the text.
     pub(super) is_reordered: bool,
     /// Steps taken.
     pub(super) work: usize,
@@ -74,10 +75,11 @@ fn variables_of(terms: &Terms, pattern: &Pattern, visit: &mut dyn FnMut(usize)) 
 }
 
 impl Planner<'_> {
-    /// Makes the goals of a formula after which `next` comes. `bound` says what is bound before.
+    /// Makes the goals of a formula that is followed by `next`. `bound` says which variables are bound before
+    /// it.
     pub(super) fn plan(&mut self, formula: &Formula, bound: &mut Bound, next: GoalId) -> GoalId {
         if let Formula::Pattern(pattern) = formula {
-            // There is nothing to arrange, and nobody asks what is bound behind it.
+            // There is nothing to order, and the caller does not use what is bound afterwards.
             self.work += 1;
             return self.emit_pattern(pattern, next);
         }
@@ -107,7 +109,8 @@ impl Planner<'_> {
         }
     }
 
-    /// A pattern, and for each predicate with rules that it may be about an alternative.
+    /// Makes the goals of a pattern: the facts, and an alternative for each predicate with rules that it may
+    /// match.
     fn emit_pattern(&mut self, pattern: &Pattern, next: GoalId) -> GoalId {
         let is_plain = pattern.functor.as_variable().is_none() && pattern.tail == Term::NIL;
         let relation = match is_plain {
@@ -153,7 +156,7 @@ impl Planner<'_> {
         Arranged::And(order.into_iter().map(|at| self.arrange(&parts[at], bound)).collect())
     }
 
-    /// The order in which the parts of a conjunction are looked up.
+    /// Returns the order in which the parts of a conjunction are evaluated.
     fn order(&mut self, parts: &[Formula], bound: &Bound) -> Vec<usize> {
         let is_generator = |at: &usize| !matches!(parts[*at], Formula::Not(_) | Formula::Test(_));
         let generators: Vec<usize> = (0..parts.len()).filter(is_generator).collect();
@@ -165,7 +168,7 @@ impl Planner<'_> {
                 self.is_reordered = true;
             }
         }
-        // Tests and negations, each as soon as it may come.
+        // Tests and negations, each placed as early as possible.
         let mut waiting: Vec<usize> = (0..parts.len()).filter(|at| !is_generator(at)).collect();
         let mut order = Vec::with_capacity(parts.len());
         let mut now = bound.clone();
@@ -186,7 +189,7 @@ impl Planner<'_> {
         order
     }
 
-    /// Whether a test or negation may come behind those parts that are in order.
+    /// Returns whether a test or negation can follow the parts that are in order so far.
     fn may_come(
         &self,
         parts: &[Formula],
@@ -195,7 +198,7 @@ impl Planner<'_> {
         generators: &[usize],
         order: &[usize],
     ) -> bool {
-        // Variables that are bound for sure by now, or on which the patterns to come have no bearing.
+        // Variables that are certainly bound by now, or that later patterns do not bind.
         let mut open = vec![false; now.len()];
         for &other in generators.iter().filter(|other| !order.contains(other)) {
             self.bind(&parts[other], &mut open);
@@ -217,7 +220,7 @@ impl Planner<'_> {
         }
     }
 
-    /// Notes the variables that every answer to a formula binds.
+    /// Marks the variables that every answer to a formula binds.
     fn bind_surely(&self, formula: &Formula, bound: &mut Bound) {
         match formula {
             Formula::Pattern(_) => self.bind(formula, bound),
@@ -237,7 +240,7 @@ impl Planner<'_> {
         }
     }
 
-    /// Notes the variables that an answer to a formula may bind.
+    /// Marks the variables that some answer to a formula binds.
     fn bind(&self, formula: &Formula, bound: &mut Bound) {
         match formula {
             Formula::Pattern(pattern) => {
@@ -283,7 +286,7 @@ impl Planner<'_> {
         (order, cost)
     }
 
-    /// About how many answers a formula has for each choice of what is bound.
+    /// Estimates the number of answers to a formula, given which variables are bound.
     fn estimate(&mut self, formula: &Formula, bound: &Bound) -> f64 {
         self.work += 1;
         match formula {

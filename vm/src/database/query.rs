@@ -1,12 +1,13 @@
-//! Queries: from what is asked to the answers, in steps.
+//! Queries: from the question to the answers, in steps.
 //!
-//! A query sees the facts and rules that there were when it began. It is asked for the next step until it has found all
-//! answers, between which it may ask for the outcome of a test; the answers are then taken in portions.
+//! A query sees the facts and rules as they were when it began. The caller runs it step by step until all
+//! answers are found; between steps the query may request the outcome of a test. The answers are then taken
+//! in portions.
 //!
-//! Guarantees: answers come in the order in which nested loops over the patterns of the query, in the order of the text, would
-//! find them, each over its facts in the order in which they were asserted; what follows from rules, in the order in which
-//! it was derived. That does not depend on the order in which the patterns are looked up: where that is another one, answers
-//! are put into order at the end. No answer comes twice.
+//! Guarantees: answers come in the order in which nested loops over the patterns of the query, in the order
+//! of the text, would find them, each loop over its facts in the order of assertion; derived facts, in the
+//! order of derivation. Evaluation may use another order; then the answers are sorted at the end. No answer
+//! comes twice.
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
@@ -24,18 +25,19 @@ use super::tuple::Tuples;
 use crate::heap::Heap;
 use crate::value::Value;
 
-/// Where answers go.
+/// Destination of answers.
 #[derive(Clone, Debug)]
 pub(super) enum Sink {
-    /// To the program.
+    /// The program.
     Query,
-    /// The facts that a table has besides what follows from rules.
+    /// A table: the answers that are facts.
     Facts(u32),
-    /// What follows from a rule.
+    /// A table: the answers that a rule derives.
     Rule(u32, Arc<Rule>),
 }
 
-/// The answers to a call of a predicate with rules: its arguments, with variables numbered as they come.
+/// A table: the answers to a call of a predicate with rules. The call has the arguments, with variables
+/// numbered in the order of their occurrence.
 #[derive(Debug)]
 pub(super) struct Answers {
     pub(super) predicate: usize,
@@ -44,25 +46,25 @@ pub(super) struct Answers {
     pub(super) width: usize,
     /// Values of the variables.
     pub(super) tuples: Tuples,
-    /// Who goes on with each answer.
+    /// Computations that continue with each answer.
     pub(super) consumers: Vec<u32>,
 }
 
-/// A computation that goes on with each answer of a table, those that are yet to be found included.
+/// A computation that continues with each answer of a table, including those yet to be found.
 #[derive(Clone, Debug)]
 pub(super) struct Consumer {
     pub(super) table: u32,
-    /// The next answer.
+    /// Index of the next answer.
     pub(super) at: usize,
-    /// Whether it has had all answers that there are.
+    /// Whether it has had all answers found so far.
     pub(super) is_idle: bool,
-    /// Its variables that stand for those of the table.
+    /// Its variables for those of the table.
     pub(super) variables: SmallVec<[u32; 4]>,
     pub(super) continuation: Continuation,
     pub(super) rank: usize,
 }
 
-/// Where a computation goes on.
+/// The rest of a computation.
 #[derive(Clone, Debug)]
 pub(super) struct Continuation {
     pub(super) goal: GoalId,
@@ -71,18 +73,18 @@ pub(super) struct Continuation {
     pub(super) keys: Box<[u64]>,
 }
 
-/// What is yet to be done.
+/// A piece of work to be done.
 #[derive(Debug)]
 pub(super) enum AgendaItem {
-    /// Finds the answers of a table: its facts, then from each rule.
+    /// Find the answers of a table: from its facts, then from each rule.
     Expand { table: u32, rule: usize },
-    /// Gives answers to a consumer.
+    /// Give answers to a consumer.
     Feed(u32),
-    /// Goes on.
+    /// Resume a computation.
     Resume(Continuation),
 }
 
-/// An answer with its place among the others.
+/// An answer with its sort key.
 #[derive(Debug)]
 pub(super) struct RankedAnswer {
     pub(super) keys: Box<[u64]>,
@@ -104,32 +106,32 @@ impl PartialOrd for RankedAnswer {
     }
 }
 
-/// The greatest is the one that comes first.
+/// The greatest is the one that comes first, as the heap pops the greatest.
 impl Ord for RankedAnswer {
     fn cmp(&self, other: &RankedAnswer) -> Ordering {
         (&other.keys, other.number).cmp(&(&self.keys, self.number))
     }
 }
 
-/// What a step has come to.
+/// The outcome of a step.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Progress {
     /// There is more to do.
     More,
-    /// The outcome of a test is wanted: its function, and the variables with their values.
+    /// The query requests the outcome of a test: its function, and the variables with their values.
     Test(Term, Vec<(Term, Term)>),
     /// All answers have been found.
     Done,
 }
 
-/// Why a query cannot be answered.
+/// Why a query failed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum QueryError {
-    /// A rule with this functor negates what follows from it.
+    /// A rule with this functor depends on its own negation.
     Circular(Term),
     /// A rule with this functor leaves a variable of its head without a value.
     Unbound(Term),
-    /// It builds too large a term.
+    /// A term has too many pairs.
     TooLarge,
 }
 
@@ -139,29 +141,29 @@ impl From<TermError> for QueryError {
     }
 }
 
-/// A query that is being answered.
+/// An open query.
 #[derive(Debug)]
 pub(crate) struct Query {
-    /// The change after which it began.
+    /// Number of the latest change when it began.
     pub(super) time: u64,
     pub(super) rules: Arc<Rules>,
     pub(super) names: Vec<Term>,
     pub(super) goals: Vec<Goal>,
-    /// Entry goals of rules, by table-independent key: predicate, rule, and which arguments are given.
+    /// First goals of rules, by predicate, rule, and mask of given arguments; independent of tables.
     pub(super) rule_goals: BTreeMap<(usize, usize, u64), GoalId>,
 
     // ---- rules
     pub(super) tables: Vec<Answers>,
-    /// Bytes of their answers, about.
+    /// Bytes of their answers, approximately.
     pub(super) table_bytes: usize,
     /// Tables by the hash of their call.
     pub(super) by_call: super::bucket::Buckets,
     pub(super) consumers: Vec<Consumer>,
     pub(super) sinks: Vec<Sink>,
-    /// What is yet to be done, by stratum.
+    /// Work to be done, by stratum.
     pub(super) agenda: Vec<VecDeque<AgendaItem>>,
 
-    // ---- what is being computed
+    // ---- the current computation
     pub(super) state: SolverState,
     pub(super) sink: u32,
     pub(super) stratum: usize,
@@ -169,29 +171,29 @@ pub(crate) struct Query {
     pub(super) trail: Vec<u32>,
     pub(super) choices: Vec<Choice>,
     pub(super) operations: Vec<MatchOperation>,
-    /// The places of facts among those of their patterns, by rank; for the order of answers.
+    /// Position of each fact among those of its pattern, by rank; the sort key of an answer.
     pub(super) keys: Vec<u64>,
-    /// Terms that it holds.
+    /// Terms that the query holds.
     pub(super) held: Vec<Term>,
 
     // ---- answers
-    /// Those variables whose values are asked for.
+    /// Numbers of the variables whose values are asked for.
     pub(super) asked: Vec<u32>,
     pub(super) is_reordered: bool,
-    /// Whether one answer may be found twice.
+    /// Whether an answer may be found more than once.
     pub(super) may_repeat: bool,
     pub(super) placed: BinaryHeap<RankedAnswer>,
     pub(super) found: usize,
     pub(super) tuples: Tuples,
-    /// The facts themselves, where these are asked for.
+    /// The facts found, as relation and row, if the caller asked for facts.
     pub(super) rows: Option<Vec<(u32, u32)>>,
-    /// How many answers were taken.
+    /// Number of answers taken.
     pub(super) taken: usize,
 }
 
 impl Query {
-    /// Begins a query. With `wants_facts`, it has to be one pattern, the answers are the facts that match it, and rules
-    /// do not count.
+    /// Begins a query. With `wants_facts` the question must be a single pattern; the answers are the facts
+    /// that match it, and rules do not count.
     pub(super) fn begin(
         database: &mut Database,
         heap: &mut Heap,
@@ -257,7 +259,7 @@ impl Query {
         })
     }
 
-    /// Notes an answer for the program.
+    /// Records an answer for the program.
     pub(super) fn answer(&mut self) {
         if self.rows.is_some() {
             return;
@@ -275,7 +277,7 @@ impl Query {
         }
     }
 
-    /// Puts answers into order; whether all are.
+    /// Sorts the answers. Returns false if the work is used up before the end.
     pub(super) fn put_into_order(&mut self, work: &mut usize) -> bool {
         while let Some(placed) = self.placed.pop() {
             let values = placed.values.iter().copied();
@@ -292,7 +294,7 @@ impl Query {
         true
     }
 
-    /// The next answer: the variables that have a value.
+    /// Returns the variables with values of the next answer, or of one further `ahead`.
     pub(super) fn next_answer(&self, ahead: usize) -> Option<impl Iterator<Item = (Term, Term)>> {
         let at = self.taken + ahead;
         if at >= self.tuples.len() {
@@ -303,7 +305,7 @@ impl Query {
         Some(named.filter(|(_, value)| !value.is_unbound()))
     }
 
-    /// Bytes in use, about.
+    /// Returns the bytes in use, approximately.
     pub(super) fn bytes(&self) -> usize {
         let consumers = self.consumers.len() * (size_of::<Consumer>() + 64);
         let placed = self.placed.len() * 96;
@@ -311,14 +313,14 @@ impl Query {
     }
 }
 
-/// Whether a formula may have an answer twice, in which all variables are asked for.
+/// Returns whether a formula may have the same answer twice, if the values of all variables are asked for.
 fn may_repeat(formula: &Formula) -> bool {
     match formula {
-        // Facts are a set, and so is what follows from rules.
+        // Facts are a set, and so are derived facts.
         Formula::Pattern(pattern) => !is_plain(pattern),
         Formula::And(parts) => parts.iter().any(may_repeat),
         Formula::Or(..) => true,
-        // What is inside leaves no bindings.
+        // Bindings made inside do not survive.
         Formula::Not(_) | Formula::Test(_) => false,
     }
 }
@@ -327,7 +329,7 @@ fn is_plain(pattern: &Pattern) -> bool {
     pattern.functor.as_variable().is_none() && pattern.tail == Term::NIL
 }
 
-/// The variables of a test that have values.
+/// Returns the variables of a test that have values.
 pub(super) fn test_bindings(test: &TestForm, names: &[Term], bindings: &[Term]) -> Vec<(Term, Term)> {
     let all = test.variables.iter().map(|&variable| (names[variable as usize], bindings[variable as usize]));
     all.filter(|(_, value)| !value.is_unbound()).collect()

@@ -1,25 +1,26 @@
-//! Relations: the facts that begin with the same term and have the same length, and their indexes.
+//! Relations: the facts with the same functor and the same number of arguments, and their indexes.
 //!
-//! A fact is a row of cells, with the number of the change that made it and of the one that ended it; a query that began in
-//! between sees it. Rows are chained in the order in which they were asserted, and so are, in each index, those with the
+//! A fact is a row of cells, with the numbers of the changes that made and ended it; queries that began in
+//! between see it. Rows are chained in the order of assertion, and so are, in each index, the rows with the
 //! same cells at the index's positions.
 //!
-//! A row that has ended stays where it is until every query has closed that may see it, then it leaves its chains, and its
-//! place is used again when every query has closed that may stand on it ([`super::Database`] keeps the times).
-//! An index is made when a query wants one, in steps; until it is complete it holds the rows before its position.
-//! Which index to make: the one for the positions that a query has bound, once the rows that such queries have looked at
-//! in vain outnumber the facts. So whatever is asked, the work is at most a few times that with the best choice.
+//! A row that has ended stays where it is until every query that may see it has closed; then it leaves its
+//! chains. Its place is used again when every query that may have its cursor on it has closed
+//! ([`super::Database`] keeps these times). An index is made on demand of a query, in steps; until it is
+//! complete it holds the rows before its position. An index is worth making for the positions that a query
+//! has bound once such queries have looked at more rows in vain than there are facts. So the work of any
+//! sequence of queries is at most a few times that with the best choice of indexes.
 
 use super::bucket::{Buckets, NONE, finish, mix};
 use super::term::Term;
 
-/// In place of the row before it: the row is in no chain.
+/// Predecessor of a row that is in no chain.
 const UNLINKED: u32 = u32::MAX - 1;
-/// With fewer rows than this, looking at all of them is best.
+/// Number of rows below which looking at all of them is best.
 const FEW: usize = 8;
-/// Indexes that a relation may have.
+/// Greatest number of indexes of a relation.
 const MOST_INDEXES: usize = 8;
-/// Arguments that an index can be for.
+/// Number of leading arguments that an index can cover.
 pub(super) const INDEXED_POSITIONS: usize = 64;
 
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +37,7 @@ struct Ends {
 
 const EMPTY: Ends = Ends { first: NONE, last: NONE };
 
-/// When a row began and ended to be a fact.
+/// The changes that made and ended a fact.
 #[derive(Clone, Copy, Debug)]
 struct Lifespan {
     born: u64,
@@ -49,7 +50,7 @@ struct Group {
     count: u32,
 }
 
-/// The rows by the cells at some positions.
+/// An index: the rows by their cells at some positions.
 #[derive(Debug)]
 pub(super) struct Index {
     mask: u64,
@@ -59,7 +60,7 @@ pub(super) struct Index {
     links: Vec<ChainLink>,
     /// Number of different keys.
     distinct: usize,
-    /// The next row to be taken in; [`NONE`] when the index is complete.
+    /// The next row to be indexed; [`NONE`] when the index is complete.
     position: u32,
 }
 
@@ -69,13 +70,13 @@ struct WantedIndex {
     vain: usize,
 }
 
-/// See the module documentation.
+/// The facts with one functor and width.
 #[derive(Debug)]
 pub(super) struct Relation {
     pub(super) functor: Term,
     /// Number of arguments.
     pub(super) width: usize,
-    /// Whether its last argument is unique for given others.
+    /// Whether the last argument is unique for given others.
     is_property: bool,
     cells: Vec<Term>,
     spans: Vec<Lifespan>,
@@ -88,16 +89,16 @@ pub(super) struct Relation {
     live: usize,
 }
 
-/// How the rows for a query are found.
+/// How to find the rows for a query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Access {
-    /// Along a chain from this row on: that of all rows, or of an index.
+    /// Follow a chain from this row on: that of the given index, or of all rows.
     Chain(Option<usize>, u32),
-    /// There is at most this one row.
+    /// Look at this row only.
     One(u32),
-    /// There is none.
+    /// There are no rows.
     Nothing,
-    /// This index has to be completed first.
+    /// Complete this index first.
     Build(usize),
 }
 
@@ -113,7 +114,7 @@ fn push(links: &mut Vec<ChainLink>, ends: &mut Ends, row: u32) {
     ends.last = row;
 }
 
-/// Takes a row out of its chain. It keeps its successor, for those who stand on it.
+/// Takes a row out of its chain. The row keeps its successor, for queries with their cursor on it.
 fn unlink(links: &mut [ChainLink], ends: &mut Ends, row: u32) {
     let ChainLink { before, after } = links[row as usize];
     match before {
@@ -162,48 +163,48 @@ impl Relation {
         }
     }
 
-    /// The arguments of a fact.
+    /// Returns the arguments of a fact.
     #[inline]
     pub(super) fn row(&self, row: u32) -> &[Term] {
         let start = row as usize * self.width;
         &self.cells[start..start + self.width]
     }
 
-    /// The change that made a row.
+    /// Returns the change that made a row.
     #[inline]
     pub(super) fn born(&self, row: u32) -> u64 {
         self.spans[row as usize].born
     }
 
-    /// Whether a query that began after change `time` sees a row.
+    /// Returns whether a query that began after change `time` sees a row.
     #[inline]
     pub(super) fn is_visible(&self, row: u32, time: u64) -> bool {
         let span = self.spans[row as usize];
         span.born <= time && time < span.died
     }
 
-    /// Whether a row is a fact now.
+    /// Returns whether a row is a fact now.
     pub(super) fn is_live(&self, row: u32) -> bool {
         self.spans[row as usize].died == u64::MAX
     }
 
-    /// The row of a fact that is there now.
+    /// Returns the row of a current fact.
     pub(super) fn find(&self, cells: &[Term]) -> Option<u32> {
         let is_it = |row| self.is_live(row) && self.row(row) == cells;
         self.set.find(hash_cells(cells), is_it)
     }
 
-    /// The rows that are facts now.
+    /// Returns the rows of all current facts.
     pub(super) fn live_rows(&self) -> impl Iterator<Item = u32> {
         (0..self.spans.len() as u32).filter(|&row| self.is_live(row))
     }
 
-    /// Whether its last argument is unique for given others.
+    /// Returns whether the last argument is unique for given others.
     pub(super) fn is_property(&self) -> bool {
         self.is_property
     }
 
-    /// From now on the last argument is to be unique for given others; `work` is what that took.
+    /// Makes the last argument unique for given others. Adds the work done to `work`.
     pub(super) fn make_property(&mut self, work: &mut usize) {
         self.is_property = true;
         let mask = Relation::arguments_mask(self.width);
@@ -217,12 +218,12 @@ impl Relation {
         *work += usize::MAX - left;
     }
 
-    /// The positions of all arguments but the last.
+    /// Returns the positions of all arguments but the last, as a mask.
     fn arguments_mask(width: usize) -> u64 {
         if (2..=INDEXED_POSITIONS).contains(&width) { (1 << (width - 1)) - 1 } else { 0 }
     }
 
-    /// The row of a property that a new fact replaces.
+    /// Returns the row that a new fact replaces, as the value of a property.
     pub(super) fn replaced(&self, cells: &[Term]) -> Option<u32> {
         if !self.is_property {
             return None;
@@ -246,18 +247,18 @@ impl Relation {
         None
     }
 
-    /// The row of a fact that was there after change `time`.
+    /// Returns the row of a fact as of change `time`.
     fn find_at(&self, cells: &[Term], time: u64) -> Option<u32> {
         let is_it = |row| self.is_visible(row, time) && self.row(row) == cells;
         self.set.find(hash_cells(cells), is_it)
     }
 
-    /// Bytes that a fact takes, about.
+    /// Returns the bytes that a fact takes, approximately.
     pub(super) fn row_bytes(&self) -> usize {
         8 * self.width + 40 + 8 * self.indexes.len()
     }
 
-    /// Adds a fact that is not there. It holds its cells.
+    /// Adds a fact that is not there. The relation then holds its cells.
     pub(super) fn add(&mut self, cells: &[Term], time: u64) -> u32 {
         let span = Lifespan { born: time, died: u64::MAX };
         let row = match self.free.pop() {
@@ -303,14 +304,14 @@ impl Relation {
         }
     }
 
-    /// Lets the place of an unlinked row be used again.
+    /// Makes the place of an unlinked row available again.
     pub(super) fn free(&mut self, row: u32) {
         self.free.push(row);
     }
 
-    // Finding rows.
+    // ---- finding rows
 
-    /// The next row of a chain.
+    /// Returns the next row of a chain.
     #[inline]
     pub(super) fn after(&self, index: Option<usize>, row: u32) -> u32 {
         match index {
@@ -319,8 +320,8 @@ impl Relation {
         }
     }
 
-    /// How to find the rows with the cells of `key` at the positions of `bound`, as of change `time`. `is_all` says that
-    /// all positions are bound.
+    /// Returns how to find the rows with the cells of `key` at the positions of `bound`, as of change `time`.
+    /// `is_all` says that all positions are bound.
     pub(super) fn access(&mut self, bound: u64, is_all: bool, key: &[Term], time: u64) -> Access {
         if is_all {
             return self.find_at(key, time).map_or(Access::Nothing, Access::One);
@@ -364,7 +365,7 @@ impl Relation {
         if first == NONE { Access::Nothing } else { Access::Chain(index, first) }
     }
 
-    /// Notes that rows are looked at for want of an index; whether they are so many that it should be made.
+    /// Notes that rows are looked at for lack of an index. Returns whether they are enough for making it.
     fn wants(&mut self, mask: u64, rows: usize) -> bool {
         if self.indexes.len() >= MOST_INDEXES {
             return false;
@@ -385,7 +386,7 @@ impl Relation {
         true
     }
 
-    /// Works on an index until it is complete or the work is used up; whether it is complete.
+    /// Works on an index until it is complete or the work is used up. Returns whether it is complete.
     pub(super) fn build(&mut self, number: usize, work: &mut usize) -> bool {
         let index = &mut self.indexes[number];
         while index.position != NONE {
@@ -398,7 +399,8 @@ impl Relation {
         true
     }
 
-    /// About how many rows have given cells at the positions of `bound`; the cells themselves where they are known.
+    /// Estimates the number of rows with given cells at the positions of `bound`; `key` has the cells if they
+    /// are known.
     pub(super) fn estimate(&self, bound: u64, is_all: bool, key: Option<&[Term]>) -> f64 {
         let live = self.live as f64;
         if is_all {
@@ -411,7 +413,8 @@ impl Relation {
                 .map_or(0.0, |group| f64::from(index.groups[group as usize].count)),
             None => live / index.distinct.max(1) as f64,
         });
-        // Without an index, each bound position is taken to leave fewer, but not how many fewer.
+        // Without an index, the guess is that each bound position reduces the number of rows, by an unknown
+        // factor.
         let guess = live.powf(1.0 / (1.0 + f64::from(bound.count_ones())));
         by_index.reduce(f64::min).unwrap_or(guess)
     }
@@ -474,7 +477,7 @@ impl Index {
         let entry = &mut self.groups[group as usize];
         entry.count -= 1;
         if entry.count == 0 {
-            // The key of a group is that of its first row, so it goes while that is still there.
+            // The key of a group is that of its first row, so it is removed while that row is still there.
             self.keys.remove(group);
             self.free_groups.push(group);
             self.distinct -= 1;

@@ -1,7 +1,7 @@
-//! Rules: facts that follow from others, and in which order what they negate has to be known.
+//! Rules, which derive facts from others, and their stratification.
 //!
-//! The rules are stratified: what a rule negates is in a stratum below that of its head. Where no such order exists, because
-//! something follows from its own negation, its predicate has no stratum, and asking for it fails.
+//! A rule's head is in a stratum above the predicates that the rule negates. Where no such order exists,
+//! because a predicate depends on its own negation, the predicate has no stratum, and queries for it fail.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,23 +9,23 @@ use std::sync::Arc;
 use super::formula::{Formula, Pattern};
 use super::term::Term;
 
-/// The stratum of a predicate that depends on its own negation.
+/// Stratum of a predicate that depends on its own negation.
 pub(super) const NO_STRATUM: usize = usize::MAX;
 
-/// A rule: what matches its head follows from its body.
+/// A rule: facts that match its head follow from its body.
 #[derive(Debug)]
 pub(super) struct Rule {
     pub(super) head: Pattern,
     pub(super) body: Formula,
     /// Names of the variables; unbound for those without a name.
     pub(super) names: Vec<Term>,
-    /// What it was made from; the same rule again replaces this one.
+    /// Source of the rule; a rule with the same source replaces this one.
     pub(super) source: Term,
-    /// Terms that it holds.
+    /// Terms that the rule holds.
     pub(super) held: Vec<Term>,
 }
 
-/// What has rules: a functor and a number of arguments.
+/// A functor and a number of arguments for which there are rules.
 #[derive(Clone, Debug)]
 pub(super) struct Predicate {
     pub(super) functor: Term,
@@ -34,22 +34,22 @@ pub(super) struct Predicate {
     pub(super) stratum: usize,
 }
 
-/// All rules. Queries keep those that there were when they began.
+/// All rules. A query keeps those of the time when it began.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rules {
     pub(super) predicates: Vec<Predicate>,
     by_name: BTreeMap<(u64, usize), usize>,
-    /// One more than the highest stratum.
+    /// The highest stratum, plus one.
     pub(super) strata: usize,
 }
 
 impl Rules {
-    /// Whether there are rules for facts with this functor and number of arguments.
+    /// Returns whether there are rules for facts with this functor and number of arguments.
     pub(super) fn has(&self, functor: Term, width: usize) -> bool {
         self.by_name.contains_key(&(functor.bits(), width))
     }
 
-    /// Adds a rule; gives back the one that it replaces.
+    /// Adds a rule. Returns the rule that it replaces.
     pub(super) fn add(&mut self, rule: Rule) -> Option<Arc<Rule>> {
         let (functor, width) = (rule.head.functor, rule.head.arguments.len());
         let predicates = &mut self.predicates;
@@ -69,7 +69,7 @@ impl Rules {
         replaced
     }
 
-    /// Gives each predicate the least stratum that is above those of what it negates.
+    /// Gives each predicate the least stratum above those of the predicates that it negates.
     fn stratify(&mut self) {
         for predicate in &mut self.predicates {
             predicate.stratum = 0;
@@ -81,7 +81,7 @@ impl Rules {
             for number in 0..most {
                 let rules = self.predicates[number].rules.clone();
                 let least = rules.iter().map(|rule| self.least_stratum(&rule.body, 0)).max().unwrap_or(0);
-                // More strata than predicates means that there is a circle.
+                // More strata than predicates means a cycle.
                 let stratum = if least > most { NO_STRATUM } else { least };
                 if stratum > self.predicates[number].stratum {
                     self.predicates[number].stratum = stratum;
@@ -107,7 +107,8 @@ impl Rules {
         }
     }
 
-    /// The predicates that a pattern may be about. One whose tail is a variable is about facts alone.
+    /// Returns the predicates that a pattern may match. A pattern whose tail is a variable matches facts
+    /// only.
     pub(super) fn matching(&self, pattern: &Pattern) -> impl Iterator<Item = usize> {
         let (width, is_closed) = (pattern.arguments.len(), pattern.tail == Term::NIL);
         let functor = pattern.functor;

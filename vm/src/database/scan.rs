@@ -1,4 +1,4 @@
-//! Facts of several relations: for patterns whose functor is a variable, or that leave the length open.
+//! Search through several relations: for patterns whose functor is a variable, or that leave the length open.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -13,13 +13,13 @@ use super::query::{Query, QueryError};
 use super::relation::{Access, INDEXED_POSITIONS};
 use super::term::Term;
 
-/// Where a search through several relations stands. It goes through their facts in the order of assertion.
+/// The state of a search through several relations, in the order in which their facts were asserted.
 #[derive(Debug)]
 pub(super) struct RelationScan {
     pattern: Arc<Pattern>,
     /// The next relation to be opened.
     opening: u32,
-    /// The next row of each relation, with the index along which it is found.
+    /// The next row of each opened relation: change that made it, relation, row.
     heads: BinaryHeap<Reverse<(u64, u32, u32)>>,
     indexes: Vec<(u32, Option<usize>)>,
     is_opened: bool,
@@ -34,12 +34,13 @@ impl RelationScan {
         self.pattern.rank
     }
 
-    /// Whether there is nothing more to be found.
+    /// Returns whether the search has ended.
     pub(super) fn is_exhausted(&self) -> bool {
         self.is_opened && self.heads.is_empty()
     }
 
-    /// The next fact that matches, its variables bound. `None` with no work left, or none left to be found.
+    /// Returns the next fact that matches, with its variables bound. `None` if the work is used up or the
+    /// search has ended.
     pub(super) fn next(
         &mut self,
         database: &mut Database,
@@ -72,7 +73,7 @@ impl RelationScan {
         Ok(None)
     }
 
-    /// Opens the next relation; false if the work is used up.
+    /// Opens the next relation. Returns false if the work is used up.
     fn open(
         &mut self,
         database: &mut Database,
@@ -113,7 +114,7 @@ impl RelationScan {
         match facts.access(bound, known == facts.width, &key, query.time) {
             Access::Nothing => {}
             Access::Build(index) => return Ok(facts.build(index, work)),
-            // The chain goes on after this row, with rows that do not match.
+            // The chain continues after this row, but only with rows that do not match.
             Access::One(row) => self.begin(facts.born(row), number, row, None),
             Access::Chain(index, row) => self.begin(facts.born(row), number, row, index),
         }

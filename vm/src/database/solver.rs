@@ -1,16 +1,17 @@
-//! The machine that runs goals: backtracking over facts, and tables for what follows from rules.
+//! The solver: backtracking over facts, and tables for derived facts.
 //!
-//! A goal that is about facts makes a choice, which gives one fact after the other; an answer found or a goal without (more)
-//! facts goes back to the latest choice. Nothing here recurses: where the machine stands is in its [`Query`], so it stops
-//! after any amount of work.
+//! A goal about facts makes a choice, which yields one fact after the other; after an answer, and when a goal
+//! has no (more) facts, the solver returns to the latest choice. Nothing here recurses: the solver's position
+//! is kept in the [`Query`], so it can stop after any amount of work.
 //!
-//! A goal that is about a predicate with rules looks for the table of the same call. Unless the table is complete, the rest
-//! of the computation is set aside as one of its consumers, and gets each answer once, whenever it is found. So each
-//! combination of answers is looked at once, and rules end that have finitely many, in whatever order they are
-//! written. AgendaItem is done by strata: what is negated is complete before its negation is looked at; a negation that comes to
-//! a table which is not is set aside as well.
-//! Source: OLD resolution with tabulation (Tamaki and Sato 1986), with the continuations of SLG; the strata are those of
-//! Apt, Blair and Walker.
+//! A goal about a predicate with rules looks up the table of the same call. Unless the table is complete, the
+//! rest of the computation is set aside as one of its consumers, and gets each answer once, whenever it is
+//! found. So each combination of answers is considered once, and rules with finitely many answers terminate,
+//! in whatever order they are written. Work is done by strata: a negated call is complete before its negation
+//! is evaluated; a negation that reaches an incomplete table is set aside as well.
+//!
+//! Source: OLD resolution with tabulation (Tamaki and Sato 1986), with the continuations of SLG; the strata
+//! are those of Apt, Blair and Walker.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -30,31 +31,31 @@ use super::scan::RelationScan;
 use super::term::Term;
 use super::tuple::Tuples;
 
-/// What the machine does next.
+/// The solver's next action.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum SolverState {
-    /// This goal.
+    /// Run this goal.
     Goal(GoalId),
-    /// Goes back to the latest choice.
+    /// Return to the latest choice.
     Back,
-    /// Waits for the outcome of the test that is this goal.
+    /// Wait for the outcome of the test that is this goal.
     Testing(GoalId),
-    /// Nothing any more.
+    /// Stop: all answers are found.
     Done,
 }
 
-/// What is done with a cell of a fact.
+/// An operation on a cell of a fact.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum MatchOperation {
-    /// It has to be this term.
+    /// Compare it with this term.
     Same(u32, Term),
-    /// It becomes the value of a variable.
+    /// Bind a variable to it.
     Bind(u32, u32),
-    /// It is matched.
+    /// Match it with a pattern.
     Match(u32, Term),
 }
 
-/// A place to come back to.
+/// A choice to return to.
 #[derive(Debug)]
 pub(super) enum Choice {
     /// Facts of one relation.
@@ -69,7 +70,7 @@ pub(super) enum Choice {
     },
     /// Facts of several relations.
     Scan { scan: Box<RelationScan>, trail: usize, next: GoalId },
-    /// Answers of a table; with a consumer, those too that are yet to come.
+    /// Answers of a table; with a consumer, including those yet to be found.
     Table {
         table: u32,
         at: usize,
@@ -81,14 +82,14 @@ pub(super) enum Choice {
     },
     /// Alternatives.
     Branch { goal: GoalId, at: usize, trail: usize },
-    /// The inside of a negation; whether all that it was about was complete.
+    /// The inside of a negation, and whether everything it depends on was complete.
     Negation { goal: GoalId, trail: usize, is_complete: bool },
 }
 
 impl Query {
-    /// Works until all answers are found, a test is wanted, or the work is used up.
+    /// Runs until all answers are found, a test is requested, or the work is used up.
     pub(super) fn step(&mut self, database: &mut Database, work: &mut usize) -> Result<Progress, QueryError> {
-        // Each step gets somewhere.
+        // Each step makes progress.
         *work = (*work).max(LEAST_WORK);
         loop {
             let Some(left) = work.checked_sub(1) else { return Ok(Progress::More) };
@@ -120,7 +121,7 @@ impl Query {
         }
     }
 
-    /// Tells the outcome of the test that was asked for.
+    /// Continues with the outcome of the requested test.
     pub(super) fn tell(&mut self, holds: bool) {
         if let SolverState::Testing(goal) = self.state
             && let Goal::Test { next, .. } = self.goals[goal as usize]
@@ -197,7 +198,7 @@ impl Query {
     }
 
     fn set_key(&mut self, rank: usize, key: u64) {
-        // Rules have ranks of their own, which are of no interest.
+        // The ranks inside rules do not matter for the order of answers.
         if self.is_reordered
             && self.sink == 0
             && let Some(place) = self.keys.get_mut(rank)
@@ -235,7 +236,7 @@ impl Query {
                         self.operations.push(MatchOperation::Bind(at, variable as u32));
                     }
                     _ => {
-                        // From here on a variable may have a value from this very fact.
+                        // From here on a variable may have its value from this very fact.
                         is_flat = false;
                         self.operations.push(MatchOperation::Match(at, argument));
                     }
@@ -251,7 +252,7 @@ impl Query {
             }
             Access::Build(index) => {
                 self.operations.truncate(first_operation);
-                // Then the goal is run again.
+                // Afterwards the goal is run again.
                 let done = database.relations[relation as usize].build(index, work);
                 return Ok(if done { None } else { Some(Progress::More) });
             }
@@ -273,7 +274,7 @@ impl Query {
             rank: pattern.rank,
             next,
         };
-        // Its first fact is looked for at once. If the work is used up on the way, the choice is there to come back to.
+        // Its first fact is searched for at once; if the work is used up on the way, the choice remains.
         self.state = SolverState::Back;
         let goes_on = self.next_row(database, choice, work);
         Ok(if goes_on { None } else { Some(Progress::More) })
@@ -286,7 +287,7 @@ impl Query {
         }
     }
 
-    /// Goes back to the latest choice; false if the work is used up on the way.
+    /// Returns to the latest choice. The result is false if the work is used up on the way.
     fn go_back(&mut self, database: &mut Database, work: &mut usize) -> Result<bool, QueryError> {
         if let Some(Choice::Table { .. }) = self.choices.last() {
             self.next_table_answer();
@@ -344,7 +345,7 @@ impl Query {
         Ok(true)
     }
 
-    /// Notes in the negation around here that it is not known yet; false if there is none.
+    /// Marks the innermost negation as undecided. Returns false if there is none.
     fn doubt(&mut self) -> bool {
         let negations = self.choices.iter_mut().rev();
         for choice in negations {
@@ -372,7 +373,7 @@ impl Query {
             let after = facts.after(index, row);
             let born = facts.born(row);
             if born > self.time {
-                // Those after it are younger still.
+                // Rows after it are younger still.
                 break;
             }
             if facts.is_visible(row, self.time) {
@@ -407,7 +408,7 @@ impl Query {
         true
     }
 
-    // Rules.
+    // ---- rules
 
     fn continuation(&self, goal: GoalId) -> Continuation {
         let keys =
@@ -429,13 +430,13 @@ impl Query {
         }
     }
 
-    /// Whether all answers of a table have been found.
+    /// Returns whether all answers of a table have been found.
     fn is_complete(&self, table: u32) -> bool {
         let stratum = self.tables[table as usize].stratum;
         stratum < self.stratum && self.agenda[..=stratum].iter().all(|waiting| waiting.is_empty())
     }
 
-    /// Goes on with the answers to a call of a predicate with rules.
+    /// Continues with the answers to a call of a predicate with rules.
     fn call(
         &mut self,
         database: &mut Database,
@@ -449,7 +450,7 @@ impl Query {
         if stratum == NO_STRATUM {
             return Err(QueryError::Circular(functor));
         }
-        // A pattern whose functor is a variable is about this predicate if that can be.
+        // A pattern whose functor is a variable matches this predicate if the variable can be its functor.
         let before = self.trail.len();
         let Query { bindings, held, trail, .. } = self;
         if !database.terms.matches(pattern.functor, functor, bindings, trail) {
@@ -486,7 +487,7 @@ impl Query {
         Ok(())
     }
 
-    /// The table of a call; made, if there is none yet.
+    /// Returns the table of a call; makes it if there is none yet.
     fn table(&mut self, predicate: usize, call: Vec<Term>, width: usize) -> u32 {
         let hash = finish(call.iter().fold(mix(8, predicate as u64), |hash, part| mix(hash, part.bits())));
         let Query { tables, by_call, .. } = self;
@@ -506,7 +507,8 @@ impl Query {
         table
     }
 
-    /// Goes on with the answers of a table, now or as they come. `before` is where the trail was before the call.
+    /// Continues with the answers of a table, now or as they are found. `before` is the length of the trail
+    /// before the call.
     fn consume(
         &mut self,
         table: u32,
@@ -516,7 +518,7 @@ impl Query {
         before: usize,
     ) {
         if self.is_complete(table) {
-            // The functor may have been bound just now; whoever goes back further undoes that.
+            // The functor may have been bound just now; returning to an earlier choice undoes that.
             let trail = self.trail.len();
             self.choices.push(Choice::Table { table, at: 0, variables, consumer: None, trail, rank, next });
             return;
@@ -536,7 +538,7 @@ impl Query {
         }
     }
 
-    /// The next answer of the table that the latest choice is about.
+    /// Continues with the next answer of the table of the latest choice.
     fn next_table_answer(&mut self) {
         let Query { choices, tables, consumers, bindings, trail: bound, .. } = self;
         let Some(Choice::Table { table, at, variables, consumer, trail, rank, next }) = choices.last_mut()
@@ -566,7 +568,7 @@ impl Query {
         self.state = SolverState::Goal(next);
     }
 
-    /// Takes up the next work, of the lowest stratum in which there is some.
+    /// Takes up the next piece of work, from the lowest stratum that has some.
     fn next_work(&mut self, database: &mut Database) -> Result<(), QueryError> {
         self.trail.clear();
         self.operations.clear();
@@ -607,7 +609,7 @@ impl Query {
         }
     }
 
-    /// Begins to find the answers of a table: its facts first, then from one rule after the other.
+    /// Begins to find the answers of a table: from its facts first, then from one rule after the other.
     fn expand(&mut self, database: &mut Database, table: u32, rule: usize) -> Result<(), QueryError> {
         let answers = &self.tables[table as usize];
         let (stratum, predicate) = (answers.stratum, answers.predicate);
@@ -656,7 +658,7 @@ impl Query {
         Ok(())
     }
 
-    /// The first goal of a rule's body, when some arguments are given.
+    /// Returns the first goal of a rule's body, for given arguments.
     fn rule_start(
         &mut self,
         database: &Database,
@@ -677,7 +679,7 @@ impl Query {
         start
     }
 
-    /// An answer has been found.
+    /// Handles an answer.
     fn solved(&mut self, database: &mut Database) -> Result<(), QueryError> {
         let Query { sinks, sink, tables, bindings, held, .. } = self;
         let (table, rule) = match &sinks[*sink as usize] {
@@ -733,8 +735,8 @@ impl Query {
     }
 }
 
-/// With less than this some goals would not get on.
+/// Least work of a step; with less, some goals would make no progress.
 const LEAST_WORK: usize = 4;
 
-/// The goal that is the end of a query or rule.
+/// Goal at the end of a query or rule.
 const SOLVED: GoalId = 0;

@@ -1,11 +1,13 @@
-//! Terms: what facts consist of, one word each, equal exactly when the objects are `equal`.
+//! Terms: the contents of facts. A term is one word; two terms are equal exactly when their objects are
+//! `equal`.
 //!
-//! Numbers, characters and symbols are the words that they are as values. Pairs, strings and numbers too large for a word
-//! are kept once, outside of the heap, with a count of those who hold on to them; they are copies, so that nobody changes
-//! a fact from outside. Any other object stands for itself. So the collector has nothing to do for a database of numbers,
-//! strings and named symbols, however large it is; all other objects that facts hold are in one hash table of the heap, which it marks as any other.
+//! Numbers, characters and symbols are the same words as their values. Pairs, strings and numbers too large
+//! for a word are stored once, outside of the heap, with a count of their holders; they are copies, so that a
+//! program cannot change a fact by changing an object. Any other object stands for itself. So a database of
+//! numbers, strings and named symbols, however large, gives the collector nothing to do; all other objects in
+//! facts are in one hash table of the heap, which the collector marks as any other.
 //!
-//! Whoever gets a term from a function that makes one holds it, until [`Terms::release`].
+//! A function that makes a term returns it held; the caller keeps it until [`Terms::release`].
 
 use super::bucket::{Buckets, finish, mix};
 use crate::equality::{self, Test};
@@ -13,7 +15,7 @@ use crate::heap::{AllocError, Heap};
 use crate::table::{Comparison, Table};
 use crate::value::Value;
 
-/// Most pairs in a term.
+/// Greatest number of pairs in a term.
 pub(crate) const MAX_SIZE: u32 = 1 << 16;
 
 /// A term, or in patterns a variable.
@@ -21,18 +23,18 @@ pub(crate) const MAX_SIZE: u32 = 1 << 16;
 pub(crate) struct Term(pub(super) Value);
 
 impl Term {
-    /// What stands in place of a term where there is none.
+    /// Marker of a missing term.
     pub(super) const UNBOUND: Term = Term(Value::UNBOUND);
     /// The empty list.
     pub(super) const NIL: Term = Term(Value::NIL);
 
-    /// The variable with this number.
+    /// Returns the variable with this number.
     #[inline]
     pub(super) const fn variable(number: u32) -> Term {
         Term(Value::variable(number))
     }
 
-    /// The number, if this is a variable.
+    /// Returns the variable's number; `None` for a term.
     #[inline]
     pub(super) fn as_variable(self) -> Option<usize> {
         self.0.as_variable().map(|number| number as usize)
@@ -43,18 +45,18 @@ impl Term {
         self == Term::UNBOUND
     }
 
-    /// A word that tells it from all others.
+    /// Returns a word that identifies the term.
     #[inline]
     pub(super) fn bits(self) -> u64 {
         self.0.bits()
     }
 }
 
-/// What is kept of a term that is more than a word.
+/// The contents of a term of more than a word.
 #[derive(Debug, PartialEq)]
 enum TermData {
     Free,
-    /// A pair: its halves, the pairs in it, and whether there is no variable in it.
+    /// A pair: its halves, the number of pairs in it, and whether it is free of variables.
     Pair {
         car: Term,
         cdr: Term,
@@ -75,29 +77,29 @@ struct TermNode {
     holders: u32,
 }
 
-/// All terms that are more than a word.
+/// All terms of more than a word.
 #[derive(Debug)]
 pub(crate) struct Terms {
     nodes: Vec<TermNode>,
     buckets: Buckets,
     free: Vec<u32>,
-    /// Those that had no holder at some time; [`Terms::sweep`] frees them if they have none still.
+    /// Nodes that had no holder at some time; [`Terms::sweep`] frees those that have none.
     unheld: Vec<u32>,
-    /// A hash table of the heap with the objects, `NIL` as long as there are none.
+    /// Hash table in the heap of the objects in terms; `NIL` before the first.
     objects: Value,
-    /// Bytes in use, about.
+    /// Bytes in use, approximately.
     pub(super) bytes: usize,
 }
 
-/// Bytes of a node besides its contents.
+/// Bytes of a node without its contents.
 const NODE_BYTES: usize = size_of::<TermNode>() + 16;
 
-/// Why there is no term.
+/// Why a term was not made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TermError {
-    /// No room for the table of objects.
+    /// There is no room for the table of objects.
     Room(AllocError),
-    /// More than [`MAX_SIZE`] pairs.
+    /// The term would have more than [`MAX_SIZE`] pairs.
     TooLarge,
 }
 
@@ -124,7 +126,7 @@ impl Terms {
     fn intern(&mut self, hash: u32, data: TermData) -> Term {
         if let Some(found) = self.buckets.find(hash, |other| self.nodes[other as usize].data == data) {
             self.nodes[found as usize].holders += 1;
-            // What is kept holds its parts once, however often it is made.
+            // A stored term holds its parts once, however often it is made.
             if let TermData::Pair { car, cdr, .. } | TermData::Ratio(car, cdr) = data {
                 self.release(car);
                 self.release(cdr);
@@ -147,7 +149,7 @@ impl Terms {
         Term(Value::term(index))
     }
 
-    /// Calls `visit` with words and objects that tell a term from all others.
+    /// Calls `visit` with words and objects that identify a term in another run, too.
     pub(super) fn visit_state(&self, term: Term, visit: &mut dyn FnMut(Result<u64, Value>)) {
         let mut open = vec![term];
         while let Some(term) = open.pop() {
@@ -179,14 +181,14 @@ impl Terms {
         }
     }
 
-    /// Another holder for a term.
+    /// Adds a holder to a term.
     pub(super) fn retain(&mut self, term: Term) {
         if let Some(index) = term.0.as_term() {
             self.nodes[index as usize].holders += 1;
         }
     }
 
-    /// Gives up a term.
+    /// Removes a holder of a term.
     pub(super) fn release(&mut self, term: Term) {
         if let Some(index) = term.0.as_term() {
             let node = &mut self.nodes[index as usize];
@@ -197,10 +199,11 @@ impl Terms {
         }
     }
 
-    /// The pair of two terms, which the caller gives up. Objects in them are counted where they were taken in.
+    /// Returns the pair of two terms, whose holders become the pair's. Objects in them were counted when they
+    /// became terms.
     ///
     /// # Errors
-    /// [`TermError::TooLarge`]; the halves are given up all the same.
+    /// [`TermError::TooLarge`]; the halves are released all the same.
     pub(super) fn pair(&mut self, car: Term, cdr: Term) -> Result<Term, TermError> {
         let size = 1 + self.size(car) + self.size(cdr);
         if size > MAX_SIZE {
@@ -220,7 +223,7 @@ impl Terms {
         }
     }
 
-    /// The halves of a pair.
+    /// Returns the halves of a pair; `None` for any other term.
     #[inline]
     pub(super) fn as_pair(&self, term: Term) -> Option<(Term, Term)> {
         match self.nodes[term.0.as_term()? as usize].data {
@@ -229,7 +232,7 @@ impl Terms {
         }
     }
 
-    /// Whether there is no variable in a term.
+    /// Returns whether a term is free of variables.
     #[inline]
     pub(super) fn is_ground(&self, term: Term) -> bool {
         match term.0.as_term() {
@@ -240,7 +243,7 @@ impl Terms {
         }
     }
 
-    /// The list of some terms, each of which gets another holder.
+    /// Returns the list of some terms, each of which gets another holder.
     pub(super) fn list(&mut self, items: &[Term], tail: Term) -> Result<Term, TermError> {
         let mut list = tail;
         self.retain(tail);
@@ -251,7 +254,7 @@ impl Terms {
         Ok(list)
     }
 
-    /// Frees up to `most` terms that nobody holds.
+    /// Frees up to `most` terms without holders.
     pub(super) fn sweep(&mut self, heap: &mut Heap, most: usize) {
         for _ in 0..most {
             let Some(index) = self.unheld.pop() else { return };
@@ -278,9 +281,9 @@ impl Terms {
         }
     }
 
-    // Objects of the heap.
+    // ---- objects of the heap
 
-    /// Whether an object lives as long as its package anyway.
+    /// Returns whether an object is a symbol with a package, which is permanent.
     fn is_named(heap: &Heap, v: Value) -> bool {
         heap.symbol(v).is_some_and(|symbol| symbol.package.is_true())
     }
@@ -288,7 +291,7 @@ impl Terms {
     fn find_object(&self, heap: &Heap, v: Value) -> Option<(Table, u32, Option<usize>)> {
         let table = Table::of(heap, self.objects)?;
         let hash = equality::hash(heap, Test::Eq, v);
-        // Comparing by identity has no need of a limit.
+        // Comparison by identity needs no limit.
         let mut work = usize::MAX;
         let entry = table.find(heap, Test::Eq, v, hash, &mut work).unwrap_or_default();
         Some((table, hash, entry.map(|(entry, _)| entry)))
@@ -302,8 +305,8 @@ impl Terms {
         Ok(self.intern(hash, TermData::Object(v)))
     }
 
-    /// Makes the table of objects, if there is none yet: the caller keeps it from being collected.
-    /// Before there is one, no object may be made a term.
+    /// Makes the table of objects if there is none yet; the caller keeps the returned object from being
+    /// collected. Without the table, objects cannot become terms.
     pub(super) fn make_object_table(&mut self, heap: &mut Heap) -> Result<Option<Value>, AllocError> {
         if self.objects.is_true() {
             return Ok(None);
@@ -312,9 +315,9 @@ impl Terms {
         Ok(Some(self.objects))
     }
 
-    // From values and to values.
+    // ---- from values and to values
 
-    /// The term of an object that is no pair.
+    /// Returns the term of an object other than a pair.
     pub(super) fn atom(&mut self, heap: &mut Heap, v: Value) -> Result<Term, AllocError> {
         if !v.is_address() {
             return Ok(Term(v));
@@ -342,7 +345,7 @@ impl Terms {
         if Terms::is_named(heap, v) { Ok(Term(v)) } else { self.object(heap, v) }
     }
 
-    /// The object of a term. `work` is what that took.
+    /// Returns the object of a term. Adds the work done to `work`.
     ///
     /// # Errors
     /// As for every allocation.
@@ -396,10 +399,10 @@ impl Terms {
         }
     }
 
-    // Patterns.
+    // ---- patterns
 
-    /// A pattern with its variables replaced: a term if all of them have one. The caller does not hold it; new pairs are
-    /// noted in `made`, held.
+    /// Returns a pattern with its variables replaced, if all of them have values. The caller does not hold
+    /// the term; new pairs are appended to `made`, held.
     ///
     /// # Errors
     /// [`TermError::TooLarge`].
@@ -422,7 +425,8 @@ impl Terms {
         })
     }
 
-    /// A pattern with what `replace` gives in place of its variables; `None` where that gives none.
+    /// Returns a pattern with its variables replaced by `replace`; `None` if that returns `None` for one of
+    /// them.
     pub(super) fn rebuild(
         &mut self,
         pattern: Term,
@@ -463,7 +467,7 @@ impl Terms {
         Ok(terms.pop())
     }
 
-    /// Matches a pattern with a ground term: binds variables in `bindings`, and notes them in `trail`.
+    /// Matches a pattern with a ground term: binds variables in `bindings`, and appends them to `trail`.
     pub(super) fn matches(
         &self,
         pattern: Term,
@@ -529,7 +533,7 @@ impl Terms {
         }
     }
 
-    /// Terms that are kept. For tests.
+    /// Returns the number of stored terms.
     #[cfg(test)]
     pub(super) fn kept(&self) -> usize {
         self.nodes.len() - self.free.len()

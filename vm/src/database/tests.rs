@@ -9,7 +9,7 @@ use super::{Progress, Term};
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// A machine, and texts in place of values.
+/// A machine, with texts in place of values.
 struct Fixture {
     vm: Vm,
 }
@@ -369,7 +369,7 @@ impl Question {
         }
     }
 
-    /// All answers, in the order of nested loops; negations come last.
+    /// Returns all answers, in the order of nested loops; negations come last.
     fn solve(&self, facts: &[Fact], row: Row) -> Vec<Row> {
         match self {
             Question::Pattern(name, parts) => {
@@ -403,7 +403,7 @@ impl Question {
         }
     }
 
-    /// Its variables in the order of the text.
+    /// Appends the variables in the order of the text.
     fn variables(&self, seen: &mut Vec<usize>) {
         match self {
             Question::Pattern(_, parts) => {
@@ -516,7 +516,11 @@ proptest! {
         portion in 1usize..40,
     ) {
         let mut fixture = Fixture::new();
-        let bodies = ["(and (edge ?x ?z) (path ?z ?y))", "(and (path ?x ?z) (edge ?z ?y))", "(and (path ?x ?z) (path ?z ?y))"];
+        let bodies = [
+            "(and (edge ?x ?z) (path ?z ?y))",
+            "(and (path ?x ?z) (edge ?z ?y))",
+            "(and (path ?x ?z) (path ?z ?y))",
+        ];
         fixture.rule("(path ?x ?y)", bodies[shape]);
         fixture.rule("(path ?x ?y)", "(edge ?x ?y)");
         fixture.rule("(apart ?x ?y)", "(and (edge ?x ?) (edge ? ?y) (not (path ?x ?y)))");
@@ -527,7 +531,9 @@ proptest! {
         loop {
             let longer: BTreeSet<_> = path
                 .iter()
-                .flat_map(|&(x, z)| edges.iter().filter(move |&&(from, _)| from == z).map(move |&(_, y)| (x, y)))
+                .flat_map(|&(x, z)| {
+                    edges.iter().filter(move |&&(from, _)| from == z).map(move |&(_, y)| (x, y))
+                })
                 .collect();
             let size = path.len();
             path.extend(longer);
@@ -535,7 +541,9 @@ proptest! {
                 break;
             }
         }
-        let shown = |pairs: &BTreeSet<(u8, u8)>| pairs.iter().map(|(x, y)| format!("((?A . {x}) (?B . {y}))")).collect::<BTreeSet<_>>();
+        let shown = |pairs: &BTreeSet<(u8, u8)>| -> BTreeSet<String> {
+            pairs.iter().map(|(x, y)| format!("((?A . {x}) (?B . {y}))")).collect()
+        };
         let query = fixture.open("(path ?a ?b)");
         let found = fixture.finish(query, portion);
         prop_assert_eq!(found.len(), path.len());

@@ -1,9 +1,9 @@
-//! Sequences of tuples of terms, of one width, in the order in which they came; as sets if that is wanted.
+//! Sequences of tuples of terms, all of one width, in the order of insertion; optionally without repetition.
 
 use super::bucket::{Buckets, finish, mix};
 use super::term::Term;
 
-/// See the module documentation.
+/// Tuples of terms.
 #[derive(Debug, Default)]
 pub(super) struct Tuples {
     width: usize,
@@ -21,7 +21,7 @@ impl Tuples {
         self.count
     }
 
-    /// Bytes in use, about.
+    /// Returns the bytes in use, approximately.
     pub(super) fn bytes(&self) -> usize {
         8 * self.cells.len() + 12 * self.count
     }
@@ -31,13 +31,13 @@ impl Tuples {
         &self.cells[at * self.width..(at + 1) * self.width]
     }
 
-    /// Adds a tuple.
+    /// Appends a tuple.
     pub(super) fn push(&mut self, tuple: impl Iterator<Item = Term>) {
         self.cells.extend(tuple);
         self.count += 1;
     }
 
-    /// Adds a tuple unless it is there; whether it was not. Not to be mixed with [`Tuples::push`].
+    /// Appends a tuple unless it is there; returns whether it is new. Not to be mixed with [`Tuples::push`].
     pub(super) fn insert(&mut self, tuple: impl Iterator<Item = Term>) -> bool {
         let start = self.cells.len();
         self.cells.extend(tuple);

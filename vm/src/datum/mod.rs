@@ -1,17 +1,16 @@
-//! Between the data of the compiler and the objects of the program, both ways, with identity.
+//! Conversion between the compiler's data and the program's objects, both ways, with identity.
 //!
-//! A [`Unit`] is what one compilation remembers: which object was made from which datum and the other way
-//! round, so that
+//! A [`Unit`] records, for one compilation, which object was made from which datum and the other way round,
+//! so that
+//! * parts of a form that a macro passes through return as the same data, with their spans;
+//! * shared structure stays shared, and an uninterned symbol stays the same symbol, in both directions;
+//! * an object that no datum can describe is represented by a number, and returns as itself.
 //!
-//! * parts of a form that a macro passes through come back as the data that they were, with their spans;
-//! * what is shared stays shared, and an uninterned symbol stays the same symbol, whichever way it goes;
-//! * an object that no datum can describe goes as a number, and comes back as itself.
+//! A macro may have changed its form in place. So an object becomes the datum from which it was made only if
+//! its parts are still those of the datum; otherwise it becomes a new datum at the old place.
 //!
-//! A macro may have changed its form in place. So an object is given back as the datum that it was made from
-//! only if its parts still are; else it becomes a new datum at the old place.
-//!
-//! Guarantees: walks use no native stack in proportion to the depth. Circular and oversized structure is
-//! refused with a text.
+//! Guarantees: walks use no native stack in proportion to depth. Circular and oversized structure is refused
+//! with a text.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -27,10 +26,10 @@ use crate::value::Value;
 use crate::world::load::{Shared, array, character, integer, integer_of, ratio};
 use crate::world::{GivenMap, GivenSet, World};
 
-/// The most nodes that an object may have to become a datum.
+/// Greatest number of nodes of an object that becomes a datum.
 const MAX_NODES: usize = 4_000_000;
 
-/// The most objects of which a unit remembers data.
+/// Greatest number of objects whose data a unit remembers.
 const MAX_REMEMBERED: usize = 1 << 19;
 
 /// Why an object does not become a datum.
@@ -53,23 +52,23 @@ impl fmt::Display for DatumError {
 
 impl std::error::Error for DatumError {}
 
-/// What one compilation remembers of objects and data.
+/// Objects and data of one compilation.
 #[derive(Default)]
 pub(crate) struct Unit {
     /// Objects that no datum can describe, by number.
     objects: Vec<Value>,
     object_ids: GivenMap<u64, u32>,
-    /// Uninterned symbols.
+    /// Uninterned symbols, by number.
     uninterned: BTreeMap<u32, Value>,
     uninterned_ids: GivenMap<u64, u32>,
-    /// By the address of the object: the object, and its datum.
+    /// Objects and their data, by the address of the object.
     data: GivenMap<u64, (Value, Datum)>,
-    /// By the address of the datum: the datum, and its object.
+    /// Data and their objects, by the address of the datum.
     values: GivenMap<u64, (Datum, Value)>,
-    /// The addresses of objects whose data were made of them, not the other way round: their place is that of
+    /// Addresses of objects whose data were made from them, not the other way round: their place is that of
     /// the macro call that they came from last.
     made: GivenSet<u64>,
-    /// Nodes that were walked over since this was last asked.
+    /// Nodes visited since the last call of [`Unit::take_work`].
     work: u64,
 }
 
@@ -88,20 +87,20 @@ impl Shared for Unit {
     }
 }
 
-/// What a walk from datum to object does next.
+/// The next step of a walk from datum to object.
 enum ToValue<'a> {
     Visit(&'a Datum),
     Build(&'a Datum),
 }
 
-/// What a walk from object to datum does next.
+/// The next step of a walk from object to datum.
 enum ToDatum {
     Visit(Value),
     Build(Value),
 }
 
 impl Unit {
-    /// Calls `visit` with every object that is remembered.
+    /// Calls `visit` with every object that the unit keeps alive.
     pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
         self.objects.iter().copied().for_each(&mut *visit);
         self.uninterned.values().copied().for_each(&mut *visit);
@@ -109,12 +108,12 @@ impl Unit {
         self.values.values().for_each(|&(_, value)| visit(value));
     }
 
-    /// Nodes that were walked over since this was last asked.
+    /// Returns the number of nodes visited since the last call.
     pub(crate) fn take_work(&mut self) -> u64 {
         std::mem::take(&mut self.work)
     }
 
-    /// The number by which data refer to an object.
+    /// Returns the number by which data refer to an object.
     pub(crate) fn pin(&mut self, object: Value) -> ObjectId {
         let next = self.objects.len() as u32;
         let id = *self.object_ids.entry(object.bits()).or_insert(next);
@@ -124,7 +123,7 @@ impl Unit {
         ObjectId(id)
     }
 
-    /// An object by its number.
+    /// Returns an object by its number.
     pub(crate) fn pinned(&self, ObjectId(id): ObjectId) -> Option<Value> {
         self.object(id)
     }
@@ -134,10 +133,10 @@ impl Unit {
         self.values.insert(datum.identity() as u64, (datum.clone(), value));
     }
 
-    /// The object for a datum.
+    /// Returns the object for a datum.
     ///
     /// # Errors
-    /// As for every allocation. What was made is remembered, so that a second attempt goes on from there.
+    /// As for every allocation. What was made is remembered, so a second attempt resumes.
     pub(crate) fn value_of(
         &mut self,
         heap: &mut Heap,
@@ -145,7 +144,7 @@ impl Unit {
         datum: &Datum,
     ) -> Result<Value, AllocError> {
         if self.data.len() > MAX_REMEMBERED {
-            // Of forms that old, no macro passes a part through.
+            // These forms are so old that no macro passes a part of them through.
             self.data.clear();
             self.values.clear();
             self.made.clear();
@@ -207,7 +206,7 @@ impl Unit {
         })
     }
 
-    /// The object of a symbol.
+    /// Returns the object of a symbol.
     ///
     /// # Errors
     /// As for every allocation.
@@ -226,7 +225,7 @@ impl Unit {
         Ok(object)
     }
 
-    /// The datum for an object. What no datum is remembered for gets the place `span`.
+    /// Returns the datum for an object. Parts without a remembered datum get the place `span`.
     ///
     /// # Errors
     /// [`DatumError`] if the object is circular or too large.
@@ -239,7 +238,7 @@ impl Unit {
     ) -> Result<Datum, DatumError> {
         let mut steps = vec![ToDatum::Visit(object)];
         let mut made: Vec<Datum> = Vec::new();
-        // What this walk has met: `None` while it is inside.
+        // Compound objects met by this walk: `None` while it is inside.
         let mut met: GivenMap<u64, Option<Datum>> = GivenMap::default();
         let mut nodes = 0;
         while let Some(step) = steps.pop() {
@@ -281,11 +280,11 @@ impl Unit {
         Ok(made.pop().unwrap_or_else(|| Datum::nil(span)))
     }
 
-    /// The datum of an object with these parts: the one that it was made from, unless its parts are others
-    /// now.
+    /// Returns the datum of an object with these parts: the one from which it was made, unless its parts have
+    /// changed.
     fn compound(&mut self, heap: &Heap, object: Value, parts: Vec<Datum>, span: Span) -> Datum {
         let known = self.data.get(&object.bits()).map(|(_, datum)| datum.clone());
-        // A literal that a macro gives again and again is at another place each time.
+        // A literal returned by a macro repeatedly is at another place each time.
         let is_made = self.made.contains(&object.bits());
         if let Some(known) = &known
             && are_parts(known, &parts)
@@ -336,7 +335,7 @@ impl Unit {
         datum
     }
 
-    /// What datum describes an atom, if there is one.
+    /// Returns the datum that describes an atom, if there is one.
     fn atom_kind(&mut self, heap: &Heap, world: &World, object: Value) -> Option<DatumKind> {
         if object.is_nil() {
             return Some(DatumKind::Nil);
@@ -360,13 +359,13 @@ impl Unit {
         Some(DatumKind::String(Arc::from(text?)))
     }
 
-    /// As [`Unit::datum_of`]; what no datum can describe becomes an object as a whole.
+    /// As [`Unit::datum_of`]; an object that no datum can describe is represented as a whole.
     pub(crate) fn datum_or_object(&mut self, heap: &Heap, world: &World, object: Value, span: Span) -> Datum {
         self.datum_of(heap, world, object, span)
             .unwrap_or_else(|_| Datum::new(DatumKind::Object(self.pin(object)), span))
     }
 
-    /// The object of an uninterned symbol, if it was met.
+    /// Returns the object of an uninterned symbol, if it was met.
     pub(crate) fn find_uninterned(&self, symbol: &Symbol) -> Option<Value> {
         match symbol.home() {
             Home::Uninterned(id) => self.uninterned(*id),
@@ -374,7 +373,7 @@ impl Unit {
         }
     }
 
-    /// The compiler's name for a symbol.
+    /// Returns the compiler's name for a symbol.
     pub(crate) fn symbol_name(&mut self, heap: &Heap, world: &World, object: Value) -> Option<Symbol> {
         if let Some(symbol) = world.name_of(heap, object) {
             return Some(symbol);
@@ -389,10 +388,10 @@ impl Unit {
     }
 }
 
-/// The parts of an object that is no atom.
+/// The parts of an object other than an atom.
 enum ObjectParts<'a> {
     Pair(Value, Value),
-    /// Dimensions, unless it is a simple vector, and elements.
+    /// Dimensions (unless it is a simple vector) and elements.
     Items(Option<&'a [Value]>, &'a [Value]),
 }
 
@@ -405,8 +404,7 @@ fn parts_of(heap: &Heap, object: Value) -> Option<ObjectParts<'_>> {
         Kind::Array => {
             let dimensions = heap.array_dimensions(object)?;
             let array = heap.array(object)?;
-            // Fill pointers and adjustability are beyond what a datum says, and so are elements that are no
-            // values.
+            // Data cannot express fill pointers, adjustability, and elements that are not values.
             let is_plain = array.header.flags & (Array::HAS_FILL_POINTER | Array::ADJUSTABLE) == 0;
             let items = heap.vector(array.data).filter(|_| is_plain && dimensions.len() != 1)?;
             Some(ObjectParts::Items(Some(dimensions), items))
@@ -415,7 +413,7 @@ fn parts_of(heap: &Heap, object: Value) -> Option<ObjectParts<'_>> {
     }
 }
 
-/// Adds visits to `steps`, the first part on top.
+/// Pushes visits onto `steps`, the first part on top.
 fn visit_parts(parts: Option<ObjectParts<'_>>, steps: &mut Vec<ToDatum>) {
     match parts {
         Some(ObjectParts::Pair(car, cdr)) => steps.extend([ToDatum::Visit(cdr), ToDatum::Visit(car)]),
@@ -424,7 +422,7 @@ fn visit_parts(parts: Option<ObjectParts<'_>>, steps: &mut Vec<ToDatum>) {
     }
 }
 
-/// Whether `datum` has just these parts.
+/// Returns whether `datum` has exactly these parts.
 fn are_parts(datum: &Datum, parts: &[Datum]) -> bool {
     match datum.kind() {
         DatumKind::Cons(car, cdr) => {
@@ -437,7 +435,7 @@ fn are_parts(datum: &Datum, parts: &[Datum]) -> bool {
     }
 }
 
-/// Whether both are the same node, or atoms that a program cannot tell apart.
+/// Returns whether both are the same node, or atoms that a program cannot distinguish.
 fn is_equivalent(a: &Datum, b: &Datum) -> bool {
     a.is_same(b)
         || match (a.kind(), b.kind()) {

@@ -74,7 +74,7 @@ fn parts_that_are_passed_through_keep_their_spans() {
     let items = back.as_list().unwrap();
     assert!(items[1].is_same(&inner));
     assert_eq!((back.span(), items[0].span()), (at(99), at(99)));
-    // And the other way: the same datum is the same object.
+    // In the other direction, the same datum is the same object.
     assert_eq!(fixture.value_of(&inner), argument);
     assert_eq!(fixture.value_of(&back), expansion);
 }

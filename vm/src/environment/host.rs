@@ -1,7 +1,7 @@
 //! Running the compile-time parts of a program for a compiler outside of the machine.
 //!
-//! A unit is compiled at a time: [`Vm::begin_unit`] forgets what was remembered of the last one. Between
-//! calls the unit keeps everything alive that its data refer to.
+//! Units are compiled one at a time: [`Vm::begin_unit`] forgets the objects of the last one. Between calls
+//! the unit keeps everything alive that its data refer to.
 
 use std::sync::Arc;
 
@@ -20,9 +20,9 @@ use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::load::{Alone, LoadError, load};
 
-/// Ticks that one macro call may take before it counts as one that never ends.
+/// Greatest number of ticks of a macro call; a longer one counts as endless.
 const MACRO_TICKS: u64 = 50_000_000;
-/// Ticks that the compile-time part of one form may take.
+/// Greatest number of ticks of the compile-time part of one form.
 const LOAD_TICKS: u64 = 1_000_000_000;
 
 impl Vm {
@@ -31,12 +31,12 @@ impl Vm {
         self.compiler.compiler = Some(compiler);
     }
 
-    /// Begins to compile another unit: objects and uninterned symbols of the last one are forgotten.
+    /// Begins to compile another unit. Forgets the objects and uninterned symbols of the last one.
     pub fn begin_unit(&mut self) {
         self.compiler.unit.replace(Unit::default());
     }
 
-    /// Loads a module that stands alone, such as one from a file, and gives the functions that run its
+    /// Loads a module that stands alone, such as one from a file. Returns the functions that run its
     /// top-level forms, in order, as a list.
     ///
     /// # Errors
@@ -45,8 +45,8 @@ impl Vm {
         with_room(self, |vm| load(&mut vm.heap, &mut vm.world, module, &mut Alone::default()))
     }
 
-    /// Takes in an image, such as that of the library, and gives the functions that run its top-level forms,
-    /// in order, as a list. The image counts as verified.
+    /// Adds an image, such as that of the library. Returns the functions that run its top-level forms, in
+    /// order, as a list. The image counts as verified.
     ///
     /// # Errors
     /// [`LoadError`].
@@ -55,17 +55,17 @@ impl Vm {
         with_room(self, |vm| vm.world.open_image(&mut vm.heap, image.clone()))
     }
 
-    /// Closes the language: from here on, its names cannot be defined again.
+    /// Seals the language: from here on, its names cannot be defined again.
     pub fn seal(&mut self) {
         self.world.is_open = false;
     }
 
-    /// Opens the language again, until [`Vm::seal`]: for tests that put a defect into the library.
+    /// Unseals the language, until [`Vm::seal`]: for tests that put a defect into the library.
     pub fn unseal(&mut self) {
         self.world.is_open = true;
     }
 
-    /// Runs the functions of a loaded module one after the other, in one task: the value of the last.
+    /// Runs the functions of a loaded module one after the other, in one task. Returns the value of the last.
     ///
     /// # Errors
     /// [`CallError`].
@@ -93,7 +93,7 @@ pub(crate) fn with_compiler<T>(
     Ok(result)
 }
 
-/// Loads a module of the unit that is being compiled.
+/// Loads a module of the unit being compiled.
 ///
 /// # Errors
 /// [`LoadError`].
@@ -104,7 +104,7 @@ pub(crate) fn load_in_unit(vm: &mut Vm, module: &Module) -> Result<Value, LoadEr
     functions
 }
 
-/// Does something outside of all tasks that may find no room: then once more, after a collection.
+/// Runs `work` outside of all tasks; if there is no room, once more after a collection.
 fn with_room<T>(vm: &mut Vm, mut work: impl FnMut(&mut Vm) -> Result<T, LoadError>) -> Result<T, LoadError> {
     match work(vm) {
         Err(LoadError::Alloc(AllocError::NeedCollection)) => {
@@ -115,7 +115,7 @@ fn with_room<T>(vm: &mut Vm, mut work: impl FnMut(&mut Vm) -> Result<T, LoadErro
     }
 }
 
-/// The function, form and environment of a macro call, as the program sees them.
+/// Returns the function, form and environment of a macro call, as the program sees them.
 pub(crate) fn macro_call(vm: &mut Vm, call: &MacroCall) -> Result<Option<[Value; 3]>, LoadError> {
     let mut unit = vm.compiler.unit.take();
     let prepared = prepare(vm, call, &mut unit);
@@ -143,7 +143,7 @@ fn prepare(vm: &mut Vm, call: &MacroCall, unit: &mut Unit) -> Result<Option<[Val
     Ok(Some([function, form, environment]))
 }
 
-/// The function that calls the functions of a list.
+/// Returns the function that calls the functions of a list.
 fn runner(vm: &mut Vm) -> Result<Value, CallError> {
     if vm.world.runner.is_nil() {
         // The module is the machine's own, so all it can lack is room.
@@ -155,7 +155,8 @@ fn runner(vm: &mut Vm) -> Result<Value, CallError> {
     Ok(vm.world.runner)
 }
 
-/// A module that gives a function that calls the functions of a list, and returns what the last one returned.
+/// Returns a module whose form returns a function that calls the functions of a list, and returns the value
+/// of the last.
 fn runner_module() -> Module {
     let function = |registers, constants: &[u32], code: &[Instr]| Function {
         registers,

@@ -1,8 +1,10 @@
-//! What names mean, for a compiler that works on the program of this machine.
+//! The meaning of names, for a compiler that works on the program of this machine.
 //!
-//! Guarantees: no question is answered by running the program, and none makes an object, so asking is cheap
-//! and can be done in the middle of a builtin. Not here: running macros for a compiler outside of the machine
-//! (`host`), compiling at run time (`builtins::eval`).
+//! Guarantees: no question is answered by running the program, and none makes an object, so questions are
+//! cheap and allowed in the middle of a builtin.
+//!
+//! Not here: running macros for a compiler outside of the machine (`host`), compiling at run time
+//! (`builtins::eval`).
 
 use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::compile::{
@@ -86,7 +88,7 @@ fn is_of_language(home: &str) -> bool {
     matches!(home, CL_PACKAGE | ESL_PACKAGE | KEYWORD_PACKAGE)
 }
 
-/// What a symbol of which no object was made yet names as a function: a builtin, or something of the library.
+/// Returns the function that a symbol without an object names: a builtin, or one of the library.
 fn function_so_far(world: &World, symbol: &Symbol) -> GlobalFunction {
     if let Some((image, definition)) = world.images.definition(symbol) {
         if definition.macro_function.is_some() {
@@ -103,7 +105,7 @@ fn function_so_far(world: &World, symbol: &Symbol) -> GlobalFunction {
     }
 }
 
-/// What such a symbol names as a variable.
+/// Returns the variable that such a symbol names.
 fn variable_so_far(world: &World, symbol: &Symbol) -> GlobalVariable {
     if symbol.is_keyword() {
         return GlobalVariable::Constant(Datum::symbol(symbol.clone(), Span::default()));
@@ -126,7 +128,7 @@ fn arity_of(parameters: &Parameters) -> Arity {
     Arity { min, max: if has_more { None } else { Some(min + u32::from(parameters.optional)) } }
 }
 
-/// The value of `indicator` in the property list of a symbol object.
+/// Returns the value of `indicator` in the property list of a symbol object.
 pub(crate) fn property(heap: &Heap, object: Value, indicator: Value) -> Option<Value> {
     let mut plist = heap.symbol(object)?.plist;
     while let Some(entry) = heap.as_cons(plist) {
@@ -139,7 +141,7 @@ pub(crate) fn property(heap: &Heap, object: Value, indicator: Value) -> Option<V
     None
 }
 
-/// The symbol, as the program sees it, if there is an object of it already.
+/// Returns the symbol as the program sees it, if it has an object already.
 fn value_for(vm: &Vm, symbol: &Symbol) -> Option<Value> {
     match symbol.package() {
         Some(_) => vm.world.find(symbol),
@@ -147,7 +149,7 @@ fn value_for(vm: &Vm, symbol: &Symbol) -> Option<Value> {
     }
 }
 
-/// The object of a symbol, if there is one already.
+/// Returns the object of a symbol, if there is one already.
 fn object_for(vm: &Vm, symbol: &Symbol) -> Option<Value> {
     vm.world.object_of(&vm.heap, value_for(vm, symbol)?)
 }
@@ -162,7 +164,7 @@ fn function_info(vm: &Vm, object: Value) -> GlobalFunction {
     }
 }
 
-/// How many arguments a function takes, if that is known without decoding damaged code.
+/// Returns the number of arguments that a function takes; `None` if its code is damaged.
 pub(crate) fn arity(vm: &Vm, function: Value) -> Option<Arity> {
     let code = vm.heap.code(vm.heap.function_code(function)?)?;
     let shape = Shape::unpack(code.spare[0]);
@@ -195,7 +197,7 @@ fn variable_info(vm: &Vm, object: Value) -> GlobalVariable {
     }
 }
 
-/// What `%define-accessor` has recorded.
+/// Returns the record of `%define-accessor`.
 fn accessor_info(vm: &Vm, object: Value) -> Option<Accessor> {
     let record = property(&vm.heap, object, vm.world.known.accessor)?;
     let class = vm.heap.as_cons(record)?;
@@ -207,7 +209,7 @@ fn accessor_info(vm: &Vm, object: Value) -> Option<Accessor> {
     })
 }
 
-/// What the library says of a name of Common Lisp that it leaves out.
+/// Returns the library's advice on a name of Common Lisp that it omits.
 fn instead_of(vm: &Vm, symbol: &Symbol) -> Option<String> {
     if !symbol.is_in(CL_PACKAGE) {
         return None;

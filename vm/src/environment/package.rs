@@ -8,21 +8,21 @@ use crate::heap::AllocError;
 use crate::vm::Vm;
 
 impl Vm {
-    /// The current package: what `*package*` is in the running task. When a program has put something else
-    /// there, it is `ESL-USER`.
+    /// Returns the current package: the value of `*package*` in the running task. If that is not a package,
+    /// it is `ESL-USER`.
     pub(crate) fn current_package(&self) -> PackageId {
         let value = self.symbol_value(self.world.known.package);
         value.and_then(|value| self.world.package_of(&self.heap, value)).unwrap_or(PackageId::USER)
     }
 
-    /// Names of all symbols that a person can write in the current package without a prefix, sorted.
+    /// Returns the names of all symbols that can be written in the current package without a prefix, sorted.
     pub fn accessible_names(&self) -> Vec<String> {
         let names = self.world.packages().accessible_names(self.current_package());
         names.into_iter().filter(|name| !name.starts_with('%')).map(String::from).collect()
     }
 
-    /// Makes the package of this name the value of `*package*` outside of all bindings; false if there is
-    /// none.
+    /// Makes the package of this name the value of `*package*` outside of all bindings. Returns false if
+    /// there is none.
     ///
     /// # Errors
     /// [`AllocError`] without room.
@@ -33,7 +33,7 @@ impl Vm {
         Ok(true)
     }
 
-    /// The symbol that a name denotes when it is read.
+    /// Returns the symbol that a name denotes when it is read.
     pub(crate) fn read_symbol(
         &mut self,
         prefix: Option<&str>,

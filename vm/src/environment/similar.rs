@@ -1,4 +1,4 @@
-//! Names that a misspelt one may have been meant to be.
+//! Suggestions for misspelt names.
 
 use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
@@ -7,10 +7,10 @@ use crate::heap::layout::Symbol as SymbolObject;
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// How many names are given.
+/// Greatest number of suggestions.
 const MOST: usize = 3;
 
-/// Names like `symbol` that are defined, the likeliest first.
+/// Returns defined names similar to `symbol`, the likeliest first.
 pub(super) fn similar(vm: &Vm, symbol: &Symbol, variable: bool) -> Vec<Symbol> {
     let limit = match symbol.name().chars().count() {
         0..=2 => 0,
@@ -41,7 +41,7 @@ pub(super) fn similar(vm: &Vm, symbol: &Symbol, variable: bool) -> Vec<Symbol> {
         }
         vm.world.images.each_definition(&mut consider);
     }
-    // Of equal distance, names of the program's own come first, then in the order of the alphabet.
+    // At equal distance, the program's own names come first, then in alphabetical order.
     found.sort_by_key(|(distance, candidate)| {
         let is_foreign = candidate.package() != symbol.package();
         (*distance, is_foreign, candidate.name().to_owned())
@@ -49,7 +49,7 @@ pub(super) fn similar(vm: &Vm, symbol: &Symbol, variable: bool) -> Vec<Symbol> {
     found.into_iter().take(MOST).map(|(_, candidate)| candidate).collect()
 }
 
-/// Whether a program that writes `symbol` would think of `candidate`.
+/// Returns whether `candidate` is a likely meaning of a program that writes `symbol`.
 fn is_visible(candidate: &Symbol, symbol: &Symbol) -> bool {
     match candidate.package() {
         None => false,
@@ -68,8 +68,8 @@ fn is_defined(vm: &Vm, value: Value, variable: bool) -> bool {
     flags & (SymbolObject::SPECIAL | SymbolObject::CONSTANT) != 0
 }
 
-/// The number of characters to insert, delete, replace or swap with their neighbour to make `a` into `b`, if
-/// it is at most `limit`.
+/// Returns the number of characters to insert, delete, replace or swap with their neighbour to turn `a` into
+/// `b`, if it is at most `limit`.
 fn distance(a: &str, b: &str, limit: usize) -> Option<usize> {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
     if a.len().abs_diff(b.len()) > limit {

@@ -17,7 +17,7 @@ fn span() -> Span {
     Span::default()
 }
 
-/// A function with these parameters, constants and code.
+/// Returns a function with these parameters, constants and code.
 fn function(required: u8, registers: u8, constants: &[u32], code: &str) -> Function {
     Function {
         parameters: Parameters::exactly(required),
@@ -28,7 +28,7 @@ fn function(required: u8, registers: u8, constants: &[u32], code: &str) -> Funct
     }
 }
 
-/// A module whose only form calls a builtin with constants.
+/// Returns a module whose only form calls a builtin with constants.
 fn call(builtin: Builtin, arguments: Vec<Constant>) -> Module {
     let count = arguments.len() as u8;
     let mut code: String =
@@ -42,7 +42,7 @@ fn call(builtin: Builtin, arguments: Vec<Constant>) -> Module {
     }
 }
 
-/// A module that makes `(lambda (form environment) (list 'quote (cdr form)))` the macro `QUOTED`.
+/// Returns a module that makes `(lambda (form environment) (list 'quote (cdr form)))` the macro `QUOTED`.
 fn macro_module() -> Module {
     let define = format!(
         "load-const r2 k0
@@ -70,7 +70,7 @@ fn load(vm: &mut Vm, module: &Module) {
     vm.run_toplevel(functions, 1_000).unwrap();
 }
 
-/// What the modules define, once run and once as the table of an image.
+/// Returns two machines with the definitions of the modules: run once, and from the table of an image.
 fn machines(modules: Vec<Module>) -> [Vm; 2] {
     let mut running = Vm::for_tests();
     modules.iter().for_each(|module| load(&mut running, module));
@@ -158,7 +158,7 @@ fn a_kept_value_comes_back_as_itself() {
     assert_eq!(vm.heap.car(value), Some(Value::T));
 }
 
-/// A compiler of forms `(NAME . arguments)`: it has the macro `NAME` called, and the value is the expansion.
+/// A compiler of forms `(NAME . arguments)`: it expands the macro `NAME`, and the value is the expansion.
 struct Toy;
 
 enum ToyCompilation {

@@ -1,8 +1,8 @@
-//! Which registers of a frame may still be read from a place of its code on: only these belong to a state.
-//! The others hold what is left of earlier work, and would make two states of one.
+//! Liveness: the registers of a frame that may still be read from a given instruction on. Only these belong
+//! to a state; the others hold remains of earlier work, and would make two states of one.
 //!
-//! A register that may be read is never said not to be. It may be the other way round: what a landing of a
-//! control entry reads counts everywhere in its function.
+//! The analysis is conservative: a register that may be read is always live. Some others are live, too: what
+//! a landing of a control entry reads is live everywhere in its function.
 
 use esl_bytecode::module::CaptureSource;
 use esl_bytecode::opcode::Instr;
@@ -38,23 +38,23 @@ impl RegisterSet {
     }
 }
 
-/// An instruction, as far as it matters here.
+/// An instruction's effect on liveness.
 struct LiveStep {
     at: usize,
     reads: RegisterSet,
     writes: RegisterSet,
-    /// Words to which control goes from here.
+    /// Words at which control may continue.
     next: [Option<usize>; 2],
-    /// Where the entry lands that it pushes.
+    /// Landing of the control entry that it pushes.
     landing: Option<usize>,
 }
 
-/// For each word at which an instruction begins, the registers that may be read from there on.
+/// The live registers for each word at which an instruction begins.
 #[derive(Debug, Default)]
 pub(super) struct Live(Vec<RegisterSet>);
 
 impl Live {
-    /// What is live in a function with these words and constants.
+    /// Analyses a function with these words and constants.
     pub(super) fn of(heap: &Heap, words: &[u32], constants: &[Value]) -> Live {
         let mut steps = Vec::new();
         let mut at = 0;
@@ -82,7 +82,7 @@ impl Live {
         Live(live)
     }
 
-    /// Whether a register may be read from word `at` on.
+    /// Returns the registers that may be read from word `at` on.
     pub(super) fn at(&self, at: usize) -> RegisterSet {
         self.0.get(at).copied().unwrap_or_default()
     }
@@ -152,7 +152,7 @@ fn step(heap: &Heap, constants: &[Value], at: usize, instruction: Instr) -> Live
     LiveStep { at, reads, writes, next: [falls_through.then_some(after), jump], landing }
 }
 
-/// The registers from which the captures of a closure are taken.
+/// Returns the registers from which the captures of a closure are taken.
 fn captured_registers(heap: &Heap, code: Option<Value>) -> Vec<usize> {
     let Some((code, layout)) = code.and_then(|code| Some((code, heap.code(code)?))) else {
         return Vec::new();

@@ -52,17 +52,17 @@ use crate::vm::Vm;
 use fingerprint::Fingerprints;
 use point::{explore_by, run_by_points};
 
-/// How to explore.
+/// Settings of an exploration.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
     /// Where points are.
     pub grain: Grain,
-    /// Ticks after which a task is stopped that comes to no point.
+    /// Ticks after which a task that reaches no point is stopped.
     pub turn: u32,
-    /// States after which to give up.
+    /// Number of states at which the search gives up.
     pub states: usize,
-    /// Whether states are told apart by what was written to standard output, too. Without, an ending stands
-    /// for all runs that came to the same states on the way, whatever they had written by then.
+    /// Whether states also differ by what was written to standard output. Without this, an ending stands for
+    /// all runs that passed through the same states, whatever they had written before.
     pub output: bool,
 }
 
@@ -75,55 +75,54 @@ impl Default for Settings {
 /// A way in which runs end.
 #[derive(Clone, Debug)]
 pub struct Ending<T> {
-    /// What the caller says of it.
+    /// The caller's description.
     pub what: T,
-    /// The choices that lead there.
+    /// Choices of the first schedule that ends so.
     pub choices: Vec<u32>,
-    /// How many of the runs ended so.
+    /// Number of runs that ended so.
     pub runs: usize,
 }
 
-/// What exploring has found.
+/// The result of an exploration.
 #[derive(Clone, Debug)]
 pub struct Exploration<T> {
-    /// Different states at points.
+    /// Number of different states at points.
     pub states: usize,
-    /// Runs: one for each choice that led to a state from which something was left to be seen, and for each
-    /// ending.
+    /// Number of runs: one for each choice that led to a state from which something remained to be explored,
+    /// and for each ending.
     pub runs: usize,
-    /// The ways to end, the one with the fewest switches first.
+    /// The ways of ending, the one with the fewest preemptions first.
     pub endings: Vec<Ending<T>>,
     /// Choices that lead to a state from which no schedule leads to an end, if there is one.
     pub endless: Option<Vec<u32>>,
-    /// Whether a schedule comes back to a state in which it has been: it can go on for ever, be it that tasks
-    /// are treated unfairly.
+    /// Whether a schedule returns to a state: then it can go on for ever, if only by treating tasks unfairly.
     pub has_cycle: bool,
-    /// Whether all states were seen; otherwise there were more than [`Settings::states`].
+    /// Whether all states were explored; otherwise there are more than [`Settings::states`].
     pub is_complete: bool,
 }
 
-/// A place in the tree of choices: the choice made last, after those of another place.
+/// A node in the tree of choices: its last choice, after those of its parent.
 #[derive(Clone, Copy, Debug)]
 struct ChoiceNode {
     parent: u32,
     choice: u32,
-    /// The state in which it was made.
+    /// State in which the choice was made.
     state: u32,
 }
 
 const ROOT: u32 = 0;
 
-/// What is known during a search.
+/// The state of a search.
 #[derive(Default)]
 struct Search {
     nodes: Vec<ChoiceNode>,
-    /// Places to go on from, by the number of switches that lead there; each has the latest last.
+    /// Nodes to continue from, by number of preemptions; the latest is last.
     open: Vec<Vec<u32>>,
-    /// States by their fingerprints.
+    /// Numbers of states, by fingerprint.
     states: HashMap<u128, u32>,
-    /// The place from which each state was seen first.
+    /// Node from which each state was reached first.
     places: Vec<u32>,
-    /// From which state to which others a step leads.
+    /// Steps, as pairs of the states before and after.
     steps: Vec<(u32, u32)>,
     /// States from which a step leads to the end.
     last: Vec<u32>,
@@ -142,12 +141,12 @@ impl Search {
         self.open[switches].push(node);
     }
 
-    /// The place with the fewest switches to go on from.
+    /// Returns the next node to continue from, one with the fewest preemptions, and that number.
     fn next(&mut self) -> Option<(usize, u32)> {
         self.open.iter_mut().enumerate().find_map(|(switches, nodes)| Some((switches, nodes.pop()?)))
     }
 
-    /// The choices that lead to a place.
+    /// Returns the choices that lead to a node.
     fn choices(&self, node: u32) -> Vec<u32> {
         let mut choices = Vec::new();
         let mut at = node;
@@ -159,7 +158,7 @@ impl Search {
         choices
     }
 
-    /// Choices that lead to a state from which the end cannot be reached.
+    /// Returns choices that lead to a state from which the end cannot be reached.
     fn endless(&self) -> Option<Vec<u32>> {
         let mut before = vec![Vec::new(); self.places.len()];
         for &(from, to) in &self.steps {
@@ -176,8 +175,8 @@ impl Search {
         Some(self.choices(self.places[stuck]))
     }
 
-    /// Whether steps lead from a state back to it: what is left when states without a step to them are taken
-    /// away.
+    /// Returns whether steps lead from a state back to it: whether states remain when those without a step to
+    /// them are removed repeatedly.
     fn has_cycle(&self) -> bool {
         let mut after = vec![Vec::new(); self.places.len()];
         let mut steps_to = vec![0_u32; self.places.len()];
@@ -201,10 +200,10 @@ impl Search {
     }
 }
 
-/// Runs under all schedules the program that each machine of `begin` is about to run: its main task has been
-/// made. `judge` says how a run has ended.
+/// Runs a program under all schedules. Each machine made by `begin` is about to run it: its main task exists.
+/// `judge` describes how a run has ended.
 ///
-/// The machines have to be alike: the same program, settings and outside. The clock of their host is virtual.
+/// The machines must be alike: the same program, settings and outside. The clocks of their hosts are virtual.
 ///
 /// # Errors
 /// Those of `begin`.
@@ -229,7 +228,7 @@ pub fn explore<T: PartialEq, E>(
         runs += 1;
         let choices = search.choices(place);
         let mut given = choices.iter().copied();
-        // Where the run is: the choices so far, and the state in which the last step began.
+        // Position of the run: the choices so far, and the state in which the last step began.
         let mut node = place;
         let mut before = (place != ROOT).then(|| search.nodes[place as usize].state);
         let outcome = run_by_points(&mut machine, &mut |vm, runnable| {
@@ -259,7 +258,7 @@ pub fn explore<T: PartialEq, E>(
             }
             before = Some(state);
             if runnable.count > 1 {
-                // A switch is one where the task that has just run could have gone on.
+                // A preemption is a switch at which the task that has just run could have continued.
                 let switches = switches + usize::from(runnable.has_last);
                 for choice in (1..runnable.count).rev() {
                     let other = search.node(ChoiceNode { parent: node, choice, state });

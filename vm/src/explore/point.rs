@@ -6,18 +6,18 @@ use crate::schedule::Choices;
 use crate::task::{TaskIndex, TaskNumber, TaskState};
 use crate::vm::Vm;
 
-/// What there is to choose from.
+/// The tasks to choose from.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Runnable {
-    /// How many tasks.
+    /// Number of runnable tasks.
     pub(super) count: u32,
     /// Whether the first of them is the task that ran last.
     pub(super) has_last: bool,
 }
 
 impl Vm {
-    /// Runs the program from point to point along a list of choices that [`super::explore`] has found with
-    /// the same settings; beyond its end the first choice is taken.
+    /// Runs the program from point to point along a list of choices found by [`super::explore`] with the same
+    /// settings; beyond the end of the list, the first choice is taken.
     pub fn follow(&mut self, settings: &Settings, choices: &[u32]) -> RunOutcome {
         explore_by(self, settings);
         let mut choices = choices.iter().copied();

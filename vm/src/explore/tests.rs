@@ -1,4 +1,4 @@
-//! Exploring programs assembled by hand, and the parts of it. What it finds of programs in ESL is in
+//! Exploration of programs assembled by hand, and its parts. Programs in ESL are explored in
 //! `conformance/tests/explore.rs`.
 
 use std::convert::Infallible;
@@ -26,7 +26,7 @@ fn words(code: &[Instr]) -> Vec<u32> {
         .collect()
 }
 
-/// A machine with a task for each of these codes, which may use eight registers and the symbol `F` as
+/// Makes a machine with a task for each of these codes, which may use eight registers and the symbol `F` as
 /// constant 0.
 fn machine(tasks: &[&[Instr]]) -> Vm {
     let mut vm = Vm::for_tests();
@@ -69,7 +69,7 @@ fn endings(tasks: &[&[Instr]], settings: &Settings) -> Exploration<(RunOutcome, 
     }
 }
 
-/// Makes `F` a number before a point, and twice what it is then behind it.
+/// Sets `F` to a number before a point, and doubles it after the point.
 fn writer(number: i16) -> Vec<Instr> {
     vec![
         Instr::LoadInt { dst: Dst(5), value: Int16(number) },
@@ -89,10 +89,10 @@ fn all_orders_are_found() {
     let found = endings(&[&first, &second], &Settings::default());
     let mut values: Vec<&str> = found.endings.iter().map(|ending| &*ending.what.1).collect();
     values.sort_unstable();
-    // One after the other, either way, and with the second number written in between, either way.
+    // Either order without interleaving, and either order with the second number written in between.
     assert_eq!(values, ["2", "20", "4", "40"]);
     assert!(found.is_complete && !found.has_cycle && found.endless.is_none(), "{found:?}");
-    // The first ending is that of the plain schedule.
+    // The first ending is that of the schedule without preemption.
     assert!(found.endings[0].choices.iter().all(|&choice| choice == 0), "{found:?}");
     for ending in &found.endings {
         let mut vm = machine(&[&first, &second]);
@@ -111,7 +111,7 @@ fn what_never_ends_is_found() {
 
 #[test]
 fn it_gives_up_after_the_given_number_of_states() {
-    // A counter makes each state another one.
+    // A counter makes each state different.
     let counts = [
         Instr::LoadInt { dst: Dst(0), value: Int16(0) },
         Instr::AddInt { dst: Dst(0), left: Reg(0), value: Int8(1) },
@@ -139,7 +139,7 @@ fn a_fingerprint_depends_on_the_state_alone() {
     };
     let plain = of(&|vm, symbol| list(vm, symbol, 2));
     let elsewhere = of(&|vm, symbol| {
-        // Other addresses, and what nobody holds.
+        // Other addresses, and objects that are garbage.
         for _ in 0..100 {
             vm.heap.list(&[Value::T; 7]).unwrap();
         }
@@ -148,7 +148,7 @@ fn a_fingerprint_depends_on_the_state_alone() {
     assert_eq!(plain, elsewhere);
     assert_ne!(plain, of(&|vm, symbol| list(vm, symbol, 3)));
     assert_ne!(plain, of(&|_, _| {}));
-    // A list that is shared is not one that was made twice.
+    // A shared list differs from a list made twice.
     let pair = |vm: &mut Vm, symbol, is_shared: bool| {
         let list = vm.heap.list(&[Value::T]).unwrap();
         let other = if is_shared { list } else { vm.heap.list(&[Value::T]).unwrap() };
@@ -198,7 +198,7 @@ fn registers_are_live_while_they_may_be_read() {
     assert_eq!(at(4), [0]);
     assert_eq!(at(5), [1, 2, 3, 4, 5]);
     assert_eq!(at(6), [5]);
-    // What a landing reads may be read as long as the entry stands.
+    // A register read by a landing is live as long as the control entry is in place.
     let code = words(&[
         Instr::PushCleanup { window: Base(4), to: Jump(1) }, // 0, 1
         Instr::EnterCleanup {},                              // 2

@@ -1,17 +1,17 @@
 //! The standard streams of a program, buffered between it and the host.
 //!
-//! Standard output is written in blocks: when the buffer is full, before the program waits or reads standard input, and
-//! at its end. Standard error is written at once, after what is in standard output's buffer, so that the two come out in
-//! the order of the program. Input is decoded as UTF-8; what is none comes out as U+FFFD.
+//! Standard output is written in blocks: when the buffer is full, before the program waits or reads standard
+//! input, and at its end. Standard error is written at once, after the contents of standard output's buffer,
+//! so that both appear in the order of the program. Input is decoded as UTF-8; invalid bytes become U+FFFD.
 //!
 //! Guarantees: once nobody reads standard output any more, everything written to it is dropped, and
-//! [`Console::is_broken`] says so: the run ends quietly.
+//! [`Console::is_broken`] holds: the run ends quietly.
 
 use std::collections::VecDeque;
 
 use super::{Host, HostError, Input, Output};
 
-/// Bytes that standard output gathers.
+/// Size of a block of standard output, in bytes.
 const BLOCK: usize = 1 << 14;
 
 /// The standard streams.
@@ -20,26 +20,26 @@ pub(crate) struct Console {
     output: Vec<u8>,
     /// Characters since the last line end, by stream.
     columns: [usize; 2],
-    /// A hash of all that was written to standard output, if that is wanted.
+    /// A hash of everything written to standard output, if requested.
     noted: Option<u64>,
     broken: bool,
-    /// Why standard output could not be written, until somebody asks.
+    /// Error of the latest write to standard output, until it is taken.
     failure: Option<HostError>,
     /// Decoded input, in order.
     input: VecDeque<u32>,
-    /// The bytes of a character that has not come in whole.
+    /// Bytes of a character of which the rest has not arrived.
     partial: Vec<u8>,
     at_end: bool,
 }
 
-/// What standard input has to say.
+/// The outcome of taking something from standard input.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Taken<T> {
-    /// This came in.
+    /// It was there.
     Next(T),
-    /// Nothing yet.
+    /// It has not arrived yet.
     WouldBlock,
-    /// There is no more.
+    /// The input has ended.
     End,
     /// Reading failed.
     Failed(HostError),
@@ -66,23 +66,23 @@ impl Console {
                 self.flush(host);
                 let mut bytes = Vec::new();
                 encode(characters, &mut bytes);
-                // There is nobody to tell that standard error is gone.
+                // Standard error is gone, and there is no other stream for the error.
                 let _ = host.write(Output::Error, &bytes);
             }
         }
     }
 
-    /// From now on what is written to standard output is noted, or not.
+    /// Turns the hash of everything written to standard output on, from zero, or off.
     pub(crate) fn note_all(&mut self, on: bool) {
         self.noted = on.then_some(0);
     }
 
-    /// A hash of what was noted.
+    /// Returns the hash of everything written to standard output.
     pub(crate) fn noted(&self) -> u64 {
         self.noted.unwrap_or(0)
     }
 
-    /// Writes what standard output has gathered.
+    /// Writes the buffer of standard output.
     pub(crate) fn flush(&mut self, host: &mut dyn Host) {
         if self.output.is_empty() {
             return;
@@ -97,17 +97,17 @@ impl Console {
         self.output.clear();
     }
 
-    /// Characters since the last line end of a stream.
+    /// Returns the number of characters since the last line end of a stream.
     pub(crate) fn column(&self, output: Output) -> usize {
         self.columns[output as usize]
     }
 
-    /// Whether nobody reads standard output any more.
+    /// Returns whether nobody reads standard output any more.
     pub(crate) fn is_broken(&self) -> bool {
         self.broken
     }
 
-    /// Why standard output could not be written, if that happened since this was last asked.
+    /// Returns the error of a write to standard output, if there was one since the last call.
     pub(crate) fn take_failure(&mut self) -> Option<HostError> {
         self.failure.take()
     }
@@ -127,7 +127,7 @@ impl Console {
         }
     }
 
-    /// Takes the next line of standard input without its end, and whether that was missing.
+    /// Takes the next line of standard input without its line end, and whether the line end was missing.
     pub(crate) fn read_line(&mut self, host: &mut dyn Host) -> Taken<(Vec<u32>, bool)> {
         let mut searched = 0;
         loop {
@@ -148,28 +148,28 @@ impl Console {
         }
     }
 
-    /// Whether nothing more will come in.
+    /// Returns whether the input has ended.
     pub(crate) fn is_at_end(&self) -> bool {
         self.at_end
     }
 
-    /// What has come in and was not read.
+    /// Returns the input that has arrived and was not read.
     pub(crate) fn pending(&self) -> String {
         let text = |&code: &u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
         self.input.iter().map(text).collect()
     }
 
-    /// Drops so many characters of what has come in.
+    /// Drops this number of characters of the input.
     pub(crate) fn skip(&mut self, characters: usize) {
         self.input.drain(..characters.min(self.input.len()));
     }
 
-    /// Gives a character back to standard input.
+    /// Puts a character back in front of the input.
     pub(crate) fn unread(&mut self, character: u32) {
         self.input.push_front(character);
     }
 
-    /// Gives a line back to standard input.
+    /// Puts a line back in front of the input.
     pub(crate) fn unread_line(&mut self, line: &[u32], is_cut: bool) {
         if !is_cut {
             self.unread(u32::from('\n'));
@@ -177,7 +177,7 @@ impl Console {
         line.iter().rev().for_each(|&character| self.unread(character));
     }
 
-    /// Has more input come in, in addition to what was not read yet.
+    /// Reads more input, in addition to what was not read yet.
     pub(crate) fn fill(&mut self, host: &mut dyn Host) -> Taken<()> {
         if self.at_end {
             return Taken::End;
@@ -226,7 +226,7 @@ impl Console {
     }
 }
 
-/// The column after writing `characters` from `column` on.
+/// Returns the column after writing `characters` from `column` on.
 pub(crate) fn column_after(column: usize, characters: &[u32]) -> usize {
     match characters.iter().rposition(|&c| c == u32::from('\n')) {
         Some(last) => characters.len() - last - 1,
@@ -234,7 +234,7 @@ pub(crate) fn column_after(column: usize, characters: &[u32]) -> usize {
     }
 }
 
-/// Appends characters as UTF-8; what is no Unicode scalar value becomes U+FFFD.
+/// Appends characters as UTF-8; a code that is not a Unicode scalar value becomes U+FFFD.
 pub(crate) fn encode(characters: &[u32], bytes: &mut Vec<u8>) {
     for &code in characters {
         match u8::try_from(code) {

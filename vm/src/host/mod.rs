@@ -1,12 +1,15 @@
-//! The outside of the virtual machine, as a trait: clocks, standard streams, files, arguments, messages from other
-//! threads.
+//! The outside of the virtual machine, as a trait: clocks, standard streams, files, arguments, messages from
+//! other threads.
 //!
-//! Guarantees: nothing else in this crate names clocks, files, threads, the environment or randomness (a test says so),
-//! so a run depends on the program, the seed and the answers of its host, and on nothing else. Every function here
-//! answers with plain data, so a host can be recorded ([`RecordingHost`]) and replayed ([`ReplayHost`]).
-//! Not here: who asks when. The scheduler reads the clock once per round and drains the inbox between slices.
+//! Guarantees: nothing else in this crate names clocks, files, threads, the environment or randomness (a test
+//! checks this), so a run depends only on the program, the seed and the answers of its host. All functions
+//! here return plain data, so a host can be recorded ([`RecordingHost`]) and replayed ([`ReplayHost`]).
 //!
-//! A host gives what it wants to give. File access is a grant: [`VirtualHost`] has only the files that it was given.
+//! Not here: when the host is asked. The scheduler reads the clock once per round and drains the inbox
+//! between slices.
+//!
+//! A host decides what it makes available. File access is a grant: [`VirtualHost`] has only the files that it
+//! was given.
 
 use std::fmt;
 
@@ -31,14 +34,14 @@ pub enum Output {
     Error,
 }
 
-/// What became of an attempt to read standard input.
+/// The outcome of an attempt to read standard input.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Input {
-    /// So many bytes came in, at least one.
+    /// Bytes that were read, at least one.
     Data(Vec<u8>),
-    /// Nothing is there yet; [`Host::wait`] wakes when something is.
+    /// Nothing has arrived yet; [`Host::wait`] wakes when something has.
     WouldBlock,
-    /// There is no more.
+    /// The input has ended.
     End,
     /// Reading failed.
     Failed(HostError),
@@ -47,26 +50,26 @@ pub enum Input {
 /// How a file is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WriteMode {
-    /// What the file held is replaced; it is made if there is none.
+    /// Replace the contents; create the file if there is none.
     Replace,
-    /// The bytes go to its end; it is made if there is none.
+    /// Append to the file; create it if there is none.
     Append,
-    /// The file is made; it is an error if there is one.
+    /// Create the file; it is an error if it exists.
     Create,
 }
 
-/// Why the host did not do what it was asked for.
+/// Why the host did not carry out a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HostError {
-    /// Nobody reads what is written: the other end of a pipe is gone.
+    /// The other end of a pipe has closed.
     BrokenPipe,
     /// There is no such file.
     NotFound,
-    /// The host, or the system, does not allow it.
+    /// The host, or the system, does not grant access.
     Refused,
-    /// There is such a file already.
+    /// The file exists already.
     Exists,
-    /// Something else, in words.
+    /// Another error, described by the system.
     Other(String),
 }
 
@@ -84,75 +87,76 @@ impl fmt::Display for HostError {
 
 impl std::error::Error for HostError {}
 
-/// A message from another thread: the name of what it is for, and what it says.
+/// A message from another thread.
 #[derive(Clone, Debug)]
 pub struct Message {
-    /// What it is for; the program chooses by this.
+    /// Purpose of the message, by which the program dispatches.
     pub channel: String,
-    /// What it says. No datum in it may be an object.
+    /// Contents. No datum in them may be an object.
     pub arguments: Vec<Datum>,
 }
 
 /// Why a wait ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wake {
-    /// The time has come.
+    /// The deadline has passed.
     Time,
-    /// A message or input has come.
+    /// A message or input has arrived.
     Arrival,
-    /// Nothing can ever come: no deadline, no input, and no sender of messages is left.
+    /// Nothing can ever arrive: there is no deadline, no input, and no sender of messages.
     Never,
 }
 
-/// Everything that the virtual machine learns from outside.
+/// The source of everything that the virtual machine learns from outside.
 pub trait Host {
-    /// Nanoseconds of a clock that never goes back, from some start.
+    /// Returns the nanoseconds of a clock that never goes back, since some start.
     fn monotonic(&mut self) -> u64;
 
-    /// Nanoseconds since 1970-01-01 00:00 UTC.
+    /// Returns the nanoseconds since 1970-01-01 00:00 UTC.
     fn wall_clock(&mut self) -> i64;
 
-    /// Does nothing until the monotonic clock shows `deadline` nanoseconds, a message arrives or, if `for_input`,
-    /// standard input has something to say. May wake too early.
+    /// Waits until the monotonic clock shows `deadline` nanoseconds, a message arrives or, if `for_input`,
+    /// standard input has data or ends. May wake too early.
     fn wait(&mut self, deadline: Option<u64>, for_input: bool) -> Wake;
 
-    /// Nanoseconds of real time, for figures and pictures of a run: nothing that the run does depends on it. 0 where there is no
-    /// real time.
+    /// Returns nanoseconds of real time, for figures and timelines of a run, on which nothing in the run
+    /// depends. 0 if there is no real time.
     fn stopwatch(&mut self) -> u64 {
         0
     }
 
-    /// Whether time stands still unless somebody waits, so that a long computation must be told to pass some.
+    /// Returns whether time passes only when somebody waits, so that a long computation has to let some pass
+    /// explicitly.
     fn is_virtual(&self) -> bool {
         false
     }
 
-    /// Lets `nanoseconds` pass at once. Only for hosts whose time is virtual.
+    /// Lets `nanoseconds` pass at once. Only for hosts with virtual time.
     fn advance(&mut self, nanoseconds: u64) {
         let _ = nanoseconds;
     }
 
-    /// A seed for the choices of a run, for when none was given.
+    /// Returns a seed for the random choices of a run, if none was given.
     fn seed(&mut self) -> u64;
 
-    /// The arguments of the program.
+    /// Returns the arguments of the program.
     fn arguments(&mut self) -> Vec<String>;
 
-    /// Writes bytes to a standard stream, all of them.
+    /// Writes all of the bytes to a standard stream.
     ///
     /// # Errors
-    /// [`HostError::BrokenPipe`] if nobody reads them, another if they could not be written.
+    /// [`HostError::BrokenPipe`] if nobody reads them, another error if they could not be written.
     fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError>;
 
-    /// Reads what standard input has, without waiting.
+    /// Reads the available part of standard input, without waiting.
     fn read_input(&mut self) -> Input;
 
-    /// Whether standard output is a terminal, or something else that a person watches.
+    /// Returns whether standard output is a terminal, or something else that a person watches.
     fn is_interactive(&mut self) -> bool {
         false
     }
 
-    /// The whole contents of a file.
+    /// Returns the whole contents of a file.
     ///
     /// # Errors
     /// [`HostError`], and [`HostError::Refused`] if the embedder does not grant it.
@@ -164,7 +168,7 @@ pub trait Host {
     /// [`HostError`], and [`HostError::Refused`] if the embedder does not grant it.
     fn write_file(&mut self, path: &str, bytes: &[u8], mode: WriteMode) -> Result<(), HostError>;
 
-    /// Whether there is a file of this name that the program may know of.
+    /// Returns whether there is a file of this name that the program may know of.
     fn file_exists(&mut self, path: &str) -> bool;
 
     /// Removes a file.
@@ -173,15 +177,16 @@ pub trait Host {
     /// [`HostError`], and [`HostError::Refused`] if the embedder does not grant it.
     fn delete_file(&mut self, path: &str) -> Result<(), HostError>;
 
-    /// The messages that have arrived, in order.
+    /// Returns the messages that have arrived, in order.
     fn receive(&mut self) -> Vec<Message>;
 
-    /// The status with which a program ends whose standard output nobody reads any more. It did nothing wrong.
+    /// Returns the exit status of a program whose standard output nobody reads any more, which is not the
+    /// program's fault.
     fn broken_output_status(&self) -> u8 {
         0
     }
 
-    /// Whether somebody may still send messages. While this is so, a run in which everything waits is not deadlocked
-    /// if something waits for a message.
+    /// Returns whether more messages may be sent. While this holds, a run in which everything waits is not
+    /// deadlocked if something waits for a message.
     fn has_senders(&self) -> bool;
 }

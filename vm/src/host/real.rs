@@ -1,8 +1,8 @@
 //! The real host: the system's clocks, streams and files.
 //!
-//! One channel carries what comes from other threads: messages, and chunks of standard input, which a thread of its
-//! own reads, a chunk for each time that the program asks. So waiting for either, up to a deadline, is one operation,
-//! and input that nobody asked for stays with the system.
+//! A single channel carries everything from other threads: messages, and chunks of standard input. A thread
+//! reads standard input, one chunk per request of the program. So waiting for either, up to a deadline, is
+//! one operation, and input that was not requested stays with the system.
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -12,22 +12,22 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::{Host, HostError, Input, Message, Output, Wake, WriteMode};
 
-/// What comes in from other threads.
+/// An arrival from another thread.
 enum Incoming {
     Message(Message),
     Input(Input),
-    /// A sender of messages is gone; perhaps it was the last.
+    /// A sender of messages is gone, perhaps the last.
     SenderGone,
-    /// The wait is to end, whatever it is for.
+    /// The current wait is to end.
     Wake,
 }
 
-/// Ends a wait of the host, from any thread: when the machine is to be interrupted while nothing runs.
+/// Ends a wait of the host from any thread, to interrupt the machine while nothing runs.
 #[derive(Clone)]
 pub struct Waker(Sender<Incoming>);
 
 impl Waker {
-    /// Ends the wait that is under way, or the next one.
+    /// Ends the current wait, or the next one.
     pub fn wake(&self) {
         // Without a host there is nothing to wake.
         let _ = self.0.send(Incoming::Wake);
@@ -37,12 +37,12 @@ impl Waker {
 /// Sends messages to a virtual machine, from any thread.
 pub struct MessageSender {
     channel: Sender<Incoming>,
-    /// Counted by the host, which thereby knows whether messages can still come.
+    /// Token counted by the host, which thereby knows whether messages can still arrive.
     alive: Option<Arc<()>>,
 }
 
 impl MessageSender {
-    /// Sends a message; whether somebody is there to receive it.
+    /// Sends a message. Returns whether there is a receiver.
     pub fn send(&self, message: Message) -> bool {
         self.channel.send(Incoming::Message(message)).is_ok()
     }
@@ -56,7 +56,7 @@ impl Clone for MessageSender {
 
 impl Drop for MessageSender {
     fn drop(&mut self) {
-        // The count goes down first: the host looks at it when it has the notice.
+        // The token is dropped first, because the host counts when it has received the notice.
         self.alive = None;
         let _ = self.channel.send(Incoming::SenderGone);
     }
@@ -65,19 +65,19 @@ impl Drop for MessageSender {
 /// Which files a program may read and write.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum FileAccess {
-    /// None.
+    /// No files.
     #[default]
     None,
-    /// Those in these directories and below.
+    /// Files in these directories and below.
     Under(Vec<PathBuf>),
-    /// All that the system lets the process read and write.
+    /// All files that the system lets the process read and write.
     All,
 }
 
-/// Takes bytes that are written.
+/// Receives the bytes written by a program.
 pub type Screen = Box<dyn FnMut(&[u8]) -> std::io::Result<()> + Send>;
 
-/// The system, as the operating system shows it to the process.
+/// The outside as provided by the operating system.
 pub struct RealHost {
     start: Instant,
     arguments: Vec<String>,
@@ -87,18 +87,18 @@ pub struct RealHost {
     alive: Arc<()>,
     messages: Vec<Message>,
     input: Option<Input>,
-    /// Asks the reading thread for a chunk; there is no thread until the first is wanted.
+    /// Requests a chunk from the reading thread, which is started at the first request.
     reader: Option<Sender<()>>,
     is_reading: bool,
     is_woken: bool,
-    /// Where both output streams go instead of to the process's own.
+    /// Destination of both output streams, in place of the process's own.
     screen: Option<Screen>,
-    /// The time, if it is virtual.
+    /// Nanoseconds of virtual time, if time is virtual.
     virtual_time: Option<u64>,
 }
 
 impl RealHost {
-    /// A host whose program has these arguments, and no access to files.
+    /// Creates a host with these arguments for the program, and without access to files.
     pub fn new(arguments: Vec<String>) -> RealHost {
         let (sender, incoming) = channel();
         RealHost {
@@ -118,7 +118,7 @@ impl RealHost {
         }
     }
 
-    /// Has what the program writes to its output streams go to `screen`.
+    /// Redirects both output streams of the program to `screen`.
     #[must_use]
     pub fn with_screen(mut self, screen: Screen) -> RealHost {
         self.screen = Some(screen);
@@ -132,19 +132,19 @@ impl RealHost {
         self
     }
 
-    /// Makes time virtual: it begins at zero, and passes only when the program waits or the host is told so.
+    /// Makes time virtual: it starts at zero, and passes only when the program waits or the host is told so.
     #[must_use]
     pub fn with_virtual_time(mut self) -> RealHost {
         self.virtual_time = Some(0);
         self
     }
 
-    /// A sender of messages to this host's program.
+    /// Returns a sender of messages to this host's program.
     pub fn sender(&self) -> MessageSender {
         MessageSender { channel: self.sender.clone(), alive: Some(self.alive.clone()) }
     }
 
-    /// What ends this host's waits.
+    /// Returns a handle that ends this host's waits.
     pub fn waker(&self) -> Waker {
         Waker(self.sender.clone())
     }
@@ -167,7 +167,7 @@ impl RealHost {
         }
     }
 
-    /// Sees to it that a chunk of input is on its way.
+    /// Makes sure that a chunk of input is requested.
     fn ask_for_input(&mut self) {
         if self.is_reading || self.input.is_some() {
             return;
@@ -203,12 +203,12 @@ impl RealHost {
     }
 }
 
-/// The path without links and dots, so that no link leads out of what is granted.
+/// Returns the path without links and dots, so that no link leads out of the granted directories.
 fn resolve(path: &Path, must_exist: bool) -> Result<PathBuf, HostError> {
     match std::fs::canonicalize(path) {
         Ok(full) => Ok(full),
         Err(error) if must_exist || error.kind() != std::io::ErrorKind::NotFound => Err(error_of(&error)),
-        // A dangling link would be written through to a place that was not looked at.
+        // A write would follow a dangling link to a place that was not checked.
         Err(_) if path.symlink_metadata().is_ok() => Err(HostError::Refused),
         Err(_) => {
             let name = path.file_name().ok_or(HostError::NotFound)?;
@@ -221,7 +221,7 @@ fn resolve(path: &Path, must_exist: bool) -> Result<PathBuf, HostError> {
     }
 }
 
-/// The body of the thread that reads standard input.
+/// Body of the thread that reads standard input.
 fn read_on_demand(asked: &Receiver<()>, answer: &Sender<Incoming>) {
     let mut buffer = [0; 4096];
     while asked.recv().is_ok() {
@@ -290,7 +290,8 @@ impl Host for RealHost {
                 return Wake::Arrival;
             }
             if let (Some(now), Some(deadline), false) = (self.virtual_time, deadline, for_input) {
-                // Input takes no virtual time, so that it comes at the same time in each run; all else waits for nobody.
+                // Input takes no virtual time, so that it arrives at the same time in each run; nothing else
+                // is waited for.
                 self.virtual_time = Some(now.max(deadline));
                 return Wake::Time;
             }
@@ -309,7 +310,7 @@ impl Host for RealHost {
             match received {
                 Ok(incoming) => self.take_in(incoming),
                 Err(RecvTimeoutError::Timeout) => return Wake::Time,
-                // The host holds a sender itself.
+                // The host itself holds a sender.
                 Err(RecvTimeoutError::Disconnected) => return Wake::Never,
             }
         }
@@ -340,7 +341,7 @@ impl Host for RealHost {
     fn read_input(&mut self) -> Input {
         self.drain();
         match self.input.take() {
-            // The end stays the end, without asking again.
+            // The end is permanent and is not requested again.
             Some(Input::End) => {
                 self.input = Some(Input::End);
                 Input::End

@@ -1,8 +1,9 @@
-//! Recording what a host answers, and giving the same answers again.
+//! Recording the answers of a host, and replaying them.
 //!
-//! Guarantees: a program that is deterministic but for its host does the same under a [`ReplayHost`] as it did under the
-//! [`RecordingHost`], without touching anything outside. When it asks something else than it did then, the replay has
-//! diverged: that is noted, and the answers from there on are those of a host that has nothing.
+//! Guarantees: a program that is deterministic but for its host does the same under a [`ReplayHost`] as it
+//! did under the [`RecordingHost`], without touching anything outside. When it makes a different request than
+//! it did then, the replay has diverged: this is recorded, and further answers are those of a host without
+//! anything.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -25,7 +26,7 @@ macro_rules! define_records {
         }
 
         $(
-            /// Wraps the answers of this kind, of which some have the same type.
+            /// Wraps the answers of this kind, since some kinds have the same type.
             #[derive(Clone)]
             struct $variant($ty);
 
@@ -46,11 +47,11 @@ macro_rules! define_records {
 }
 
 define_records! {
-    /// The monotonic clock.
+    /// Time of the monotonic clock.
     Monotonic(u64);
-    /// The wall clock.
+    /// Time of the wall clock.
     WallClock(i64);
-    /// A wait.
+    /// Outcome of a wait.
     Waited(Wake);
     /// Whether time is virtual.
     Virtual(bool);
@@ -58,13 +59,13 @@ define_records! {
     Seed(u64);
     /// The arguments.
     Arguments(Vec<String>);
-    /// What became of a write to a standard stream or a file, or of a removal.
+    /// Outcome of a write to a standard stream or a file, or of a removal.
     Written(Result<(), HostError>);
     /// Standard input.
     Read(Input);
-    /// Whether somebody watches.
+    /// Whether a person watches standard output.
     Interactive(bool);
-    /// The contents of a file.
+    /// Contents of a file.
     FileRead(Result<Vec<u8>, HostError>);
     /// Whether a file exists, or a sender of messages.
     Exists(bool);
@@ -72,23 +73,23 @@ define_records! {
     Received(Vec<Message>);
 }
 
-/// The answers of a host, in order, while they are being recorded.
+/// The answers of a host in order, while they are being recorded.
 #[derive(Clone, Default)]
 pub struct Recording(Arc<Mutex<Vec<Record>>>);
 
 impl Recording {
     fn records(&self) -> MutexGuard<'_, Vec<Record>> {
-        // Each record is whole: a panic elsewhere does not spoil the list.
+        // Each record is pushed whole, so a panic elsewhere does not corrupt the list.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// All that was recorded so far.
+    /// Returns everything recorded so far.
     pub fn to_records(&self) -> Vec<Record> {
         self.records().clone()
     }
 }
 
-/// A host that records what another one answers.
+/// A host that records the answers of another one.
 pub struct RecordingHost<H> {
     host: H,
     recording: Recording,
@@ -100,7 +101,7 @@ impl<H: Host> RecordingHost<H> {
         RecordingHost { host, recording: Recording::default() }
     }
 
-    /// The record, which grows as the host is asked.
+    /// Returns the recording, which grows with each request.
     pub fn recording(&self) -> Recording {
         self.recording.clone()
     }
@@ -128,7 +129,7 @@ impl<H: Host> Host for RecordingHost<H> {
     }
 
     fn stopwatch(&mut self) -> u64 {
-        // Nothing depends on it, so it is no part of the record.
+        // Nothing depends on it, so it is not recorded.
         self.host.stopwatch()
     }
 
@@ -199,14 +200,14 @@ impl<H: Host> Host for RecordingHost<H> {
     }
 }
 
-/// What is left to replay.
+/// The answers yet to be replayed.
 #[derive(Default)]
 struct Remaining {
     records: VecDeque<Record>,
     diverged: bool,
 }
 
-/// A host that gives the answers that were recorded. What the program writes is captured.
+/// A host that replays recorded answers. It captures what the program writes.
 #[derive(Clone)]
 pub struct ReplayHost {
     remaining: Arc<Mutex<Remaining>>,
@@ -214,28 +215,28 @@ pub struct ReplayHost {
 }
 
 impl ReplayHost {
-    /// Replays these answers.
+    /// Creates a host that replays these answers.
     pub fn new(records: Vec<Record>) -> ReplayHost {
         let remaining = Remaining { records: records.into(), diverged: false };
         ReplayHost { remaining: Arc::new(Mutex::new(remaining)), captured: Captured::default() }
     }
 
     fn remaining(&self) -> MutexGuard<'_, Remaining> {
-        // Each record is whole: a panic elsewhere does not spoil the list.
+        // Each record is popped whole, so a panic elsewhere does not corrupt the list.
         self.remaining.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether the program has asked something else than it did when the answers were recorded.
+    /// Returns whether the program has made a different request than it did during recording.
     pub fn has_diverged(&self) -> bool {
         self.remaining().diverged
     }
 
-    /// Whether all answers were given.
+    /// Returns whether all answers were replayed.
     pub fn is_at_end(&self) -> bool {
         self.remaining().records.is_empty()
     }
 
-    /// What the program writes to the standard streams.
+    /// Returns what the program writes to the standard streams.
     pub fn captured(&self) -> Captured {
         self.captured.clone()
     }
@@ -277,7 +278,7 @@ impl Host for ReplayHost {
     }
 
     fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError> {
-        // Captured even where the recorded write failed: it is what the program wanted to say.
+        // Output is captured even if the recorded write failed, as it is what the program wanted to write.
         self.captured.append(output, bytes);
         self.next::<Written>().map_or(Err(HostError::BrokenPipe), |answer| answer.0)
     }
@@ -320,7 +321,7 @@ mod tests {
     use super::*;
     use crate::host::VirtualHost;
 
-    /// Some program: what it learns from `host`, in words.
+    /// A stand-in for a program: describes what it learns from `host`.
     fn run(host: &mut dyn Host) -> String {
         let mut log = format!("{} {:?} ", host.seed(), host.arguments());
         log += &format!("{:?} {} ", host.wait(Some(30), false), host.monotonic());

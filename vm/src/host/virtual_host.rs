@@ -1,11 +1,11 @@
-//! A host without an outside: a clock that jumps, given input, captured output, files that live in memory.
+//! A host without an outside: a clock that jumps, given input, captured output, files in memory.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::{Host, HostError, Input, Message, Output, Wake, WriteMode};
 
-/// What a program has written, and the files as they are: shared between a [`VirtualHost`] and whoever looks at it.
+/// The output of a program and its files, shared between a [`VirtualHost`] and its observers.
 #[derive(Clone, Default)]
 pub struct Captured(Arc<Mutex<Contents>>);
 
@@ -18,16 +18,16 @@ struct Contents {
 
 impl Captured {
     fn contents(&self) -> MutexGuard<'_, Contents> {
-        // The contents are whole at every moment: a panic elsewhere does not spoil them.
+        // The contents are consistent at every moment, so a panic elsewhere does not corrupt them.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What was written to standard output so far.
+    /// Returns everything written to standard output so far.
     pub fn output(&self) -> String {
         String::from_utf8_lossy(&self.contents().output).into_owned()
     }
 
-    /// What was written to standard error so far.
+    /// Returns everything written to standard error so far.
     pub fn error(&self) -> String {
         String::from_utf8_lossy(&self.contents().error).into_owned()
     }
@@ -40,7 +40,7 @@ impl Captured {
         }
     }
 
-    /// The contents of a file.
+    /// Returns the contents of a file.
     pub fn file(&self, path: &str) -> Option<Vec<u8>> {
         self.contents().files.get(path).cloned()
     }
@@ -54,26 +54,26 @@ pub struct VirtualHost {
     seed: u64,
     arguments: Vec<String>,
     input: VecDeque<Vec<u8>>,
-    /// Messages by the time at which they arrive, earliest first.
+    /// Messages by their times of arrival, the earliest first.
     messages: VecDeque<(u64, Message)>,
     captured: Captured,
-    /// Bytes that may still be written to standard output before it breaks.
+    /// Number of bytes that may still be written to standard output before it breaks.
     output_limit: Option<usize>,
     refuses_files: bool,
 }
 
 impl VirtualHost {
-    /// A host with nothing in it, at time zero.
+    /// Creates a host without input, messages and files, at time zero.
     pub fn new() -> VirtualHost {
         VirtualHost::default()
     }
 
-    /// What the program writes.
+    /// Returns the captured output and the files.
     pub fn captured(&self) -> Captured {
         self.captured.clone()
     }
 
-    /// Gives text to standard input, as one chunk; the end comes after the last.
+    /// Adds text to standard input, as one chunk; the input ends after the last.
     #[must_use]
     pub fn with_input(mut self, text: impl Into<Vec<u8>>) -> VirtualHost {
         let text = text.into();
@@ -104,14 +104,14 @@ impl VirtualHost {
         self
     }
 
-    /// Puts a file there.
+    /// Adds a file.
     #[must_use]
     pub fn with_file(self, path: &str, contents: impl Into<Vec<u8>>) -> VirtualHost {
         self.captured.contents().files.insert(path.to_owned(), contents.into());
         self
     }
 
-    /// Lets a message arrive at a time in nanoseconds.
+    /// Adds a message that arrives at a time in nanoseconds.
     #[must_use]
     pub fn with_message(mut self, time: u64, message: Message) -> VirtualHost {
         let at = self.messages.partition_point(|&(other, _)| other <= time);
@@ -119,7 +119,7 @@ impl VirtualHost {
         self
     }
 
-    /// Breaks standard output after so many bytes.
+    /// Breaks standard output after this number of bytes.
     #[must_use]
     pub fn with_output_limit(mut self, bytes: usize) -> VirtualHost {
         self.output_limit = Some(bytes);
@@ -149,7 +149,7 @@ impl Host for VirtualHost {
 
     fn wait(&mut self, deadline: Option<u64>, for_input: bool) -> Wake {
         if for_input {
-            // Input is there or at its end: there is nothing to wait for.
+            // Input is available or has ended; there is nothing to wait for.
             return Wake::Arrival;
         }
         match (deadline, self.messages.front()) {

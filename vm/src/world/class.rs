@@ -1,12 +1,13 @@
 //! Classes of structures and conditions.
 //!
-//! A Class is a record; [`slot`] names its slots. Every class has a *line*: the chain of first superclasses, from the
-//! root down to itself, as a simple vector. `A` is on the line of `B` exactly when the element of that vector at `A`'s
-//! depth is `A`, so the common test for a subclass is a few loads. Conditions may have several superclasses; what they
-//! inherit beside the line is in a list.
+//! A Class is a record; [`slot`] names its slots. Every class has a *line*: the chain of first superclasses,
+//! from the root down to the class itself, as a simple vector. `A` is on the line of `B` exactly when the
+//! element of that vector at `A`'s depth is `A`, so the common test for a subclass is a few loads. Conditions
+//! may have several superclasses; ancestors that are not on the line are in a list.
 //!
-//! Guarantees: a class of which instances exist never changes its slots. Defining a name again with the same
-//! superclasses and slots keeps the class, else the name gets a new one, and old instances stay what they are.
+//! Guarantees: a class with instances never changes its slots. Defining a name again with the same
+//! superclasses and slots keeps the class; otherwise the name gets a new class, and old instances remain
+//! unchanged.
 
 use crate::heap::{AllocError, Heap, Kind};
 use crate::value::Value;
@@ -14,36 +15,38 @@ use crate::world::World;
 
 /// Slots of a Class.
 pub(crate) mod slot {
-    /// Its name, a symbol.
+    /// Name, a symbol.
     pub(crate) const NAME: usize = 0;
-    /// List of its direct superclasses.
+    /// List of the direct superclasses.
     pub(crate) const SUPERS: usize = 1;
-    /// Simple vector of the classes on its line, itself last.
+    /// Simple vector of the classes on the line, this class last.
     pub(crate) const LINE: usize = 2;
-    /// Index of itself in that vector.
+    /// Index of this class in that vector.
     pub(crate) const DEPTH: usize = 3;
-    /// List of the superclasses that are not on its line, direct or not.
+    /// List of the superclasses that are not on the line, direct or not.
     pub(crate) const OTHERS: usize = 4;
-    /// List of the names of its slots, inherited ones first.
+    /// List of the names of the slots, inherited ones first.
     pub(crate) const SLOTS: usize = 5;
-    /// Number of its slots.
+    /// Number of slots of an instance.
     pub(crate) const COUNT: usize = 6;
-    /// What the library keeps about it.
+    /// Data of the library.
     pub(crate) const DATA: usize = 7;
-    /// How many slots a Class has.
+    /// Number of slots of a Class.
     pub(crate) const LEN: usize = 8;
 }
 
-/// The longest line. A program that goes beyond has lost its way, and the line of each class is a copy.
+/// Greatest length of a line. Longer ones are certainly a mistake of the program, and each class copies its
+/// line.
 pub(crate) const MAX_DEPTH: usize = 200;
 
 impl World {
-    /// The class of this name, a symbol.
+    /// Returns the class of this name, a symbol.
     pub(crate) fn find_class(&self, name: Value) -> Option<Value> {
         self.classes.get(&name.bits()).copied()
     }
 
-    /// Defines a class: of a symbol, Classes, names of slots (symbols), and data of the library.
+    /// Defines a class by its name (a symbol), superclasses (Classes), names of slots (symbols), and data of
+    /// the library.
     ///
     /// # Errors
     /// As for every allocation; nothing is defined then.
@@ -90,7 +93,7 @@ impl World {
         Ok(class)
     }
 
-    /// Whether `class` is `ancestor` or inherits from it. False for what is no class.
+    /// Returns whether `class` is `ancestor` or inherits from it. False unless both are classes.
     #[inline]
     pub(crate) fn is_subclass(&self, heap: &Heap, class: Value, ancestor: Value) -> bool {
         if class == ancestor {
@@ -109,12 +112,12 @@ impl World {
     }
 }
 
-/// Returns the name of a class; `NIL` for what is none.
+/// Returns the name of a class; `NIL` for any other value.
 pub(crate) fn name_of(heap: &Heap, class: Value) -> Value {
     class_slot(heap, class, slot::NAME)
 }
 
-/// A slot of a Class; `NIL` for what is none.
+/// Returns a slot of a Class; `NIL` for any other value.
 pub(crate) fn class_slot(heap: &Heap, class: Value, index: usize) -> Value {
     heap.record(class, Kind::Class).map_or(Value::NIL, |record| record[index])
 }
@@ -123,13 +126,13 @@ fn line_of(heap: &Heap, class: Value) -> &[Value] {
     heap.vector(class_slot(heap, class, slot::LINE)).unwrap_or(&[])
 }
 
-/// A class and all that it inherits from.
+/// Returns a class and all its ancestors.
 fn ancestors(heap: &Heap, class: Value) -> impl Iterator<Item = Value> {
     let line = line_of(heap, class).iter().rev().copied();
     line.chain(list(heap, class_slot(heap, class, slot::OTHERS)))
 }
 
-/// The items of a list of the machine's own, which is proper.
+/// Returns the items of one of the machine's own lists, which are proper.
 fn list(heap: &Heap, list: Value) -> impl Iterator<Item = Value> {
     let mut rest = list;
     std::iter::from_fn(move || {

@@ -1,8 +1,8 @@
-//! What the images define symbols as, given to their objects when these are made.
+//! Definitions of images, applied to symbol objects when these are made.
 //!
-//! To define one symbol may make the objects of others, which are defined in their turn: not by recursion, but from a
-//! list. A symbol stays on the list until it has all that is defined of it, so when there is no room in the middle, the
-//! next attempt to get at any symbol goes on from there.
+//! Defining one symbol may make the objects of others, which are defined in turn: not by recursion, but from
+//! a list. A symbol stays on the list until its definition is complete, so if there is no room halfway, the
+//! next access to any symbol resumes.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::world::World;
 use crate::world::load::{self, LoadError};
 
 impl World {
-    /// Takes an image in: a list of the functions that run its top-level forms.
+    /// Adds an image. Returns a list of the functions that run its top-level forms, in order.
     ///
     /// # Errors
     /// [`LoadError`].
@@ -30,16 +30,16 @@ impl World {
         for name in self.images.exports() {
             self.packages.register(PackageId::ESL, name, true);
         }
-        // Symbols that are there already have missed the definitions.
+        // Symbols with objects have missed the new definitions.
         self.undefined_yet.extend(self.symbols.keys().cloned());
         self.define_symbols(heap)?;
         Ok(toplevel)
     }
 
-    /// Gives the symbols on the list what the images define them as.
+    /// Applies the images' definitions to the symbols on the list.
     pub(super) fn define_symbols(&mut self, heap: &mut Heap) -> Result<(), AllocError> {
         if self.is_defining {
-            // Whoever is at it will come to those that were added.
+            // The outer call will come to the symbols that were added.
             return Ok(());
         }
         self.is_defining = true;
@@ -50,7 +50,7 @@ impl World {
             let symbol = self.undefined_yet[last].clone();
             result = self.define(heap, &symbol);
             if result.is_ok() {
-                // Others may have been added behind it.
+                // Others may have been added after it.
                 self.undefined_yet.remove(last);
             }
         }

@@ -1,4 +1,4 @@
-//! The symbols and keywords that the machine itself speaks of.
+//! The symbols and keywords that the machine itself uses.
 
 use esl_bytecode::symbol::Symbol;
 
@@ -20,7 +20,7 @@ macro_rules! home {
 
 macro_rules! define_known {
     ($( $field:ident = $home:ident $name:literal ; )*) => {
-        /// Well-known symbols, made when the machine is.
+        /// Well-known symbols, made together with the machine.
         #[derive(Clone, Copy, Debug)]
         #[allow(missing_docs, reason = "each is the symbol of its name")]
         pub(crate) struct Known {
@@ -28,7 +28,7 @@ macro_rules! define_known {
         }
 
         impl Known {
-            /// What stands there until [`Known::intern`] has been called.
+            /// Placeholder until [`Known::intern`] has been called.
             pub(super) const NONE: Known = Known { $( $field: Value::NIL, )* };
 
             /// Makes all of them.
@@ -72,7 +72,7 @@ define_known! {
     waiting = keyword "WAITING";
     // Properties under which the machine keeps data on a symbol.
     accessor = esl "%ACCESSOR";
-    // Answers and options in keywords.
+    // Results and options that are keywords.
     internal = keyword "INTERNAL";
     external = keyword "EXTERNAL";
     inherited = keyword "INHERITED";

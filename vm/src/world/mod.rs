@@ -1,13 +1,16 @@
-//! The world of names: symbols, packages, classes, builtins as functions.
+//! The world of names: symbols, packages, classes, and builtins as functions.
 //!
-//! The rules of packages (what a name read in a package means) are those of [`esl_bytecode`]; here is what the names
-//! stand for in a running machine. A symbol object is made when it is first asked for, and with it, for the name of a
-//! builtin, the function object. So a machine starts with a few dozen symbols however large the language is.
+//! The rules of packages (what a name read in a package means) are those of [`esl_bytecode`]; here are the
+//! objects that names stand for in a running machine. A symbol object is made at its first use, and with it,
+//! for the name of a builtin, the function object. So a machine starts with a few dozen symbols, however
+//! large the language is.
 //!
-//! Guarantees: one symbol object for each symbol of a package, for as long as the machine lives. [`Value::NIL`] and
-//! [`Value::T`] are never symbol objects in the hands of a program; their names, functions and properties are in two
-//! *companion* objects, which [`World::object_of`] gives.
-//! Not here: what may be redefined is asked by the builtins; values of task-local bindings (`control`).
+//! Guarantees: one symbol object for each symbol of a package, for as long as the machine lives. A program
+//! never sees a symbol object for [`Value::NIL`] and [`Value::T`]; their names, functions and properties are
+//! in two *companion* objects, which [`World::object_of`] returns.
+//!
+//! Not here: whether a name may be redefined, which the builtins check; values of task-local bindings
+//! (`control`).
 
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, HashMap};
@@ -34,7 +37,7 @@ pub(crate) mod stream;
 
 pub(crate) use known::Known;
 
-/// Hashes what is a good hash already: symbols, and addresses of objects.
+/// Hasher of keys that are good hashes already: symbols, and addresses of objects.
 #[derive(Default)]
 pub(crate) struct GivenHash(u64);
 
@@ -50,36 +53,36 @@ impl Hasher for GivenHash {
     }
 
     fn write_u64(&mut self, word: u64) {
-        // Addresses differ in the middle bits only; the table looks at the lowest and the highest.
+        // Addresses differ in the middle bits only; the table uses the lowest and the highest.
         self.0 = word.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(26);
     }
 }
 
-/// A map whose keys hash themselves well.
+/// A map with keys that hash themselves well.
 pub(crate) type GivenMap<K, V> = HashMap<K, V, BuildHasherDefault<GivenHash>>;
 
-/// A set of what hashes itself well.
+/// A set of keys that hash themselves well.
 pub(crate) type GivenSet<K> = std::collections::HashSet<K, BuildHasherDefault<GivenHash>>;
 
-/// Names and what they stand for.
+/// Names, and the objects that they stand for.
 pub(crate) struct World {
-    /// Symbols that the machine speaks of.
+    /// Symbols that the machine uses.
     pub(crate) known: Known,
-    /// Whether the library is being loaded: only then may names of the language be defined.
+    /// Whether names of the language may be defined: only while the library is being loaded.
     pub(crate) is_open: bool,
-    /// The objects of symbols that have a package.
+    /// Objects of symbols with a package.
     pub(crate) symbols: GivenMap<Symbol, Value>,
-    /// The names of symbol objects, by address: filled when somebody asks.
+    /// Names of symbol objects by address, filled on demand.
     pub(crate) names: RefCell<GivenMap<u64, Symbol>>,
-    /// The next number for an uninterned symbol of the compiler.
+    /// Number of the compiler's next uninterned symbol.
     pub(crate) fresh: Cell<u32>,
     /// The rules of packages.
     pub(crate) packages: Packages,
     /// The objects of packages.
     pub(crate) package_objects: BTreeMap<PackageId, Value>,
-    /// Packages in which symbols are at home, by name.
+    /// Home packages of symbols, by name.
     pub(crate) homes: BTreeMap<Arc<str>, (PackageId, Value)>,
-    /// The function that runs the top-level functions of a module, once it was needed.
+    /// Function that runs the top-level functions of a module; `NIL` until it is first needed.
     pub(crate) runner: Value,
     /// Standard input, output and error.
     pub(crate) streams: [Value; 3],
@@ -87,23 +90,23 @@ pub(crate) struct World {
     pub(crate) nil: Value,
     /// The companion of `T`.
     pub(crate) t: Value,
-    /// The code of every symbol without a function.
+    /// Code of every symbol without a function.
     pub(crate) undefined: Value,
-    /// Symbols that have an object, but not yet what the images define them as.
+    /// Symbols with an object to which the images' definitions have not been applied.
     pub(crate) undefined_yet: Vec<Symbol>,
     /// Whether symbols are being defined.
     pub(crate) is_defining: bool,
     /// Modules that are loaded piece by piece.
     pub(crate) images: Images,
-    /// Structure and condition classes by the address of their names.
+    /// Classes of structures and conditions, by the address of their names.
     pub(crate) classes: GivenMap<u64, Value>,
 }
 
 impl World {
-    /// A world of the language's names, without any definition but the builtins.
+    /// Makes a world of the language's names, with the builtins as its only definitions.
     ///
     /// # Errors
-    /// [`AllocError`] when the heap is too small for it.
+    /// [`AllocError`] if the heap is too small for it.
     pub(crate) fn new(heap: &mut Heap) -> Result<World, AllocError> {
         let shape = Shape::other(Sort::Undefined, 0);
         let undefined = trust::alloc_stub(heap, Value::NIL, Value::NIL, shape, 1, trust::UNDEFINED_WORD)?;
@@ -145,7 +148,7 @@ impl World {
         Ok(world)
     }
 
-    /// The companion of a symbol that is an immediate.
+    /// Makes the companion of a symbol that is an immediate.
     fn make_constant(&mut self, heap: &mut Heap, symbol: &Symbol, value: Value) -> Result<Value, AllocError> {
         let object = self.make_object(heap, symbol)?;
         heap.symbol_set_value(object, value);
@@ -155,8 +158,8 @@ impl World {
         Ok(object)
     }
 
-    /// The symbol, as a program sees it: `NIL` and `T` are immediates. For an uninterned one a new symbol each time; who
-    /// wants one object for one number keeps a table.
+    /// Returns the symbol as a program sees it: `NIL` and `T` are immediates. For an uninterned symbol,
+    /// returns a new object each time; a caller that wants one object for one number keeps a table.
     ///
     /// # Errors
     /// As for every allocation.
@@ -177,7 +180,7 @@ impl World {
         Ok(object)
     }
 
-    /// The symbol of this name in `COMMON-LISP`.
+    /// Returns the symbol of this name in `COMMON-LISP`.
     ///
     /// # Errors
     /// As for every allocation.
@@ -185,7 +188,7 @@ impl World {
         self.intern(heap, &Symbol::cl(name))
     }
 
-    /// The symbol of this name in `ESL`.
+    /// Returns the symbol of this name in `ESL`.
     ///
     /// # Errors
     /// As for every allocation.
@@ -193,7 +196,7 @@ impl World {
         self.intern(heap, &Symbol::esl(name))
     }
 
-    /// The keyword of this name.
+    /// Returns the keyword of this name.
     ///
     /// # Errors
     /// As for every allocation.
@@ -201,17 +204,17 @@ impl World {
         self.intern(heap, &Symbol::keyword(name))
     }
 
-    /// The symbol, if there is an object of it already.
+    /// Returns the symbol, if it has an object already.
     pub(crate) fn find(&self, symbol: &Symbol) -> Option<Value> {
         self.symbols.get(symbol).copied()
     }
 
-    /// Calls `visit` with every symbol of which there is an object, and the symbol as a program sees it.
+    /// Calls `visit` with every symbol that has an object, and with the object as a program sees it.
     pub(crate) fn each_symbol(&self, visit: &mut dyn FnMut(&Symbol, Value)) {
         self.symbols.iter().for_each(|(symbol, &value)| visit(symbol, value));
     }
 
-    /// A new object for `symbol`, with its builtin function if it names one.
+    /// Makes an object for `symbol`, with its builtin function if it names one.
     fn make_object(&mut self, heap: &mut Heap, symbol: &Symbol) -> Result<Value, AllocError> {
         let name = heap.alloc_str(symbol.name())?;
         let (package, flags) = match symbol.package() {
@@ -235,7 +238,7 @@ impl World {
         Ok(object)
     }
 
-    /// A new symbol object in no table, with this name (a String) and package.
+    /// Makes a symbol object in no table, with this name (a String) and package.
     ///
     /// # Errors
     /// As for every allocation.
@@ -259,7 +262,8 @@ impl World {
         trust::alloc_function(heap, code, &[])
     }
 
-    /// The symbol object of a symbol: the companion of `NIL` and `T`, others are their own. `None` if `v` is no symbol.
+    /// Returns the symbol object of a symbol: the companion for `NIL` and `T`, the symbol itself otherwise.
+    /// `None` unless `v` is a symbol.
     #[inline]
     pub(crate) fn object_of(&self, heap: &Heap, v: Value) -> Option<Value> {
         match v {
@@ -270,13 +274,13 @@ impl World {
         }
     }
 
-    /// Whether `v` is a symbol, `NIL` and `T` included.
+    /// Returns whether `v` is a symbol, including `NIL` and `T`.
     #[inline]
     pub(crate) fn is_symbol(&self, heap: &Heap, v: Value) -> bool {
         v.is_nil() || v == Value::T || heap.is(v, Kind::Symbol)
     }
 
-    /// The name of a symbol as the compiler knows it. `None` if `v` is no symbol, or one without a package.
+    /// Returns the name of a symbol as the compiler knows it. `None` unless `v` is a symbol with a package.
     pub(crate) fn name_of(&self, heap: &Heap, v: Value) -> Option<Symbol> {
         let object = self.object_of(heap, v)?;
         if let Some(symbol) = self.names.borrow().get(&object.bits()) {
@@ -292,14 +296,14 @@ impl World {
         Some(symbol)
     }
 
-    /// A number for a fresh uninterned symbol of the compiler.
+    /// Returns a number for a fresh uninterned symbol of the compiler.
     pub(crate) fn fresh(&self) -> u32 {
         let number = self.fresh.get();
         self.fresh.set(number.wrapping_add(1));
         number
     }
 
-    /// The function of a symbol, unless it has none. `None`, too, if `v` is no symbol.
+    /// Returns the function of a symbol. `None` if it has none, or `v` is not a symbol.
     #[inline]
     pub(crate) fn function_of(&self, heap: &Heap, v: Value) -> Option<Value> {
         let function = heap.symbol(self.object_of(heap, v)?)?.function;
@@ -311,13 +315,13 @@ impl World {
         self.function_of(heap, symbol).is_some()
     }
 
-    /// Whether `function` is what a symbol without a function holds.
+    /// Returns whether `function` is the placeholder of a symbol without a function.
     #[inline]
     pub(crate) fn is_undefined(&self, heap: &Heap, function: Value) -> bool {
         heap.function_code(function) == Some(self.undefined)
     }
 
-    /// Takes the function of a symbol away. `None` if `v` is no symbol.
+    /// Removes the function of a symbol. `None` unless `v` is a symbol.
     ///
     /// # Errors
     /// As for every allocation.
@@ -327,13 +331,14 @@ impl World {
         Ok(heap.symbol_set_function(object, function))
     }
 
-    /// The macro function of a symbol.
+    /// Returns the macro function of a symbol.
     pub(crate) fn macro_function_of(&self, heap: &Heap, v: Value) -> Option<Value> {
         let function = heap.symbol(self.object_of(heap, v)?)?.macro_function;
         if function.is_nil() { None } else { Some(function) }
     }
 
-    /// Whether the symbol may not be given another function, macro or constant: it belongs to the language.
+    /// Returns whether the symbol belongs to the language, so that it cannot get another function, macro or
+    /// constant.
     pub(crate) fn is_locked(&self, heap: &Heap, v: Value) -> bool {
         let flags = self.object_of(heap, v).and_then(|object| heap.flags(object, Kind::Symbol));
         !self.is_open && flags.is_some_and(|flags| flags & SymbolObject::LOCKED != 0)
@@ -373,7 +378,7 @@ const fn sorted_builtins() -> [u16; BUILTINS.len()] {
             gap = gap * 3 + 1;
         }
     }
-    // Shell sort: short, and the compiler runs it, once.
+    // Shell sort is short, and the compiler runs it only once.
     while gap > 0 {
         let mut at = gap;
         while at < numbers.len() {
@@ -408,7 +413,7 @@ const fn is_before(a: u16, b: u16) -> bool {
     a.len() < b.len()
 }
 
-/// The builtin that `symbol` names.
+/// Returns the builtin that `symbol` names.
 pub(crate) fn find_builtin(symbol: &Symbol) -> Option<Builtin> {
     let is_cl = symbol.is_in(CL_PACKAGE);
     if !is_cl && !symbol.is_in(ESL_PACKAGE) {

@@ -1,6 +1,6 @@
 //! Packages as objects of the program.
 //!
-//! The rules are those of [`Packages`]; a package object is a record of its name, and there is one for each package.
+//! The rules are those of [`Packages`]; a package object is a record of its name, and each package has one.
 
 use std::sync::Arc;
 
@@ -11,8 +11,8 @@ use crate::value::Value;
 use crate::world::World;
 
 impl World {
-    /// The object of the package of this name, and its number. A name that nobody has defined becomes a package without
-    /// symbols: so code can be loaded before the `defpackage` in it has run.
+    /// Returns the number and the object of the package of this name. An undefined name becomes a package
+    /// without symbols, so that code can be loaded before its `defpackage` has run.
     pub(super) fn home(
         &mut self,
         heap: &mut Heap,
@@ -23,7 +23,7 @@ impl World {
         }
         let package = match self.packages.named(name) {
             Some(package) => package,
-            // Without nicknames and used packages, there is nothing to be in the way of a name that is free.
+            // Without nicknames and used packages, a free name cannot conflict.
             None => self.packages.make_package(name, &[], &[]).unwrap_or(PackageId::USER),
         };
         let object = self.package_object(heap, package)?;
@@ -31,7 +31,7 @@ impl World {
         Ok((package, object))
     }
 
-    /// The object of a package.
+    /// Returns the object of a package.
     ///
     /// # Errors
     /// As for every allocation.
@@ -49,22 +49,22 @@ impl World {
         Ok(object)
     }
 
-    /// The package of a package object.
+    /// Returns the package of a package object.
     pub(crate) fn package_of(&self, heap: &Heap, object: Value) -> Option<PackageId> {
         self.packages.named(&self.package_name(heap, object)?)
     }
 
-    /// The name of a package object.
+    /// Returns the name of a package object.
     pub(crate) fn package_name(&self, heap: &Heap, object: Value) -> Option<String> {
         heap.string_text(*heap.record(object, Kind::Package)?.first()?)
     }
 
-    /// The packages and their rules.
+    /// Returns the packages and their rules.
     pub(crate) fn packages(&self) -> &Packages {
         &self.packages
     }
 
-    /// The packages and their rules, to be changed.
+    /// Returns the packages and their rules, for changes.
     pub(crate) fn packages_mut(&mut self) -> &mut Packages {
         &mut self.packages
     }

@@ -1,4 +1,4 @@
-//! Constants of an image as data for the compiler, without an object of the program.
+//! Constants of an image as data for the compiler, without making objects.
 
 use std::sync::Arc;
 
@@ -8,8 +8,8 @@ use esl_bytecode::module::PoolIdx;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
-/// The datum that a constant describes; `None` for functions and classes, and for what contains them. Data
-/// refer to earlier constants only, so this ends.
+/// Returns the datum that a constant describes; `None` for functions and classes, and for data that contain
+/// them. Data refer to earlier constants only, so the walk ends.
 pub(super) fn datum(image: &ModuleImage, packages: &[Arc<str>], index: PoolIdx) -> Option<Datum> {
     enum Todo {
         Visit(PoolIdx),
@@ -30,7 +30,7 @@ pub(super) fn datum(image: &ModuleImage, packages: &[Arc<str>], index: PoolIdx) 
                             SymbolHome::Package(home) => {
                                 Symbol::new(packages.get(home as usize)?, record.name)
                             }
-                            // Its object is another one whenever it is asked for.
+                            // Each mention of it would be a different object.
                             SymbolHome::Uninterned(_) => return None,
                         })
                     }

@@ -1,5 +1,4 @@
-//! What is known of a function beside its code: lambda list, documentation, and where in the source it was
-//! written.
+//! Information about functions beside their code: lambda list, documentation, and places in the source.
 //!
 //! The `debug` slot of a Code is a Record of four slots: lambda list, documentation, names of the sources (a
 //! simple vector, shared by the functions of a module), and the places: words, four for each entry.
@@ -14,10 +13,10 @@ const DOCUMENTATION: usize = 1;
 const SOURCES: usize = 2;
 const PLACES: usize = 3;
 
-/// `aux` of the record: tells it from other records of the machine.
+/// Value of `aux` that distinguishes this record from the machine's other records.
 pub(crate) const DEBUG_RECORD: u16 = 1;
 
-/// A place in a source, for people.
+/// A place in a source, for display.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourcePlace {
     /// Name of the source.
@@ -28,7 +27,7 @@ pub struct SourcePlace {
     pub column: u32,
 }
 
-/// A simple vector of the names of sources.
+/// Makes a simple vector of the names of sources.
 pub(super) fn sources(heap: &mut Heap, sources: &[String]) -> Result<Value, AllocError> {
     let mut names = Vec::with_capacity(sources.len());
     for source in sources {
@@ -37,7 +36,7 @@ pub(super) fn sources(heap: &mut Heap, sources: &[String]) -> Result<Value, Allo
     heap.alloc_vector(&names)
 }
 
-/// The record of a function of a module with this pool.
+/// Makes the record of a function of a module with this pool.
 pub(super) fn describe(
     heap: &mut Heap,
     function: &Function,
@@ -59,7 +58,7 @@ pub(super) fn describe(
     heap.alloc_record(Kind::Record, 0, DEBUG_RECORD, &slots)
 }
 
-/// The place that word `pc` of a code comes from, by its debug record.
+/// Returns the source place of word `pc` of a code, from its debug record.
 pub(super) fn place_of(heap: &Heap, debug: Value, pc: u32) -> Option<SourcePlace> {
     let record = heap.record(debug, Kind::Record)?;
     let words = heap.words(record[PLACES])?;
@@ -74,12 +73,12 @@ pub(super) fn place_of(heap: &Heap, debug: Value, pc: u32) -> Option<SourcePlace
     Some(SourcePlace { source: heap.string_text(name)?, line: entry.line, column: entry.column })
 }
 
-/// The last entry that begins at `pc` or before.
+/// Returns the last entry that begins at or before `pc`.
 pub(super) fn entry_at(entries: impl Iterator<Item = LineEntry>, pc: u32) -> Option<LineEntry> {
     entries.take_while(|entry| entry.pc <= pc).last()
 }
 
-/// Lambda list and documentation, by a debug record.
+/// Returns lambda list and documentation, from a debug record.
 pub(super) fn texts(heap: &Heap, debug: Value) -> Option<(Value, Value)> {
     let record = heap.record(debug, Kind::Record)?;
     Some((record[LAMBDA_LIST], record[DOCUMENTATION]))

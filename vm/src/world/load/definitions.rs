@@ -1,13 +1,12 @@
-//! The definitions of an image: what symbols are in it, as a table instead of code that runs.
+//! The definitions of an image: a table of its symbols, instead of code that defines them.
 //!
 //! The table is the last constant of the image, a vector: the symbol `ESL::%DEFINITIONS`; a vector of the
 //! symbols that the package `ESL` exports; then rows of four: a symbol, its function, its macro function, and
-//! its *data* (`NIL` for none of these). Data are a vector: flags, the value, then indicators and values of
-//! properties, the first as they come first in the property list.
+//! its *data* (`NIL` where there is none). Data are a vector: flags, the value, then indicators and values of
+//! properties, in the order of the property list.
 //!
-//! The number of rows is a power of two. A symbol is in the row that its hash says, or in the next free one;
-//! rows without a symbol begin with `NIL`. So finding a symbol takes about one look, and taking the table in
-//! takes none.
+//! The number of rows is a power of two. A symbol is in the row of its hash, or in the next free one; empty
+//! rows begin with `NIL`. So finding a symbol takes about one look, and loading the table takes none.
 //!
 //! [`super::prepare()`] makes the table when the library is built.
 
@@ -17,49 +16,49 @@ use esl_bytecode::file::{ConstantRecord, ModuleImage, PoolIndexes, ReadError, Sy
 use esl_bytecode::module::PoolIdx;
 use esl_bytecode::symbol::Symbol;
 
-/// Name of the symbol that the table begins with.
+/// Name of the symbol at the beginning of the table.
 pub(super) const MARKER: &str = "%DEFINITIONS";
-/// Items before the rows.
+/// Number of items before the rows.
 pub(super) const HEAD: usize = 2;
-/// Items of a row.
+/// Number of items in a row.
 pub(super) const ROW: usize = 4;
-/// Flag of data: a special variable.
+/// Flag of data: the symbol is a special variable.
 pub(super) const SPECIAL: i64 = 1;
-/// Flag of data: a constant.
+/// Flag of data: the symbol is a constant.
 pub(super) const CONSTANT: i64 = 2;
-/// Flag of data: has a value.
+/// Flag of data: the symbol has a value.
 pub(super) const VALUE: i64 = 4;
 /// Flag of data: the value is the standard stream of this number.
 pub(super) const STREAM: i64 = 8;
 
-/// What an image defines a symbol as: functions by number, data by index of the constant.
+/// An image's definition of a symbol: functions by number, data by index of the constant.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct ImageDefinition {
-    /// Its function.
+    /// Number of the function.
     pub function: Option<u32>,
-    /// Its macro function.
+    /// Number of the macro function.
     pub macro_function: Option<u32>,
-    /// Whether it is a special variable.
+    /// Whether the symbol is a special variable.
     pub is_special: bool,
-    /// Whether it is a constant.
+    /// Whether the symbol is a constant.
     pub is_constant: bool,
-    /// Its value.
+    /// The value.
     pub value: Option<PoolIdx>,
-    /// The number of the standard stream that is its value.
+    /// Number of the standard stream that is the value.
     pub stream: Option<usize>,
-    /// Its properties: indicator and value.
+    /// Indicators and values of the properties.
     pub properties: Vec<(PoolIdx, PoolIdx)>,
 }
 
-/// The table of an image. To decode a vector takes a look at each of its items, so they are kept.
+/// The table of an image. Decoding a vector visits each of its items, so the result is kept.
 pub(super) struct Definitions {
     exports: Option<PoolIdx>,
-    /// The rows one after the other: none, or as many as a power of two.
+    /// The rows in sequence: none, or a power of two of them.
     rows: Vec<PoolIdx>,
 }
 
 impl Definitions {
-    /// The table of an image; an empty one if it has none.
+    /// Returns the table of an image; an empty one if there is none.
     pub(super) fn of(image: &ModuleImage) -> Result<Definitions, ReadError> {
         let mut definitions = Definitions { exports: None, rows: Vec::new() };
         let table = PoolIdx((image.constant_count() as u32).saturating_sub(1));
@@ -76,7 +75,7 @@ impl Definitions {
         Ok(definitions)
     }
 
-    /// The row of `symbol`.
+    /// Returns the definition of `symbol`.
     pub(super) fn find(
         &self,
         image: &ModuleImage,
@@ -91,7 +90,7 @@ impl Definitions {
             if name_of(image, packages, row[0])? == wanted {
                 return Some(read_row(image, row));
             }
-            // There are free rows, so this ends.
+            // There are empty rows, so the search ends.
             at = (at + 1) & last;
         }
     }
@@ -105,7 +104,7 @@ impl Definitions {
         }
     }
 
-    /// The names that the package `ESL` exports.
+    /// Returns the names that the package `ESL` exports.
     pub(super) fn exports<'a>(&self, image: &'a ModuleImage, packages: &'a [Arc<str>]) -> Vec<&'a str> {
         let exports = self.exports.and_then(|exports| vector(image, exports));
         let names = exports.iter().flat_map(|exports| exports.iter());
@@ -150,17 +149,17 @@ fn read_row(image: &ModuleImage, row: &[PoolIdx]) -> ImageDefinition {
     }
 }
 
-/// FNV-1a of a symbol's package and name. Images hold tables made with it.
+/// FNV-1a of a symbol's package and name. Tables in images depend on it.
 pub(super) fn hash(package: &str, name: &str) -> u64 {
     let bytes = package.bytes().chain([0xFF]).chain(name.bytes());
     let hash = bytes.fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
     });
-    // The low bits of a product know little of the high ones.
+    // The low bits of a product hardly depend on the high ones of its factors.
     hash ^ hash >> 32
 }
 
-/// Package and name of a constant that is a symbol.
+/// Returns package and name of a constant that is a symbol with a package.
 pub(super) fn name_of<'a>(
     image: &'a ModuleImage,
     packages: &'a [Arc<str>],

@@ -1,12 +1,12 @@
 //! The image of the library: a module that is loaded piece by piece.
 //!
-//! A function of the image is a stub with its number until it is called for the first time; then its code is
-//! decoded, and with it those constants that it names and nobody has named before. What was made is kept in
-//! simple vectors of the heap, by number, so that everybody gets the same.
+//! A function of the image is a stub with its number until its first call; then its code is decoded, and with
+//! it the constants that it names, unless they exist already. The objects made are kept in simple vectors of
+//! the heap, by number, so that each is made once.
 //!
-//! The image may come with *definitions*: instead of a top-level form that runs when the machine starts, a
-//! row in a table that is looked at when a symbol object is made. So a start does nothing for functions that
-//! a program does not use. [`super::prepare`] makes the rows when the library is built.
+//! The image may come with *definitions*: a row in a table, consulted when a symbol object is made, instead
+//! of a top-level form that runs when the machine starts. So functions that a program does not use cost no
+//! time at the start. [`super::prepare`] makes the rows when the library is built.
 
 use std::sync::Arc;
 
@@ -28,31 +28,31 @@ use crate::world::World;
 #[derive(Default)]
 pub(crate) struct Images(Vec<Image>);
 
-/// One image, and what was made of it.
+/// An image, and the objects made of it.
 struct Image {
     module: Arc<ModuleImage>,
     packages: Vec<Arc<str>>,
     definitions: Definitions,
-    /// Symbol objects by number in the image, [`Value::UNSUPPLIED`] where there is none yet.
+    /// Symbol objects by number in the image; [`Value::UNSUPPLIED`] where there is none yet.
     symbols: Value,
     /// Values of the pool, likewise.
     pool: Value,
-    /// Functions by number, likewise: for one without captures its Function, for one with captures its Code.
+    /// Functions by number, likewise: the Function of one without captures, the Code of one with captures.
     functions: Value,
-    /// The code of functions that were not called yet. Its owner is the number of the image; capture 0 of the
+    /// Code of functions before their first call. Its owner is the number of the image; capture 0 of the
     /// function is its number in the image.
     lazy: Value,
 }
 
 impl Images {
-    /// Calls `visit` with everything that was made of the images.
+    /// Calls `visit` with every object made of the images.
     pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
         for image in &self.0 {
             [image.symbols, image.pool, image.functions, image.lazy].into_iter().for_each(&mut *visit);
         }
     }
 
-    /// The definitions of `symbol`, and the number of the image that has them.
+    /// Returns the definition of `symbol`, and the number of the image that has it.
     pub(crate) fn definition(&self, symbol: &Symbol) -> Option<(usize, ImageDefinition)> {
         let find = |(number, image): (usize, &Image)| {
             Some((number, image.definitions.find(&image.module, &image.packages, symbol)?))
@@ -60,19 +60,19 @@ impl Images {
         self.0.iter().enumerate().find_map(find)
     }
 
-    /// The names that the newest image exports from `ESL`.
+    /// Returns the names that the newest image exports from `ESL`.
     pub(crate) fn exports(&self) -> Vec<String> {
         let names = self.0.last().map(|image| image.definitions.exports(&image.module, &image.packages));
         names.unwrap_or_default().into_iter().map(str::to_owned).collect()
     }
 
-    /// The datum that a constant of an image describes, if there is one.
+    /// Returns the datum that a constant of an image describes, if there is one.
     pub(crate) fn datum(&self, image: usize, index: PoolIdx) -> Option<Datum> {
         let image = self.0.get(image)?;
         data::datum(&image.module, &image.packages, index)
     }
 
-    /// The package and name of a constant of an image that is a symbol.
+    /// Returns package and name of a constant of an image that is a symbol.
     pub(crate) fn symbol(&self, image: usize, index: PoolIdx) -> Option<(&str, &str)> {
         let image = self.0.get(image)?;
         name_of(&image.module, &image.packages, index)
@@ -90,13 +90,13 @@ impl Images {
         self.0.get(image)?.module.function(FunctionNumber(function)).ok()
     }
 
-    /// Name of a source of an image.
+    /// Returns the name of a source of an image.
     fn source(&self, image: usize, source: u32) -> Option<String> {
         self.0.get(image)?.module.sources().ok()?.into_iter().nth(source as usize)
     }
 }
 
-/// Takes an image in: a list of the functions that run its top-level forms, in order.
+/// Adds an image. Returns a list of the functions that run its top-level forms, in order.
 ///
 /// # Errors
 /// [`LoadError`].
@@ -122,7 +122,7 @@ pub(crate) fn open(heap: &mut Heap, world: &mut World, module: Arc<ModuleImage>)
     Ok(heap.list(&toplevel)?)
 }
 
-/// The function of an image with this number, which has no captures.
+/// Returns the function of an image with this number, which has no captures.
 ///
 /// # Errors
 /// As for every allocation.
@@ -135,10 +135,10 @@ pub(crate) fn function(
     ImageLoader { heap, world, image }.function(FunctionNumber(number))
 }
 
-/// The value of a constant of an image, which is data or a function without captures.
+/// Returns the value of a constant of an image, which is data or a function without captures.
 ///
 /// # Errors
-/// As for every allocation. What is damaged is `NIL`: the image is part of this program.
+/// As for every allocation. A damaged constant is `NIL`: the image is part of this program.
 pub(crate) fn constant(
     heap: &mut Heap,
     world: &mut World,
@@ -151,7 +151,7 @@ pub(crate) fn constant(
     }
 }
 
-/// Work on one image.
+/// A loader at work on one image.
 struct ImageLoader<'a> {
     heap: &'a mut Heap,
     world: &'a mut World,
@@ -172,7 +172,7 @@ impl ImageLoader<'_> {
         if made == Value::UNSUPPLIED { None } else { Some(made) }
     }
 
-    /// A function without captures: a stub, if nobody asked for it before.
+    /// Returns a function without captures; makes a stub for it at the first request.
     fn function(&mut self, number: FunctionNumber) -> Result<Value, AllocError> {
         let table = self.image().functions;
         if let Some(function) = self.made(table, number.0) {
@@ -202,8 +202,8 @@ impl ImageLoader<'_> {
         Ok(object)
     }
 
-    /// The value of a constant other than a function with captures. Data refer to earlier entries only, so a
-    /// stack of what is being made comes to an end.
+    /// Returns the value of a constant other than a function with captures. Data refer to earlier entries
+    /// only, so the stack of values under construction is finite.
     fn constant(&mut self, index: PoolIdx) -> Result<Value, LoadError> {
         let table = self.image().pool;
         if let Some(value) = self.made(table, index.0) {
@@ -236,12 +236,12 @@ impl ImageLoader<'_> {
         Ok(self.made(table, index.0).unwrap_or(Value::NIL))
     }
 
-    /// Adds those of `parts` to `under_way` that are not made yet.
+    /// Pushes those of `parts` that do not exist yet onto `under_way`.
     fn require(&self, table: Value, parts: impl IntoIterator<Item = PoolIdx>, under_way: &mut Vec<PoolIdx>) {
         under_way.extend(parts.into_iter().filter(|part| self.made(table, part.0).is_none()));
     }
 
-    /// Makes the value of a record whose parts are made.
+    /// Makes the value of a record whose parts exist.
     fn make(&mut self, record: ConstantRecord<'_>, table: Value) -> Result<Value, LoadError> {
         let pool = |heap: &Heap, PoolIdx(index): PoolIdx| {
             heap.vector(table).and_then(|pool| pool.get(index as usize)).copied().unwrap_or(Value::NIL)
@@ -275,8 +275,8 @@ impl ImageLoader<'_> {
         })
     }
 
-    /// The Code of a function, ready to run. Functions with captures that it makes closures of are made ready
-    /// with it, and those inside them.
+    /// Returns the Code of a function, ready to run. Functions with captures, of which it makes closures, are
+    /// made ready with it, and those inside them.
     fn code(&mut self, number: FunctionNumber) -> Result<Value, LoadError> {
         let module = self.module();
         let first = self.start(&module, number)?;
@@ -303,7 +303,7 @@ impl ImageLoader<'_> {
         Ok(first)
     }
 
-    /// A Code in which functions with captures are still missing among the constants.
+    /// Makes a Code whose constants still lack functions with captures.
     fn start(&mut self, module: &ModuleImage, number: FunctionNumber) -> Result<Value, LoadError> {
         let function = module.function(number)?;
         let mut missing = None;
@@ -334,7 +334,7 @@ impl ImageLoader<'_> {
     }
 }
 
-/// Lambda list and documentation of a function of an image.
+/// Returns lambda list and documentation of a function of an image.
 pub(super) fn texts(
     heap: &mut Heap,
     world: &mut World,
@@ -347,7 +347,7 @@ pub(super) fn texts(
     Ok((constant(function.lambda_list)?, constant(function.documentation)?))
 }
 
-/// The number of image and function behind the stub or the code of a function of an image.
+/// Returns the numbers of image and function behind the stub or the code of a function of an image.
 pub(crate) fn origin(heap: &Heap, function: Value) -> Option<(usize, u32)> {
     let code = heap.code(heap.function_code(function)?)?;
     let image = code.owner.as_index()?;
@@ -376,7 +376,7 @@ impl World {
     }
 }
 
-/// Where word `pc` of a code of an image was written.
+/// Returns the source place of word `pc` of a code of an image.
 pub(super) fn place_of(heap: &Heap, world: &World, code: Value, pc: u32) -> Option<debug::SourcePlace> {
     let parts = heap.code(code)?;
     let (image, number) = (parts.owner.as_index()?, parts.debug.as_index()?);

@@ -1,14 +1,14 @@
-//! From compiled modules to functions in the heap.
+//! Loading: from compiled modules to functions in the heap.
 //!
-//! A module that is read or compiled while the machine runs is verified and loaded as a whole; nothing of it
-//! stays outside of the heap, so what a program has forgotten is collected. The image of the library is
-//! trusted and loaded piece by piece (`image`): a function is a stub until it is called for the first time.
+//! A module that is read or compiled while the machine runs is verified and loaded as a whole. Nothing of it
+//! stays outside of the heap, so code that a program no longer reaches is collected. The image of the library
+//! is trusted and loaded piece by piece (`image`): a function is a stub until its first call.
 //!
 //! Guarantees: one value for each entry of a module's pool, so that literal data keep their identity; a Code
 //! is laid out as `shape` says.
 //!
-//! A constant that names a structure class is its symbol here. The machine puts the class in its place when
-//! an instruction first needs it, so code may be loaded before the class is defined, and sees the class as it
+//! A constant that names a structure class is loaded as its symbol. The machine replaces it by the class when
+//! an instruction first needs it, so code may be loaded before the class is defined, and uses the class as it
 //! is then.
 
 use std::collections::BTreeMap;
@@ -46,11 +46,11 @@ pub use prepare::prepare;
 /// Why a module was not loaded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LoadError {
-    /// The verifier refuses it.
+    /// The verifier refuses the module.
     Refused(VerifyError),
     /// The image is damaged.
     Damaged(ReadError),
-    /// It refers to an object of another compilation.
+    /// The module refers to an object of another compilation.
     ForeignObject,
     /// There is no room.
     Alloc(AllocError),
@@ -81,18 +81,18 @@ impl From<ReadError> for LoadError {
     }
 }
 
-/// The objects that the constants of a module may refer to, beside those that they describe: what modules of
-/// one compilation have in common.
+/// Objects that the constants of a module may refer to but do not describe: those shared by the modules of
+/// one compilation.
 pub(crate) trait Shared {
-    /// The symbol object for an uninterned symbol's number, if there is one.
+    /// Returns the symbol object for an uninterned symbol's number, if there is one.
     fn uninterned(&self, id: u32) -> Option<Value>;
-    /// Notes the symbol object that was made for a number.
+    /// Records the symbol object made for a number.
     fn note_uninterned(&mut self, id: u32, object: Value);
-    /// An object of the program.
+    /// Returns an object of the program.
     fn object(&self, id: u32) -> Option<Value>;
 }
 
-/// A module that stands alone, as one from a file does.
+/// The shared objects of a module that stands alone, such as one from a file.
 #[derive(Default)]
 pub(crate) struct Alone(BTreeMap<u32, Value>);
 
@@ -110,10 +110,10 @@ impl Shared for Alone {
     }
 }
 
-/// Loads a module: a list of the functions that run its top-level forms, in order.
+/// Loads a module. Returns a list of the functions that run its top-level forms, in order.
 ///
 /// # Errors
-/// [`LoadError`]; then nothing of it can be reached.
+/// [`LoadError`]; then nothing of the module is reachable.
 pub(crate) fn load(
     heap: &mut Heap,
     world: &mut World,
@@ -124,23 +124,22 @@ pub(crate) fn load(
     Loader { heap, world, module, shared, verified, pool: Vec::new(), functions: Vec::new() }.load()
 }
 
-/// A module on its way into the heap.
+/// A module being loaded.
 struct Loader<'a> {
     heap: &'a mut Heap,
     world: &'a mut World,
     module: &'a Module,
     shared: &'a mut dyn Shared,
     verified: Verified,
-    /// The values of the pool.
+    /// Values of the pool.
     pool: Vec<Value>,
-    /// For a function without captures its Function, for one with captures its Code.
+    /// Functions by number: the Function of one without captures, the Code of one with captures.
     functions: Vec<Value>,
 }
 
 impl Loader<'_> {
     fn load(mut self) -> Result<Value, LoadError> {
-        // Data may contain functions, and functions each other, so functions are made before they have their
-        // code.
+        // Data may contain functions, and functions each other, so functions are made before their code.
         let shape = Shape::other(Sort::Lazy, 0);
         let stub = trust::alloc_stub(self.heap, Value::NIL, Value::NIL, shape, 0, LAZY_WORD)?;
         for function in &self.module.functions {
@@ -177,7 +176,7 @@ impl Loader<'_> {
         Ok(self.heap.list(&toplevel)?)
     }
 
-    /// Puts the Codes of functions with captures, which are known only now, where they are constants.
+    /// Stores the Codes of functions with captures, known only now, into the constants that refer to them.
     fn fill_in(&mut self, codes: &[Value]) {
         for (function, &code) in self.module.functions.iter().zip(codes) {
             for (index, &PoolIdx(constant)) in function.constants.iter().enumerate() {
@@ -198,7 +197,7 @@ impl Loader<'_> {
         Ok(object)
     }
 
-    /// The value of a constant; earlier ones are there.
+    /// Returns the value of a constant; the values of earlier ones are in the pool.
     fn constant(&mut self, constant: &Constant) -> Result<Value, LoadError> {
         let pool = |&PoolIdx(index): &PoolIdx| self.pool[index as usize];
         Ok(match constant {
@@ -225,13 +224,13 @@ impl Loader<'_> {
     }
 }
 
-/// What `aux` of a Function is that is a form at top level, or several.
+/// Value of `aux` of a Function that runs one or several top-level forms.
 pub(crate) const TOP_LEVEL: u16 = 1;
 
-/// What a Code is made from.
+/// The parts from which a Code is made.
 struct FunctionParts<'a> {
     function: &'a Function,
-    /// Its constants, the names of its keys last.
+    /// Constants of the function, then the names of its keys.
     constants: &'a [Value],
     name: Value,
     debug: Value,
@@ -261,7 +260,7 @@ fn make_code(
     trust::alloc_code(heap, parts, verified)
 }
 
-/// The constants of a function's Code: its own, then the names of its keys.
+/// Returns the constants of a function's Code: its own, then the names of its keys.
 fn own_constants(function: &Function, value: impl FnMut(PoolIdx) -> Value) -> Vec<Value> {
     let keys = function.parameters.keys.iter().flatten();
     function.constants.iter().chain(keys).copied().map(value).collect()
@@ -275,7 +274,7 @@ pub(crate) fn character(c: char) -> Value {
     Value::character(u32::from(c)).unwrap_or(Value::NIL)
 }
 
-/// The value of an integer of any size.
+/// Returns an integer of any size as a value.
 ///
 /// # Errors
 /// As for every allocation.
@@ -298,7 +297,7 @@ pub(crate) fn integer_of(heap: &Heap, v: Value) -> Option<BigInt> {
     Some(BigInt::from_bytes_le(sign, &bytes))
 }
 
-/// The value of a ratio in lowest terms.
+/// Returns a ratio in lowest terms as a value.
 ///
 /// # Errors
 /// As for every allocation.
@@ -308,7 +307,7 @@ pub(crate) fn ratio(heap: &mut Heap, numerator: &BigInt, denominator: &BigInt) -
     heap.alloc_ratio(numerator, denominator)
 }
 
-/// A literal array of a rank other than 1.
+/// Makes a literal array of a rank other than 1.
 ///
 /// # Errors
 /// As for every allocation.

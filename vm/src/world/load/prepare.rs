@@ -1,9 +1,10 @@
-//! Makes the table of definitions of an image: top-level forms that do nothing but define are run here, as
-//! far as constants go, and noted instead of kept.
+//! Preparation of an image: top-level forms that only define are turned into rows of the table of
+//! definitions.
 //!
-//! A form is a short piece of code of a few kinds of instructions and builtins. Anything else, or a value
-//! that is no constant, and the form stays a form. The forms that stay run after all that are noted; a
-//! library must not depend on the order between the two.
+//! Each form is executed here on constants alone. It is a short piece of code of a few kinds of instructions
+//! and builtins. With anything else, or with a value that is not a constant, the form stays a form. The
+//! remaining forms run after all definitions in the table; a library must not depend on the order between the
+//! two.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,10 +16,10 @@ use esl_bytecode::symbol::{ESL_PACKAGE, Symbol};
 
 use super::definitions::{CONSTANT, HEAD, MARKER, ROW, SPECIAL, STREAM, VALUE, hash};
 
-/// The function of the library that tells whether a symbol is a constant with a value already.
+/// Library function that tells whether a symbol already is a constant with a value.
 const IS_CONSTANT: &str = "%IS-CONSTANT-WITH";
 
-/// What a register holds.
+/// The contents of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum KnownValue {
     Nil,
@@ -29,7 +30,7 @@ enum KnownValue {
     Stream(i32),
 }
 
-/// What a symbol is.
+/// The definition of a symbol.
 #[derive(Clone, Debug, Default)]
 struct DefinitionRow {
     symbol: Option<PoolIdx>,
@@ -37,13 +38,13 @@ struct DefinitionRow {
     macro_function: Option<PoolIdx>,
     flags: i64,
     value: Option<KnownValue>,
-    /// The newest last.
+    /// Indicators and values, the newest last.
     properties: Vec<(PoolIdx, KnownValue)>,
 }
 
 type SymbolName = (Arc<str>, String);
 
-/// What was noted so far.
+/// The definitions so far.
 #[derive(Clone, Debug, Default)]
 struct Noted {
     rows: BTreeMap<SymbolName, DefinitionRow>,
@@ -51,8 +52,8 @@ struct Noted {
     exports: Vec<PoolIdx>,
 }
 
-/// Turns the top-level forms of `module` that do nothing but define into a table, for an image: functions,
-/// macros, special variables, constants, properties and exports. Those that do nothing at all go.
+/// Turns the top-level forms of `module` that only define into a table, for an image: functions, macros,
+/// special variables, constants, properties and exports. Forms without effect are dropped.
 ///
 /// The module must stay the only one in its file: its last constant becomes the table.
 #[must_use]
@@ -75,7 +76,7 @@ pub fn prepare(mut module: Module) -> Module {
     module
 }
 
-/// One thing that a form does. Symbols have a package.
+/// An effect of a form, on a symbol with a package.
 #[derive(Clone, Copy, Debug)]
 enum Effect {
     Function(PoolIdx, PoolIdx),
@@ -87,7 +88,7 @@ enum Effect {
     Export(PoolIdx),
 }
 
-/// A form that is being run.
+/// A form being executed.
 struct FormRun<'a> {
     module: &'a Module,
     registers: [Option<KnownValue>; 256],
@@ -96,14 +97,14 @@ struct FormRun<'a> {
 }
 
 impl FormRun<'_> {
-    /// Runs a top-level function to its end. `None` if that takes more than constants.
+    /// Executes a top-level function to its end. `None` if that takes more than constants.
     fn run(&mut self, FunctionNumber(number): FunctionNumber) -> Option<()> {
         let function = &self.module.functions[number as usize];
         let wide = |index: u32| KnownValue::Constant(function.constants[index as usize]);
         let constant = |index: u16| wide(index.into());
         let mut pc = 0;
         loop {
-            // Jumps go forward, so this ends.
+            // Jumps go forward, so the loop ends.
             let instruction = Instr::decode(&function.code, pc)?;
             pc += instruction.opcode().words();
             let mut jump = |distance: i64| pc = (pc as i64 + distance) as usize;
@@ -157,7 +158,7 @@ impl FormRun<'_> {
         self.registers[usize::from(register)] = Some(value);
     }
 
-    /// What the one function of the library gives that may be called here.
+    /// Returns the result of the only library function that may be called here.
     fn call_library(&mut self, function: KnownValue, window: u8, count: u8) -> Option<KnownValue> {
         let Constant::Symbol(function) = self.constant(self.symbol(function)?) else { return None };
         let argument = |position: usize| self.registers[usize::from(window) + 2 + position];
@@ -168,7 +169,7 @@ impl FormRun<'_> {
         is_new.then_some(KnownValue::Nil)
     }
 
-    /// Notes what a builtin does, and gives its value.
+    /// Records the effect of a builtin, and returns its value.
     fn call(&mut self, builtin: u32, window: u8, count: u8) -> Option<KnownValue> {
         let argument = |position: u8| {
             if position < count {
@@ -222,7 +223,7 @@ impl FormRun<'_> {
         &self.module.constants[index as usize]
     }
 
-    /// The constant, if it is a symbol with a package.
+    /// Returns the constant, if it is a symbol with a package.
     fn symbol(&self, known: KnownValue) -> Option<PoolIdx> {
         let KnownValue::Constant(index) = known else { return None };
         match self.constant(index) {
@@ -231,7 +232,7 @@ impl FormRun<'_> {
         }
     }
 
-    /// The constant, if it is a function without captures.
+    /// Returns the constant, if it is a function without captures.
     fn function(&self, known: KnownValue) -> Option<PoolIdx> {
         let KnownValue::Constant(index) = known else { return None };
         match self.constant(index) {
@@ -242,7 +243,7 @@ impl FormRun<'_> {
         }
     }
 
-    /// What is known, unless it is a function with captures or an object of the program.
+    /// Returns the value, unless it is a function with captures or an object of the program.
     fn data(&self, known: KnownValue) -> Option<KnownValue> {
         match known {
             KnownValue::Constant(index) => match self.constant(index) {
@@ -255,7 +256,7 @@ impl FormRun<'_> {
         }
     }
 
-    /// Whether this designates the package `ESL`.
+    /// Returns whether the value designates the package `ESL`.
     fn is_esl(&self, known: KnownValue) -> bool {
         let KnownValue::Constant(index) = known else { return false };
         match self.constant(index) {
@@ -265,7 +266,7 @@ impl FormRun<'_> {
         }
     }
 
-    /// Notes the export of a symbol, or of a list of symbols, of `ESL`.
+    /// Records the export of a symbol, or of a list of symbols, of `ESL`.
     fn export(&mut self, known: KnownValue) -> Option<()> {
         let KnownValue::Constant(mut list) = known else { return None };
         let mut symbols = Vec::new();
@@ -342,7 +343,7 @@ impl Noted {
         }
     }
 
-    /// Makes the table the last constant.
+    /// Appends the table as the last constant.
     fn write(self, module: &mut Module) {
         let mut pool = PoolAdditions { constants: &mut module.constants };
         let none = pool.add(Constant::Nil);
@@ -388,7 +389,7 @@ impl PoolAdditions<'_> {
         }
     }
 
-    /// The data of a row, if it has any.
+    /// Returns the data of a row, if it has any.
     fn data(&mut self, row: &DefinitionRow) -> Option<PoolIdx> {
         if row.flags == 0 && row.value.is_none() && row.properties.is_empty() {
             return None;

@@ -11,7 +11,7 @@ use esl_bytecode::symbol::Symbol;
 use super::*;
 use crate::vm::Vm;
 
-/// A function with these constants and this code.
+/// Returns a function with these constants and this code.
 fn function(registers: u8, constants: &[u32], code: &str) -> Function {
     Function {
         registers,
@@ -21,8 +21,8 @@ fn function(registers: u8, constants: &[u32], code: &str) -> Function {
     }
 }
 
-/// `(%set-function 'adder (lambda (n) (lambda (x) (+ n x))))` and `(quote #1=(a "text" . #1#))`-like shared
-/// data.
+/// `(%set-function 'adder (lambda (n) (lambda (x) (+ n x))))` and shared data similar to `(quote #1=(a "text"
+/// . #1#))`.
 fn module() -> Module {
     let set_function = Builtin::SetFunction.number();
     let define = format!(
@@ -59,12 +59,12 @@ fn image(module: &Module) -> Arc<ModuleImage> {
     Arc::new(ModuleImage::open(ImageBytes::Shared(bytes.into())).unwrap())
 }
 
-/// Runs all top-level functions; the value of the last.
+/// Runs all top-level functions and returns the value of the last.
 fn run(vm: &mut Vm, toplevel: Value) -> Value {
     vm.run_toplevel(toplevel, 1_000).unwrap()
 }
 
-/// `((adder 2) 40)`
+/// Runs `((adder 2) 40)`.
 fn use_adder(vm: &mut Vm) -> Value {
     let name = vm.world.intern_esl(&mut vm.heap, "ADDER").unwrap();
     let adder = vm.call(name, &[Value::small(2)], 1_000).unwrap()[0];
