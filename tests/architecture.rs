@@ -1,5 +1,5 @@
-//! `ARCHITECTURE.md` maps the code completely: its tables list exactly the modules that exist, and each type in its
-//! glossary exists.
+//! `ARCHITECTURE.md` maps the code completely and correctly: its tables list exactly the modules that exist, and each
+//! type in its glossary exists. So does each file that it and the other documents at the root name.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -19,8 +19,8 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-fn document() -> String {
-    fs::read_to_string(root().join("ARCHITECTURE.md")).expect("the document can be read")
+fn read(name: &str) -> String {
+    fs::read_to_string(root().join(name)).expect("the document can be read")
 }
 
 /// Returns the part of a text from `heading` to the next heading.
@@ -46,7 +46,7 @@ fn modules(folder: &Path) -> BTreeSet<String> {
 
 #[test]
 fn the_map_lists_every_module() {
-    let document = document();
+    let document = read("ARCHITECTURE.md");
     for (heading, folder) in SECTIONS {
         assert_eq!(names_of_rows(section(&document, heading)), modules(&root().join(folder)), "{heading}");
     }
@@ -77,7 +77,7 @@ fn declared_types(folder: PathBuf) -> BTreeSet<String> {
 
 #[test]
 fn each_type_in_the_glossary_exists() {
-    let document = document();
+    let document = read("ARCHITECTURE.md");
     let (_, glossary) = document.split_once("## 7. Glossary").expect("there is a glossary");
     let types: BTreeSet<String> =
         SECTIONS.iter().flat_map(|(_, folder)| declared_types(root().join(folder))).collect();
@@ -87,4 +87,28 @@ fn each_type_in_the_glossary_exists() {
     let missing: Vec<&&str> = named.iter().filter(|name| is_type(name) && !types.contains(**name)).collect();
     assert!(named.len() > 40, "the glossary names {} types", named.len());
     assert!(missing.is_empty(), "no type is called {missing:?}");
+}
+
+/// Returns the inline code of a Markdown text that looks like the path of a file or a folder.
+fn paths_in_code(text: &str) -> Vec<&str> {
+    let is_path = |code: &str| {
+        let is_file = [".rs", ".esl", ".md", ".toml"].iter().any(|extension| code.ends_with(extension));
+        let characters = |c: char| c.is_alphanumeric() || "_-./".contains(c);
+        (is_file || code.contains('/')) && code.chars().all(characters)
+    };
+    // Fenced blocks are every second part.
+    let prose = text.split("\n```").step_by(2);
+    prose.flat_map(|part| part.split('`').skip(1).step_by(2)).filter(|code| is_path(code)).collect()
+}
+
+#[test]
+fn each_file_that_a_document_names_exists() {
+    // Paths in the story of a task are relative to the machine or the library.
+    let bases = ["", "vm/src", "stdlib"];
+    for name in ["ARCHITECTURE.md", "CONTRIBUTING.md", "README.md"] {
+        let text = read(name);
+        let exists = |path: &&str| bases.iter().any(|base| root().join(base).join(path).exists());
+        let missing: Vec<&str> = paths_in_code(&text).into_iter().filter(|path| !exists(path)).collect();
+        assert!(missing.is_empty(), "{name} names {missing:?}");
+    }
 }
