@@ -120,7 +120,7 @@ impl Operands<'_> {
 }
 
 macro_rules! define_assembler {
-    ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $substitute:ident
+    ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $($kind:ident)+
         { $( $field:ident : $ty:ident ),* } ; )*) => {
         fn opcode(mnemonic: &str) -> Option<Opcode> {
             match mnemonic {

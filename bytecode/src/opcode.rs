@@ -1,7 +1,8 @@
 //! The opcode table: every instruction of the virtual machine, declared once.
 //!
 //! The table is expanded into [`Opcode`], [`Instr`] with its encoder and decoder, the disassembler's text, the
-//! verifier's view of operands, and `docs/bytecode.md`. The interpreter has one arm for each row, in this order.
+//! verifier's view of operands, and `docs/bytecode.md`. The interpreter has one arm for each row, in the order of the
+//! rows (its tests compare the two).
 //!
 //! An instruction is one 32-bit word, `opcode | operands << 8`, or two: the second, the *aux* word, holds the operand
 //! of 32 bits. `R[n]` is a register of the current frame, `K[n]` a constant of the function. Jumps are relative to the
@@ -9,13 +10,26 @@
 //!
 //! Numbers are never given twice. 0 and those from `0xC0` on belong to the virtual machine and are refused in files.
 //!
-//! The word after the mnemonic says what becomes of the value that a recovery puts in place of a failed instruction:
-//! `value` goes to the first operand, `test` decides the jump, `call` is delivered as the results of a call,
-//! `effect` is dropped; for `never` there is no value that could stand, and a recovery can only have the instruction
-//! tried again, or leave; `silent` instructions never fail.
+//! The word after the mnemonic says how an instruction ends that cannot do its work, and what becomes of the value that
+//! a recovery puts in its place:
+//!
+//! - `silent`: it never fails. `jump` and `return` are silent instructions that control never passes through: what
+//!   follows them is reached from elsewhere.
+//! - `value`: the substitute goes to the first operand, a [`Dst`].
+//! - `test`: the substitute is the outcome of the test, which jumps if it holds; `test_not` jumps if it does not. The
+//!   last operand is the [`Jump`] or [`Back`].
+//! - `effect`: the substitute is dropped.
+//! - `call`: the substitutes are delivered as the results of the call; `tail` is a call in place of the running
+//!   function, whose results they are then. A [`Callee`] says what is called. The operands begin with `window` and
+//!   `count`; then comes `want`, unless it is a tail call.
+//! - `never`: nothing could stand for its work, so a recovery can only have the instruction tried again, or leave.
+//!
+//! After `value`, `test` or `effect` stands the [`Builtin`] that the instruction is, if it is one: applied to the
+//! registers that it reads and its integers, in their order, that does the same, failures included.
 
 use std::fmt;
 
+use crate::builtin::Builtin;
 use crate::operand::*;
 
 /// Calls `$with!` with every row of the table.
@@ -37,31 +51,31 @@ macro_rules! for_each_opcode {
 
             // ---- arithmetic
             /// `R[dst] := R[left] + R[right]`
-            Add = 0x08, "add", value { dst: Dst, left: Reg, right: Reg };
+            Add = 0x08, "add", value Add { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := R[left] - R[right]`
-            Sub = 0x09, "sub", value { dst: Dst, left: Reg, right: Reg };
+            Sub = 0x09, "sub", value Subtract { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := R[left] * R[right]`
-            Mul = 0x0A, "mul", value { dst: Dst, left: Reg, right: Reg };
+            Mul = 0x0A, "mul", value Multiply { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := R[left] / R[right]`
-            Div = 0x0B, "div", value { dst: Dst, left: Reg, right: Reg };
+            Div = 0x0B, "div", value Divide { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := R[left] + value`
-            AddInt = 0x0C, "add-int", value { dst: Dst, left: Reg, value: Int8 };
+            AddInt = 0x0C, "add-int", value Add { dst: Dst, left: Reg, value: Int8 };
             /// `R[dst]` := the quotient of `R[left]` by `R[right]`, rounded towards minus infinity
-            Floor = 0x0D, "floor", value { dst: Dst, left: Reg, right: Reg };
+            Floor = 0x0D, "floor", value Floor { dst: Dst, left: Reg, right: Reg };
             /// `R[dst]` := the quotient of `R[left]` by `R[right]`, rounded towards zero
-            Truncate = 0x0E, "truncate", value { dst: Dst, left: Reg, right: Reg };
+            Truncate = 0x0E, "truncate", value Truncate { dst: Dst, left: Reg, right: Reg };
             /// `R[dst]` := the remainder that goes with `floor`
-            Mod = 0x0F, "mod", value { dst: Dst, left: Reg, right: Reg };
+            Mod = 0x0F, "mod", value Mod { dst: Dst, left: Reg, right: Reg };
             /// `R[dst]` := the remainder that goes with `truncate`
-            Rem = 0x10, "rem", value { dst: Dst, left: Reg, right: Reg };
+            Rem = 0x10, "rem", value Rem { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := R[left] and R[right]`, bit by bit
-            LogAnd = 0x11, "logand", value { dst: Dst, left: Reg, right: Reg };
+            LogAnd = 0x11, "logand", value LogAnd { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := R[left] or R[right]`, bit by bit
-            LogIor = 0x12, "logior", value { dst: Dst, left: Reg, right: Reg };
+            LogIor = 0x12, "logior", value LogIor { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := R[left] xor R[right]`, bit by bit
-            LogXor = 0x13, "logxor", value { dst: Dst, left: Reg, right: Reg };
+            LogXor = 0x13, "logxor", value LogXor { dst: Dst, left: Reg, right: Reg };
             /// `R[dst]` := integer `R[left]` shifted left by `R[right]`, right when that is negative
-            Ash = 0x14, "ash", value { dst: Dst, left: Reg, right: Reg };
+            Ash = 0x14, "ash", value Ash { dst: Dst, left: Reg, right: Reg };
 
             // ---- comparisons that give T or NIL
             /// `R[dst] := (not R[src])`
@@ -71,19 +85,19 @@ macro_rules! for_each_opcode {
             /// `R[dst] := (eql R[left] R[right])`
             Eql = 0x1A, "eql", silent { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := (= R[left] R[right])`
-            NumEq = 0x1B, "num-eq", value { dst: Dst, left: Reg, right: Reg };
+            NumEq = 0x1B, "num-eq", value NumEqual { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := (< R[left] R[right])`
-            Less = 0x1C, "less", value { dst: Dst, left: Reg, right: Reg };
+            Less = 0x1C, "less", value Less { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := (<= R[left] R[right])`
-            LessEq = 0x1D, "less-eq", value { dst: Dst, left: Reg, right: Reg };
+            LessEq = 0x1D, "less-eq", value LessEqual { dst: Dst, left: Reg, right: Reg };
             /// `R[dst] := (char= R[left] R[right])`
-            CharEq = 0x1F, "char-eq", value { dst: Dst, left: Reg, right: Reg };
+            CharEq = 0x1F, "char-eq", value CharEqualExactly { dst: Dst, left: Reg, right: Reg };
             /// `R[dst]` := whether `R[src]` is of the type
             IsType = 0x1E, "is-type", silent { dst: Dst, src: Reg, code: TypeIdx };
 
             // ---- jumps forward
             /// Jumps.
-            JumpAlways = 0x20, "jump", silent { to: Jump24 };
+            JumpAlways = 0x20, "jump", jump { to: Jump24 };
             /// Jumps if `R[test]` is `NIL`.
             JumpIfNil = 0x21, "jump-if-nil", silent { test: Reg, to: Jump16 };
             /// Jumps if `R[test]` is not `NIL`.
@@ -111,33 +125,35 @@ macro_rules! for_each_opcode {
             /// Jumps unless `R[test]` is of the type.
             JumpIfNotType = 0x2D, "jump-if-not-type", silent { test: Reg, code: TypeIdx, to: Jump };
             /// Jumps if `(= R[left] R[right])`.
-            JumpNumEq = 0x30, "jump-num-eq", test { left: Reg, right: Reg, to: Jump };
+            JumpNumEq = 0x30, "jump-num-eq", test NumEqual { left: Reg, right: Reg, to: Jump };
             /// Jumps unless `(= R[left] R[right])`.
-            JumpNotNumEq = 0x31, "jump-not-num-eq", test { left: Reg, right: Reg, to: Jump };
+            JumpNotNumEq = 0x31, "jump-not-num-eq", test_not NumEqual { left: Reg, right: Reg, to: Jump };
             /// Jumps if `(< R[left] R[right])`.
-            JumpLess = 0x32, "jump-less", test { left: Reg, right: Reg, to: Jump };
+            JumpLess = 0x32, "jump-less", test Less { left: Reg, right: Reg, to: Jump };
             /// Jumps unless `(< R[left] R[right])`.
-            JumpNotLess = 0x33, "jump-not-less", test { left: Reg, right: Reg, to: Jump };
+            JumpNotLess = 0x33, "jump-not-less", test_not Less { left: Reg, right: Reg, to: Jump };
             /// Jumps if `(<= R[left] R[right])`.
-            JumpLessEq = 0x34, "jump-less-eq", test { left: Reg, right: Reg, to: Jump };
+            JumpLessEq = 0x34, "jump-less-eq", test LessEqual { left: Reg, right: Reg, to: Jump };
             /// Jumps unless `(<= R[left] R[right])`.
-            JumpNotLessEq = 0x35, "jump-not-less-eq", test { left: Reg, right: Reg, to: Jump };
+            JumpNotLessEq = 0x35, "jump-not-less-eq", test_not LessEqual { left: Reg, right: Reg, to: Jump };
             /// Jumps if `(= R[left] value)`.
-            JumpNumEqInt = 0x36, "jump-num-eq-int", test { left: Reg, value: Int16, to: Jump };
+            JumpNumEqInt = 0x36, "jump-num-eq-int", test NumEqual { left: Reg, value: Int16, to: Jump };
             /// Jumps unless `(= R[left] value)`.
-            JumpNotNumEqInt = 0x37, "jump-not-num-eq-int", test { left: Reg, value: Int16, to: Jump };
+            JumpNotNumEqInt = 0x37, "jump-not-num-eq-int", test_not NumEqual
+                { left: Reg, value: Int16, to: Jump };
             /// Jumps if `(< R[left] value)`.
-            JumpLessInt = 0x38, "jump-less-int", test { left: Reg, value: Int16, to: Jump };
+            JumpLessInt = 0x38, "jump-less-int", test Less { left: Reg, value: Int16, to: Jump };
             /// Jumps unless `(< R[left] value)`.
-            JumpNotLessInt = 0x39, "jump-not-less-int", test { left: Reg, value: Int16, to: Jump };
+            JumpNotLessInt = 0x39, "jump-not-less-int", test_not Less { left: Reg, value: Int16, to: Jump };
             /// Jumps if `(> R[left] value)`.
-            JumpGreaterInt = 0x3A, "jump-greater-int", test { left: Reg, value: Int16, to: Jump };
+            JumpGreaterInt = 0x3A, "jump-greater-int", test Greater { left: Reg, value: Int16, to: Jump };
             /// Jumps unless `(> R[left] value)`.
-            JumpNotGreaterInt = 0x3B, "jump-not-greater-int", test { left: Reg, value: Int16, to: Jump };
+            JumpNotGreaterInt = 0x3B, "jump-not-greater-int", test_not Greater
+                { left: Reg, value: Int16, to: Jump };
 
             // ---- loops: the only jumps back, a tick each
             /// Jumps back.
-            Loop = 0x40, "loop", silent { to: Back24 };
+            Loop = 0x40, "loop", jump { to: Back24 };
             /// Jumps back if `R[test]` is `NIL`.
             LoopIfNil = 0x41, "loop-if-nil", silent { test: Reg, to: Back16 };
             /// Jumps back if `R[test]` is not `NIL`.
@@ -145,46 +161,48 @@ macro_rules! for_each_opcode {
             /// Jumps back if `R[test]` is a pair.
             LoopIfCons = 0x43, "loop-if-cons", silent { test: Reg, to: Back16 };
             /// Jumps back if `(< R[left] R[right])`.
-            LoopLess = 0x44, "loop-less", test { left: Reg, right: Reg, to: Back };
+            LoopLess = 0x44, "loop-less", test Less { left: Reg, right: Reg, to: Back };
             /// Jumps back unless `(< R[left] R[right])`.
-            LoopNotLess = 0x45, "loop-not-less", test { left: Reg, right: Reg, to: Back };
-            /// `R[counter] := R[counter] + step`, then jumps back if `(< R[counter] R[limit])`. The addition, and with
-            /// it the instruction, has no effect if either is no real number.
+            LoopNotLess = 0x45, "loop-not-less", test_not Less { left: Reg, right: Reg, to: Back };
+            /// `R[counter] := R[counter] + step`, then jumps back if `(< R[counter] R[limit])`. The addition,
+            /// and with it the instruction, has no effect if either is no real number.
             LoopCount = 0x46, "loop-count", test { counter: Reg, limit: Reg, step: Int8, to: Back };
 
             // ---- lists
             /// `R[dst] := (cons R[car] R[cdr])`
-            Cons = 0x48, "cons", value { dst: Dst, car: Reg, cdr: Reg };
+            Cons = 0x48, "cons", value Cons { dst: Dst, car: Reg, cdr: Reg };
             /// `R[dst] := (car R[list])`
-            Car = 0x49, "car", value { dst: Dst, list: Reg };
+            Car = 0x49, "car", value Car { dst: Dst, list: Reg };
             /// `R[dst] := (cdr R[list])`
-            Cdr = 0x4A, "cdr", value { dst: Dst, list: Reg };
+            Cdr = 0x4A, "cdr", value Cdr { dst: Dst, list: Reg };
             /// `R[dst] := (cadr R[list])`
-            Cadr = 0x4B, "cadr", value { dst: Dst, list: Reg };
+            Cadr = 0x4B, "cadr", value Cadr { dst: Dst, list: Reg };
             /// `R[dst] := (cddr R[list])`
-            Cddr = 0x4C, "cddr", value { dst: Dst, list: Reg };
+            Cddr = 0x4C, "cddr", value Cddr { dst: Dst, list: Reg };
             /// The car of the pair `R[pair]` becomes `R[value]`.
-            SetCar = 0x4D, "set-car", effect { pair: Reg, value: Reg };
+            SetCar = 0x4D, "set-car", effect SetCar { pair: Reg, value: Reg };
             /// The cdr of the pair `R[pair]` becomes `R[value]`.
-            SetCdr = 0x4E, "set-cdr", effect { pair: Reg, value: Reg };
+            SetCdr = 0x4E, "set-cdr", effect SetCdr { pair: Reg, value: Reg };
             /// `R[dst]` := a fresh list of `R[first], … R[first+count-1]`
             List = 0x4F, "list", value { dst: Dst, first: Base, count: Count };
 
             // ---- vectors and structures
             /// `R[dst] := (svref R[vector] R[index])`
-            VectorRef = 0x50, "vector-ref", value { dst: Dst, vector: Reg, index: Reg };
-            /// Element `R[index]` of the simple vector `R[vector]` becomes `R[value]`.
-            VectorSet = 0x51, "vector-set", effect { vector: Reg, index: Reg, value: Reg };
+            VectorRef = 0x50, "vector-ref", value Svref { dst: Dst, vector: Reg, index: Reg };
             /// `R[dst] := (aref R[array] R[index])`, for an array of rank 1
-            ArrayRef = 0x52, "array-ref", value { dst: Dst, array: Reg, index: Reg };
+            ArrayRef = 0x52, "array-ref", value Aref { dst: Dst, array: Reg, index: Reg };
+            /// Element `R[index]` of the simple vector `R[vector]` becomes `R[value]`.
+            VectorSet = 0x51, "vector-set", effect SetSvref { vector: Reg, index: Reg, value: Reg };
             /// Element `R[index]` of the array `R[array]` of rank 1 becomes `R[value]`.
-            ArraySet = 0x53, "array-set", effect { array: Reg, index: Reg, value: Reg };
+            ArraySet = 0x53, "array-set", effect SetAref { array: Reg, index: Reg, value: Reg };
             /// `R[dst] := (char R[string] R[index])`
-            CharRef = 0x57, "char-ref", value { dst: Dst, string: Reg, index: Reg };
-            /// `R[dst]` := slot `slot` of `R[instance]`, which must be an instance of the class or a subclass.
+            CharRef = 0x57, "char-ref", value Char { dst: Dst, string: Reg, index: Reg };
+            /// `R[dst]` := slot `slot` of `R[instance]`, which must be an instance of the class or a
+            /// subclass.
             Slot = 0x54, "slot", value { dst: Dst, instance: Reg, slot: Index, class: WideClassIdx };
             /// Slot `slot` of `R[instance]` becomes `R[value]`.
-            SetSlot = 0x55, "set-slot", effect { instance: Reg, slot: Index, value: Reg, class: WideClassIdx };
+            SetSlot = 0x55, "set-slot", effect
+                { instance: Reg, slot: Index, value: Reg, class: WideClassIdx };
             /// Jumps unless `R[test]` is an instance of the class or a subclass.
             JumpIfNotInstance = 0x56, "jump-if-not-instance", silent { test: Reg, class: ClassIdx, to: Jump };
 
@@ -195,10 +213,11 @@ macro_rules! for_each_opcode {
             BoxRef = 0x59, "box-ref", silent { dst: Dst, cell: Reg };
             /// The box `R[cell]` holds `R[src]`.
             BoxSet = 0x5A, "box-set", silent { cell: Reg, src: Reg };
-            /// `R[dst]` := a closure of `K[function]`, whose captures are taken as that function declares them
+            /// `R[dst]` := a closure of `K[function]`, whose captures are taken as that function declares
+            /// them
             MakeClosure = 0x5B, "make-closure", never { dst: Dst, function: FunctionIdx };
-            /// Capture `index` of the closure `R[closure]`, made by `make-closure` in this frame, becomes `R[src]`. The
-            /// closure's function declares that capture as one that comes later.
+            /// Capture `index` of the closure `R[closure]`, made by `make-closure` in this frame, becomes
+            /// `R[src]`. The closure's function declares that capture as one that comes later.
             PatchCapture = 0x5C, "patch-capture", silent { closure: Reg, index: Index, src: Reg };
             /// `R[dst]` := capture `index` of the running function
             CaptureRef = 0x5D, "capture-ref", silent { dst: Dst, index: Index };
@@ -214,37 +233,42 @@ macro_rules! for_each_opcode {
             Bind = 0x62, "bind", never { src: Reg, symbol: SymbolIdx };
             /// Undoes the newest `count` bindings of this frame.
             Unbind = 0x63, "unbind", silent { count: Count };
-            /// Binds the symbols of the list `R[symbols]` to the items of `R[values]`, missing ones to nothing. The
-            /// innermost control entry must be a scope of this frame; popping it undoes the bindings.
+            /// Binds the symbols of the list `R[symbols]` to the items of `R[values]`, missing ones to
+            /// nothing. The innermost control entry must be a scope of this frame; popping it undoes the
+            /// bindings.
             BindList = 0x64, "bind-list", effect { symbols: Reg, values: Reg };
             /// `R[dst]` := the global function named `K[symbol]`
             FunctionRef = 0x65, "function-ref", value { dst: Dst, symbol: SymbolIdx };
 
             // ---- calls: a window is the callee (or room for it), a link word, then the arguments
             /// Calls the function (or function named by the symbol) `R[window]` with `R[window+2] …`.
-            Call = 0x68, "call", call { window: Base, count: Count, want: Want, pad: Pad };
+            Call = 0x68, "call", call Given { window: Base, count: Count, want: Want, pad: Pad };
             /// Calls the global function `K[symbol]` with `R[window+2] …`.
-            CallGlobal = 0x69, "call-global", call { window: Base, count: Count, want: Want, symbol: WideSymbolIdx };
+            CallGlobal = 0x69, "call-global", call Global
+                { window: Base, count: Count, want: Want, symbol: WideSymbolIdx };
             /// Calls the running function, with the number of arguments that it takes exactly.
-            CallSelf = 0x6A, "call-self", call { window: Base, count: Count, want: Want, pad: Pad };
+            CallSelf = 0x6A, "call-self", call Running { window: Base, count: Count, want: Want, pad: Pad };
             /// Calls a builtin with `R[window+2] …`.
-            CallBuiltin = 0x6B, "call-builtin", call { window: Base, count: Count, want: Want, builtin: BuiltinIdx };
+            CallBuiltin = 0x6B, "call-builtin", call Builtin
+                { window: Base, count: Count, want: Want, builtin: BuiltinIdx };
             /// Calls `R[window]` with `R[window+2] …`, the last argument a list of further arguments.
-            Apply = 0x6C, "apply", call { window: Base, count: Count, want: Want, pad: Pad };
-            /// As `call`, in place of the running function.
-            TailCall = 0x6D, "tail-call", call { window: Base, count: Count, pad: Pad };
-            /// As `call-global`, in place of the running function.
-            TailCallGlobal = 0x6E, "tail-call-global", call { window: Base, count: Count, symbol: WideSymbolIdx };
-            /// As `call-builtin`; returns what the builtin returns.
-            TailCallBuiltin = 0x6F, "tail-call-builtin", call { window: Base, count: Count, builtin: BuiltinIdx };
+            Apply = 0x6C, "apply", call Applied { window: Base, count: Count, want: Want, pad: Pad };
             /// As `apply`, in place of the running function.
-            TailApply = 0x70, "tail-apply", call { window: Base, count: Count, pad: Pad };
+            TailApply = 0x70, "tail-apply", tail Applied { window: Base, count: Count, pad: Pad };
+            /// As `call`, in place of the running function.
+            TailCall = 0x6D, "tail-call", tail Given { window: Base, count: Count, pad: Pad };
+            /// As `call-global`, in place of the running function.
+            TailCallGlobal = 0x6E, "tail-call-global", tail Global
+                { window: Base, count: Count, symbol: WideSymbolIdx };
+            /// As `call-builtin`; returns what the builtin returns.
+            TailCallBuiltin = 0x6F, "tail-call-builtin", tail Builtin
+                { window: Base, count: Count, builtin: BuiltinIdx };
             /// Returns `R[src]`.
-            Return = 0x71, "return", silent { src: Reg };
+            Return = 0x71, "return", return { src: Reg };
             /// Returns `R[first], … R[first+count-1]` as multiple values.
-            ReturnValues = 0x72, "return-values", silent { first: Base, count: Count };
+            ReturnValues = 0x72, "return-values", return { first: Base, count: Count };
             /// Returns the value list.
-            ReturnAll = 0x73, "return-all", silent { };
+            ReturnAll = 0x73, "return-all", return {};
 
             // ---- the value list: where all values of a form are kept
             /// The value list := `R[first], … R[first+count-1]`
@@ -259,38 +283,44 @@ macro_rules! for_each_opcode {
             // ---- the control stack. While an entry stands, registers below its `window` keep their values.
             /// `R[dst]` := a fresh tag, equal only to itself, for `push-catch`
             NewTag = 0x78, "new-tag", value { dst: Dst };
-            /// Pushes a catch for the tag `R[tag]`: a throw to it pops it, delivers its values to the window, and
-            /// goes on at `to`.
+            /// Pushes a catch for the tag `R[tag]`: a throw to it pops it, delivers its values to the window,
+            /// and goes on at `to`.
             PushCatch = 0x79, "push-catch", never { window: Base, tag: Reg, want: Want, to: Jump };
             /// Pushes a cleanup: when an unwinding passes, the code at `to` runs until `end-cleanup`.
             PushCleanup = 0x7A, "push-cleanup", never { window: Base, to: Jump };
-            /// Pushes handlers: for each type of the vector `K[types]`, a case. When one takes a condition, the entry
-            /// is popped, `R[window]` is the index of the case, `R[window+1]` the condition, and control goes to `to`.
+            /// Pushes handlers: for each type of the vector `K[types]`, a case. When one takes a condition,
+            /// the entry is popped, `R[window]` is the index of the case, `R[window+1]` the condition, and
+            /// control goes to `to`.
             PushHandlerCase = 0x7B, "push-handler-case", never { window: Base, types: VectorIdx, to: Jump };
-            /// Pushes handlers that run at the point of signalling: `R[handlers]` is a list of `(type . function)`.
+            /// Pushes recovery procedures. `R[state]` is their table, a vector, or what the machine has made
+            /// of it. A throw to `R[state]` pops them, delivers two values to the window, and goes on at
+            /// `to`, where the function that runs the clauses is made: the machine makes it there when a
+            /// failure needs it first.
+            PushRecovery = 0x84, "push-recovery", never { window: Base, state: Reg, to: Jump };
+            /// Pushes a cleanup for failures: when a failure, an abort or an expired limit leaves, the code
+            /// at `to` runs until `end-cleanup`. After a failure the value list is then that failure and what
+            /// is known about it.
+            PushFailureCleanup = 0x85, "push-failure-cleanup", never { window: Base, to: Jump };
+            /// Pushes handlers that run at the point of signalling: `R[handlers]` is a list of `(type .
+            /// function)`.
             PushHandlers = 0x7C, "push-handlers", never { window: Base, handlers: Reg };
-            /// Pushes a mask: entries from the fixnum `R[from]` on (a height of the control stack) are not searched.
+            /// Pushes a mask: entries from the fixnum `R[from]` on (a height of the control stack) are not
+            /// searched.
             PushMask = 0x7D, "push-mask", never { window: Base, from: Reg };
             /// Pushes a scope for `bind-list`.
             PushScope = 0x7E, "push-scope", never { window: Base };
             /// Pops the newest `count` entries, and undoes bindings made since the oldest of them.
             PopControl = 0x7F, "pop-control", silent { count: Count };
-            /// Ends the protected part in the normal way: the cleanup entry on top becomes a running cleanup, and control
-            /// falls through into its code. The value list is kept until `end-cleanup`.
-            EnterCleanup = 0x80, "enter-cleanup", silent { };
-            /// Ends a cleanup: goes on with what it interrupted, or with the next instruction after `enter-cleanup`.
-            EndCleanup = 0x81, "end-cleanup", silent { };
-            /// Throws the value list to the catch for the tag `R[tag]`. Fails with `control-error`, nothing unwound,
-            /// when there is none; `kind` says which form it was: 0 `throw`, 1 `return-from`, 2 `go`. Then the value list is
-            /// what a recovery gave.
+            /// Ends the protected part in the normal way: the cleanup entry on top becomes a running cleanup,
+            /// and control falls through into its code. The value list is kept until `end-cleanup`.
+            EnterCleanup = 0x80, "enter-cleanup", silent {};
+            /// Ends a cleanup: goes on with what it interrupted, or with the next instruction after
+            /// `enter-cleanup`.
+            EndCleanup = 0x81, "end-cleanup", silent {};
+            /// Throws the value list to the catch for the tag `R[tag]`. Fails with `control-error`, nothing
+            /// unwound, when there is none; `kind` says which form it was: 0 `throw`, 1 `return-from`, 2
+            /// `go`. Then the value list is what a recovery gave.
             Throw = 0x82, "throw", effect { tag: Reg, kind: Count };
-            /// Pushes recovery procedures. `R[state]` is their table, a vector, or what the machine has made of it. A throw
-            /// to `R[state]` pops them, delivers two values to the window, and goes on at `to`, where the function that
-            /// runs the clauses is made: the machine makes it there when a failure needs it first.
-            PushRecovery = 0x84, "push-recovery", never { window: Base, state: Reg, to: Jump };
-            /// Pushes a cleanup for failures: when a failure, an abort or an expired limit leaves, the code at `to` runs until
-            /// `end-cleanup`. After a failure the value list is then that failure and what is known about it.
-            PushFailureCleanup = 0x85, "push-failure-cleanup", never { window: Base, to: Jump };
         }
     };
 }
@@ -302,34 +332,168 @@ pub enum Substitute {
     Silent,
     /// The value goes to the register that the first operand names.
     Value,
-    /// The value decides whether the jump is taken.
+    /// The value decides the test; the instruction jumps if it holds.
     Test,
+    /// The value decides the test; the instruction jumps if it does not hold.
+    TestNot,
     /// The values are delivered as the results of a call.
     Call,
+    /// The values are returned, as those of a tail call.
+    Tail,
     /// The value is dropped.
     Effect,
     /// No value can stand for the instruction: it is tried again, or left.
     Never,
 }
 
+impl Substitute {
+    /// Returns the word for it in the documentation.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Substitute::Silent => "silent",
+            Substitute::Value => "value",
+            Substitute::Test => "test",
+            Substitute::TestNot => "test-not",
+            Substitute::Call => "call",
+            Substitute::Tail => "tail",
+            Substitute::Effect => "effect",
+            Substitute::Never => "never",
+        }
+    }
+}
+
+/// What an instruction calls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Callee {
+    /// The function in the first register of the window, or the one that the symbol there names.
+    Given,
+    /// The global function that the constant `symbol` names.
+    Global,
+    /// The running function.
+    Running,
+    /// The operand `builtin`.
+    Builtin,
+    /// As [`Callee::Given`]; the last argument is a list of further arguments.
+    Applied,
+}
+
+impl Callee {
+    /// Whether the callee is a value in the first register of the window.
+    pub const fn is_in_window(self) -> bool {
+        matches!(self, Callee::Given | Callee::Applied)
+    }
+}
+
+/// The operands that all calls have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Call {
+    /// What is called.
+    pub callee: Callee,
+    /// First register of the window.
+    pub window: Base,
+    /// Number of arguments in the window.
+    pub count: Count,
+    /// How many values are delivered to the window; `None` for a tail call.
+    pub want: Option<Want>,
+}
+
 macro_rules! substitute {
     (silent) => {
         Substitute::Silent
     };
-    (value) => {
+    (jump) => {
+        Substitute::Silent
+    };
+    (return) => {
+        Substitute::Silent
+    };
+    (value $($builtin:ident)?) => {
         Substitute::Value
     };
-    (test) => {
+    (test $($builtin:ident)?) => {
         Substitute::Test
     };
-    (call) => {
+    (test_not $($builtin:ident)?) => {
+        Substitute::TestNot
+    };
+    (effect $($builtin:ident)?) => {
+        Substitute::Effect
+    };
+    (call $callee:ident) => {
         Substitute::Call
     };
-    (effect) => {
-        Substitute::Effect
+    (tail $callee:ident) => {
+        Substitute::Tail
     };
     (never) => {
         Substitute::Never
+    };
+}
+
+macro_rules! falls_through {
+    (jump) => {
+        false
+    };
+    (return) => {
+        false
+    };
+    (tail $callee:ident) => {
+        false
+    };
+    ($($other:ident)+) => {
+        true
+    };
+}
+
+macro_rules! callee {
+    (call $callee:ident) => {
+        Some(Callee::$callee)
+    };
+    (tail $callee:ident) => {
+        Some(Callee::$callee)
+    };
+    ($($other:ident)+) => {
+        None
+    };
+}
+
+macro_rules! call {
+    ($instr:expr, $name:ident call $callee:ident) => {
+        match $instr {
+            Instr::$name { window, count, want, .. } => {
+                Some(Call { callee: Callee::$callee, window, count, want: Some(want) })
+            }
+            _ => None,
+        }
+    };
+    ($instr:expr, $name:ident tail $callee:ident) => {
+        match $instr {
+            Instr::$name { window, count, .. } => {
+                Some(Call { callee: Callee::$callee, window, count, want: None })
+            }
+            _ => None,
+        }
+    };
+    ($instr:expr, $name:ident $($other:ident)+) => {
+        None
+    };
+}
+
+macro_rules! builtin {
+    (value $builtin:ident) => {
+        Some(Builtin::$builtin)
+    };
+    (test $builtin:ident) => {
+        Some(Builtin::$builtin)
+    };
+    (test_not $builtin:ident) => {
+        Some(Builtin::$builtin)
+    };
+    (effect $builtin:ident) => {
+        Some(Builtin::$builtin)
+    };
+    ($($other:ident)+) => {
+        None
     };
 }
 
@@ -340,8 +504,12 @@ pub struct OpcodeInfo {
     pub opcode: Opcode,
     /// Its name in disassemblies.
     pub mnemonic: &'static str,
-    /// What a substituted value becomes.
+    /// What becomes of a value put in place of the failed instruction.
     pub substitute: Substitute,
+    /// What it calls, if it is a call.
+    pub callee: Option<Callee>,
+    /// The builtin that it is, if it is one.
+    pub builtin: Option<Builtin>,
     /// Name and type of each operand, in order.
     pub operands: &'static [(&'static str, &'static str)],
     /// Its effect.
@@ -349,7 +517,7 @@ pub struct OpcodeInfo {
 }
 
 macro_rules! define_opcodes {
-    ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $substitute:ident
+    ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $($kind:ident)+
         { $( $field:ident : $ty:ident ),* } ; )*) => {
         /// The number of an instruction.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -370,7 +538,9 @@ macro_rules! define_opcodes {
             $( OpcodeInfo {
                 opcode: Opcode::$name,
                 mnemonic: $mnemonic,
-                substitute: substitute!($substitute),
+                substitute: substitute!($($kind)+),
+                callee: callee!($($kind)+),
+                builtin: builtin!($($kind)+),
                 operands: &[$( (stringify!($field), stringify!($ty)) ),*],
                 doc: &[$( $doc ),*],
             }, )*
@@ -378,7 +548,7 @@ macro_rules! define_opcodes {
 
         impl Opcode {
             /// The opcode with this number, unless there is none.
-            pub fn from_number(number: u8) -> Option<Opcode> {
+            pub const fn from_number(number: u8) -> Option<Opcode> {
                 match number {
                     $( $number => Some(Opcode::$name), )*
                     _ => None,
@@ -402,8 +572,40 @@ macro_rules! define_opcodes {
             /// What becomes of a value put in place of the failed instruction.
             pub const fn substitute(self) -> Substitute {
                 match self {
-                    $( Opcode::$name => substitute!($substitute), )*
+                    $( Opcode::$name => substitute!($($kind)+), )*
                 }
+            }
+
+            /// Whether control may come to the next instruction from this one.
+            pub const fn falls_through(self) -> bool {
+                match self {
+                    $( Opcode::$name => falls_through!($($kind)+), )*
+                }
+            }
+
+            /// What it calls; `None` unless it is a call.
+            pub const fn callee(self) -> Option<Callee> {
+                match self {
+                    $( Opcode::$name => callee!($($kind)+), )*
+                }
+            }
+
+            /// The builtin that does the same with the registers that it reads and its integers; `None` if there
+            /// is none.
+            pub const fn builtin(self) -> Option<Builtin> {
+                match self {
+                    $( Opcode::$name => builtin!($($kind)+), )*
+                }
+            }
+
+            /// Whether it is a call in place of the running function.
+            pub const fn is_tail(self) -> bool {
+                matches!(self.substitute(), Substitute::Tail)
+            }
+
+            /// Whether a test jumps when it holds.
+            pub const fn jumps_when(self) -> bool {
+                !matches!(self.substitute(), Substitute::TestNot)
             }
         }
 
@@ -412,6 +614,13 @@ macro_rules! define_opcodes {
             pub fn opcode(&self) -> Opcode {
                 match self {
                     $( Instr::$name { .. } => Opcode::$name, )*
+                }
+            }
+
+            /// The operands that all calls have; `None` unless it is a call.
+            pub fn call(&self) -> Option<Call> {
+                match self {
+                    $( Instr::$name { .. } => call!(*self, $name $($kind)+), )*
                 }
             }
 
@@ -433,14 +642,21 @@ macro_rules! define_opcodes {
                 let word = *code.get(at)?;
                 let opcode = Opcode::from_number(word as u8)?;
                 let aux = if opcode.words() == 2 { *code.get(at + 1)? } else { 0 };
+                Some(Instr::from_words(opcode, word, aux))
+            }
+
+            /// Decodes the operands of an instruction with this opcode; `aux` is of no matter if it has one word.
+            #[inline(always)]
+            pub fn from_words(opcode: Opcode, word: u32, aux: u32) -> Instr {
                 #[allow(unused_mut, unused_variables, reason = "some instructions have no operands")]
                 let mut unpacker = Unpacker { word: word >> 8, aux };
-                Some(match opcode {
+                match opcode {
                     $( Opcode::$name => Instr::$name { $( $field: unpacker.take::<$ty>() ),* }, )*
-                })
+                }
             }
 
             /// Calls `visit` with the role of each operand, in order.
+            #[inline]
             pub fn visit_operands(&self, mut visit: impl FnMut(Role)) {
                 #[allow(unused, reason = "some instructions have no operands")]
                 let visit = &mut visit;
@@ -483,6 +699,46 @@ macro_rules! define_opcodes {
 }
 
 for_each_opcode!(define_opcodes);
+
+// Rows have the operands that the word after the mnemonic asks for.
+const _: () = {
+    let mut row = 0;
+    while row < OPCODES.len() {
+        let OpcodeInfo { opcode, substitute, callee, operands, .. } = OPCODES[row];
+        let last = if operands.is_empty() { "" } else { operands[operands.len() - 1].1 };
+        match substitute {
+            Substitute::Value => assert!(is(operands[0].1, "Dst"), "`value` needs a Dst"),
+            Substitute::Test | Substitute::TestNot => {
+                assert!(is(last, "Jump") || is(last, "Back"), "`test` needs a Jump or Back at its end")
+            }
+            Substitute::Call => {
+                assert!(is(operands[2].1, "Want"), "a call wants values; `tail` is for tail calls")
+            }
+            Substitute::Tail => {
+                assert!(!is(operands[2].1, "Want"), "nobody delivers the values of a tail call")
+            }
+            Substitute::Silent | Substitute::Effect | Substitute::Never => {}
+        }
+        match callee {
+            Some(Callee::Global) => assert!(is(last, "WideSymbolIdx"), "a call of a symbol needs the symbol"),
+            Some(Callee::Builtin) => assert!(is(last, "BuiltinIdx"), "a call of a builtin needs the builtin"),
+            _ => {}
+        }
+        // A return finds the call two words before its return address.
+        assert!(callee.is_none() || opcode.words() == 2, "a call has two words");
+        row += 1;
+    }
+};
+
+/// Whether two names are the same, at compile time.
+const fn is(left: &str, right: &str) -> bool {
+    let (left, right) = (left.as_bytes(), right.as_bytes());
+    let mut at = 0;
+    while at < left.len() && at < right.len() && left[at] == right[at] {
+        at += 1;
+    }
+    at == left.len() && at == right.len()
+}
 
 struct Packer {
     word: u32,

@@ -44,6 +44,10 @@ pub enum Role {
     Builtin(u32),
     /// A type code.
     TypeCode(u8),
+    /// How many values are wanted.
+    Want(Want),
+    /// A word that must be zero.
+    Pad(u32),
     /// A plain number.
     Number(i32),
 }
@@ -106,7 +110,7 @@ operand!(/** A jump back. */ Back16(i16), 16, |n| Role::Backward(i32::from(n)), 
 operand!(/** A jump back. */ Back24(i32), 24, Role::Backward, "{:+}");
 operand!(/** A jump back, in the aux word. */ Back(i32), 32, Role::Backward, "{:+}");
 operand!(/** Number of a builtin, in the aux word. */ BuiltinIdx(u32), 32, Role::Builtin, "b{}");
-operand!(/** An aux word that only keeps calls two words long. */ Pad(u32), 32, |_| Role::Number(0), "{}");
+operand!(/** An aux word that only keeps calls two words long. */ Pad(u32), 32, Role::Pad, "{}");
 operand!(/** Number of a [`crate::opcode::TypeCode`]. */ TypeIdx(u8), 8, Role::TypeCode, "t{}");
 
 /// How many values the receiver of a call, a block or a catch wants.
@@ -144,7 +148,7 @@ impl Operand for Want {
         Want(bits as u8)
     }
     fn role(self) -> Role {
-        Role::Number(i32::from(self.0))
+        Role::Want(self)
     }
 }
 

@@ -87,8 +87,8 @@ fn opcode_table(rows: &[OpcodeInfo], text: &mut String) {
         let kinds: Vec<String> = operands.map(|(name, kind)| format!("{name}: {kind}")).collect();
         let kinds = if kinds.is_empty() { String::new() } else { format!("`{}`", kinds.join(", ")) };
         let number = format!("`0x{:02X}`", info.opcode as u8);
-        let failure = format!("{:?}", info.substitute).to_lowercase();
-        row(text, &[&number, &format!("`{}`", info.mnemonic), &kinds, &failure, &doc(info.doc)]);
+        let failure = info.substitute.word();
+        row(text, &[&number, &format!("`{}`", info.mnemonic), &kinds, failure, &doc(info.doc)]);
     }
 }
 

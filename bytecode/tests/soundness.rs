@@ -9,7 +9,7 @@ mod support;
 use esl_bytecode::assembler::assemble;
 use esl_bytecode::disasm;
 use esl_bytecode::module::{CaptureSource, Constant, Function, FunctionNumber, Module};
-use esl_bytecode::opcode::{Instr, OPCODES, Opcode, Substitute};
+use esl_bytecode::opcode::{Call, Instr, OPCODES, Substitute};
 use esl_bytecode::operand::{Base, Count, Role, Want};
 use esl_bytecode::verify::verify;
 use support::{Random, build, module_with_random_code};
@@ -172,13 +172,13 @@ impl<'a> Model<'a> {
                 self.write(register, Cell::Object);
                 Next::Instruction
             }
-            (Substitute::Test, _) => self.maybe_jump(instr, next),
-            (Substitute::Call, instr) => match window(instr) {
-                Some((window, want)) => {
+            (Substitute::Test | Substitute::TestNot, _) => self.maybe_jump(instr, next),
+            (Substitute::Call | Substitute::Tail, _) => match instr.call() {
+                Some(Call { window, want: Some(want), .. }) => {
                     self.deliver(window, want);
                     Next::Instruction
                 }
-                None => Next::Left,
+                _ => Next::Left,
             },
             (Substitute::Effect, _) => {
                 // M5: the value list is empty then, or what the recovery gave, and not what others have left.
@@ -247,9 +247,13 @@ impl<'a> Model<'a> {
         self.value_list = want == Want::ALL;
     }
 
-    fn call(&mut self, window: Base, count: Count, want: Want) -> Next {
+    fn call(&mut self, Call { callee, window, count, want }: Call) -> Next {
         assert!(u32::from(window.0) + 2 + u32::from(count.0) <= u32::from(self.function.registers), "V3");
+        if callee.is_in_window() {
+            self.read(window.0);
+        }
         self.read_all(Base(window.0 + 2), count);
+        let Some(want) = want else { return self.leave() };
         for entry in &self.entries {
             assert!(window.0 >= entry.window, "V10");
         }
@@ -273,7 +277,7 @@ impl<'a> Model<'a> {
                 to = next.checked_add_signed(distance as isize);
             }
         });
-        let always = matches!(instr.opcode(), Opcode::JumpAlways | Opcode::Loop);
+        let always = !instr.opcode().falls_through();
         match to {
             Some(to) if always || self.random.once_in(2) => {
                 if to < next {
@@ -290,6 +294,9 @@ impl<'a> Model<'a> {
     }
 
     fn step(&mut self, instr: Instr, next: usize) -> Next {
+        if let Some(call) = instr.call() {
+            return self.call(call);
+        }
         let landing = |distance: i32| next.checked_add_signed(distance as isize).expect("V2");
         match instr {
             Instr::Move { dst, src } => {
@@ -377,22 +384,6 @@ impl<'a> Model<'a> {
                 assert_eq!(self.entries.last().map(|entry| entry.kind), Some(Kind::Scope), "V9");
                 let count = self.random.below(3);
                 self.bindings.extend(std::iter::repeat_n(Binding::OfList, count));
-            }
-            Instr::Call { window, count, want, .. } | Instr::Apply { window, count, want, .. } => {
-                self.read(window.0);
-                return self.call(window, count, want);
-            }
-            Instr::CallGlobal { window, count, want, .. }
-            | Instr::CallSelf { window, count, want, .. }
-            | Instr::CallBuiltin { window, count, want, .. } => return self.call(window, count, want),
-            Instr::TailCall { window, count, .. } | Instr::TailApply { window, count, .. } => {
-                self.read(window.0);
-                self.read_all(Base(window.0 + 2), count);
-                return self.leave();
-            }
-            Instr::TailCallGlobal { window, count, .. } | Instr::TailCallBuiltin { window, count, .. } => {
-                self.read_all(Base(window.0 + 2), count);
-                return self.leave();
             }
             Instr::Return { src } => {
                 self.read(src.0);
@@ -486,18 +477,6 @@ impl<'a> Model<'a> {
             }
         }
         Next::Instruction
-    }
-}
-
-/// The window and the wanted values of a call that comes back.
-fn window(instr: Instr) -> Option<(Base, Want)> {
-    match instr {
-        Instr::Call { window, want, .. }
-        | Instr::CallGlobal { window, want, .. }
-        | Instr::CallSelf { window, want, .. }
-        | Instr::CallBuiltin { window, want, .. }
-        | Instr::Apply { window, want, .. } => Some((window, want)),
-        _ => None,
     }
 }
 

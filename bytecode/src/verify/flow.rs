@@ -12,7 +12,7 @@ use super::registers::{Class, Registers};
 use super::shape::Shape;
 use super::state::{Entry, EntryKind, Landing, State};
 use crate::module::{CaptureSource, Constant, Function, FunctionNumber, MAX_CONTROL, Module, Parameters};
-use crate::opcode::{Instr, Substitute};
+use crate::opcode::{Call, Instr, Substitute};
 use crate::operand::{Base, Count, FunctionIdx, Role, Want};
 
 /// Work for each instruction: how often it may be gone through, times the control entries that then stand.
@@ -149,6 +149,9 @@ impl Flow<'_> {
             // A recovery may have run.
             state.registers.value_list = false;
         }
+        if let Some(call) = instr.call() {
+            return self::call(state, call);
+        }
         match instr {
             Instr::Move { dst, src } => {
                 let class = readable(state, src.0)?;
@@ -225,22 +228,6 @@ impl Flow<'_> {
                 state.bindings = 0;
             }
 
-            Instr::Call { window, count, want, .. } | Instr::Apply { window, count, want, .. } => {
-                read(state, window.0)?;
-                call(state, window, count, want)?;
-            }
-            Instr::CallGlobal { window, count, want, .. }
-            | Instr::CallSelf { window, count, want, .. }
-            | Instr::CallBuiltin { window, count, want, .. } => call(state, window, count, want)?,
-            Instr::TailCall { window, count, .. } | Instr::TailApply { window, count, .. } => {
-                read(state, window.0)?;
-                read_all(state, Base(window.0 + 2), count)?;
-                return leave(state);
-            }
-            Instr::TailCallGlobal { window, count, .. } | Instr::TailCallBuiltin { window, count, .. } => {
-                read_all(state, Base(window.0 + 2), count)?;
-                return leave(state);
-            }
             Instr::Return { src } => {
                 read(state, src.0)?;
                 return leave(state);
@@ -359,7 +346,7 @@ impl Flow<'_> {
             }
             self.jump(state, target(next, distance))?;
         }
-        Ok(!matches!(instr, Instr::JumpAlways { .. } | Instr::Loop { .. }))
+        Ok(instr.opcode().falls_through())
     }
 
     fn make_closure(&self, state: &mut State, dst: u8, operand: FunctionIdx) -> Result<(), Fault> {
@@ -462,14 +449,19 @@ fn assign(state: &mut State, first: Base, count: Count) {
     }
 }
 
-/// A call with the arguments of a window; the frames of callees lie over what is above it.
-fn call(state: &mut State, window: Base, count: Count, want: Want) -> Result<(), Fault> {
+/// A call with the arguments of a window; the frames of callees lie over what is above it. Says whether control goes on
+/// with the next instruction.
+fn call(state: &mut State, Call { callee, window, count, want }: Call) -> Result<bool, Fault> {
+    if callee.is_in_window() {
+        read(state, window.0)?;
+    }
     read_all(state, Base(window.0 + 2), count)?;
+    let Some(want) = want else { return leave(state) };
     expect_window(state, window)?;
     state.keep_below(window.0);
     assign(state, window, Count(want.registers()));
     state.registers.value_list = want == Want::ALL;
-    Ok(())
+    Ok(true)
 }
 
 fn pop(state: &mut State, Count(count): Count) -> Result<(), Fault> {

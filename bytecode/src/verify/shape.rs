@@ -4,10 +4,10 @@ use super::error::{Fault, Place, VerifyError};
 use super::pool;
 use crate::builtin::Builtin;
 use crate::module::{
-    Constant, Function, FunctionNumber, MAX_CAPTURES, MAX_CODE, MAX_REGISTERS, Module, Parameters, PoolIdx,
+    Constant, Function, FunctionNumber, MAX_CAPTURES, MAX_CODE, MAX_REGISTERS, Module, PoolIdx,
 };
-use crate::opcode::{Instr, Opcode, TypeCode};
-use crate::operand::{Base, Count, Pad, Role, Want};
+use crate::opcode::{Call, Callee, Instr, Opcode, TypeCode};
+use crate::operand::{Count, Role, Want};
 
 /// Where instructions begin, and to which of them control may come from elsewhere than the one before.
 #[derive(Clone, Debug)]
@@ -145,6 +145,10 @@ impl Check<'_> {
             Role::Read(register) | Role::Write(register) => self.range(u32::from(register), 1),
             // The rule of the opcode says how far it goes.
             Role::Base(_) | Role::Number(_) => Ok(()),
+            Role::Pad(0) => Ok(()),
+            Role::Pad(_) => Err(Fault::SpareBits),
+            Role::Want(Want::ONE | Want::ALL | Want(2..=Want::MAX)) => Ok(()),
+            Role::Want(Want(number)) => Err(Fault::Want(number)),
             Role::Constant(index) => pool::verify_data(self.module, self.pool_index(index)?),
             Role::SymbolConstant(index) => {
                 self.kind(index, "a symbol", |constant| matches!(constant, Constant::Symbol(_)))
@@ -204,50 +208,16 @@ impl Check<'_> {
 
     /// What the roles of operands do not tell.
     fn own_rules(self, instr: Instr) -> Result<(), Fault> {
+        if let Some(call) = instr.call() {
+            return self.call(instr, call);
+        }
         match instr {
-            Instr::Call { pad: Pad(1..), .. }
-            | Instr::CallSelf { pad: Pad(1..), .. }
-            | Instr::Apply { pad: Pad(1..), .. }
-            | Instr::TailCall { pad: Pad(1..), .. }
-            | Instr::TailApply { pad: Pad(1..), .. } => Err(Fault::SpareBits),
             Instr::LoadNil { first, count }
             | Instr::List { first, count, .. }
             | Instr::ReturnValues { first, count }
             | Instr::SetValues { first, count }
             | Instr::GetValues { first, count } => self.range(first.0.into(), count.0.into()),
-            Instr::Call { window, count, want, .. } | Instr::CallGlobal { window, count, want, .. } => {
-                self.window(window, count, want)
-            }
-            Instr::CallSelf { window, count, want, .. } => {
-                let Parameters { required, .. } = self.function.parameters;
-                if !self.function.parameters.is_exact() || required != count.0 {
-                    return Err(Fault::Arguments(count.0));
-                }
-                self.window(window, count, want)
-            }
-            Instr::CallBuiltin { window, count, want, builtin } => {
-                self.builtin_arity(builtin.0, count)?;
-                self.window(window, count, want)
-            }
-            Instr::TailCallBuiltin { window, count, builtin } => {
-                self.builtin_arity(builtin.0, count)?;
-                self.window(window, count, Want::ONE)
-            }
-            Instr::Apply { window, count, want, .. } => {
-                self.list_argument(count)?;
-                self.window(window, count, want)
-            }
-            Instr::TailApply { window, count, .. } => {
-                self.list_argument(count)?;
-                self.window(window, count, Want::ONE)
-            }
-            Instr::TailCall { window, count, .. } | Instr::TailCallGlobal { window, count, .. } => {
-                self.window(window, count, Want::ONE)
-            }
-            Instr::PushCatch { window, want, .. } => {
-                self.want(want)?;
-                self.range(window.0.into(), want.registers().into())
-            }
+            Instr::PushCatch { window, want, .. } => self.range(window.0.into(), want.registers().into()),
             Instr::PushHandlerCase { window, .. } | Instr::PushRecovery { window, .. } => {
                 self.range(window.0.into(), 2)
             }
@@ -265,32 +235,23 @@ impl Check<'_> {
         }
     }
 
-    /// Room for a callee, a link word and arguments, and for the results.
-    fn window(self, window: Base, count: Count, want: Want) -> Result<(), Fault> {
-        self.want(want)?;
+    /// A call needs arguments that its callee takes, as far as that is known, and room for a callee, a link word, the
+    /// arguments and the results.
+    fn call(self, instr: Instr, Call { callee, window, count, want }: Call) -> Result<(), Fault> {
+        let takes_them = match callee {
+            Callee::Given | Callee::Global => true,
+            Callee::Running => {
+                let parameters = &self.function.parameters;
+                parameters.is_exact() && parameters.required == count.0
+            }
+            Callee::Builtin => takes(instr, count),
+            Callee::Applied => count.0 > 0,
+        };
+        if !takes_them {
+            return Err(Fault::Arguments(count.0));
+        }
         self.range(window.0.into(), 2 + u32::from(count.0))?;
-        self.range(window.0.into(), want.registers().into())
-    }
-
-    fn want(self, want: Want) -> Result<(), Fault> {
-        match want {
-            Want::ONE | Want::ALL | Want(2..=Want::MAX) => Ok(()),
-            Want(number) => Err(Fault::Want(number)),
-        }
-    }
-
-    fn builtin_arity(self, number: u32, count: Count) -> Result<(), Fault> {
-        let arity = Builtin::from_number(number).ok_or(Fault::Builtin(number))?.info().arity;
-        let given = u32::from(count.0);
-        if given >= arity.min && arity.max.is_none_or(|max| given <= max) {
-            Ok(())
-        } else {
-            Err(Fault::Arguments(count.0))
-        }
-    }
-
-    fn list_argument(self, count: Count) -> Result<(), Fault> {
-        if count.0 == 0 { Err(Fault::Arguments(0)) } else { Ok(()) }
+        self.range(window.0.into(), want.map_or(0, Want::registers).into())
     }
 
     /// Whether the capture, which must be there, is a box.
@@ -298,4 +259,19 @@ impl Check<'_> {
         let capture = self.function.captures.get(usize::from(index)).ok_or(Fault::Capture(index))?;
         Ok(capture.boxed)
     }
+}
+
+/// Whether the builtin that is an operand of `instr` takes so many arguments.
+fn takes(instr: Instr, count: Count) -> bool {
+    let mut builtin = None;
+    instr.visit_operands(|role| {
+        if let Role::Builtin(number) = role {
+            builtin = Builtin::from_number(number);
+        }
+    });
+    let given = u32::from(count.0);
+    builtin.is_some_and(|builtin| {
+        let arity = builtin.info().arity;
+        given >= arity.min && arity.max.is_none_or(|max| given <= max)
+    })
 }

@@ -5,7 +5,7 @@
 //! a landing of a control entry reads is live everywhere in its function.
 
 use esl_bytecode::module::CaptureSource;
-use esl_bytecode::opcode::Instr;
+use esl_bytecode::opcode::{Call, Instr};
 use esl_bytecode::operand::{Base, Count, Role};
 
 use crate::heap::Heap;
@@ -101,40 +101,21 @@ fn step(heap: &Heap, constants: &[Value], at: usize, instruction: Instr) -> Live
     let range = |set: &mut RegisterSet, Base(first): Base, skipped: usize, Count(count): Count| {
         set.insert_range(usize::from(first) + skipped, usize::from(count));
     };
-    let (mut falls_through, mut lands) = (true, false);
-    match instruction {
-        Instr::List { first, count, .. } | Instr::SetValues { first, count } => {
-            range(&mut reads, first, 0, count);
+    if let Some(Call { callee, window, count, .. }) = instruction.call() {
+        if callee.is_in_window() {
+            reads.insert(usize::from(window.0));
         }
+        range(&mut reads, window, 2, count);
+        range(&mut writes, window, 0, Count(u8::MAX));
+    }
+    let falls_through = instruction.opcode().falls_through();
+    let mut lands = false;
+    match instruction {
+        Instr::List { first, count, .. }
+        | Instr::SetValues { first, count }
+        | Instr::ReturnValues { first, count } => range(&mut reads, first, 0, count),
         Instr::LoadNil { first, count } | Instr::GetValues { first, count } => {
             range(&mut writes, first, 0, count);
-        }
-        Instr::ReturnValues { first, count } => {
-            range(&mut reads, first, 0, count);
-            falls_through = false;
-        }
-        Instr::Return { .. } | Instr::ReturnAll {} | Instr::JumpAlways { .. } | Instr::Loop { .. } => {
-            falls_through = false;
-        }
-        Instr::Call { window, count, .. } | Instr::Apply { window, count, .. } => {
-            range(&mut reads, window, 0, Count(1));
-            range(&mut reads, window, 2, count);
-            range(&mut writes, window, 0, Count(u8::MAX));
-        }
-        Instr::CallGlobal { window, count, .. }
-        | Instr::CallSelf { window, count, .. }
-        | Instr::CallBuiltin { window, count, .. } => {
-            range(&mut reads, window, 2, count);
-            range(&mut writes, window, 0, Count(u8::MAX));
-        }
-        Instr::TailCall { window, count, .. } | Instr::TailApply { window, count, .. } => {
-            range(&mut reads, window, 0, Count(1));
-            range(&mut reads, window, 2, count);
-            falls_through = false;
-        }
-        Instr::TailCallGlobal { window, count, .. } | Instr::TailCallBuiltin { window, count, .. } => {
-            range(&mut reads, window, 2, count);
-            falls_through = false;
         }
         Instr::MakeClosure { function, .. } => {
             for register in captured_registers(heap, constants.get(usize::from(function.0)).copied()) {

@@ -4,14 +4,12 @@
 //! A call is made ready before it has any effect, so that one that fails, or lacks room, leaves the frame as it was.
 
 use esl_bytecode::builtin::{BUILTINS, BuiltinInfo};
-use esl_bytecode::opcode::{Opcode, Substitute};
+use esl_bytecode::opcode::{Callee, Opcode, Substitute};
 use esl_bytecode::word::Word;
 
 use super::arguments::{arrange, count_of_arguments, describe_arity, spread};
 use super::substitute::{deliver, return_all, substitute};
-use super::{
-    Operation, Signal, aux_at, code_of, constants_of, failure, operation, pc_as_value, stubs, word_at,
-};
+use super::{Signal, aux_at, code_of, constant, failure, pc_as_value, stubs, word_at};
 use crate::heap::layout::{Kind, Symbol};
 use crate::raise::Arguments;
 use crate::raise::{Exit, Raised};
@@ -35,11 +33,9 @@ pub(super) enum FramePlace {
 impl FramePlace {
     /// Returns the place of a call that does the work of an instruction.
     pub(super) fn for_instruction(word: Word) -> FramePlace {
-        match word.opcode() {
-            Some(Opcode::TailCallBuiltin | Opcode::TailCall | Opcode::TailCallGlobal | Opcode::TailApply) => {
-                FramePlace::Tail
-            }
-            Some(opcode) if opcode.substitute() == Substitute::Call => FramePlace::Window,
+        match word.opcode().map(Opcode::substitute) {
+            Some(Substitute::Tail) => FramePlace::Tail,
+            Some(Substitute::Call) => FramePlace::Window,
             _ => FramePlace::Above,
         }
     }
@@ -57,16 +53,14 @@ pub(super) unsafe fn slow_call(vm: &mut Vm) -> Signal {
         let word = word_at(pc);
         let window = base.add(word.a());
         let given = std::slice::from_raw_parts(window.add(2), word.b());
-        let operation = operation(word);
-        let callee = match operation {
-            Operation::CallGlobal | Operation::TailCallGlobal => {
-                *constants_of(code_of(*base.sub(2))).add(aux_at(pc) as usize)
-            }
-            Operation::CallSelf => *base.sub(2),
-            _ => *window,
+        let sort = word.opcode().and_then(Opcode::callee);
+        let callee = match sort {
+            Some(Callee::Global) => constant(base, aux_at(pc) as usize),
+            Some(Callee::Running) => *base.sub(2),
+            Some(Callee::Given | Callee::Applied | Callee::Builtin) | None => *window,
         };
         let place = FramePlace::for_instruction(word);
-        if matches!(operation, Operation::Apply | Operation::TailApply) {
+        if sort == Some(Callee::Applied) {
             let mut arguments = Arguments::from_slice(given);
             if let Err(exit) = spread(vm, &mut arguments) {
                 return Signal::Exit(exit);

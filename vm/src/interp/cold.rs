@@ -6,17 +6,18 @@
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::module::CaptureSource;
-use esl_bytecode::opcode::TypeCode;
+use esl_bytecode::opcode::{Instr, Opcode, TypeCode};
+use esl_bytecode::operand::Role;
 
 use super::arguments::MAX_SPREAD;
-use super::{Operation, Signal, aux_at, code_of, constant, constants_of, failure, operation, word_at};
+use super::{Signal, aux_at, code_of, constant, constants_of, failure, word_at};
 use crate::heap::layout::{Code, Function, Kind};
 use crate::number;
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::shape::capture_source;
 use crate::types;
 use crate::value::Value;
-use crate::vm::{Native, Vm};
+use crate::vm::Vm;
 use crate::world::class;
 
 /// Puts an outcome into register `dst`.
@@ -34,34 +35,72 @@ unsafe fn finish(base: *mut Value, dst: usize, outcome: Outcome) -> Signal {
     }
 }
 
-/// The builtin that does what an instruction does.
-fn builtin(operation: Operation) -> Builtin {
-    match operation {
-        Operation::Add | Operation::AddInt => Builtin::Add,
-        Operation::Sub => Builtin::Subtract,
-        Operation::Mul => Builtin::Multiply,
-        Operation::Div => Builtin::Divide,
-        Operation::Floor => Builtin::Floor,
-        Operation::Truncate => Builtin::Truncate,
-        Operation::Mod => Builtin::Mod,
-        Operation::Rem => Builtin::Rem,
-        Operation::LogAnd => Builtin::LogAnd,
-        Operation::LogIor => Builtin::LogIor,
-        Operation::LogXor => Builtin::LogXor,
-        Operation::Ash => Builtin::Ash,
-        Operation::CharEq => Builtin::CharEqualExactly,
-        Operation::CharRef => Builtin::Char,
-        Operation::VectorRef => Builtin::Svref,
-        Operation::VectorSet => Builtin::SetSvref,
-        Operation::ArrayRef => Builtin::Aref,
-        Operation::ArraySet => Builtin::SetAref,
-        _ => unreachable!("these instructions have no builtin"),
+/// The opcode with this number.
+const fn opcode(number: u8) -> Opcode {
+    match Opcode::from_number(number) {
+        Some(opcode) => opcode,
+        None => panic!("no opcode has this number"),
     }
 }
 
-/// The implementation of the builtin that does what an instruction does.
-fn native(vm: &Vm, operation: Operation) -> Native {
-    vm.natives[builtin(operation) as usize]
+/// The builtin that the row of an opcode names. An arm that leaves an instruction without one to [`compute`] or [`test`]
+/// does not compile.
+pub(super) const fn builtin(opcode: Opcode) -> Builtin {
+    match opcode.builtin() {
+        Some(builtin) => builtin,
+        None => panic!("the row of this instruction names no builtin"),
+    }
+}
+
+/// The largest number of arguments that an instruction gives its builtin.
+const MAX_ARGUMENTS: usize = 3;
+
+/// Has the builtin that the row of an instruction names do its work; gives the outcome, and the register for it.
+///
+/// # Safety
+/// See the module's header; `pc` is at an instruction with this opcode.
+#[inline(always)]
+unsafe fn apply_builtin<const OPCODE: u8>(
+    vm: &mut Vm,
+    pc: *const u32,
+    base: *mut Value,
+) -> (Outcome, Option<u8>) {
+    let builtin = const { builtin(opcode(OPCODE)) };
+    let mut arguments = [Value::NIL; MAX_ARGUMENTS];
+    let (mut count, mut dst) = (0, None);
+    // SAFETY: by the contract; V1 for the aux word, V3 for the registers.
+    unsafe {
+        let aux = if const { opcode(OPCODE).words() } == 2 { aux_at(pc) } else { 0 };
+        Instr::from_words(const { opcode(OPCODE) }, *pc, aux).visit_operands(|role| {
+            let argument = match role {
+                Role::Read(register) => *base.add(usize::from(register)),
+                Role::Number(number) => Value::small(number),
+                Role::Write(register) => return dst = Some(register),
+                _ => return,
+            };
+            arguments[count] = argument;
+            count += 1;
+        });
+    }
+    let arguments = &arguments[..count];
+    let outcome = match (builtin, arguments) {
+        (Builtin::Add, &[x, y]) => number::add(vm, x, y),
+        (Builtin::Subtract, &[x, y]) => number::subtract(vm, x, y),
+        (Builtin::Multiply, &[x, y]) => number::multiply(vm, x, y),
+        (Builtin::Divide, &[x, y]) => number::divide(vm, x, y),
+        (Builtin::NumEqual, &[x, y]) => number::num_equal(vm, x, y).map(Value::boolean),
+        (Builtin::Less, &[x, y]) => number::less(vm, x, y).map(Value::boolean),
+        (Builtin::LessEqual, &[x, y]) => number::less_or_equal(vm, x, y).map(Value::boolean),
+        (Builtin::Greater, &[x, y]) => number::less(vm, y, x).map(Value::boolean),
+        _ => vm.natives[builtin as usize](vm, arguments),
+    };
+    let outcome = match outcome {
+        // Of quotient and remainder the instruction wants the first.
+        Err(Exit::Values) => Ok(vm.exchange.values.first().copied().unwrap_or(Value::NIL)),
+        Err(Exit::Slowly) => ask_twin(vm, builtin, arguments),
+        outcome => outcome,
+    };
+    (outcome, dst)
 }
 
 /// Has the ESL twin of a builtin do what is too much work for one instruction: its call takes the instruction's place.
@@ -72,71 +111,58 @@ fn ask_twin(vm: &mut Vm, builtin: Builtin, arguments: &[Value]) -> Outcome {
     Err(Exit::Call)
 }
 
-/// Arithmetic, comparisons that give a value, and characters.
+/// An instruction with a result, or for effect, that is a builtin.
+///
+/// # Safety
+/// See the module's header; `pc` is at an instruction with this opcode.
 #[cold]
 #[inline(never)]
-pub(super) unsafe fn arithmetic(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: V1, V3: the operands of the instruction at `pc` are registers of the frame at `base`.
+pub(super) unsafe fn compute<const OPCODE: u8>(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: by the contract; V3: the result goes to a register of the frame.
     unsafe {
-        let word = word_at(pc);
-        let (dst, b, c) = (word.a(), word.b(), word.c());
-        let left = *base.add(b);
-        if operation(word) == Operation::AddInt {
-            let outcome = number::add(vm, left, Value::small(word.signed_c()));
-            return finish(base, dst, outcome);
+        match apply_builtin::<OPCODE>(vm, pc, base) {
+            (Ok(value), dst) => {
+                if let Some(register) = dst {
+                    *base.add(usize::from(register)) = value;
+                }
+                Signal::Next
+            }
+            (Err(exit), _) => Signal::Exit(exit),
         }
-        let right = *base.add(c);
-        let outcome = match operation(word) {
-            Operation::Add => number::add(vm, left, right),
-            Operation::Sub => number::subtract(vm, left, right),
-            Operation::Mul => number::multiply(vm, left, right),
-            Operation::Div => number::divide(vm, left, right),
-            Operation::NumEq => number::num_equal(vm, left, right).map(Value::boolean),
-            Operation::Less => number::less(vm, left, right).map(Value::boolean),
-            Operation::LessEq => number::less_or_equal(vm, left, right).map(Value::boolean),
-            operation => native(vm, operation)(vm, &[left, right]),
-        };
-        let outcome = match outcome {
-            // Of quotient and remainder the instruction wants the first.
-            Err(Exit::Values) => Ok(vm.exchange.values.first().copied().unwrap_or(Value::NIL)),
-            Err(Exit::Slowly) => ask_twin(vm, builtin(operation(word)), &[left, right]),
-            outcome => outcome,
-        };
-        finish(base, dst, outcome)
     }
 }
 
-/// Comparisons that jump, and the counting loop: whether they hold.
+/// A test that is a builtin: whether it holds.
+///
+/// # Safety
+/// See the module's header; `pc` is at an instruction with this opcode.
 #[cold]
 #[inline(never)]
-pub(super) unsafe fn compare(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Result<bool, Signal> {
+pub(super) unsafe fn test<const OPCODE: u8>(
+    vm: &mut Vm,
+    pc: *const u32,
+    base: *mut Value,
+) -> Result<bool, Signal> {
+    // SAFETY: by the contract.
+    let (outcome, _) = unsafe { apply_builtin::<OPCODE>(vm, pc, base) };
+    outcome.map(Value::is_true).map_err(Signal::Exit)
+}
+
+/// `loop-count`: whether it jumps. Nothing is stored before the comparison has come out well.
+///
+/// # Safety
+/// See the module's header.
+#[cold]
+#[inline(never)]
+pub(super) unsafe fn loop_count(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Result<bool, Signal> {
     // SAFETY: V1, V3: the operands of the instruction at `pc` are registers of the frame at `base`.
     unsafe {
         let word = word_at(pc);
-        let (a, b) = (word.a(), word.b());
-        let left = *base.add(a);
-        let int = Value::small(word.signed_d());
-        let result = match operation(word) {
-            Operation::JumpNumEq | Operation::JumpNotNumEq => number::num_equal(vm, left, *base.add(b)),
-            Operation::JumpLess | Operation::JumpNotLess | Operation::LoopLess | Operation::LoopNotLess => {
-                number::less(vm, left, *base.add(b))
-            }
-            Operation::JumpLessEq | Operation::JumpNotLessEq => number::less_or_equal(vm, left, *base.add(b)),
-            Operation::JumpNumEqInt | Operation::JumpNotNumEqInt => number::num_equal(vm, left, int),
-            Operation::JumpLessInt | Operation::JumpNotLessInt => number::less(vm, left, int),
-            Operation::JumpGreaterInt | Operation::JumpNotGreaterInt => number::less(vm, int, left),
-            _ => {
-                // The counting loop: nothing is stored before the comparison has come out well.
-                let step = Value::small(word.signed_c());
-                let limit = *base.add(b);
-                number::add(vm, left, step).and_then(|sum| {
-                    let holds = number::less(vm, sum, limit)?;
-                    *base.add(a) = sum;
-                    Ok(holds)
-                })
-            }
-        };
-        result.map_err(Signal::Exit)
+        let (counter, limit) = (base.add(word.a()), *base.add(word.b()));
+        let sum = number::add(vm, *counter, Value::small(word.signed_c())).map_err(Signal::Exit)?;
+        let holds = number::less(vm, sum, limit).map_err(Signal::Exit)?;
+        *counter = sum;
+        Ok(holds)
     }
 }
 
@@ -168,19 +194,6 @@ pub(super) fn is_type(vm: &Vm, value: Value, code: u8) -> bool {
     }
 }
 
-/// `cons` when the hole is full.
-#[cold]
-#[inline(never)]
-pub(super) unsafe fn cons(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: V1, V3: the operands of the instruction at `pc` are registers of the frame at `base`.
-    unsafe {
-        let word = word_at(pc);
-        let (dst, b, c) = (word.a(), word.b(), word.c());
-        let outcome = vm.heap.cons(*base.add(b), *base.add(c)).map_err(Exit::from);
-        finish(base, dst, outcome)
-    }
-}
-
 /// `list`.
 #[inline(never)]
 pub(super) unsafe fn list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
@@ -200,57 +213,7 @@ pub(super) unsafe fn list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
     }
 }
 
-/// The parts of lists, of what is no pair.
-#[cold]
-#[inline(never)]
-pub(super) unsafe fn list_part(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: V1, V3: the operands of the instruction at `pc` are registers of the frame at `base`.
-    unsafe {
-        let word = word_at(pc);
-        let (a, b) = (word.a(), word.b());
-        let part = match operation(word) {
-            Operation::SetCar | Operation::SetCdr => {
-                return failure(vm, Raised::Type(*base.add(a), Expected::Type("CONS")));
-            }
-            Operation::Cadr | Operation::Cddr => {
-                let list = *base.add(b);
-                let rest = if list.is_nil() { Some(list) } else { vm.heap.cdr(list) };
-                match rest {
-                    Some(rest) if rest.is_nil() => Ok(rest),
-                    Some(rest) => vm.exchange.type_error(rest, "LIST"),
-                    None => vm.exchange.type_error(list, "LIST"),
-                }
-            }
-            _ if (*base.add(b)).is_nil() => Ok(Value::NIL),
-            _ => vm.exchange.type_error(*base.add(b), "LIST"),
-        };
-        finish(base, a, part)
-    }
-}
-
-/// References to arrays that are no simple vectors, or with a wrong index.
-#[cold]
-#[inline(never)]
-pub(super) unsafe fn array(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: V1, V3: the operands of the instruction at `pc` are registers of the frame at `base`.
-    unsafe {
-        let word = word_at(pc);
-        let (a, b, c) = (word.a(), word.b(), word.c());
-        let (x, y, z) = (*base.add(a), *base.add(b), *base.add(c));
-        match operation(word) {
-            operation @ (Operation::VectorRef | Operation::ArrayRef) => {
-                let outcome = native(vm, operation)(vm, &[y, z]);
-                finish(base, a, outcome)
-            }
-            operation => match native(vm, operation)(vm, &[x, y, z]) {
-                Ok(_) => Signal::Next,
-                Err(exit) => Signal::Exit(exit),
-            },
-        }
-    }
-}
-
-/// Slots: the first time at a place, of instances of subclasses, and of what is no instance.
+/// `slot`: the first time at a place, of an instance of a subclass, and of what is no instance.
 #[cold]
 #[inline(never)]
 pub(super) unsafe fn slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
@@ -258,23 +221,41 @@ pub(super) unsafe fn slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
     // is a constant for a class.
     unsafe {
         let word = word_at(pc);
-        let (a, b, c) = (word.a(), word.b(), word.c());
+        let (instance, slot) = (*base.add(word.b()), word.c());
         let class = class_constant(vm, base, aux_at(pc) as usize);
-        let reads = operation(word) == Operation::Slot;
-        let (instance, slot) = if reads { (*base.add(b), c) } else { (*base.add(a), b) };
-        let has_slot = vm.heap.structure_slots(instance).is_some_and(|slots| slot < slots.len());
-        if !has_slot || !vm.world.is_instance(&vm.heap, instance, class) {
-            let raised = Raised::Type(instance, Expected::Specifier(class::name_of(&vm.heap, class)));
-            return failure(vm, raised);
+        if let Err(signal) = expect_slot(vm, instance, slot, class) {
+            return signal;
         }
-        if reads {
-            let value = vm.heap.structure_slots(instance).map_or(Value::NIL, |slots| slots[slot]);
-            *base.add(a) = value;
-        } else {
-            vm.heap.structure_set(instance, slot, *base.add(c));
-        }
+        *base.add(word.a()) = vm.heap.structure_slots(instance).map_or(Value::NIL, |slots| slots[slot]);
         Signal::Next
     }
+}
+
+/// `set-slot`, as [`slot`].
+#[cold]
+#[inline(never)]
+pub(super) unsafe fn set_slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
+    // SAFETY: as for `slot`, V1, V3 and V4.
+    unsafe {
+        let word = word_at(pc);
+        let (instance, slot) = (*base.add(word.a()), word.b());
+        let class = class_constant(vm, base, aux_at(pc) as usize);
+        if let Err(signal) = expect_slot(vm, instance, slot, class) {
+            return signal;
+        }
+        vm.heap.structure_set(instance, slot, *base.add(word.c()));
+        Signal::Next
+    }
+}
+
+/// Fails unless `instance` is one of the class, or of a subclass, and has that slot.
+fn expect_slot(vm: &mut Vm, instance: Value, slot: usize, class: Value) -> Result<(), Signal> {
+    let has_slot = vm.heap.structure_slots(instance).is_some_and(|slots| slot < slots.len());
+    if has_slot && vm.world.is_instance(&vm.heap, instance, class) {
+        return Ok(());
+    }
+    let expected = Expected::Specifier(class::name_of(&vm.heap, class));
+    Err(failure(vm, Raised::Type(instance, expected)))
 }
 
 /// Whether `value` is an instance of the class that is constant `index`, or of a subclass.

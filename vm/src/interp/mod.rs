@@ -48,7 +48,9 @@ mod unwind;
 mod variable;
 
 pub(crate) use collect::top_of_task;
+use esl_bytecode::builtin::Builtin;
 use esl_bytecode::for_each_opcode;
+use esl_bytecode::opcode::Opcode;
 use esl_bytecode::word::Word;
 
 use crate::cpu::Cpu;
@@ -58,7 +60,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 macro_rules! define_operations {
-    ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $substitute:ident
+    ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $($kind:ident)+
         { $( $field:ident : $ty:ident ),* } ; )*) => {
         /// The operations of the loop: every opcode, and those that only the machine's own stubs contain.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -378,42 +380,55 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                 };
             }
+            // Sees to what a builtin or an allocation has left.
+            macro_rules! attend {
+                () => {
+                    if vm.wants_safepoint() {
+                        ticks = vm.prepare_safepoint(ticks);
+                    }
+                };
+            }
             // Leaves the instruction to a cold function.
             macro_rules! cold {
                 ($words:literal, $function:path) => {{
                     match $function(vm, pc, base) {
                         Signal::Next => {
-                            if vm.wants_safepoint() {
-                                ticks = vm.prepare_safepoint(ticks);
-                            }
+                            attend!();
                             next!($words);
                         }
                         signal => break signal,
                     }
                 }};
             }
-            // A comparison's cold part puts T or NIL into the value list's place and says Next.
+            // Leaves the instruction to the builtin that its row names.
+            macro_rules! compute {
+                ($operation:ident) => {{
+                    const _: Builtin = cold::builtin(Opcode::$operation);
+                    cold!(1, cold::compute::<{ Opcode::$operation as u8 }>)
+                }};
+            }
+            // Leaves the test to a cold function, which says whether it holds.
             macro_rules! cold_test {
-                ($words:literal, $jump_when:literal, $offset:expr) => {{
-                    match cold::compare(vm, pc, base) {
-                        Ok(holds) => jump_if!($words, holds == $jump_when, $offset),
+                ($operation:ident, $function:path, $offset:expr) => {{
+                    match $function(vm, pc, base) {
+                        Ok(holds) => jump_if!(2, holds == const { Opcode::$operation.jumps_when() }, $offset),
                         Err(signal) => break signal,
                     }
                 }};
             }
             // A double and a fixnum, or a zero.
             macro_rules! mixed {
-                ($mixed:path, $x:expr, $y:expr) => {{
+                ($operation:ident, $mixed:path, $x:expr, $y:expr) => {{
                     let v = $mixed($x, $y);
                     if v != Value::UNBOUND {
                         set!(word.a(), v);
                         next!(1, 2);
                     }
-                    cold!(1, cold::arithmetic)
+                    compute!($operation)
                 }};
             }
             macro_rules! arithmetic {
-                ($fixnum:ident, $float:tt, $mixed:path) => {{
+                ($operation:ident, $fixnum:ident, $float:tt, $mixed:path) => {{
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) {
                         let (sum, overflow) = (x.bits() as i64).$fixnum(y.bits() as i64);
@@ -427,7 +442,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(1, 1);
                         }
                     }
-                    mixed!($mixed, x, y)
+                    mixed!($operation, $mixed, x, y)
                 }};
             }
             macro_rules! compare {
@@ -440,38 +455,45 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                 }};
             }
+            // Leaves the test to the builtin that its row names.
+            macro_rules! compute_test {
+                ($operation:ident, $offset:expr) => {{
+                    const _: Builtin = cold::builtin(Opcode::$operation);
+                    cold_test!($operation, cold::test::<{ Opcode::$operation as u8 }>, $offset)
+                }};
+            }
             macro_rules! jump_compare {
-                ($operator:tt, $jump_when:literal) => {{
+                ($operation:ident, $operator:tt) => {{
                     let offset = aux!() as i32 as isize;
                     compare!(
                         $operator,
                         get!(word.a()),
                         get!(word.b()),
-                        jump_if!(2, $jump_when, offset),
-                        jump_if!(2, !$jump_when, offset)
+                        jump_if!(2, const { Opcode::$operation.jumps_when() }, offset),
+                        jump_if!(2, const { !Opcode::$operation.jumps_when() }, offset)
                     );
-                    cold_test!(2, $jump_when, offset)
+                    compute_test!($operation, offset)
                 }};
             }
             macro_rules! jump_compare_int {
-                ($operator:tt, $jump_when:literal) => {{
+                ($operation:ident, $operator:tt) => {{
                     let offset = aux!() as i32 as isize;
                     let x = get!(word.a());
                     if x.is_fixnum() {
                         let holds = (x.bits() as i64) $operator (i64::from(word.signed_d()) << 2);
-                        jump_if!(2, holds == $jump_when, offset);
+                        jump_if!(2, holds == const { Opcode::$operation.jumps_when() }, offset);
                     }
-                    cold_test!(2, $jump_when, offset)
+                    compute_test!($operation, offset)
                 }};
             }
             macro_rules! bitwise {
-                ($operator:tt) => {{
+                ($operation:ident, $operator:tt) => {{
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) {
                         set!(word.a(), Value::from_bits(x.bits() $operator y.bits()));
                         next!(1);
                     }
-                    cold!(1, cold::arithmetic)
+                    compute!($operation)
                 }};
             }
             // Makes the frame of a function with bytecode that takes exactly the given arguments.
@@ -488,6 +510,37 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     k = constants_of(code);
                     pc = (*code).entry;
                     continue;
+                }};
+            }
+            // As `enter!`, in place of the running frame, if the function takes so many arguments.
+            macro_rules! enter_in_place {
+                ($window:expr, $function:expr) => {{
+                    let (window, function): (*mut Value, Value) = ($window, $function);
+                    let code = code_of(function);
+                    if (*code).arity == word.b() as u32
+                        && base.add((*code).nregs as usize) <= vm.cpu.stack_end()
+                    {
+                        for i in 0..word.b() {
+                            *base.add(i) = *window.add(2 + i);
+                        }
+                        *base.sub(2) = function;
+                        k = constants_of(code);
+                        pc = (*code).entry;
+                        continue;
+                    }
+                }};
+            }
+            // Calls the builtin of the instruction with the arguments in its window.
+            macro_rules! call_native {
+                ($wants_one:expr) => {{
+                    let arguments = std::slice::from_raw_parts(base.add(word.a() + 2), word.b());
+                    // SAFETY: V5: the number is in the table, the number of arguments right. The slice of
+                    // arguments stays good, since no builtin writes to the stack or moves it.
+                    let native = *vm.natives.get_unchecked(aux!() as usize);
+                    vm.cpu.set_pc(pc);
+                    vm.cpu.set_base(base);
+                    vm.cpu.wants_one = $wants_one;
+                    native(vm, arguments)
                 }};
             }
             macro_rules! return_value {
@@ -534,8 +587,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 }
 
                 // ---- arithmetic
-                Operation::Add => arithmetic!(overflowing_add, +, double::mixed_add),
-                Operation::Sub => arithmetic!(overflowing_sub, -, double::mixed_subtract),
+                Operation::Add => arithmetic!(Add, overflowing_add, +, double::mixed_add),
+                Operation::Sub => arithmetic!(Sub, overflowing_sub, -, double::mixed_subtract),
                 Operation::Mul => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) {
@@ -552,7 +605,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     {
                         next!(1, 1);
                     }
-                    mixed!(double::mixed_multiply, x, y)
+                    mixed!(Mul, double::mixed_multiply, x, y)
                 }
                 Operation::Div => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
@@ -564,7 +617,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     {
                         next!(1);
                     }
-                    mixed!(double::mixed_divide, x, y)
+                    mixed!(Div, double::mixed_divide, x, y)
                 }
                 Operation::AddInt => {
                     let x = get!(word.b());
@@ -583,7 +636,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     {
                         next!(1, 1);
                     }
-                    cold!(1, cold::arithmetic)
+                    compute!(AddInt)
                 }
                 Operation::Floor => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
@@ -592,7 +645,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), Value::from_bits((quotient << 2) as u64));
                         next!(1);
                     }
-                    cold!(1, cold::arithmetic)
+                    compute!(Floor)
                 }
                 Operation::Truncate => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
@@ -601,7 +654,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), Value::from_bits((quotient << 2) as u64));
                         next!(1);
                     }
-                    cold!(1, cold::arithmetic)
+                    compute!(Truncate)
                 }
                 Operation::Mod => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
@@ -611,7 +664,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), Value::from_bits(remainder as u64));
                         next!(1);
                     }
-                    cold!(1, cold::arithmetic)
+                    compute!(Mod)
                 }
                 Operation::Rem => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
@@ -620,11 +673,11 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), Value::from_bits(remainder as u64));
                         next!(1);
                     }
-                    cold!(1, cold::arithmetic)
+                    compute!(Rem)
                 }
-                Operation::LogAnd => bitwise!(&),
-                Operation::LogIor => bitwise!(|),
-                Operation::LogXor => bitwise!(^),
+                Operation::LogAnd => bitwise!(LogAnd, &),
+                Operation::LogIor => bitwise!(LogIor, |),
+                Operation::LogXor => bitwise!(LogXor, ^),
                 Operation::Ash => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) {
@@ -639,7 +692,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(1);
                         }
                     }
-                    cold!(1, cold::arithmetic)
+                    compute!(Ash)
                 }
 
                 // ---- comparisons that give T or NIL
@@ -658,17 +711,17 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 Operation::NumEq => {
                     compare!(==, get!(word.b()), get!(word.c()),
                         { set!(word.a(), Value::T); next!(1) }, { set!(word.a(), Value::NIL); next!(1) });
-                    cold!(1, cold::arithmetic)
+                    compute!(NumEq)
                 }
                 Operation::Less => {
                     compare!(<, get!(word.b()), get!(word.c()),
                         { set!(word.a(), Value::T); next!(1) }, { set!(word.a(), Value::NIL); next!(1) });
-                    cold!(1, cold::arithmetic)
+                    compute!(Less)
                 }
                 Operation::LessEq => {
                     compare!(<=, get!(word.b()), get!(word.c()),
                         { set!(word.a(), Value::T); next!(1) }, { set!(word.a(), Value::NIL); next!(1) });
-                    cold!(1, cold::arithmetic)
+                    compute!(LessEq)
                 }
                 Operation::CharEq => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
@@ -676,7 +729,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), Value::boolean(x == y));
                         next!(1);
                     }
-                    cold!(1, cold::arithmetic)
+                    compute!(CharEq)
                 }
                 Operation::IsType => {
                     set!(word.a(), Value::boolean(cold::is_type(vm, get!(word.b()), word.c() as u8)));
@@ -712,18 +765,18 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 Operation::JumpIfNotType => {
                     jump_if!(2, !cold::is_type(vm, get!(word.a()), word.b() as u8), aux!() as i32 as isize)
                 }
-                Operation::JumpNumEq => jump_compare!(==, true),
-                Operation::JumpNotNumEq => jump_compare!(==, false),
-                Operation::JumpLess => jump_compare!(<, true),
-                Operation::JumpNotLess => jump_compare!(<, false),
-                Operation::JumpLessEq => jump_compare!(<=, true),
-                Operation::JumpNotLessEq => jump_compare!(<=, false),
-                Operation::JumpNumEqInt => jump_compare_int!(==, true),
-                Operation::JumpNotNumEqInt => jump_compare_int!(==, false),
-                Operation::JumpLessInt => jump_compare_int!(<, true),
-                Operation::JumpNotLessInt => jump_compare_int!(<, false),
-                Operation::JumpGreaterInt => jump_compare_int!(>, true),
-                Operation::JumpNotGreaterInt => jump_compare_int!(>, false),
+                Operation::JumpNumEq => jump_compare!(JumpNumEq, ==),
+                Operation::JumpNotNumEq => jump_compare!(JumpNotNumEq, ==),
+                Operation::JumpLess => jump_compare!(JumpLess, <),
+                Operation::JumpNotLess => jump_compare!(JumpNotLess, <),
+                Operation::JumpLessEq => jump_compare!(JumpLessEq, <=),
+                Operation::JumpNotLessEq => jump_compare!(JumpNotLessEq, <=),
+                Operation::JumpNumEqInt => jump_compare_int!(JumpNumEqInt, ==),
+                Operation::JumpNotNumEqInt => jump_compare_int!(JumpNotNumEqInt, ==),
+                Operation::JumpLessInt => jump_compare_int!(JumpLessInt, <),
+                Operation::JumpNotLessInt => jump_compare_int!(JumpNotLessInt, <),
+                Operation::JumpGreaterInt => jump_compare_int!(JumpGreaterInt, >),
+                Operation::JumpNotGreaterInt => jump_compare_int!(JumpNotGreaterInt, >),
 
                 // ---- loops
                 Operation::Loop => {
@@ -753,11 +806,11 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 }
                 Operation::LoopLess => {
                     tick!();
-                    jump_compare!(<, true)
+                    jump_compare!(LoopLess, <)
                 }
                 Operation::LoopNotLess => {
                     tick!();
-                    jump_compare!(<, false)
+                    jump_compare!(LoopNotLess, <)
                 }
                 Operation::LoopCount => {
                     tick!();
@@ -770,7 +823,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             jump_if!(2, sum < limit.bits() as i64, aux!() as i32 as isize);
                         }
                     }
-                    cold_test!(2, true, aux!() as i32 as isize)
+                    cold_test!(LoopCount, cold::loop_count, aux!() as i32 as isize)
                 }
 
                 // ---- lists
@@ -779,7 +832,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), v);
                         next!(1);
                     }
-                    cold!(1, cold::cons)
+                    compute!(Cons)
                 }
                 Operation::Car => {
                     let list = get!(word.b());
@@ -787,7 +840,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), (*list.cons_ptr()).car);
                         next!(1);
                     }
-                    cold!(1, cold::list_part)
+                    compute!(Car)
                 }
                 Operation::Cdr => {
                     let list = get!(word.b());
@@ -795,7 +848,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), (*list.cons_ptr()).cdr);
                         next!(1);
                     }
-                    cold!(1, cold::list_part)
+                    compute!(Cdr)
                 }
                 Operation::Cadr => {
                     let list = get!(word.b());
@@ -806,7 +859,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(1);
                         }
                     }
-                    cold!(1, cold::list_part)
+                    compute!(Cadr)
                 }
                 Operation::Cddr => {
                     let list = get!(word.b());
@@ -817,7 +870,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(1);
                         }
                     }
-                    cold!(1, cold::list_part)
+                    compute!(Cddr)
                 }
                 Operation::SetCar => {
                     let pair = get!(word.a());
@@ -825,7 +878,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         vm.heap.store(&raw mut (*pair.cons_ptr()).car, get!(word.b()));
                         next!(1);
                     }
-                    cold!(1, cold::list_part)
+                    compute!(SetCar)
                 }
                 Operation::SetCdr => {
                     let pair = get!(word.a());
@@ -833,7 +886,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         vm.heap.store(&raw mut (*pair.cons_ptr()).cdr, get!(word.b()));
                         next!(1);
                     }
-                    cold!(1, cold::list_part)
+                    compute!(SetCdr)
                 }
                 Operation::List => cold!(1, cold::list),
 
@@ -847,7 +900,10 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         set!(word.a(), *element(vector, (index.bits() >> 2) as usize));
                         next!(1);
                     }
-                    cold!(1, cold::array)
+                    if word.number() == Opcode::VectorRef as u8 {
+                        compute!(VectorRef)
+                    }
+                    compute!(ArrayRef)
                 }
                 Operation::VectorSet | Operation::ArraySet => {
                     let (vector, index) = (get!(word.a()), get!(word.b()));
@@ -858,7 +914,10 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         vm.heap.store(element(vector, (index.bits() >> 2) as usize), get!(word.c()));
                         next!(1);
                     }
-                    cold!(1, cold::array)
+                    if word.number() == Opcode::VectorSet as u8 {
+                        compute!(VectorSet)
+                    }
+                    compute!(ArraySet)
                 }
                 Operation::CharRef => {
                     let (string, index) = (get!(word.b()), get!(word.c()));
@@ -873,7 +932,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             }
                         }
                     }
-                    cold!(1, cold::arithmetic)
+                    compute!(CharRef)
                 }
                 Operation::Slot => {
                     let instance = get!(word.b());
@@ -897,7 +956,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                             next!(2);
                         }
                     }
-                    cold!(2, cold::slot)
+                    cold!(2, cold::set_slot)
                 }
                 Operation::JumpIfNotInstance => {
                     let value = get!(word.a());
@@ -1005,19 +1064,10 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 Operation::CallBuiltin => {
                     tick!();
                     let window = base.add(word.a());
-                    let arguments = std::slice::from_raw_parts(window.add(2), word.b());
-                    // SAFETY: V5: the number is in the table, the number of arguments right. The slice of
-                    // arguments stays good, since no builtin writes to the stack or moves it.
-                    let native = *vm.natives.get_unchecked(aux!() as usize);
-                    vm.cpu.set_pc(pc);
-                    vm.cpu.set_base(base);
-                    vm.cpu.wants_one = word.c() == 0;
-                    match native(vm, arguments) {
+                    match call_native!(word.c() == 0) {
                         Ok(value) if word.c() == 0 => {
                             *window = value;
-                            if vm.wants_safepoint() {
-                                ticks = vm.prepare_safepoint(ticks);
-                            }
+                            attend!();
                             next!(2)
                         }
                         Ok(value) => {
@@ -1028,9 +1078,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         }
                         Err(Exit::Values) => {
                             substitute::deliver(vm, window, word.c());
-                            if vm.wants_safepoint() {
-                                ticks = vm.prepare_safepoint(ticks);
-                            }
+                            attend!();
                             next!(2)
                         }
                         Err(exit) => {
@@ -1047,58 +1095,26 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     let window = base.add(word.a());
                     let function = *window;
                     if function.is_object() && (*function.object_ptr()).kind == Kind::Function {
-                        let code = code_of(function);
-                        if (*code).arity == word.b() as u32
-                            && base.add((*code).nregs as usize) <= vm.cpu.stack_end()
-                        {
-                            for i in 0..word.b() {
-                                *base.add(i) = *window.add(2 + i);
-                            }
-                            *base.sub(2) = function;
-                            k = constants_of(code);
-                            pc = (*code).entry;
-                            continue;
-                        }
+                        enter_in_place!(window, function);
                     }
                     break Signal::Call;
                 }
                 Operation::TailCallGlobal => {
                     tick!();
+                    // SAFETY: as for `CallGlobal`.
                     let symbol = (*k.add(aux!() as usize)).object_ptr().cast::<Symbol>();
-                    let function = (*symbol).function;
-                    let code = code_of(function);
-                    if (*code).arity == word.b() as u32
-                        && base.add((*code).nregs as usize) <= vm.cpu.stack_end()
-                    {
-                        let window = base.add(word.a());
-                        for i in 0..word.b() {
-                            *base.add(i) = *window.add(2 + i);
-                        }
-                        *base.sub(2) = function;
-                        k = constants_of(code);
-                        pc = (*code).entry;
-                        continue;
-                    }
+                    enter_in_place!(base.add(word.a()), (*symbol).function);
                     break Signal::Call;
                 }
                 Operation::TailCallBuiltin => {
                     tick!();
-                    let arguments = std::slice::from_raw_parts(base.add(word.a() + 2), word.b());
-                    let native = *vm.natives.get_unchecked(aux!() as usize);
-                    vm.cpu.set_pc(pc);
-                    vm.cpu.set_base(base);
-                    vm.cpu.wants_one = false;
-                    match native(vm, arguments) {
+                    match call_native!(false) {
                         Ok(value) => {
-                            if vm.wants_safepoint() {
-                                ticks = vm.prepare_safepoint(ticks);
-                            }
+                            attend!();
                             return_value!(value)
                         }
                         Err(Exit::Values) => {
-                            if vm.wants_safepoint() {
-                                ticks = vm.prepare_safepoint(ticks);
-                            }
+                            attend!();
                             break Signal::ReturnAll;
                         }
                         Err(exit) => {

@@ -11,10 +11,9 @@
 //! The stub's `error-return` finds the instruction by the saved pc. The same way serves an instruction whose work a
 //! function of the library takes over, and one that asks for a call.
 
-use esl_bytecode::opcode::{Opcode, Substitute};
-use esl_bytecode::word::Word;
+use esl_bytecode::opcode::Substitute;
 
-use super::{Operation, Signal, aux_at, code_of, operation, pc_from_value, stubs, word_at};
+use super::{Signal, aux_at, code_of, pc_from_value, stubs, word_at};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -67,40 +66,18 @@ pub(super) unsafe fn substitute(vm: &mut Vm) -> Signal {
             Substitute::Effect | Substitute::Silent => {}
             // Nothing can stand for what the instruction was to do: it is tried again.
             Substitute::Never => return Signal::Reload,
-            Substitute::Test => {
-                if vm.exchange.values.first().is_some_and(|v| v.is_true()) == jumps_when(word) {
+            Substitute::Test | Substitute::TestNot => {
+                if value.is_true() == opcode.jumps_when() {
                     vm.cpu.set_pc(pc.add(2).offset(aux_at(pc) as i32 as isize));
                     return Signal::Reload;
                 }
             }
-            Substitute::Call => match opcode {
-                Opcode::TailCall | Opcode::TailCallGlobal | Opcode::TailCallBuiltin | Opcode::TailApply => {
-                    return Signal::ReturnAll;
-                }
-                _ => deliver(vm, base.add(word.a()), word.c()),
-            },
+            Substitute::Call => deliver(vm, base.add(word.a()), word.c()),
+            Substitute::Tail => return Signal::ReturnAll,
         }
         vm.cpu.set_pc(pc.add(stubs::length(word)));
         Signal::Reload
     }
-}
-
-/// Whether a comparison that holds makes the instruction jump.
-///
-/// # Safety
-/// The word is one of code that has passed the verifier.
-unsafe fn jumps_when(word: Word) -> bool {
-    !matches!(
-        // SAFETY: by the contract the word is an instruction.
-        unsafe { operation(word) },
-        Operation::JumpNotNumEq
-            | Operation::JumpNotLess
-            | Operation::JumpNotLessEq
-            | Operation::JumpNotNumEqInt
-            | Operation::JumpNotLessInt
-            | Operation::JumpNotGreaterInt
-            | Operation::LoopNotLess
-    )
 }
 
 /// `error-return`: the value list holds what the function above the frame has returned.

@@ -1,7 +1,7 @@
 //! The loop on programs assembled by hand: calls, ticks, unwinding, tasks that take turns.
 
 use esl_bytecode::module::{Constant, Function, FunctionNumber, Module, Parameters, PoolIdx};
-use esl_bytecode::opcode::Instr;
+use esl_bytecode::opcode::{Instr, OPCODES};
 use esl_bytecode::operand::*;
 use esl_bytecode::symbol::Symbol;
 
@@ -177,4 +177,17 @@ fn without_a_library_a_failure_ends_the_task_and_says_why() {
     let mut vm = machine(Config::default());
     let main = install(&mut vm, vec![car]);
     assert_eq!(vm.call(main, &[], u64::MAX), Err(CallError::Failed(":TYPE-ERROR 5 LIST".into())));
+}
+
+#[test]
+fn the_loop_has_an_arm_for_each_row_in_the_order_of_the_table() {
+    // An arm begins with its opcodes, one or several, in a column of its own.
+    const ARM: &str = "\n                Operation::";
+    let source = include_str!("mod.rs");
+    let arms = source.split(ARM).skip(1).filter_map(|arm| Some(arm.split_once(" =>")?.0));
+    let operations: Vec<&str> = arms.flat_map(|names| names.split(" | Operation::")).collect();
+    let rows: Vec<String> = OPCODES.iter().map(|row| format!("{:?}", row.opcode)).collect();
+    let (of_rows, of_stubs) = operations.split_at(rows.len());
+    assert_eq!(of_rows, rows);
+    assert_eq!(of_stubs, ["ErrorReturn", "InterruptReturn", "TaskExit"]);
 }

@@ -29,11 +29,7 @@ fn tail_call_in(words: &[u32]) -> Option<usize> {
     let mut found = None;
     let mut at = 0;
     while let Some(opcode) = words.get(at).and_then(|&word| Opcode::from_number(word as u8)) {
-        let is_tail_call = matches!(
-            opcode,
-            Opcode::TailCall | Opcode::TailCallGlobal | Opcode::TailCallBuiltin | Opcode::TailApply
-        );
-        if is_tail_call && found.replace(at).is_some() {
+        if opcode.is_tail() && found.replace(at).is_some() {
             return None;
         }
         at += opcode.words();
