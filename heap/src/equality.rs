@@ -154,7 +154,7 @@ fn mix(hash: u64, word: u64) -> u64 {
     (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15)
 }
 
-/// Returns the upper half of a product, which depends on all bits of its factors.
+/// Folds the upper half of a product, which depends on all bits of its factors, into the lower half.
 #[inline]
 fn finish(hash: u64) -> u32 {
     ((hash >> 32) ^ hash) as u32

@@ -1,4 +1,4 @@
-//! Exploring: running a program under every schedule, to find those that end badly or to show that there is
+//! Exploration: running a program under every schedule, to find those that end badly or to show that there is
 //! none.
 //!
 //! ```text
@@ -7,32 +7,32 @@
 //! live          which registers of a frame belong to a state
 //! ```
 //!
-//! **Points.** A task is taken to run undisturbed from one *point* to the next. It stands at a point just
-//! before it does something that other tasks can see, or looks at what they do: before it begins a wait,
-//! signals, passes a checkpoint, changes the database, enters a critical section, asks for an abort, and
-//! before its end; with [`Grain::Reads`] also before it counts signals, asks what became of a task, or
-//! queries the database. Nothing that happens between two points is visible to other tasks by these means, so
-//! any schedule of the machine does what one of those explored does. What tasks share in another way
-//! (variables, tables, structures) is not looked at: programs protect that by critical sections, which are
-//! one step each. A task that comes to no point is stopped after [`Settings::turn`] ticks.
+//! **Points.** A task is assumed to run undisturbed from one *point* to the next. It stands at a point just
+//! before it does something that other tasks can see: before it begins a wait, signals, passes a checkpoint,
+//! changes the database, enters a critical section, asks for an abort, and before its end; with
+//! [`Grain::Reads`] also before it looks at what others do: before it counts signals, asks what became of a
+//! task, or queries the database. Nothing between two points is visible to other tasks by these means, so
+//! every schedule of the machine behaves like one of those explored. State shared in other ways (variables,
+//! tables, structures) is not considered: programs protect it by critical sections, which are one step each.
+//! A task that reaches no point is stopped after [`Settings::turn`] ticks.
 //!
-//! **Choices.** At each point any runnable task may go on, whatever its priority (every one has its turns
-//! sometimes). First comes the task that has just run, then the others from the oldest to the newest; a
-//! choice is an index into that order, and a list of choices gives a schedule: [`Vm::follow`] runs it again.
-//! Time is virtual, and moves when all tasks wait.
+//! **Choices.** At each point any runnable task may continue, whatever its priority (every task has a turn at
+//! some time). The task that has just run comes first, then the others from the oldest to the newest; a
+//! choice is an index into that order, and a list of choices determines a schedule: [`Vm::follow`] runs it
+//! again. Time is virtual, and moves when all tasks wait.
 //!
-//! **Search.** Going back is starting again: a machine is begun anew, follows the choices that lead to a
-//! place where another one was possible, and goes on with that one until it ends or comes to a state that is
-//! known. So nothing has to be copied or undone, and every schedule that is reported has been run from its
-//! beginning. Places are taken in the order of how often a task had to give way that could have gone on, so
-//! the first schedule that leads to an ending is one with the fewest such switches.
+//! **Search.** Going back means starting again: a new machine follows the choices up to a point where another
+//! one was possible, takes that one, and continues until it ends or reaches a known state. So nothing has to
+//! be copied or undone, and every reported schedule has been run from its beginning. The search proceeds by
+//! the number of preemptions (points at which a task had to give way although it could have continued), so
+//! the first schedule that leads to an ending is one with the fewest preemptions.
 //!
 //! **States** are told apart by fingerprints of 128 bits (see `fingerprint`). We accept the risk of a
 //! fingerprint collision; exploring a state twice only costs time.
 //!
-//! Not here: the outside (what is in files, what was read). What a command will do: begin machines as for
-//! `run`, with a captured outside; write the numbers of states and schedules, and for each ending its first
-//! schedule; `run` with that list shows it again, with traces.
+//! Not here: the outside (contents of files, input that was read); making machines and judging how their runs
+//! ended, which are up to the caller.
+//!
 //! Source: Musuvathi and Qadeer 2007 for the order by preemptions; state hashes are as old as SPIN (Holzmann
 //! 1988).
 

@@ -27,7 +27,7 @@ impl Vm {
     }
 }
 
-/// Has tasks stop at points from now on.
+/// Makes tasks stop at points from now on.
 pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
     vm.scheduler.points.grain = Some(settings.grain);
     vm.config.slice = settings.turn;
@@ -35,8 +35,8 @@ pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
     vm.outside.console.note_all(settings.output);
 }
 
-/// Runs from point to point; at each, `choose` says which task goes on, or that the run is given up. Returns
-/// how the run has ended, unless it was given up.
+/// Runs from point to point; at each, `choose` says which task continues, or `None` to give up the run.
+/// Returns how the run has ended, unless it was given up.
 pub(super) fn run_by_points(
     vm: &mut Vm,
     choose: &mut dyn FnMut(&mut Vm, Runnable) -> Option<u32>,

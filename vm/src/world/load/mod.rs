@@ -286,7 +286,7 @@ pub(crate) fn integer(heap: &mut Heap, value: &BigInt) -> Result<Value, AllocErr
     heap.alloc_bignum(value.sign() == num_bigint::Sign::Minus, &limbs)
 }
 
-/// Returns the integer that a value is, of any size; `None` for what is no integer.
+/// Returns the integer that a value is, of any size; `None` for any other value.
 pub(crate) fn integer_of(heap: &Heap, v: Value) -> Option<BigInt> {
     if let Some(n) = v.as_fixnum() {
         return Some(n.into());
@@ -327,8 +327,8 @@ impl World {
         debug::place_of(heap, parts.debug, pc)
     }
 
-    /// Returns the lambda list and the documentation of a function, `NIL` for what it has not. `None` if
-    /// `function` is no function.
+    /// Returns lambda list and documentation of a function; `NIL` for either that it lacks. `None` unless
+    /// `function` is a function.
     ///
     /// # Errors
     /// [`LoadError`] if an image is damaged, or there is no room.
