@@ -1,7 +1,24 @@
-//! Pictures of a run in time: who ran, waited and signalled when, failures and recoveries, collections.
+//! Timelines of runs: when each task ran, waited and signalled; failures, recoveries and collections.
 //!
-//! A file that ends in `.svg` gets one drawing, for short runs. Every other file gets a trace in the Trace Event Format, that the
-//! Perfetto UI and `chrome://tracing` open; it is written as the run goes on, so its length takes no memory.
+//! A file whose name ends in `.svg` becomes one drawing, for short runs. Every other file becomes a trace in
+//! the Trace Event Format, which the Perfetto UI and `chrome://tracing` open; it is written during the run,
+//! so that its length takes no memory.
+//!
+//! ```
+//! use esl::host::VirtualHost;
+//! use esl::program::{Source, compile, machine, run_in};
+//! use esl::timeline::Timeline;
+//!
+//! let program = compile(&[Source::new("wait.esl", "(sleep 1)")]).program.expect("it compiles");
+//! let mut machine = machine(esl::Config::default(), Box::new(VirtualHost::new()))?;
+//! let file = std::env::temp_dir().join(format!("esl-timeline-{}.svg", std::process::id()));
+//! let timeline = Timeline::begin(&file, &mut machine)?;
+//! run_in(&mut machine, &program)?;
+//! timeline.end(&mut machine)?;
+//! assert!(std::fs::read_to_string(&file)?.contains("the main task"));
+//! # std::fs::remove_file(file)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod svg;
 mod trace;
@@ -18,49 +35,50 @@ use esl_vm::vm::Vm;
 pub use svg::Drawing;
 pub use trace::Trace;
 
-/// A file that the picture of a run goes to.
-pub struct Timeline(Arc<Mutex<Kind>>);
+/// A file that a run is pictured in.
+pub struct Timeline(Arc<Mutex<Picture>>);
 
-enum Kind {
+/// Form of the file.
+enum Picture {
     Trace(Trace<BufWriter<File>>),
     Drawing(Drawing, File),
 }
 
-/// What of a timeline watches the run.
-struct Watch(Arc<Mutex<Kind>>);
+/// Observer of the run, which shares the file with its [`Timeline`].
+struct Watch(Arc<Mutex<Picture>>);
 
-fn lock(kind: &Mutex<Kind>) -> MutexGuard<'_, Kind> {
-    // A panic elsewhere does not spoil what was noted.
-    kind.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock(picture: &Mutex<Picture>) -> MutexGuard<'_, Picture> {
+    // A panic elsewhere leaves the picture as it was.
+    picture.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Timeline {
-    /// Makes the file, and has the machine's run noted in it from now on.
+    /// Creates the file, and pictures the machine's run in it from now on.
     ///
     /// # Errors
     /// If the file cannot be written.
     pub fn begin(path: &Path, machine: &mut Vm) -> io::Result<Timeline> {
         let file = File::create(path)?;
         let is_drawing = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
-        let kind = if is_drawing {
-            Kind::Drawing(Drawing::new(), file)
+        let picture = if is_drawing {
+            Picture::Drawing(Drawing::new(), file)
         } else {
-            Kind::Trace(Trace::new(BufWriter::new(file)))
+            Picture::Trace(Trace::new(BufWriter::new(file)))
         };
-        let shared = Arc::new(Mutex::new(kind));
+        let shared = Arc::new(Mutex::new(picture));
         machine.add_observer(Box::new(Watch(shared.clone())));
         Ok(Timeline(shared))
     }
 
-    /// Ends the file, when the run is over.
+    /// Completes the file when the run is over.
     ///
     /// # Errors
-    /// If something could not be written.
+    /// If a part of the file could not be written.
     pub fn end(self, machine: &mut Vm) -> io::Result<()> {
         drop(machine.take_observers());
         match &mut *lock(&self.0) {
-            Kind::Trace(trace) => trace.end(),
-            Kind::Drawing(drawing, file) => io::Write::write_all(file, drawing.draw().as_bytes()),
+            Picture::Trace(trace) => trace.end(),
+            Picture::Drawing(drawing, file) => io::Write::write_all(file, drawing.draw().as_bytes()),
         }
     }
 }
@@ -68,8 +86,8 @@ impl Timeline {
 impl Observer for Watch {
     fn see(&mut self, time: u64, task: TaskNumber, seen: Seen<'_>) {
         match &mut *lock(&self.0) {
-            Kind::Trace(trace) => trace.see(time, task, seen),
-            Kind::Drawing(drawing, _) => drawing.see(time, task, seen),
+            Picture::Trace(trace) => trace.see(time, task, seen),
+            Picture::Drawing(drawing, _) => drawing.see(time, task, seen),
         }
     }
 }

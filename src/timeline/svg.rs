@@ -1,8 +1,8 @@
-//! A short run as one drawing: a row for each task with its states as bars, signals as arrows, failures, recoveries and ends as
-//! marks, collections as a band behind.
+//! A short run as one drawing: a row for each task with its activities as bars, signals as arrows, failures,
+//! recoveries and ends as signs, and collections as bands behind the rows.
 //!
-//! The drawing is made when the run is over, so what it shows is bounded: beyond that many items it shows the beginning of the run,
-//! and says so.
+//! The drawing is made when the run is over, so the number of its items is bounded. A longer run is drawn up
+//! to where that number is reached, and the drawing says so.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -10,8 +10,9 @@ use std::fmt::Write as _;
 use esl_vm::observe::{Observer, Seen};
 use esl_vm::task::TaskNumber;
 
-/// Bars, arrows and marks that a drawing has at most, and rows.
+/// Most bars, arrows, signs and bands in a drawing.
 const ITEMS: usize = 20_000;
+/// Most rows in a drawing.
 const ROWS: usize = 100;
 
 // Lengths in pixels.
@@ -20,27 +21,27 @@ const LEFT: f64 = 150.0;
 const RIGHT: f64 = 30.0;
 const TOP: f64 = 64.0;
 const ROW: f64 = 36.0;
-/// Where the bar of a row begins, below the place for texts, and its height.
+/// Distance from the top of a row, which is left to texts, to its bars.
 const BAR: f64 = 14.0;
 const BAR_HEIGHT: f64 = 16.0;
-/// The width of a character of the texts in bars and above them.
+/// Width of a character of the texts in bars and above them.
 const CHARACTER: f64 = 5.6;
 
-/// What a task does, as a bar.
+/// Activity of a task, drawn as a bar.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum State {
+enum Activity {
     Runs,
     Ready,
     Waits(String),
 }
 
 struct Bar {
-    state: State,
+    state: Activity,
     begin: u64,
     end: u64,
 }
 
-/// What happens at a point of time.
+/// Event in the life of a task, drawn as a sign.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Sign {
     Signals,
@@ -50,45 +51,45 @@ enum Sign {
     Ends(&'static str),
 }
 
-struct Row {
+struct TaskRow {
     name: String,
     bars: Vec<Bar>,
-    /// The state that began last.
-    open: Option<(State, u64)>,
+    /// Activity that has not ended, and its begin.
+    open: Option<(Activity, u64)>,
     marks: Vec<(u64, Sign, String)>,
 }
 
-/// A run, as far as it is to be drawn.
+/// A run, as far as it will be drawn.
 #[derive(Default)]
 pub struct Drawing {
-    rows: Vec<Row>,
-    /// The row of each task that has one.
+    rows: Vec<TaskRow>,
+    /// Row of each task that has one.
     row_of: HashMap<u64, usize>,
-    /// Signals: when, from which row to which.
+    /// Signals: time, rows of the two tasks, name of the event.
     arrows: Vec<(u64, usize, usize, String)>,
     collections: Vec<(u64, u64)>,
     collects_since: Option<u64>,
     items: usize,
-    /// When there was no more room.
+    /// Time at which [`ITEMS`] was reached.
     full_at: Option<u64>,
     hidden_rows: usize,
     latest: u64,
 }
 
 impl Drawing {
-    /// An empty drawing.
+    /// Creates an empty drawing.
     pub fn new() -> Drawing {
         Drawing::default()
     }
 
-    fn change(&mut self, time: u64, task: u64, state: Option<State>) {
+    fn change(&mut self, time: u64, task: u64, state: Option<Activity>) {
         let Some(row) = self.row_of.get(&task).and_then(|&row| self.rows.get_mut(row)) else { return };
         if row.open.as_ref().map(|(open, _)| open) == state.as_ref() {
             return;
         }
         if let Some((open, begin)) = row.open.take()
-            // To be ready for no time is not worth a bar.
-            && (open != State::Ready || begin < time)
+            // A task that is ready for no time gets no bar.
+            && (open != Activity::Ready || begin < time)
         {
             row.bars.push(Bar { state: open, begin, end: time });
             self.items += 1;
@@ -115,12 +116,12 @@ impl Observer for Drawing {
             return;
         }
         match seen {
-            // Tasks of the library are no part of what the program shows of itself.
+            // Tasks of the library are not shown.
             Seen::Begins { is_hidden: true, .. } => {}
             Seen::Begins { name, .. } => {
                 if self.rows.len() < ROWS {
                     self.row_of.insert(task, self.rows.len());
-                    self.rows.push(Row {
+                    self.rows.push(TaskRow {
                         name: name.into(),
                         bars: Vec::new(),
                         open: None,
@@ -135,15 +136,15 @@ impl Observer for Drawing {
                     row.name = name.into();
                 }
             }
-            Seen::Runs => self.change(time, task, Some(State::Runs)),
-            Seen::IsReady => self.change(time, task, Some(State::Ready)),
-            Seen::Waits(reason) => self.change(time, task, Some(State::Waits(reason.into()))),
+            Seen::Runs => self.change(time, task, Some(Activity::Runs)),
+            Seen::IsReady => self.change(time, task, Some(Activity::Ready)),
+            Seen::Waits(reason) => self.change(time, task, Some(Activity::Waits(reason.into()))),
             Seen::IsToEnd => self.mark(time, task, Sign::IsToEnd, "is to be aborted".into()),
             Seen::Ends(how) => {
                 self.change(time, task, None);
                 let how = ["succeeded", "failed", "aborted"].into_iter().find(|known| *known == how);
                 self.mark(time, task, Sign::Ends(how.unwrap_or("ended")), how.unwrap_or("ended").into());
-                // Its row stays; its number has no more to tell.
+                // The row stays; nothing more comes under this number.
                 self.row_of.remove(&task);
             }
             Seen::Signals(event) => self.mark(time, task, Sign::Signals, format!("signals {event}")),
@@ -169,7 +170,7 @@ impl Observer for Drawing {
     }
 }
 
-/// From times to pixels.
+/// Maps times to pixels.
 struct Scale {
     begin: u64,
     length: f64,
@@ -181,7 +182,7 @@ impl Scale {
         LEFT + (WIDTH - LEFT - RIGHT) * part
     }
 
-    /// The distance of the lines of the axis, in nanoseconds: 1, 2 or 5 times a power of ten.
+    /// Returns the distance of the lines of the axis in nanoseconds: 1, 2 or 5 times a power of ten.
     fn step(&self) -> u64 {
         let wanted = (self.length / 9.0).max(1.0);
         let power = 10f64.powf(wanted.log10().floor());
@@ -190,7 +191,7 @@ impl Scale {
     }
 }
 
-/// A time in the unit that suits the steps of the axis.
+/// Writes a time in the unit that suits the steps of the axis.
 fn in_words(time: u64, step: u64) -> String {
     let (unit, name) = match step {
         0..1_000 => (1, "ns"),
@@ -205,7 +206,7 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// As much of a text as there is room for; nothing where that is next to nothing.
+/// Returns as much of a text as fits into `width`; nothing if that is less than five characters.
 fn fit(text: &str, width: f64) -> String {
     let room = ((width - 6.0) / CHARACTER).max(0.0) as usize;
     if text.chars().count() <= room {
@@ -223,7 +224,7 @@ const STYLE: &str = "text{font:11px sans-serif;fill:#333}.s{font-size:10px;fill:
 .e{stroke:#2f7d5b;stroke-width:2}.t{fill:#c33}";
 
 impl Drawing {
-    /// The drawing as the text of an SVG file.
+    /// Returns the drawing as the text of an SVG file.
     pub fn draw(&mut self) -> String {
         let end = self.latest;
         for row in &mut self.rows {
@@ -324,19 +325,19 @@ fn axis(svg: &mut String, scale: &Scale, end: u64, bottom: f64) {
     }
 }
 
-/// The height of the upper edge of a row's bars.
+/// Returns the y of the upper edge of a row's bars.
 fn top_of_bars(row: usize) -> f64 {
     TOP + ROW * row as f64 + BAR
 }
 
-fn draw_bars(svg: &mut String, scale: &Scale, index: usize, row: &Row) {
+fn draw_bars(svg: &mut String, scale: &Scale, index: usize, row: &TaskRow) {
     let y = top_of_bars(index);
     let name = fit(&row.name, LEFT - 10.0);
     _ = writeln!(svg, "<text class=\"n\" x=\"{}\" y=\"{}\">{}</text>", LEFT - 8.0, y + 12.0, escape(&name));
-    // What runs is drawn over what waits, because it is widened so as to be seen.
+    // Bars of running are widened so as to be seen, and are drawn over the others.
     for runs in [false, true] {
         let mut last = f64::NEG_INFINITY;
-        for bar in row.bars.iter().filter(|bar| (bar.state == State::Runs) == runs) {
+        for bar in row.bars.iter().filter(|bar| (bar.state == Activity::Runs) == runs) {
             let (x, right) = (scale.x(bar.begin), scale.x(bar.end));
             let width = (right - x).max(if runs { 2.0 } else { 0.5 });
             if right < last + 0.2 {
@@ -344,9 +345,9 @@ fn draw_bars(svg: &mut String, scale: &Scale, index: usize, row: &Row) {
             }
             last = x + width;
             let (class, title) = match &bar.state {
-                State::Runs => ("r", "runs".to_string()),
-                State::Ready => ("y", "is ready".to_string()),
-                State::Waits(reason) => ("w", format!("waits for {reason}")),
+                Activity::Runs => ("r", "runs".to_string()),
+                Activity::Ready => ("y", "is ready".to_string()),
+                Activity::Waits(reason) => ("w", format!("waits for {reason}")),
             };
             let (begin, end) = (bar.begin as f64 / 1e6, bar.end as f64 / 1e6);
             _ = writeln!(
@@ -354,7 +355,7 @@ fn draw_bars(svg: &mut String, scale: &Scale, index: usize, row: &Row) {
                 "<rect class=\"{class}\" x=\"{x:.1}\" y=\"{y}\" width=\"{width:.1}\" height=\"{BAR_HEIGHT}\"><title>{}, {begin:.3} to {end:.3} ms</title></rect>",
                 escape(&title)
             );
-            if let State::Waits(reason) = &bar.state {
+            if let Activity::Waits(reason) = &bar.state {
                 let text = fit(reason, width);
                 if !text.is_empty() {
                     _ = writeln!(
@@ -413,9 +414,9 @@ fn draw_sign(svg: &mut String, sign: Sign, x: f64, y: f64) {
     };
 }
 
-fn draw_marks(svg: &mut String, scale: &Scale, index: usize, row: &Row) {
+fn draw_marks(svg: &mut String, scale: &Scale, index: usize, row: &TaskRow) {
     let y = top_of_bars(index);
-    // Texts stand above the bars, where there is room behind the one before.
+    // Texts stand above the bars, where the text before leaves room.
     let mut free = 0.0;
     let mut last: Option<(Sign, f64)> = None;
     for (time, sign, text) in &row.marks {
@@ -424,11 +425,11 @@ fn draw_marks(svg: &mut String, scale: &Scale, index: usize, row: &Row) {
             continue;
         }
         last = Some((*sign, x));
-        // Beside the failure that it is for.
+        // A recovery stands beside its failure.
         let aside = if *sign == Sign::Recovers { 10.0 } else { 0.0 };
         draw_sign(svg, *sign, x + aside, y);
         let width = CHARACTER * text.chars().count() as f64;
-        // The rest is said by the sign, and by the arrow what a net and the end of a task signal.
+        // Other signs explain themselves, and arrows show what a net and the end of a task signal.
         let has_text = match sign {
             Sign::Fails | Sign::Recovers => true,
             Sign::Signals => text != "signals an event" && !text.ends_with(&row.name),

@@ -1,8 +1,8 @@
-//! A run as a trace in the Trace Event Format: a track for each task with its states as slices, signals as flows, failures and
-//! recoveries as marks; the collector has a track of its own.
+//! A run as a trace in the Trace Event Format: a track for each task with its states as slices, signals as
+//! flows, failures and recoveries as marks, and a track for the collector.
 //!
-//! Guarantees: events are in the order of time; each slice that begins ends; each flow has both ends, inside slices.
-//! Memory is taken for the tasks that have not ended, and for nothing else.
+//! Guarantees: events are in the order of time; each slice that begins ends; each flow has both ends, inside
+//! slices. A trace in progress takes memory for the tasks that have not ended, and for nothing else.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -11,16 +11,17 @@ use std::io::{self, Write};
 use esl_vm::observe::{Observer, Seen};
 use esl_vm::task::TaskNumber;
 
-/// The process that the tracks of tasks belong to, and that of the machine's own.
+/// Process of the tracks of tasks.
 const TASKS: u32 = 1;
+/// Process of the machine's own tracks.
 const MACHINE: u32 = 2;
 
-/// A trace that is being written.
+/// A trace in progress.
 pub struct Trace<W> {
     out: W,
-    /// The tasks that have not ended: the slice that is open on their tracks.
+    /// Slice that is open on the track of each task that has not ended.
     tasks: BTreeMap<u64, Option<String>>,
-    /// Open slices on the collector's track.
+    /// Number of open slices on the collector's track.
     collector: u32,
     flows: u64,
     latest: u64,
@@ -74,7 +75,7 @@ impl<W: Write> Trace<W> {
         self.event('M', (process, track), what, &more);
     }
 
-    /// Ends the slice of a task, and begins another one.
+    /// Ends the open slice of a task, and begins one for `state`.
     fn change(&mut self, task: u64, state: Option<String>) {
         let Some(open) = self.tasks.get_mut(&task) else { return };
         if *open == state {
@@ -117,10 +118,10 @@ impl<W: Write> Trace<W> {
         }
     }
 
-    /// Ends the trace: what is open ends now.
+    /// Ends the open slices and the trace.
     ///
     /// # Errors
-    /// The first thing that went wrong in writing.
+    /// The first error of writing.
     pub fn end(&mut self) -> io::Result<()> {
         for task in self.tasks.keys().copied().collect::<Vec<_>>() {
             self.change(task, None);
@@ -169,7 +170,7 @@ impl<W: Write + Send> Observer for Trace<W> {
     }
 }
 
-/// Adds a text as a JSON string.
+/// Appends a text as a JSON string.
 fn quote(text: &str, out: &mut String) {
     out.push('"');
     for c in text.chars() {
