@@ -1,4 +1,13 @@
-//! Values of programs as Rust sees them.
+//! Values of programs, as data of Rust.
+//!
+//! ```
+//! use esl::Data;
+//!
+//! let reading = Data::list([Data::Keyword("TEMPERATURE".into()), Data::Float(21.5)]);
+//! assert_eq!(reading.to_string(), "(:TEMPERATURE 21.5)");
+//! let items = reading.as_list().expect("it is a list");
+//! assert_eq!(items[1].as_float(), Some(21.5));
+//! ```
 
 use std::fmt;
 
@@ -7,7 +16,7 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
-/// A value that came from a program or goes to one.
+/// A value from a program, or for one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Data {
     /// `NIL`: false, and the empty list.
@@ -16,7 +25,7 @@ pub enum Data {
     True,
     /// An integer of 64 bits.
     Integer(i64),
-    /// A larger integer, in decimal digits.
+    /// A larger integer.
     BigInteger(BigInt),
     /// A ratio: numerator and denominator.
     Ratio(BigInt, BigInt),
@@ -32,30 +41,30 @@ pub enum Data {
     Symbol(String),
     /// A proper list, not empty.
     List(Vec<Data>),
-    /// A list whose last `cdr` is not `NIL`: its elements, and that `cdr`.
+    /// A list whose last `cdr` is not `NIL`: its elements, and that last `cdr`.
     DottedList(Vec<Data>, Box<Data>),
     /// A vector.
     Vector(Vec<Data>),
 }
 
 impl Data {
-    /// `T` or `NIL`.
+    /// Returns `T` or `NIL`.
     pub fn boolean(value: bool) -> Data {
         if value { Data::True } else { Data::Nil }
     }
 
-    /// A list, which is `NIL` if there are no items.
+    /// Returns the list of these items: `NIL` if there are none.
     pub fn list(items: impl IntoIterator<Item = Data>) -> Data {
         let items: Vec<Data> = items.into_iter().collect();
         if items.is_empty() { Data::Nil } else { Data::List(items) }
     }
 
-    /// Whether it is anything but `NIL`.
+    /// Returns whether the value counts as true: whether it is anything but `NIL`.
     pub fn is_true(&self) -> bool {
         !matches!(self, Data::Nil)
     }
 
-    /// The integer, if it is one of 64 bits.
+    /// Returns the integer, if the value is an integer of 64 bits.
     pub fn as_integer(&self) -> Option<i64> {
         match self {
             Data::Integer(value) => Some(*value),
@@ -63,7 +72,7 @@ impl Data {
         }
     }
 
-    /// The number as a float, if it is a float or an integer of 64 bits.
+    /// Returns the number as a float, if the value is a float or an integer of 64 bits.
     pub fn as_float(&self) -> Option<f64> {
         match self {
             Data::Float(value) => Some(*value),
@@ -72,7 +81,7 @@ impl Data {
         }
     }
 
-    /// The string, if it is one.
+    /// Returns the string, if the value is a string.
     pub fn as_str(&self) -> Option<&str> {
         match self {
             Data::String(value) => Some(value),
@@ -80,7 +89,7 @@ impl Data {
         }
     }
 
-    /// The elements, if it is a proper list; none for `NIL`.
+    /// Returns the elements, if the value is a proper list; no elements for `NIL`.
     pub fn as_list(&self) -> Option<&[Data]> {
         match self {
             Data::Nil => Some(&[]),
@@ -145,7 +154,7 @@ impl Data {
 }
 
 impl fmt::Display for Data {
-    /// As the program would print it with `prin1`.
+    /// Writes the value as the program would print it with `prin1`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sequence = |f: &mut fmt::Formatter<'_>, items: &[Data]| {
             for (i, item) in items.iter().enumerate() {

@@ -1,6 +1,6 @@
-//! Exploring the schedules of a program: which ways there are for it to end, and how it comes to each.
+//! Exploring the schedules of a program: in which ways it can end, and which choices lead to each.
 //!
-//! See [`esl_vm::explore`] for what is explored, and what is not.
+//! [`esl_vm::explore`] says what is explored.
 //!
 //! ```
 //! use esl::explore::{Settings, explore};
@@ -16,7 +16,7 @@
 //! let mut outputs: Vec<&str> = found.endings.iter().map(|ending| &*ending.what.output).collect();
 //! outputs.sort();
 //! assert_eq!(outputs, ["creak ", "creak creak "]);
-//! # Ok::<(), String>(())
+//! # Ok::<(), esl::Error>(())
 //! ```
 
 use std::cell::RefCell;
@@ -26,24 +26,25 @@ use esl_vm::host::{Captured, VirtualHost};
 use esl_vm::task::TaskId;
 use esl_vm::vm::Vm;
 
+use crate::error::Error;
 use crate::program::{self, Ended, Program};
 
-/// How a run has ended, and what it has written.
+/// A run as it is seen from outside.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Outcome {
-    /// How it ended.
+pub struct Behaviour {
+    /// Way in which the run ended.
     pub ended: Ended,
-    /// What was written to standard output.
+    /// Text written to standard output.
     pub output: String,
-    /// What was written to standard error.
+    /// Text written to standard error.
     pub errors: String,
 }
 
-/// What is done to a machine before the program is loaded.
-type Prepare<'a> = &'a dyn Fn(&mut Vm) -> Result<(), String>;
+/// Prepares each machine before the program is loaded.
+type Prepare<'a> = &'a dyn Fn(&mut Vm) -> Result<(), Error>;
 
-/// A machine that is about to run a program, its main task, and what it will write.
-fn begin(program: &Program, prepare: Prepare<'_>) -> Result<(Vm, TaskId, Captured), String> {
+/// Returns a machine that is about to run a program, its main task, and its outputs.
+fn begin(program: &Program, prepare: Prepare<'_>) -> Result<(Vm, TaskId, Captured), Error> {
     let host = VirtualHost::new();
     let captured = host.captured();
     let mut machine = program::machine(Default::default(), Box::new(host))?;
@@ -55,20 +56,20 @@ fn begin(program: &Program, prepare: Prepare<'_>) -> Result<(Vm, TaskId, Capture
 /// Runs a program under all schedules.
 ///
 /// # Errors
-/// A text, if the program could not be begun.
-pub fn explore(program: &Program, settings: &Settings) -> Result<Exploration<Outcome>, String> {
+/// As [`program::run`].
+pub fn explore(program: &Program, settings: &Settings) -> Result<Exploration<Behaviour>, Error> {
     explore_with(program, settings, &|_| Ok(()))
 }
 
-/// As [`explore`], with something done to each machine before the program is loaded.
+/// Runs a program under all schedules, on machines that `prepare` has changed before they load the program.
 ///
 /// # Errors
-/// As for [`explore`], and those of `prepare`.
+/// As [`program::run`], and the errors of `prepare`.
 pub fn explore_with(
     program: &Program,
     settings: &Settings,
     prepare: Prepare<'_>,
-) -> Result<Exploration<Outcome>, String> {
+) -> Result<Exploration<Behaviour>, Error> {
     let present = RefCell::new(None);
     let begin = || {
         let (machine, main, captured) = begin(program, prepare)?;
@@ -78,17 +79,17 @@ pub fn explore_with(
     esl_vm::explore::explore(settings, begin, |machine, outcome| {
         let (main, captured) = present.take().expect("a machine that has run was begun");
         let ended = program::end(machine, main, outcome);
-        Outcome { ended, output: captured.output(), errors: captured.error() }
+        Behaviour { ended, output: captured.output(), errors: captured.error() }
     })
 }
 
 /// Runs a program by a list of choices that [`explore`] has found with the same settings.
 ///
 /// # Errors
-/// As for [`explore`].
-pub fn follow(program: &Program, settings: &Settings, choices: &[u32]) -> Result<Outcome, String> {
+/// As [`program::run`].
+pub fn follow(program: &Program, settings: &Settings, choices: &[u32]) -> Result<Behaviour, Error> {
     let (mut machine, main, captured) = begin(program, &|_| Ok(()))?;
     let outcome = machine.follow(settings, choices);
     let ended = program::end(&mut machine, main, outcome);
-    Ok(Outcome { ended, output: captured.output(), errors: captured.error() })
+    Ok(Behaviour { ended, output: captured.output(), errors: captured.error() })
 }

@@ -1,7 +1,10 @@
-//! ESL, the Execution Support Language: programs that decide, while the world changes, what an agent does next.
+//! ESL, the Execution Support Language, for programs that decide what an agent does next while the world
+//! changes.
 //!
-//! This crate puts the compiler, the virtual machine and the library together. [`Engine`] is for programs in Rust that
-//! want to run ESL; [`program`] is what the commands `eslc` and `eslvm` are made of.
+//! This crate puts the compiler, the virtual machine and the library together. [`Engine`] evaluates ESL for
+//! programs in Rust; [`program`] compiles and runs whole programs, as the commands `eslc` and `eslvm` do. The
+//! package is called `esl-lang`. Its feature `cli`, on by default, adds the commands, the REPL and what only
+//! they depend on.
 //!
 //! ```
 //! use esl::{Data, Engine};
@@ -21,14 +24,16 @@
 pub mod command;
 pub mod data;
 pub mod engine;
+pub mod error;
 pub mod explore;
-pub mod library;
+pub mod module_path;
 pub mod program;
 #[cfg(feature = "cli")]
 pub mod repl;
 pub mod timeline;
 
 pub use data::Data;
-pub use engine::{Engine, Error};
+pub use engine::Engine;
+pub use error::Error;
 pub use esl_vm::host;
 pub use esl_vm::vm::Config;

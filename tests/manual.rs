@@ -1,5 +1,5 @@
-//! The examples of the manual, `docs/manual/*.md`, and of `README.md`, run by the commands; `conformance/src/chapter.rs`
-//! describes their form.
+//! The examples of the manual, `docs/manual/*.md`, and of `README.md`, run by the commands;
+//! `conformance/src/chapter.rs` describes their form.
 
 use std::path::Path;
 use std::process::Command;

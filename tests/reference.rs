@@ -1,4 +1,5 @@
-//! The manual's reference is what `help` says, and `docs/manual/reference.md` is up to date. `ESL_BLESS=1` writes it.
+//! The manual's reference is what `help` says, and `docs/manual/reference.md` is up to date. `ESL_BLESS=1`
+//! writes it.
 
 use std::path::Path;
 

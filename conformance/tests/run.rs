@@ -8,6 +8,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use esl::Config;
+use esl::command::{exit_status, parse_size};
 use esl::host::VirtualHost;
 use esl::program::{self, Compiled, Program, Source};
 use esl_bytecode::diagnostic::Severity;
@@ -99,7 +100,7 @@ fn config(options: &[String], setting: Setting) -> Result<Config, Failed> {
     for pair in options.chunks(2) {
         let [option, value] = pair else { return Err(format!("`{}` needs a value", pair[0]).into()) };
         match option.as_str() {
-            "--memory" => config.memory = esl::command::parse_size(value)?,
+            "--memory" => config.memory = parse_size(value)?,
             "--budget" => config.budget = Some(value.parse()?),
             "--slice" => config.slice = value.parse()?,
             "--seed" => config.seed = value.parse()?,
@@ -119,7 +120,7 @@ fn config(options: &[String], setting: Setting) -> Result<Config, Failed> {
 fn run(name: &str, expected: &Expectations, program: &Program, config: Config) -> Result<(), String> {
     let host = VirtualHost::new();
     let captured = host.captured();
-    let report = program::run(program, config, Box::new(host))?;
+    let summary = program::run(program, config, Box::new(host)).map_err(|error| error.to_string())?;
     let (output, errors) = (captured.output(), captured.error());
     let lines: Vec<&str> = output.lines().map(str::trim_end).filter(|line| !line.is_empty()).collect();
     if lines != expected.output {
@@ -132,11 +133,11 @@ fn run(name: &str, expected: &Expectations, program: &Program, config: Config) -
             &lines[first..],
         ));
     }
-    let status = report.ended.status();
+    let status = exit_status(summary.ended);
     if status != expected.expected_status() {
         return Err(format!(
             "ended with status {status} ({:?}), expected {}\nstandard error:\n{errors}",
-            report.ended,
+            summary.ended,
             expected.expected_status()
         ));
     }

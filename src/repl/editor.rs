@@ -1,14 +1,13 @@
 //! Lines from a terminal: editing, history across sessions, completion of names.
 
-use std::io::Write;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
 
 use rustyline::error::ReadlineError;
 use rustyline::history::DefaultHistory;
-use rustyline::{Completer, ExternalPrinter, Helper, Highlighter, Hinter, Validator};
+use rustyline::{Completer, Helper, Highlighter, Hinter, Validator};
 
-use super::typing::{Line, Lines};
+use super::lines::{Line, Lines};
+use super::screen::Screen;
 
 /// The helper of the line editor.
 #[derive(Default, Helper, Hinter, Highlighter, Validator, Completer)]
@@ -17,14 +16,14 @@ struct Names {
     completer: NameCompleter,
 }
 
-/// Completes names: of the language, and those that the person has used. They are in order.
+/// Completes the names of the language, and those that the person has used. They are sorted.
 #[derive(Default)]
 struct NameCompleter {
     names: Vec<String>,
 }
 
 impl NameCompleter {
-    /// Where the name that ends at `position` begins, and all names that begin like it.
+    /// Returns the start of the name that ends at `position`, and all names that begin with that part of it.
     fn candidates(&self, line: &str, position: usize) -> (usize, Vec<String>) {
         let start = line[..position].rfind(|c: char| "()'`,\"# ".contains(c)).map_or(0, |index| index + 1);
         let prefix = line[start..position].to_uppercase();
@@ -50,27 +49,6 @@ impl rustyline::completion::Completer for NameCompleter {
     }
 }
 
-/// What prints above the line that is being edited, once there is an editor.
-#[derive(Clone, Default)]
-pub(super) struct Printer(Arc<Mutex<Option<Box<dyn ExternalPrinter + Send>>>>);
-
-impl Printer {
-    /// From now on prints as if there were no editor.
-    pub(super) fn leave_editor(&self) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
-    }
-
-    /// Prints bytes of the program: above the line that is being edited, if one is.
-    pub(super) fn print(&self, bytes: &[u8]) -> std::io::Result<()> {
-        let mut printer = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(printer) = &mut *printer {
-            return printer.print(String::from_utf8_lossy(bytes).into_owned()).map_err(std::io::Error::other);
-        }
-        let mut out = std::io::stdout().lock();
-        out.write_all(bytes).and_then(|()| out.flush())
-    }
-}
-
 /// A terminal with line editing.
 pub(super) struct Editor {
     editor: Option<rustyline::Editor<Names, DefaultHistory>>,
@@ -78,12 +56,13 @@ pub(super) struct Editor {
 }
 
 impl Editor {
-    /// An editor with the history of earlier sessions, if there is one; its printer goes to `printer`.
-    pub(super) fn new(printer: &Printer) -> Editor {
+    /// Creates an editor with the history of earlier sessions. From now on `screen` prints above the line
+    /// that is edited.
+    pub(super) fn new(screen: &Screen) -> Editor {
         let mut editor = rustyline::Editor::<Names, DefaultHistory>::new().ok();
         let external = editor.as_mut().and_then(|editor| editor.create_external_printer().ok());
         if let Some(external) = external {
-            *printer.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(external));
+            screen.print_through(Box::new(external));
         }
         let history = std::env::home_dir().map(|home| home.join(".esl-history"));
         if let (Some(editor), Some(history)) = (&mut editor, &history) {
@@ -98,7 +77,7 @@ impl Editor {
 impl Lines for Editor {
     fn next(&mut self, prompt: &str) -> Line {
         let Some(editor) = &mut self.editor else {
-            return Line::Failed("the terminal cannot be used".into());
+            return Line::Failed("the terminal cannot be used for editing".into());
         };
         match editor.readline(prompt) {
             Ok(line) => Line::Text(line),
@@ -116,7 +95,7 @@ impl Lines for Editor {
 
     fn remember(&mut self, form: &str) {
         let Some(editor) = &mut self.editor else { return };
-        // A history that cannot be kept is no reason to stop.
+        // The session goes on without a history that cannot be kept.
         _ = editor.add_history_entry(form.replace('\n', " "));
         if let Some(history) = &self.history {
             _ = editor.save_history(history);

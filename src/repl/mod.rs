@@ -1,18 +1,30 @@
-//! The REPL: reads forms, has them evaluated in a machine that lasts, prints their values.
+//! The REPL: reads forms, evaluates them in a machine that lasts, prints their values.
 //!
-//! Lines are gathered until they hold a whole form. With a terminal there are line editing, history and completion; from a
-//! pipe forms are read alike and nothing but results is written. Reading, evaluating and printing are functions of the
-//! library; here is only what has to do with lines.
+//! Lines are gathered until they hold a whole form. At a terminal there are line editing, history and
+//! completion; from a pipe forms are read alike, and nothing but results is written. Reading, evaluating and
+//! printing are functions of the library; this module deals with lines only.
 //!
-//! Tasks that a form has made go on in the background: while other forms are evaluated, and while a line is awaited. They are
-//! aborted, and their cleanups awaited, at the end of the session.
+//! Tasks that a form has made go on in the background: while other forms are evaluated, and while a line is
+//! awaited. At the end of the session they are aborted, and their cleanups awaited.
+//!
+//! ```
+//! use esl::Config;
+//! use esl::module_path::ModulePath;
+//!
+//! // Standard input ends at once here, and so does the session.
+//! let status = esl::repl::run(Config::default(), false, &ModulePath::none());
+//! assert_eq!(status, Ok(0));
+//! ```
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "the REPL talks with people")]
 
 mod editor;
+mod lines;
+mod screen;
 mod terminal;
 mod typing;
 
 use std::io::{IsTerminal, Write};
+use std::ops::ControlFlow::{self, Break, Continue};
 
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_vm::host::{FileAccess, Output, RealHost};
@@ -21,74 +33,70 @@ use esl_vm::task::{TaskId, TaskResult};
 use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
 
-use crate::command::{SUCCESS, USAGE, complain, interrupt_on_signal};
-use crate::library::Library;
+use crate::command::{NOT_COMPILED, SUCCESS, USAGE, complain, interrupt_on_signal};
+use crate::module_path::ModulePath;
 use crate::program;
-use editor::Printer;
-use typing::{Line, Typing};
+use lines::Line;
+use screen::Screen;
+use typing::Typing;
 
-/// The prompt, and the one for further lines of a form.
+/// Prompt for a form.
 const PROMPT: &str = "? ";
+/// Prompt for further lines of a form.
 const CONTINUATION: &str = "  ";
 
-/// Runs the REPL until the end of the input or `:quit`, with the modules of `library`. Gives the exit status.
+/// Runs the REPL until the end of the input or `:quit`, with the modules of `path`. Returns the exit status.
 ///
 /// # Errors
-/// The exit status, if the machine could not be made.
-pub fn run(config: Config, virtual_time: bool, library: &Library) -> Result<u8, u8> {
+/// The exit status, after a message, if the machine could not be made or standard input cannot be read.
+pub fn run(config: Config, virtual_time: bool, path: &ModulePath) -> Result<u8, u8> {
     let mut host = RealHost::new(Vec::new()).with_files(FileAccess::All);
     let is_interactive = std::io::stdin().is_terminal();
-    let printer = Printer::default();
+    let screen = Screen::default();
     if is_interactive {
-        let printer = printer.clone();
-        host = host.with_screen(Box::new(move |bytes| printer.print(bytes)));
+        let screen = screen.clone();
+        host = host.with_screen(Box::new(move |bytes| screen.print(bytes)));
     }
     if virtual_time {
         host = host.with_virtual_time();
     }
     let waker = host.waker();
-    let setup = |text| {
-        complain(text);
+    let setup = |error| {
+        complain(error);
         USAGE
     };
     let mut machine = program::machine(config, Box::new(host)).map_err(setup)?;
-    program::set_library(&mut machine, library).map_err(setup)?;
+    program::set_module_path(&mut machine, path).map_err(setup)?;
     machine.complain_to(Output::Standard);
-    let typing = Typing::begin(is_interactive, printer, machine.stop_flag(), waker.clone())
-        .map_err(|error| setup(format!("no thread can be made: {error}")))?;
-    let mut session = Session { machine, typing, virtual_time, failure: None };
-    session.call("%REPL-BEGIN", "");
-    interrupt_on_signal(session.machine.interrupt_flag(), waker);
-    let status = session.talk();
-    session.machine.abort_all();
-    session.machine.run(u64::MAX);
-    session.machine.flush();
+    let typing =
+        Typing::begin(is_interactive, screen, machine.stop_flag(), waker.clone()).map_err(|error| {
+            complain(format_args!("no thread can be made to read standard input: {error}"));
+            USAGE
+        })?;
+    let mut repl = Repl { machine, typing, virtual_time, failure: None };
+    repl.call("%REPL-BEGIN", "");
+    interrupt_on_signal(repl.machine.interrupt_flag(), waker);
+    let status = repl.talk();
+    repl.machine.abort_all();
+    repl.machine.run(u64::MAX);
+    repl.machine.flush();
     status
 }
 
 /// Ticks that background tasks run between two looks at what they have written.
 const BACKGROUND_TICKS: u64 = 100_000;
 
-struct Session {
+/// A session: the machine, and the lines that are typed.
+struct Repl {
     machine: Vm,
     typing: Typing,
     /// Whether time passes only while a form is evaluated.
     virtual_time: bool,
-    /// The report of the last failure, for `:bt`.
+    /// Report of the last failure, for `:bt`.
     failure: Option<String>,
 }
 
-/// What is to be done after a form.
-enum Next {
-    /// Read the next one.
-    Form,
-    /// The text is the beginning of a form.
-    More,
-    /// End with this status.
-    Quit(u8),
-}
-
-impl Session {
+impl Repl {
     /// Runs background tasks until the next line has come.
     fn next_line(&mut self, prompt: &'static str) -> Line {
         self.typing.ask(prompt);
@@ -114,6 +122,7 @@ impl Session {
         }
     }
 
+    /// Evaluates lines until the session ends. Returns the exit status.
     fn talk(&mut self) -> Result<u8, u8> {
         let mut text = String::new();
         loop {
@@ -122,15 +131,13 @@ impl Session {
                 self.typing.learn(self.machine.accessible_names());
             }
             let line = self.next_line(prompt);
-            if let Next::Quit(status) = self.next() {
-                // A task has asked for the end meanwhile.
+            if let Break(status) = self.unless_exited() {
+                // A background task has asked for the end.
                 return Ok(status);
             }
             match line {
-                Line::Text(line)
-                    if text.is_empty() && line.trim_start().starts_with(':') && is_command(&line) =>
-                {
-                    if let Next::Quit(status) = self.command(line.trim()) {
+                Line::Text(line) if text.is_empty() && is_command(&line) => {
+                    if let Break(status) = self.command(line.trim()) {
                         return Ok(status);
                     }
                     self.typing.remember(&line);
@@ -138,18 +145,20 @@ impl Session {
                 Line::Text(line) => {
                     text.push_str(&line);
                     text.push('\n');
-                    match self.evaluate(&text) {
-                        Next::More => {}
-                        Next::Form => self.typing.remember(std::mem::take(&mut text).trim_end()),
-                        Next::Quit(status) => return Ok(status),
+                    let is_whole = self.evaluate(&text);
+                    if let Break(status) = self.unless_exited() {
+                        return Ok(status);
+                    }
+                    if is_whole {
+                        self.typing.remember(std::mem::take(&mut text).trim_end());
                     }
                 }
                 Line::Dropped => text.clear(),
                 Line::End => {
                     if !text.trim().is_empty() {
-                        // The rest is no whole form: say so.
+                        // The rest is not a whole form: reading it again reports what is missing.
                         self.call("%REPL-INCOMPLETE", &text);
-                        return Ok(crate::command::NOT_COMPILED);
+                        return Ok(NOT_COMPILED);
                     }
                     self.machine.flush();
                     return Ok(SUCCESS);
@@ -162,28 +171,26 @@ impl Session {
         }
     }
 
-    /// Evaluates the forms of a text and prints their values, unless the last form is incomplete.
-    fn evaluate(&mut self, text: &str) -> Next {
-        match self.call("%REPL-EVALUATE", text) {
-            Some(value) => match self.machine.export(value).ok().as_ref().map(Datum::kind) {
-                Some(DatumKind::Symbol(symbol)) if symbol.name() == "MORE" => Next::More,
-                _ => self.next(),
-            },
-            None => self.next(),
-        }
+    /// Evaluates the forms of a text and prints their values. Returns whether the last form is complete; if
+    /// it is not, nothing has been evaluated.
+    fn evaluate(&mut self, text: &str) -> bool {
+        let Some(value) = self.call("%REPL-EVALUATE", text) else { return true };
+        let datum = self.machine.export(value).ok();
+        !matches!(datum.as_ref().map(Datum::kind), Some(DatumKind::Symbol(symbol)) if symbol.name() == "MORE")
     }
 
-    /// What follows an evaluation: the next form, unless the program has asked for the end.
-    fn next(&self) -> Next {
-        self.machine.exit_status().map_or(Next::Form, Next::Quit)
+    /// Breaks with the exit status that the program has asked to end with.
+    fn unless_exited(&self) -> ControlFlow<u8> {
+        self.machine.exit_status().map_or(Continue(()), Break)
     }
 
-    fn command(&mut self, line: &str) -> Next {
+    /// Obeys a command of the REPL; breaks with the exit status at the end of the session.
+    fn command(&mut self, line: &str) -> ControlFlow<u8> {
         let (command, argument) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         match command {
             ":quit" | ":exit" => {
                 self.machine.flush();
-                return Next::Quit(SUCCESS);
+                return Break(SUCCESS);
             }
             ":load" => {
                 let path = argument.trim();
@@ -197,13 +204,13 @@ impl Session {
             ":tasks" => print!("{}", self.machine.task_report()),
             _ => print!("{HELP}"),
         }
-        self.next()
+        self.unless_exited()
     }
 
     /// Runs the machine until `task` has ended, or can never do so.
     fn run(&mut self, task: TaskId) -> RunOutcome {
         loop {
-            // A line that is awaited does not end an evaluation; it may have come just now.
+            // A requested line does not end an evaluation; it may have come just now.
             match self.machine.run_until(Some(task), u64::MAX) {
                 RunOutcome::Stopped => {}
                 outcome => return outcome,
@@ -211,13 +218,14 @@ impl Session {
         }
     }
 
-    /// Calls a function of the library with a text, in a task that Ctrl-C aborts. `None` if it did not return.
+    /// Calls a function of the library with a text, in a task that Ctrl-C aborts. Returns nothing if it did
+    /// not return.
     fn call(&mut self, function: &str, text: &str) -> Option<Value> {
         let text = self.machine.import(&Datum::string(text, Default::default())).ok()?;
         let task = match self.machine.spawn_library(function, &[text]) {
             Ok(task) => task,
-            Err(text) => {
-                complain(text);
+            Err(error) => {
+                complain(error);
                 return None;
             }
         };
@@ -242,18 +250,18 @@ impl Session {
                 }
                 None => println!("Aborted"),
             },
-            // What the task has written may end within a line.
+            // The output of the task may have ended within a line.
             _ if self.machine.exit_status().is_none() => _ = self.call("%REPL-ABORTED", ""),
             _ => {}
         }
-        // What could not be written will be missed when the next value is.
+        // A standard output that cannot be written is noticed when the next value is printed.
         _ = std::io::stdout().flush();
         None
     }
 }
 
-/// What is shown of a failure's report at once: what went wrong, unless the last lines say that already, and those. What is
-/// left out are the frames, which `:bt` shows.
+/// Returns the part of a failure's report that is shown at once: what went wrong, unless the last lines say
+/// so already, and the last lines. `:bt` shows the rest, the frames.
 fn in_short(report: &str) -> String {
     let lines: Vec<&str> = report.lines().collect();
     let ending = lines.len().saturating_sub(2);
@@ -264,7 +272,7 @@ fn in_short(report: &str) -> String {
     shown.flat_map(|line| [line, "\n"]).collect()
 }
 
-/// Whether a line that begins with a colon is a command of the REPL, not a keyword to be evaluated.
+/// Returns whether a line is a command of the REPL, not a keyword to be evaluated.
 fn is_command(line: &str) -> bool {
     let word = line.split_whitespace().next().unwrap_or("");
     matches!(word, ":quit" | ":exit" | ":load" | ":bt" | ":tasks" | ":help")

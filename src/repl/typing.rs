@@ -1,80 +1,51 @@
-//! Lines that are typed while the machine runs: a thread of its own waits for them.
+//! Lines that are typed while the machine runs: a thread of their own waits for them.
 //!
-//! It reads a line only when it is asked to, so that a program that is evaluated has the standard input to itself.
+//! The thread reads a line only on request, so that a form that is being evaluated has the standard input to
+//! itself.
 
-use std::io::BufRead;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use esl_vm::host::Waker;
 
-use super::editor::{Editor, Printer};
+use super::editor::Editor;
+use super::lines::{Line, Lines, Pipe};
+use super::screen::Screen;
 use super::terminal::Terminal;
 
-/// What reading a line gave.
-pub(super) enum Line {
-    /// A line.
-    Text(String),
-    /// The person wants to drop what was typed so far.
-    Dropped,
-    /// There are no more lines.
-    End,
-    /// Reading failed.
-    Failed(String),
-}
-
-/// Where lines come from.
-pub(super) trait Lines {
-    /// The next line, without its newline.
-    fn next(&mut self, prompt: &str) -> Line;
-    /// Notes a whole form for the history.
-    fn remember(&mut self, _form: &str) {}
-    /// Takes the names that are there now.
-    fn learn(&mut self, _names: Vec<String>) {}
-}
-
-/// Lines from a pipe or a file.
-struct Pipe;
-
-impl Lines for Pipe {
-    fn next(&mut self, _prompt: &str) -> Line {
-        let mut line = String::new();
-        match std::io::stdin().lock().read_line(&mut line) {
-            Ok(0) => Line::End,
-            Ok(_) => Line::Text(line.trim_end_matches(['\n', '\r']).to_string()),
-            Err(error) => Line::Failed(error.to_string()),
-        }
-    }
-}
-
-/// What the thread is asked for.
+/// Request to the thread.
 enum Request {
-    /// A line, with this prompt.
+    /// Read a line, with this prompt.
     Line(&'static str),
+    /// Add a form to the history.
     Remember(String),
+    /// Take the names to complete from.
     Learn(Vec<String>),
 }
 
-/// The lines of a session.
+/// Source of the lines of a session.
 pub(super) struct Typing {
     requests: Sender<Request>,
     lines: Receiver<Line>,
-    /// Set when a line has come, so that the machine stops what it runs meanwhile.
+    /// Set when a line has come, so that the machine stops its background tasks.
     has_come: Arc<AtomicBool>,
     /// Whether a person types at a terminal.
-    pub is_interactive: bool,
-    /// How the terminal was, if there is one.
+    pub(super) is_interactive: bool,
+    /// Settings of the terminal when the session began.
     terminal: Option<Terminal>,
-    printer: Printer,
+    screen: Screen,
 }
 
 impl Typing {
-    /// Begins to read: from a terminal with an editor, whose printer goes to `printer`, or from a pipe. When a line comes, the flag
-    /// is set and the machine woken.
+    /// Starts the thread: it reads from a terminal, with an editor that prints through `screen`, or from a
+    /// pipe. When a line comes, it sets the flag and wakes the machine.
+    ///
+    /// # Errors
+    /// If the system makes no thread.
     pub(super) fn begin(
         is_interactive: bool,
-        printer: Printer,
+        screen: Screen,
         has_come: Arc<AtomicBool>,
         waker: Waker,
     ) -> std::io::Result<Typing> {
@@ -82,7 +53,7 @@ impl Typing {
         let (answer, lines) = channel();
         let flag = has_come.clone();
         let terminal = if is_interactive { Terminal::now() } else { None };
-        let above = printer.clone();
+        let above = screen.clone();
         std::thread::Builder::new().name("typing".into()).spawn(move || {
             let mut source: Box<dyn Lines> =
                 if is_interactive { Box::new(Editor::new(&above)) } else { Box::new(Pipe) };
@@ -102,50 +73,50 @@ impl Typing {
                 }
             }
         })?;
-        Ok(Typing { requests, lines, has_come, is_interactive, terminal, printer })
+        Ok(Typing { requests, lines, has_come, is_interactive, terminal, screen })
     }
 
     fn request(&self, request: Request) {
-        // Without the thread there is nothing to ask; `take` and `wait` say so.
+        // Without the thread there is nobody to ask; `wait` reports that.
         _ = self.requests.send(request);
     }
 
-    /// Has the next line read.
+    /// Requests the next line.
     pub(super) fn ask(&self, prompt: &'static str) {
         self.request(Request::Line(prompt));
     }
 
-    /// Gives up the line that is awaited, for good; whether that can be done.
+    /// Gives up the requested line, for good, and restores the terminal. Returns whether that could be done.
     pub(super) fn leave(&self) -> bool {
         if !self.is_interactive {
             return true;
         }
         let is_left = self.terminal.as_ref().is_some_and(Terminal::restore);
         if is_left {
-            self.printer.leave_editor();
+            self.screen.leave_editor();
         }
         is_left
     }
 
-    /// Notes a whole form for the history.
+    /// Adds a whole form to the history.
     pub(super) fn remember(&self, form: &str) {
         self.request(Request::Remember(form.into()));
     }
 
-    /// Takes the names that are there now, to complete what is typed.
+    /// Hands over the names to complete from.
     pub(super) fn learn(&self, names: Vec<String>) {
         self.request(Request::Learn(names));
     }
 
-    /// The line that was asked for, if it has come.
+    /// Takes the requested line, if it has come.
     pub(super) fn take(&self) -> Option<Line> {
         self.lines.try_recv().ok().inspect(|_| self.has_come.store(false, Ordering::Relaxed))
     }
 
-    /// Waits for the line that was asked for.
+    /// Waits for the requested line.
     pub(super) fn wait(&self) -> Line {
         let line = self.lines.recv();
         self.has_come.store(false, Ordering::Relaxed);
-        line.unwrap_or_else(|_| Line::Failed("its reader is gone".into()))
+        line.unwrap_or_else(|_| Line::Failed("the thread that reads it has ended".into()))
     }
 }

@@ -4,24 +4,49 @@
 //! machine maps it, and decodes a function at its first call.
 #![forbid(unsafe_code)]
 
+use std::fmt;
+
 use esl_bytecode::file::{ImageBytes, ModuleImage};
 use esl_bytecode::symbol::{ESL_PACKAGE, USER_PACKAGE};
+use esl_vm::load::LoadError;
+use esl_vm::run::CallError;
 use esl_vm::vm::Vm;
 
 /// The image: the bytes of an `.eslb` file.
 pub static IMAGE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/image.eslb"));
 
+/// Reason why a machine does not get the library. With an intact image, that is want of memory.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum StdlibError {
+    /// The image was not loaded.
+    Image(LoadError),
+    /// A top-level form of the library did not return.
+    Toplevel(CallError),
+}
+
+impl fmt::Display for StdlibError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            StdlibError::Image(error) => write!(f, "the library cannot be loaded: {error}"),
+            StdlibError::Toplevel(error) => write!(f, "the library cannot be started: {error}"),
+        }
+    }
+}
+
+impl std::error::Error for StdlibError {}
+
 /// Loads the library into a machine that has none.
 ///
 /// # Errors
-/// Returns a text if the machine's memory limit leaves no room for the library.
-pub fn load(machine: &mut Vm) -> Result<(), String> {
-    let image = ModuleImage::open_trusted(ImageBytes::Static(IMAGE)).map_err(|error| error.to_string())?;
-    let no_room = "there is no memory for the library";
-    machine.enter_package(ESL_PACKAGE).map_err(|_| no_room)?;
-    let functions = machine.open_image(image).map_err(|error| error.to_string())?;
-    machine.run_toplevel(functions, u64::MAX).map_err(|error| error.to_string())?;
-    machine.enter_package(USER_PACKAGE).map_err(|_| no_room)?;
+/// [`StdlibError`], if the machine's limit of memory leaves no room for the library.
+pub fn load(machine: &mut Vm) -> Result<(), StdlibError> {
+    let image = ModuleImage::open_trusted(ImageBytes::Static(IMAGE));
+    let image = image.map_err(|error| StdlibError::Image(error.into()))?;
+    let no_room = |error| StdlibError::Image(LoadError::Alloc(error));
+    machine.enter_package(ESL_PACKAGE).map_err(no_room)?;
+    let functions = machine.open_image(image).map_err(StdlibError::Image)?;
+    machine.run_toplevel(functions, u64::MAX).map_err(StdlibError::Toplevel)?;
+    machine.enter_package(USER_PACKAGE).map_err(no_room)?;
     machine.seal();
     Ok(())
 }

@@ -1,5 +1,5 @@
-//! Wrong command lines and damaged, endless or huge input: each ends with a message and the right status, without a crash or
-//! a wait without end.
+//! Wrong command lines and damaged, endless or huge input: each ends with a message and the right status,
+//! without a crash or a wait without end.
 
 use std::io::{Read, Write};
 use std::process::{Child, Command, Stdio};
@@ -101,7 +101,7 @@ fn files_that_cannot_be_read() {
         std::fs::set_permissions(&source, std::fs::Permissions::from_mode(0o000)).expect("it is our file");
         // Whoever may read everything is not kept from it.
         if std::fs::read(&source).is_err() {
-            check(&run(&mut eslvm(&["run", &source]), b""), 2, "it may not be read");
+            check(&run(&mut eslvm(&["run", &source]), b""), 2, "permission denied");
         }
         std::fs::set_permissions(&source, std::fs::Permissions::from_mode(0o600)).expect("it is our file");
     }
@@ -129,7 +129,7 @@ fn wrong_command_lines() {
     ] {
         check(&run(&mut eslvm(arguments), b""), 2, message);
     }
-    check(&run(&mut eslc(&["compile", "-"]), b"(print 1)"), 2, "say with -o");
+    check(&run(&mut eslc(&["compile", "-"]), b"(print 1)"), 2, "say with -o where it goes");
     assert_eq!(run(&mut eslvm(&["--help"]), b"").status, Some(0));
     assert_eq!(run(&mut eslc(&["--version"]), b"").status, Some(0));
 }
@@ -146,13 +146,13 @@ fn damaged_bytecode() {
     check(&run(&mut eslc(&["compile", &compiled]), b""), 2, "is compiled already");
     for length in [0, 4, 8, 31, 100, bytes.len() / 2, bytes.len() - 1] {
         let path = folder.file("short.eslb", &bytes[..length]);
-        check(&run(&mut eslvm(&["run", &path]), b""), 3, "short.eslb is no sound program");
+        check(&run(&mut eslvm(&["run", &path]), b""), 3, "short.eslb is not a valid program");
     }
     for position in (0..bytes.len()).step_by(bytes.len() / 40) {
         let mut changed = bytes.clone();
         changed[position] ^= 1 << (position % 8);
         let path = folder.file("changed.eslb", changed);
-        check(&run(&mut eslvm(&["run", &path]), b""), 3, "changed.eslb is no sound program");
+        check(&run(&mut eslvm(&["run", &path]), b""), 3, "changed.eslb is not a valid program");
     }
     let path = folder.file("source.eslb", "(print 1)");
     check(&run(&mut eslvm(&["run", &path]), b""), 3, "not a compiled ESL file");

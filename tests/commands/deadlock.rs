@@ -14,7 +14,8 @@ fn lines(name: &str, report: &str) -> Vec<String> {
     report.lines().map(|line| short(line.trim())).collect()
 }
 
-/// A tail call leaves no frame of the function that waits; the report then names the form with which the task began.
+/// A tail call leaves no frame of the function that waits; the report then names the form with which the task
+/// began.
 #[test]
 fn every_task_that_waits_is_named_with_its_place() {
     let program = r#"(defvar *door* (make-event 'door)) (defvar *main* (current-task))

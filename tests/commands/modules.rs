@@ -15,8 +15,8 @@ impl Folder {
         std::fs::copy(self.path().join(from), self.path().join(to)).expect("a file can be copied");
     }
 
-    /// Runs a command with `library` as `ESL_LIBRARY`. Returns its status, the lines of its output that are not empty, and
-    /// its errors.
+    /// Runs a command with `library` as `ESL_LIBRARY`. Returns its status, the lines of its output that are
+    /// not empty, and its errors.
     fn run(&self, program: &str, arguments: &[&str], library: &str) -> (i32, String, String) {
         let mut command = command(program, arguments);
         let run = process::run(command.current_dir(self.path()).env("ESL_LIBRARY", library), "");
@@ -205,11 +205,11 @@ fn a_damaged_module_is_refused() {
     folder.file("a.eslb", b"no bytecode");
     let (status, _, errors) = folder.run(ESLVM, &["run", "main.esl"], "");
     assert_eq!(status, 1);
-    assert!(errors.contains("it is no sound program"), "{errors}");
+    assert!(errors.contains("it is not a valid program"), "{errors}");
     folder.file("main.esl", "(require \"a\")");
     let (status, _, errors) = folder.run(ESLVM, &["run", "main.esl"], "");
     assert_eq!(status, 3);
-    assert!(errors.contains("`./a.eslb` is no sound program"), "{errors}");
+    assert!(errors.contains("`./a.eslb` is not a valid program"), "{errors}");
 }
 
 #[test]
@@ -227,7 +227,8 @@ fn files_that_are_compiled_together_share_their_modules() {
     folder.check_run(&["out.eslb"], "1\n2");
 }
 
-/// What is in the files of the next test, and what is said about them: positions in the file, not in the form.
+/// What is in the files of the next test, and what is said about them: positions in the file, not in the
+/// form.
 const MISTAKES: [(&str, &str, &str); 3] = [
     (
         "warned.esl",
@@ -295,7 +296,8 @@ fn what_is_wrong_in_a_file_that_is_loaded_is_reported_there() {
         let (status, _, errors) = folder.run(ESLVM, &["run", "main.esl"], "");
         assert_eq!(status, i32::from(!is_warned), "{errors}");
         assert!(errors.starts_with(said), "{name}:\n{errors}");
-        // A module is compiled as a whole, and when it is required as the program runs, by what the machine brings along.
+        // A module is compiled as a whole, and when it is required as the program runs, by what the machine
+        // brings along.
         let module = name.trim_end_matches(".esl");
         let text = format!("(let ((name \"{module}\")) (require name))");
         folder.file("main.esl", text);

@@ -1,4 +1,5 @@
-//! `eslvm run --timeline`: the trace keeps the rules of the Trace Event Format, and holds what happened; so does the drawing.
+//! `eslvm run --timeline`: the trace keeps the rules of the Trace Event Format, and holds what happened; so
+//! does the drawing.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -44,8 +45,8 @@ fn text<'a>(event: &'a Value, member: &str) -> &'a str {
     event[member].as_str().unwrap_or_else(|| panic!("no {member} in {event}"))
 }
 
-/// Asserts that a trace keeps the rules: what each phase needs, times in order, slices that nest and end, flows with two ends
-/// inside slices. Gives its events.
+/// Asserts that a trace keeps the rules: what each phase needs, times in order, slices that nest and end,
+/// flows with two ends inside slices. Gives its events.
 fn check(trace: &str) -> Vec<Value> {
     let mut trace: Value = serde_json::from_str(trace).expect("it is JSON");
     assert!(matches!(text(&trace, "displayTimeUnit"), "ms" | "ns"));

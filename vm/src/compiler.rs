@@ -9,6 +9,7 @@ use std::cell::RefCell;
 use std::sync::Arc;
 
 use esl_bytecode::compile::{Compilation, Compile, Part, Step};
+use esl_bytecode::diagnostic::Diagnostic;
 use slotmap::{Key, KeyData, SlotMap, new_key_type};
 
 use crate::datum::Unit;
@@ -72,6 +73,8 @@ pub(crate) struct ActiveCompilation {
     pub(crate) step: Option<Step>,
     /// Whether it waits for the value of a module that was to be loaded.
     pub(crate) keeps: bool,
+    /// Whether its form comes from a text without a name, as the embedder's do.
+    pub(crate) is_nameless: bool,
 }
 
 /// The compiler of a machine, and the jobs of its programs.
@@ -83,6 +86,8 @@ pub(crate) struct Compiler {
     pub(crate) jobs: SlotMap<JobId, CompilerJob>,
     /// Objects and uninterned symbols of the compilation under way.
     pub(crate) unit: RefCell<Unit>,
+    /// Errors of the form of a nameless text that was refused last, for the embedder.
+    pub(crate) refused: Vec<Diagnostic>,
 }
 
 impl Compiler {

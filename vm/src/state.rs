@@ -127,7 +127,7 @@ state! {
     /// Visits the content of a compiler.
     Compiler by VisitCompiler :: compiler_content {
         content { jobs }
-        transient { unit }
+        transient { unit, refused }
         process { compiler }
     }
 }

@@ -3,7 +3,7 @@
 mod defects;
 mod putting_back;
 
-use esl::explore::{Exploration, Grain, Outcome, Settings, explore, follow};
+use esl::explore::{Behaviour, Exploration, Grain, Settings, explore, follow};
 use esl::program::{self, Ended, Program, Source};
 
 pub(crate) fn compile(text: &str) -> Program {
@@ -18,7 +18,7 @@ fn say<T>(grain: Grain, found: &Exploration<T>) {
 }
 
 /// Explores a program, and checks that the choices of each ending lead to it again.
-pub(crate) fn endings(text: &str, grain: Grain) -> Exploration<Outcome> {
+pub(crate) fn endings(text: &str, grain: Grain) -> Exploration<Behaviour> {
     let program = compile(text);
     let settings = Settings { grain, ..Settings::default() };
     let found = explore(&program, &settings).expect("the program can start");
@@ -32,10 +32,10 @@ pub(crate) fn endings(text: &str, grain: Grain) -> Exploration<Outcome> {
 }
 
 /// Returns the sorted outputs of an exploration whose runs have all ended well.
-fn outputs(found: &Exploration<Outcome>) -> Vec<String> {
+fn outputs(found: &Exploration<Behaviour>) -> Vec<String> {
     let mut outputs = Vec::new();
     for ending in &found.endings {
-        let Outcome { ended, output, errors } = &ending.what;
+        let Behaviour { ended, output, errors } = &ending.what;
         assert_eq!(*ended, Ended::Normally(0), "choices {:?}\n{output}{errors}", ending.choices);
         outputs.push(output.split_whitespace().collect::<Vec<_>>().join(" "));
     }
@@ -45,7 +45,7 @@ fn outputs(found: &Exploration<Outcome>) -> Vec<String> {
 }
 
 /// Checks that a program ends well under every schedule, with exactly the `expected` outputs.
-pub(crate) fn check(text: &str, grain: Grain, expected: &[&str]) -> Exploration<Outcome> {
+pub(crate) fn check(text: &str, grain: Grain, expected: &[&str]) -> Exploration<Behaviour> {
     let found = endings(text, grain);
     assert_eq!(outputs(&found), expected);
     assert_eq!((&found.endless, found.has_cycle), (&None, false), "a run may never end");

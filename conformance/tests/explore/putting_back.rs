@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use esl::host::VirtualHost;
-use esl::{Config, program};
+use esl::{Config, Error, program};
 use esl_bytecode::compile::{Compile, drive};
 use esl_bytecode::diagnostic::Severity;
 use esl_bytecode::module::Module;
@@ -68,22 +68,22 @@ fn compile(text: &str) -> Module {
 }
 
 /// Does `work` in a machine whose language packages are unlocked for the duration.
-fn opened(machine: &mut Vm, work: impl FnOnce(&mut Vm) -> Result<(), String>) -> Result<(), String> {
-    let no_room = |_| "out of memory".to_string();
+fn opened(machine: &mut Vm, work: impl FnOnce(&mut Vm) -> Result<(), Error>) -> Result<(), Error> {
     machine.unseal();
-    machine.enter_package(ESL_PACKAGE).map_err(no_room)?;
+    machine.enter_package(ESL_PACKAGE).map_err(|_| Error::NoMemory("a package"))?;
     work(machine)?;
-    machine.enter_package(USER_PACKAGE).map_err(no_room)?;
+    machine.enter_package(USER_PACKAGE).map_err(|_| Error::NoMemory("a package"))?;
     machine.seal();
     Ok(())
 }
 
 impl Defect {
     /// Replaces the functions in a machine's library.
-    pub(crate) fn put_into(&self, machine: &mut Vm) -> Result<(), String> {
+    pub(crate) fn put_into(&self, machine: &mut Vm) -> Result<(), Error> {
         opened(machine, |machine| {
-            let functions = machine.load_module(&self.module).map_err(|error| error.to_string())?;
-            machine.run_toplevel(functions, u64::MAX).map(|_| ()).map_err(|error| error.to_string())
+            let functions = machine.load_module(&self.module)?;
+            machine.run_toplevel(functions, u64::MAX)?;
+            Ok(())
         })
     }
 }

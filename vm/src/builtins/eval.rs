@@ -41,8 +41,9 @@ fn is_unfinished(code: &str) -> bool {
 }
 
 impl Vm {
-    fn begin(&mut self, compilation: Box<dyn Compilation>, unit: Unit) -> Value {
-        let running = ActiveCompilation { compilation, unit, step: None, keeps: false };
+    /// Begins a compilation and returns its handle. `is_nameless` says whether its form comes from a text without a name.
+    fn begin(&mut self, compilation: Box<dyn Compilation>, unit: Unit, is_nameless: bool) -> Value {
+        let running = ActiveCompilation { compilation, unit, step: None, keeps: false, is_nameless };
         self.compiler.add(CompilerJob::Compilation(Box::new(running)))
     }
 
@@ -143,8 +144,9 @@ impl Vm {
     fn read_datum(&mut self, text: &str, start: usize, name: Option<&str>) -> Result<Read, Exit> {
         let read = environment::with_compiler(self, |vm, compiler| {
             let read = compiler.read(vm, text, start);
-            read.map_err(|diagnostic| {
-                (is_unfinished(diagnostic.code), compiler.render(&diagnostic, name, text))
+            read.map_err(|diagnostic| ReadFault {
+                text: compiler.render(&diagnostic, name, text),
+                diagnostic,
             })
         })?;
         let end = read.as_ref().map_or(text.len(), |&(_, end)| end);
@@ -152,8 +154,7 @@ impl Vm {
         match read {
             Ok((Some(datum), end)) => Ok(Read::Datum(datum, end)),
             Ok((None, _)) => Ok(Read::End),
-            Err((true, text)) => Ok(Read::Unfinished(text)),
-            Err((false, text)) => self.exchange.raise(Raised::Reader(text)),
+            Err(fault) => Ok(Read::Fault(fault)),
         }
     }
 
@@ -166,21 +167,35 @@ impl Vm {
     }
 }
 
-/// What came of reading.
+/// Result of reading.
 enum Read {
     /// A datum, and the offset of the byte after it.
     Datum(Datum, usize),
-    /// There is nothing but white space.
+    /// Nothing but white space.
     End,
-    /// The datum goes on after the end of the text, of which this is said.
-    Unfinished(String),
+    /// No datum.
+    Fault(ReadFault),
+}
+
+/// Fault in a text that is read.
+struct ReadFault {
+    diagnostic: Box<Diagnostic>,
+    /// The diagnostic, drawn for people.
+    text: String,
+}
+
+impl ReadFault {
+    /// Returns whether the text ends in the middle of a datum.
+    fn is_unfinished(&self) -> bool {
+        is_unfinished(self.diagnostic.code)
+    }
 }
 
 pub(super) fn begin_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut unit = Unit::default();
     let form = vm.as_form(&mut unit, arguments[0], Span::default())?;
     let compilation = environment::with_compiler(vm, |_, compiler| compiler.compile_form(form, None))?;
-    Ok(vm.begin(compilation, unit))
+    Ok(vm.begin(compilation, unit, false))
 }
 
 pub(super) fn begin_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -189,7 +204,7 @@ pub(super) fn begin_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(text) = vm.text_of(text) else { return vm.exchange.type_error(text, "STRING") };
     vm.exchange.charge(text.len());
     let compilation = environment::with_compiler(vm, |_, compiler| compiler.compile_text(&name, &text))?;
-    Ok(vm.begin(compilation, Unit::default()))
+    Ok(vm.begin(compilation, Unit::default(), false))
 }
 
 pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -206,7 +221,7 @@ pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             let functions = load(&mut vm.heap, &mut vm.world, &module, &mut Alone::default());
             vm.exchange.loaded(functions)
         }
-        Err(reason) => vm.exchange.raise(Raised::File(path, format!("it is no sound program: {reason}"))),
+        Err(reason) => vm.exchange.raise(Raised::File(path, format!("it is not a valid program: {reason}"))),
     }
 }
 
@@ -234,13 +249,19 @@ pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 fn begin_form(vm: &mut Vm, text: &mut FormText) -> Outcome {
     match vm.read_datum(&text.text, text.position, text.name.as_deref())? {
         Read::End => Ok(Value::NIL),
-        Read::Unfinished(what) => vm.exchange.raise(Raised::Reader(what)),
+        Read::Fault(fault) => {
+            if text.name.is_none() {
+                vm.compiler.refused = vec![*fault.diagnostic];
+            }
+            vm.exchange.raise(Raised::Reader(fault.text))
+        }
         Read::Datum(datum, end) => {
             let part = text.part(end);
+            let is_nameless = part.is_none();
             let compilation =
                 environment::with_compiler(vm, |_, compiler| compiler.compile_form(datum, part))?;
             text.pass(end);
-            Ok(vm.begin(compilation, Unit::default()))
+            Ok(vm.begin(compilation, Unit::default(), is_nameless))
         }
     }
 }
@@ -267,6 +288,10 @@ fn step(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Valu
             running.unit = vm.compiler.unit.replace(outer);
             // A node is worth more than a cell of a list.
             vm.exchange.charge(nodes as usize * 16);
+            if let (Step::Done(None, diagnostics), true) = (&step, running.is_nameless) {
+                let is_error = |diagnostic: &&Diagnostic| diagnostic.severity == Severity::Error;
+                vm.compiler.refused = diagnostics.iter().filter(is_error).cloned().collect();
+            }
             step
         }
     };
@@ -300,10 +325,11 @@ pub(super) fn read_from_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             vm.give_values(&[Value::T, object, Value::index(end)])
         }
         Read::End => vm.give_values(&[Value::NIL, Value::NIL, Value::index(first + characters.len())]),
-        Read::Unfinished(_) => {
+        Read::Fault(fault) if fault.is_unfinished() => {
             let unfinished = vm.world.known.unfinished;
             vm.give_values(&[unfinished, Value::NIL, Value::index(first + characters.len())])
         }
+        Read::Fault(fault) => vm.exchange.raise(Raised::Reader(fault.text)),
     }
 }
 
@@ -323,12 +349,15 @@ pub(super) fn read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
                 continue;
             }
             Read::Datum(datum, end) => (Value::T, vm.read_object(&datum)?, end),
-            Read::End | Read::Unfinished(_) if may_grow => {
+            Read::Fault(fault) if !fault.is_unfinished() => {
+                return vm.exchange.raise(Raised::Reader(fault.text));
+            }
+            Read::End | Read::Fault(_) if may_grow => {
                 vm.more_input()?;
                 continue;
             }
             Read::End => (Value::NIL, Value::NIL, text.len()),
-            Read::Unfinished(_) => (vm.world.known.unfinished, Value::NIL, text.len()),
+            Read::Fault(_) => (vm.world.known.unfinished, Value::NIL, text.len()),
         };
         vm.skip_source(stream, &source, text[..end].chars().count());
         return vm.give_values(&[status, object]);

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use esl_bytecode::compile::{Compile, CompileTimeHost, LocalDefinition, MacroCall, MacroRef};
 use esl_bytecode::datum::{Datum, ObjectId};
+use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::file::ModuleImage;
 use esl_bytecode::module::{Constant, Function, FunctionNumber, Module, Parameters, PoolIdx};
 use esl_bytecode::opcode::Instr;
@@ -29,6 +30,13 @@ impl Vm {
     /// Gives the machine a compiler, for `eval`, `load` and `read`.
     pub fn set_compiler(&mut self, compiler: Box<dyn Compile>) {
         self.compiler.compiler = Some(compiler);
+    }
+
+    /// Takes the errors of a form that was refused, if `message`, which a call has failed with, is about that
+    /// form. The form is one of a text without a name; spans are those in the text.
+    pub fn take_refused(&mut self, message: &str) -> Option<Vec<Diagnostic>> {
+        let refused = std::mem::take(&mut self.compiler.refused);
+        message.contains(&refused.last()?.message).then_some(refused)
     }
 
     /// Begins to compile another unit. Forgets the objects and uninterned symbols of the last one.

@@ -9,11 +9,18 @@ use crate::task::{End, Task, TaskId, TaskResult};
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// Why a call from outside returned no values.
+/// Reason why a call from outside returned no values.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CallError {
-    /// A failure ended the task. The text says which.
-    Failed(String),
+    /// A failure ended the task.
+    Failed {
+        /// Cause of the failure, or name of the condition's type, as the program prints it: `:TYPE-ERROR`.
+        cause: String,
+        /// Text of the condition.
+        message: String,
+        /// Message, frames of the failure and what they were recovering from.
+        report: String,
+    },
     /// The task was aborted.
     Aborted,
     /// Every task waits for what cannot come.
@@ -31,7 +38,7 @@ pub enum CallError {
 impl fmt::Display for CallError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            CallError::Failed(text) => f.write_str(text),
+            CallError::Failed { message, .. } => f.write_str(message),
             CallError::Aborted => f.write_str("it was aborted"),
             CallError::Deadlocked => f.write_str("it waits for what cannot come"),
             CallError::BudgetSpent => f.write_str("the budget of the run is spent"),
@@ -58,12 +65,14 @@ impl Vm {
         let id = self.spawn(function, arguments).map_err(|_| CallError::NoMemory)?;
         let outcome = self.run_until(Some(id), ticks);
         let result = self.result(id);
+        let report = self.report(id);
         self.forget(id);
         match (result, outcome) {
             (TaskResult::Succeeded(values), _) => Ok(values),
             (TaskResult::Failed(condition), _) => {
-                let text = self.embedder.last_words.take().unwrap_or_else(|| self.describe(condition));
-                Err(CallError::Failed(text))
+                let cause = report::cause_label(&self.heap, condition);
+                let message = self.embedder.last_words.take().unwrap_or_else(|| self.describe(condition));
+                Err(CallError::Failed { cause, message, report: report.unwrap_or_default() })
             }
             (TaskResult::Aborted, _) => Err(CallError::Aborted),
             (TaskResult::Running, RunOutcome::Waiting) => Err(CallError::Deadlocked),

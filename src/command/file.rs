@@ -1,0 +1,89 @@
+//! Reading the files that a command is given.
+
+use std::fs::File;
+use std::io::{ErrorKind, IsTerminal, Read};
+use std::path::Path;
+
+use esl_bytecode::file::MAGIC;
+use esl_compiler::diagnostic::{Format, Renderer, Sources};
+use esl_compiler::reader::decode;
+
+use super::{NOT_COMPILED, USAGE, complain};
+use crate::program::{Program, Source};
+
+/// Size in bytes beyond which a file is refused: nobody has written that much, or it does not end at all.
+const MAX_BYTES: u64 = 64 << 20;
+
+/// Content of a file that holds a program.
+pub enum ProgramFile {
+    /// Source text.
+    Source(Source),
+    /// Bytecode.
+    Compiled(Program),
+}
+
+/// Reads a source file; `-` is standard input.
+///
+/// # Errors
+/// The exit status, after a message.
+pub fn read_source(path: &Path) -> Result<Source, u8> {
+    let (name, bytes) = read_bytes(path)?;
+    if bytes.starts_with(&MAGIC) {
+        complain(format_args!("{name} is compiled already; name its source"));
+        return Err(USAGE);
+    }
+    source(name, bytes)
+}
+
+/// Reads a source or a bytecode file, which its first bytes tell apart; `-` is standard input.
+///
+/// # Errors
+/// The exit status, after a message.
+pub fn read_program(path: &Path) -> Result<ProgramFile, u8> {
+    let (name, bytes) = read_bytes(path)?;
+    if !bytes.starts_with(&MAGIC) && path.extension().is_none_or(|extension| extension != "eslb") {
+        return source(name, bytes).map(ProgramFile::Source);
+    }
+    Program::from_bytes(&bytes).map(ProgramFile::Compiled).map_err(|error| {
+        complain(format_args!("{name} is not a valid program: {error}"));
+        NOT_COMPILED
+    })
+}
+
+fn read_bytes(path: &Path) -> Result<(String, Vec<u8>), u8> {
+    let is_stdin = path.as_os_str() == "-";
+    let name = if is_stdin { "<stdin>".into() } else { path.display().to_string() };
+    let mut bytes = Vec::new();
+    let result = if is_stdin {
+        std::io::stdin().take(MAX_BYTES + 1).read_to_end(&mut bytes)
+    } else {
+        File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
+    };
+    match result {
+        Ok(length) if length as u64 > MAX_BYTES => {
+            complain(format_args!("{name} is too long: at most {} MiB are read", MAX_BYTES >> 20));
+            Err(USAGE)
+        }
+        Ok(_) => Ok((name, bytes)),
+        Err(error) => {
+            let reason = match error.kind() {
+                ErrorKind::NotFound => "there is no such file".into(),
+                ErrorKind::IsADirectory => "it is a directory; name a file in it".into(),
+                ErrorKind::PermissionDenied => "permission denied".into(),
+                _ => error.to_string(),
+            };
+            complain(format_args!("{name} cannot be read: {reason}"));
+            Err(USAGE)
+        }
+    }
+}
+
+fn source(name: String, bytes: Vec<u8>) -> Result<Source, u8> {
+    let mut sources = Sources::new();
+    let id = sources.add(name.clone(), None);
+    decode(id, bytes).map(|text| Source::new(name, text)).map_err(|diagnostic| {
+        let renderer = Renderer { color: std::io::stderr().is_terminal(), format: Format::Human };
+        eprintln!("{}", renderer.render(&diagnostic, &sources));
+        NOT_COMPILED
+    })
+}

@@ -1,0 +1,86 @@
+//! The common part of the commands `eslc` and `eslvm`: exit statuses, reading their files, showing
+//! diagnostics.
+//!
+//! ```
+//! use esl::command::{BUDGET_OR_MEMORY_SPENT, exit_status, parse_size};
+//! use esl::program::Ended;
+//!
+//! assert_eq!(exit_status(Ended::BudgetSpent), BUDGET_OR_MEMORY_SPENT);
+//! assert_eq!(parse_size("64M"), Ok(64 << 20));
+//! ```
+#![allow(clippy::print_stderr, reason = "commands print")]
+
+mod file;
+#[cfg(feature = "cli")]
+mod interrupt;
+mod size;
+
+use std::path::Path;
+
+use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_compiler::diagnostic::{Format, Renderer};
+
+use crate::program::{Compiled, Ended};
+
+pub use file::{ProgramFile, read_program, read_source};
+#[cfg(feature = "cli")]
+pub use interrupt::{end_on_signal, interrupt_on_signal};
+pub use size::{SizeError, parse_size};
+
+/// Exit status of success.
+pub const SUCCESS: u8 = 0;
+/// Exit status of a run whose main task a failure left.
+pub const FAILED: u8 = 1;
+/// Exit status of wrong usage, or of a file that cannot be read or written.
+pub const USAGE: u8 = 2;
+/// Exit status of a program that does not compile, or whose bytecode is refused.
+pub const NOT_COMPILED: u8 = 3;
+/// Exit status of a run in which no task can ever run again.
+pub const DEADLOCKED: u8 = 4;
+/// Exit status of a run that has spent its budget, or needs more memory than it may have.
+pub const BUDGET_OR_MEMORY_SPENT: u8 = 5;
+/// Exit status of a run ended from outside, as shells report a command that Ctrl-C has ended.
+pub const INTERRUPTED: u8 = 130;
+
+/// Returns the exit status of a run.
+pub fn exit_status(ended: Ended) -> u8 {
+    match ended {
+        Ended::Normally(status) => status,
+        Ended::Failed => FAILED,
+        Ended::Deadlocked => DEADLOCKED,
+        Ended::BudgetSpent | Ended::HeapExhausted => BUDGET_OR_MEMORY_SPENT,
+        Ended::Interrupted => INTERRUPTED,
+    }
+}
+
+/// Returns the name of the running command, for messages.
+fn command_name() -> String {
+    let path = std::env::args_os().next().unwrap_or_default();
+    Path::new(&path).file_stem().map_or("esl".into(), |name| name.to_string_lossy().into_owned())
+}
+
+/// Prints a message of the command itself.
+pub fn complain(text: impl std::fmt::Display) {
+    eprintln!("{}: {text}", command_name());
+}
+
+/// Prints the diagnostics of a compilation and, for people, their number.
+pub fn print_diagnostics(compiled: &Compiled, renderer: &Renderer) {
+    for diagnostic in &compiled.diagnostics {
+        eprintln!("{}\n", renderer.render(diagnostic, &compiled.sources));
+    }
+    if renderer.format == Format::Json || compiled.diagnostics.is_empty() {
+        return;
+    }
+    let is_error = |diagnostic: &&Diagnostic| diagnostic.severity == Severity::Error;
+    let errors = compiled.diagnostics.iter().filter(is_error).count();
+    let warnings = compiled.diagnostics.len() - errors;
+    let count = |n: usize, what: &str| match n {
+        0 => None,
+        1 => Some(format!("1 {what}")),
+        n => Some(format!("{n} {what}s")),
+    };
+    let counts: Vec<String> =
+        [count(errors, "error"), count(warnings, "warning")].into_iter().flatten().collect();
+    complain(counts.join(", "));
+}

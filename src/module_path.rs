@@ -1,0 +1,157 @@
+//! The folders in which `require` looks for modules.
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use esl::module_path::{ModuleError, ModulePath};
+//!
+//! let path = ModulePath::new([Path::new("plant/main.esl")], &["shared".into()]);
+//! assert_eq!(path.folders()[..2], [Path::new("plant"), Path::new("shared")]);
+//! let missing = path.find("no-such-module").expect_err("there is no such file");
+//! assert!(matches!(missing, ModuleError::NotFound { .. }));
+//! ```
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use esl_bytecode::compile::Required;
+use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::file;
+use esl_bytecode::span::SourceId;
+use esl_bytecode::verify::verify;
+use esl_compiler::reader::decode;
+use esl_vm::load::LoadError;
+
+/// The environment variable that names further folders, separated as in `PATH`.
+pub const VARIABLE: &str = "ESL_LIBRARY";
+
+/// Folders, in the order in which they are searched.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ModulePath {
+    folders: Vec<PathBuf>,
+}
+
+/// Reason why a module is not found, or cannot be used.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum ModuleError {
+    /// The name is not one that a file in the folders can have.
+    InvalidName,
+    /// No folder has such a file.
+    NotFound {
+        /// Name of the module.
+        name: String,
+        /// Folders that were searched.
+        folders: Vec<PathBuf>,
+    },
+    /// The file cannot be read.
+    Unreadable(PathBuf, std::io::Error),
+    /// The file is not text in UTF-8.
+    NotText(PathBuf, Box<Diagnostic>),
+    /// The compiled file is damaged, was made by another version, or breaks a rule of the verifier.
+    Refused(PathBuf, LoadError),
+}
+
+impl fmt::Display for ModuleError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ModuleError::InvalidName => f.write_str("expected the name of a file, without its type"),
+            ModuleError::NotFound { folders, .. } if folders.is_empty() => {
+                f.write_str("there are no folders to search: name some with `--library`")
+            }
+            ModuleError::NotFound { name, folders } => {
+                let folders: Vec<String> =
+                    folders.iter().map(|folder| format!("`{}`", folder.display())).collect();
+                write!(f, "there is no `{name}.esl` in {}", folders.join(", "))
+            }
+            ModuleError::Unreadable(path, error) => {
+                write!(f, "`{}` cannot be read: {error}", path.display())
+            }
+            ModuleError::NotText(path, diagnostic) => {
+                write!(f, "`{}`: {}", path.display(), diagnostic.message)
+            }
+            ModuleError::Refused(path, error) => {
+                write!(f, "`{}` is not a valid program: {error}", path.display())
+            }
+        }
+    }
+}
+
+impl std::error::Error for ModuleError {}
+
+impl ModulePath {
+    /// Returns a path without folders.
+    pub fn none() -> ModulePath {
+        ModulePath::default()
+    }
+
+    /// Returns the folders of these files, so that modules beside them are found; then `folders`; then those
+    /// of [`VARIABLE`].
+    pub fn new<'a>(files: impl IntoIterator<Item = &'a Path>, folders: &[PathBuf]) -> ModulePath {
+        let mut path = ModulePath::none();
+        for file in files {
+            let folder = file.parent().filter(|_| file.as_os_str() != "-").unwrap_or(Path::new(""));
+            path.add(if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+        }
+        for folder in folders {
+            path.add(folder);
+        }
+        for folder in std::env::split_paths(&std::env::var_os(VARIABLE).unwrap_or_default()) {
+            if !folder.as_os_str().is_empty() {
+                path.add(&folder);
+            }
+        }
+        path
+    }
+
+    fn add(&mut self, folder: &Path) {
+        if !self.folders.iter().any(|known| known == folder) {
+            self.folders.push(folder.to_path_buf());
+        }
+    }
+
+    /// Returns the folders.
+    pub fn folders(&self) -> &[PathBuf] {
+        &self.folders
+    }
+
+    /// Reads the module of this name for a compilation: its source, or else the compiled file, from the first
+    /// folder that has either.
+    ///
+    /// # Errors
+    /// [`ModuleError`].
+    pub fn find(&self, name: &str) -> Result<Required, ModuleError> {
+        if name.is_empty() || name.starts_with('/') || name.contains("..") {
+            return Err(ModuleError::InvalidName);
+        }
+        for folder in &self.folders {
+            let source = folder.join(format!("{name}.esl"));
+            if source.is_file() {
+                return read_source(&source);
+            }
+            let compiled = folder.join(format!("{name}.eslb"));
+            if compiled.is_file() {
+                return read_compiled(&compiled);
+            }
+        }
+        Err(ModuleError::NotFound { name: name.into(), folders: self.folders.clone() })
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, ModuleError> {
+    std::fs::read(path).map_err(|error| ModuleError::Unreadable(path.into(), error))
+}
+
+fn read_source(path: &Path) -> Result<Required, ModuleError> {
+    let text = decode(SourceId(0), read(path)?)
+        .map_err(|diagnostic| ModuleError::NotText(path.into(), diagnostic))?;
+    let name = path.strip_prefix(".").unwrap_or(path).display().to_string();
+    Ok(Required::Source { name, text: text.into() })
+}
+
+fn read_compiled(path: &Path) -> Result<Required, ModuleError> {
+    let refused = |error| ModuleError::Refused(path.into(), error);
+    let module = file::read(&read(path)?).map_err(|error| refused(error.into()))?;
+    verify(&module).map_err(|error| refused(LoadError::Refused(error)))?;
+    Ok(Required::Compiled(Box::new(module)))
+}

@@ -1,0 +1,134 @@
+//! Compiling sources to a program, and expanding their macros.
+
+use esl_bytecode::compile::drive_with;
+use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::span::Span;
+use esl_compiler::diagnostic::{Sources, code};
+use esl_compiler::session::{Compiler, Texts};
+use esl_vm::host::{FileAccess, RealHost};
+use esl_vm::vm::{Config, Vm};
+
+use super::{Program, Source, machine, set_module_path};
+use crate::error::Error;
+use crate::module_path::ModulePath;
+
+/// Result of a compilation.
+#[derive(Debug)]
+pub struct Compiled {
+    /// Program, unless there was an error.
+    pub program: Option<Program>,
+    /// All that was found, in the order of the text.
+    pub diagnostics: Vec<Diagnostic>,
+    /// Sources that the diagnostics refer to.
+    pub sources: Sources,
+}
+
+impl Compiled {
+    /// Returns whether an error was found.
+    pub fn has_errors(&self) -> bool {
+        self.diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error)
+    }
+}
+
+/// Place of the modules that a program requires.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Modules {
+    /// Part of the program.
+    Inside,
+    /// Files of their own, which the program finds when it runs.
+    Apart,
+}
+
+/// Compiles sources to one program that runs them in order. They are one unit: functions may be called before
+/// the source that defines them, and macros used after it. Each begins in the package `ESL-USER`.
+///
+/// Macros run in a machine of their own, whose definitions are gone when the compilation is over. The sources
+/// cannot require modules.
+pub fn compile(sources: &[Source]) -> Compiled {
+    compile_with(sources, &ModulePath::none(), Modules::Inside)
+}
+
+/// Compiles sources as [`compile`] does, with the modules found in `path`.
+pub fn compile_with(sources: &[Source], path: &ModulePath, modules: Modules) -> Compiled {
+    let mut compiler = Compiler::default();
+    if modules == Modules::Apart {
+        compiler = compiler.apart();
+    }
+    let texts: Vec<(&str, &str)> = sources.iter().map(|source| (&*source.name, &*source.text)).collect();
+    compile_texts(&mut compiler.compile_texts(&texts), path)
+}
+
+/// Expands the macros of a source. Returns its text after that, and the diagnostics. Modules that it requires
+/// are left out.
+pub fn expand(source: &Source, path: &ModulePath) -> (String, Compiled) {
+    let mut expansion = Compiler::default().apart().expand_text(&source.name, &source.text);
+    let compiled = compile_texts(&mut expansion, path);
+    (expansion.expansion().to_string(), Compiled { program: None, ..compiled })
+}
+
+fn compile_texts(texts: &mut Texts, path: &ModulePath) -> Compiled {
+    let mut find = |name: &str| path.find(name).map_err(|error| error.to_string());
+    let (module, diagnostics) = match compile_time_machine(path) {
+        Ok(mut machine) => drive_with(texts, &mut machine, &mut find),
+        Err(error) => (None, vec![code::COMPILE_TIME_FAILURE.at(Span::default(), error.to_string())]),
+    };
+    let program = module.map(|module| Program { module });
+    Compiled { program, diagnostics, sources: texts.sources().clone() }
+}
+
+/// Returns the machine in which macros run. It may read the modules of `path`.
+fn compile_time_machine(path: &ModulePath) -> Result<Vm, Error> {
+    let files = FileAccess::Under(path.folders().to_vec());
+    let mut machine = machine(Config::DEFAULT, Box::new(RealHost::new(Vec::new()).with_files(files)))?;
+    set_module_path(&mut machine, path)?;
+    Ok(machine)
+}
+
+#[cfg(test)]
+mod tests {
+    use esl_vm::host::VirtualHost;
+
+    use super::*;
+    use crate::program::run;
+
+    /// Compiles texts together. Returns the messages of diagnostics, and the output of the program.
+    fn run_together(texts: &[&str]) -> (Vec<String>, String) {
+        let sources: Vec<Source> = texts
+            .iter()
+            .enumerate()
+            .map(|(index, text)| Source::new(format!("{index}.esl"), *text))
+            .collect();
+        let compiled = compile(&sources);
+        let place = |diagnostic: &Diagnostic| {
+            let span = diagnostic.primary.span;
+            let name = compiled.sources.name(span.source).unwrap_or_default();
+            format!("{name}: {}", diagnostic.message)
+        };
+        let messages = compiled.diagnostics.iter().map(place).collect();
+        let Some(program) = compiled.program else { return (messages, String::new()) };
+        let program =
+            Program::from_bytes(&program.to_bytes().expect("it can be written")).expect("it is valid");
+        let host = VirtualHost::new();
+        let captured = host.captured();
+        run(&program, Config::DEFAULT, Box::new(host)).expect("it runs");
+        (messages, captured.output())
+    }
+
+    #[test]
+    fn sources_see_what_others_define() {
+        let first = "(defmacro twice (x) `(list ,x ,x)) (defun first-one () (second-one)) (defvar *v* 5)";
+        let second = "(defun second-one () (twice *v*)) (princ (first-one)) (third-one)";
+        let (messages, output) = run_together(&[first, second]);
+        assert_eq!(messages, ["1.esl: no function is called `third-one`"]);
+        assert_eq!(output, "(5 5)");
+    }
+
+    #[test]
+    fn each_source_begins_in_the_package_of_the_user() {
+        let first = "(defpackage :inner (:use :esl)) (in-package :inner) (princ (package-name *package*))";
+        let second = "(princ (list (package-name *package*) (symbol-package 'x)))";
+        let (messages, output) = run_together(&[first, second]);
+        assert!(messages.is_empty(), "{messages:?}");
+        assert_eq!(output, "INNER(ESL-USER #<PACKAGE \"ESL-USER\">)");
+    }
+}

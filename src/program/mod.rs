@@ -1,0 +1,80 @@
+//! Whole programs: compiling source files, keeping the result in a file, running it to its end.
+//!
+//! ```
+//! use esl::Config;
+//! use esl::host::VirtualHost;
+//! use esl::program::{Ended, Program, Source, compile, run};
+//!
+//! let compiled = compile(&[Source::new("greet.esl", "(format t \"hello from ~a~%\" 'greet)")]);
+//! assert!(!compiled.has_errors());
+//! let bytes = compiled.program.expect("there are no errors").to_bytes()?;
+//!
+//! let host = VirtualHost::new();
+//! let captured = host.captured();
+//! let summary = run(&Program::from_bytes(&bytes)?, Config::default(), Box::new(host))?;
+//! assert_eq!(summary.ended, Ended::Normally(0));
+//! assert_eq!(captured.output(), "hello from GREET\n");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod compile;
+mod run;
+
+use std::sync::Arc;
+
+use esl_bytecode::file::WriteError;
+use esl_bytecode::module::Module;
+use esl_bytecode::verify::verify;
+use esl_bytecode::{disasm, file};
+use esl_vm::load::LoadError;
+
+pub use compile::{Compiled, Modules, compile, compile_with, expand};
+pub(crate) use run::end;
+pub use run::{Ended, Summary, begin, machine, run, run_in, set_module_path, set_traces};
+
+/// A source text and its name in diagnostics and backtraces.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Name: a path, or `<stdin>`.
+    pub name: String,
+    /// Text.
+    pub text: Arc<str>,
+}
+
+impl Source {
+    /// Creates a source.
+    pub fn new(name: impl Into<String>, text: impl Into<Arc<str>>) -> Source {
+        Source { name: name.into(), text: text.into() }
+    }
+}
+
+/// A compiled program.
+#[derive(Clone, Debug)]
+pub struct Program {
+    module: Module,
+}
+
+impl Program {
+    /// Reads a program from the bytes of an `.eslb` file, and verifies it.
+    ///
+    /// # Errors
+    /// [`LoadError::Damaged`] or [`LoadError::Refused`].
+    pub fn from_bytes(bytes: &[u8]) -> Result<Program, LoadError> {
+        let module = file::read(bytes)?;
+        verify(&module).map_err(LoadError::Refused)?;
+        Ok(Program { module })
+    }
+
+    /// Returns the bytes of an `.eslb` file.
+    ///
+    /// # Errors
+    /// [`WriteError`], if the program contains an object that no file can hold, or is too large.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, WriteError> {
+        file::write(&self.module)
+    }
+
+    /// Returns the program as text, instruction by instruction.
+    pub fn disassemble(&self) -> String {
+        disasm::module(&self.module)
+    }
+}

@@ -1,0 +1,184 @@
+//! Machines that have the library, and running programs on them.
+
+use esl_bytecode::datum::Datum;
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+use esl_compiler::session::Compiler;
+use esl_vm::heap::HeapStats;
+use esl_vm::host::Host;
+use esl_vm::run::RunOutcome;
+use esl_vm::task::{TaskId, TaskResult};
+use esl_vm::vm::{Config, Vm};
+
+use super::Program;
+use crate::error::Error;
+use crate::module_path::ModulePath;
+
+/// Way in which a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// The program came to its end, or asked to end with this status.
+    Normally(u8),
+    /// A failure left the main task.
+    Failed,
+    /// A failure for want of memory left the main task.
+    HeapExhausted,
+    /// The budget of the run is spent.
+    BudgetSpent,
+    /// Every task waits for an event that no task can signal.
+    Deadlocked,
+    /// The run was interrupted from outside.
+    Interrupted,
+}
+
+/// Figures of a run.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    /// Way in which the run ended.
+    pub ended: Ended,
+    /// Ticks of all tasks.
+    pub ticks: u64,
+    /// Tasks made, the main task included.
+    pub tasks: u64,
+    /// Turns of tasks.
+    pub turns: u64,
+    /// Turns that came after a turn of another task.
+    pub switches: u64,
+    /// Figures of the heap.
+    pub heap: HeapStats,
+}
+
+/// Creates a machine with the library, and with a compiler for `eval` and `load`.
+///
+/// # Errors
+/// [`Error::NoMemory`], if the limit of memory leaves no room for the library.
+pub fn machine(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, Error> {
+    // The library is loaded at full speed; the settings count from the program on.
+    let unhurried =
+        Config { slice: Config::DEFAULT.slice, budget: None, collect_always: false, ..config.clone() };
+    let mut machine = Vm::new(unhurried, host).map_err(|_| Error::NoMemory("the library"))?;
+    machine.set_compiler(Box::new(Compiler::default()));
+    esl_stdlib::load(&mut machine).map_err(|_| Error::NoMemory("the library"))?;
+    machine.begin_program(config);
+    Ok(machine)
+}
+
+/// Has a machine write to its error output what happens to `failures`, `goals` or `tasks`. Nothing changes if
+/// `traces` is empty.
+///
+/// # Errors
+/// [`Error::NoMemory`].
+pub fn set_traces(machine: &mut Vm, traces: &[String]) -> Result<(), Error> {
+    if traces.is_empty() {
+        return Ok(());
+    }
+    let keyword = |name: &String| Datum::symbol(Symbol::keyword(&name.to_uppercase()), Span::default());
+    call_with_list(machine, "%SET-TRACES", traces.iter().map(keyword))?;
+    machine.trace_tasks(traces.iter().any(|name| name == "tasks"));
+    Ok(())
+}
+
+/// Has `require` search the folders of `path`.
+///
+/// # Errors
+/// [`Error::NoMemory`].
+pub fn set_module_path(machine: &mut Vm, path: &ModulePath) -> Result<(), Error> {
+    let folders = path.folders().iter().map(|folder| folder.to_string_lossy());
+    call_with_list(machine, "%SET-MODULE-PATH", folders.map(|folder| Datum::string(&folder, Span::default())))
+}
+
+/// Calls a function of the library with a list of `items`.
+fn call_with_list(machine: &mut Vm, function: &str, items: impl Iterator<Item = Datum>) -> Result<(), Error> {
+    let list = Datum::list(items.collect::<Vec<_>>(), Span::default());
+    let list = machine.import(&list).map_err(|_| Error::NoMemory("the settings"))?;
+    let function = machine.library_function(function)?;
+    machine.call(function, &[list], u64::MAX)?;
+    Ok(())
+}
+
+/// Runs a program to its end.
+///
+/// # Errors
+/// [`Error::NoMemory`] or [`Error::Refused`], if the program cannot be begun. A program that fails returns
+/// [`Ended::Failed`].
+pub fn run(program: &Program, config: Config, host: Box<dyn Host + Send>) -> Result<Summary, Error> {
+    let mut machine = machine(config, host)?;
+    run_in(&mut machine, program)
+}
+
+/// Loads a program into a machine that has the library, and makes its main task. Running the machine runs it.
+///
+/// # Errors
+/// As [`run`].
+pub fn begin(machine: &mut Vm, program: &Program) -> Result<TaskId, Error> {
+    let functions = machine.load_module(&program.module)?;
+    let main = machine.spawn_library("%RUN-TOPLEVEL", &[functions])?;
+    machine.set_interruptible(Some(main));
+    machine.set_main(main);
+    Ok(main)
+}
+
+/// Runs a program in a machine that has the library.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Summary, Error> {
+    let main = begin(machine, program)?;
+    let outcome = machine.run(u64::MAX);
+    let ended = end(machine, main, outcome);
+    let (tasks, turns, switches) = machine.tasks_turns_and_switches();
+    Ok(Summary { ended, ticks: machine.ticks(), tasks, turns, switches, heap: machine.heap_stats() })
+}
+
+/// Returns how a program with this main task has ended, and writes the reports of its failure or deadlock.
+pub(crate) fn end(machine: &mut Vm, main: TaskId, outcome: RunOutcome) -> Ended {
+    machine.flush();
+    if let Some(report) = machine.report(main) {
+        machine.complain(&report);
+    }
+    match (outcome, machine.result(main)) {
+        (RunOutcome::BudgetSpent, _) => Ended::BudgetSpent,
+        (RunOutcome::Waiting, _) => {
+            let report = machine.deadlock_report();
+            machine.complain(&report);
+            Ended::Deadlocked
+        }
+        (_, TaskResult::Failed(condition)) if machine.is_heap_exhausted(condition) => Ended::HeapExhausted,
+        (_, TaskResult::Failed(_)) => Ended::Failed,
+        (_, TaskResult::Aborted) if machine.exit_status().is_none() => {
+            if machine.was_interrupted() {
+                Ended::Interrupted
+            } else {
+                Ended::Failed
+            }
+        }
+        _ => Ended::Normally(machine.exit_status().unwrap_or(0)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use esl_vm::host::VirtualHost;
+
+    use super::*;
+    use crate::program::{Source, compile};
+
+    #[test]
+    fn what_cleanups_may_take_can_be_set() {
+        let text =
+            "(let ((task (spawn (unwind-protect (loop) (dotimes (i 5000)) (princ 'a) (sleep 5) (princ 'b)))))
+                      (sleep 0)
+                      (abort-task task)
+                      (princ 'over))";
+        let output = |config: Config| {
+            let program = compile(&[Source::new("cleanup.esl", text)]).program.expect("it compiles");
+            let host = VirtualHost::new();
+            let captured = host.captured();
+            run(&program, config, Box::new(host)).expect("it runs");
+            captured.output()
+        };
+        assert_eq!(output(Config::DEFAULT), "ABOVER");
+        assert_eq!(output(Config { cleanup_ticks: 1000, ..Config::DEFAULT }), "OVER");
+        assert_eq!(output(Config { cleanup_time: 1_000_000_000, ..Config::DEFAULT }), "AOVER");
+    }
+}
