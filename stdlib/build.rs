@@ -1,8 +1,8 @@
 //! Compiles the library to its image, file by file in the order of `load-order`.
 //!
 //! One machine runs the macros and loads each file after its compilation, so that files can use the
-//! definitions of earlier ones. An error in the library is an error of the build. A warning is a warning of the
-//! build, unless it is about a name that a later file defines.
+//! definitions of earlier ones. An error in the library is an error of the build. A warning is a warning of
+//! the build, unless it is about a name that a later file defines.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a build step talks to cargo")]
 
 use std::path::{Path, PathBuf};

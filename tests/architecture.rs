@@ -1,5 +1,5 @@
-//! `ARCHITECTURE.md` maps the code completely and correctly: its tables list exactly the modules that exist, and each
-//! type in its glossary exists. So does each file that it and the other documents at the root name.
+//! `ARCHITECTURE.md` maps the code completely and correctly: its tables list exactly the modules that exist,
+//! and each type in its glossary exists. So does each file that it and the other documents at the root name.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -8,7 +8,8 @@
 //! L2:  4  call r2.. 1 want all  ; a label may stand in the line of its instruction
 //! ```
 //!
-//! Constants, builtins and type codes are given by number. A jump goes to a label, or by a distance with a sign.
+//! Constants, builtins and type codes are given by number. A jump goes to a label, or by a distance with a
+//! sign.
 
 use std::collections::HashMap;
 use std::fmt;

@@ -1,14 +1,16 @@
 //! The builtin table: every function that is written in Rust, declared once.
 //!
-//! A row is: the path of the implementation below `builtins` of the virtual machine, the home package (`cl`, `esl`, or
-//! `internal` for the library's own use), the name, and the lambda list; `-> one` if the compiler counts on exactly one
-//! value; and for a builtin that stops at a limit of work, the ESL function that takes over from it. The compiler takes
-//! names and arities from here, the virtual machine its table of implementations, `help` and the reference their text.
+//! A row is: the path of the implementation below `builtins` of the virtual machine, the home package (`cl`,
+//! `esl`, or `internal` for the library's own use), the name, and the lambda list; `-> one` if the compiler
+//! counts on exactly one value; and for a builtin that stops at a limit of work, the ESL function that takes
+//! over from it. The compiler takes names and arities from here, the virtual machine its table of
+//! implementations, `help` and the reference their text.
 //!
-//! Builtins take required, optional and rest arguments only; functions with keyword arguments are written in ESL.
+//! Builtins take required, optional and rest arguments only; functions with keyword arguments are written in
+//! ESL.
 //!
-//! Not here: the implementations. A path is only a name until the virtual machine's use of [`for_each_builtin`]
-//! expands it.
+//! Not here: the implementations. A path is only a name until the virtual machine's use of
+//! [`for_each_builtin`] expands it.
 //!
 //! [`for_each_builtin`]: crate::for_each_builtin
 
@@ -45,7 +47,8 @@ pub struct BuiltinInfo {
     pub arity: Arity,
     /// Whether the compiler may take a call of it for a form with exactly one value.
     pub returns_one: bool,
-    /// The ESL function, internal to the package `ESL`, that takes over when the work is above a builtin's limit.
+    /// The ESL function, internal to the package `ESL`, that takes over when the work is above a builtin's
+    /// limit.
     pub slowly: Option<&'static str>,
     /// What it does.
     pub doc: &'static [&'static str],

@@ -1,9 +1,9 @@
-//! What compiler and virtual machine are to each other. Neither names the other: the compiler asks an [`Environment`]
-//! what names mean and drives a [`CompileTimeHost`] that runs macros; the virtual machine is handed a [`Compile`] for
-//! `eval`, `load` and `read`.
+//! What compiler and virtual machine are to each other. Neither names the other: the compiler asks an
+//! [`Environment`] what names mean and drives a [`CompileTimeHost`] that runs macros; the virtual machine is
+//! handed a [`Compile`] for `eval`, `load` and `read`.
 //!
-//! A compilation is a machine of steps: it never runs a macro itself but says that one is to be run, and is told the
-//! outcome. So a running program can compile in a task that is preempted and aborted like any other.
+//! A compilation is a machine of steps: it never runs a macro itself but says that one is to be run, and is
+//! told the outcome. So a running program can compile in a task that is preempted and aborted like any other.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -91,17 +91,19 @@ pub trait Environment {
     fn global(&self, symbol: &Symbol) -> Global;
     /// What is known of the function `(setf symbol)`.
     fn setf_function(&self, symbol: &Symbol) -> GlobalFunction;
-    /// The data that the library recorded about `symbol` under `indicator`, such as the expander of a `defsetf`.
+    /// The data that the library recorded about `symbol` under `indicator`, such as the expander of a
+    /// `defsetf`.
     fn property(&self, symbol: &Symbol, indicator: &Symbol) -> Option<Datum>;
-    /// The symbol that `name` denotes when read in the current package (`package` is `None`), or after `package:` or, if
-    /// `internal`, `package::`.
+    /// The symbol that `name` denotes when read in the current package (`package` is `None`), or after
+    /// `package:` or, if `internal`, `package::`.
     ///
     /// # Errors
     /// [`InternError`] if there is no such package or no such external symbol.
     fn intern(&mut self, package: Option<&str>, name: &str, internal: bool) -> Result<Symbol, InternError>;
     /// A number for a fresh uninterned symbol of this compilation unit.
     fn fresh(&mut self) -> u32;
-    /// Names like `symbol` that are defined as a function or, if `variable`, as a variable; the likeliest first.
+    /// Names like `symbol` that are defined as a function or, if `variable`, as a variable; the likeliest
+    /// first.
     fn similar(&self, symbol: &Symbol, variable: bool) -> Vec<Symbol>;
 }
 
@@ -139,17 +141,17 @@ pub struct MacroCall {
 pub enum Step {
     /// Run this macro and answer with [`Answer::Expansion`] or [`Answer::Failed`].
     Expand(MacroCall),
-    /// Load this module and run its top level, at compile time. Answer with [`Answer::Loaded`], or [`Answer::Failed`];
-    /// if `keep`, with [`Answer::Object`], the value of its last top-level form.
+    /// Load this module and run its top level, at compile time. Answer with [`Answer::Loaded`], or
+    /// [`Answer::Failed`]; if `keep`, with [`Answer::Object`], the value of its last top-level form.
     Load {
         /// The module.
         module: Module,
         /// Whether the value is wanted.
         keep: bool,
     },
-    /// Find the module that the text being compiled requires by this name. Answer with [`Answer::Module`]; with
-    /// [`Answer::Loaded`] if it is defined already where macros run, and the program is to find it when it runs; or with
-    /// [`Answer::Failed`].
+    /// Find the module that the text being compiled requires by this name. Answer with [`Answer::Module`];
+    /// with [`Answer::Loaded`] if it is defined already where macros run, and the program is to find it when
+    /// it runs; or with [`Answer::Failed`].
     Require(String),
     /// The compilation is over. There is no module when one of the diagnostics is an error.
     Done(Option<Module>, Vec<Diagnostic>),
@@ -188,8 +190,8 @@ pub enum Answer {
 
 /// A compilation under way.
 pub trait Compilation: Send {
-    /// Takes the outcome of the last step and works up to the next one. Work between two steps is bounded by the size
-    /// of one top-level form; `charge` is called with the number of nodes that were worked on.
+    /// Takes the outcome of the last step and works up to the next one. Work between two steps is bounded by
+    /// the size of one top-level form; `charge` is called with the number of nodes that were worked on.
     fn step(
         &mut self,
         environment: &mut dyn Environment,
@@ -217,22 +219,25 @@ pub struct Part<'a> {
 
 /// A compiler, for a virtual machine that evaluates at run time.
 pub trait Compile: Send {
-    /// Begins to compile one form, which is from nowhere or from a part of a text. Its value is what the last top-level
-    /// function of the module returns.
+    /// Begins to compile one form, which is from nowhere or from a part of a text. Its value is what the last
+    /// top-level function of the module returns.
     fn compile_form(&self, form: Datum, part: Option<Part<'_>>) -> Box<dyn Compilation>;
     /// Begins to compile a whole text, called `name` in diagnostics.
     fn compile_text(&self, name: &str, text: &str) -> Box<dyn Compilation>;
-    /// Reads one datum of `text` from byte `start` on: the datum, `None` at the end of the text, and the offset after it.
+    /// Reads one datum of `text` from byte `start` on: the datum, `None` at the end of the text, and the
+    /// offset after it.
     ///
     /// # Errors
-    /// A diagnostic, for a text that is no datum; [`Diagnostic::code`] tells an unfinished one from a wrong one.
+    /// A diagnostic, for a text that is no datum; [`Diagnostic::code`] tells an unfinished one from a wrong
+    /// one.
     fn read(
         &self,
         environment: &mut dyn Environment,
         text: &str,
         start: usize,
     ) -> Result<(Option<Datum>, usize), Box<Diagnostic>>;
-    /// Draws a diagnostic of a text that was read as it is shown to people; with the source line, if a name is given.
+    /// Draws a diagnostic of a text that was read as it is shown to people; with the source line, if a name
+    /// is given.
     fn render(&self, diagnostic: &Diagnostic, name: Option<&str>, text: &str) -> String;
 }
 
@@ -256,7 +261,8 @@ pub trait CompileTimeHost: Environment {
 /// A text that says why there is none, and what to do.
 pub type Library<'a> = &'a mut dyn FnMut(&str) -> Result<Required, String>;
 
-/// Works a compilation through to its end with the help of `host`. A text that requires modules cannot be compiled so.
+/// Works a compilation through to its end with the help of `host`. A text that requires modules cannot be
+/// compiled so.
 pub fn drive(
     compilation: &mut dyn Compilation,
     host: &mut dyn CompileTimeHost,

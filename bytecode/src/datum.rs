@@ -1,7 +1,8 @@
 //! Data as source text denotes it: what the reader makes, macros transform and modules keep as constants.
 //!
-//! A [`Datum`] is an immutable tree (or graph: sub-data may be shared) in which every node carries the [`Span`] that
-//! it was read from. Sharing is identity: the same node reached twice denotes one object of the running program.
+//! A [`Datum`] is an immutable tree (or graph: sub-data may be shared) in which every node carries the
+//! [`Span`] that it was read from. Sharing is identity: the same node reached twice denotes one object of the
+//! running program.
 //!
 //! Guarantees: dropping a datum takes no native stack in proportion to its depth.
 //! Not here: reading text (the compiler's `reader`), objects of a running program (the virtual machine).
@@ -14,8 +15,9 @@ use num_bigint::BigInt;
 use crate::span::Span;
 use crate::symbol::Symbol;
 
-/// An object of the running program that occurs in a form given to `eval` or returned by a macro: an index into a
-/// table that the compile-time host keeps for the length of one compilation. It cannot be written to a file.
+/// An object of the running program that occurs in a form given to `eval` or returned by a macro: an index
+/// into a table that the compile-time host keeps for the length of one compilation. It cannot be written to a
+/// file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ObjectId(pub u32);
 
@@ -146,7 +148,8 @@ impl Datum {
         }
     }
 
-    /// The elements of a list, in order. Stops at the first tail that is no pair; [`Elements::tail`] gives it.
+    /// The elements of a list, in order. Stops at the first tail that is no pair; [`Elements::tail`] gives
+    /// it.
     pub fn elements(&self) -> Elements<'_> {
         Elements { rest: self }
     }
@@ -220,7 +223,8 @@ impl fmt::Debug for Datum {
 }
 
 impl fmt::Display for Datum {
-    /// The datum as it could be read again, as far as that goes; deep and long parts are cut off with `#` and `...`.
+    /// The datum as it could be read again, as far as that goes; deep and long parts are cut off with `#` and
+    /// `...`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         display(self, f, 0)
     }

@@ -38,8 +38,8 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
-    /// Creates a diagnostic at `span`. The compiler calls this in one place only, `Code::at`, so that every code it
-    /// reports is in its table.
+    /// Creates a diagnostic at `span`. The compiler calls this in one place only, `Code::at`, so that every
+    /// code it reports is in its table.
     pub fn new(code: &'static str, severity: Severity, message: impl Into<String>, span: Span) -> Diagnostic {
         Diagnostic {
             code,

@@ -9,8 +9,8 @@
 //!     1  call-global r2.. 1 want 1 k0  ; TICK
 //! ```
 //!
-//! Guarantees: any module has a text, also one that the verifier refuses; the text depends on nothing but the module;
-//! its instructions are those that [`crate::assembler`] reads.
+//! Guarantees: any module has a text, also one that the verifier refuses; the text depends on nothing but the
+//! module; its instructions are those that [`crate::assembler`] reads.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Write};

@@ -25,12 +25,12 @@
 //! top level   count, then function numbers
 //! ```
 //!
-//! So each symbol, constant and function can be read on its own: [`ModuleImage`] opens a file without looking at any of
-//! them. [`read`] decodes all of it.
+//! So each symbol, constant and function can be read on its own: [`ModuleImage`] opens a file without looking
+//! at any of them. [`read`] decodes all of it.
 //!
-//! Guarantees: [`read`] of what [`write()`] gave is the same module; no bytes make a reader panic, or allocate more than a
-//! small multiple of their number.
-//! Not here: whether a module makes sense to run (`verify`).
+//! Guarantees: [`read`] of what [`write()`] gave is the same module; no bytes make a reader panic, or
+//! allocate more than a small multiple of their number. Not here: whether a module makes sense to run
+//! (`verify`).
 
 mod cursor;
 mod error;
@@ -124,7 +124,8 @@ mod tag {
     pub(super) const CLASS: u8 = 13;
 }
 
-/// Decodes a whole file. The module is well-formed as a file; call [`crate::verify::verify`] before it is run.
+/// Decodes a whole file. The module is well-formed as a file; call [`crate::verify::verify`] before it is
+/// run.
 ///
 /// # Errors
 /// [`ReadError`] for bytes that are no intact file of this version.

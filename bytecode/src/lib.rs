@@ -1,7 +1,8 @@
 //! The contract between the ESL compiler and the ESL virtual machine.
 //!
-//! Here is what both must agree on and neither may own: the opcode table, the builtin table, modules with their file
-//! format, verifier and disassembler, literal data, packages, and the traits by which each calls on the other.
+//! Here is what both must agree on and neither may own: the opcode table, the builtin table, modules with
+//! their file format, verifier and disassembler, literal data, packages, and the traits by which each calls
+//! on the other.
 #![forbid(unsafe_code)]
 
 pub mod assembler;

@@ -1,8 +1,8 @@
 //! Makes one module of several, such as the files of the library.
 //!
-//! Pools, functions and sources are put one after the other; numbers in them move, code stays as it is. Constants of
-//! which a program cannot tell two apart (symbols, numbers, characters, classes) are kept once. Strings, pairs, vectors
-//! and arrays have an identity, and those of different modules stay different.
+//! Pools, functions and sources are put one after the other; numbers in them move, code stays as it is.
+//! Constants of which a program cannot tell two apart (symbols, numbers, characters, classes) are kept once.
+//! Strings, pairs, vectors and arrays have an identity, and those of different modules stay different.
 //!
 //! Uninterned symbols of different modules are different: they get new numbers.
 
@@ -24,8 +24,8 @@ pub fn link(modules: impl IntoIterator<Item = Module>) -> Module {
     linker.linked
 }
 
-/// As [`link`], for modules of one compilation unit: an uninterned symbol of one is that of the same number in another,
-/// and keeps its number. Each has the sources of the one before it, and maybe more.
+/// As [`link`], for modules of one compilation unit: an uninterned symbol of one is that of the same number
+/// in another, and keeps its number. Each has the sources of the one before it, and maybe more.
 pub fn join(modules: impl IntoIterator<Item = Module>) -> Module {
     let mut linker = Linker { is_one_unit: true, ..Linker::default() };
     for module in modules {

@@ -1,7 +1,7 @@
 //! A compiled unit, as the compiler makes it and the virtual machine loads it.
 //!
-//! Constants form a pool of the module in which entries refer to earlier entries only; each function has its own list
-//! of pool indexes, so that linking two modules renumbers those lists and leaves code alone.
+//! Constants form a pool of the module in which entries refer to earlier entries only; each function has its
+//! own list of pool indexes, so that linking two modules renumbers those lists and leaves code alone.
 
 use std::sync::Arc;
 
@@ -67,7 +67,8 @@ pub enum CaptureSource {
 pub struct Capture {
     /// Where it comes from.
     pub source: CaptureSource,
-    /// Whether it is a box, to be used by `capture-box-ref` and `capture-box-set`. Never so for one that comes later.
+    /// Whether it is a box, to be used by `capture-box-ref` and `capture-box-set`. Never so for one that
+    /// comes later.
     pub boxed: bool,
 }
 
@@ -83,9 +84,9 @@ impl Capture {
     }
 }
 
-/// What a function takes. Arguments arrive in registers: first the required ones, then the optional ones, then the list
-/// of the rest, then one register for each key. A parameter that got no argument holds the *unsupplied* marker, which
-/// `jump-if-supplied` tests for.
+/// What a function takes. Arguments arrive in registers: first the required ones, then the optional ones,
+/// then the list of the rest, then one register for each key. A parameter that got no argument holds the
+/// *unsupplied* marker, which `jump-if-supplied` tests for.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Parameters {
     /// Number of required parameters.

@@ -1,31 +1,34 @@
 //! The opcode table: every instruction of the virtual machine, declared once.
 //!
-//! The table is expanded into [`Opcode`], [`Instr`] with its encoder and decoder, the disassembler's text, the
-//! verifier's view of operands, and `docs/bytecode.md`. The interpreter has one arm for each row, in the order of the
-//! rows (its tests compare the two).
+//! The table is expanded into [`Opcode`], [`Instr`] with its encoder and decoder, the disassembler's text,
+//! the verifier's view of operands, and `docs/bytecode.md`. The interpreter has one arm for each row, in the
+//! order of the rows (its tests compare the two).
 //!
-//! An instruction is one 32-bit word, `opcode | operands << 8`, or two: the second, the *aux* word, holds the operand
-//! of 32 bits. `R[n]` is a register of the current frame, `K[n]` a constant of the function. Jumps are relative to the
-//! word after the instruction. Only the rows under "loops" jump back, and each of them is a tick; so is every call.
+//! An instruction is one 32-bit word, `opcode | operands << 8`, or two: the second, the *aux* word, holds the
+//! operand of 32 bits. `R[n]` is a register of the current frame, `K[n]` a constant of the function. Jumps
+//! are relative to the word after the instruction. Only the rows under "loops" jump back, and each of them is
+//! a tick; so is every call.
 //!
-//! Numbers are never given twice. 0 and those from `0xC0` on belong to the virtual machine and are refused in files.
+//! Numbers are never given twice. 0 and those from `0xC0` on belong to the virtual machine and are refused in
+//! files.
 //!
-//! The word after the mnemonic says how an instruction ends that cannot do its work, and what becomes of the value that
-//! a recovery puts in its place:
+//! The word after the mnemonic says how an instruction ends that cannot do its work, and what becomes of the
+//! value that a recovery puts in its place:
 //!
-//! - `silent`: it never fails. `jump` and `return` are silent instructions that control never passes through: what
-//!   follows them is reached from elsewhere.
+//! - `silent`: it never fails. `jump` and `return` are silent instructions that control never passes through:
+//!   what follows them is reached from elsewhere.
 //! - `value`: the substitute goes to the first operand, a [`Dst`].
-//! - `test`: the substitute is the outcome of the test, which jumps if it holds; `test_not` jumps if it does not. The
-//!   last operand is the [`Jump`] or [`Back`].
+//! - `test`: the substitute is the outcome of the test, which jumps if it holds; `test_not` jumps if it does
+//!   not. The last operand is the [`Jump`] or [`Back`].
 //! - `effect`: the substitute is dropped.
-//! - `call`: the substitutes are delivered as the results of the call; `tail` is a call in place of the running
-//!   function, whose results they are then. A [`Callee`] says what is called. The operands begin with `window` and
-//!   `count`; then comes `want`, unless it is a tail call.
-//! - `never`: nothing could stand for its work, so a recovery can only have the instruction tried again, or leave.
+//! - `call`: the substitutes are delivered as the results of the call; `tail` is a call in place of the
+//!   running function, whose results they are then. A [`Callee`] says what is called. The operands begin with
+//!   `window` and `count`; then comes `want`, unless it is a tail call.
+//! - `never`: nothing could stand for its work, so a recovery can only have the instruction tried again, or
+//!   leave.
 //!
-//! After `value`, `test` or `effect` stands the [`Builtin`] that the instruction is, if it is one: applied to the
-//! registers that it reads and its integers, in their order, that does the same, failures included.
+//! After `value`, `test` or `effect` stands the [`Builtin`] that the instruction is, if it is one: applied to
+//! the registers that it reads and its integers, in their order, that does the same, failures included.
 
 use std::fmt;
 
@@ -590,8 +593,8 @@ macro_rules! define_opcodes {
                 }
             }
 
-            /// The builtin that does the same with the registers that it reads and its integers; `None` if there
-            /// is none.
+            /// The builtin that does the same with the registers that it reads and its integers; `None` if
+            /// there is none.
             pub const fn builtin(self) -> Option<Builtin> {
                 match self {
                     $( Opcode::$name => builtin!($($kind)+), )*
@@ -636,8 +639,8 @@ macro_rules! define_opcodes {
                 }
             }
 
-            /// Decodes the instruction that begins at `code[at]`. `None` if there is no such opcode or the aux word
-            /// is missing.
+            /// Decodes the instruction that begins at `code[at]`. `None` if there is no such opcode or the
+            /// aux word is missing.
             pub fn decode(code: &[u32], at: usize) -> Option<Instr> {
                 let word = *code.get(at)?;
                 let opcode = Opcode::from_number(word as u8)?;
@@ -645,7 +648,8 @@ macro_rules! define_opcodes {
                 Some(Instr::from_words(opcode, word, aux))
             }
 
-            /// Decodes the operands of an instruction with this opcode; `aux` is of no matter if it has one word.
+            /// Decodes the operands of an instruction with this opcode; `aux` is of no matter if it has one
+            /// word.
             #[inline(always)]
             pub fn from_words(opcode: Opcode, word: u32, aux: u32) -> Instr {
                 #[allow(unused_mut, unused_variables, reason = "some instructions have no operands")]
@@ -665,7 +669,8 @@ macro_rules! define_opcodes {
                 }
             }
 
-            /// Calls `visit` with each operand's type, as its operand newtype is called, its text and its role.
+            /// Calls `visit` with each operand's type, as its operand newtype is called, its text and its
+            /// role.
             pub fn visit_texts(&self, mut visit: impl FnMut(&'static str, &dyn fmt::Display, Role)) {
                 #[allow(unused, reason = "some instructions have no operands")]
                 let visit = &mut visit;

@@ -1,7 +1,7 @@
 //! Operands of instructions. An operand's type says how wide it is, what it may be and how it is printed.
 //!
-//! Operands are packed in the order of the opcode table: those of 8, 16 and 24 bits into the instruction word after
-//! the opcode (low bits first), the one of 32 bits, if any, into the *aux* word that follows.
+//! Operands are packed in the order of the opcode table: those of 8, 16 and 24 bits into the instruction word
+//! after the opcode (low bits first), the one of 32 bits, if any, into the *aux* word that follows.
 
 use std::fmt;
 

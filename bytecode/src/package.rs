@@ -1,14 +1,16 @@
 //! Packages: which symbol a name denotes, and how a symbol is written.
 //!
-//! A package maps names to symbols. Those that are *present* in it have an entry of its own; others it *inherits*: the
-//! external symbols of the packages that it uses. A name is looked up in this order, and a name that is not found
-//! becomes a new symbol with the package as its home. Two symbols are the same if home and name are.
+//! A package maps names to symbols. Those that are *present* in it have an entry of its own; others it
+//! *inherits*: the external symbols of the packages that it uses. A name is looked up in this order, and a
+//! name that is not found becomes a new symbol with the package as its home. Two symbols are the same if home
+//! and name are.
 //!
-//! Besides the rules of Common Lisp there is one shorthand: a package may *export again* all that another exports, but
-//! for the names of which it has symbols of its own. So `ESL` stands for the whole language without a thousand entries.
+//! Besides the rules of Common Lisp there is one shorthand: a package may *export again* all that another
+//! exports, but for the names of which it has symbols of its own. So `ESL` stands for the whole language
+//! without a thousand entries.
 //!
-//! Names that are the same in every program are kept as sorted lists (`names`), and get an entry when they are first
-//! read: a machine starts without filling tables.
+//! Names that are the same in every program are kept as sorted lists (`names`), and get an entry when they
+//! are first read: a machine starts without filling tables.
 //!
 //! Not here: which package is the current one, and what a symbol stands for (the virtual machine).
 
@@ -169,11 +171,12 @@ impl Packages {
         &self.table[package].uses
     }
 
-    /// A new package without symbols. `COMMON-LISP` beside `ESL`, which exports all of it again but for what it takes over,
-    /// adds nothing.
+    /// A new package without symbols. `COMMON-LISP` beside `ESL`, which exports all of it again but for what
+    /// it takes over, adds nothing.
     ///
     /// # Errors
-    /// [`PackageError::NameTaken`] for a name that is in use; [`PackageError::Conflict`] as for [`Packages::use_package`].
+    /// [`PackageError::NameTaken`] for a name that is in use; [`PackageError::Conflict`] as for
+    /// [`Packages::use_package`].
     pub fn make_package(
         &mut self,
         name: &str,
@@ -216,7 +219,8 @@ impl Packages {
         Ok(())
     }
 
-    /// Makes known that the symbol `name` is at home in `package`. For the tables of an image: nothing is checked.
+    /// Makes known that the symbol `name` is at home in `package`. For the tables of an image: nothing is
+    /// checked.
     pub fn register(&mut self, package: PackageId, name: impl Into<Cow<'static, str>>, external: bool) {
         let entry = Entry { home: package, external, shadowing: false, symbol: None };
         self.table[package].symbols.insert(name.into(), entry);
@@ -263,8 +267,8 @@ impl Packages {
         Some((known.unwrap_or_else(|| Symbol::new(&self.table[found.home].name, name)), status))
     }
 
-    /// The symbol that `name` denotes in `package`; a new one, at home there, if there was none (then there is no
-    /// status). In `KEYWORD` new symbols are external.
+    /// The symbol that `name` denotes in `package`; a new one, at home there, if there was none (then there
+    /// is no status). In `KEYWORD` new symbols are external.
     pub fn intern(&mut self, package: PackageId, name: &str) -> (Symbol, Option<Status>) {
         match self.look_up(package, name) {
             Some((found, status)) => (self.symbol(found, name), Some(status)),
@@ -292,12 +296,12 @@ impl Packages {
         symbol
     }
 
-    /// The symbol that a text denotes when it is read: `name` in the `current` package; or `prefix:name`, or, if
-    /// `internal`, `prefix::name`. An empty prefix is that of keywords.
+    /// The symbol that a text denotes when it is read: `name` in the `current` package; or `prefix:name`, or,
+    /// if `internal`, `prefix::name`. An empty prefix is that of keywords.
     ///
     /// # Errors
-    /// [`InternError::NoPackage`] if there is none called `prefix`; [`InternError::NotExternal`] if it does not export
-    /// such a symbol, also for `prefix::name` if it belongs to the standard and has no such name.
+    /// [`InternError::NoPackage`] if there is none called `prefix`; [`InternError::NotExternal`] if it does
+    /// not export such a symbol, also for `prefix::name` if it belongs to the standard and has no such name.
     pub fn read(
         &mut self,
         current: PackageId,
@@ -340,8 +344,9 @@ impl Packages {
     /// Makes `symbol`, which `package` has in some way, external in it.
     ///
     /// # Errors
-    /// [`PackageError::NotAccessible`] if the package does not have it; [`PackageError::Conflict`] if a package that
-    /// uses this one has another symbol of that name; [`PackageError::Standard`] for `COMMON-LISP`.
+    /// [`PackageError::NotAccessible`] if the package does not have it; [`PackageError::Conflict`] if a
+    /// package that uses this one has another symbol of that name; [`PackageError::Standard`] for
+    /// `COMMON-LISP`.
     pub fn export(&mut self, package: PackageId, symbol: &Symbol) -> Result<(), PackageError> {
         let name = symbol.name();
         let (found, status) = self
@@ -372,8 +377,8 @@ impl Packages {
     /// Makes `symbol` present in `package`.
     ///
     /// # Errors
-    /// [`PackageError::Conflict`] if it has another symbol of that name; [`PackageError::NotAccessible`] for a symbol
-    /// without a home; [`PackageError::Standard`] for `COMMON-LISP`.
+    /// [`PackageError::Conflict`] if it has another symbol of that name; [`PackageError::NotAccessible`] for
+    /// a symbol without a home; [`PackageError::Standard`] for `COMMON-LISP`.
     pub fn import(&mut self, package: PackageId, symbol: &Symbol) -> Result<(), PackageError> {
         let home = symbol.package().and_then(|home| self.named(home));
         let home = home.ok_or_else(|| PackageError::NotAccessible(symbol.clone()))?;
@@ -430,13 +435,14 @@ impl Packages {
         Ok(())
     }
 
-    /// Whether one of `others` exports again what `used` does: then that one stands for both, and `used` need not be used.
+    /// Whether one of `others` exports again what `used` does: then that one stands for both, and `used` need
+    /// not be used.
     fn is_offered_again(&self, used: PackageId, others: &[PackageId]) -> bool {
         others.iter().any(|&other| self.table[other].exports_again == Some(used))
     }
 
-    /// Checks that no two of the packages that `user` uses or is about to use export different symbols by one name,
-    /// unless it has a symbol of its own by that name.
+    /// Checks that no two of the packages that `user` uses or is about to use export different symbols by one
+    /// name, unless it has a symbol of its own by that name.
     fn check_inherited(&self, user: &str, used: PackageId, others: &[PackageId]) -> Result<(), PackageError> {
         let own = self.named(user).map(|id| &self.table[id].symbols);
         for &other in others {

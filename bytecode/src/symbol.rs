@@ -1,8 +1,8 @@
 //! Names of symbols as compiler, module format and reader see them.
 //!
-//! A [`Symbol`] is a home package and a name; two with the same package and name are equal. A symbol without a
-//! package (`#:g`, `gensym`) is known by a number that is unique within one compilation unit. The symbol *objects*
-//! of a running program (with value, function and properties) belong to the virtual machine.
+//! A [`Symbol`] is a home package and a name; two with the same package and name are equal. A symbol without
+//! a package (`#:g`, `gensym`) is known by a number that is unique within one compilation unit. The symbol
+//! *objects* of a running program (with value, function and properties) belong to the virtual machine.
 
 use std::fmt;
 use std::hash::{Hash, Hasher};
@@ -99,7 +99,8 @@ impl Symbol {
     }
 }
 
-/// The symbol that keeps the global function `(setf symbol)`: one of the same package, named as it is written.
+/// The symbol that keeps the global function `(setf symbol)`: one of the same package, named as it is
+/// written.
 pub fn setf_cell(symbol: &Symbol) -> Symbol {
     let name = format!("(SETF {})", symbol.name());
     match symbol.home() {
@@ -141,7 +142,8 @@ impl Hash for Symbol {
 }
 
 impl fmt::Display for Symbol {
-    /// The name, with `:` before a keyword and `#:` before an uninterned symbol; other packages are not shown.
+    /// The name, with `:` before a keyword and `#:` before an uninterned symbol; other packages are not
+    /// shown.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.0.home {
             Home::Package(package) if &**package == KEYWORD_PACKAGE => write!(f, ":{}", self.name()),

@@ -8,8 +8,8 @@ use esl_bytecode::verify::verify;
 use proptest::prelude::*;
 use support::{Random, any_module, module_with_random_code};
 
-/// Takes `bytes` for a file in every way there is. Only that this ends without a panic matters, and that no module
-/// that passes the verifier is printed with a panic.
+/// Takes `bytes` for a file in every way there is. Only that this ends without a panic matters, and that no
+/// module that passes the verifier is printed with a panic.
 fn use_as_file(bytes: &[u8]) {
     if let Ok(module) = file::read(bytes) {
         let _ = verify(&module);

@@ -1,7 +1,8 @@
 //! Writes `docs/bytecode.md` and `docs/builtins.md` from the tables, and fails when they are stale.
 //!
-//! The text around the tables is in the folder `reference` beside this file. A line `@opcodes FIRST LAST` there stands
-//! for the rows from one mnemonic to the other, in the order of the table; every row must be asked for once.
+//! The text around the tables is in the folder `reference` beside this file. A line `@opcodes FIRST LAST`
+//! there stands for the rows from one mnemonic to the other, in the order of the table; every row must be
+//! asked for once.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;

@@ -1,8 +1,8 @@
 //! The verifier against a model of the interpreter that knows what each register really holds.
 //!
-//! Random code that the verifier accepts is run by the model, which takes every freedom that a real run has: tests go
-//! either way, instructions fail and are recovered from in all ways, anything that can land an unwinding does. Whatever
-//! the interpreter may assume (V1 to V11), the model checks.
+//! Random code that the verifier accepts is run by the model, which takes every freedom that a real run has:
+//! tests go either way, instructions fail and are recovered from in all ways, anything that can land an
+//! unwinding does. Whatever the interpreter may assume (V1 to V11), the model checks.
 
 mod support;
 
@@ -41,8 +41,8 @@ enum Kind {
     FailureCleanup {
         to: usize,
     },
-    /// It came about by `enter-cleanup`, or by an unwinding to the entry with this index, or to somewhere below this
-    /// frame.
+    /// It came about by `enter-cleanup`, or by an unwinding to the entry with this index, or to somewhere
+    /// below this frame.
     Running {
         unwinding: Option<Target>,
         value_list: bool,

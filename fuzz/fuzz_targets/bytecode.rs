@@ -1,4 +1,5 @@
-//! Reads bytes as a compiled file, with corrected checksums: code that the verifier accepts runs without harm.
+//! Reads bytes as a compiled file, with corrected checksums: code that the verifier accepts runs without
+//! harm.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {

@@ -56,8 +56,9 @@ enum Color {
 enum Action {
     /// Compile files to bytecode
     ///
-    /// Without -o each FILE.esl becomes a FILE.eslb of its own, which finds the modules that it requires when it
-    /// runs. With -o all files, and the modules that they require, become one program that runs the files in order.
+    /// Without -o each FILE.esl becomes a FILE.eslb of its own, which finds the modules that it requires when
+    /// it runs. With -o all files, and the modules that they require, become one program that runs the files
+    /// in order.
     Compile {
         /// Source files; `-` is standard input
         #[arg(required = true, value_name = "FILE")]

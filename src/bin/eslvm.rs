@@ -31,16 +31,18 @@ struct Command {
 enum Action {
     /// Run a program
     ///
-    /// Exit status: 0 success, or the status that the program asks for; 1 a failure left the main task; 2 wrong
-    /// usage, or a file that cannot be read or written; 3 the program does not compile or is refused; 4 no task can
-    /// ever run again; 5 the budget or the memory is spent; 130 interrupted.
+    /// Exit status: 0 success, or the status that the program asks for; 1 a failure left the main task; 2
+    /// wrong usage, or a file that cannot be read or written; 3 the program does not compile or is refused; 4
+    /// no task can ever run again; 5 the budget or the memory is spent; 130 interrupted.
     Run {
         #[command(flatten)]
         options: MachineOptions,
-        /// Print figures of the run to standard error at its end; with `=tasks`, also of the tasks with most ticks
+        /// Print figures of the run to standard error at its end; with `=tasks`, also of the tasks with most
+        /// ticks
         #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "run")]
         stats: Option<Stats>,
-        /// Write a timeline of the tasks to a file: a drawing if its name ends in `.svg`, else a trace for Perfetto
+        /// Write a timeline of the tasks to a file: a drawing if its name ends in `.svg`, else a trace for
+        /// Perfetto
         #[arg(long, value_name = "FILE")]
         timeline: Option<PathBuf>,
         /// Trace failures, goals or tasks on standard error: a list such as failures,tasks

@@ -1,5 +1,5 @@
-//! Everything that the machine learns from outside goes through its host: no other file names clocks, files, the
-//! network, the environment, threads or standard streams.
+//! Everything that the machine learns from outside goes through its host: no other file names clocks, files,
+//! the network, the environment, threads or standard streams.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! Fingerprints of the two tables that compiler and virtual machine must agree on, computed at compile time.
 //!
-//! They cover what the meaning of a file depends on: numbers, operands and substitute rules of opcodes, type codes, and
-//! names and arities of builtins in their order. Texts for people are left out.
+//! They cover what the meaning of a file depends on: numbers, operands and substitute rules of opcodes, type
+//! codes, and names and arities of builtins in their order. Texts for people are left out.
 
 use crate::builtin::{BUILTINS, Visibility};
 use crate::opcode::{OPCODES, TypeCode};

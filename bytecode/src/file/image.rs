@@ -35,8 +35,8 @@ impl Deref for ImageBytes {
 
 /// An opened file. Each symbol, constant and function is decoded when it is asked for.
 ///
-/// For files that this process trusts, such as the image of the library: what is decoded in parts is not seen by the
-/// verifier. A file from elsewhere goes through [`super::read`] and [`crate::verify::verify`].
+/// For files that this process trusts, such as the image of the library: what is decoded in parts is not seen
+/// by the verifier. A file from elsewhere goes through [`super::read`] and [`crate::verify::verify`].
 #[derive(Clone, Debug)]
 pub struct ModuleImage {
     bytes: ImageBytes,
@@ -152,7 +152,8 @@ impl ModuleImage {
         Ok(image)
     }
 
-    /// Opens a file that is known to be intact, such as one that is part of the program: only its header is looked at.
+    /// Opens a file that is known to be intact, such as one that is part of the program: only its header is
+    /// looked at.
     ///
     /// # Errors
     /// [`ReadError`] for bytes that are no file of this version and these tables.

@@ -14,8 +14,8 @@ use crate::symbol::{Home, Symbol};
 /// The file that holds `module`.
 ///
 /// # Errors
-/// [`WriteError::Object`] if a constant is an object of the running program, [`WriteError::TooLong`] for a module beyond
-/// the limits of the format.
+/// [`WriteError::Object`] if a constant is an object of the running program, [`WriteError::TooLong`] for a
+/// module beyond the limits of the format.
 pub fn write(module: &Module) -> Result<Vec<u8>, WriteError> {
     let mut symbols = SymbolTable::default();
     // Constants number the symbols that they use, so they come before the table of symbols is written.

@@ -4,8 +4,8 @@ use super::{Entry, PackageId, Packages};
 use crate::builtin::{BUILTINS, Visibility};
 use crate::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, USER_PACKAGE};
 
-/// The external names of `COMMON-LISP`, sorted. All of the standard's, also those that ESL leaves out: so a program
-/// cannot take one for a name of its own by mistake, and messages can say what to use instead.
+/// The external names of `COMMON-LISP`, sorted. All of the standard's, also those that ESL leaves out: so a
+/// program cannot take one for a name of its own by mistake, and messages can say what to use instead.
 pub const CL_NAMES: [&str; 978] = split(include_str!("common_lisp.txt"));
 
 /// Names of `COMMON-LISP` that ESL gives a meaning of its own.
@@ -27,9 +27,10 @@ impl PackageId {
 impl Packages {
     /// The standard packages, with the names of Common Lisp and of the builtins.
     ///
-    /// `ESL` uses `COMMON-LISP` and exports its names again, but for those that it takes over. So a package that uses
-    /// only `ESL`, as `ESL-USER` does, has all of the language. `COMMON-LISP-USER` is for programs that say that they are
-    /// in it: there the names that `ESL` takes over mean what they mean in Common Lisp.
+    /// `ESL` uses `COMMON-LISP` and exports its names again, but for those that it takes over. So a package
+    /// that uses only `ESL`, as `ESL-USER` does, has all of the language. `COMMON-LISP-USER` is for programs
+    /// that say that they are in it: there the names that `ESL` takes over mean what they mean in Common
+    /// Lisp.
     pub fn standard() -> Packages {
         let mut packages = Packages::empty();
         for (id, name, nickname) in [

@@ -139,7 +139,8 @@ pub enum Fault {
     ToplevelCaptures,
     /// V13: `NIL` or `T` as a symbol like others.
     StandardSymbol,
-    /// V13: a ratio that is not in lowest terms, or whose denominator is not above 1, or that is too large to tell.
+    /// V13: a ratio that is not in lowest terms, or whose denominator is not above 1, or that is too large to
+    /// tell.
     Ratio,
     /// V13: an array of rank 1, or with another number of elements than its dimensions say.
     Array,

@@ -1,8 +1,9 @@
 //! The data flow over a function (V1's end, V6 to V11): what is known at each place, on every path to it.
 //!
-//! A state is kept for each word that control can come to from elsewhere. Whenever one of them changes, the code from
-//! there on is gone through again, lowest word first: straight code once, a loop once more for each loop around it.
-//! States only ever lose knowledge, so this ends; a limit of work ends it sooner for code that no compiler makes.
+//! A state is kept for each word that control can come to from elsewhere. Whenever one of them changes, the
+//! code from there on is gone through again, lowest word first: straight code once, a loop once more for each
+//! loop around it. States only ever lose knowledge, so this ends; a limit of work ends it sooner for code
+//! that no compiler makes.
 
 use std::collections::BTreeSet;
 
@@ -449,8 +450,8 @@ fn assign(state: &mut State, first: Base, count: Count) {
     }
 }
 
-/// A call with the arguments of a window; the frames of callees lie over what is above it. Says whether control goes on
-/// with the next instruction.
+/// A call with the arguments of a window; the frames of callees lie over what is above it. Says whether
+/// control goes on with the next instruction.
 fn call(state: &mut State, Call { callee, window, count, want }: Call) -> Result<bool, Fault> {
     if callee.is_in_window() {
         read(state, window.0)?;

@@ -59,7 +59,8 @@ pub(super) struct Registers {
     values: RegisterSet,
     boxes: RegisterSet,
     maybe_unsupplied: RegisterSet,
-    /// Registers with a closure that this frame has made, and of which function of the module, where that matters.
+    /// Registers with a closure that this frame has made, and of which function of the module, where that
+    /// matters.
     closures: SmallVec<[(u8, u32); 2]>,
     /// Whether this frame has set the value list.
     pub(super) value_list: bool,
@@ -79,7 +80,8 @@ impl Registers {
         }
     }
 
-    /// `register` now holds something of `class`, or nothing that is known. Says whether something else was known.
+    /// `register` now holds something of `class`, or nothing that is known. Says whether something else was
+    /// known.
     pub(super) fn set(&mut self, register: u8, class: Option<Class>) -> bool {
         let before = self.class(register);
         let closures = self.closures.len();

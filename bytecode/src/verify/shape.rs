@@ -1,4 +1,5 @@
-//! The linear pass over a function: what can be seen of each instruction on its own (V1 to V5, and captures of V8).
+//! The linear pass over a function: what can be seen of each instruction on its own (V1 to V5, and captures
+//! of V8).
 
 use super::error::{Fault, Place, VerifyError};
 use super::pool;
@@ -235,8 +236,8 @@ impl Check<'_> {
         }
     }
 
-    /// A call needs arguments that its callee takes, as far as that is known, and room for a callee, a link word, the
-    /// arguments and the results.
+    /// A call needs arguments that its callee takes, as far as that is known, and room for a callee, a link
+    /// word, the arguments and the results.
     fn call(self, instr: Instr, Call { callee, window, count, want }: Call) -> Result<(), Fault> {
         let takes_them = match callee {
             Callee::Given | Callee::Global => true,

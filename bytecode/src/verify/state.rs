@@ -1,4 +1,5 @@
-//! All that is known at one place of a function's code: registers, bindings, and the control entries that stand.
+//! All that is known at one place of a function's code: registers, bindings, and the control entries that
+//! stand.
 
 use super::error::Fault;
 use super::registers::{Class, Registers};
@@ -45,8 +46,8 @@ pub(super) struct Entry {
     /// Bindings made before it was pushed, since the entry below it.
     pub(super) bindings_below: u32,
     pub(super) landing: Option<Landing>,
-    /// For a running cleanup: what is known when it came about by `enter-cleanup`, or by a failure that it is for. `None`
-    /// if it never does.
+    /// For a running cleanup: what is known when it came about by `enter-cleanup`, or by a failure that it is
+    /// for. `None` if it never does.
     pub(super) entered: Option<Box<Registers>>,
 }
 
@@ -58,8 +59,8 @@ pub(super) struct State {
     pub(super) bindings: u32,
     /// The entries, the innermost last. Their windows do not decrease.
     pub(super) entries: Vec<Entry>,
-    /// Whether something about a register below an entry's window was known a moment ago and is not now. Code that
-    /// such an entry lands at must then be told.
+    /// Whether something about a register below an entry's window was known a moment ago and is not now. Code
+    /// that such an entry lands at must then be told.
     pub(super) lost: bool,
 }
 
@@ -74,7 +75,8 @@ impl State {
         self.entries.last().map_or(0, |entry| entry.window)
     }
 
-    /// All views of the registers: as they are, and as they are if running cleanups came about by `enter-cleanup`.
+    /// All views of the registers: as they are, and as they are if running cleanups came about by
+    /// `enter-cleanup`.
     fn views(&mut self) -> impl Iterator<Item = &mut Registers> {
         let entered = self.entries.iter_mut().filter_map(|entry| entry.entered.as_deref_mut());
         std::iter::once(&mut self.registers).chain(entered)

@@ -12,9 +12,9 @@ const CAPTURES_BOX: u32 = 3;
 const CAPTURES_LATER: u32 = 4;
 const PASSES_CAPTURES: u32 = 5;
 
-/// Constants: `k0` a symbol, `k1` an integer, `k2` a plain function, `k3` a class, `k4` a vector of types, `k5` to `k7`
-/// functions that capture `r0` as a value, `r0` as a box, and something later, `k8` a vector that lists no types,
-/// `k9` a function that takes on both captures of its maker.
+/// Constants: `k0` a symbol, `k1` an integer, `k2` a plain function, `k3` a class, `k4` a vector of types,
+/// `k5` to `k7` functions that capture `r0` as a value, `r0` as a box, and something later, `k8` a vector
+/// that lists no types, `k9` a function that takes on both captures of its maker.
 fn constants() -> Vec<Constant> {
     let function = |number| Constant::Function(FunctionNumber(number));
     vec![

@@ -58,8 +58,9 @@ for_each_opcode!(define_builder);
 /// Registers that random code uses.
 pub(crate) const REGISTERS: u8 = 7;
 
-/// Constants by the number that random code knows them by: a symbol, an integer, a function without captures, functions
-/// with a value, a box, and a later capture, a function that hands on captures, a class, and a vector of types.
+/// Constants by the number that random code knows them by: a symbol, an integer, a function without captures,
+/// functions with a value, a box, and a later capture, a function that hands on captures, a class, and a
+/// vector of types.
 const SYMBOL: u32 = 0;
 const INTEGER: u32 = 1;
 const FUNCTIONS: std::ops::Range<u32> = 2..7;

@@ -104,8 +104,8 @@ pub(crate) const POWER: &str = "
   (to-achieve (power device value)
     (t (assert (list 'power device value))))";
 
-/// Returns a program with two tasks that want different values of a property, and a change from outside: the case
-/// model-checked in 1997.
+/// Returns a program with two tasks that want different values of a property, and a change from outside: the
+/// case model-checked in 1997.
 pub(crate) fn two_tasks() -> String {
     format!("{POWER} {TWO_TASKS}")
 }

@@ -1,7 +1,7 @@
 //! Arrays: their elements, dimensions and fill pointers.
 //!
-//! What keeps the elements decides what they may be: any value, characters, or integers below 256. [`esl_heap::array`]
-//! reads them.
+//! What keeps the elements decides what they may be: any value, characters, or integers below 256.
+//! [`esl_heap::array`] reads them.
 
 pub(crate) use esl_heap::array::{Elements, all_elements, data_of, vector_elements, vector_length};
 use esl_heap::array::{dimensions, total_size};
@@ -33,7 +33,8 @@ impl Vm {
         }
     }
 
-    /// Stores an element of what keeps the elements of an array. `value` has been checked, and `index` is in range.
+    /// Stores an element of what keeps the elements of an array. `value` has been checked, and `index` is in
+    /// range.
     pub(crate) fn store_element(&mut self, data: Value, index: usize, value: Value) {
         if self.heap.vector_set(data, index, value).is_some() {
             return;

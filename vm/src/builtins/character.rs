@@ -109,8 +109,8 @@ pub(super) fn name_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(name.and_then(|name| character::named(&name)).map_or(Value::NIL, character_of))
 }
 
-/// Whether `holds` is true of all neighbours, as codes. All arguments are checked, also behind a pair for which it is
-/// not.
+/// Whether `holds` is true of all neighbours, as codes. All arguments are checked, also behind a pair for
+/// which it is not.
 fn chain(vm: &mut Vm, arguments: &[Value], fold: bool, holds: impl Fn(u32, u32) -> bool) -> Outcome {
     let mut codes = Vec::with_capacity(arguments.len());
     for &v in arguments {

@@ -1,5 +1,5 @@
-//! The logical database: changes of facts, and queries in steps. Whatever calls functions of the program is ESL, in
-//! `stdlib/database.esl`.
+//! The logical database: changes of facts, and queries in steps. Whatever calls functions of the program is
+//! ESL, in `stdlib/database.esl`.
 
 use crate::database::{FormulaError, Progress, QueryError};
 use crate::heap::AllocError;

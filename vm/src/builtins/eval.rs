@@ -1,8 +1,8 @@
 //! Reading and compiling at run time.
 //!
-//! `eval`, `load` and `macroexpand` are written in ESL. A compilation is a machine of steps that never runs a macro
-//! itself: `%compilation-step` tells the program what to call, and is told the outcome. So a task that compiles is
-//! preempted and aborted like any other, in the middle of a macro too.
+//! `eval`, `load` and `macroexpand` are written in ESL. A compilation is a machine of steps that never runs a
+//! macro itself: `%compilation-step` tells the program what to call, and is told the outcome. So a task that
+//! compiles is preempted and aborted like any other, in the middle of a macro too.
 //!
 //! Step by step (`kind` and `outcome` are `:start nil` at first):
 //!
@@ -14,7 +14,8 @@
 //!   => :done functions diagnostics          over; NIL for functions if one of the diagnostics is an error
 //! ```
 //!
-//! Diagnostics are a list of `(severity code text)`. Whoever begins a compilation ends it with `%end-compilation`.
+//! Diagnostics are a list of `(severity code text)`. Whoever begins a compilation ends it with
+//! `%end-compilation`.
 
 use esl_bytecode::compile::{Answer, Compilation, Step};
 use esl_bytecode::datum::Datum;
@@ -41,7 +42,8 @@ fn is_unfinished(code: &str) -> bool {
 }
 
 impl Vm {
-    /// Begins a compilation and returns its handle. `is_nameless` says whether its form comes from a text without a name.
+    /// Begins a compilation and returns its handle. `is_nameless` says whether its form comes from a text
+    /// without a name.
     fn begin(&mut self, compilation: Box<dyn Compilation>, unit: Unit, is_nameless: bool) -> Value {
         let running = ActiveCompilation { compilation, unit, step: None, keeps: false, is_nameless };
         self.compiler.add(CompilerJob::Compilation(Box::new(running)))

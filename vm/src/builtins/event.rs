@@ -1,7 +1,7 @@
 //! Events, waits and time: the primitives from which the library makes the forms that wait.
 //!
-//! A builtin that waits parks its task and is done again, from the start, when the task goes on: then the task's `wait` is
-//! what it was parked at.
+//! A builtin that waits parks its task and is done again, from the start, when the task goes on: then the
+//! task's `wait` is what it was parked at.
 
 use crate::builtins::LIMIT;
 use crate::heap::Kind;
@@ -123,7 +123,8 @@ const MAX_EVENTS: usize = 4096;
 /// Begins a wait of the running task for `events`, an event or a list of them.
 ///
 /// # Errors
-/// A failure if something else is among them; [`Exit::Collect`]; [`Exit::Again`] while signals are under delivery.
+/// A failure if something else is among them; [`Exit::Collect`]; [`Exit::Again`] while signals are under
+/// delivery.
 pub(super) fn begin_wait(vm: &mut Vm, events: Value, options: WaitOptions) -> Outcome {
     vm.scheduler.wait_for_deliveries()?;
     let owner = vm.scheduler.task().object;
@@ -156,7 +157,8 @@ pub(super) fn take_or_park(vm: &mut Vm, events: Value, options: WaitOptions) -> 
     vm.scheduler.park_at(wait, None)
 }
 
-/// Waits for a signal of `events` that comes after they were counted, if `count` is not `NIL`, and gives its arguments.
+/// Waits for a signal of `events` that comes after they were counted, if `count` is not `NIL`, and gives its
+/// arguments.
 fn wait_for_signal(vm: &mut Vm, events: Value, count: Value, what: Value) -> Outcome {
     let wait = vm.scheduler.task().wait;
     if wait.is_true() {

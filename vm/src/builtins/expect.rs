@@ -6,7 +6,8 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 impl Vm {
-    /// Notes that `datum` is not of the type that `specifier` writes: parentheses, names of `COMMON-LISP`, integers.
+    /// Notes that `datum` is not of the type that `specifier` writes: parentheses, names of `COMMON-LISP`,
+    /// integers.
     #[cold]
     pub(crate) fn specifier_error<T>(&mut self, datum: Value, specifier: &str) -> Result<T, Exit> {
         let specifier = self.read_specifier(specifier)?;
@@ -47,7 +48,8 @@ impl Vm {
         self.specifier_error(datum, &format!("(CONS (INTEGER 0 {length}) (INTEGER {least} {length}))"))
     }
 
-    /// The part of a sequence of `length` elements from `start` to before `end`; `NIL` is the beginning or the end.
+    /// The part of a sequence of `length` elements from `start` to before `end`; `NIL` is the beginning or
+    /// the end.
     pub(crate) fn bounds(&mut self, start: Value, end: Value, length: usize) -> Result<(usize, usize), Exit> {
         let from = if start.is_nil() { Some(0) } else { start.as_index() };
         let to = if end.is_nil() { Some(length) } else { end.as_index() };

@@ -1,4 +1,5 @@
-//! What the library needs to signal a failure: the handlers on the control stack, the end of a task, backtraces.
+//! What the library needs to signal a failure: the handlers on the control stack, the end of a task,
+//! backtraces.
 
 use smallvec::SmallVec;
 

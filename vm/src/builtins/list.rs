@@ -1,7 +1,7 @@
 //! Lists: pairs and their parts, building, joining and copying.
 //!
-//! A walk visits at most [`LIMIT`] pairs and then leaves to the function's ESL twin, which can be interrupted; so a
-//! circular list is not a hang.
+//! A walk visits at most [`LIMIT`] pairs and then leaves to the function's ESL twin, which can be
+//! interrupted; so a circular list is not a hang.
 
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;

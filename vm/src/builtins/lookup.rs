@@ -87,8 +87,8 @@ pub(super) fn adjoin_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if found.is_true() { Ok(arguments[1]) } else { Ok(vm.heap.cons(arguments[0], arguments[1])?) }
 }
 
-/// The pair with an indicator in a property list and the pair with its value, `NIL` and `NIL` if it is not there, and the pair
-/// in front of them.
+/// The pair with an indicator in a property list and the pair with its value, `NIL` and `NIL` if it is not
+/// there, and the pair in front of them.
 fn find_property(vm: &mut Vm, plist: Value, indicator: Value) -> Result<Option<[Value; 3]>, Exit> {
     let (mut before, mut rest) = (Value::NIL, plist);
     for visited in 0..LIMIT {

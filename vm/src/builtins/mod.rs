@@ -2,27 +2,29 @@
 //!
 //! Rules for a builtin:
 //! - It never calls back into the language. It may ask for a call in its place ([`Exit::Call`]).
-//! - Its work is bounded: up to [`LIMIT`] units, for which it charges; above, it gives [`Exit::Slowly`] before it has had
-//!   any effect, or fails.
-//! - It allocates before it has any effect, since [`Exit::Collect`] means that it is done again from the start.
+//! - Its work is bounded: up to [`LIMIT`] units, for which it charges; above, it gives [`Exit::Slowly`]
+//!   before it has had any effect, or fails.
+//! - It allocates before it has any effect, since [`Exit::Collect`] means that it is done again from the
+//!   start.
 //! - No collection happens while it runs, so values need no rooting.
 //!
-//! The ESL twins are the functions in the `slowly` column of the table, `%SLOW-` and the builtin's name, with the same
-//! arguments. A twin does what the builtin does, failures included, in steps that can be interrupted; it may call the
-//! builtin on parts, and may not be given the whole again:
-//! - Lists: plain loops. `%slow-list-length` walks at two speeds and gives `NIL` for a circle; all others may go round for
-//!   ever.
-//! - Vectors and strings: parts of at most 16 384 elements, by the `start` and `end` of the builtin, or by `%replace`
-//!   into a fresh `%make-vector` or `%make-string`.
-//! - `%slow-+`, `%slow--`, `%slow-*`, `%slow-/` and their like of more than two numbers: pair by pair. Of two large integers,
-//!   the product by halves of the longer one (`ash`, `%ldb`); quotients by long division, a few limbs of the dividend at a
-//!   time, from the top; `gcd` by `%gcd-step` until the second value is 0, after a `rem` where lengths differ much. Ratios
-//!   by their numerators and denominators. `expt` by repeated squares, `isqrt` by Newton's steps, digits by halves
-//!   (`truncate` by a power of the radix).
+//! The ESL twins are the functions in the `slowly` column of the table, `%SLOW-` and the builtin's name, with
+//! the same arguments. A twin does what the builtin does, failures included, in steps that can be
+//! interrupted; it may call the builtin on parts, and may not be given the whole again:
+//! - Lists: plain loops. `%slow-list-length` walks at two speeds and gives `NIL` for a circle; all others may
+//!   go round for ever.
+//! - Vectors and strings: parts of at most 16 384 elements, by the `start` and `end` of the builtin, or by
+//!   `%replace` into a fresh `%make-vector` or `%make-string`.
+//! - `%slow-+`, `%slow--`, `%slow-*`, `%slow-/` and their like of more than two numbers: pair by pair. Of two
+//!   large integers, the product by halves of the longer one (`ash`, `%ldb`); quotients by long division, a
+//!   few limbs of the dividend at a time, from the top; `gcd` by `%gcd-step` until the second value is 0,
+//!   after a `rem` where lengths differ much. Ratios by their numerators and denominators. `expt` by repeated
+//!   squares, `isqrt` by Newton's steps, digits by halves (`truncate` by a power of the radix).
 //! - Hash tables: the hash by `%table-hash` or the hash function of the program (second and third value of
-//!   `%hash-table-test`), then the test on the keys in `%table-candidates`. A key found is read, set or deleted with
-//!   `%table-value`, `%set-table-value`, `%table-delete`; one not found is added with `%table-add` and the `%table-serial`
-//!   from before. Where one of these says that the table has changed meanwhile, all over again.
+//!   `%hash-table-test`), then the test on the keys in `%table-candidates`. A key found is read, set or
+//!   deleted with `%table-value`, `%set-table-value`, `%table-delete`; one not found is added with
+//!   `%table-add` and the `%table-serial` from before. Where one of these says that the table has changed
+//!   meanwhile, all over again.
 //! - `%slow-table-next`: the builtin from `%table-skip` on.
 //! - `%slow-wait-for-events`: all that has options.
 //!
@@ -43,7 +45,8 @@ pub(crate) const COPY_LIMIT: usize = 1 << 15;
 macro_rules! define_natives {
     ($( $(#[doc = $doc:literal])* $id:ident = $native:path, $visibility:ident $name:literal
         ($lambda_list:literal) $(-> $results:ident)? $(slowly $slowly:literal)?; )*) => {
-        /// The implementations, by the numbers of their rows. A row whose path names no function does not compile.
+        /// The implementations, by the numbers of their rows. A row whose path names no function does not
+        /// compile.
         pub(crate) static NATIVES: Natives = [$( $native ),*];
     };
 }

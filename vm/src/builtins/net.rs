@@ -1,6 +1,7 @@
 //! Nets: tasks that belong to a form, from which the library makes `task-net` and `or-parallel`.
 //!
-//! A net is a list of a wait and the tasks. The wait is for no event; each of the tasks is put into its queue at its end.
+//! A net is a list of a wait and the tasks. The wait is for no event; each of the tasks is put into its queue
+//! at its end.
 
 use smallvec::{SmallVec, smallvec};
 

@@ -46,7 +46,8 @@ pub(super) fn call_host(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             Err(error) => return vm.exchange.raise(Raised::Simple(error.to_string())),
         }
     }
-    // The function has effects that cannot be done twice, so what it gives is kept until there is room for it.
+    // The function has effects that cannot be done twice, so what it gives is kept until there is room for
+    // it.
     let answer = match vm.outside.answer.take() {
         Some(answer) => answer,
         None => (vm.outside.functions[number])(&data),

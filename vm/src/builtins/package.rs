@@ -97,8 +97,8 @@ impl Vm {
         }
     }
 
-    /// What is written before the name of a symbol: nothing, `:`, `#:`, or a package with one or two colons. `None` for
-    /// what is no symbol.
+    /// What is written before the name of a symbol: nothing, `:`, `#:`, or a package with one or two colons.
+    /// `None` for what is no symbol.
     pub(crate) fn qualifier(&self, symbol: Value) -> Option<Qualifier> {
         match self.world.name_of(&self.heap, symbol) {
             Some(name) => Some(self.world.packages().qualifier(&name, self.current_package())),

@@ -1,6 +1,8 @@
-//! How atoms are written: symbols with the escapes that make them read back, strings in quotes, characters by name.
+//! How atoms are written: symbols with the escapes that make them read back, strings in quotes, characters by
+//! name.
 //!
-//! Not here: what the printer variables say and the way through lists and vectors, which are written in ESL; packages.
+//! Not here: what the printer variables say and the way through lists and vectors, which are written in ESL;
+//! packages.
 
 use crate::character;
 use crate::equality::characters_of;
@@ -90,7 +92,8 @@ fn in_case(characters: &[u32], case: Value) -> Vec<u32> {
     characters.iter().map(change).collect()
 }
 
-/// Whether a name read as it stands would be another symbol, or none, or has a character that would do that elsewhere.
+/// Whether a name read as it stands would be another symbol, or none, or has a character that would do that
+/// elsewhere.
 fn needs_bars(characters: &[u32]) -> bool {
     let is_plain = |&code: &u32| {
         let c = char::from_u32(code).unwrap_or(' ');
@@ -105,8 +108,9 @@ fn needs_bars(characters: &[u32]) -> bool {
         || looks_like_a_number(characters)
 }
 
-/// Whether a token is what the standard calls a potential number (2.3.1.1): it has a digit, begins with a digit, sign,
-/// point or `^` or `_`, does not end with a sign, and consists of these, `/`, and letters none of which are neighbours.
+/// Whether a token is what the standard calls a potential number (2.3.1.1): it has a digit, begins with a
+/// digit, sign, point or `^` or `_`, does not end with a sign, and consists of these, `/`, and letters none
+/// of which are neighbours.
 fn looks_like_a_number(characters: &[u32]) -> bool {
     let token: Option<Vec<u8>> = characters.iter().map(|&code| u8::try_from(code).ok()).collect();
     let Some(token) = token else { return false };

@@ -1,5 +1,5 @@
-//! Searching sequences by `eql` and `equal`: what `find`, `position`, `count` and `remove` do without a function of the
-//! program.
+//! Searching sequences by `eql` and `equal`: what `find`, `position`, `count` and `remove` do without a
+//! function of the program.
 
 use crate::builtins::array::{Elements, vector_elements};
 use crate::equality::{self, Test};

@@ -1,6 +1,7 @@
 //! Lists and vectors alike: length, elements, parts, copies, reversal, and the ways between the two.
 //!
-//! Lists are walked up to [`LIMIT`] pairs. Vectors are copied up to [`COPY_LIMIT`] elements, which takes about as long.
+//! Lists are walked up to [`LIMIT`] pairs. Vectors are copied up to [`COPY_LIMIT`] elements, which takes
+//! about as long.
 
 use smallvec::SmallVec;
 
@@ -15,8 +16,8 @@ use super::list::reverse_in_place;
 use super::{COPY_LIMIT, LIMIT};
 
 impl Vm {
-    /// Copies `count` elements between what keeps the elements of two arrays, as if by way of a third. The ranges are
-    /// inside.
+    /// Copies `count` elements between what keeps the elements of two arrays, as if by way of a third. The
+    /// ranges are inside.
     ///
     /// # Errors
     /// `type-error` for the first element that the target cannot keep; nothing has been copied then.

@@ -1,7 +1,7 @@
 //! Strings: designators, comparison, case, trimming, joining, searching.
 //!
-//! A string is a vector of code points, with or without a fill pointer. The functions with keyword arguments are
-//! written in ESL over these; a bound that is `NIL` is the beginning or the end.
+//! A string is a vector of code points, with or without a fill pointer. The functions with keyword arguments
+//! are written in ESL over these; a bound that is `NIL` is the beginning or the end.
 
 use std::cmp::Ordering;
 
@@ -22,7 +22,8 @@ use crate::types::is_string;
 const SEARCH_LIMIT: usize = 1 << 20;
 
 impl Vm {
-    /// The string that a designator stands for: a string itself, the name of a symbol, a character as a string of one.
+    /// The string that a designator stands for: a string itself, the name of a symbol, a character as a
+    /// string of one.
     pub(crate) fn string_designator(&mut self, v: Value) -> Outcome {
         if characters_of(&self.heap, v).is_some() {
             return Ok(v);

@@ -1,5 +1,5 @@
-//! Slots of structures, where an instruction does not reach: classes named at run time, more slots than an operand
-//! counts.
+//! Slots of structures, where an instruction does not reach: classes named at run time, more slots than an
+//! operand counts.
 
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::value::Value;

@@ -1,8 +1,9 @@
 //! Hash tables.
 //!
-//! Tables that compare by a test of the machine are searched here, within a limit of work; above it, and for tests that
-//! are functions of the program, the ESL twin compares the keys that have the same hash. Since it can be interrupted, what it
-//! has found is checked again where it is used: an entry must still have the very key, a table the same keys.
+//! Tables that compare by a test of the machine are searched here, within a limit of work; above it, and for
+//! tests that are functions of the program, the ESL twin compares the keys that have the same hash. Since it
+//! can be interrupted, what it has found is checked again where it is used: an entry must still have the very
+//! key, a table the same keys.
 
 use crate::equality::{self, Test};
 use crate::number;
@@ -33,7 +34,8 @@ fn table(vm: &mut Vm, v: Value) -> Result<Table, Exit> {
 
 /// The entry of a key, if it has one; and its hash, if that was needed to know.
 ///
-/// The key is often the one that was looked up last, as in `(push item (gethash key table))`: that entry is tried first.
+/// The key is often the one that was looked up last, as in `(push item (gethash key table))`: that entry is
+/// tried first.
 #[inline(always)]
 fn find(vm: &mut Vm, table: Table, key: Value) -> Result<Place, Exit> {
     let Comparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
@@ -222,7 +224,8 @@ pub(super) fn table_hash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::index(equality::hash(&vm.heap, test, key) as usize))
 }
 
-/// The 32 bits of a hash: a fixnum as [`table_hash`] gives it, or any integer of a hash function of the program.
+/// The 32 bits of a hash: a fixnum as [`table_hash`] gives it, or any integer of a hash function of the
+/// program.
 fn hash_argument(vm: &mut Vm, v: Value) -> Result<u32, Exit> {
     match v.as_index().and_then(|hash| u32::try_from(hash).ok()) {
         Some(hash) => Ok(hash),

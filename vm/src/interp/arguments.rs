@@ -1,4 +1,5 @@
-//! The arguments of a call: the list of an application spread, and arguments put in the order of the parameters.
+//! The arguments of a call: the list of an application spread, and arguments put in the order of the
+//! parameters.
 
 use super::constants_of;
 use crate::describe;
@@ -27,7 +28,8 @@ pub(super) fn spread(vm: &mut Vm, arguments: &mut Arguments) -> Result<(), Exit>
     if rest.is_true() { vm.exchange.type_error(list, "LIST") } else { Ok(()) }
 }
 
-/// Puts arguments in the order of the parameter registers into `arranged`, which is empty: missing ones unsupplied, the rest as a list, keys by name.
+/// Puts arguments in the order of the parameter registers into `arranged`, which is empty: missing ones
+/// unsupplied, the rest as a list, keys by name.
 ///
 /// # Safety
 /// `code` is the Code of `function`, of the given shape, with bytecode.

@@ -1,7 +1,8 @@
-//! Calls that do not take the fast way: other callees than functions with exactly the given arguments, natives called
-//! as functions, applications, and calls for which the stack has to grow.
+//! Calls that do not take the fast way: other callees than functions with exactly the given arguments,
+//! natives called as functions, applications, and calls for which the stack has to grow.
 //!
-//! A call is made ready before it has any effect, so that one that fails, or lacks room, leaves the frame as it was.
+//! A call is made ready before it has any effect, so that one that fails, or lacks room, leaves the frame as
+//! it was.
 
 use esl_bytecode::builtin::{BUILTINS, BuiltinInfo};
 use esl_bytecode::opcode::{Callee, Opcode, Substitute};
@@ -71,7 +72,8 @@ pub(super) unsafe fn slow_call(vm: &mut Vm) -> Signal {
     }
 }
 
-/// Calls `callee` with `arguments`, which may lie in the running frame: they are copied before the stack moves.
+/// Calls `callee` with `arguments`, which may lie in the running frame: they are copied before the stack
+/// moves.
 ///
 /// # Safety
 /// The contract of [`super::settle`]; for [`FramePlace::Window`] at an instruction that has a window.
@@ -181,7 +183,8 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Fram
                 Signal::Next
             }
             FramePlace::Above => substitute(vm),
-            // What is called in an interrupted task is written in ESL; were it not, the task would just go on.
+            // What is called in an interrupted task is written in ESL; were it not, the task would just go
+            // on.
             FramePlace::Interrupt => {
                 vm.restore_wait();
                 Signal::Reload

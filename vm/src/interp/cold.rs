@@ -1,8 +1,8 @@
-//! The slow parts of instructions: each decodes its operands again, does its work, and writes its own result, so that
-//! the loop passes three registers and expects nothing back but a [`Signal`].
+//! The slow parts of instructions: each decodes its operands again, does its work, and writes its own result,
+//! so that the loop passes three registers and expects nothing back but a [`Signal`].
 //!
-//! Every function here has the contract of [`super::settle`]: `pc` is at an instruction of the row it serves, `base` is
-//! the running frame's, and what the verifier proved holds (V1 to V13).
+//! Every function here has the contract of [`super::settle`]: `pc` is at an instruction of the row it serves,
+//! `base` is the running frame's, and what the verifier proved holds (V1 to V13).
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::module::CaptureSource;
@@ -43,8 +43,8 @@ const fn opcode(number: u8) -> Opcode {
     }
 }
 
-/// The builtin that the row of an opcode names. An arm that leaves an instruction without one to [`compute`] or [`test`]
-/// does not compile.
+/// The builtin that the row of an opcode names. An arm that leaves an instruction without one to [`compute`]
+/// or [`test`] does not compile.
 pub(super) const fn builtin(opcode: Opcode) -> Builtin {
     match opcode.builtin() {
         Some(builtin) => builtin,
@@ -55,7 +55,8 @@ pub(super) const fn builtin(opcode: Opcode) -> Builtin {
 /// The largest number of arguments that an instruction gives its builtin.
 const MAX_ARGUMENTS: usize = 3;
 
-/// Has the builtin that the row of an instruction names do its work; gives the outcome, and the register for it.
+/// Has the builtin that the row of an instruction names do its work; gives the outcome, and the register for
+/// it.
 ///
 /// # Safety
 /// See the module's header; `pc` is at an instruction with this opcode.
@@ -103,7 +104,8 @@ unsafe fn apply_builtin<const OPCODE: u8>(
     (outcome, dst)
 }
 
-/// Has the ESL twin of a builtin do what is too much work for one instruction: its call takes the instruction's place.
+/// Has the ESL twin of a builtin do what is too much work for one instruction: its call takes the
+/// instruction's place.
 #[cold]
 fn ask_twin(vm: &mut Vm, builtin: Builtin, arguments: &[Value]) -> Outcome {
     let function = vm.twin_of(builtin.info())?;
@@ -270,8 +272,8 @@ pub(super) unsafe fn is_instance(vm: &mut Vm, base: *mut Value, value: Value, in
     vm.world.is_instance(&vm.heap, value, class)
 }
 
-/// The class that is a constant of the running function. As loaded the constant is the name of the class; the class, as
-/// it is now, is put in its place, also when the class of that name has become another one.
+/// The class that is a constant of the running function. As loaded the constant is the name of the class; the
+/// class, as it is now, is put in its place, also when the class of that name has become another one.
 ///
 /// # Safety
 /// The frame at `base` is the running one, and constant `index` of its function is for a class.

@@ -1,8 +1,8 @@
 //! Safepoints: preemption, and the collector's turns.
 //!
-//! Here is everything that the collector has to find: [`mark_roots`] names the fixed roots, [`scan`] the values of a
-//! task. A task's stack is scanned once in a cycle: that of the running task when the cycle begins, every other one when
-//! the marker gets to it or just before the task runs, whichever is first.
+//! Here is everything that the collector has to find: [`mark_roots`] names the fixed roots, [`scan`] the
+//! values of a task. A task's stack is scanned once in a cycle: that of the running task when the cycle
+//! begins, every other one when the marker gets to it or just before the task runs, whichever is first.
 
 use super::{Leave, code_of};
 use crate::compiler::Compiler;
@@ -29,8 +29,8 @@ unsafe fn top_of(task: &Task, base: usize) -> usize {
     }
 }
 
-/// Turns of the collector after which a slice ends, however many ticks are left: they take their time too. The ticks are
-/// not charged.
+/// Turns of the collector after which a slice ends, however many ticks are left: they take their time too.
+/// The ticks are not charged.
 const TURNS_IN_SLICE: u32 = 8;
 
 /// Words of a stack that count as one visit of the collector.
@@ -110,9 +110,11 @@ fn mark_more(heap: &mut Heap, tasks: &mut Tasks) {
 }
 
 impl Vm {
-    /// What happens at a tick when none is left: a turn of the collector, and the end of the slice if it is over.
+    /// What happens at a tick when none is left: a turn of the collector, and the end of the slice if it is
+    /// over.
     pub(super) fn safepoint(&mut self) -> Option<Leave> {
-        // `ticks` is negative here: at least by the tick that was not there, and more if builtins have overdrawn.
+        // `ticks` is negative here: at least by the tick that was not there, and more if builtins have
+        // overdrawn.
         let left = self.cpu.reserve + self.cpu.ticks + 1;
         self.cpu.reserve = 0;
         if self.config.collect_always {
@@ -151,8 +153,8 @@ impl Vm {
         !self.exchange.charges.is_empty() || self.heap.gc_due()
     }
 
-    /// Takes what was charged from the ticks that are left, and sees to it that the next tick is a safepoint if one is wanted there.
-    /// Returns the ticks until then.
+    /// Takes what was charged from the ticks that are left, and sees to it that the next tick is a safepoint
+    /// if one is wanted there. Returns the ticks until then.
     #[cold]
     #[inline(never)]
     pub(super) fn prepare_safepoint(&mut self, ticks: i32) -> i32 {
@@ -221,8 +223,8 @@ impl Vm {
         self.end_pause(pause);
     }
 
-    /// Begins a turn of the collector: notes where the running task stands, and tells whoever watches. Returns when it began, if
-    /// the run is watched.
+    /// Begins a turn of the collector: notes where the running task stands, and tells whoever watches.
+    /// Returns when it began, if the run is watched.
     fn begin_pause(&mut self) -> Option<u64> {
         if self.scheduler.running.is_some() {
             self.save_cpu();

@@ -1,8 +1,8 @@
 //! Arithmetic on doubles, for the loop.
 //!
-//! A double in a register of the frame is decoded, used and encoded without leaving the vector unit where there is one:
-//! the way through general registers and back takes as long as a multiplication, and programs wait for it, since the
-//! result of one operation is what the next one needs.
+//! A double in a register of the frame is decoded, used and encoded without leaving the vector unit where
+//! there is one: the way through general registers and back takes as long as a multiplication, and programs
+//! wait for it, since the result of one operation is what the next one needs.
 //!
 //! Not here: comparisons, which nobody waits for, and doubles in boxes, which are the numeric tower's.
 #![allow(unsafe_code)]
@@ -114,10 +114,10 @@ mod register {
 
 pub(super) use register::{load, store};
 
-/// The operations between a double and a fixnum, and on the doubles that have a constant of their own (zeros, above all):
-/// too long for the loop, too common for the way that all numbers take. They are leaves, so that the loop's registers stay where
-/// they are. Each gives `UNBOUND` for what it leaves to the numeric tower: other operands, results that need a box, and those that
-/// fail.
+/// The operations between a double and a fixnum, and on the doubles that have a constant of their own (zeros,
+/// above all): too long for the loop, too common for the way that all numbers take. They are leaves, so that
+/// the loop's registers stay where they are. Each gives `UNBOUND` for what it leaves to the numeric tower:
+/// other operands, results that need a box, and those that fail.
 macro_rules! define_mixed {
     ($($name:ident $operator:tt;)*) => { $(
         #[inline(never)]

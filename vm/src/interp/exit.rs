@@ -80,8 +80,8 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
     unsafe { call(vm, function, &arguments, FramePlace::Above) }
 }
 
-/// Collects, so that the instruction at `vm.cpu.pc()` is done again with more room; if that did not help the last time, the
-/// heap is exhausted.
+/// Collects, so that the instruction at `vm.cpu.pc()` is done again with more room; if that did not help the
+/// last time, the heap is exhausted.
 ///
 /// # Safety
 /// The contract of [`super::settle`].

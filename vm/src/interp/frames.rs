@@ -1,5 +1,5 @@
-//! Walks over the frames of a task's stack: for backtraces, for reports, for what recovers from a failure, for a
-//! fingerprint of the task's state.
+//! Walks over the frames of a task's stack: for backtraces, for reports, for what recovers from a failure,
+//! for a fingerprint of the task's state.
 
 use std::marker::PhantomData;
 
@@ -11,8 +11,8 @@ use crate::value::Value;
 use crate::vm::Vm;
 use esl_bytecode::opcode::{Callee, Opcode};
 
-/// Words below the first register of a task's outermost frame: the frame of the stub at the task's end has nothing but
-/// its link, and no code of a program stands there.
+/// Words below the first register of a task's outermost frame: the frame of the stub at the task's end has
+/// nothing but its link, and no code of a program stands there.
 const BELOW_FRAMES: usize = 4;
 
 /// One frame.
@@ -45,8 +45,8 @@ impl<'a> Frame<'a> {
         unsafe { pc_from_value(*self.base.sub(1)) }
     }
 
-    /// Whether its function was called by name, or by the machine in the place of an instruction, and not as a value that
-    /// the caller was given.
+    /// Whether its function was called by name, or by the machine in the place of an instruction, and not as
+    /// a value that the caller was given.
     fn is_called_by_name(&self) -> bool {
         let return_to = self.return_address();
         // SAFETY: F2: two words before a return address is the word of the call.
@@ -78,7 +78,8 @@ impl<'a> Frames<'a> {
     /// Walks from a frame outward.
     ///
     /// # Safety
-    /// The task whose stack begins at `bottom` stands at `pc` in the frame with the registers at `base`, for `'a`.
+    /// The task whose stack begins at `bottom` stands at `pc` in the frame with the registers at `base`, for
+    /// `'a`.
     unsafe fn new(bottom: *mut Value, pc: *const u32, base: *mut Value) -> Frames<'a> {
         let next = Some((pc, base));
         Frames { bottom, next, is_exact: true, uncovered: usize::MAX, stack: PhantomData }
@@ -146,8 +147,8 @@ pub(crate) fn entry_word(task: &Task, entry: &Entry) -> Option<usize> {
 }
 
 impl Vm {
-    /// Returns the frames of the running task. `vm.cpu` is in order when a builtin that the interpreter called asks for
-    /// them only up to its innermost frame's pc, so that one is given as it was saved.
+    /// Returns the frames of the running task. `vm.cpu` is in order when a builtin that the interpreter
+    /// called asks for them only up to its innermost frame's pc, so that one is given as it was saved.
     pub(crate) fn frames(&self) -> impl Iterator<Item = Frame<'_>> {
         let task = self.scheduler.running.as_ref();
         // SAFETY: F1: `vm.cpu` describes the running task, which is borrowed for as long.
@@ -156,15 +157,16 @@ impl Vm {
             .flatten()
     }
 
-    /// Returns the base of the outermost frame of the library around a failure, inside the frame whose base is `around`:
-    /// the recovery's values become what that frame returns. `None` if the program itself has failed. To be asked by a
-    /// builtin that was called by the function that deals with the failure.
+    /// Returns the base of the outermost frame of the library around a failure, inside the frame whose base
+    /// is `around`: the recovery's values become what that frame returns. `None` if the program itself has
+    /// failed. To be asked by a builtin that was called by the function that deals with the failure.
     pub(crate) fn frame_of_operation(&mut self, around: u32) -> Option<u32> {
         let (mut found, mut looked_at) = (None, 0);
         let mut frames = self.frames();
         let mut callee = frames.next()?;
         for caller in frames {
-            // A caller that was given its callee as a value may be the program's, which has called on by a tail call.
+            // A caller that was given its callee as a value may be the program's, which has called on by a
+            // tail call.
             if found.is_some() && !callee.is_called_by_name() {
                 break;
             }

@@ -1,5 +1,5 @@
-//! Functions that run where a task was interrupted: a call above its frame that leaves the instruction there, and the
-//! wait at which it was parked, as they were.
+//! Functions that run where a task was interrupted: a call above its frame that leaves the instruction there,
+//! and the wait at which it was parked, as they were.
 
 use super::Signal;
 use super::call::{FramePlace, call};
@@ -25,8 +25,8 @@ pub(super) unsafe fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]
     unsafe { call(vm, function, arguments, FramePlace::Interrupt) }
 }
 
-/// `interrupt-return`: the function that ran where the task was interrupted has returned. The instruction there, which has
-/// had no effect yet, comes next, and a wait at which the task was parked goes on.
+/// `interrupt-return`: the function that ran where the task was interrupted has returned. The instruction
+/// there, which has had no effect yet, comes next, and a wait at which the task was parked goes on.
 ///
 /// # Safety
 /// The contract of [`super::settle`], at the stub.

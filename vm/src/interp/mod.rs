@@ -329,8 +329,9 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     *base.add($register) = value;
                 }};
             }
-            // Keeps the ends of arms apart. The code generator would make one end of those that are alike, which costs a
-            // jump per instruction; it cannot with a line of assembly that differs, though nothing is in it.
+            // Keeps the ends of arms apart. The code generator would make one end of those that are alike,
+            // which costs a jump per instruction; it cannot with a line of assembly that differs, though
+            // nothing is in it.
             macro_rules! apart {
                 () => {
                     apart!(0)
@@ -937,8 +938,9 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 Operation::Slot => {
                     let instance = get!(word.b());
                     if is_instance_of_exactly(instance, *k.add(aux!() as usize)) {
-                        // The class has the slot: the compiler took its number from it, and `cold::slot` checked it when
-                        // this place met the class first. Instances of a class never change in length.
+                        // The class has the slot: the compiler took its number from it, and `cold::slot`
+                        // checked it when this place met the class first. Instances of a class never change
+                        // in length.
                         let slot = word.c() + 1;
                         if slot < (*instance.object_ptr()).len as usize {
                             set!(word.a(), *element(instance, slot));

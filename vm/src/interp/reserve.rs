@@ -61,7 +61,8 @@ impl Vm {
         Ok(())
     }
 
-    /// Closes the reserves of stack and heap once the handling of their exhaustion is over: an unwinding has landed.
+    /// Closes the reserves of stack and heap once the handling of their exhaustion is over: an unwinding has
+    /// landed.
     pub(super) fn close_reserves(&mut self) {
         self.heap.close_reserve();
         if self.scheduler.task().flags.uses_reserve()
@@ -72,8 +73,9 @@ impl Vm {
         }
     }
 
-    /// The reserve is used up that was for handling the exhaustion of stack or heap: leaves what has handled it, which
-    /// the library has put into a catch, so that the failure goes on outward. Without that, the task ends with `cause`.
+    /// The reserve is used up that was for handling the exhaustion of stack or heap: leaves what has handled
+    /// it, which the library has put into a catch, so that the failure goes on outward. Without that, the
+    /// task ends with `cause`.
     pub(crate) fn leave_reserve(&mut self, cause: Value) {
         match self.scheduler.task().control.find_catch(self.world.known.reserve) {
             Some(index) => {

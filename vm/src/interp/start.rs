@@ -25,7 +25,8 @@ fn direct_code(heap: &Heap, function: Value, arguments: Value) -> Option<&Code> 
         .then_some(code)
 }
 
-/// Gives a new task its first frame: that of `function`, or a starter that calls it with the list of arguments in its place.
+/// Gives a new task its first frame: that of `function`, or a starter that calls it with the list of
+/// arguments in its place.
 pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function: Value, arguments: Value) {
     let stub = stubs::task_exit();
     if let Some(code) = direct_code(heap, function, arguments) {
@@ -58,8 +59,9 @@ pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function
     task.base = 4;
 }
 
-/// What the second word of a task's stack holds: the code with which the task began, for those who want to know where that was
-/// written when a tail call has taken the place of its frame. Not the function, which would keep what it has captured.
+/// What the second word of a task's stack holds: the code with which the task began, for those who want to
+/// know where that was written when a tail call has taken the place of its frame. Not the function, which
+/// would keep what it has captured.
 fn first_code(heap: &Heap, function: Value) -> Value {
     heap.function_code(function).unwrap_or(Value::NIL)
 }

@@ -1,12 +1,13 @@
-//! Operations that only the virtual machine makes, and the code that consists of them: where a task's first function
-//! returns to, where the function returns to that took the place of a failed instruction, and the one that ran where
-//! its task was interrupted.
+//! Operations that only the virtual machine makes, and the code that consists of them: where a task's first
+//! function returns to, where the function returns to that took the place of a failed instruction, and the
+//! one that ran where its task was interrupted.
 //!
-//! Opcode 0 and those from `0xC0` on are refused in files, so whoever meets one of these knows that the machine has put
-//! it there. (Because there is a 0, the loop's table of jumps begins there, and the opcode is its index as it is.)
+//! Opcode 0 and those from `0xC0` on are refused in files, so whoever meets one of these knows that the
+//! machine has put it there. (Because there is a 0, the loop's table of jumps begins there, and the opcode is
+//! its index as it is.)
 //!
-//! A return reads the call word two words before the return address, so each stub is a call word, its aux word, and
-//! then the operation that goes on.
+//! A return reads the call word two words before the return address, so each stub is a call word, its aux
+//! word, and then the operation that goes on.
 
 use esl_bytecode::opcode::Opcode;
 use esl_bytecode::operand::Want;
@@ -54,12 +55,14 @@ pub(crate) fn error_return(window: u8) -> *const u32 {
     &raw const ERROR_RETURN_CODE[usize::from(window)][2]
 }
 
-/// Return address of a function that runs in an interrupted frame, whose window is this register of the frame.
+/// Return address of a function that runs in an interrupted frame, whose window is this register of the
+/// frame.
 pub(crate) fn interrupt_return(window: u8) -> *const u32 {
     &raw const INTERRUPT_RETURN_CODE[usize::from(window)][2]
 }
 
-/// Whether a return address is one of [`error_return`] or [`interrupt_return`]: the frame has its pc behind its registers.
+/// Whether a return address is one of [`error_return`] or [`interrupt_return`]: the frame has its pc behind
+/// its registers.
 pub(crate) fn is_return_above(pc: *const u32) -> bool {
     is_in(&ERROR_RETURN_CODE, pc) || is_in(&INTERRUPT_RETURN_CODE, pc)
 }

@@ -1,15 +1,16 @@
-//! Results: where the values go that a call returns, and those that stand for the result of a failed instruction.
+//! Results: where the values go that a call returns, and those that stand for the result of a failed
+//! instruction.
 //!
 //! Values arrive in the value list. A call's go to its window. A substitute goes where the row of the failed
-//! instruction in the opcode table says, and control goes on behind the instruction. What computes the substitute runs
-//! in a frame above the failed instruction, whose pc is saved between the two:
+//! instruction in the opcode table says, and control goes on behind the instruction. What computes the
+//! substitute runs in a frame above the failed instruction, whose pc is saved between the two:
 //!
 //! ```text
 //! registers of the frame with the failed instruction | its pc | %raise | return pc, a stub | arguments ...
 //! ```
 //!
-//! The stub's `error-return` finds the instruction by the saved pc. The same way serves an instruction whose work a
-//! function of the library takes over, and one that asks for a call.
+//! The stub's `error-return` finds the instruction by the saved pc. The same way serves an instruction whose
+//! work a function of the library takes over, and one that asks for a call.
 
 use esl_bytecode::opcode::Substitute;
 

@@ -32,8 +32,8 @@ fn function(required: u8, registers: u8, constants: &[u32], code: &[Instr]) -> F
     }
 }
 
-/// Loads the functions as a module of which the first runs at top level. Its pool is the symbol `F`, then the functions
-/// from the second on.
+/// Loads the functions as a module of which the first runs at top level. Its pool is the symbol `F`, then the
+/// functions from the second on.
 fn install(vm: &mut Vm, functions: Vec<Function>) -> Value {
     let mut constants = vec![Constant::Symbol(Symbol::esl("F"))];
     constants.extend((1..functions.len()).map(|number| Constant::Function(FunctionNumber(number as u32))));

@@ -1,7 +1,7 @@
 //! Instructions on the control stack, and unwinding.
 //!
-//! Every instruction here has the contract of [`super::settle`]: `pc` is at an instruction of the row it serves, `base`
-//! is the running frame's, and what the verifier proved holds (V1 to V13).
+//! Every instruction here has the contract of [`super::settle`]: `pc` is at an instruction of the row it
+//! serves, `base` is the running frame's, and what the verifier proved holds (V1 to V13).
 
 use esl_bytecode::opcode::Opcode;
 use esl_bytecode::word::Word;
@@ -348,8 +348,8 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
 }
 
 impl Vm {
-    /// The function that runs the clauses of the recovery procedures of an entry, made as the first instruction at its
-    /// landing says; `None` if there is no such entry or instruction.
+    /// The function that runs the clauses of the recovery procedures of an entry, made as the first
+    /// instruction at its landing says; `None` if there is no such entry or instruction.
     pub(crate) fn recovery_function(&mut self, index: usize) -> Result<Option<Value>, Exit> {
         let Some(entry) = self.scheduler.task().control.entries.get(index).copied() else { return Ok(None) };
         if entry.kind != EntryKind::Recovery {
@@ -379,7 +379,8 @@ impl Vm {
     /// # Safety
     /// The entry belongs to the running task, and its frame is live.
     unsafe fn resume_at(&mut self, entry: &Entry) {
-        // SAFETY: by the contract, the base of the entry lies in the stack, and the address in the code of the frame there.
+        // SAFETY: by the contract, the base of the entry lies in the stack, and the address in the code of
+        // the frame there.
         unsafe {
             self.cpu.set_pc(entry.pc.get());
             self.cpu.set_base(self.scheduler.task().stack.start().add(entry.base as usize));

@@ -1,8 +1,9 @@
 //! Streams: the standard ones, and those that read from or write to a string or a text file.
 //!
-//! A Stream is a record ([`crate::world::stream`]). A file is read as a whole when it is opened; output to a file
-//! is gathered, and written in blocks and when the stream is closed. Output to a string is gathered in strings that
-//! never grow, so that the millionth character takes as long as the first. Every output stream knows its column.
+//! A Stream is a record ([`crate::world::stream`]). A file is read as a whole when it is opened; output to a
+//! file is gathered, and written in blocks and when the stream is closed. Output to a string is gathered in
+//! strings that never grow, so that the millionth character takes as long as the first. Every output stream
+//! knows its column.
 
 use smallvec::SmallVec;
 
@@ -61,7 +62,8 @@ impl Vm {
         self.heap.record_set(stream, Kind::Stream, index, value);
     }
 
-    /// The open stream that `v` designates for reading or writing: `NIL` is the standard one, `T` the terminal.
+    /// The open stream that `v` designates for reading or writing: `NIL` is the standard one, `T` the
+    /// terminal.
     fn designated_stream(&mut self, v: Value, is_input: bool) -> Result<(Value, StreamKind), Exit> {
         let known = self.world.known;
         let [input, output, _] = self.world.streams;
@@ -208,7 +210,8 @@ impl Vm {
         encode(self.heap.string(buffer).map_or(&[], |all| &all[..position]), &mut bytes);
         let mode = write_mode(self.stream_index(stream, slot::MODE));
         let name = self.text_of(self.stream_slot(stream, slot::NAME)).unwrap_or_default();
-        // What cannot be written is not tried again: the next block would fail too, and closing has to succeed.
+        // What cannot be written is not tried again: the next block would fail too, and closing has to
+        // succeed.
         self.set_stream_slot(stream, slot::POSITION, Value::small(0));
         self.set_stream_slot(stream, slot::MODE, Value::small(1));
         match self.outside.host.write_file(&name, &bytes, mode) {
@@ -219,8 +222,8 @@ impl Vm {
         }
     }
 
-    /// What becomes of a program whose standard output could not be written: it fails, or if nobody reads it any more,
-    /// the run ends.
+    /// What becomes of a program whose standard output could not be written: it fails, or if nobody reads it
+    /// any more, the run ends.
     fn check_output(&mut self) -> Result<(), Exit> {
         if self.outside.console.is_broken() {
             if self.outside.exit_status.is_some() {

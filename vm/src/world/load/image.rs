@@ -359,8 +359,8 @@ pub(crate) fn origin(heap: &Heap, function: Value) -> Option<(usize, u32)> {
 }
 
 impl World {
-    /// Replaces the stub of a function of an image by its code. Returns the number of words that were decoded,
-    /// 0 if the function was ready.
+    /// Replaces the stub of a function of an image by its code. Returns the number of words that were
+    /// decoded, 0 if the function was ready.
     ///
     /// # Errors
     /// [`LoadError`] if the image is damaged, or there is no room.
