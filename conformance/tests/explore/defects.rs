@@ -96,7 +96,7 @@ fn a_property_that_was_violated_meanwhile_does_not_count_as_achieved() {
         &[":ON", ":TOLD"],
         &[(
             "locks.esl",
-            r"after ACHIEVE has looked.
+            r"after ACHIEVE checked it.
             ((%holds-p lock)",
             r"
             (t",
