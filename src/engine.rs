@@ -157,7 +157,7 @@ mod tests {
     #[test]
     fn a_text_is_refused_with_its_errors_and_their_places() {
         assert_eq!(refused("(list 1)\n(list 2"), [("unclosed-list", 9)]);
-        assert_eq!(refused("(list (if) (let 5))"), [("malformed-form", 6), ("malformed-form", 16)]);
+        assert_eq!(refused("(list (if) (let 5))"), [("missing-part", 7), ("malformed-binding", 16)]);
         assert_eq!(refused("(defun car (x) x)"), [("locked-name", 7)]);
     }
 

@@ -17,7 +17,7 @@ use esl_vm::run::CallError;
 /// let outcome = |engine: &mut Engine, text| engine.eval(text).expect_err("it does not return");
 ///
 /// let Error::DoesNotCompile(errors) = outcome(&mut engine, "(print 1)\n(let 5)") else { panic!() };
-/// assert_eq!((errors[0].code, errors[0].primary.span.start), ("malformed-form", 15));
+/// assert_eq!((errors[0].code, errors[0].primary.span.start), ("malformed-binding", 15));
 ///
 /// let Error::Failed { cause, message, .. } = outcome(&mut engine, "(car 5)") else { panic!() };
 /// assert_eq!((&*cause, &*message), (":TYPE-ERROR", "The value 5 is not of type LIST."));

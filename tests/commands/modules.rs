@@ -260,17 +260,17 @@ warning[wrong-argument-count]: `car` takes 1 argument, but is given 2
         "wrong.esl",
         "(print 1)\n(defmacro m () '(if)) (list\n  (m) (if))\n",
         "\
-error[malformed-form]: `if` takes a test, a form for true, and at most one for false
+error[missing-part]: `if` takes a test, a form for true, and at most one for false, but has no parts
  --> wrong.esl:3:3
   |
 3 |   (m) (if))
   |   ^^^ in the expansion of `m`
 
-error[malformed-form]: `if` takes a test, a form for true, and at most one for false
- --> wrong.esl:3:7
+error[missing-part]: `if` takes a test, a form for true, and at most one for false, but has no parts
+ --> wrong.esl:3:8
   |
 3 |   (m) (if))
-  |       ^^^^
+  |        ^^
 ",
     ),
     (

@@ -145,7 +145,7 @@ pub(super) unsafe fn test<const OPCODE: u8>(
     pc: *const u32,
     base: *mut Value,
 ) -> Result<bool, Signal> {
-    // SAFETY: by the contract.
+    // SAFETY: `pc` is at an instruction with this opcode, and `base` at its frame, as the caller promises.
     let (outcome, _) = unsafe { apply_builtin::<OPCODE>(vm, pc, base) };
     outcome.map(Value::is_true).map_err(Signal::Exit)
 }
@@ -237,7 +237,7 @@ pub(super) unsafe fn slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
 #[cold]
 #[inline(never)]
 pub(super) unsafe fn set_slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
-    // SAFETY: as for `slot`, V1, V3 and V4.
+    // SAFETY: V1 and V3: an instruction with its aux word, its registers in the frame; V4: a class constant.
     unsafe {
         let word = word_at(pc);
         let (instance, slot) = (*base.add(word.a()), word.b());

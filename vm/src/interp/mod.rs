@@ -1103,7 +1103,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 }
                 Operation::TailCallGlobal => {
                     tick!();
-                    // SAFETY: as for `CallGlobal`.
+                    // SAFETY: V4: the constant is a symbol, and the function of a symbol is a Function.
                     let symbol = (*k.add(aux!() as usize)).object_ptr().cast::<Symbol>();
                     enter_in_place!(base.add(word.a()), (*symbol).function);
                     break Signal::Call;
