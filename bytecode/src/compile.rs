@@ -171,6 +171,34 @@ pub enum Required {
     Compiled(Box<Module>),
 }
 
+/// A place in a source, for people.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourcePlace {
+    /// Name of the source.
+    pub source: String,
+    /// Line, from 1.
+    pub line: u32,
+    /// Column in characters, from 1.
+    pub column: u32,
+}
+
+/// A failure of a part of the program that runs at compile time, such as a macro.
+#[derive(Clone, Debug, Default)]
+pub struct CompileTimeFailure {
+    /// Report of the failure.
+    pub report: String,
+    /// Innermost place in the program, not in the library, at which it failed; `None` if there is none.
+    pub place: Option<SourcePlace>,
+    /// Objects that the failure is about, the likeliest culprit last. Parts of a form keep their places.
+    pub culprits: Vec<Datum>,
+}
+
+impl From<String> for CompileTimeFailure {
+    fn from(report: String) -> CompileTimeFailure {
+        CompileTimeFailure { report, ..CompileTimeFailure::default() }
+    }
+}
+
 /// What became of a step.
 #[derive(Debug)]
 pub enum Answer {
@@ -184,8 +212,8 @@ pub enum Answer {
     Object(ObjectId),
     /// The module that was asked for.
     Module(Required),
-    /// The macro or module failed; the text says with what.
-    Failed(String),
+    /// The macro or module failed.
+    Failed(CompileTimeFailure),
 }
 
 /// A compilation under way.
@@ -246,13 +274,13 @@ pub trait CompileTimeHost: Environment {
     /// Runs a macro to its end, within a limit of ticks.
     ///
     /// # Errors
-    /// The text of the failure that ended it.
-    fn expand(&mut self, call: &MacroCall) -> Result<Datum, String>;
+    /// The failure that ended it.
+    fn expand(&mut self, call: &MacroCall) -> Result<Datum, CompileTimeFailure>;
     /// Loads a module and runs its top level.
     ///
     /// # Errors
-    /// The text of the failure that ended it.
-    fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, String>;
+    /// The failure that ended it.
+    fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, CompileTimeFailure>;
 }
 
 /// Finds the module of a name.
@@ -293,7 +321,7 @@ pub fn drive_with(
             },
             Step::Require(name) => match library(&name) {
                 Ok(module) => Answer::Module(module),
-                Err(reason) => Answer::Failed(reason),
+                Err(reason) => Answer::Failed(reason.into()),
             },
         };
     }

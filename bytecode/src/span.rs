@@ -21,6 +21,11 @@ impl Span {
         Span { source, start, end }
     }
 
+    /// Whether `other` lies in this range.
+    pub fn contains(self, other: Span) -> bool {
+        self.source == other.source && self.start <= other.start && other.end <= self.end
+    }
+
     /// The smallest range that covers both; `self` when they lie in different sources.
     pub fn to(self, other: Span) -> Span {
         if self.source != other.source {

@@ -115,6 +115,24 @@ mod tests {
     }
 
     #[test]
+    fn a_failure_in_a_macro_is_located_in_the_call_and_in_the_macro() {
+        let text = "(defmacro twice (form)\n  (list 'progn form\n        (car 'form)))\n\
+                    (twice (print 1))\n(dotimes\n    (5 3)\n  (print 1))\n\
+                    (eval-when (:compile-toplevel)\n  (car 'table))";
+        let compiled = compile(&[Source::new("a.esl", text)]);
+        let part = |span: Span| &text[span.start as usize..span.end as usize];
+        let places: Vec<Vec<&str>> = compiled
+            .diagnostics
+            .iter()
+            .map(|found| {
+                let labels = std::iter::once(&found.primary).chain(&found.secondary);
+                labels.map(|label| part(label.span)).collect()
+            })
+            .collect();
+        assert_eq!(places, [vec!["twice", "(car 'form)"], vec!["5"], vec!["(car 'table)"]]);
+    }
+
+    #[test]
     fn sources_see_what_others_define() {
         let first = "(defmacro twice (x) `(list ,x ,x)) (defun first-one () (second-one)) (defvar *v* 5)";
         let second = "(defun second-one () (twice *v*)) (princ (first-one)) (third-one)";

@@ -4,6 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
 
+use esl_bytecode::compile::SourcePlace;
+
 use crate::heap::Heap;
 use crate::task::TaskId;
 use crate::value::Value;
@@ -23,6 +25,8 @@ pub(crate) struct Embedder {
     pub(crate) was_interrupted: bool,
     /// Text of a failure that ended a task while there was no library to deal with it.
     pub(crate) last_words: Option<String>,
+    /// Innermost place in the program of the failure that ended a task last, if there is one.
+    pub(crate) last_place: Option<SourcePlace>,
 }
 
 impl Embedder {

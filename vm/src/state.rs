@@ -173,6 +173,7 @@ list_state! { Embedder {
     interruptible: Run,
     was_interrupted: Run,
     last_words: Run,
+    last_place: Run,
 } }
 list_state! { Watch { is_watched: Derived, observers: Process, figures: Process, traces_tasks: Process } }
 list_state! { Observers {

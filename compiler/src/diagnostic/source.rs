@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use esl_bytecode::compile::{LineIndex, Part, Place};
+use esl_bytecode::compile::{LineIndex, Part, Place, SourcePlace};
 use esl_bytecode::span::{SourceId, Span};
 
 #[derive(Clone, Debug)]
@@ -62,9 +62,29 @@ impl Sources {
         let text = source.text.as_ref()?;
         let (part, line) = &source.part;
         let start = span.start as usize;
-        let inside = (part.start..=part.end).contains(&start) && text.is_char_boundary(start);
+        if start > text.len() || !text.is_char_boundary(start) {
+            return None;
+        }
+        if !(part.start..=part.end).contains(&start) {
+            return Some(LineIndex::new(text).place(text, span));
+        }
         let lines = || LineIndex::of_part(text, part.clone(), *line);
-        inside.then(|| source.lines.get_or_init(lines).place(text, span))
+        Some(source.lines.get_or_init(lines).place(text, span))
+    }
+
+    /// Returns the source that a place names, and the byte of the place in its text; `None` if the text is unknown or
+    /// does not contain the place.
+    pub fn offset_of(&self, place: &SourcePlace) -> Option<(SourceId, usize)> {
+        let is_named = |source: &Source| source.name == place.source && source.text.is_some();
+        let index = self.sources.iter().rposition(is_named)?;
+        let text = self.sources[index].text.as_ref()?;
+        let (line, column) = (place.line.checked_sub(1)? as usize, place.column.checked_sub(1)? as usize);
+        let line_start = match line {
+            0 => 0,
+            _ => text.match_indices('\n').nth(line - 1)?.0 + 1,
+        };
+        let (offset, _) = text[line_start..].char_indices().nth(column)?;
+        Some((SourceId(index as u32), line_start + offset))
     }
 
     /// Returns the line and column of the position after `span`.

@@ -14,7 +14,8 @@ use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashSet;
 
 use super::chunk::{Chunk, OpenChunk, Purpose};
-use super::form::{Checked, Form, is_known, name};
+use super::failure::{Failure, FailurePlace};
+use super::form::{Checked, Form, is_known, name, span_of};
 use super::global::GlobalUses;
 use super::job::{Job, To, Top, Waiting};
 use super::origin::{OriginId, Origins};
@@ -60,6 +61,8 @@ pub struct Expander {
     pub(super) objects: Vec<Option<ObjectId>>,
     /// What the next answer is about.
     pub(super) waiting: Waiting,
+    /// Form of the last macro call for which the expander stopped.
+    call: Option<Datum>,
     /// Why the expander stops after the current job.
     pub(super) stopped: Option<Stop>,
     /// Findings that have not been taken yet.
@@ -86,6 +89,7 @@ impl Expander {
             places: Vec::new(),
             objects: Vec::new(),
             waiting: Waiting::Nothing,
+            call: None,
             stopped: None,
             diagnostics: Vec::new(),
             reported: FxHashSet::default(),
@@ -274,6 +278,7 @@ impl Expander {
     ) -> Checked {
         let origin = self.origins.enter(&form.operator, form.span, is_standard, around)?;
         self.waiting = waiting(origin);
+        self.call = Some(form.datum.clone());
         let locals = self.scope.locals();
         self.stopped = Some(Stop::Macro(MacroCall { function, form: form.datum.clone(), locals }));
         Ok(())
@@ -300,25 +305,9 @@ impl Expander {
             }
             (Waiting::TopLevel(top), Answer::Expansion(form)) => self.jobs.push(Job::TopLevel(form, top)),
             (Waiting::Object(_), Answer::Object(object)) => self.objects.push(Some(object)),
-            (Waiting::Form(to), Answer::Failed(failure)) => {
-                self.macro_failed(&failure, to.origin, to.span);
-                self.fill_nil(to);
-            }
-            (Waiting::Place(to) | Waiting::SetfExpansion(_, to), Answer::Failed(failure)) => {
-                self.macro_failed(&failure, to.origin, to.span);
-                self.places.push(SetfExpansion::broken(to.span));
-            }
-            (Waiting::TopLevel(top), Answer::Failed(failure)) => {
-                self.macro_failed(&failure, top.origin, top.span);
-            }
-            (Waiting::Object(span), Answer::Failed(failure)) => {
-                let message = format!("the definition of a local macro failed: {failure}");
-                self.report(code::MACRO_FAILED.at(span, message), None);
-                self.objects.push(None);
-            }
-            (Waiting::Load(span), Answer::Failed(failure)) => {
-                let message = format!("this form failed at compile time: {failure}");
-                self.report(code::COMPILE_TIME_FAILURE.at(span, message), None);
+            (waiting, Answer::Failed(failure)) => {
+                self.waiting = waiting;
+                self.fail(&failure.into());
             }
             (Waiting::Object(_), _) => self.objects.push(None),
             // There is nothing to do, or the driver has mixed up its answers: the form stays as it is.
@@ -330,20 +319,58 @@ impl Expander {
         }
     }
 
+    /// Takes the failure of the last stop.
+    pub fn fail(&mut self, failure: &Failure) {
+        match std::mem::replace(&mut self.waiting, Waiting::Nothing) {
+            Waiting::Nothing => {}
+            Waiting::Form(to) => {
+                self.macro_failed(failure, to.origin, to.span);
+                self.fill_nil(to);
+            }
+            // Without its compiler macro, a call is an ordinary one.
+            Waiting::Call(call, to) => self.jobs.push(Job::Expand(call.globally(), to)),
+            Waiting::Place(to) | Waiting::SetfExpansion(_, to) => {
+                self.macro_failed(failure, to.origin, to.span);
+                self.places.push(SetfExpansion::broken(to.span));
+            }
+            Waiting::TopLevel(top) => self.macro_failed(failure, top.origin, top.span),
+            Waiting::Object(span) => {
+                let message = format!("the definition of a local macro failed: {}", failure.report);
+                self.report(failure.located(code::MACRO_FAILED.at(span, message)), None);
+                self.objects.push(None);
+            }
+            Waiting::Load(span) => {
+                let message = format!("this form failed at compile time: {}", failure.report);
+                let diagnostic = match failure.place {
+                    FailurePlace::Here(part) if span.contains(part) => {
+                        code::COMPILE_TIME_FAILURE.at(part, message)
+                    }
+                    _ => failure.located(code::COMPILE_TIME_FAILURE.at(span, message)),
+                };
+                self.report(diagnostic, None);
+            }
+        }
+    }
+
     // ---- findings
 
-    fn macro_failed(&mut self, failure: &str, origin: Option<OriginId>, span: Span) {
+    /// Reports the failure of the macro whose call at `span` the expander stopped for.
+    fn macro_failed(&mut self, failure: &Failure, origin: Option<OriginId>, span: Span) {
         let origin = origin.map(|origin| self.origins.get(origin));
         let failed = origin.map_or_else(|| "a macro".to_string(), |origin| name(&origin.name));
         let is_standard = origin.is_some_and(|origin| origin.is_standard);
         // Checks of arguments begin with the name of the macro, which the message contains already.
         let shown = origin.map(|origin| origin.name.to_string() + " ").unwrap_or_default();
-        let failure = failure.strip_prefix(&shown).unwrap_or(failure);
+        let report = failure.report.strip_prefix(&shown).unwrap_or(&failure.report);
+        let call = self.call.take();
+        let head = call.as_ref().and_then(Datum::as_cons).map_or(span, |(head, _)| span_of(head, span));
         // A macro of the language fails only on a form that it cannot take.
         let diagnostic = if is_standard {
-            code::MALFORMED_FORM.at(span, format!("{failed} {failure}"))
+            let part = call.and_then(|call| failure.faulty_part(&call));
+            code::MALFORMED_FORM.at(part.unwrap_or(head), format!("{failed} {report}"))
         } else {
-            code::MACRO_FAILED.at(span, format!("{failed} failed while it was expanded: {failure}"))
+            let message = format!("{failed} failed while it was expanded: {report}");
+            failure.located(code::MACRO_FAILED.at(head, message))
         };
         self.report(diagnostic, None);
     }

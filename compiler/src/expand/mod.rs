@@ -69,7 +69,7 @@
 //! # Layers
 //!
 //! Data and tables come first (`form`, `scope`, `lambda_list`, `function`, `setf`, `origin`, `job`, `chunk`,
-//! `global`), then the [`Expander`], then one file for each family of forms, whose methods are methods of the
+//! `failure`, `global`), then the [`Expander`], then one file for each family of forms, whose methods are methods of the
 //! `Expander`, and last the table of operators. A file uses only files before it; `tests/layers.rs` holds
 //! that.
 
@@ -83,6 +83,7 @@ mod control;
 mod define;
 mod destructure;
 mod expander;
+mod failure;
 mod form;
 mod function;
 mod global;
@@ -105,3 +106,4 @@ mod variable;
 
 pub use chunk::{Chunk, Purpose};
 pub use expander::{Expander, Stop};
+pub use failure::{Failure, FailurePlace};

@@ -139,6 +139,14 @@ pub fn read_datum(
     }
 }
 
+/// Returns the end of the datum of `text` that begins at byte `start`; `None` if it is faulty.
+pub(crate) fn datum_end(text: &str, start: usize) -> Option<usize> {
+    match Scanner::new(SourceId::default()).scan(text, start) {
+        Scan::Datum(end) => Some(end),
+        Scan::Errors(_) | Scan::End => None,
+    }
+}
+
 /// Whether a diagnostic of this code says only that the text ends too early. A REPL then waits for another
 /// line.
 pub fn is_unfinished(code: &str) -> bool {

@@ -15,7 +15,7 @@ mod queue;
 
 use std::sync::Arc;
 
-use esl_bytecode::compile::{Answer, Compilation, Compile, Environment, Part, Required, Step};
+use esl_bytecode::compile::{Answer, Compilation, Compile, Environment, Part, Required, SourcePlace, Step};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::link::join;
@@ -24,9 +24,9 @@ use esl_bytecode::span::{SourceId, Span};
 
 use crate::diagnostic::{Renderer, Sources, code};
 use crate::expand::print::print;
-use crate::expand::{Chunk, Expander, Stop};
+use crate::expand::{Chunk, Expander, Failure, FailurePlace, Stop};
 use crate::lower::{SourceLines, lower};
-use crate::reader::read_datum;
+use crate::reader::{datum_end, read_datum};
 
 use queue::{FormQueue, Next, renumber_uninterned};
 
@@ -57,8 +57,8 @@ impl Compiler {
         Texts(CompilationState { listing: Some(String::new()), ..self.texts(&[(name, text)]) })
     }
 
-    /// Begins to compile texts, each with its name, to one module that runs them in order. To one another
-    /// they are like queue of one text, but each is read, and runs, in the package `ESL-USER` until it says
+    /// Begins to compile texts, each with its name, to one module that runs them in order. They see each other's
+    /// definitions like parts of one text, but each is read, and runs, in the package `ESL-USER` until it says
     /// otherwise. Diagnostics number them from the compiler's source number on.
     pub fn compile_texts(&self, texts: &[(&str, &str)]) -> Texts {
         Texts(self.texts(texts))
@@ -199,9 +199,16 @@ impl Compilation for CompilationState {
             self.take_module(&name, span, answer);
         } else if let Some(span) = self.loading.take() {
             if let Answer::Failed(failure) = answer {
-                let message = format!("the module failed at compile time: {failure}");
+                let message = format!("the module failed at compile time: {}", failure.report);
                 self.diagnostics.push(code::COMPILE_TIME_FAILURE.at(span, message));
             }
+        } else if let Answer::Failed(failure) = answer {
+            let here = failure.place.as_ref().and_then(|place| self.span_of(place));
+            let mut failure = Failure::from(failure);
+            if let Some(span) = here {
+                failure.place = FailurePlace::Here(span);
+            }
+            self.expander.fail(&failure);
         } else {
             self.expander.answer(answer);
         }
@@ -257,6 +264,15 @@ impl CompilationState {
         }
     }
 
+    /// Returns the span of the datum at a place, up to the end of its first line, if the text is one of the compilation.
+    fn span_of(&self, place: &SourcePlace) -> Option<Span> {
+        let (SourceId(index), start) = self.sources.offset_of(place)?;
+        let text = self.sources.text(SourceId(index))?;
+        let end = datum_end(text, start).unwrap_or(start + 1);
+        let end = text[start..end].find('\n').map_or(end, |length| start + length);
+        Some(Span::new(SourceId(index.checked_sub(self.source.0)?), start as u32, end as u32))
+    }
+
     /// Puts the module that was asked for in the place of the form that requires it.
     fn take_module(&mut self, name: &str, span: Span, answer: Answer) {
         let Input::Texts(queue) = &mut self.input else { return };
@@ -267,8 +283,8 @@ impl CompilationState {
                 queue.enter(name, span, source, text);
             }
             Answer::Module(Required::Compiled(module)) => queue.enter_compiled(name, span, *module),
-            Answer::Failed(reason) => {
-                let message = format!("the module `{name}` is not available: {reason}");
+            Answer::Failed(failure) => {
+                let message = format!("the module `{name}` is not available: {}", failure.report);
                 self.diagnostics.push(code::UNKNOWN_MODULE.at(span, message));
             }
             _ => queue.add_call(name, span),

@@ -4,8 +4,8 @@
 use std::collections::HashMap;
 
 use esl_bytecode::compile::{
-    Accessor, Arity, CompileTimeHost, Environment, Global, GlobalFunction, GlobalVariable, InternError,
-    MacroCall, MacroRef,
+    Accessor, Arity, CompileTimeFailure, CompileTimeHost, Environment, Global, GlobalFunction,
+    GlobalVariable, InternError, MacroCall, MacroRef, SourcePlace,
 };
 use esl_bytecode::datum::{Datum, ObjectId};
 use esl_bytecode::module::{Constant, Module};
@@ -26,6 +26,8 @@ pub(crate) struct FakeHost {
     /// The functions of local macros, in the order in which they will be loaded.
     pub(crate) local_macros: Vec<Macro>,
     objects: usize,
+    /// The place at which macros fail.
+    pub(crate) failing_place: Option<SourcePlace>,
     /// What was loaded: whether to keep, and the symbols among the constants.
     pub(crate) loaded: Vec<(bool, String)>,
 }
@@ -40,6 +42,7 @@ impl FakeHost {
             macros: HashMap::new(),
             local_macros: Vec::new(),
             objects: 0,
+            failing_place: None,
             loaded: Vec::new(),
         };
         host.define_macro("when", "(if #1 (progn . #2...))");
@@ -204,18 +207,29 @@ impl Environment for FakeHost {
     }
 }
 
+impl FakeHost {
+    /// The failure of a macro: at `failing_place`, and about the first argument.
+    fn failure(&self, report: String, args: &[Datum]) -> CompileTimeFailure {
+        let culprits = args.get(1).cloned().into_iter().collect();
+        CompileTimeFailure { report, place: self.failing_place.clone(), culprits }
+    }
+}
+
 impl CompileTimeHost for FakeHost {
-    fn expand(&mut self, call: &MacroCall) -> Result<Datum, String> {
-        let mut args: Vec<Datum> = call.form.as_list().ok_or("no list")?.into_iter().cloned().collect();
+    fn expand(&mut self, call: &MacroCall) -> Result<Datum, CompileTimeFailure> {
+        let items = call.form.as_list().ok_or("no list".to_string())?;
+        let mut args: Vec<Datum> = items.into_iter().cloned().collect();
         args[0] = call.form.clone();
         let expander = match &call.function {
             MacroRef::Global(symbol) => self.macros.get_mut(symbol),
             MacroRef::Local(ObjectId(number)) => self.local_macros.get_mut(*number as usize),
         };
-        expander.ok_or("there is no such macro")?(&mut self.bare, &args)
+        let expander = expander.ok_or("there is no such macro".to_string())?;
+        let expansion = expander(&mut self.bare, &args);
+        expansion.map_err(|report| self.failure(report, &args))
     }
 
-    fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, String> {
+    fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, CompileTimeFailure> {
         let symbols = module.constants.iter().filter_map(|constant| match constant {
             Constant::Symbol(symbol) => Some(symbol.name().to_lowercase()),
             _ => None,

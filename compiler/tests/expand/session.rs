@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use esl_bytecode::compile::{Compilation, Compile, Part, Step, drive};
+use esl_bytecode::compile::{Compilation, Compile, Part, SourcePlace, Step, drive};
 use esl_bytecode::diagnostic::Severity;
 use esl_bytecode::span::SourceId;
 use esl_bytecode::verify::verify;
@@ -123,4 +123,27 @@ fn a_program_can_be_shown_with_its_macros_expanded() {
     assert!(module.is_some());
     let expected = "(if *x* (print 1) ())\n\n(%set-function 'h (%named-lambda h () (block h 2)))\n\n";
     assert_eq!(expansion.expansion(), expected);
+}
+
+#[test]
+fn a_failure_of_a_macro_shows_the_line_inside_it_after_the_call() {
+    let text = "(defmacro failing (form)\n  (list form\n        (car 5)))\n(list 1\n  (failing\n    2))";
+    let mut host = FakeHost::new();
+    host.failing_place = Some(SourcePlace { source: "test.esl".into(), line: 3, column: 9 });
+    let mut compilation = Compiler::for_source(SourceId(2)).compile_text("test.esl", text);
+    let (_, found) = drive(&mut *compilation, &mut host);
+    let shown = compilation.render(&found[0]);
+    let expected = "\
+error[macro-failed]: `failing` failed while it was expanded: it did not work
+ --> test.esl:5:4
+  |
+3 |         (car 5)))
+  |         ------- it failed here
+4 | (list 1
+5 |   (failing
+  |    ^^^^^^^";
+    assert_eq!(shown, expected);
+    host.failing_place = Some(SourcePlace { source: "macros.esl".into(), line: 7, column: 3 });
+    let (_, found) = drive(&mut *Compiler::default().compile_text("test.esl", text), &mut host);
+    assert_eq!(found[0].help.as_deref(), Some("it failed at macros.esl:7:3"));
 }

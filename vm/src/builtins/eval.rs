@@ -80,11 +80,11 @@ impl Vm {
             "START" => Answer::Start,
             "EXPANSION" => match unit.datum_of(&self.heap, &self.world, outcome, Span::default()) {
                 Ok(expansion) => Answer::Expansion(expansion),
-                Err(error) => Answer::Failed(error.to_string()),
+                Err(error) => Answer::Failed(error.to_string().into()),
             },
             "LOADED" if running.keeps => Answer::Object(unit.pin(outcome)),
             "LOADED" => Answer::Loaded,
-            "FAILED" => Answer::Failed(self.designated_text(outcome)?),
+            "FAILED" => Answer::Failed(self.designated_text(outcome)?.into()),
             _ => return self.exchange.program_error(format!("{kind} is no outcome of a step")),
         })
     }

@@ -140,6 +140,7 @@ pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         }
         None => {
             vm.embedder.last_words = vm.heap.string_text(arguments[1]);
+            vm.embedder.last_place = report::place_in_program(vm, vm.scheduler.task(), vm.frames());
             vm.scheduler.task_mut().extra_mut().report = Some(FailureReport { story, ending });
         }
     }

@@ -314,6 +314,15 @@ impl Unit {
         datum
     }
 
+    /// Returns the datum that an object was made from. Of an atom that has none, returns a datum without a place.
+    pub(crate) fn origin_of(&mut self, heap: &Heap, world: &World, object: Value) -> Option<Datum> {
+        let known = self.data.get(&object.bits()).map(|(_, datum)| datum.clone());
+        known.or_else(|| match parts_of(heap, object) {
+            Some(_) => None,
+            None => self.atom_kind(heap, world, object).map(|kind| Datum::new(kind, Span::default())),
+        })
+    }
+
     fn atom_datum(&mut self, heap: &Heap, world: &World, object: Value, span: Span) -> Datum {
         if let Some((_, datum)) = self.data.get(&object.bits())
             && let DatumKind::String(text) = datum.kind()

@@ -5,7 +5,9 @@
 
 use std::sync::Arc;
 
-use esl_bytecode::compile::{Compile, CompileTimeHost, LocalDefinition, MacroCall, MacroRef};
+use esl_bytecode::compile::{
+    Compile, CompileTimeFailure, CompileTimeHost, LocalDefinition, MacroCall, MacroRef,
+};
 use esl_bytecode::datum::{Datum, ObjectId};
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::file::ModuleImage;
@@ -25,6 +27,8 @@ use crate::world::load::{Alone, LoadError, load};
 const MACRO_TICKS: u64 = 50_000_000;
 /// Greatest number of ticks of the compile-time part of one form.
 const LOAD_TICKS: u64 = 1_000_000_000;
+/// Objects that the failure of a macro mentions, at most.
+const MAX_CULPRITS: usize = 50;
 
 impl Vm {
     /// Gives the machine a compiler, for `eval`, `load` and `read`.
@@ -207,22 +211,53 @@ fn runner_module() -> Module {
 }
 
 impl CompileTimeHost for Vm {
-    fn expand(&mut self, call: &MacroCall) -> Result<Datum, String> {
+    fn expand(&mut self, call: &MacroCall) -> Result<Datum, CompileTimeFailure> {
         let prepared = with_room(self, |vm| macro_call(vm, call)).map_err(|error| error.to_string())?;
         let Some([function, form, environment]) = prepared else {
-            return Err("the macro is not defined any more".into());
+            return Err("the macro is not defined any more".to_string().into());
         };
-        let values = self.call(function, &[form, environment], MACRO_TICKS);
-        let values = values.map_err(|error| error.to_string())?;
+        self.embedder.last_place = None;
+        let values = match self.call_or_condition(function, &[form, environment], MACRO_TICKS) {
+            Ok(values) => values,
+            Err((error, condition)) => {
+                let culprits = self.culprits(condition);
+                let place = self.embedder.last_place.take();
+                return Err(CompileTimeFailure { report: error.to_string(), place, culprits });
+            }
+        };
         let expansion = values.first().copied().unwrap_or(Value::NIL);
         let mut unit = self.compiler.unit.borrow_mut();
         let datum = unit.datum_of(&self.heap, &self.world, expansion, call.form.span());
-        datum.map_err(|error| error.to_string())
+        datum.map_err(|error| error.to_string().into())
     }
 
-    fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, String> {
+    fn load(&mut self, module: Module, keep: bool) -> Result<Option<ObjectId>, CompileTimeFailure> {
         let functions = with_room(self, |vm| load_in_unit(vm, &module)).map_err(|error| error.to_string())?;
-        let value = self.run_toplevel(functions, LOAD_TICKS).map_err(|error| error.to_string())?;
-        Ok(keep.then(|| self.compiler.unit.borrow_mut().pin(value)))
+        self.embedder.last_place = None;
+        match self.run_toplevel(functions, LOAD_TICKS) {
+            Ok(value) => Ok(keep.then(|| self.compiler.unit.borrow_mut().pin(value))),
+            Err(error) => {
+                let place = self.embedder.last_place.take();
+                Err(CompileTimeFailure { report: error.to_string(), place, culprits: Vec::new() })
+            }
+        }
+    }
+}
+
+impl Vm {
+    /// Returns the objects that a condition is about, as data of the unit: the values of its slots, and the
+    /// items of those that are lists.
+    fn culprits(&self, condition: Value) -> Vec<Datum> {
+        let mut objects = Vec::new();
+        for &slot in self.heap.structure_slots(condition).unwrap_or_default() {
+            objects.push(slot);
+            let mut rest = slot;
+            while let (Some(pair), true) = (self.heap.as_cons(rest), objects.len() < MAX_CULPRITS) {
+                objects.push(pair.car);
+                rest = pair.cdr;
+            }
+        }
+        let mut unit = self.compiler.unit.borrow_mut();
+        objects.into_iter().filter_map(|object| unit.origin_of(&self.heap, &self.world, object)).collect()
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use esl_bytecode::compile::SourcePlace;
 use esl_bytecode::opcode::Opcode;
 
 use super::{reason_of, task_label};
@@ -122,22 +123,29 @@ impl Vm {
     }
 }
 
-/// Returns the innermost place of the program, not of the library, at which a task stands. If tail calls have
-/// left no frame of the program, it is that of the tail call in the function with which the task began, or of
-/// its beginning if there are several.
+/// Returns the text of the innermost place of the program at which a parked task stands.
 fn program_place(vm: &Vm, task: &Task) -> Option<String> {
+    let place = place_in_program(vm, task, Frames::of_task(task))?;
+    Some(format!("{}:{}:{}", place.source, place.line, place.column))
+}
+
+/// Returns the innermost place of the program, not of the library, at which a task with these frames stands.
+/// If tail calls have left no frame of the program, it is that of the tail call in the function with which the
+/// task began, or of its beginning if there are several.
+pub(crate) fn place_in_program<'a>(
+    vm: &Vm,
+    task: &Task,
+    frames: impl Iterator<Item = Frame<'a>>,
+) -> Option<SourcePlace> {
     let place = |code: Value, word: usize| {
-        let place = vm
-            .world
-            .source_place(&vm.heap, code, word as u32)
-            .filter(|place| !is_of_library(&place.source))?;
-        Some(format!("{}:{}:{}", place.source, place.line, place.column))
+        let place = vm.world.source_place(&vm.heap, code, word as u32);
+        place.filter(|place| !is_of_library(&place.source))
     };
     let in_frame = |frame: Frame<'_>| {
         let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
         place(vm.heap.function_code(frame.function)?, word)
     };
-    Frames::of_task(task).take(FRAMES).find_map(in_frame).or_else(|| {
+    frames.take(FRAMES).find_map(in_frame).or_else(|| {
         let code = first_code_of(task);
         place(code, tail_call_in(vm.heap.code_words(code)?).unwrap_or(0))
     })

@@ -62,26 +62,36 @@ impl Vm {
         arguments: &[Value],
         ticks: u64,
     ) -> Result<Vec<Value>, CallError> {
-        let id = self.spawn(function, arguments).map_err(|_| CallError::NoMemory)?;
+        self.call_or_condition(function, arguments, ticks).map_err(|(error, _)| error)
+    }
+
+    /// As [`Vm::call`]; the error comes with the condition of the failure, or `NIL`.
+    pub(crate) fn call_or_condition(
+        &mut self,
+        function: Value,
+        arguments: &[Value],
+        ticks: u64,
+    ) -> Result<Vec<Value>, (CallError, Value)> {
+        let id = self.spawn(function, arguments).map_err(|_| (CallError::NoMemory, Value::NIL))?;
         let outcome = self.run_until(Some(id), ticks);
         let result = self.result(id);
         let report = self.report(id);
         self.forget(id);
-        match (result, outcome) {
-            (TaskResult::Succeeded(values), _) => Ok(values),
+        let error = match (result, outcome) {
+            (TaskResult::Succeeded(values), _) => return Ok(values),
             (TaskResult::Failed(condition), _) => {
                 let cause = report::cause_label(&self.heap, condition);
                 let message = self.embedder.last_words.take().unwrap_or_else(|| self.describe(condition));
-                Err(CallError::Failed { cause, message, report: report.unwrap_or_default() })
+                let failed = CallError::Failed { cause, message, report: report.unwrap_or_default() };
+                return Err((failed, condition));
             }
-            (TaskResult::Aborted, _) => Err(CallError::Aborted),
-            (TaskResult::Running, RunOutcome::Waiting) => Err(CallError::Deadlocked),
-            (TaskResult::Running, RunOutcome::BudgetSpent) => Err(CallError::BudgetSpent),
-            (TaskResult::Running, RunOutcome::Stopped) => Err(CallError::Stopped),
-            (TaskResult::Running, RunOutcome::Done | RunOutcome::TicksUsed) => {
-                Err(CallError::TicksUsed(ticks))
-            }
-        }
+            (TaskResult::Aborted, _) => CallError::Aborted,
+            (TaskResult::Running, RunOutcome::Waiting) => CallError::Deadlocked,
+            (TaskResult::Running, RunOutcome::BudgetSpent) => CallError::BudgetSpent,
+            (TaskResult::Running, RunOutcome::Stopped) => CallError::Stopped,
+            (TaskResult::Running, RunOutcome::Done | RunOutcome::TicksUsed) => CallError::TicksUsed(ticks),
+        };
+        Err((error, Value::NIL))
     }
 
     /// Makes a program's main task the one with whose failure the run ends.

@@ -3,6 +3,7 @@
 //! The `debug` slot of a Code is a Record of four slots: lambda list, documentation, names of the sources (a
 //! simple vector, shared by the functions of a module), and the places: words, four for each entry.
 
+use esl_bytecode::compile::SourcePlace;
 use esl_bytecode::module::{Function, LineEntry, PoolIdx};
 
 use crate::heap::{AllocError, Heap, Kind};
@@ -15,17 +16,6 @@ const PLACES: usize = 3;
 
 /// Value of `aux` that distinguishes this record from the machine's other records.
 pub(crate) const DEBUG_RECORD: u16 = 1;
-
-/// A place in a source, for display.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SourcePlace {
-    /// Name of the source.
-    pub source: String,
-    /// Line, from 1.
-    pub line: u32,
-    /// Column in characters, from 1.
-    pub column: u32,
-}
 
 /// Makes a simple vector of the names of sources.
 pub(super) fn sources(heap: &mut Heap, sources: &[String]) -> Result<Value, AllocError> {

@@ -10,6 +10,7 @@
 
 use std::sync::Arc;
 
+use esl_bytecode::compile::SourcePlace;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::file::{ConstantRecord, ModuleImage, SymbolHome};
 use esl_bytecode::module::{Function, FunctionNumber, PoolIdx};
@@ -377,11 +378,11 @@ impl World {
 }
 
 /// Returns the source place of word `pc` of a code of an image.
-pub(super) fn place_of(heap: &Heap, world: &World, code: Value, pc: u32) -> Option<debug::SourcePlace> {
+pub(super) fn place_of(heap: &Heap, world: &World, code: Value, pc: u32) -> Option<SourcePlace> {
     let parts = heap.code(code)?;
     let (image, number) = (parts.owner.as_index()?, parts.debug.as_index()?);
     let function = world.images.decode(image, number as u32)?;
     let entry = debug::entry_at(function.lines.into_iter(), pc)?;
     let source = world.images.source(image, entry.source)?;
-    Some(debug::SourcePlace { source, line: entry.line, column: entry.column })
+    Some(SourcePlace { source, line: entry.line, column: entry.column })
 }
