@@ -1067,8 +1067,31 @@ macro_rules! for_each_builtin {
                ;
             /// Records that the function `name` reads slot `slot` of the class named `class`. Comes after the
             /// function.
-            DefineAccessor = class::define_accessor, internal "%DEFINE-ACCESSOR" ("name class slot read-only")
-               ;
+            DefineAccessor = class::define_accessor, internal "%DEFINE-ACCESSOR"
+                ("name class slot read-only");
+
+            // ---- instances of the classes of DEFCLASS
+            /// A fresh instance of a class, with a layout and a simple vector of the values of its slots.
+            NewInstance = instance::new_instance, internal "%NEW-INSTANCE" ("class layout slots");
+            /// Makes `instance` one of `class`, with another layout and other slots, and returns it.
+            ChangeInstance = instance::change_instance, internal "%CHANGE-INSTANCE"
+                ("instance class layout slots");
+            /// Whether `object` is an instance of a class that `DEFCLASS` has defined.
+            Instancep = instance::instancep, internal "%INSTANCEP" ("object");
+            /// The content of a slot without a value.
+            UnboundMarker = instance::unbound_marker, internal "%UNBOUND-MARKER" ("");
+            /// The slot `name` of `instance`. `cache` is a simple vector of the layout that was met last, and
+            /// the slot's index there.
+            CachedSlotValue = instance::slot_value, internal "%SLOT-VALUE" ("instance name cache")
+                slowly "%SLOW-SLOT-VALUE";
+            /// Makes `value` the slot `name` of `instance`, and returns `value`.
+            SetCachedSlotValue = instance::set_slot_value, internal "%SET-SLOT-VALUE"
+                ("instance name cache value") slowly "%SLOW-SET-SLOT-VALUE";
+            /// Gives a class other direct superclasses. Its subclasses have to be updated in turn.
+            UpdateClass = instance::update_class, internal "%UPDATE-CLASS" ("class supers");
+            /// The item after the class of `object` in `cache`, a simple vector of classes and items in turn;
+            /// `NIL` if the class is not in it.
+            CachedMethods = instance::cached_methods, internal "%CACHED-METHODS" ("cache object");
 
             // ---- reading and compiling at run time
             /// A handle of the compilation of `form`.

@@ -103,7 +103,8 @@ fn loosely_same(
     }
     match (heap.kind(a), heap.kind(b)) {
         (Some(Kind::Structure), Some(Kind::Structure)) => {
-            if heap.structure_class(a) != heap.structure_class(b) {
+            // Instances of DEFCLASS are the same only if they are one object.
+            if heap.structure_class(a) != heap.structure_class(b) || heap.is_instance(a) {
                 return Some(false);
             }
             let (left, right) = (heap.structure_slots(a)?, heap.structure_slots(b)?);
@@ -285,7 +286,7 @@ fn loose_hash(heap: &Heap, v: Value, hash: u64, open: &mut SmallVec<[Value; 16]>
         return mix(hash, elements.len() as u64);
     }
     match heap.kind(v) {
-        Some(Kind::Structure) => {
+        Some(Kind::Structure) if !heap.is_instance(v) => {
             let slots = heap.structure_slots(v).unwrap_or_default();
             open.extend(slots.iter().take(HASHED_PARTS).rev().copied());
             mix(hash, heap.identity(heap.structure_class(v).unwrap_or(Value::NIL)))

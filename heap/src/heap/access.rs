@@ -10,7 +10,7 @@
 //! of a function, the data of an array, the class of a structure) have setters of their own, or none.
 
 use super::Heap;
-use super::layout::{Array, Bignum, Code, Cons, Float, Function, Header, Kind, Symbol};
+use super::layout::{Array, Bignum, Code, Cons, Float, Function, Header, Kind, Structure, Symbol};
 use super::object::is_vouched_for;
 use crate::value::Value;
 use std::slice;
@@ -234,6 +234,20 @@ impl Heap {
     #[inline]
     pub fn structure_set(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
         self.set_slot(v, Kind::Structure, index.checked_add(1)?, new)
+    }
+
+    /// Whether `v` is a structure that may get another class: see [`Structure::INSTANCE`].
+    #[inline]
+    pub fn is_instance(&self, v: Value) -> bool {
+        self.flags(v, Kind::Structure).is_some_and(|flags| flags & Structure::INSTANCE != 0)
+    }
+
+    /// Makes `v`, an instance, one of another class; `None` if it is none, or `class` is not a Class.
+    pub fn instance_set_class(&mut self, v: Value, class: Value) -> Option<()> {
+        if !self.is_instance(v) || !self.is(class, Kind::Class) {
+            return None;
+        }
+        self.set_slot(v, Kind::Structure, 0, class)
     }
 
     // Symbols and functions.

@@ -412,6 +412,11 @@ pub struct Structure {
     pub slots: [Value; 0],
 }
 
+impl Structure {
+    /// Flag of an instance of a class of `defclass`, which may get another class.
+    pub const INSTANCE: u8 = 1;
+}
+
 const _: () = assert!(size_of::<Structure>() == 16);
 
 #[cfg(test)]

@@ -28,6 +28,25 @@ impl Vm {
         self.exchange.program_error(format!("there is no structure or condition type {name}"))
     }
 
+    /// Returns the classes that the list `supers` holds or names, for a class that inherits from them.
+    ///
+    /// # Errors
+    /// `type-error` or `program-error` if an item is not a class, or its inheritance is at the maximum depth.
+    pub(super) fn superclasses(&mut self, supers: Value) -> Result<Vec<Value>, Exit> {
+        let mut classes = Vec::new();
+        for class in self.list_items(supers, LIMIT)? {
+            classes.push(self.class(class)?);
+        }
+        let is_too_deep = classes.iter().any(|&class| {
+            class_slot(&self.heap, class, slot::DEPTH).as_index().is_some_and(|depth| depth >= MAX_DEPTH)
+        });
+        if is_too_deep {
+            let text = format!("types include each other more than {MAX_DEPTH} levels deep");
+            return self.exchange.program_error(text);
+        }
+        Ok(classes)
+    }
+
     /// Notes that `datum` is no instance of `class`.
     fn instance_error<T>(&mut self, datum: Value, class: Value) -> Result<T, Exit> {
         let name = if self.heap.is(class, Kind::Class) { class::name_of(&self.heap, class) } else { class };
@@ -58,19 +77,8 @@ pub(super) fn make_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             .exchange
             .program_error(format!("{name} belongs to the language and cannot be redefined as a type"));
     }
-    let mut classes = Vec::new();
-    for class in vm.list_items(supers, LIMIT)? {
-        classes.push(vm.class(class)?);
-    }
+    let classes = vm.superclasses(supers)?;
     let slots = vm.list_items(slots, LIMIT)?;
-    let is_too_deep = classes.iter().any(|&class| {
-        class_slot(&vm.heap, class, slot::DEPTH).as_index().is_some_and(|depth| depth >= MAX_DEPTH)
-    });
-    if is_too_deep {
-        return vm
-            .exchange
-            .program_error(format!("types include each other more than {MAX_DEPTH} levels deep"));
-    }
     Ok(vm.world.define_class(&mut vm.heap, name, &classes, &slots, data)?)
 }
 
@@ -145,6 +153,9 @@ pub(super) fn copy_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     else {
         return vm.instance_error(arguments[0], vm.world.known.structure_object);
     };
+    if vm.heap.is_instance(arguments[0]) {
+        return vm.instance_error(arguments[0], vm.world.known.structure_object);
+    }
     let slots = slots.to_vec();
     vm.exchange.charge(slots.len());
     Ok(vm.heap.alloc_structure(class, &slots)?)

@@ -7,7 +7,8 @@
 //!
 //! Guarantees: a class with instances never changes its slots. Defining a name again with the same
 //! superclasses and slots keeps the class; otherwise the name gets a new class, and old instances remain
-//! unchanged.
+//! unchanged. A class of `defclass` gets other superclasses in place ([`update`]): its instances have no
+//! slots that depend on them.
 
 use crate::heap::{AllocError, Heap, Kind};
 use crate::value::Value;
@@ -64,15 +65,7 @@ impl World {
             heap.record_set(class, Kind::Class, slot::DATA, data);
             return Ok(class);
         }
-        let mut line = supers.first().map_or(Vec::new(), |&first| line_of(heap, first).to_vec());
-        let mut others: Vec<Value> = Vec::new();
-        for &class in supers {
-            for ancestor in ancestors(heap, class) {
-                if !line.contains(&ancestor) && !others.contains(&ancestor) {
-                    others.push(ancestor);
-                }
-            }
-        }
+        let (mut line, others) = lineage(heap, supers);
         let depth = line.len();
         line.push(Value::NIL);
         let line = heap.alloc_vector(&line)?;
@@ -140,6 +133,43 @@ fn list(heap: &Heap, list: Value) -> impl Iterator<Item = Value> {
         rest = pair.cdr;
         Some(pair.car)
     })
+}
+
+/// The line of the first of `supers`, and all that the others inherit from beside it.
+fn lineage(heap: &Heap, supers: &[Value]) -> (Vec<Value>, Vec<Value>) {
+    let line = supers.first().map_or(Vec::new(), |&first| line_of(heap, first).to_vec());
+    let mut others: Vec<Value> = Vec::new();
+    for &class in supers {
+        for ancestor in ancestors(heap, class) {
+            if !line.contains(&ancestor) && !others.contains(&ancestor) {
+                others.push(ancestor);
+            }
+        }
+    }
+    (line, others)
+}
+
+/// Gives `class`, which stays the object that it is, other direct superclasses. Its subclasses are up to the
+/// caller.
+///
+/// # Errors
+/// As for every allocation; nothing has changed then.
+pub(crate) fn update(heap: &mut Heap, class: Value, supers: &[Value]) -> Result<(), AllocError> {
+    let (mut line, others) = lineage(heap, supers);
+    let depth = line.len();
+    line.push(class);
+    let line = heap.alloc_vector(&line)?;
+    let others = heap.list(&others)?;
+    let supers = heap.list(supers)?;
+    for (index, value) in [
+        (slot::LINE, line),
+        (slot::DEPTH, Value::index(depth)),
+        (slot::OTHERS, others),
+        (slot::SUPERS, supers),
+    ] {
+        heap.record_set(class, Kind::Class, index, value);
+    }
+    Ok(())
 }
 
 fn is_same_layout(heap: &Heap, class: Value, supers: &[Value], slots: &[Value]) -> bool {
