@@ -796,3 +796,44 @@ e") (read-from-string "#:g") (read-from-string ":Key")))
               (loop for d = (peek-char nil in nil nil) while (and d (digit-char-p d))
                     for v = (digit-char-p (read-char in)) then (+ (* 10 v) (digit-char-p (read-char in)))
                     finally (return v))))
+
+;; classes: slots, initialization, other classes
+;;; 214
+(progn
+  (defclass k214 () ((a :initarg :a :initform 1) (b :initarg :b) (c :allocation :class :initform 3)))
+  (defclass l214 (k214) ((d :initform 4) (a :initform 2)))
+  (defmethod initialize-instance :after ((object l214) &key (e 5)) (setf (slot-value object 'b) e))
+  (defmethod slot-unbound (class (object k214) name) (declare (ignore class)) (list 'unbound name))
+  (defmethod slot-missing (class (object k214) name operation &optional value)
+    (declare (ignore class operation value))
+    (list 'missing name))
+  (defmethod update-instance-for-different-class :after ((old k214) (new l214) &key)
+    (setf (slot-value new 'b) (list 'was (slot-value old 'a))))
+  (defmethod update-instance-for-redefined-class :after ((object l214) added discarded values &key)
+    (setf (slot-value object 'b) (list added discarded values)))
+  (answer 214
+          (let ((k (make-instance 'k214)) (l (make-instance 'l214 :e 6)))
+            (with-slots (a (other b)) k
+              (setf a 7)
+              (list a other (slot-value k 'z) (slot-value l 'a) (slot-value l 'b) (slot-value l 'd)
+                    (slot-boundp k 'b) (slot-exists-p k 'd) (slot-exists-p l 'd)
+                    (progn (slot-makunbound l 'a) (slot-boundp l 'a))
+                    (progn (reinitialize-instance k :a 8) a)
+                    (progn (shared-initialize l '(a)) (slot-value l 'a))
+                    (progn (setf (slot-value l 'c) 9) (slot-value k 'c))
+                    (progn (change-class k 'l214) (slot-value k 'b))
+                    (progn (make-instances-obsolete 'l214) (slot-value l 'b))
+                    (slot-boundp (allocate-instance (find-class 'k214)) 'a)
+                    (class-name (class-of l)) (typep k 'k214) (find-class 'm214 nil))))))
+
+;; what generic functions do without a method
+;;; 215
+(progn
+  (defgeneric g215 (x))
+  (defmethod g215 ((x integer)) (call-next-method))
+  (defmethod no-applicable-method ((function (eql #'g215)) &rest arguments) (list 'none arguments))
+  (defmethod no-next-method ((function (eql #'g215)) method &rest arguments)
+    (declare (ignore method))
+    (list 'no-next arguments))
+  (defclass p215 () ((x :initarg :x :accessor p215-x)))
+  (answer 215 (list (g215 'a) (with-accessors ((x p215-x)) (make-instance 'p215 :x 1) (incf x)))))
