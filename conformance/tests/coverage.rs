@@ -5,9 +5,6 @@ use std::collections::BTreeSet;
 use esl::{Config, Engine, host::VirtualHost};
 use esl_conformance::programs;
 
-/// Names that no program uses, with the reason.
-const EXCEPTIONS: &[(&str, &str)] = &[("UNBOUND-SLOT-INSTANCE", "no operation leaves a slot unbound")];
-
 /// Form that lists the defined names.
 const NAMES: &str = "
 (let ((names nil))
@@ -40,11 +37,6 @@ fn every_name_is_used_by_a_program() {
     let names = engine.eval(NAMES).expect("the names can be listed").to_string();
     let names: Vec<&str> = names.trim_matches('"').split(' ').collect();
     assert!(names.len() > 500, "only {} names are listed", names.len());
-    let excepted = |name: &str| EXCEPTIONS.iter().any(|&(exception, _)| exception == name);
-    let unused: Vec<&str> =
-        names.into_iter().filter(|name| !used.contains(*name) && !excepted(name)).collect();
+    let unused: Vec<&str> = names.into_iter().filter(|name| !used.contains(*name)).collect();
     assert!(unused.is_empty(), "no conformance program uses {} names: {}", unused.len(), unused.join(" "));
-    for (name, reason) in EXCEPTIONS {
-        assert!(!used.contains(*name), "a program uses {name}: remove the exception ({reason})");
-    }
 }
