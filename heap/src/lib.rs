@@ -6,7 +6,7 @@
 //! | [`heap`] | [`Heap`]: allocation, checked access, incremental collection |
 //! | [`stack`] | the register stack of one task |
 //! | [`saved_pc`] | the address at which a task goes on |
-//! | [`array`] | the elements of arrays, wherever they are kept |
+//! | [`mod@array`] | the elements of arrays, wherever they are kept |
 //! | [`number`] | which values are numbers, and which numbers are equal |
 //! | [`equality`] | `eq`, `eql`, `equal`, `equalp`, and hashes that agree with them |
 //! | [`table`] | hash tables that keep the order of insertion |

@@ -3,9 +3,9 @@
 //! A link leads to an entry: the hash of its key (32 bits), its number, one too high (28 bits; 0 leads
 //! nowhere), and whether the chain goes on behind it. The heads of the chains are links, and each entry has
 //! the link to the next of its chain. So a search knows the hash of a key before it goes there, and a key
-//! that is not there is mostly missed without a look at any entry. [`storage`] has how all this is stored.
+//! that is not there is mostly missed without a look at any entry. `storage` has how all this is stored.
 //!
-//! Invariant: a table has [`PER_ENTRY`] chains for each entry that was ever in use (and for one at least). So
+//! Invariant: a table has `PER_ENTRY` chains for each entry that was ever in use (and for one at least). So
 //! each new entry adds as many, and each of these takes its share from one other; nothing is ever rehashed at
 //! once, and no operation takes time in proportion to the size of the table. What was removed leaves a free
 //! entry, and the last one freed is the first to be taken again, which is also where SBCL puts a new key: the
