@@ -96,10 +96,10 @@ fn a_property_that_was_violated_meanwhile_does_not_count_as_achieved() {
         &[":ON", ":TOLD"],
         &[(
             "locks.esl",
-            r"after ACHIEVE checked it.
-            ((%holds-p lock)",
-            r"
-            (t",
+            r"            ((%holds-p lock)
+             (setf",
+            r"            (t
+             (setf",
         )],
     );
 }
