@@ -1,0 +1,344 @@
+//! The embedding API: a machine in which a program in Rust evaluates ESL.
+//!
+//! ```
+//! use std::time::Duration;
+//!
+//! use esl::host::VirtualHost;
+//! use esl::{Config, Data, Engine};
+//!
+//! // A machine with little memory whose time is virtual and whose output is kept.
+//! let host = VirtualHost::new();
+//! let captured = host.captured();
+//! let mut engine = Engine::with(Config { memory: 32 << 20, ..Config::default() }, Box::new(host))?;
+//! let value = engine.eval("(progn (sleep 3600) (format t \"an hour later~%\") (now))")?;
+//! assert_eq!(value, Data::Float(Duration::from_secs(3600).as_secs_f64()));
+//! assert_eq!(captured.output(), "an hour later\n");
+//! # Ok::<(), esl::Error>(())
+//! ```
+
+mod call;
+mod executor;
+mod operation;
+
+use std::future::Future;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use esl_bytecode::datum::Datum;
+use esl_bytecode::symbol::USER_PACKAGE;
+use esl_vm::embed::HostFunction;
+use esl_vm::host::{Host, RealHost};
+use esl_vm::run::CallError;
+use esl_vm::value::Value;
+use esl_vm::vm::{Config, Vm};
+
+use crate::data::Data;
+use crate::error::{Error, NAME_MARKS};
+use crate::program;
+
+pub use call::{Call, Failure};
+pub use executor::{Executor, Job};
+pub use operation::Operation;
+
+/// A machine with the library. Definitions last from one evaluation to the next.
+///
+/// An engine belongs to one thread at a time and can be sent to another; engines share nothing.
+pub struct Engine {
+    machine: Vm,
+    ticks: u64,
+    /// Runs the futures of operations.
+    executor: Executor,
+}
+
+impl Engine {
+    /// Creates an engine with the default limits, whose programs write to the standard streams.
+    ///
+    /// # Errors
+    /// [`Error::NoMemory`], if the system has none.
+    pub fn new() -> Result<Engine, Error> {
+        Engine::with(Config::default(), Box::new(RealHost::new(Vec::new())))
+    }
+
+    /// Creates an engine with limits and a host of the embedder's.
+    ///
+    /// # Errors
+    /// [`Error::NoMemory`], if the limit of memory leaves no room for the library.
+    pub fn with(config: Config, host: Box<dyn Host + Send>) -> Result<Engine, Error> {
+        Ok(Engine { machine: program::machine(config, host)?, ticks: u64::MAX, executor: executor::thread() })
+    }
+
+    /// Limits the ticks (calls and turns of loops) of each evaluation.
+    #[must_use]
+    pub fn with_ticks(mut self, ticks: u64) -> Engine {
+        self.ticks = ticks;
+        self
+    }
+
+    /// Has the futures of operations run by an executor of the embedder's, such as a tokio runtime. Without
+    /// this, one thread of the engine's runs them all.
+    #[must_use]
+    pub fn with_executor(mut self, executor: impl Fn(Job) + Send + Sync + 'static) -> Engine {
+        self.executor = Arc::new(executor);
+        self
+    }
+
+    /// Defines a function that programs call and Rust implements. It returns at once, and cannot call back; a
+    /// panic in it is a failure `:HOST-PANIC` of the call.
+    ///
+    /// `lambda_list` is that of the function, in ESL: `(metres &key (speed 0.1))`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidName`]; [`Error::DoesNotCompile`] if the name belongs to the language, or the lambda
+    /// list is none.
+    pub fn define<F, V>(
+        &mut self,
+        name: &str,
+        lambda_list: &str,
+        documentation: &str,
+        mut function: F,
+    ) -> Result<(), Error>
+    where
+        F: FnMut(Call) -> Result<V, Failure> + Send + 'static,
+        V: Into<Data>,
+    {
+        self.define_by(name, lambda_list, documentation, "NIL", |names| {
+            HostFunction::AtOnce(Box::new(move |arguments| {
+                let arguments = arguments.iter().map(Data::from_datum).collect();
+                let call = Call { names: names.clone(), arguments };
+                let result = catch_unwind(AssertUnwindSafe(|| function(call)));
+                let result = result.unwrap_or_else(|panic| Err(Failure::of_panic(&*panic)));
+                result.map(|value| value.into().to_datum(USER_PACKAGE)).map_err(|failure| failure.to_host())
+            }))
+        })
+    }
+
+    /// Defines a function whose calls are operations, performed by futures. The calling task waits until the
+    /// future is ready; when the call is left before, the future is dropped.
+    ///
+    /// ```
+    /// use esl::Engine;
+    ///
+    /// let mut engine = Engine::new()?;
+    /// engine.define_async("DRIVE", "(metres &key (speed 1))", "Drives that far.", |call| async move {
+    ///     let (metres, speed): (f64, f64) = (call.get("metres")?, call.get("speed")?);
+    ///     Ok(metres / speed)
+    /// })?;
+    /// assert_eq!(engine.eval("(drive 3 :speed 2)")?.as_float(), Some(1.5));
+    /// # Ok::<(), esl::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Engine::define`].
+    pub fn define_async<F, R, V>(
+        &mut self,
+        name: &str,
+        lambda_list: &str,
+        documentation: &str,
+        mut function: F,
+    ) -> Result<(), Error>
+    where
+        F: FnMut(Call) -> R + Send + 'static,
+        R: Future<Output = Result<V, Failure>> + Send + 'static,
+        V: Into<Data> + 'static,
+    {
+        let executor = self.executor.clone();
+        self.define_operation(name, lambda_list, documentation, move |operation| {
+            let future = function(operation.call().clone());
+            executor(executor::job(operation, future));
+        })
+    }
+
+    /// Defines a function whose calls are operations. `begin` begins one, and sees to it that it is completed
+    /// or fails, on any thread; the calling task waits until then.
+    ///
+    /// # Errors
+    /// As [`Engine::define`].
+    pub fn define_operation<F>(
+        &mut self,
+        name: &str,
+        lambda_list: &str,
+        documentation: &str,
+        mut begin: F,
+    ) -> Result<(), Error>
+    where
+        F: FnMut(Operation) + Send + 'static,
+    {
+        self.define_by(name, lambda_list, documentation, "T", |names| {
+            HostFunction::Operation(Box::new(move |operation| {
+                let operation = Operation::new(operation, names.clone());
+                // A panic drops the operation, which is how the program hears of it.
+                drop(catch_unwind(AssertUnwindSafe(|| begin(operation))));
+            }))
+        })
+    }
+
+    /// Has calls of an operation that are left not wait until it has stopped.
+    ///
+    /// # Errors
+    /// [`Error::InvalidName`].
+    pub fn detach(&mut self, name: &str) -> Result<(), Error> {
+        check_name(name)?;
+        self.eval(&format!("(esl::%detach '{name})")).map(drop)
+    }
+
+    /// Defines a function of the embedder's, which `make` makes for the variables of its lambda list.
+    fn define_by(
+        &mut self,
+        name: &str,
+        lambda_list: &str,
+        documentation: &str,
+        is_operation: &str,
+        make: impl FnOnce(Arc<[String]>) -> HostFunction,
+    ) -> Result<(), Error> {
+        check_name(name)?;
+        let documentation = documentation.replace('\\', "\\\\").replace('"', "\\\"");
+        let definition =
+            format!("(esl::%define-host-function {name} {lambda_list} \"{documentation}\" {is_operation})");
+        let names = self.eval(&definition)?;
+        let names = names.as_list().unwrap_or_default().iter();
+        let names = names.map(|name| name.as_str().unwrap_or_default().to_lowercase()).collect();
+        self.machine.add_host_function(&name.to_uppercase(), make(names));
+        Ok(())
+    }
+
+    /// Evaluates the forms of a text one after another, and returns the first value of the last form.
+    ///
+    /// Tasks that the text has spawned go on in later evaluations.
+    ///
+    /// # Errors
+    /// All of [`Error`] but [`Error::Refused`] and [`Error::InvalidName`].
+    pub fn eval(&mut self, text: &str) -> Result<Data, Error> {
+        let datum = Datum::string(text, Default::default());
+        let text = self.machine.import(&datum).map_err(|_| Error::NoMemory("the text"))?;
+        let function = self.machine.library_function("%EVAL-TEXT")?;
+        let result = self.machine.call(function, &[text], self.ticks);
+        self.machine.flush();
+        match result {
+            Ok(values) => {
+                let datum = self.machine.export(values.first().copied().unwrap_or(Value::NIL))?;
+                Ok(Data::from_datum(&datum))
+            }
+            Err(error) => Err(self.error(error)),
+        }
+    }
+
+    /// Returns the reason why an evaluation did not return.
+    fn error(&mut self, error: CallError) -> Error {
+        if let CallError::Failed { message, .. } = &error
+            && let Some(diagnostics) = self.machine.take_refused(message)
+        {
+            return Error::DoesNotCompile(diagnostics);
+        }
+        error.into()
+    }
+
+    /// Ends what still runs: aborts all tasks, newest first, and runs their cleanups; cancels operations
+    /// under way, and waits until they have stopped. Returns what has not ended in time. An engine that is
+    /// dropped does the same.
+    pub fn end(&mut self) -> Vec<String> {
+        let left = self.machine.end_run();
+        self.machine.flush();
+        left
+    }
+
+    /// Returns the machine, for what this API does not offer.
+    pub fn machine(&mut self) -> &mut Vm {
+        &mut self.machine
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// Checks that a text is the name of a function.
+///
+/// # Errors
+/// [`Error::InvalidName`].
+fn check_name(name: &str) -> Result<(), Error> {
+    let is_name = |c: char| c.is_alphanumeric() || NAME_MARKS.contains(c);
+    if name.is_empty() || !name.chars().all(is_name) { Err(Error::InvalidName(name.into())) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use esl_vm::embed::ExportError;
+    use esl_vm::host::VirtualHost;
+
+    use super::*;
+
+    fn engine(config: Config) -> Engine {
+        Engine::with(config, Box::new(VirtualHost::new())).expect("there is room for the library")
+    }
+
+    /// Returns the codes of the errors for which a text is refused, and the starts of their spans.
+    fn refused(text: &str) -> Vec<(&'static str, u32)> {
+        match engine(Config::default()).eval(text) {
+            Err(Error::DoesNotCompile(errors)) => {
+                errors.iter().map(|error| (error.code, error.primary.span.start)).collect()
+            }
+            other => panic!("`{text}` gives {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_text_is_refused_with_its_errors_and_their_places() {
+        assert_eq!(refused("(list 1)\n(list 2"), [("unclosed-list", 9)]);
+        assert_eq!(refused("(list (if) (let 5))"), [("missing-part", 7), ("malformed-binding", 16)]);
+        assert_eq!(refused("(defun car (x) x)"), [("locked-name", 7)]);
+    }
+
+    #[test]
+    fn a_form_that_the_program_evaluates_fails() {
+        let mut engine = engine(Config::default());
+        for (text, expected) in [
+            ("(eval '(let 5))", ":COMPILATION-FAILED"),
+            ("(read-from-string \")\")", ":READER-ERROR"),
+            ("(progn (ignore-errors (eval '(let 5))) (fail :lost 'in 'space))", ":LOST"),
+        ] {
+            let Err(Error::Failed { cause, report, .. }) = engine.eval(text) else { panic!("{text}") };
+            assert_eq!(cause, expected);
+            assert!(report.contains("no recovery available"), "{report}");
+        }
+    }
+
+    #[test]
+    fn an_evaluation_that_does_not_return_and_an_engine_that_is_dropped_run_cleanups() {
+        let host = VirtualHost::new();
+        let captured = host.captured();
+        let engine = Engine::with(Config::default(), Box::new(host)).expect("there is room for the library");
+        let mut engine = engine.with_ticks(10_000);
+        let taken = |captured: &esl_vm::host::Captured, before: &mut usize| {
+            let output = captured.output();
+            let new = output[*before..].to_owned();
+            *before = output.len();
+            new
+        };
+        let mut before = 0;
+        assert_eq!(engine.eval("(unwind-protect (loop) (princ 'off))"), Err(Error::TicksUsed(10_000)));
+        assert_eq!(taken(&captured, &mut before), "OFF");
+        let waiting = "(unwind-protect (wait-for-event (make-event)) (princ 'left))";
+        assert_eq!(engine.eval(waiting), Err(Error::Deadlocked));
+        assert_eq!(taken(&captured, &mut before), "LEFT");
+        let background = "(progn (spawn (unwind-protect (loop) (princ 'old)))
+                                 (spawn (unwind-protect (loop) (sleep 5) (princ 'new)))
+                                 (sleep 0))";
+        assert_eq!(engine.eval(background), Ok(Data::Nil));
+        drop(engine);
+        assert_eq!(taken(&captured, &mut before), "OLDNEW");
+    }
+
+    #[test]
+    fn limits_are_told_apart() {
+        let mut small = engine(Config { budget: Some(10_000), ..Config::default() }).with_ticks(6_000);
+        assert_eq!(small.eval("(loop)"), Err(Error::TicksUsed(6_000)));
+        assert_eq!(small.eval("(loop)"), Err(Error::BudgetSpent));
+        let mut engine = engine(Config::default());
+        assert_eq!(engine.eval("(abort-task (current-task))"), Err(Error::Aborted));
+        assert_eq!(engine.eval("(let ((a (list 1))) (rplacd a a))"), Err(ExportError::Circular.into()));
+        let error = engine.define("READ SENSOR", "()", "", |_| Ok(Data::Nil));
+        assert_eq!(error, Err(Error::InvalidName("READ SENSOR".into())));
+    }
+}

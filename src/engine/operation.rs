@@ -1,0 +1,83 @@
+//! Operations as the embedder's code holds them.
+
+use std::sync::Arc;
+
+use esl_bytecode::symbol::USER_PACKAGE;
+use esl_vm::host;
+
+use super::call::{Call, Failure};
+use crate::data::Data;
+
+/// Something that the embedder's code does for a task of the program, which waits until it completes or
+/// fails.
+///
+/// It can be sent to another thread, and may be completed at any time, also when its engine is gone, which
+/// has no effect. One that is dropped has failed with the cause `:OPERATION-DROPPED`.
+///
+/// ```
+/// use esl::Engine;
+///
+/// let mut engine = Engine::new()?;
+/// engine.define_operation("ADD", "(a b)", "Adds elsewhere.", |operation| {
+///     std::thread::spawn(move || {
+///         let (a, b) = (operation.call().get::<i64>("a"), operation.call().get::<i64>("b"));
+///         match (a, b) {
+///             (Ok(a), Ok(b)) => operation.complete(a + b),
+///             (Err(failure), _) | (_, Err(failure)) => operation.fail(failure),
+///         }
+///     });
+/// })?;
+/// let sums = "(task-net (one (add 1 2)) (two (add 3 4)))";
+/// assert_eq!(engine.eval(&format!("(multiple-value-list {sums})"))?.to_string(), "(3 7)");
+/// # Ok::<(), esl::Error>(())
+/// ```
+pub struct Operation {
+    host: host::Operation,
+    call: Call,
+}
+
+impl Operation {
+    pub(super) fn new(host: host::Operation, names: Arc<[String]>) -> Operation {
+        let arguments = host.arguments().iter().map(Data::from_datum).collect();
+        Operation { host, call: Call { names, arguments } }
+    }
+
+    /// Returns the call that the operation is for.
+    pub fn call(&self) -> &Call {
+        &self.call
+    }
+
+    /// Ends the operation: this is the value of the call.
+    pub fn complete<V: Into<Data>>(self, value: V) {
+        self.complete_with(&[value.into()]);
+    }
+
+    /// Ends the operation: these are the values of the call.
+    pub fn complete_with(self, values: &[Data]) {
+        self.host.complete(values.iter().map(|value| value.to_datum(USER_PACKAGE)).collect());
+    }
+
+    /// Ends the operation: the call fails.
+    pub fn fail(self, failure: impl Into<Failure>) {
+        self.host.fail(failure.into().to_host());
+    }
+
+    /// Reports how far the operation is, for `operation-progress`.
+    pub fn report_progress(&self, value: impl Into<Data>) {
+        self.host.report_progress(vec![value.into().to_datum(USER_PACKAGE)]);
+    }
+
+    /// Has `function` called when the program leaves the call, or cancels the operation; at once if it has
+    /// done so already. The program waits until the operation is completed, fails or is dropped, so that what
+    /// is still moving is not commanded again; whatever end it has then counts as cancelled.
+    ///
+    /// The engine waits for the function, which should only pass the message on.
+    pub fn on_cancel(&self, function: impl FnOnce() + Send + 'static) {
+        self.host.on_cancel(function);
+    }
+
+    /// Returns whether the program has left the call, or cancelled the operation.
+    pub fn is_cancelled(&self) -> bool {
+        self.host.is_cancelled()
+    }
+}

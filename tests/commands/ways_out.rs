@@ -1,0 +1,117 @@
+//! The ends of a run that the outside wants: cleanups run, and the status says which signal it was.
+
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, Command, Stdio};
+
+use esl_conformance::process;
+
+use crate::eslvm;
+use crate::folder::Folder;
+
+/// A program that is started and has printed its first line.
+struct Running {
+    child: Child,
+    output: BufReader<std::process::ChildStdout>,
+    _folder: Folder,
+}
+
+/// What has become of a program.
+struct Ended {
+    status: Option<i32>,
+    output: String,
+    errors: String,
+}
+
+impl Running {
+    fn start(name: &str, text: &str) -> Running {
+        let folder = Folder::new(name);
+        let path = folder.file("program.esl", text);
+        let mut command = eslvm(&["run", &path]);
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().expect("the command is there");
+        let mut output = BufReader::new(child.stdout.take().expect("the output is a pipe"));
+        output.read_line(&mut String::new()).expect("the program begins");
+        Running { child, output, _folder: folder }
+    }
+
+    fn send(&self, signal: &str) {
+        let sent = Command::new("kill").args([signal, &self.child.id().to_string()]).status();
+        assert!(sent.expect("there is a kill").success());
+    }
+
+    /// Waits for a line of output.
+    fn line(&mut self) -> String {
+        let mut line = String::new();
+        self.output.read_line(&mut line).expect("output is text");
+        line.trim().to_owned()
+    }
+
+    fn end(mut self) -> Ended {
+        let mut output = String::new();
+        self.output.read_to_string(&mut output).expect("output is text");
+        let done = self.child.wait_with_output().expect("a child can be waited for");
+        let errors = String::from_utf8_lossy(&done.stderr).into_owned();
+        Ended { status: done.status.code(), output, errors }
+    }
+}
+
+/// Tasks that switch a motor off at their ends, in the order in which they were made.
+const MOTORS: &str = "(defun run-motor (name)
+  (unwind-protect (loop (sleep 0.001))
+    (format t \"~a is off~%\" name)
+    (finish-output)))
+(spawn (:name 'left) (run-motor 'left))
+(spawn (:name 'right) (run-motor 'right))
+(sleep 0.01)
+(format t \"begun~%\")
+(finish-output)
+(run-motor 'main)";
+
+#[test]
+fn every_signal_ends_a_run_with_its_cleanups_newest_first() {
+    for (signal, status, said) in
+        [("-TERM", 143, "terminated"), ("-HUP", 129, "hung up"), ("-INT", 130, "interrupted")]
+    {
+        let running = Running::start(&format!("signal{signal}"), MOTORS);
+        running.send(signal);
+        let ended = running.end();
+        assert_eq!(
+            (ended.status, &*ended.output),
+            (Some(status), "RIGHT is off\nLEFT is off\nMAIN is off\n")
+        );
+        assert!(ended.errors.contains(said), "{}", ended.errors);
+    }
+}
+
+#[test]
+fn a_second_interrupt_cuts_the_end_short_and_names_what_is_left() {
+    let text = "(spawn (:name 'arm)
+                  (unwind-protect (loop (sleep 1))
+                    (format t \"stowing~%\")
+                    (finish-output)
+                    (sleep 100)))
+                (sleep 0.01)
+                (format t \"begun~%\")
+                (finish-output)
+                (loop (sleep 1))";
+    let mut running = Running::start("cut", text);
+    running.send("-TERM");
+    assert_eq!(running.line(), "stowing");
+    running.send("-INT");
+    let ended = running.end();
+    assert_eq!(ended.status, Some(143), "{}", ended.errors);
+    assert!(ended.errors.contains("Left are\n"), "{}", ended.errors);
+    assert!(ended.errors.contains("  task ARM, in a cleanup, "), "{}", ended.errors);
+}
+
+#[test]
+fn the_end_of_a_run_has_the_time_that_is_given() {
+    let text = "(spawn (:name 'arm) (unwind-protect (loop (sleep 1)) (sleep 100) (princ 'never)))
+                (wait-for-event (make-event))";
+    let folder = Folder::new("cleanup-time");
+    let path = folder.file("program.esl", text);
+    let arguments = ["run", "--clock", "virtual", "--cleanup-time", "5", "--budget", "100000", &path];
+    let run = process::run(&mut eslvm(&arguments), "");
+    assert_eq!((run.status, &*run.output), (Some(5), ""), "{}", run.errors);
+    assert!(run.errors.contains("A cleanup of task ARM takes too long and is left."), "{}", run.errors);
+}

@@ -1,0 +1,117 @@
+//! Operations: beginning and cancelling them, and what has become of them.
+
+use crate::builtins::task::expect_task;
+use crate::datum;
+use crate::raise::{Exit, Outcome, Raised};
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::wait::operation;
+use esl_bytecode::datum::Datum;
+
+use super::expect::exactly;
+
+/// Returns the name of a function of the host, and its arguments, from a symbol and a list.
+///
+/// # Errors
+/// A failure if an argument is no data.
+pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(String, Vec<Datum>), Exit> {
+    let (name, arguments) = (call[0], call[1]);
+    let name = vm.heap.symbol(name).and_then(|symbol| vm.heap.string_text(symbol.name));
+    let mut data = Vec::new();
+    let mut rest = arguments;
+    while let Some(pair) = vm.heap.as_cons(rest) {
+        match datum::export(&vm.heap, &vm.world, pair.car) {
+            Ok((datum, work)) => {
+                vm.exchange.charge(work);
+                data.push(datum);
+            }
+            Err(error) => return vm.exchange.raise(Raised::Simple(error.to_string())),
+        }
+        rest = pair.cdr;
+    }
+    Ok((name.unwrap_or_default(), data))
+}
+
+/// Returns the handle of an operation that `v` is.
+///
+/// # Errors
+/// A failure if it is none.
+fn expect_handle(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
+    if operation::is_handle(&vm.heap, v) { Ok(v) } else { vm.exchange.not_a(v, vm.world.known.operation) }
+}
+
+pub(super) fn begin_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.scheduler.point()?;
+    let [_, _, detached] = exactly(arguments);
+    let (name, data) = host_call(vm, arguments)?;
+    if !vm.outside.has_operation(&name) {
+        return vm.exchange.raise(Raised::Cause("NOT-IN-THIS-WORLD", arguments[0]));
+    }
+    let number = vm.outside.operations.next_number();
+    let handle = operation::make(&mut vm.heap, arguments[0], number, vm.world.known.pending)?;
+    vm.outside.begin_operation(&name, &data, handle, detached.is_true());
+    Ok(handle)
+}
+
+pub(super) fn cancel_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.scheduler.point()?;
+    let handle = expect_handle(vm, arguments[0])?;
+    vm.outside.operations.cancel(operation::number(&vm.heap, handle));
+    Ok(Value::NIL)
+}
+
+pub(super) fn operation_state(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.scheduler.point_of_read()?;
+    let handle = expect_handle(vm, arguments[0])?;
+    let slot = |slot| vm.heap.slot_or_nil(handle, slot);
+    let values = [slot(operation::STATE), slot(operation::RESULT)];
+    vm.give_values(&values)
+}
+
+pub(super) fn operation_progress(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.scheduler.point_of_read()?;
+    let handle = expect_handle(vm, arguments[0])?;
+    Ok(vm.heap.slot_or_nil(handle, operation::PROGRESS))
+}
+
+pub(super) fn operation_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let handle = expect_handle(vm, arguments[0])?;
+    Ok(Value::index(operation::number(&vm.heap, handle) as usize))
+}
+
+pub(super) fn operationp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(Value::boolean(operation::is_handle(&vm.heap, arguments[0])))
+}
+
+pub(super) fn make_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let number = vm.outside.operations.next_number();
+    let handle = operation::make(&mut vm.heap, arguments[0], number, vm.world.known.pending)?;
+    vm.outside.operations.count();
+    Ok(handle)
+}
+
+pub(super) fn end_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.scheduler.point()?;
+    let [handle, state, result] = exactly(arguments);
+    let handle = expect_handle(vm, handle)?;
+    vm.scheduler.wait_for_deliveries()?;
+    if vm.heap.slot_or_nil(handle, operation::STATE) == vm.world.known.pending {
+        vm.signal_event(handle, &[])?;
+        vm.heap.slot_set(handle, operation::RESULT, result);
+        vm.heap.slot_set(handle, operation::STATE, state);
+    }
+    Ok(Value::NIL)
+}
+
+pub(super) fn operation_performer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let handle = expect_handle(vm, arguments[0])?;
+    Ok(vm.heap.slot_or_nil(handle, operation::PERFORMER))
+}
+
+pub(super) fn set_operation_performer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [handle, task] = exactly(arguments);
+    let handle = expect_handle(vm, handle)?;
+    let task = expect_task(vm, task)?;
+    vm.heap.slot_set(handle, operation::PERFORMER, task);
+    Ok(task)
+}

@@ -1,0 +1,211 @@
+//! A host whose questions are counted into a canary: which they are, in their order, with their arguments.
+//! Answers are not; whatever they change in the run shows in what follows.
+
+use esl_bytecode::datum::Datum;
+
+use super::{Awaited, Failure, Host, HostError, Inbox, Incoming, Input, Output, Wake, WriteMode};
+use crate::canary::Canary;
+
+/// Questions to a host.
+#[derive(Clone, Copy)]
+enum Question {
+    Monotonic = 1,
+    WallClock,
+    Due,
+    Wait,
+    Advance,
+    Seed,
+    Arguments,
+    Write,
+    ReadInput,
+    IsInteractive,
+    ReadFile,
+    WriteFile,
+    FileExists,
+    DeleteFile,
+    Call,
+    Begin,
+}
+
+/// A machine's host, and the canary of the questions that it was asked.
+pub(crate) struct Asked {
+    host: Box<dyn Host + Send>,
+    canary: Canary,
+}
+
+impl Asked {
+    /// Counts the questions to `host` from here on.
+    pub(crate) fn new(host: Box<dyn Host + Send>) -> Asked {
+        Asked { host, canary: Canary::default() }
+    }
+
+    /// Returns the canary of the questions so far.
+    pub(crate) fn canary(&self) -> Canary {
+        self.canary
+    }
+
+    fn note(&mut self, question: Question) {
+        self.canary.mix(question as u64);
+    }
+
+    fn note_word(&mut self, question: Question, word: u64) {
+        self.note(question);
+        self.canary.mix(word);
+    }
+
+    fn note_bytes(&mut self, question: Question, bytes: &[u8]) {
+        self.note(question);
+        self.canary.mix_bytes(bytes);
+    }
+
+    fn note_call(&mut self, question: Question, name: &str, arguments: &[Datum]) {
+        self.note_bytes(question, name.as_bytes());
+        for argument in arguments {
+            self.canary.mix_bytes(argument.to_string().as_bytes());
+        }
+    }
+}
+
+impl Host for Asked {
+    fn monotonic(&mut self) -> u64 {
+        self.note(Question::Monotonic);
+        self.host.monotonic()
+    }
+
+    fn wall_clock(&mut self) -> i64 {
+        self.note(Question::WallClock);
+        self.host.wall_clock()
+    }
+
+    fn due(&mut self, deadline: u64) -> Option<u64> {
+        self.note_word(Question::Due, deadline);
+        self.host.due(deadline)
+    }
+
+    fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
+        self.note_word(Question::Wait, deadline.unwrap_or(u64::MAX));
+        self.host.wait(deadline, awaited)
+    }
+
+    fn stopwatch(&mut self) -> u64 {
+        // No question of the run's.
+        self.host.stopwatch()
+    }
+
+    fn is_virtual(&self) -> bool {
+        self.host.is_virtual()
+    }
+
+    fn advance(&mut self, nanoseconds: u64) {
+        self.note_word(Question::Advance, nanoseconds);
+        self.host.advance(nanoseconds);
+    }
+
+    fn seed(&mut self) -> u64 {
+        self.note(Question::Seed);
+        self.host.seed()
+    }
+
+    fn arguments(&mut self) -> Vec<String> {
+        self.note(Question::Arguments);
+        self.host.arguments()
+    }
+
+    fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError> {
+        self.note_word(Question::Write, output as u64);
+        self.canary.mix_bytes(bytes);
+        self.host.write(output, bytes)
+    }
+
+    fn read_input(&mut self) -> Input {
+        self.note(Question::ReadInput);
+        self.host.read_input()
+    }
+
+    fn is_interactive(&mut self) -> bool {
+        self.note(Question::IsInteractive);
+        self.host.is_interactive()
+    }
+
+    fn read_file(&mut self, path: &str) -> Result<Vec<u8>, HostError> {
+        self.note_bytes(Question::ReadFile, path.as_bytes());
+        self.host.read_file(path)
+    }
+
+    fn write_file(&mut self, path: &str, bytes: &[u8], mode: WriteMode) -> Result<(), HostError> {
+        self.note_bytes(Question::WriteFile, path.as_bytes());
+        self.canary.mix(mode as u64);
+        self.canary.mix_bytes(bytes);
+        self.host.write_file(path, bytes, mode)
+    }
+
+    fn file_exists(&mut self, path: &str) -> bool {
+        self.note_bytes(Question::FileExists, path.as_bytes());
+        self.host.file_exists(path)
+    }
+
+    fn delete_file(&mut self, path: &str) -> Result<(), HostError> {
+        self.note_bytes(Question::DeleteFile, path.as_bytes());
+        self.host.delete_file(path)
+    }
+
+    fn call(
+        &mut self,
+        name: &str,
+        arguments: &[Datum],
+        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, Failure>,
+    ) -> Result<Datum, Failure> {
+        self.note_call(Question::Call, name, arguments);
+        self.host.call(name, arguments, function)
+    }
+
+    fn begin(&mut self, name: &str, arguments: &[Datum], function: &mut dyn FnMut(&[Datum])) {
+        self.note_call(Question::Begin, name, arguments);
+        self.host.begin(name, arguments, function);
+    }
+
+    fn inbox(&self) -> Inbox {
+        self.host.inbox()
+    }
+
+    fn poll(&mut self, round: u64) -> Vec<Incoming> {
+        self.host.poll(round)
+    }
+
+    fn broken_output_status(&self) -> u8 {
+        self.host.broken_output_status()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::host::VirtualHost;
+
+    #[test]
+    fn questions_and_arguments_count() {
+        let canary = |ask: fn(&mut Asked)| {
+            let mut asked = Asked::new(Box::new(VirtualHost::new()));
+            ask(&mut asked);
+            asked.canary().value()
+        };
+        let found = [
+            canary(|_| {}),
+            canary(|host| _ = host.monotonic()),
+            canary(|host| _ = host.wall_clock()),
+            canary(|host| _ = host.write(Output::Standard, b"a")),
+            canary(|host| _ = host.write(Output::Standard, b"b")),
+            canary(|host| _ = host.write(Output::Error, b"a")),
+            canary(|host| _ = host.write_file("a", b"b", WriteMode::Replace)),
+            canary(|host| _ = host.write_file("a", b"b", WriteMode::Append)),
+            canary(|host| _ = host.file_exists("a")),
+            canary(|host| _ = host.delete_file("a")),
+            canary(|host| host.begin("a", &[], &mut |_| {})),
+            canary(|host| host.begin("b", &[], &mut |_| {})),
+        ];
+        for (i, one) in found.iter().enumerate() {
+            assert!(!found[i + 1..].contains(one), "question {i}");
+        }
+        assert_eq!(canary(|host| _ = host.stopwatch()), canary(|_| {}), "no question of the run's");
+    }
+}

@@ -1,0 +1,148 @@
+//! The inbox of a machine: everything that reaches a run from outside without having been asked for.
+//!
+//! Other threads put things in; the machine looks between two turns, which costs one relaxed load, and takes
+//! out everything at once, in the order of arrival. So a run is a function of its program, its seed, the
+//! answers of its host, and the contents of its inbox by the rounds in which they were taken.
+//!
+//! Guarantees: nothing is lost, and nothing is taken twice. An inbox may outlive its machine; what is put in
+//! then has no effect.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::{News, ProcessSignal};
+
+/// Something that reaches a run from outside.
+#[derive(Clone, Debug)]
+pub enum Incoming {
+    /// The run is to end: every task is aborted, newest first; without a main task, only the one named by
+    /// [`Vm::set_interruptible`](crate::vm::Vm::set_interruptible). An interrupt during the end of a run cuts
+    /// that short.
+    Signal(ProcessSignal),
+    /// The run under way, or the next one, is to come back to the embedder.
+    Stop,
+    /// Standard input has data, or has ended: tasks that wait for it try again.
+    Input,
+    /// News of an operation.
+    Operation {
+        /// Number of the operation.
+        number: u64,
+        /// What is heard of it.
+        news: News,
+    },
+}
+
+#[derive(Default)]
+struct Shared {
+    /// Whether something was put in, or the bell rung, since the contents were taken last.
+    is_rung: AtomicBool,
+    contents: Mutex<Vec<Incoming>>,
+    /// Notified, under the lock of `contents`, when `is_rung` is set.
+    bell: Condvar,
+}
+
+/// The inbox of one machine, shared by those who put things in and the host that takes them out.
+#[derive(Clone, Default)]
+pub struct Inbox(Arc<Shared>);
+
+impl Inbox {
+    /// Creates an empty inbox.
+    pub fn new() -> Inbox {
+        Inbox::default()
+    }
+
+    fn contents(&self) -> MutexGuard<'_, Vec<Incoming>> {
+        // The contents are whole at every moment, so a panic elsewhere does not corrupt them.
+        self.0.contents.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Puts something in, from any thread, and ends the host's wait.
+    pub fn put(&self, incoming: Incoming) {
+        self.contents().push(incoming);
+        self.ring();
+    }
+
+    /// Ends the host's wait, or the next one, and has the machine look.
+    pub fn ring(&self) {
+        let _contents = self.contents();
+        self.0.is_rung.store(true, Ordering::Relaxed);
+        self.0.bell.notify_all();
+    }
+
+    /// Returns whether the machine should look.
+    #[inline]
+    pub fn is_rung(&self) -> bool {
+        self.0.is_rung.load(Ordering::Relaxed)
+    }
+
+    /// Takes everything out.
+    pub fn take(&self) -> Vec<Incoming> {
+        let mut contents = self.contents();
+        self.0.is_rung.store(false, Ordering::Relaxed);
+        std::mem::take(&mut *contents)
+    }
+
+    /// Waits until the machine should look, or until `time` is over. Returns whether it should.
+    pub fn wait(&self, time: Option<Duration>) -> bool {
+        let deadline = time.and_then(|time| Instant::now().checked_add(time));
+        let mut contents = self.contents();
+        while !self.is_rung() {
+            contents = match deadline {
+                None => self.0.bell.wait(contents).unwrap_or_else(PoisonError::into_inner),
+                Some(deadline) => {
+                    let left = deadline.saturating_duration_since(Instant::now());
+                    if left.is_zero() {
+                        return false;
+                    }
+                    let waited = self.0.bell.wait_timeout(contents, left);
+                    waited.unwrap_or_else(PoisonError::into_inner).0
+                }
+            };
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_lost_or_taken_twice_between_threads() {
+        let inbox = Inbox::new();
+        let threads: Vec<_> = (0..4)
+            .map(|_| {
+                let inbox = inbox.clone();
+                std::thread::spawn(move || (0..1000).for_each(|_| inbox.put(Incoming::Input)))
+            })
+            .collect();
+        let mut taken = 0;
+        while taken < 4000 {
+            assert!(inbox.wait(None));
+            taken += inbox.take().len();
+        }
+        threads.into_iter().for_each(|thread| thread.join().expect("it does not panic"));
+        assert!(inbox.take().is_empty() && !inbox.is_rung());
+    }
+
+    #[test]
+    fn contents_are_taken_in_order() {
+        let inbox = Inbox::new();
+        let all =
+            [Incoming::Signal(ProcessSignal::Interrupt), Incoming::Input, Incoming::Stop, Incoming::Input];
+        all.iter().for_each(|incoming| inbox.put(incoming.clone()));
+        assert_eq!(format!("{:?}", inbox.take()), format!("{all:?}"));
+    }
+
+    #[test]
+    fn a_wait_ends_with_a_ring_or_with_its_time() {
+        let inbox = Inbox::new();
+        assert!(!inbox.wait(Some(Duration::from_millis(1))));
+        let other = inbox.clone();
+        let thread = std::thread::spawn(move || other.ring());
+        assert!(inbox.wait(None) && inbox.take().is_empty());
+        assert!(!inbox.is_rung());
+        assert!(thread.join().is_ok());
+    }
+}

@@ -1,0 +1,198 @@
+//! Operations as the outside sees them: what it does for a task, and what becomes of it.
+//!
+//! Guarantees: an operation has one end, however the host's code behaves: it cannot be completed twice, and
+//! one that is dropped without an end has failed. What is said of an operation after the end of its machine
+//! has no effect.
+
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use esl_bytecode::datum::Datum;
+
+use super::{Inbox, Incoming};
+
+/// A failure as it crosses the border between a program and its host, in either direction.
+#[derive(Clone, Debug)]
+pub struct Failure {
+    /// Name of the cause, a keyword: `VALVE-STUCK`. The name of a condition type stands for that type.
+    pub cause: String,
+    /// Arguments of the failure.
+    pub arguments: Vec<Datum>,
+}
+
+/// What is heard of an operation.
+#[derive(Clone, Debug)]
+pub enum News {
+    /// It goes on, and this is how far it is.
+    Progress(Vec<Datum>),
+    /// It has come to its end, with these values.
+    Completed(Vec<Datum>),
+    /// It has failed, or stopped because it was cancelled.
+    Failed(Failure),
+}
+
+/// What happens when the program cancels an operation.
+#[derive(Default)]
+enum OnCancel {
+    /// Nobody has said it yet.
+    #[default]
+    Unknown,
+    /// This function is called.
+    Call(Box<dyn FnOnce() + Send>),
+    /// It has happened.
+    Done,
+}
+
+/// The part of an operation that the machine keeps: it can cancel the operation.
+#[derive(Clone, Default)]
+pub(crate) struct Canceller(Arc<Mutex<OnCancel>>);
+
+impl fmt::Debug for Canceller {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Canceller")
+    }
+}
+
+impl Canceller {
+    fn lock(&self) -> MutexGuard<'_, OnCancel> {
+        // The state is whole at every moment, so a panic elsewhere does not corrupt it.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Tells the outside to stop the operation.
+    pub(crate) fn cancel(&self) {
+        let before = std::mem::replace(&mut *self.lock(), OnCancel::Done);
+        if let OnCancel::Call(function) = before {
+            function();
+        }
+    }
+}
+
+/// Something that the outside does for a task, until it completes or fails.
+///
+/// The task waits until then. Dropping the operation is a failure of the cause `:OPERATION-DROPPED`, or of
+/// the cause `:HOST-PANIC` if a panic has dropped it.
+pub struct Operation {
+    number: u64,
+    arguments: Vec<Datum>,
+    inbox: Inbox,
+    canceller: Canceller,
+    is_over: bool,
+}
+
+impl Operation {
+    /// Begins the operation with this number, of which the inbox will hear.
+    pub(crate) fn new(number: u64, arguments: Vec<Datum>, inbox: Inbox, canceller: Canceller) -> Operation {
+        Operation { number, arguments, inbox, canceller, is_over: false }
+    }
+
+    /// Returns its number, unique in the machine.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Returns the arguments of the call.
+    pub fn arguments(&self) -> &[Datum] {
+        &self.arguments
+    }
+
+    fn tell(&self, news: News) {
+        self.inbox.put(Incoming::Operation { number: self.number, news });
+    }
+
+    /// Ends the operation: these are the values of the call.
+    pub fn complete(mut self, values: Vec<Datum>) {
+        self.is_over = true;
+        self.tell(News::Completed(values));
+    }
+
+    /// Ends the operation: the call fails.
+    pub fn fail(mut self, failure: Failure) {
+        self.is_over = true;
+        self.tell(News::Failed(failure));
+    }
+
+    /// Reports how far the operation is.
+    pub fn report_progress(&self, values: Vec<Datum>) {
+        self.tell(News::Progress(values));
+    }
+
+    /// Has `function` called when the program cancels the operation; at once if it has done so already. The
+    /// machine waits for the function, so it should only pass the message on. The operation is over when it
+    /// is completed, fails or is dropped.
+    pub fn on_cancel(&self, function: impl FnOnce() + Send + 'static) {
+        let mut state = self.canceller.lock();
+        if matches!(*state, OnCancel::Done) {
+            drop(state);
+            return function();
+        }
+        *state = OnCancel::Call(Box::new(function));
+    }
+
+    /// Returns whether the program has cancelled the operation.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(*self.canceller.lock(), OnCancel::Done)
+    }
+}
+
+impl Drop for Operation {
+    fn drop(&mut self) {
+        if !self.is_over {
+            let cause = if std::thread::panicking() { "HOST-PANIC" } else { "OPERATION-DROPPED" };
+            self.tell(News::Failed(Failure { cause: cause.into(), arguments: Vec::new() }));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn begun() -> (Operation, Inbox, Canceller) {
+        let (inbox, canceller) = (Inbox::new(), Canceller::default());
+        (Operation::new(7, Vec::new(), inbox.clone(), canceller.clone()), inbox, canceller)
+    }
+
+    fn heard(inbox: &Inbox) -> String {
+        format!("{:?}", inbox.take())
+    }
+
+    #[test]
+    fn an_operation_has_one_end() {
+        let (operation, inbox, _) = begun();
+        operation.report_progress(Vec::new());
+        operation.complete(Vec::new());
+        let expected =
+            "[Operation { number: 7, news: Progress([]) }, Operation { number: 7, news: Completed([]) }]";
+        assert_eq!(heard(&inbox), expected);
+        let (operation, inbox, _) = begun();
+        drop(operation);
+        assert!(heard(&inbox).contains("OPERATION-DROPPED"));
+    }
+
+    #[test]
+    fn a_panic_is_told_from_a_drop() {
+        let (operation, inbox, _) = begun();
+        let thread = std::thread::spawn(move || {
+            let _operation = operation;
+            panic!("the host's code is wrong");
+        });
+        assert!(thread.join().is_err());
+        assert!(heard(&inbox).contains("HOST-PANIC"));
+    }
+
+    #[test]
+    fn cancelling_calls_once_before_or_after() {
+        let (operation, inbox, canceller) = begun();
+        let other = operation.inbox.clone();
+        operation.on_cancel(move || other.ring());
+        assert!(!operation.is_cancelled());
+        canceller.cancel();
+        canceller.cancel();
+        assert!(operation.is_cancelled() && inbox.is_rung());
+        inbox.take();
+        let other = operation.inbox.clone();
+        operation.on_cancel(move || other.ring());
+        assert!(inbox.is_rung());
+    }
+}

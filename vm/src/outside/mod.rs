@@ -1,0 +1,105 @@
+//! The outside of a machine: its host, the standard streams, the embedder's functions, and the operations
+//! that these have begun.
+
+mod operations;
+
+use std::collections::BTreeMap;
+
+use esl_bytecode::datum::Datum;
+
+use crate::host::{Asked, Canceller, Console, Failure, Host, Inbox, Operation, Output};
+use crate::value::Value;
+pub(crate) use operations::Operations;
+
+/// Code of the embedder's that takes and returns data, and cannot call back.
+pub type DataFunction = Box<dyn FnMut(&[Datum]) -> Result<Datum, Failure> + Send>;
+
+/// A function that the embedder gives to programs.
+pub enum HostFunction {
+    /// It returns at once.
+    AtOnce(DataFunction),
+    /// It begins an operation.
+    Operation(Box<dyn FnMut(Operation) + Send>),
+}
+
+/// Everything through which a machine reaches the outside.
+pub(crate) struct Outside {
+    /// Clocks, files and streams.
+    pub(crate) host: Asked,
+    /// The host's inbox.
+    pub(crate) inbox: Inbox,
+    /// The standard streams, buffered.
+    pub(crate) console: Console,
+    /// The embedder's functions, by name.
+    pub(crate) functions: BTreeMap<String, HostFunction>,
+    /// Answer of one of them, while there is no room for it in the heap.
+    pub(crate) answer: Option<Result<Datum, Failure>>,
+    /// The operations under way.
+    pub(crate) operations: Operations,
+    /// Stream that reports are written to.
+    pub(crate) complaints: Output,
+    /// Status that the program has asked to end with.
+    pub(crate) exit_status: Option<u8>,
+}
+
+impl Outside {
+    /// Creates the outside that `host` stands for.
+    pub(crate) fn new(host: Box<dyn Host + Send>) -> Outside {
+        Outside {
+            inbox: host.inbox(),
+            host: Asked::new(host),
+            console: Console::default(),
+            functions: BTreeMap::new(),
+            answer: None,
+            operations: Operations::default(),
+            complaints: Output::Error,
+            exit_status: None,
+        }
+    }
+
+    /// Calls a function of the embedder's that returns at once; `None` if there is none of this name.
+    pub(crate) fn call(&mut self, name: &str, arguments: &[Datum]) -> Option<Result<Datum, Failure>> {
+        match self.functions.get_mut(name)? {
+            HostFunction::AtOnce(function) => Some(self.host.call(name, arguments, function)),
+            HostFunction::Operation(_) => None,
+        }
+    }
+
+    /// Returns whether the embedder has an operation of this name.
+    pub(crate) fn has_operation(&self, name: &str) -> bool {
+        matches!(self.functions.get(name), Some(HostFunction::Operation(_)))
+    }
+
+    /// Begins an operation of the embedder's.
+    pub(crate) fn begin_operation(
+        &mut self,
+        name: &str,
+        arguments: &[Datum],
+        handle: Value,
+        is_detached: bool,
+    ) {
+        let Some(HostFunction::Operation(function)) = self.functions.get_mut(name) else { return };
+        let canceller = Canceller::default();
+        self.operations.begin(handle, canceller.clone(), is_detached);
+        let number = self.operations.begun;
+        self.host.begin(name, arguments, &mut |arguments| {
+            function(Operation::new(number, arguments.to_vec(), self.inbox.clone(), canceller.clone()));
+        });
+    }
+
+    /// Writes what programs have printed and is still in a buffer.
+    pub(crate) fn flush(&mut self) {
+        self.console.flush(&mut self.host);
+    }
+
+    /// Writes a report, on lines of its own.
+    pub(crate) fn complain(&mut self, text: &str) {
+        let mut characters: Vec<u32> = text.chars().map(u32::from).collect();
+        if self.console.column(self.complaints) > 0 {
+            characters.insert(0, u32::from('\n'));
+        }
+        self.flush();
+        self.console.write(&mut self.host, self.complaints, &characters);
+        self.flush();
+    }
+}

@@ -1,0 +1,76 @@
+//! The operations under way, as the machine knows them.
+
+use std::collections::BTreeMap;
+
+use crate::host::Canceller;
+use crate::value::Value;
+
+/// An operation under way.
+#[derive(Clone, Debug)]
+pub(crate) struct Open {
+    /// Its handle, which is an event.
+    pub(crate) handle: Value,
+    /// What cancels it.
+    pub(crate) canceller: Canceller,
+    /// Whether the program has cancelled it.
+    pub(crate) is_cancelled: bool,
+    /// Whether nobody waits until it has stopped.
+    pub(crate) is_detached: bool,
+}
+
+/// The operations under way, by number.
+#[derive(Default)]
+pub(crate) struct Operations {
+    pub(crate) open: BTreeMap<u64, Open>,
+    /// Number of operations begun so far.
+    pub(crate) begun: u64,
+}
+
+impl Operations {
+    /// Returns whether none is under way.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.open.is_empty()
+    }
+
+    /// Returns the number of the operation that begins next.
+    pub(crate) fn next_number(&self) -> u64 {
+        self.begun + 1
+    }
+
+    /// Counts an operation that a task performs in place of the outside, and returns its number.
+    pub(crate) fn count(&mut self) -> u64 {
+        self.begun += 1;
+        self.begun
+    }
+
+    /// Adds the next operation.
+    pub(crate) fn begin(&mut self, handle: Value, canceller: Canceller, is_detached: bool) {
+        self.begun += 1;
+        self.open.insert(self.begun, Open { handle, canceller, is_cancelled: false, is_detached });
+    }
+
+    /// Cancels an operation, once. The outside says when it has stopped.
+    pub(crate) fn cancel(&mut self, number: u64) {
+        if let Some(open) = self.open.get_mut(&number)
+            && !std::mem::replace(&mut open.is_cancelled, true)
+        {
+            open.canceller.cancel();
+        }
+    }
+
+    /// Cancels all that are under way.
+    pub(crate) fn cancel_all(&mut self) {
+        let numbers: Vec<u64> = self.open.keys().copied().collect();
+        numbers.into_iter().for_each(|number| self.cancel(number));
+    }
+
+    /// Returns whether one is under way that is waited for.
+    pub(crate) fn are_awaited(&self) -> bool {
+        self.open.values().any(|open| !open.is_detached)
+    }
+
+    /// Calls `visit` with the handles of all that are under way.
+    pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
+        self.open.values().for_each(|open| visit(open.handle));
+    }
+}

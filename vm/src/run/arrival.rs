@@ -1,0 +1,52 @@
+//! Taking in what has come into the machine's inbox, between two turns.
+
+use super::operation::hear;
+use super::wake::make_runnable;
+use crate::host::{Host, Incoming, ProcessSignal};
+use crate::task::TaskState;
+use crate::vm::Vm;
+
+/// Takes in the contents of the inbox, in the order in which they came. Returns whether the run is to come
+/// back to the embedder.
+#[cold]
+pub(crate) fn take_in(vm: &mut Vm) -> bool {
+    let mut stops = false;
+    for incoming in vm.outside.host.poll(vm.scheduler.rounds) {
+        match incoming {
+            Incoming::Signal(signal) => stops |= end_by_signal(vm, signal),
+            Incoming::Stop => stops = true,
+            Incoming::Input => wake_readers(vm),
+            Incoming::Operation { number, news } => hear(vm, number, news),
+        }
+    }
+    stops
+}
+
+/// Ends the run because of a signal, or the task that was named; a signal that no task is named for waits for
+/// the next one. Returns whether the signal cuts the end of the run short.
+fn end_by_signal(vm: &mut Vm, signal: ProcessSignal) -> bool {
+    let embedder = &mut vm.embedder;
+    if embedder.is_ending {
+        let cuts = signal == ProcessSignal::Interrupt;
+        embedder.is_cut_short |= cuts;
+        return cuts;
+    }
+    match embedder.interruptible {
+        None => embedder.signal_waits = Some(signal),
+        Some(id) => {
+            embedder.ended_by = Some(signal);
+            embedder.is_ending = vm.scheduler.main.is_some();
+            if vm.embedder.is_ending { vm.abort_all() } else { vm.abort(id) }
+        }
+    }
+    false
+}
+
+/// Has the tasks that wait for standard input try again.
+pub(super) fn wake_readers(vm: &mut Vm) {
+    for id in std::mem::take(&mut vm.scheduler.readers) {
+        if vm.scheduler.tasks.get(id).is_some_and(|task| task.state == TaskState::Reading) {
+            make_runnable(vm, id.index, false);
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! News of operations, from the inbox to their handles.
+
+use super::finish::allocate_without_retry;
+use crate::datum;
+use crate::host::News;
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::wait::operation;
+use esl_bytecode::datum::Datum;
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+
+/// Takes in what is heard of an operation: notes it in the handle, and signals that. What is heard of one
+/// that is over has no effect.
+pub(super) fn hear(vm: &mut Vm, number: u64, news: News) {
+    let Some(open) = vm.outside.operations.open.get(&number) else { return };
+    let (handle, is_cancelled) = (open.handle, open.is_cancelled);
+    let known = vm.world.known;
+    let (state, items) = match news {
+        News::Progress(values) => {
+            let values = import_list(vm, &values).unwrap_or(Value::NIL);
+            vm.heap.slot_set(handle, operation::PROGRESS, values);
+            return signal(vm, handle);
+        }
+        _ if is_cancelled => (known.cancelled, Vec::new()),
+        News::Completed(values) => (known.completed, values),
+        News::Failed(failure) => {
+            let cause = Datum::symbol(Symbol::keyword(&failure.cause), Span::default());
+            (known.failed, [vec![cause], failure.arguments].concat())
+        }
+    };
+    let (state, result) = match import_list(vm, &items) {
+        Some(list) => (state, list),
+        None => {
+            let cause = known.heap_exhausted;
+            (known.failed, allocate_without_retry(vm, |vm| Ok(vm.heap.list(&[cause])?)))
+        }
+    };
+    vm.heap.slot_set(handle, operation::RESULT, result);
+    vm.heap.slot_set(handle, operation::STATE, state);
+    signal(vm, handle);
+    vm.outside.operations.open.remove(&number);
+}
+
+/// Returns data as a list of the heap; `None` if there is no room for it.
+fn import_list(vm: &mut Vm, items: &[Datum]) -> Option<Value> {
+    let list = Datum::list(items.iter().cloned(), Span::default());
+    // A cons around it tells the empty list from a lack of room.
+    let cell = allocate_without_retry(vm, |vm| {
+        let (list, _) = datum::import(&mut vm.heap, &mut vm.world, &list)?;
+        Ok(vm.heap.cons(list, Value::NIL)?)
+    });
+    vm.heap.as_cons(cell).map(|cell| cell.car)
+}
+
+/// Signals the handle of an operation under way.
+fn signal(vm: &mut Vm, handle: Value) {
+    allocate_without_retry(vm, |vm| vm.signal_event(handle, &[]).map(|()| Value::NIL));
+}

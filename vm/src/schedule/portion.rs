@@ -1,0 +1,28 @@
+//! Portions of a run: the embedder may give a run its ticks in portions, which changes nothing in the run.
+//!
+//! So the end of a portion ends no turn. What is known of the slice that it falls into is kept, and the next
+//! portion begins with the rest of that slice. Until then nothing that a program can see has been counted.
+
+use crate::task::{AccountId, TaskId};
+
+/// A slice of which ticks are left.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OpenSlice {
+    /// Ticks left of it.
+    pub(crate) left: u64,
+    /// Ticks used of it, which its task was not charged yet.
+    pub(crate) used: u64,
+    /// Account that its ticks will be charged to.
+    pub(crate) account: AccountId,
+    /// Number of the collector's turns in it.
+    pub(crate) collections: u32,
+}
+
+/// A turn into which the end of a portion has fallen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OpenTurn {
+    /// Task whose turn it is.
+    pub(crate) task: TaskId,
+    /// Slice under way; `None` if the turn goes on with another slice.
+    pub(crate) slice: Option<OpenSlice>,
+}
