@@ -153,6 +153,95 @@ impl Data {
     }
 }
 
+/// A type of Rust that arguments of functions of the embedder's can have.
+pub trait FromData: Sized {
+    /// Name of the type in `COMMON-LISP`, for failures.
+    const TYPE: &'static str;
+
+    /// Returns the value that data stand for; `None` if they are of another type.
+    fn from_data(data: &Data) -> Option<Self>;
+}
+
+/// Defines conversions for a type: its name in ESL, from data, and to data.
+macro_rules! convert {
+    ($( $ty:ty, $name:literal, |$data:ident| $from:expr, |$value:ident| $to:expr ; )*) => {
+        $(
+            impl FromData for $ty {
+                const TYPE: &'static str = $name;
+
+                fn from_data($data: &Data) -> Option<$ty> {
+                    $from
+                }
+            }
+
+            impl From<$ty> for Data {
+                fn from($value: $ty) -> Data {
+                    $to
+                }
+            }
+        )*
+    };
+}
+
+convert! {
+    i64, "INTEGER", |data| data.as_integer(), |value| Data::Integer(value);
+    i32, "INTEGER", |data| data.as_integer()?.try_into().ok(), |value| Data::Integer(value.into());
+    u32, "UNSIGNED-BYTE", |data| data.as_integer()?.try_into().ok(), |value| Data::Integer(value.into());
+    f64, "REAL", |data| data.as_float(), |value| Data::Float(value);
+    bool, "T", |data| Some(data.is_true()), |value| Data::boolean(value);
+    String, "STRING", |data| data.as_str().map(str::to_owned), |value| Data::String(value);
+    (), "NULL", |data| (!data.is_true()).then_some(()), |_value| Data::Nil;
+}
+
+impl FromData for Data {
+    const TYPE: &'static str = "T";
+
+    fn from_data(data: &Data) -> Option<Data> {
+        Some(data.clone())
+    }
+}
+
+/// `NIL` is `None`, so an optional argument needs no value to stand for its absence.
+impl<T: FromData> FromData for Option<T> {
+    const TYPE: &'static str = T::TYPE;
+
+    fn from_data(data: &Data) -> Option<Option<T>> {
+        if data.is_true() { T::from_data(data).map(Some) } else { Some(None) }
+    }
+}
+
+/// A list or a vector.
+impl<T: FromData> FromData for Vec<T> {
+    const TYPE: &'static str = "SEQUENCE";
+
+    fn from_data(data: &Data) -> Option<Vec<T>> {
+        let items = match data {
+            Data::Vector(items) => items,
+            list => list.as_list()?,
+        };
+        items.iter().map(T::from_data).collect()
+    }
+}
+
+impl From<&str> for Data {
+    fn from(value: &str) -> Data {
+        Data::String(value.to_owned())
+    }
+}
+
+impl<T: Into<Data>> From<Vec<T>> for Data {
+    /// Returns a list.
+    fn from(items: Vec<T>) -> Data {
+        Data::list(items.into_iter().map(Into::into))
+    }
+}
+
+impl<T: Into<Data>> From<Option<T>> for Data {
+    fn from(value: Option<T>) -> Data {
+        value.map_or(Data::Nil, Into::into)
+    }
+}
+
 impl fmt::Display for Data {
     /// Writes the value as the program would print it with `prin1`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -42,8 +42,7 @@ pub enum Error {
         /// Message, frames of the failure and what they were recovering from, as the commands print them.
         report: String,
     },
-    /// The evaluation was aborted: by the program, or through
-    /// [`Vm::interrupt_flag`](esl_vm::vm::Vm::interrupt_flag).
+    /// The evaluation was aborted: by the program, or by a [`ProcessSignal`](crate::host::ProcessSignal).
     Aborted,
     /// The evaluation waits for an event that no task can signal.
     Deadlocked,
@@ -51,7 +50,7 @@ pub enum Error {
     BudgetSpent,
     /// The evaluation did not end within this number of ticks, and was ended.
     TicksUsed(u64),
-    /// The run was stopped through [`Vm::stop_flag`](esl_vm::vm::Vm::stop_flag).
+    /// The run was stopped by [`Incoming::Stop`](crate::host::Incoming).
     Stopped,
     /// [`Config::memory`](crate::Config::memory) leaves no room. Holds what it leaves no room for.
     NoMemory(&'static str),
@@ -59,7 +58,7 @@ pub enum Error {
     Refused(LoadError),
     /// The value cannot become [`Data`](crate::Data).
     NotData(ExportError),
-    /// The name cannot be that of a function or parameter.
+    /// The name cannot be that of a function.
     InvalidName(String),
 }
 
@@ -88,10 +87,9 @@ impl fmt::Display for Error {
             }
             Error::Refused(error) => error.fmt(f),
             Error::NotData(error) => error.fmt(f),
-            Error::InvalidName(name) => write!(
-                f,
-                "`{name}` is not the name of a function or parameter: use letters, digits and {NAME_MARKS}"
-            ),
+            Error::InvalidName(name) => {
+                write!(f, "`{name}` is not the name of a function: use letters, digits and {NAME_MARKS}")
+            }
         }
     }
 }

@@ -7,12 +7,12 @@
 //! they depend on.
 //!
 //! ```
-//! use esl::{Data, Engine};
+//! use esl::Engine;
 //!
 //! let mut engine = Engine::new()?;
-//! engine.register("READ-SENSOR", &["NUMBER"], "The temperature at a sensor, in degrees.", |arguments| {
-//!     let number = arguments[0].as_integer().ok_or("the sensor's number must be an integer")?;
-//!     Ok(Data::Float(20.0 + 0.5 * number as f64))
+//! engine.define("READ-SENSOR", "(number)", "The temperature at a sensor, in degrees.", |call| {
+//!     let number: i64 = call.get("number")?;
+//!     Ok(20.0 + 0.5 * number as f64)
 //! })?;
 //! engine.eval("(defun warm-p (sensor) (> (read-sensor sensor) 21))")?;
 //! let warm = engine.eval("(loop for sensor from 0 to 5 when (warm-p sensor) collect sensor)")?;
@@ -20,6 +20,11 @@
 //! # Ok::<(), esl::Error>(())
 //! ```
 #![forbid(unsafe_code)]
+
+/// The examples of the manual's chapter on embedding, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/manual/embedding.md")]
+struct Embedding;
 
 pub mod command;
 pub mod data;

@@ -69,6 +69,9 @@ fn declared_types(folder: PathBuf) -> BTreeSet<String> {
                     });
                     types.extend(names.map(String::from));
                 }
+                // A macro declares the types of operands, each in a row with its role.
+                let rows = text.lines().filter(|line| line.contains(", Role::"));
+                types.extend(rows.filter_map(|line| Some(line.trim().split_once('(')?.0.to_string())));
             }
         }
     }

@@ -35,7 +35,7 @@ impl fmt::Display for AssembleError {
 
 impl std::error::Error for AssembleError {}
 
-/// The code that `text` describes.
+/// Returns the code that `text` describes.
 ///
 /// # Errors
 /// [`AssembleError`] for the first line that cannot be understood.
@@ -90,7 +90,7 @@ struct Operands<'a> {
 }
 
 impl Operands<'_> {
-    /// The next operand, of the type that is called `kind`.
+    /// Returns the next operand, of the type that is called `kind`.
     fn take<T: Operand>(&mut self, kind: &str) -> Result<T, String> {
         if kind == "Pad" {
             return Ok(T::from_bits(0));

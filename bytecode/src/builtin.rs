@@ -21,7 +21,7 @@ use rustc_hash::FxHashMap;
 use crate::compile::Arity;
 use crate::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol};
 
-/// Who a builtin's name is for.
+/// Package and visibility of a builtin's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Visibility {
     /// A name of the package `COMMON-LISP`.
@@ -37,7 +37,7 @@ pub enum Visibility {
 pub struct BuiltinInfo {
     /// The builtin.
     pub builtin: Builtin,
-    /// Who its name is for.
+    /// Package and visibility of its name.
     pub visibility: Visibility,
     /// Its name.
     pub name: &'static str,
@@ -148,7 +148,7 @@ macro_rules! define_builtins {
 }
 
 impl Builtin {
-    /// The builtin with this number, unless there is none.
+    /// Returns the builtin with this number, unless there is none.
     pub fn from_number(number: u32) -> Option<Builtin> {
         BUILTINS.get(number as usize).map(|info| info.builtin)
     }
@@ -935,8 +935,31 @@ macro_rules! for_each_builtin {
             /// The innermost `limit` frames, each a list of the function's name, and source, line and column
             /// if known. A function that has no name is `(lambda)`, a form at top level `NIL`.
             Backtrace = failure::backtrace, internal "%BACKTRACE" ("limit");
-            /// Calls the embedder's function with this number.
-            CallHost = outside::call_host, internal "%CALL-HOST" ("number &rest arguments");
+            /// Calls the embedder's function of this name, a symbol, with a list of arguments.
+            CallHost = outside::call_host, internal "%CALL-HOST" ("name arguments");
+            /// Begins the embedder's operation of this name, a symbol, with a list of arguments; its handle.
+            /// Nobody waits until a detached one has stopped.
+            BeginOperation = operation::begin_operation, internal "%BEGIN-OPERATION" ("name arguments detached");
+            /// Tells the outside to stop an operation, once.
+            CancelOperation = operation::cancel_operation, internal "%CANCEL-OPERATION" ("handle");
+            /// What has become of an operation: a keyword, and the list of its values or of the cause and the
+            /// arguments of its failure.
+            OperationState = operation::operation_state, internal "%OPERATION-STATE" ("handle");
+            /// The values of the latest report of an operation on its progress, a list.
+            OperationProgress = operation::operation_progress, internal "%OPERATION-PROGRESS" ("handle");
+            /// The number of an operation.
+            OperationNumber = operation::operation_number, internal "%OPERATION-NUMBER" ("handle");
+            /// The handle of an operation that a task performs in place of the outside.
+            MakeOperation = operation::make_operation, internal "%MAKE-OPERATION" ("name");
+            /// Ends such an operation, if it is under way: a keyword, and the list that goes with it.
+            EndOperation = operation::end_operation, internal "%END-OPERATION" ("handle state result");
+            /// The task that performs an operation, or `NIL` if the outside does.
+            OperationPerformer = operation::operation_performer, internal "%OPERATION-PERFORMER" ("handle");
+            /// Sets the task that performs an operation.
+            SetOperationPerformer = operation::set_operation_performer, internal "%SET-OPERATION-PERFORMER"
+                ("handle task");
+            /// Whether an object is the handle of an operation.
+            Operationp = operation::operationp, internal "%OPERATIONP" ("object");
 
             // ---- symbols
             /// The name of a symbol, a string that is not to be changed.
@@ -1018,6 +1041,9 @@ macro_rules! for_each_builtin {
             Export = package::export, cl "EXPORT" ("symbols &optional package");
             /// Makes `symbols`, a symbol or a list of symbols, present in `package`.
             Import = package::import, cl "IMPORT" ("symbols &optional package");
+            /// Makes `symbols`, a symbol or a list of symbols, present in `package`, in place of others of
+            /// their names.
+            ShadowingImport = package::shadowing_import, cl "SHADOWING-IMPORT" ("symbols &optional package");
             /// Gives `package` symbols of its own by these names.
             Shadow = package::shadow, cl "SHADOW" ("names &optional package");
             /// The symbol that `name` denotes in `package`, made if there is none; and how the package has
@@ -1028,6 +1054,8 @@ macro_rules! for_each_builtin {
             FindSymbol = package::find_symbol, cl "FIND-SYMBOL" ("name &optional package");
             /// All external symbols of a package, by name.
             ExternalSymbols = package::external_symbols, internal "%EXTERNAL-SYMBOLS" ("package");
+            /// All symbols that are accessible in a package, by name.
+            AccessibleSymbols = package::accessible_symbols, internal "%ACCESSIBLE-SYMBOLS" ("package");
             /// What is written before the name of a symbol in the current package: a string such as `:`, or
             /// `NIL`.
             SymbolQualifier = package::symbol_qualifier, internal "%SYMBOL-QUALIFIER" ("symbol");
@@ -1234,6 +1262,8 @@ macro_rules! for_each_builtin {
             Now = outside::now, esl "NOW" ("");
             /// Microseconds on the machine's clock, which never goes back.
             InternalRealTime = outside::internal_real_time, cl "GET-INTERNAL-REAL-TIME" ("");
+            /// Microseconds on the machine's clock in which some task could run.
+            InternalRunTime = outside::internal_run_time, cl "GET-INTERNAL-RUN-TIME" ("");
             /// Seconds since the beginning of 1900, UTC.
             UniversalTime = outside::universal_time, cl "GET-UNIVERSAL-TIME" ("");
 
@@ -1289,9 +1319,9 @@ macro_rules! for_each_builtin {
             /// New tasks, one for each function and name, that begin together: a net, and the tasks. They
             /// have the priority of this task. `what` is for reports.
             SpawnNet = net::spawn_net, internal "%SPAWN-NET" ("what names &rest functions");
-            /// Waits until a task of a net has ended with `status`, and returns the first that has; or until
-            /// all have ended, and returns `NIL`.
-            AwaitNet = net::await_net, internal "%AWAIT-NET" ("net status");
+            /// Waits until a task of a net has ended with one of `statuses`, and returns the first that has;
+            /// or until all have ended, and returns `NIL`.
+            AwaitNet = net::await_net, internal "%AWAIT-NET" ("net statuses");
             /// Ends the tasks of a net that are left, and waits for that. The net may be `NIL`.
             EndNet = net::end_net, internal "%END-NET" ("net") slowly "%SLOW-END-NET";
             /// The task that runs.
@@ -1324,6 +1354,11 @@ macro_rules! for_each_builtin {
             AddCheckpoint = task::add_checkpoint, internal "%ADD-CHECKPOINT" ("id");
             /// The checkpoints that a task has passed, newest first.
             Checkpoints = task::checkpoints, internal "%CHECKPOINTS" ("task");
+            /// What the running task holds: the list that `%SET-HELD` has noted last.
+            Held = task::held, internal "%HELD" ("");
+            /// Notes a list of what the running task holds. At its end, before others are told of that, the
+            /// task calls `%RELEASE-HELD` as long as the list is not empty.
+            SetHeld = task::set_held, internal "%SET-HELD" ("list");
             /// What lets the end of another task interrupt this one with a call of `function`.
             MakeGuard = task::make_guard, internal "%MAKE-GUARD" ("function");
             /// Has a guard interrupt its task, again if it has done so before.
@@ -1333,6 +1368,8 @@ macro_rules! for_each_builtin {
             /// Makes the innermost catch, for `tag`, a limit: when it expires, its form is ended and gives
             /// the cause.
             OpenLimit = task::open_limit, internal "%OPEN-LIMIT" ("tag seconds ticks");
+            /// Makes the limit for `tag` of `task` expire with `cause`, a keyword, unless it is closed.
+            ExpireLimit = task::expire_limit, internal "%EXPIRE-LIMIT" ("task tag cause");
             /// Begins a critical section: no other task runs.
             BeginCritical = task::begin_critical, internal "%BEGIN-CRITICAL" ("");
             /// Ends a critical section.

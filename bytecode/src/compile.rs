@@ -91,16 +91,20 @@ pub trait Environment {
     fn global(&self, symbol: &Symbol) -> Global;
     /// What is known of the function `(setf symbol)`.
     fn setf_function(&self, symbol: &Symbol) -> GlobalFunction;
-    /// The data that the library recorded about `symbol` under `indicator`, such as the expander of a
+    /// Returns the data that the library recorded about `symbol` under `indicator`, such as the expander of a
     /// `defsetf`.
     fn property(&self, symbol: &Symbol, indicator: &Symbol) -> Option<Datum>;
-    /// The symbol that `name` denotes when read in the current package (`package` is `None`), or after
-    /// `package:` or, if `internal`, `package::`.
+    /// Returns the symbol that `name` denotes when read in the current package (`package` is `None`), or
+    /// after `package:` or, if `internal`, `package::`.
     ///
     /// # Errors
     /// [`InternError`] if there is no such package or no such external symbol.
     fn intern(&mut self, package: Option<&str>, name: &str, internal: bool) -> Result<Symbol, InternError>;
-    /// A number for a fresh uninterned symbol of this compilation unit.
+    /// Returns the radix, from 2 to 36, in which integers and ratios are read that say nothing of theirs.
+    fn read_base(&self) -> u32 {
+        10
+    }
+    /// Returns a number for a fresh uninterned symbol of this compilation unit.
     fn fresh(&mut self) -> u32;
     /// Names like `symbol` that are defined as a function or, if `variable`, as a variable; the likeliest
     /// first.

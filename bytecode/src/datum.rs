@@ -59,37 +59,37 @@ struct Node {
 pub struct Datum(Arc<Node>);
 
 impl Datum {
-    /// A datum of the given kind.
+    /// Returns a datum of the given kind.
     pub fn new(kind: DatumKind, span: Span) -> Datum {
         Datum(Arc::new(Node { kind, span }))
     }
 
-    /// The empty list.
+    /// Returns the empty list.
     pub fn nil(span: Span) -> Datum {
         Datum::new(DatumKind::Nil, span)
     }
 
-    /// A symbol; `COMMON-LISP:NIL` becomes the empty list.
+    /// Returns a symbol; `COMMON-LISP:NIL` becomes the empty list.
     pub fn symbol(symbol: Symbol, span: Span) -> Datum {
         if symbol.is_cl("NIL") { Datum::nil(span) } else { Datum::new(DatumKind::Symbol(symbol), span) }
     }
 
-    /// An integer.
+    /// Returns an integer.
     pub fn integer(value: impl Into<BigInt>, span: Span) -> Datum {
         Datum::new(DatumKind::Integer(value.into()), span)
     }
 
-    /// A string.
+    /// Returns a string.
     pub fn string(value: &str, span: Span) -> Datum {
         Datum::new(DatumKind::String(value.into()), span)
     }
 
-    /// A pair.
+    /// Returns a pair.
     pub fn cons(car: Datum, cdr: Datum, span: Span) -> Datum {
         Datum::new(DatumKind::Cons(car, cdr), span)
     }
 
-    /// A proper list of `items`.
+    /// Returns a proper list of `items`.
     pub fn list<I>(items: I, span: Span) -> Datum
     where
         I: IntoIterator<Item = Datum>,
@@ -98,7 +98,7 @@ impl Datum {
         Datum::list_with_tail(items, Datum::nil(span), span)
     }
 
-    /// A list of `items` that ends in `tail`.
+    /// Returns a list of `items` that ends in `tail`.
     pub fn list_with_tail<I>(items: I, tail: Datum, span: Span) -> Datum
     where
         I: IntoIterator<Item = Datum>,
@@ -117,22 +117,22 @@ impl Datum {
         self.0.span
     }
 
-    /// Whether both are the same node.
+    /// Returns whether both are the same node.
     pub fn is_same(&self, other: &Datum) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
 
-    /// An address that tells nodes apart for as long as they are alive.
+    /// Returns an address that tells nodes apart for as long as they are alive.
     pub fn identity(&self) -> usize {
         Arc::as_ptr(&self.0).addr()
     }
 
-    /// Whether this is `NIL`.
+    /// Returns whether this is `NIL`.
     pub fn is_nil(&self) -> bool {
         matches!(self.kind(), DatumKind::Nil)
     }
 
-    /// The symbol that this is, `NIL` apart.
+    /// Returns the symbol that this is, `NIL` apart.
     pub fn as_symbol(&self) -> Option<&Symbol> {
         match self.kind() {
             DatumKind::Symbol(symbol) => Some(symbol),
@@ -140,7 +140,7 @@ impl Datum {
         }
     }
 
-    /// The halves of a pair.
+    /// Returns the halves of a pair.
     pub fn as_cons(&self) -> Option<(&Datum, &Datum)> {
         match self.kind() {
             DatumKind::Cons(car, cdr) => Some((car, cdr)),
@@ -148,13 +148,13 @@ impl Datum {
         }
     }
 
-    /// The elements of a list, in order. Stops at the first tail that is no pair; [`Elements::tail`] gives
-    /// it.
+    /// Returns the elements of a list, in order. Stops at the first tail that is no pair; [`Elements::tail`]
+    /// gives it.
     pub fn elements(&self) -> Elements<'_> {
         Elements { rest: self }
     }
 
-    /// The elements of a proper list; `None` if this is not one.
+    /// Returns the elements of a proper list; `None` if this is not one.
     pub fn as_list(&self) -> Option<Vec<&Datum>> {
         let mut elements = self.elements();
         let items: Vec<&Datum> = elements.by_ref().collect();
@@ -223,8 +223,8 @@ impl fmt::Debug for Datum {
 }
 
 impl fmt::Display for Datum {
-    /// The datum as it could be read again, as far as that goes; deep and long parts are cut off with `#` and
-    /// `...`.
+    /// Returns the datum as it could be read again, as far as that goes; deep and long parts are cut off with
+    /// `#` and `...`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         display(self, f, 0)
     }

@@ -13,7 +13,7 @@ use num_bigint::BigInt;
 use crate::module::{Constant, Function, FunctionNumber, LineEntry, Module, PoolIdx};
 use crate::symbol::{Home, Symbol};
 
-/// The module that does what `modules` do one after the other.
+/// Returns the module that does what `modules` do one after the other.
 ///
 /// Verified modules give a verified module.
 pub fn link(modules: impl IntoIterator<Item = Module>) -> Module {
@@ -91,7 +91,8 @@ struct Places {
 }
 
 impl Places {
-    /// The new index of a constant. An index that the module does not have stays one that no module has.
+    /// Returns the new index of a constant. An index that the module does not have stays one that no module
+    /// has.
     fn constant(&self, PoolIdx(index): PoolIdx) -> PoolIdx {
         self.constants.get(index as usize).copied().unwrap_or(PoolIdx(u32::MAX))
     }

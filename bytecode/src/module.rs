@@ -73,12 +73,12 @@ pub struct Capture {
 }
 
 impl Capture {
-    /// A capture of a value.
+    /// Returns a capture of a value.
     pub fn value(source: CaptureSource) -> Capture {
         Capture { source, boxed: false }
     }
 
-    /// A capture of a box.
+    /// Returns a capture of a box.
     pub fn boxed(source: CaptureSource) -> Capture {
         Capture { source, boxed: true }
     }
@@ -107,7 +107,7 @@ impl Parameters {
         Parameters { required, ..Parameters::default() }
     }
 
-    /// Whether the function takes just the required arguments.
+    /// Returns whether the function takes just the required arguments.
     pub fn is_exact(&self) -> bool {
         self.optional == 0 && !self.rest && self.keys.is_none()
     }

@@ -48,7 +48,7 @@ macro_rules! for_each_opcode {
             /// `R[dst] := K[constant]`
             LoadConst = 0x03, "load-const", silent { dst: Dst, constant: ConstIdx };
             /// `R[first], … R[first+count-1] := NIL`
-            LoadNil = 0x04, "load-nil", silent { first: Base, count: Count };
+            LoadNil = 0x04, "load-nil", silent { first: Room, count: Count };
             /// `R[dst] := T`
             LoadTrue = 0x05, "load-true", silent { dst: Dst };
 
@@ -187,7 +187,7 @@ macro_rules! for_each_opcode {
             /// The cdr of the pair `R[pair]` becomes `R[value]`.
             SetCdr = 0x4E, "set-cdr", effect SetCdr { pair: Reg, value: Reg };
             /// `R[dst]` := a fresh list of `R[first], … R[first+count-1]`
-            List = 0x4F, "list", value { dst: Dst, first: Base, count: Count };
+            List = 0x4F, "list", value { dst: Dst, first: Items, count: Count };
 
             // ---- vectors and structures
             /// `R[dst] := (svref R[vector] R[index])`
@@ -245,39 +245,39 @@ macro_rules! for_each_opcode {
 
             // ---- calls: a window is the callee (or room for it), a link word, then the arguments
             /// Calls the function (or function named by the symbol) `R[window]` with `R[window+2] …`.
-            Call = 0x68, "call", call Given { window: Base, count: Count, want: Want, pad: Pad };
+            Call = 0x68, "call", call Given { window: Window, count: Count, want: Want, pad: Pad };
             /// Calls the global function `K[symbol]` with `R[window+2] …`.
             CallGlobal = 0x69, "call-global", call Global
-                { window: Base, count: Count, want: Want, symbol: WideSymbolIdx };
+                { window: Window, count: Count, want: Want, symbol: WideSymbolIdx };
             /// Calls the running function, with the number of arguments that it takes exactly.
-            CallSelf = 0x6A, "call-self", call Running { window: Base, count: Count, want: Want, pad: Pad };
+            CallSelf = 0x6A, "call-self", call Running { window: Window, count: Count, want: Want, pad: Pad };
             /// Calls a builtin with `R[window+2] …`.
             CallBuiltin = 0x6B, "call-builtin", call Builtin
-                { window: Base, count: Count, want: Want, builtin: BuiltinIdx };
+                { window: Window, count: Count, want: Want, builtin: BuiltinIdx };
             /// Calls `R[window]` with `R[window+2] …`, the last argument a list of further arguments.
-            Apply = 0x6C, "apply", call Applied { window: Base, count: Count, want: Want, pad: Pad };
+            Apply = 0x6C, "apply", call Applied { window: Window, count: Count, want: Want, pad: Pad };
             /// As `apply`, in place of the running function.
-            TailApply = 0x70, "tail-apply", tail Applied { window: Base, count: Count, pad: Pad };
+            TailApply = 0x70, "tail-apply", tail Applied { window: Window, count: Count, pad: Pad };
             /// As `call`, in place of the running function.
-            TailCall = 0x6D, "tail-call", tail Given { window: Base, count: Count, pad: Pad };
+            TailCall = 0x6D, "tail-call", tail Given { window: Window, count: Count, pad: Pad };
             /// As `call-global`, in place of the running function.
             TailCallGlobal = 0x6E, "tail-call-global", tail Global
-                { window: Base, count: Count, symbol: WideSymbolIdx };
+                { window: Window, count: Count, symbol: WideSymbolIdx };
             /// As `call-builtin`; returns what the builtin returns.
             TailCallBuiltin = 0x6F, "tail-call-builtin", tail Builtin
-                { window: Base, count: Count, builtin: BuiltinIdx };
+                { window: Window, count: Count, builtin: BuiltinIdx };
             /// Returns `R[src]`.
             Return = 0x71, "return", return { src: Reg };
             /// Returns `R[first], … R[first+count-1]` as multiple values.
-            ReturnValues = 0x72, "return-values", return { first: Base, count: Count };
+            ReturnValues = 0x72, "return-values", return { first: Items, count: Count };
             /// Returns the value list.
             ReturnAll = 0x73, "return-all", return {};
 
             // ---- the value list: where all values of a form are kept
             /// The value list := `R[first], … R[first+count-1]`
-            SetValues = 0x74, "set-values", silent { first: Base, count: Count };
+            SetValues = 0x74, "set-values", silent { first: Items, count: Count };
             /// `R[first], … R[first+count-1]` := the value list, missing values `NIL`
-            GetValues = 0x75, "get-values", silent { first: Base, count: Count };
+            GetValues = 0x75, "get-values", silent { first: Room, count: Count };
             /// `R[dst]` := a fresh list of the value list
             ValuesToList = 0x76, "values-to-list", value { dst: Dst };
             /// The value list := the items of the list `R[src]`
@@ -288,30 +288,30 @@ macro_rules! for_each_opcode {
             NewTag = 0x78, "new-tag", value { dst: Dst };
             /// Pushes a catch for the tag `R[tag]`: a throw to it pops it, delivers its values to the window,
             /// and goes on at `to`.
-            PushCatch = 0x79, "push-catch", never { window: Base, tag: Reg, want: Want, to: Jump };
+            PushCatch = 0x79, "push-catch", never { window: Window, tag: Reg, want: Want, to: Landing };
             /// Pushes a cleanup: when an unwinding passes, the code at `to` runs until `end-cleanup`.
-            PushCleanup = 0x7A, "push-cleanup", never { window: Base, to: Jump };
+            PushCleanup = 0x7A, "push-cleanup", never { window: Window, to: Landing };
             /// Pushes handlers: for each type of the vector `K[types]`, a case. When one takes a condition,
             /// the entry is popped, `R[window]` is the index of the case, `R[window+1]` the condition, and
             /// control goes to `to`.
-            PushHandlerCase = 0x7B, "push-handler-case", never { window: Base, types: VectorIdx, to: Jump };
+            PushHandlerCase = 0x7B, "push-handler-case", never { window: Window, types: VectorIdx, to: Landing };
             /// Pushes recovery procedures. `R[state]` is their table, a vector, or what the machine has made
             /// of it. A throw to `R[state]` pops them, delivers two values to the window, and goes on at
             /// `to`, where the function that runs the clauses is made: the machine makes it there when a
             /// failure needs it first.
-            PushRecovery = 0x84, "push-recovery", never { window: Base, state: Reg, to: Jump };
+            PushRecovery = 0x84, "push-recovery", never { window: Window, state: Reg, to: Landing };
             /// Pushes a cleanup for failures: when a failure, an abort or an expired limit leaves, the code
             /// at `to` runs until `end-cleanup`. After a failure the value list is then that failure and what
             /// is known about it.
-            PushFailureCleanup = 0x85, "push-failure-cleanup", never { window: Base, to: Jump };
+            PushFailureCleanup = 0x85, "push-failure-cleanup", never { window: Window, to: Landing };
             /// Pushes handlers that run at the point of signalling: `R[handlers]` is a list of `(type .
             /// function)`.
-            PushHandlers = 0x7C, "push-handlers", never { window: Base, handlers: Reg };
+            PushHandlers = 0x7C, "push-handlers", never { window: Window, handlers: Reg };
             /// Pushes a mask: entries from the fixnum `R[from]` on (a height of the control stack) are not
             /// searched.
-            PushMask = 0x7D, "push-mask", never { window: Base, from: Reg };
+            PushMask = 0x7D, "push-mask", never { window: Window, from: Reg };
             /// Pushes a scope for `bind-list`.
-            PushScope = 0x7E, "push-scope", never { window: Base };
+            PushScope = 0x7E, "push-scope", never { window: Window };
             /// Pops the newest `count` entries, and undoes bindings made since the oldest of them.
             PopControl = 0x7F, "pop-control", silent { count: Count };
             /// Ends the protected part in the normal way: the cleanup entry on top becomes a running cleanup,
@@ -323,7 +323,7 @@ macro_rules! for_each_opcode {
             /// Throws the value list to the catch for the tag `R[tag]`. Fails with `control-error`, nothing
             /// unwound, when there is none; `kind` says which form it was: 0 `throw`, 1 `return-from`, 2
             /// `go`. Then the value list is what a recovery gave.
-            Throw = 0x82, "throw", effect { tag: Reg, kind: Count };
+            Throw = 0x82, "throw", effect { tag: Reg, kind: ThrowKind };
         }
     };
 }
@@ -381,7 +381,7 @@ pub enum Callee {
 }
 
 impl Callee {
-    /// Whether the callee is a value in the first register of the window.
+    /// Returns whether the callee is a value in the first register of the window.
     pub const fn is_in_window(self) -> bool {
         matches!(self, Callee::Given | Callee::Applied)
     }
@@ -393,7 +393,7 @@ pub struct Call {
     /// What is called.
     pub callee: Callee,
     /// First register of the window.
-    pub window: Base,
+    pub window: Window,
     /// Number of arguments in the window.
     pub count: Count,
     /// How many values are delivered to the window; `None` for a tail call.
@@ -500,6 +500,44 @@ macro_rules! builtin {
     };
 }
 
+/// RegisterAccess of an instruction to consecutive registers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RegisterAccess {
+    /// Reads the registers.
+    Read {
+        /// First register.
+        first: u8,
+        /// Number of registers.
+        count: u8,
+    },
+    /// Writes the registers.
+    Write {
+        /// First register.
+        first: u8,
+        /// Number of registers.
+        count: u8,
+    },
+}
+
+impl Instr {
+    /// Calls `visit` with each access to registers that operands name, in the order of the operands. The
+    /// accesses of a call to its window are left out.
+    pub fn visit_registers(&self, mut visit: impl FnMut(RegisterAccess)) {
+        let mut range = None;
+        self.visit_operands(|role| match (role, range.take()) {
+            (Role::Read(first), _) => visit(RegisterAccess::Read { first, count: 1 }),
+            (Role::Write(first), _) => visit(RegisterAccess::Write { first, count: 1 }),
+            (Role::Count(count), Some(Role::ReadRange(first))) => {
+                visit(RegisterAccess::Read { first, count })
+            }
+            (Role::Count(count), Some(Role::WriteRange(first))) => {
+                visit(RegisterAccess::Write { first, count })
+            }
+            (role, _) => range = Some(role),
+        });
+    }
+}
+
 /// One row of the table, for tools that list opcodes.
 #[derive(Clone, Copy, Debug)]
 pub struct OpcodeInfo {
@@ -550,7 +588,7 @@ macro_rules! define_opcodes {
         ];
 
         impl Opcode {
-            /// The opcode with this number, unless there is none.
+            /// Returns the opcode with this number, unless there is none.
             pub const fn from_number(number: u8) -> Option<Opcode> {
                 match number {
                     $( $number => Some(Opcode::$name), )*
@@ -579,10 +617,17 @@ macro_rules! define_opcodes {
                 }
             }
 
-            /// Whether control may come to the next instruction from this one.
+            /// Returns whether control may come to the next instruction from this one.
             pub const fn falls_through(self) -> bool {
                 match self {
                     $( Opcode::$name => falls_through!($($kind)+), )*
+                }
+            }
+
+            /// Returns whether it may jump back, which takes a tick.
+            pub const fn is_loop(self) -> bool {
+                match self {
+                    $( Opcode::$name => false $( || is_back(stringify!($ty)) )*, )*
                 }
             }
 
@@ -593,41 +638,41 @@ macro_rules! define_opcodes {
                 }
             }
 
-            /// The builtin that does the same with the registers that it reads and its integers; `None` if
-            /// there is none.
+            /// Returns the builtin that does the same with the registers that it reads and its integers;
+            /// `None` if there is none.
             pub const fn builtin(self) -> Option<Builtin> {
                 match self {
                     $( Opcode::$name => builtin!($($kind)+), )*
                 }
             }
 
-            /// Whether it is a call in place of the running function.
+            /// Returns whether it is a call in place of the running function.
             pub const fn is_tail(self) -> bool {
                 matches!(self.substitute(), Substitute::Tail)
             }
 
-            /// Whether a test jumps when it holds.
+            /// Returns whether a test jumps when it holds.
             pub const fn jumps_when(self) -> bool {
                 !matches!(self.substitute(), Substitute::TestNot)
             }
         }
 
         impl Instr {
-            /// The opcode of this instruction.
+            /// Returns the opcode of this instruction.
             pub fn opcode(&self) -> Opcode {
                 match self {
                     $( Instr::$name { .. } => Opcode::$name, )*
                 }
             }
 
-            /// The operands that all calls have; `None` unless it is a call.
+            /// Returns the operands that all calls have; `None` unless it is a call.
             pub fn call(&self) -> Option<Call> {
                 match self {
                     $( Instr::$name { .. } => call!(*self, $name $($kind)+), )*
                 }
             }
 
-            /// The instruction word, and the aux word if it has one.
+            /// Returns the instruction word, and the aux word if it has one.
             pub fn encode(&self) -> (u32, Option<u32>) {
                 match *self {
                     $( Instr::$name { $( $field ),* } => {
@@ -666,6 +711,15 @@ macro_rules! define_opcodes {
                 let visit = &mut visit;
                 match *self {
                     $( Instr::$name { $( $field ),* } => { $( visit($field.role()); )* } )*
+                }
+            }
+
+            /// Makes the jump, or the landing of the entry pushed, lead this many words from the next
+            /// instruction on.
+            #[allow(unused_variables, reason = "some instructions have no operands")]
+            pub fn retarget(&mut self, distance: i32) {
+                match self {
+                    $( Instr::$name { $( $field ),* } => { $( $field.retarget(distance); )* } )*
                 }
             }
 
@@ -735,7 +789,12 @@ const _: () = {
     }
 };
 
-/// Whether two names are the same, at compile time.
+/// Returns whether the operand type of this name is a jump back.
+const fn is_back(operand: &str) -> bool {
+    is(operand, "Back") || is(operand, "Back16") || is(operand, "Back24")
+}
+
+/// Returns whether two names are the same, at compile time.
 const fn is(left: &str, right: &str) -> bool {
     let (left, right) = (left.as_bytes(), right.as_bytes());
     let mut at = 0;
@@ -799,7 +858,7 @@ macro_rules! define_type_codes {
             /// All of them.
             pub const ALL: &[TypeCode] = &[$( TypeCode::$name ),*];
 
-            /// The type code with this number, unless there is none.
+            /// Returns the type code with this number, unless there is none.
             pub fn from_number(number: u8) -> Option<TypeCode> {
                 match number {
                     $( $number => Some(TypeCode::$name), )*
@@ -807,7 +866,7 @@ macro_rules! define_type_codes {
                 }
             }
 
-            /// The name of the type, a symbol of `COMMON-LISP`.
+            /// Returns the name of the type, a symbol of `COMMON-LISP`.
             pub fn type_name(self) -> &'static str {
                 match self {
                     $( TypeCode::$name => $symbol, )*
@@ -877,7 +936,7 @@ mod tests {
             Instr::JumpAlways { to: Jump24(0x7f_ffff) },
             Instr::Loop { to: Back24(-0x80_0000) },
             Instr::LoopCount { counter: Reg(1), limit: Reg(2), step: Int8(-128), to: Back(-70000) },
-            Instr::Call { window: Base(9), count: Count(3), want: Want::ALL, pad: Pad(0) },
+            Instr::Call { window: Window(9), count: Count(3), want: Want::ALL, pad: Pad(0) },
             Instr::ReturnAll {},
         ];
         for case in cases {
@@ -891,7 +950,7 @@ mod tests {
     #[test]
     fn an_instruction_without_its_aux_word_does_not_decode() {
         let (word, _) =
-            Instr::Call { window: Base(0), count: Count(0), want: Want::ONE, pad: Pad(0) }.encode();
+            Instr::Call { window: Window(0), count: Count(0), want: Want::ONE, pad: Pad(0) }.encode();
         assert_eq!(Instr::decode(&[word], 0), None);
         assert_eq!(Instr::decode(&[0], 0), None);
     }

@@ -5,55 +5,66 @@
 
 use std::fmt;
 
-/// How an operand is packed, and what the verifier has to know of it.
+/// Packing of an operand, and its meaning for the verifier.
 pub trait Operand: Copy + fmt::Display {
     /// Width in bits: 8, 16 or 24 in the instruction word, 32 for the aux word.
     const WIDTH: u32;
-    /// The operand as it stands in the code, in the low `WIDTH` bits.
+    /// Returns the operand as it stands in the code, in the low `WIDTH` bits.
     fn to_bits(self) -> u32;
-    /// The operand with these bits; higher bits are ignored.
+    /// Returns the operand with these bits; higher bits are ignored.
     fn from_bits(bits: u32) -> Self;
     /// Its role, for the verifier.
     fn role(self) -> Role;
+    /// Makes a jump or a landing lead this many words from the next instruction on. Leaves other operands as
+    /// they are.
+    fn retarget(&mut self, distance: i32);
 }
 
-/// What an operand does, as far as a check without knowledge of the opcode can go.
+/// Meaning of an operand that is independent of its opcode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// A register that is read.
+    /// Register that is read.
     Read(u8),
-    /// A register that is written.
+    /// Register that is written.
     Write(u8),
-    /// A register from which on the instruction uses a range; the opcode's own rule says how long.
-    Base(u8),
-    /// A constant of any kind.
+    /// First of a range of registers that are read; the count that follows is its length.
+    ReadRange(u8),
+    /// First of a range of registers that are written; the count that follows is its length.
+    WriteRange(u8),
+    /// First register of a window; the opcode's own rule says how far it goes.
+    Window(u8),
+    /// Number of registers, arguments, entries or bindings.
+    Count(u8),
+    /// Constant of any kind.
     Constant(u32),
-    /// A constant that must be a symbol.
+    /// Constant that must be a symbol.
     SymbolConstant(u32),
-    /// A constant that must name a function of the module.
+    /// Constant that must name a function of the module.
     FunctionConstant(u32),
-    /// A constant that must name a structure class.
+    /// Constant that must name a structure class.
     ClassConstant(u32),
-    /// A constant that must be a vector.
+    /// Constant that must be a vector.
     VectorConstant(u32),
-    /// A jump, relative to the next instruction, that must not go back.
+    /// Distance of a jump from the next instruction, not negative.
     Forward(i32),
-    /// A jump, relative to the next instruction, that must go back: a turn of a loop.
+    /// Distance of a jump from the next instruction, negative: an iteration of a loop.
     Backward(i32),
-    /// A builtin's number.
+    /// Distance of the landing of the entry pushed from the next instruction, not negative.
+    Landing(i32),
+    /// Number of a builtin.
     Builtin(u32),
-    /// A type code.
+    /// Type code.
     TypeCode(u8),
-    /// How many values are wanted.
+    /// Number of values that are wanted.
     Want(Want),
-    /// A word that must be zero.
+    /// Word that must be zero.
     Pad(u32),
-    /// A plain number.
+    /// Plain number.
     Number(i32),
 }
 
-macro_rules! operand {
-    ($(#[$doc:meta])* $name:ident($repr:ty), $width:literal, $role:expr, $show:literal) => {
+macro_rules! operands {
+    ($( $(#[$doc:meta])* $name:ident($repr:ty), $width:literal, $role:expr, $show:literal; )*) => {$(
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         pub struct $name(pub $repr);
@@ -78,6 +89,11 @@ macro_rules! operand {
                 #[allow(clippy::redundant_closure_call, reason = "the table gives roles as closures")]
                 ($role)(self.0)
             }
+            fn retarget(&mut self, distance: i32) {
+                if let Role::Forward(_) | Role::Backward(_) | Role::Landing(_) = self.role() {
+                    self.0 = distance as $repr;
+                }
+            }
         }
 
         impl fmt::Display for $name {
@@ -85,33 +101,74 @@ macro_rules! operand {
                 write!(f, $show, self.0)
             }
         }
-    };
+    )*};
 }
 
-operand!(/** A register that is read. */ Reg(u8), 8, Role::Read, "r{}");
-operand!(/** A register that is written. */ Dst(u8), 8, Role::Write, "r{}");
-operand!(/** First register of a range: a call window, the items of a list, values. */ Base(u8), 8, Role::Base, "r{}..");
-operand!(/** A number of registers or arguments. */ Count(u8), 8, |n| Role::Number(i32::from(n)), "{}");
-operand!(/** Index of a slot or a capture. */ Index(u8), 8, |n| Role::Number(i32::from(n)), "#{}");
-operand!(/** A small integer. */ Int8(i8), 8, |n| Role::Number(i32::from(n)), "{}");
-operand!(/** An integer of 16 bits. */ Int16(i16), 16, |n| Role::Number(i32::from(n)), "{}");
-operand!(/** An integer of 32 bits. */ Int32(i32), 32, Role::Number, "{}");
-operand!(/** A constant of the function. */ ConstIdx(u16), 16, |n| Role::Constant(u32::from(n)), "k{}");
-operand!(/** A constant that is a symbol. */ SymbolIdx(u16), 16, |n| Role::SymbolConstant(u32::from(n)), "k{}");
-operand!(/** A constant that is a symbol, in the aux word. */ WideSymbolIdx(u32), 32, Role::SymbolConstant, "k{}");
-operand!(/** A constant that is a function of the module. */ FunctionIdx(u16), 16, |n| Role::FunctionConstant(u32::from(n)), "k{}");
-operand!(/** A constant that is a structure class, in the aux word. */ WideClassIdx(u32), 32, Role::ClassConstant, "k{}");
-operand!(/** A constant that is a structure class. */ ClassIdx(u16), 16, |n| Role::ClassConstant(u32::from(n)), "k{}");
-operand!(/** A constant that is a vector. */ VectorIdx(u16), 16, |n| Role::VectorConstant(u32::from(n)), "k{}");
-operand!(/** A jump forward. */ Jump16(i16), 16, |n| Role::Forward(i32::from(n)), "{:+}");
-operand!(/** A jump forward. */ Jump24(i32), 24, Role::Forward, "{:+}");
-operand!(/** A jump forward, in the aux word. */ Jump(i32), 32, Role::Forward, "{:+}");
-operand!(/** A jump back. */ Back16(i16), 16, |n| Role::Backward(i32::from(n)), "{:+}");
-operand!(/** A jump back. */ Back24(i32), 24, Role::Backward, "{:+}");
-operand!(/** A jump back, in the aux word. */ Back(i32), 32, Role::Backward, "{:+}");
-operand!(/** Number of a builtin, in the aux word. */ BuiltinIdx(u32), 32, Role::Builtin, "b{}");
-operand!(/** An aux word that only keeps calls two words long. */ Pad(u32), 32, Role::Pad, "{}");
-operand!(/** Number of a [`crate::opcode::TypeCode`]. */ TypeIdx(u8), 8, Role::TypeCode, "t{}");
+operands! {
+    /// A register that is read.
+    Reg(u8), 8, Role::Read, "r{}";
+    /// A register that is written.
+    Dst(u8), 8, Role::Write, "r{}";
+    /// First of a range of registers that are read. A `Count` follows.
+    Items(u8), 8, Role::ReadRange, "r{}..";
+    /// First of a range of registers that are written. A `Count` follows.
+    Room(u8), 8, Role::WriteRange, "r{}..";
+    /// First register of the window of a call or of a control entry.
+    Window(u8), 8, Role::Window, "r{}..";
+    /// A number of registers, arguments, entries or bindings.
+    Count(u8), 8, Role::Count, "{}";
+    /// Form that throws.
+    ThrowKind(u8), 8, |n| Role::Number(i32::from(n)), "{}";
+    /// Index of a slot or a capture.
+    Index(u8), 8, |n| Role::Number(i32::from(n)), "#{}";
+    /// A small integer.
+    Int8(i8), 8, |n| Role::Number(i32::from(n)), "{}";
+    /// An integer of 16 bits.
+    Int16(i16), 16, |n| Role::Number(i32::from(n)), "{}";
+    /// A constant of the function.
+    ConstIdx(u16), 16, |n| Role::Constant(u32::from(n)), "k{}";
+    /// A constant that is a symbol.
+    SymbolIdx(u16), 16, |n| Role::SymbolConstant(u32::from(n)), "k{}";
+    /// A constant that is a symbol, in the aux word.
+    WideSymbolIdx(u32), 32, Role::SymbolConstant, "k{}";
+    /// A constant that is a function of the module.
+    FunctionIdx(u16), 16, |n| Role::FunctionConstant(u32::from(n)), "k{}";
+    /// A constant that is a structure class, in the aux word.
+    WideClassIdx(u32), 32, Role::ClassConstant, "k{}";
+    /// A constant that is a structure class.
+    ClassIdx(u16), 16, |n| Role::ClassConstant(u32::from(n)), "k{}";
+    /// A constant that is a vector.
+    VectorIdx(u16), 16, |n| Role::VectorConstant(u32::from(n)), "k{}";
+    /// A jump forward.
+    Jump16(i16), 16, |n| Role::Forward(i32::from(n)), "{:+}";
+    /// A jump forward.
+    Jump24(i32), 24, Role::Forward, "{:+}";
+    /// A jump forward, in the aux word.
+    Jump(i32), 32, Role::Forward, "{:+}";
+    /// Where a control entry lands, in the aux word.
+    Landing(i32), 32, Role::Landing, "{:+}";
+    /// A jump back.
+    Back16(i16), 16, |n| Role::Backward(i32::from(n)), "{:+}";
+    /// A jump back.
+    Back24(i32), 24, Role::Backward, "{:+}";
+    /// A jump back, in the aux word.
+    Back(i32), 32, Role::Backward, "{:+}";
+    /// Number of a builtin, in the aux word.
+    BuiltinIdx(u32), 32, Role::Builtin, "b{}";
+    /// An aux word that only keeps calls two words long.
+    Pad(u32), 32, Role::Pad, "{}";
+    /// Number of a [`crate::opcode::TypeCode`].
+    TypeIdx(u8), 8, Role::TypeCode, "t{}";
+}
+
+impl ThrowKind {
+    /// A `throw`.
+    pub const THROW: ThrowKind = ThrowKind(0);
+    /// A `return-from` a block that has to be unwound to.
+    pub const RETURN_FROM: ThrowKind = ThrowKind(1);
+    /// A `go` to a tagbody that has to be unwound to.
+    pub const GO: ThrowKind = ThrowKind(2);
+}
 
 /// How many values the receiver of a call, a block or a catch wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -130,7 +187,7 @@ impl Want {
         if n <= 1 { Want::ONE } else { Want(n) }
     }
 
-    /// How many registers of the window receive a value.
+    /// Returns how many registers of the window receive a value.
     pub fn registers(self) -> u8 {
         match self {
             Want::ONE | Want::ALL => 1,
@@ -150,6 +207,7 @@ impl Operand for Want {
     fn role(self) -> Role {
         Role::Want(self)
     }
+    fn retarget(&mut self, _distance: i32) {}
 }
 
 impl fmt::Display for Want {
@@ -175,8 +233,20 @@ impl From<Reg> for Dst {
     }
 }
 
-impl From<Reg> for Base {
-    fn from(reg: Reg) -> Base {
-        Base(reg.0)
+impl From<Reg> for Items {
+    fn from(reg: Reg) -> Items {
+        Items(reg.0)
+    }
+}
+
+impl From<Reg> for Room {
+    fn from(reg: Reg) -> Room {
+        Room(reg.0)
+    }
+}
+
+impl From<Reg> for Window {
+    fn from(reg: Reg) -> Window {
+        Window(reg.0)
     }
 }

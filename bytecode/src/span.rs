@@ -16,17 +16,17 @@ pub struct Span {
 }
 
 impl Span {
-    /// The range `[start, end)` of `source`.
+    /// Returns the range `[start, end)` of `source`.
     pub fn new(source: SourceId, start: u32, end: u32) -> Span {
         Span { source, start, end }
     }
 
-    /// Whether `other` lies in this range.
+    /// Returns whether `other` lies in this range.
     pub fn contains(self, other: Span) -> bool {
         self.source == other.source && self.start <= other.start && other.end <= self.end
     }
 
-    /// The smallest range that covers both; `self` when they lie in different sources.
+    /// Returns the smallest range that covers both; `self` when they lie in different sources.
     pub fn to(self, other: Span) -> Span {
         if self.source != other.source {
             return self;

@@ -14,6 +14,8 @@ pub const CL_PACKAGE: &str = "COMMON-LISP";
 pub const ESL_PACKAGE: &str = "ESL";
 /// The package in which programs start.
 pub const USER_PACKAGE: &str = "ESL-USER";
+/// The package in which Common Lisp programs start.
+pub const CL_USER_PACKAGE: &str = "COMMON-LISP-USER";
 /// The package of keywords.
 pub const KEYWORD_PACKAGE: &str = "KEYWORD";
 
@@ -38,44 +40,44 @@ struct SymbolData {
 pub struct Symbol(Arc<SymbolData>);
 
 impl Symbol {
-    /// The symbol `name` at home in `package`. Names are taken as they are: no case folding.
+    /// Returns the symbol `name` at home in `package`. Names are taken as they are: no case folding.
     pub fn new(package: &Arc<str>, name: &str) -> Symbol {
         let hash = fnv(fnv(0xcbf2_9ce4_8422_2325, package.as_bytes()), name.as_bytes());
         Symbol(Arc::new(SymbolData { home: Home::Package(package.clone()), name: name.into(), hash }))
     }
 
-    /// A symbol of the package `COMMON-LISP`.
+    /// Returns a symbol of the package `COMMON-LISP`.
     pub fn cl(name: &str) -> Symbol {
         Symbol::new(&CL_PACKAGE.into(), name)
     }
 
-    /// A symbol of the package `ESL`.
+    /// Returns a symbol of the package `ESL`.
     pub fn esl(name: &str) -> Symbol {
         Symbol::new(&ESL_PACKAGE.into(), name)
     }
 
-    /// A keyword.
+    /// Returns a keyword.
     pub fn keyword(name: &str) -> Symbol {
         Symbol::new(&KEYWORD_PACKAGE.into(), name)
     }
 
-    /// The symbol without a package that is number `id` of its compilation unit.
+    /// Returns the symbol without a package that is number `id` of its compilation unit.
     pub fn uninterned(id: u32, name: &str) -> Symbol {
         let hash = fnv(u64::from(id) ^ 0x9e37_79b9_7f4a_7c15, name.as_bytes());
         Symbol(Arc::new(SymbolData { home: Home::Uninterned(id), name: name.into(), hash }))
     }
 
-    /// The name, without package.
+    /// Returns the name, without package.
     pub fn name(&self) -> &str {
         &self.0.name
     }
 
-    /// The home package's name, or the number of a symbol that has none.
+    /// Returns the home package's name, or the number of a symbol that has none.
     pub fn home(&self) -> &Home {
         &self.0.home
     }
 
-    /// The home package's name; `None` for an uninterned symbol.
+    /// Returns the home package's name; `None` for an uninterned symbol.
     pub fn package(&self) -> Option<&Arc<str>> {
         match &self.0.home {
             Home::Package(package) => Some(package),
@@ -83,23 +85,23 @@ impl Symbol {
         }
     }
 
-    /// Whether this is a keyword.
+    /// Returns whether this is a keyword.
     pub fn is_keyword(&self) -> bool {
         self.is_in(KEYWORD_PACKAGE)
     }
 
-    /// Whether the symbol's home is the package named `package`.
+    /// Returns whether the symbol's home is the package named `package`.
     pub fn is_in(&self, package: &str) -> bool {
         self.package().is_some_and(|home| &**home == package)
     }
 
-    /// Whether this is the symbol `name` of the package `COMMON-LISP`.
+    /// Returns whether this is the symbol `name` of the package `COMMON-LISP`.
     pub fn is_cl(&self, name: &str) -> bool {
         self.name() == name && self.is_in(CL_PACKAGE)
     }
 }
 
-/// The symbol that keeps the global function `(setf symbol)`: one of the same package, named as it is
+/// Returns the symbol that keeps the global function `(setf symbol)`: one of the same package, named as it is
 /// written.
 pub fn setf_cell(symbol: &Symbol) -> Symbol {
     let name = format!("(SETF {})", symbol.name());
@@ -142,8 +144,8 @@ impl Hash for Symbol {
 }
 
 impl fmt::Display for Symbol {
-    /// The name, with `:` before a keyword and `#:` before an uninterned symbol; other packages are not
-    /// shown.
+    /// Returns the name, with `:` before a keyword and `#:` before an uninterned symbol; other packages are
+    /// not shown.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.0.home {
             Home::Package(package) if &**package == KEYWORD_PACKAGE => write!(f, ":{}", self.name()),

@@ -10,13 +10,13 @@ use esl_bytecode::assembler::assemble;
 use esl_bytecode::disasm;
 use esl_bytecode::module::{CaptureSource, Constant, Function, FunctionNumber, Module};
 use esl_bytecode::opcode::{Call, Instr, OPCODES, Substitute};
-use esl_bytecode::operand::{Base, Count, Role, Want};
+use esl_bytecode::operand::{Count, Role, Want, Window};
 use esl_bytecode::verify::verify;
 use support::{Random, build, module_with_random_code};
 
 /// What a register holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Cell {
+enum ModelCell {
     /// A link word or a leftover of another frame.
     Garbage,
     Object,
@@ -27,7 +27,7 @@ enum Cell {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum ModelKind {
     Catch {
         to: usize,
         want: Want,
@@ -44,7 +44,7 @@ enum Kind {
     /// It came about by `enter-cleanup`, or by an unwinding to the entry with this index, or to somewhere
     /// below this frame.
     Running {
-        unwinding: Option<Target>,
+        unwinding: Option<ModelTarget>,
         value_list: bool,
     },
     Scope,
@@ -52,27 +52,27 @@ enum Kind {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Target {
+enum ModelTarget {
     Entry(usize),
     Caller,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Entry {
-    kind: Kind,
+struct ModelEntry {
+    kind: ModelKind,
     window: u8,
     bindings: usize,
 }
 
 /// How a binding came about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Binding {
+enum ModelBinding {
     One,
     OfList,
 }
 
 /// What comes after an instruction.
-enum Next {
+enum ModelNext {
     Instruction,
     Jump(usize),
     Left,
@@ -82,9 +82,9 @@ struct Model<'a> {
     module: &'a Module,
     function: &'a Function,
     random: &'a mut Random,
-    registers: Vec<Cell>,
-    entries: Vec<Entry>,
-    bindings: Vec<Binding>,
+    registers: Vec<ModelCell>,
+    entries: Vec<ModelEntry>,
+    bindings: Vec<ModelBinding>,
     /// Whether the value list is as this frame set it.
     value_list: bool,
     pc: usize,
@@ -94,11 +94,11 @@ impl<'a> Model<'a> {
     fn new(module: &'a Module, random: &'a mut Random) -> Model<'a> {
         let function = &module.functions[0];
         let parameters = &function.parameters;
-        let mut registers = vec![Cell::Garbage; usize::from(function.registers)];
+        let mut registers = vec![ModelCell::Garbage; usize::from(function.registers)];
         let rest = usize::from(parameters.required + parameters.optional);
         for (number, register) in registers[..parameters.registers()].iter_mut().enumerate() {
             let certain = number < usize::from(parameters.required) || (parameters.rest && number == rest);
-            *register = if certain || random.once_in(2) { Cell::Object } else { Cell::Marker };
+            *register = if certain || random.once_in(2) { ModelCell::Object } else { ModelCell::Marker };
         }
         Model {
             module,
@@ -120,42 +120,42 @@ impl<'a> Model<'a> {
             let outcome =
                 if self.random.once_in(6) { self.fail(instr, next) } else { self.step(instr, next) };
             match outcome {
-                Next::Instruction => self.pc = next,
-                Next::Jump(to) => self.pc = to,
-                Next::Left => return,
+                ModelNext::Instruction => self.pc = next,
+                ModelNext::Jump(to) => self.pc = to,
+                ModelNext::Left => return,
             }
         }
     }
 
     fn read(&self, register: u8) {
         let cell = self.registers[usize::from(register)];
-        assert!(matches!(cell, Cell::Object | Cell::Closure(_)), "V6: r{register} holds {cell:?}");
+        assert!(matches!(cell, ModelCell::Object | ModelCell::Closure(_)), "V6: r{register} holds {cell:?}");
     }
 
-    fn read_all(&self, Base(first): Base, Count(count): Count) {
+    fn read_all(&self, first: u8, Count(count): Count) {
         (0..count).for_each(|i| self.read(first + i));
     }
 
     fn read_box(&self, register: u8) {
-        assert_eq!(self.registers[usize::from(register)], Cell::Box, "V7: r{register}");
+        assert_eq!(self.registers[usize::from(register)], ModelCell::Box, "V7: r{register}");
     }
 
-    fn write(&mut self, register: u8, cell: Cell) {
+    fn write(&mut self, register: u8, cell: ModelCell) {
         self.registers[usize::from(register)] = cell;
     }
 
-    fn write_all(&mut self, Base(first): Base, count: u8) {
-        (0..count).for_each(|i| self.write(first + i, Cell::Object));
+    fn write_all(&mut self, first: u8, count: u8) {
+        (0..count).for_each(|i| self.write(first + i, ModelCell::Object));
     }
 
     /// Frames of others have lain over the registers from here on, and used the value list.
     fn others_ran(&mut self, from: u8) {
-        self.registers[usize::from(from)..].fill(Cell::Garbage);
+        self.registers[usize::from(from)..].fill(ModelCell::Garbage);
         self.value_list = false;
     }
 
     /// The operands of `instr` must be in order, since it may look at them before it fails.
-    fn fail(&mut self, instr: Instr, next: usize) -> Next {
+    fn fail(&mut self, instr: Instr, next: usize) -> ModelNext {
         let substitute = instr.opcode().substitute();
         if substitute == Substitute::Silent {
             return self.step(instr, next);
@@ -169,90 +169,99 @@ impl<'a> Model<'a> {
                 let mut first = None;
                 instr.visit_operands(|role| first = first.or(Some(role)));
                 let Some(Role::Write(register)) = first else { panic!("no first operand: {instr}") };
-                self.write(register, Cell::Object);
-                Next::Instruction
+                self.write(register, ModelCell::Object);
+                ModelNext::Instruction
             }
             (Substitute::Test | Substitute::TestNot, _) => self.maybe_jump(instr, next),
             (Substitute::Call | Substitute::Tail, _) => match instr.call() {
                 Some(Call { window, want: Some(want), .. }) => {
                     self.deliver(window, want);
-                    Next::Instruction
+                    ModelNext::Instruction
                 }
-                _ => Next::Left,
+                _ => ModelNext::Left,
             },
             (Substitute::Effect, _) => {
                 // M5: the value list is empty then, or what the recovery gave, and not what others have left.
                 self.value_list = matches!(instr, Instr::ListToValues { .. } | Instr::Throw { .. });
-                Next::Instruction
+                ModelNext::Instruction
             }
             (Substitute::Never | Substitute::Silent, _) => self.step(instr, next),
         }
     }
 
-    fn unwind_somewhere(&mut self) -> Next {
+    fn unwind_somewhere(&mut self) -> ModelNext {
         let targets: Vec<usize> = (0..self.entries.len())
             .filter(|&at| {
                 let kind = self.entries[at].kind;
-                matches!(kind, Kind::Catch { .. } | Kind::HandlerCase { .. } | Kind::FailureCleanup { .. })
+                matches!(
+                    kind,
+                    ModelKind::Catch { .. }
+                        | ModelKind::HandlerCase { .. }
+                        | ModelKind::FailureCleanup { .. }
+                )
             })
             .collect();
         let target = match targets.is_empty() || self.random.once_in(4) {
-            true => Target::Caller,
-            false => Target::Entry(self.random.pick(&targets)),
+            true => ModelTarget::Caller,
+            false => ModelTarget::Entry(self.random.pick(&targets)),
         };
         self.unwind(target)
     }
 
-    fn unwind(&mut self, target: Target) -> Next {
+    fn unwind(&mut self, target: ModelTarget) -> ModelNext {
         while let Some(entry) = self.entries.pop() {
             self.bindings.truncate(entry.bindings);
-            if target == Target::Entry(self.entries.len()) {
+            if target == ModelTarget::Entry(self.entries.len()) {
                 self.others_ran(entry.window);
                 match entry.kind {
-                    Kind::Catch { to, want } => {
-                        self.deliver(Base(entry.window), want);
-                        return Next::Jump(to);
+                    ModelKind::Catch { to, want } => {
+                        self.deliver(Window(entry.window), want);
+                        return ModelNext::Jump(to);
                     }
-                    Kind::HandlerCase { to } => {
-                        self.write_all(Base(entry.window), 2);
-                        return Next::Jump(to);
+                    ModelKind::HandlerCase { to } => {
+                        self.write_all(entry.window, 2);
+                        return ModelNext::Jump(to);
                     }
-                    Kind::FailureCleanup { to } => {
-                        let kind = Kind::Running { unwinding: None, value_list: true };
-                        self.entries.push(Entry { kind, ..entry });
+                    ModelKind::FailureCleanup { to } => {
+                        let kind = ModelKind::Running { unwinding: None, value_list: true };
+                        self.entries.push(ModelEntry { kind, ..entry });
                         self.value_list = false;
-                        return Next::Jump(to);
+                        return ModelNext::Jump(to);
                     }
                     kind => panic!("landed at {kind:?}"),
                 }
             }
             let runs = match entry.kind {
-                Kind::Cleanup { to } => Some(to),
+                ModelKind::Cleanup { to } => Some(to),
                 // For an abort, not for a throw.
-                Kind::FailureCleanup { to } if target == Target::Caller && self.random.once_in(2) => Some(to),
+                ModelKind::FailureCleanup { to }
+                    if target == ModelTarget::Caller && self.random.once_in(2) =>
+                {
+                    Some(to)
+                }
                 _ => None,
             };
             if let Some(to) = runs {
                 self.others_ran(entry.window);
-                let kind = Kind::Running { unwinding: Some(target), value_list: false };
-                self.entries.push(Entry { kind, ..entry });
-                return Next::Jump(to);
+                let kind = ModelKind::Running { unwinding: Some(target), value_list: false };
+                self.entries.push(ModelEntry { kind, ..entry });
+                return ModelNext::Jump(to);
             }
         }
-        Next::Left
+        ModelNext::Left
     }
 
-    fn deliver(&mut self, window: Base, want: Want) {
-        self.write_all(window, want.registers());
+    fn deliver(&mut self, window: Window, want: Want) {
+        self.write_all(window.0, want.registers());
         self.value_list = want == Want::ALL;
     }
 
-    fn call(&mut self, Call { callee, window, count, want }: Call) -> Next {
+    fn call(&mut self, Call { callee, window, count, want }: Call) -> ModelNext {
         assert!(u32::from(window.0) + 2 + u32::from(count.0) <= u32::from(self.function.registers), "V3");
         if callee.is_in_window() {
             self.read(window.0);
         }
-        self.read_all(Base(window.0 + 2), count);
+        self.read_all(window.0 + 2, count);
         let Some(want) = want else { return self.leave() };
         for entry in &self.entries {
             assert!(window.0 >= entry.window, "V10");
@@ -262,15 +271,15 @@ impl<'a> Model<'a> {
             return self.unwind_somewhere();
         }
         self.deliver(window, want);
-        Next::Instruction
+        ModelNext::Instruction
     }
 
-    fn leave(&self) -> Next {
+    fn leave(&self) -> ModelNext {
         assert!(self.entries.is_empty() && self.bindings.is_empty(), "V9: leaves something behind");
-        Next::Left
+        ModelNext::Left
     }
 
-    fn maybe_jump(&mut self, instr: Instr, next: usize) -> Next {
+    fn maybe_jump(&mut self, instr: Instr, next: usize) -> ModelNext {
         let mut to = None;
         instr.visit_operands(|role| {
             if let Role::Forward(distance) | Role::Backward(distance) = role {
@@ -283,17 +292,17 @@ impl<'a> Model<'a> {
                 if to < next {
                     self.value_list = false;
                 }
-                Next::Jump(to)
+                ModelNext::Jump(to)
             }
-            _ => Next::Instruction,
+            _ => ModelNext::Instruction,
         }
     }
 
-    fn push(&mut self, kind: Kind, window: Base) {
-        self.entries.push(Entry { kind, window: window.0, bindings: self.bindings.len() });
+    fn push(&mut self, kind: ModelKind, window: Window) {
+        self.entries.push(ModelEntry { kind, window: window.0, bindings: self.bindings.len() });
     }
 
-    fn step(&mut self, instr: Instr, next: usize) -> Next {
+    fn step(&mut self, instr: Instr, next: usize) -> ModelNext {
         if let Some(call) = instr.call() {
             return self.call(call);
         }
@@ -301,32 +310,32 @@ impl<'a> Model<'a> {
         match instr {
             Instr::Move { dst, src } => {
                 let cell = self.registers[usize::from(src.0)];
-                assert!(!matches!(cell, Cell::Garbage | Cell::Marker), "V6: moves {cell:?}");
+                assert!(!matches!(cell, ModelCell::Garbage | ModelCell::Marker), "V6: moves {cell:?}");
                 self.write(dst.0, cell);
             }
-            Instr::LoadNil { first, count } => self.write_all(first, count.0),
+            Instr::LoadNil { first, count } => self.write_all(first.0, count.0),
             Instr::List { dst, first, count } => {
-                self.read_all(first, count);
-                self.write(dst.0, Cell::Object);
+                self.read_all(first.0, count);
+                self.write(dst.0, ModelCell::Object);
             }
             Instr::JumpIfSupplied { test, to } => match self.registers[usize::from(test.0)] {
-                Cell::Marker => {}
-                Cell::Object => return Next::Jump(landing(to.0.into())),
+                ModelCell::Marker => {}
+                ModelCell::Object => return ModelNext::Jump(landing(to.0.into())),
                 cell => panic!("V6: tests {cell:?}"),
             },
             Instr::LoopCount { counter, limit, .. } => {
                 self.read(counter.0);
                 self.read(limit.0);
-                self.write(counter.0, Cell::Object);
+                self.write(counter.0, ModelCell::Object);
                 return self.maybe_jump(instr, next);
             }
             Instr::MakeBox { dst, src } => {
                 self.read(src.0);
-                self.write(dst.0, Cell::Box);
+                self.write(dst.0, ModelCell::Box);
             }
             Instr::BoxRef { dst, cell } => {
                 self.read_box(cell.0);
-                self.write(dst.0, Cell::Object);
+                self.write(dst.0, ModelCell::Object);
             }
             Instr::BoxSet { cell, src } => {
                 self.read_box(cell.0);
@@ -347,21 +356,21 @@ impl<'a> Model<'a> {
                         CaptureSource::Later => assert!(!capture.boxed, "V8"),
                     }
                 }
-                self.write(dst.0, Cell::Closure(number.0));
+                self.write(dst.0, ModelCell::Closure(number.0));
             }
             Instr::PatchCapture { closure, index, src } => {
                 self.read(src.0);
-                let Cell::Closure(number) = self.registers[usize::from(closure.0)] else { panic!("V8") };
+                let ModelCell::Closure(number) = self.registers[usize::from(closure.0)] else { panic!("V8") };
                 let capture = self.module.functions[number as usize].captures[usize::from(index.0)];
                 assert_eq!(capture.source, CaptureSource::Later, "V8");
             }
             Instr::CaptureRef { dst, index } => {
                 let boxed = self.function.captures[usize::from(index.0)].boxed;
-                self.write(dst.0, if boxed { Cell::Box } else { Cell::Object });
+                self.write(dst.0, if boxed { ModelCell::Box } else { ModelCell::Object });
             }
             Instr::CaptureBoxRef { dst, index } => {
                 assert!(self.function.captures[usize::from(index.0)].boxed, "V7");
-                self.write(dst.0, Cell::Object);
+                self.write(dst.0, ModelCell::Object);
             }
             Instr::CaptureBoxSet { src, index } => {
                 assert!(self.function.captures[usize::from(index.0)].boxed, "V7");
@@ -369,28 +378,28 @@ impl<'a> Model<'a> {
             }
             Instr::Bind { src, .. } => {
                 self.read(src.0);
-                self.bindings.push(Binding::One);
+                self.bindings.push(ModelBinding::One);
             }
             Instr::Unbind { count } => {
                 let since = self.entries.last().map_or(0, |entry| entry.bindings);
                 for _ in 0..count.0 {
                     assert!(self.bindings.len() > since, "V9: unbinds too much");
-                    assert_eq!(self.bindings.pop(), Some(Binding::One), "V9");
+                    assert_eq!(self.bindings.pop(), Some(ModelBinding::One), "V9");
                 }
             }
             Instr::BindList { symbols, values } => {
                 self.read(symbols.0);
                 self.read(values.0);
-                assert_eq!(self.entries.last().map(|entry| entry.kind), Some(Kind::Scope), "V9");
+                assert_eq!(self.entries.last().map(|entry| entry.kind), Some(ModelKind::Scope), "V9");
                 let count = self.random.below(3);
-                self.bindings.extend(std::iter::repeat_n(Binding::OfList, count));
+                self.bindings.extend(std::iter::repeat_n(ModelBinding::OfList, count));
             }
             Instr::Return { src } => {
                 self.read(src.0);
                 return self.leave();
             }
             Instr::ReturnValues { first, count } => {
-                self.read_all(first, count);
+                self.read_all(first.0, count);
                 return self.leave();
             }
             Instr::ReturnAll {} => {
@@ -398,16 +407,16 @@ impl<'a> Model<'a> {
                 return self.leave();
             }
             Instr::SetValues { first, count } => {
-                self.read_all(first, count);
+                self.read_all(first.0, count);
                 self.value_list = true;
             }
             Instr::GetValues { first, count } => {
                 assert!(self.value_list, "V11");
-                self.write_all(first, count.0);
+                self.write_all(first.0, count.0);
             }
             Instr::ValuesToList { dst } => {
                 assert!(self.value_list, "V11");
-                self.write(dst.0, Cell::Object);
+                self.write(dst.0, ModelCell::Object);
             }
             Instr::ListToValues { src } => {
                 self.read(src.0);
@@ -415,44 +424,47 @@ impl<'a> Model<'a> {
             }
             Instr::PushCatch { window, tag, want, to } => {
                 self.read(tag.0);
-                self.push(Kind::Catch { to: landing(to.0), want }, window);
+                self.push(ModelKind::Catch { to: landing(to.0), want }, window);
             }
-            Instr::PushCleanup { window, to } => self.push(Kind::Cleanup { to: landing(to.0) }, window),
+            Instr::PushCleanup { window, to } => self.push(ModelKind::Cleanup { to: landing(to.0) }, window),
             Instr::PushHandlerCase { window, to, .. } => {
-                self.push(Kind::HandlerCase { to: landing(to.0) }, window);
+                self.push(ModelKind::HandlerCase { to: landing(to.0) }, window);
             }
             Instr::PushRecovery { window, state, to } => {
                 self.read(state.0);
-                self.push(Kind::HandlerCase { to: landing(to.0) }, window);
+                self.push(ModelKind::HandlerCase { to: landing(to.0) }, window);
             }
             Instr::PushFailureCleanup { window, to } => {
-                self.push(Kind::FailureCleanup { to: landing(to.0) }, window);
+                self.push(ModelKind::FailureCleanup { to: landing(to.0) }, window);
             }
             Instr::PushHandlers { window, handlers: read } | Instr::PushMask { window, from: read } => {
                 self.read(read.0);
-                self.push(Kind::Other, window);
+                self.push(ModelKind::Other, window);
             }
-            Instr::PushScope { window } => self.push(Kind::Scope, window),
+            Instr::PushScope { window } => self.push(ModelKind::Scope, window),
             Instr::PopControl { count } => {
                 for _ in 0..count.0 {
                     let entry = self.entries.pop().expect("V9: pops what it pushed");
-                    assert!(!matches!(entry.kind, Kind::Cleanup { .. } | Kind::Running { .. }), "V9");
+                    assert!(
+                        !matches!(entry.kind, ModelKind::Cleanup { .. } | ModelKind::Running { .. }),
+                        "V9"
+                    );
                     self.bindings.truncate(entry.bindings);
                 }
             }
             Instr::EnterCleanup {} => {
                 let value_list = std::mem::take(&mut self.value_list);
                 let entry = self.entries.last_mut().expect("V9: a cleanup");
-                assert!(matches!(entry.kind, Kind::Cleanup { .. }), "V9");
+                assert!(matches!(entry.kind, ModelKind::Cleanup { .. }), "V9");
                 assert_eq!(entry.bindings, self.bindings.len(), "V9");
-                entry.kind = Kind::Running { unwinding: None, value_list };
+                entry.kind = ModelKind::Running { unwinding: None, value_list };
             }
             Instr::EndCleanup {} => {
                 let entry = self.entries.pop().expect("V9: a running cleanup");
                 assert_eq!(entry.bindings, self.bindings.len(), "V9");
                 match entry.kind {
-                    Kind::Running { unwinding: None, value_list } => self.value_list = value_list,
-                    Kind::Running { unwinding: Some(target), .. } => return self.unwind(target),
+                    ModelKind::Running { unwinding: None, value_list } => self.value_list = value_list,
+                    ModelKind::Running { unwinding: Some(target), .. } => return self.unwind(target),
                     kind => panic!("V9: ends {kind:?}"),
                 }
             }
@@ -471,12 +483,12 @@ impl<'a> Model<'a> {
                 });
                 reads.iter().for_each(|&register| self.read(register));
                 if let Some(register) = write {
-                    self.write(register, Cell::Object);
+                    self.write(register, ModelCell::Object);
                 }
                 return self.maybe_jump(instr, next);
             }
         }
-        Next::Instruction
+        ModelNext::Instruction
     }
 }
 

@@ -303,11 +303,12 @@ pub enum NodeKind {
     HandlerCase(NodeId, Vec<HandlerClause>),
     /// Runs a body with recovery procedures.
     Recovery {
-        /// A vector: `NIL`, then for each clause its cause and how often it may run, then `NIL`.
-        table: Datum,
+        /// A form whose value is a simple vector: `NIL`, then for each clause its cause and how often it may
+        /// run, then `NIL`. The machine does not change it; a literal costs nothing.
+        table: NodeId,
         /// The function that runs the clauses, always a lambda. It takes the form's state, the position of
         /// the clause in the state, and the list of the failure's arguments. To run the body again it throws
-        /// the state and `NIL` to the state; to leave the form, `NIL` and a result.
+        /// the state and any value to the state; to leave the form, `NIL` and a result.
         procedures: NodeId,
         /// The body.
         body: NodeId,

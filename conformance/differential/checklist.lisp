@@ -837,3 +837,60 @@ e") (read-from-string "#:g") (read-from-string ":Key")))
     (list 'no-next arguments))
   (defclass p215 () ((x :initarg :x :accessor p215-x)))
   (answer 215 (list (g215 'a) (with-accessors ((x p215-x)) (make-instance 'p215 :x 1) (incf x)))))
+
+;; clauses of LOOP joined by AND, and no variable
+;;; 216
+(answer 216 (list (loop for c across "ab" and i from 0 collect (list c i))
+                    (let ((x 5)) (loop for y from x and x from 1 to 3 collect (list x y)))
+                    (loop for x = 1 then (1+ x) and y = 0 then x repeat 3 collect (list x y))
+                    (loop for nil on '(1 2) collect 1)))
+
+;; leaving an iteration of FORMAT by parameters
+;;; 217
+(answer 217 (list (format nil "~{<~a~1,1^,>~}|" '(1 2 3)) (format nil "~{~v^<~a>~}|" '(1 a 0 b 2 c))
+                    (format nil "~:{<~a~0:^~a>~}|" '((1 2) (3 4))) (format nil "~@{<~a~1,2,3^,>~}|" 1 2 3)
+                    (format nil "~15,1,2,2,,,'E@e" -0.75)))
+
+;; types of compound specifiers
+;;; 218
+(answer 218 (list (multiple-value-list (subtypep '(vector character) 'string))
+                    (multiple-value-list (subtypep '(and symbol list) 'null))
+                    (multiple-value-list (subtypep 'ratio '(and rational (not integer))))
+                    (multiple-value-list (subtypep '(rational 0 1) 'integer))
+                    (multiple-value-list (subtypep '(integer 0 5) '(not (integer 7 9)))) (type-of 0)))
+
+;; the sign of minus zero
+;;; 219
+(answer 219 (list (rem -0.0 1) (mod -0.0 -1) (multiple-value-list (round -0.0))
+                    (multiple-value-list (ffloor -0.0)) (multiple-value-list (ftruncate 0.0 -2))
+                    (tanh 0.3856239926684798) (cosh 4.830571047624649)))
+
+;; shared strings, and a radix for reading
+;;; 220
+(answer 220 (list (let ((s "ab") (*print-circle* t)) (prin1-to-string (list s s)))
+                    (let ((*read-base* 16)) (read-from-string "(ff 1/F 10. 1e3 face)"))
+                    (let ((i nil))
+                      (with-input-from-string (s "(a) b" :index i) (declare (type stream s)) (read s))
+                      i)
+                    (write-to-string '(1 (2 (3))) :level 2)))
+
+;; keys and tests that are called in a certain order
+;;; 221
+(answer 221 (list (sort (list :a) #'< :key #'1+) (remove-duplicates '(1 2 3 4) :test #'<)
+                    (remove-duplicates '(4 3 2 1) :test #'< :from-end t)
+                    (remove-duplicates '(3 4 5) :from-end t :test (lambda (x y) (= (- x y) 1)))))
+
+;; a clause :NO-ERROR before others
+;;; 222
+(answer 222 (list (handler-case 1 (:no-error (x) (list :fine x)) (error () :failed))
+                    (handler-case (car 1) (:no-error (x) (list :fine x)) (error () :failed))))
+
+;; a macro that defines methods
+;;; 223
+(progn
+  (defmacro define-shape223 (name)
+    `(defgeneric ,name (x)
+       (:method ((x t)) (list :any x))
+       (:method ((x symbol)) (list :symbol (call-next-method)))))
+  (define-shape223 shape223)
+  (answer 223 (list (shape223 1) (shape223 'a))))

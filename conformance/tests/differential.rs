@@ -19,7 +19,8 @@ const EXCEPTIONS: &[(&str, &str)] = &[
     ("apropos apropos-list describe", "their output is specific to the implementation"),
     ("clear-input sleep random", "they have no effect or a random one; used, not compared"),
     (
-        "defpackage in-package make-package use-package import export shadow list-all-packages",
+        "defpackage in-package make-package use-package import export shadow shadowing-import \
+         list-all-packages",
         "programs share a package",
     ),
     ("package-nicknames package-use-list package-error-package", "packages of the two differ"),

@@ -101,6 +101,7 @@ fn config(options: &[String], setting: Setting) -> Result<Config, Failed> {
         let [option, value] = pair else { return Err(format!("`{}` needs a value", pair[0]).into()) };
         match option.as_str() {
             "--memory" => config.memory = parse_size(value)?,
+            "--stack" => config.stack = parse_size(value)? / size_of::<u64>(),
             "--budget" => config.budget = Some(value.parse()?),
             "--slice" => config.slice = value.parse()?,
             "--seed" => config.seed = value.parse()?,

@@ -4,19 +4,19 @@
 //! record over one of these, its *data*. The data decides what the elements may be: any value, characters, or
 //! integers below 256.
 //!
-//! Guarantees: an array whose dimensions or fill pointer ask for more than its data holds has the elements
-//! that are there.
+//! Guarantees: if the dimensions or the fill pointer of an array ask for more elements than its data holds,
+//! the array has those that are there.
 //!
-//! Not here: storing elements, and making and changing arrays.
+//! Not here: storing elements; creating and changing arrays.
 
 use smallvec::{SmallVec, smallvec};
 
 use crate::heap::{Heap, Kind};
 use crate::value::Value;
 
-/// The elements of an array.
+/// Elements of an array.
 #[derive(Clone, Copy, Debug)]
-pub enum Elements<'a> {
+pub enum ArrayElements<'a> {
     /// Any values.
     Values(&'a [Value]),
     /// Code points.
@@ -25,54 +25,54 @@ pub enum Elements<'a> {
     Bytes(&'a [u8]),
 }
 
-impl<'a> Elements<'a> {
-    /// The elements in `data`, which an array may have or be.
-    pub fn of_data(heap: &'a Heap, data: Value) -> Option<Elements<'a>> {
+impl<'a> ArrayElements<'a> {
+    /// Returns the elements in `data`, an array's data or a simple array itself.
+    pub fn of_data(heap: &'a Heap, data: Value) -> Option<ArrayElements<'a>> {
         Some(match heap.kind(data)? {
-            Kind::SimpleVector => Elements::Values(heap.vector(data)?),
-            Kind::String => Elements::Characters(heap.string(data)?),
-            Kind::Bytes => Elements::Bytes(heap.bytes(data)?),
+            Kind::SimpleVector => ArrayElements::Values(heap.vector(data)?),
+            Kind::String => ArrayElements::Characters(heap.string(data)?),
+            Kind::Bytes => ArrayElements::Bytes(heap.bytes(data)?),
             _ => return None,
         })
     }
 
-    /// Their number.
+    /// Returns the number of elements.
     pub fn len(self) -> usize {
         match self {
-            Elements::Values(values) => values.len(),
-            Elements::Characters(characters) => characters.len(),
-            Elements::Bytes(bytes) => bytes.len(),
+            ArrayElements::Values(values) => values.len(),
+            ArrayElements::Characters(characters) => characters.len(),
+            ArrayElements::Bytes(bytes) => bytes.len(),
         }
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no elements.
     pub fn is_empty(self) -> bool {
         self.len() == 0
     }
 
-    /// The element at `index`.
+    /// Returns the element at `index`.
     pub fn get(self, index: usize) -> Option<Value> {
         match self {
-            Elements::Values(values) => values.get(index).copied(),
-            Elements::Characters(characters) => Value::character(*characters.get(index)?),
-            Elements::Bytes(bytes) => bytes.get(index).map(|&byte| Value::small(i32::from(byte))),
+            ArrayElements::Values(values) => values.get(index).copied(),
+            ArrayElements::Characters(characters) => Value::character(*characters.get(index)?),
+            ArrayElements::Bytes(bytes) => bytes.get(index).map(|&byte| Value::small(i32::from(byte))),
         }
     }
 
-    /// Those from `start` to before `end`.
+    /// Returns the elements from `start` to before `end`.
     ///
     /// # Panics
     /// If `start` is above `end`, or `end` above the number of elements.
-    pub fn part(self, start: usize, end: usize) -> Elements<'a> {
+    pub fn part(self, start: usize, end: usize) -> ArrayElements<'a> {
         match self {
-            Elements::Values(values) => Elements::Values(&values[start..end]),
-            Elements::Characters(characters) => Elements::Characters(&characters[start..end]),
-            Elements::Bytes(bytes) => Elements::Bytes(&bytes[start..end]),
+            ArrayElements::Values(values) => ArrayElements::Values(&values[start..end]),
+            ArrayElements::Characters(characters) => ArrayElements::Characters(&characters[start..end]),
+            ArrayElements::Bytes(bytes) => ArrayElements::Bytes(&bytes[start..end]),
         }
     }
 }
 
-/// What keeps the elements of an array: the array itself if it is simple.
+/// Returns the data of an array: the array itself if it is simple.
 pub fn data_of(heap: &Heap, array: Value) -> Option<Value> {
     match heap.kind(array)? {
         Kind::SimpleVector | Kind::String | Kind::Bytes => Some(array),
@@ -81,15 +81,15 @@ pub fn data_of(heap: &Heap, array: Value) -> Option<Value> {
     }
 }
 
-/// All elements of an array, those behind a fill pointer too.
-pub fn all_elements(heap: &Heap, array: Value) -> Option<Elements<'_>> {
-    let elements = Elements::of_data(heap, data_of(heap, array)?)?;
+/// Returns all elements of an array, even those behind a fill pointer.
+pub fn all_elements(heap: &Heap, array: Value) -> Option<ArrayElements<'_>> {
+    let elements = ArrayElements::of_data(heap, data_of(heap, array)?)?;
     let size = total_size(heap, array)?.min(elements.len());
     Some(elements.part(0, size))
 }
 
-/// The elements of a vector, up to its fill pointer.
-pub fn vector_elements(heap: &Heap, vector: Value) -> Option<Elements<'_>> {
+/// Returns the elements of a vector, up to its fill pointer.
+pub fn vector_elements(heap: &Heap, vector: Value) -> Option<ArrayElements<'_>> {
     let elements = all_elements(heap, vector)?;
     match heap.array(vector) {
         None => Some(elements),
@@ -101,22 +101,22 @@ pub fn vector_elements(heap: &Heap, vector: Value) -> Option<Elements<'_>> {
     }
 }
 
-/// Number of elements of a vector, up to its fill pointer.
+/// Returns the number of elements of a vector, up to its fill pointer.
 pub fn vector_length(heap: &Heap, vector: Value) -> Option<usize> {
-    vector_elements(heap, vector).map(Elements::len)
+    vector_elements(heap, vector).map(ArrayElements::len)
 }
 
-/// Product of the dimensions.
+/// Returns the product of the dimensions.
 pub fn total_size(heap: &Heap, array: Value) -> Option<usize> {
     match heap.array_dimensions(array) {
         Some(dimensions) => {
             dimensions.iter().try_fold(1usize, |size, v| size.checked_mul(v.as_index().unwrap_or(0)))
         }
-        None => Elements::of_data(heap, array).map(Elements::len),
+        None => ArrayElements::of_data(heap, array).map(ArrayElements::len),
     }
 }
 
-/// The dimensions, as counts.
+/// Returns the dimensions.
 pub fn dimensions(heap: &Heap, array: Value) -> Option<SmallVec<[usize; 4]>> {
     match heap.array_dimensions(array) {
         Some(dimensions) => Some(dimensions.iter().map(|v| v.as_index().unwrap_or(0)).collect()),

@@ -1,10 +1,11 @@
-//! Characters: case, classes and names. A character is a code point below 0x11_0000, surrogates included.
+//! Characters: their case, classes and names. A character is a code point below 0x11_0000; surrogates are
+//! included.
 //!
 //! Case is that of Common Lisp: a letter has case only if it and one other letter are each other's
 //! counterparts. So `ß`, whose upper case is two letters, and `µ`, whose upper case belongs to another
 //! letter, have none.
 
-/// The upper case of a letter that has one; the character itself otherwise.
+/// Returns the upper case of a letter that has one, and any other character itself.
 #[inline]
 pub fn upcase(code: u32) -> u32 {
     if code < 0x80 {
@@ -13,7 +14,7 @@ pub fn upcase(code: u32) -> u32 {
     partner(code, upper)
 }
 
-/// The lower case of a letter that has one; the character itself otherwise.
+/// Returns the lower case of a letter that has one, and any other character itself.
 #[inline]
 pub fn downcase(code: u32) -> u32 {
     if code < 0x80 {
@@ -22,7 +23,7 @@ pub fn downcase(code: u32) -> u32 {
     partner(code, lower)
 }
 
-/// What letters that differ in case only share.
+/// Returns a character that letters differing only in case share.
 #[inline]
 pub fn fold(code: u32) -> u32 {
     downcase(code)
@@ -48,38 +49,39 @@ fn lower(c: char) -> Option<char> {
     if mapped.len() == 1 { mapped.next().filter(|&other| other != c) } else { None }
 }
 
-/// Whether it is a letter with a lower case.
+/// Returns whether `code` is a letter in upper case.
 pub fn is_upper(code: u32) -> bool {
     downcase(code) != code
 }
 
-/// Whether it is a letter with an upper case.
+/// Returns whether `code` is a letter in lower case.
 pub fn is_lower(code: u32) -> bool {
     upcase(code) != code
 }
 
-/// Whether it is a letter.
+/// Returns whether `code` is a letter.
 pub fn is_alphabetic(code: u32) -> bool {
-    // What the standard library calls alphabetic takes in marks that go above letters.
+    // The standard library's alphabetic characters include marks that go above letters.
     char::from_u32(code).is_some_and(char::is_alphabetic) && !(0x300..0x370).contains(&code)
 }
 
-/// Whether it is a letter or a digit.
+/// Returns whether `code` is a letter or a digit.
 pub fn is_alphanumeric(code: u32) -> bool {
     is_alphabetic(code) || char::from_u32(code).is_some_and(char::is_numeric) && !is_small_number(code)
 }
 
-/// Superscripts, fractions, and numbers in circles, which count as numbers but are no digits.
+/// Returns whether `code` is a superscript, a fraction, or a number in a circle. These count as numbers but
+/// are no digits.
 fn is_small_number(code: u32) -> bool {
     matches!(code, 0xB2 | 0xB3 | 0xB9 | 0xBC..=0xBE | 0x2070..=0x209F | 0x2150..=0x218F | 0x2460..=0x24FF | 0x2776..=0x2793)
 }
 
-/// Whether it is not for control.
+/// Returns whether `code` is not a control character.
 pub fn is_graphic(code: u32) -> bool {
     (0x20..0x7F).contains(&code) || code >= 0xA0
 }
 
-/// Whether one can see it, and what it is, where it is printed.
+/// Returns whether one can see the printed character and tell it from others.
 fn is_visible(code: u32) -> bool {
     match char::from_u32(code) {
         Some(c) => !(c.is_control() || c.is_whitespace() || is_invisible(c)),
@@ -87,20 +89,23 @@ fn is_visible(code: u32) -> bool {
     }
 }
 
-/// Marks that show nothing: soft hyphen, joiners, directions, byte order, noncharacters, private use.
+/// Returns whether `c` shows nothing: soft hyphen, joiners, directions, byte order mark, noncharacters,
+/// private use.
 fn is_invisible(c: char) -> bool {
     matches!(c as u32,
         0xAD | 0x200B..=0x200F | 0x202A..=0x202E | 0x2060..=0x206F | 0xFEFF | 0xFFF9..=0xFFFB
         | 0xE000..=0xF8FF | 0xFDD0..=0xFDEF | 0xFFFE | 0xFFFF | 0xE0000..=0xE0FFF | 0xF_0000..=0x10_FFFF)
 }
 
-/// The weight of a digit in `radix`, from 2 to 36, if it is one. Other scripts' digits do not count.
+/// Returns the weight of a digit in `radix`. Digits of other scripts do not count.
+///
+/// # Panics
+/// If `radix` is not between 2 and 36.
 pub fn digit_weight(code: u32, radix: u32) -> Option<u32> {
     char::from_u32(code)?.to_digit(radix)
 }
 
-/// Names of the characters that have no better way to be written; the first for a code is the one that is
-/// printed.
+/// Names of characters that do not print as themselves. The first one for a code is the one that is printed.
 const NAMES: [(u32, &str); 42] = [
     (0, "Nul"),
     (1, "Soh"),
@@ -146,8 +151,8 @@ const NAMES: [(u32, &str); 42] = [
     (127, "Del"),
 ];
 
-/// The name of a character: a word for those that show nothing, `U` and its code in hexadecimal for other
-/// ones that do not print as themselves. Characters that do have none.
+/// Returns the name of a character that does not print as itself: a word if the table above has one, else `U`
+/// and its code in hexadecimal.
 pub fn name(code: u32) -> Option<String> {
     if let Some((_, name)) = NAMES.iter().find(|&&(named, _)| named == code) {
         return Some((*name).into());
@@ -155,7 +160,7 @@ pub fn name(code: u32) -> Option<String> {
     if is_visible(code) { None } else { Some(format!("U{code:X}")) }
 }
 
-/// The character with this name, in any case.
+/// Returns the character with this name, in any case.
 pub fn named(name: &str) -> Option<u32> {
     if let Some(&(code, _)) = NAMES.iter().find(|(_, known)| known.eq_ignore_ascii_case(name)) {
         return Some(code);

@@ -1,33 +1,34 @@
-//! When objects count as the same: `eq`, `eql`, `equal`, `equalp`, and hashes that agree with them.
+//! Equality of objects: `eq`, `eql`, `equal`, `equalp`, and hashes that agree with them.
 //!
-//! Guarantees: no native stack in proportion to depth; a comparison stops when the work it was given is used
-//! up, and says so; a hash looks at a bounded part of an object. Equal objects have equal hashes, and the
-//! hashes of a run are the same in every run of the same program. Not here: functions of the program as
-//! tests, which ESL calls; hash tables and `equalp`, where ESL compares as soon as two different tables meet.
+//! Guarantees: the native stack does not grow with the depth of objects. A comparison stops when it has used
+//! up the work it was given, and says so; a hash looks at a bounded part of an object. Equal objects have
+//! equal hashes, and the hashes of a run are the same in every run of the same program.
+//! Not here: tests that are functions of the program, which ESL calls; `equalp` of two hash tables, which ESL
+//! compares.
 
 use smallvec::{SmallVec, smallvec};
 
-use crate::array::{Elements, all_elements, vector_elements};
+use crate::array::{ArrayElements, all_elements, vector_elements};
 use crate::character;
 use crate::heap::{Heap, Kind};
 use crate::number;
 use crate::value::Value;
 
-/// The tests that the machine knows.
+/// A test that the machine knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Test {
-    /// One object.
+    /// The same object.
     Eq,
-    /// One object, or numbers of one type and value.
+    /// The same object, or numbers of one type and value.
     Eql,
     /// The same structure of pairs and strings.
     Equal,
-    /// The same structure; case of letters and type of numbers do not matter.
+    /// The same structure; neither the case of letters nor the type of numbers matters.
     Equalp,
 }
 
-/// Whether `a` and `b` are the same by `test`. `None` when that takes more than `work`, from which what was
-/// done is taken, or when only ESL can tell.
+/// Returns whether `a` and `b` are equal by `test`, and takes the work done from `work`. `None` if there is
+/// more work than that, or only ESL can tell.
 #[inline]
 pub fn same(heap: &Heap, test: Test, a: Value, b: Value, work: &mut usize) -> Option<bool> {
     if a == b {
@@ -36,7 +37,7 @@ pub fn same(heap: &Heap, test: Test, a: Value, b: Value, work: &mut usize) -> Op
     match test {
         Test::Eq => Some(false),
         Test::Eql => Some(number::eql(heap, a, b)),
-        // What is no address has no inside.
+        // A value without an address has no inside.
         Test::Equal if !(a.is_address() && b.is_address()) => Some(false),
         _ => walk(heap, test == Test::Equalp, a, b, work),
     }
@@ -67,13 +68,13 @@ fn walk(heap: &Heap, loosely: bool, a: Value, b: Value, work: &mut usize) -> Opt
     Some(true)
 }
 
-/// The characters of a string, up to its fill pointer.
+/// Returns the characters of a string, up to its fill pointer.
 pub fn characters_of(heap: &Heap, v: Value) -> Option<&[u32]> {
     if let Some(characters) = heap.string(v) {
         return Some(characters);
     }
     match vector_elements(heap, v)? {
-        Elements::Characters(characters) => Some(characters),
+        ArrayElements::Characters(characters) => Some(characters),
         _ => None,
     }
 }
@@ -87,7 +88,7 @@ fn same_strings(heap: &Heap, a: Value, b: Value, work: &mut usize) -> Option<boo
     Some(a == b)
 }
 
-/// One pair of objects by `equalp`; the pairs of their parts go to `open`.
+/// Compares one pair of objects by `equalp`; the pairs of their parts go to `open`.
 fn loosely_same(
     heap: &Heap,
     a: Value,
@@ -133,7 +134,7 @@ fn same_arrays(
     if left.len() != right.len() {
         return Some(false);
     }
-    if let (Elements::Characters(left), Elements::Characters(right)) = (left, right) {
+    if let (ArrayElements::Characters(left), ArrayElements::Characters(right)) = (left, right) {
         *work = work.checked_sub(left.len() / 16)?;
         return Some(
             left.iter().zip(right).all(|(&a, &b)| a == b || character::fold(a) == character::fold(b)),
@@ -144,9 +145,9 @@ fn same_arrays(
     Some(true)
 }
 
-/// Parts of an object that its hash looks at.
+/// Number of parts of an object that its hash looks at.
 const HASHED_PARTS: usize = 64;
-/// Characters of a string that its hash looks at.
+/// Number of characters of a string that its hash looks at.
 const HASHED_CHARACTERS: usize = 4096;
 
 /// Mixes a word into a hash.
@@ -161,16 +162,16 @@ fn finish(hash: u64) -> u32 {
     ((hash >> 32) ^ hash) as u32
 }
 
-/// A hash of a fixnum in which sixteen neighbours stay neighbours: keys are often numbers that a program
-/// counts up, and a table then finds them in one place of memory. Their order there is mixed as well, so that
-/// no step between keys makes hashes that share their low bits.
+/// Returns a hash of a fixnum that keeps sixteen neighbours together: programs often count their keys up, and
+/// a table then finds them in one place of memory. The order of the sixteen is mixed too, so that hashes do
+/// not share their low bits, whatever the step between keys.
 #[inline]
 pub fn fixnum_hash(n: i64) -> u32 {
     let group = finish(mix(0, (n >> 4) as u64));
     group << 4 | (n as u32 ^ group >> 28) & 15
 }
 
-/// A hash of `v` that agrees with `test`.
+/// Returns a hash of `v` that agrees with `test`.
 #[inline(always)]
 pub fn hash(heap: &Heap, test: Test, v: Value) -> u32 {
     match v.as_fixnum() {
@@ -179,7 +180,7 @@ pub fn hash(heap: &Heap, test: Test, v: Value) -> u32 {
     }
 }
 
-/// A hash of what is no fixnum, or is compared by `equalp`.
+/// Returns a hash of a value that is not a fixnum, or is compared by `equalp`.
 fn other_hash(heap: &Heap, test: Test, v: Value) -> u32 {
     if test == Test::Equal
         && let Some(characters) = heap.string(v)
@@ -198,7 +199,8 @@ fn other_hash(heap: &Heap, test: Test, v: Value) -> u32 {
     finish(mix(0, word))
 }
 
-/// What `sxhash` gives: as the hash of `equal`, and the same for a symbol of the same name in another run.
+/// Returns the value of `sxhash`: the hash of `equal`, but for a symbol one that depends on its name alone,
+/// so that it is the same in every run.
 pub fn sxhash(heap: &Heap, v: Value) -> u32 {
     match heap.symbol(v).and_then(|symbol| heap.string(symbol.name)) {
         Some(name) => finish(characters_hash(name, false)),
@@ -206,7 +208,7 @@ pub fn sxhash(heap: &Heap, v: Value) -> u32 {
     }
 }
 
-/// A number that equal numbers of one type share; `None` for what is no boxed number.
+/// Returns a hash word that equal numbers of one type share; `None` if `v` is not a boxed number.
 fn number_hash(heap: &Heap, v: Value) -> Option<u64> {
     let limbs = |v: Value, hash: u64| match heap.bignum(v) {
         Some(n) => n.limbs.iter().fold(mix(hash, u64::from(n.negative)), |hash, &limb| mix(hash, limb)),
@@ -220,7 +222,7 @@ fn number_hash(heap: &Heap, v: Value) -> Option<u64> {
     }
 }
 
-/// A number that numbers of equal value share, whatever their type.
+/// Returns a hash word that numbers of equal value share, whatever their type.
 fn value_hash(heap: &Heap, v: Value) -> u64 {
     match number::exact_double(heap, v) {
         // Minus zero is zero.
@@ -246,8 +248,8 @@ fn characters_hash(characters: &[u32], loosely: bool) -> u64 {
     }
 }
 
-/// The hash of pairs, strings and, `loosely`, arrays and structures, from the first parts in the order of
-/// reading.
+/// Returns the hash word of a pair or string, or if `loosely` of an array or structure, from its first parts
+/// in reading order.
 fn parts_hash(heap: &Heap, v: Value, loosely: bool) -> u64 {
     let mut open: SmallVec<[Value; 16]> = smallvec![v];
     let mut hash = 0;
@@ -280,7 +282,7 @@ fn loose_hash(heap: &Heap, v: Value, hash: u64, open: &mut SmallVec<[Value; 16]>
         return mix(hash, value_hash(heap, v));
     }
     if let Some(elements) = vector_elements(heap, v).or_else(|| all_elements(heap, v)) {
-        // A string and a vector of the same characters are the same: elements are hashed one by one.
+        // A string equals a vector of the same characters, so elements are hashed one by one.
         let shown = elements.len().min(HASHED_PARTS);
         open.extend((0..shown).rev().filter_map(|index| elements.get(index)));
         return mix(hash, elements.len() as u64);
@@ -296,7 +298,8 @@ fn loose_hash(heap: &Heap, v: Value, hash: u64, open: &mut SmallVec<[Value; 16]>
     }
 }
 
-/// The hash that a program has given: `low` is the lowest limb of the magnitude of an integer.
+/// Returns the hash for an integer that a hash function of the program has returned; `low` is the lowest limb
+/// of its magnitude.
 pub fn given_hash(low: u64) -> u32 {
     finish(mix(0, low))
 }

@@ -1,10 +1,10 @@
-//! Addresses of instructions, kept for the time when their task runs again.
+//! Addresses at which tasks go on, saved while they do not run.
 
 #![allow(unsafe_code)]
 
 /// Address of an instruction in code or in a stub, or no address.
 ///
-/// To follow one is up to whoever runs the code, and unsafe; anybody may store and compare them.
+/// Anybody may store and compare saved addresses. To follow one is unsafe, and up to whoever runs the code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SavedPc(*const u32);
 

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Frames overlap: the window of a call becomes the callee's frame. Nothing in the heap points into a stack,
-//! so growing one is a copy.
+//! so to grow one is to copy it.
 //!
 //! Invariants:
 //! 1. Every word from the start to `capacity` is initialised and reads as a valid [`Value`]: a return pc has
@@ -22,7 +22,7 @@ use std::ptr::NonNull;
 use crate::list_state;
 use crate::value::Value;
 
-/// A stack.
+/// Register stack of a task.
 pub struct Stack {
     start: NonNull<Value>,
     capacity: u32,
@@ -35,10 +35,10 @@ list_state! { Stack { start: Run, capacity: Run } }
 unsafe impl Send for Stack {}
 
 /// Words of the smallest stack. With the word that an allocator takes for itself it fills a block of 128
-/// bytes, and so do the others.
+/// bytes; the other sizes fill blocks likewise.
 const SMALLEST: usize = 15;
 
-/// The words of the segment that holds at least `words` words: 15, 23, 31, 47, 63, 95, ...
+/// Returns the size of the smallest segment with at least `words` words: 15, 23, 31, 47, 63, 95, …
 fn segment(words: usize) -> usize {
     assert!(words < 1 << 31, "a stack has less than 2^31 words");
     let power = (words + 1).max(SMALLEST + 1).next_power_of_two();
@@ -47,7 +47,7 @@ fn segment(words: usize) -> usize {
 }
 
 impl Stack {
-    /// A stack of nils with at least `words` words.
+    /// Creates a stack of at least `words` words, all `nil`.
     ///
     /// # Panics
     /// If `words` is not below 2^31.
@@ -56,24 +56,24 @@ impl Stack {
         Stack { start: allocate(capacity), capacity: capacity as u32 }
     }
 
-    /// A stack without words, in the place of one that is taken away.
+    /// Creates a stack without words, to stand in for one that was taken away.
     pub const fn none() -> Stack {
         Stack { start: NonNull::dangling(), capacity: 0 }
     }
 
-    /// Address of the first word.
+    /// Returns the address of the first word.
     #[inline(always)]
     pub fn start(&self) -> *mut Value {
         self.start.as_ptr()
     }
 
-    /// Number of words.
+    /// Returns the number of words.
     #[inline(always)]
     pub fn capacity(&self) -> usize {
         self.capacity as usize
     }
 
-    /// Makes room for at least `words` words, keeping the contents. Moves the stack.
+    /// Makes room for at least `words` words and keeps the contents. The stack moves.
     ///
     /// # Panics
     /// If `words` is not below 2^31.
@@ -81,7 +81,7 @@ impl Stack {
         self.move_to(segment(words.max(self.capacity() + self.capacity() / 4)));
     }
 
-    /// Gives back what is not needed for the words below `top`. Moves the stack.
+    /// Gives back the memory that the words below `top` do not need. The stack moves.
     pub fn shrink(&mut self, top: usize) {
         self.move_to(segment(top));
     }
@@ -98,16 +98,16 @@ impl Stack {
         self.capacity = capacity as u32;
     }
 
-    /// Clears everything from `top` on, so that what is below is all that a scan sees.
+    /// Sets all words from `top` on to `nil`, so that a scan sees only those below.
     pub fn wipe(&mut self, top: usize) {
-        // The interpreter does not note how high it has written: that would cost each call a store.
+        // The interpreter does not note how high it has written, since that would cost each call a store.
         for index in top..self.capacity() {
             // SAFETY: the index is below the capacity, so the word lies in the segment.
             unsafe { self.start.as_ptr().add(index).write(Value::NIL) };
         }
     }
 
-    /// The words below `top`.
+    /// Returns the words below `top`.
     pub fn words(&self, top: usize) -> &[Value] {
         debug_assert!(top <= self.capacity());
         // SAFETY: invariant 1: every word below the capacity is a value; the slice borrows the stack.
@@ -125,7 +125,7 @@ fn layout(words: usize) -> Layout {
     Layout::array::<Value>(words).expect("a stack is far smaller than the address space")
 }
 
-/// Gives back the memory of a stack, which has some unless it is a stack without words.
+/// Gives back a segment, unless it has no words.
 fn free(start: NonNull<Value>, words: usize) {
     if words > 0 {
         // SAFETY: `allocate` made every segment with words, with this layout; its owner uses it no longer.

@@ -1,37 +1,38 @@
 //! The list of all state: what each field of the machine means for a run.
 //!
 //! [`list_state!`](crate::list_state) lists the fields of a struct, in any module that sees them. It takes
-//! the struct apart without `..`, so a new field does not compile until the list gives it a [`Role`]. A field
-//! that consists of listed structs has the role `Parts`, which compiles only if they are listed too. So
+//! the struct apart without `..`, so a new field does not compile until the list gives it a [`FieldRole`]. A
+//! field that consists of listed structs has the role `Parts`, which compiles only if they are listed too. So
 //! [`Listed::FIELDS`] of a struct is a tree of everything that it owns.
 //!
 //! Guarantees: the tree is complete. Code that compares, saves or copies a machine can be checked against it.
 
-/// What a field is to a run.
+/// Meaning of a field for a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// State of the run: two machines that differ here may go on differently.
+pub enum FieldRole {
+    /// State of the run: two machines that differ here may behave differently.
     Run,
-    /// Follows from other fields; kept to save time.
+    /// Follows from other fields, and is kept to save time.
     Derived,
-    /// Belongs to the process: an address, a handle, a cache. A run goes on alike with another one.
+    /// Belongs to the process: an address, a handle, a cache. Another one in its place makes no difference to
+    /// the run.
     Process,
-    /// Made of structs that are listed themselves.
+    /// Made of structs that are listed themselves; these are their fields.
     Parts(&'static [Field]),
 }
 
-/// One field of a listed struct.
+/// A field of a listed struct.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// Its name in the source.
+    /// Name in the source.
     pub name: &'static str,
-    /// What it is to a run.
-    pub role: Role,
+    /// Meaning for a run.
+    pub role: FieldRole,
 }
 
-/// A struct whose fields are all listed, by [`list_state!`](crate::list_state).
+/// A struct whose fields are all listed by [`list_state!`](crate::list_state).
 pub trait Listed {
-    /// The fields, in the order of the list.
+    /// Fields, in the order of the list.
     const FIELDS: &'static [Field];
 }
 
@@ -55,14 +56,14 @@ impl<T: Listed + ?Sized> Listed for Box<T> {
     const FIELDS: &'static [Field] = T::FIELDS;
 }
 
-/// Returns the fields of the struct that a field of another one is made of.
-pub const fn parts_of<Owner, Part: Listed>(_field: fn(&Owner) -> &Part) -> Role {
-    Role::Parts(Part::FIELDS)
+/// Returns the role of a field that consists of listed structs.
+pub const fn parts_of<Owner, Part: Listed>(_field: fn(&Owner) -> &Part) -> FieldRole {
+    FieldRole::Parts(Part::FIELDS)
 }
 
 /// Lists the fields of a struct: `list_state! { Pacing { floor: Run, threshold: Run } }`.
 ///
-/// The words are those of [`Role`](crate::state::Role).
+/// The words are those of [`FieldRole`](crate::state::FieldRole).
 #[macro_export]
 macro_rules! list_state {
     ($owner:ident { $( $field:tt : $role:ident ),* $(,)? }) => {
@@ -80,7 +81,7 @@ macro_rules! list_state {
         }
     };
     (@role $owner:ident $field:tt Parts) => { $crate::state::parts_of(|whole: &$owner| &whole.$field) };
-    (@role $owner:ident $field:tt $role:ident) => { $crate::state::Role::$role };
+    (@role $owner:ident $field:tt $role:ident) => { $crate::state::FieldRole::$role };
 }
 
 #[cfg(test)]
@@ -105,12 +106,14 @@ mod tests {
 
     #[test]
     fn a_list_is_a_tree_of_fields() {
-        let inner: &[Field] =
-            &[Field { name: "count", role: Role::Run }, Field { name: "_address", role: Role::Process }];
+        let inner: &[Field] = &[
+            Field { name: "count", role: FieldRole::Run },
+            Field { name: "_address", role: FieldRole::Process },
+        ];
         assert_eq!(Inner::FIELDS, inner);
-        assert_eq!(Outer::FIELDS[0], Field { name: "inner", role: Role::Parts(inner) });
-        assert_eq!(Outer::FIELDS[1], Field { name: "total", role: Role::Derived });
-        assert_eq!(Single::FIELDS, [Field { name: "0", role: Role::Parts(inner) }]);
+        assert_eq!(Outer::FIELDS[0], Field { name: "inner", role: FieldRole::Parts(inner) });
+        assert_eq!(Outer::FIELDS[1], Field { name: "total", role: FieldRole::Derived });
+        assert_eq!(Single::FIELDS, [Field { name: "0", role: FieldRole::Parts(inner) }]);
         let whole = Outer { inner: vec![Some(Inner { count: 1, _address: 0 })], total: 1 };
         assert_eq!(whole.inner.iter().flatten().map(|inner| inner.count).sum::<u32>(), whole.total);
         assert_eq!(Single(Inner { count: 2, _address: 0 }).0.count, 2);

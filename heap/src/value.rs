@@ -10,17 +10,17 @@
 //!      110   handle                generation in bits 3..32, index in bits 32..64
 //! ```
 //!
-//! Guarantees: two values are `eq` in the language exactly when their words are equal, except that nothing is
-//! promised about boxed numbers; every word that safe code can make is either free of addresses or was handed
-//! out by the heap. Truth is one compare with [`Value::NIL`]. Fixnums add, subtract and compare without
-//! untagging, a test of two fixnums is `(a | b) & 3 == 0`, of two immediate doubles `a & b & 3 == 3`.
+//! Guarantees: two values are `eq` in the language exactly when their words are equal; nothing is promised
+//! about boxed numbers. A word that safe code can make either has no address in it or comes from the heap.
+//! Truth is one comparison with [`Value::NIL`]. Fixnums are added, subtracted and compared without untagging;
+//! the test for two fixnums is `(a | b) & 3 == 0`, that for two immediate doubles `a & b & 3 == 3`.
 //!
-//! A raw pointer to an instruction has its two low bits clear, so the collector takes it for a fixnum; that
-//! is why a stack may hold return addresses between values.
+//! The two low bits of an instruction's address are clear, so the collector takes it for a fixnum; therefore
+//! a stack may hold return addresses between values.
 //!
-//! Not here: following an address (`heap`), doubles outside the window and big integers (boxed, `heap`), the
-//! names and property lists of `nil` and `t`, whose symbol objects the VM keeps aside: in programs
-//! [`Value::NIL`] and [`Value::T`] are their only representation.
+//! Not here: following an address (`heap`); doubles outside the window and big integers, which are boxed
+//! (`heap`); names and property lists of `nil` and `t`. The VM keeps symbol objects for these two aside: in
+//! programs [`Value::NIL`] and [`Value::T`] are their only representation.
 //!
 //! Unsafe invariants:
 //! 1. A word tagged as cons or object was made from the address of a live object of the heap of this VM
@@ -76,18 +76,19 @@ const fn immediate(sub: u64, payload: u64) -> Value {
 }
 
 impl Value {
-    /// What moves the exponents of the window to the two patterns that the rotation turns into the tag.
+    /// Added to the bits of a double to move the exponents of the window to the two patterns that the
+    /// rotation turns into the tag.
     pub const DOUBLE_BIAS: u64 = 3 << 60;
 
     /// The empty list and falsehood.
     pub const NIL: Value = immediate(SUB_NIL, 0);
     /// Truth.
     pub const T: Value = immediate(SUB_T, 0);
-    /// What a variable without a value holds. Never seen by a program.
+    /// Content of a variable without a value. Never seen by a program.
     pub const UNBOUND: Value = immediate(SUB_UNBOUND, 0);
-    /// What a parameter holds for which no argument was given. Never seen by a program.
+    /// Content of a parameter that got no argument. Never seen by a program.
     pub const UNSUPPLIED: Value = immediate(SUB_UNSUPPLIED, 0);
-    /// What reading past the end gives inside the VM.
+    /// Result of reading past the end. Never seen by a program.
     pub const EOF: Value = immediate(SUB_EOF, 0);
     /// The double `+0.0`.
     pub const POSITIVE_ZERO: Value = immediate(SUB_POSITIVE_ZERO, 0);
@@ -97,9 +98,9 @@ impl Value {
     pub const INFINITY: Value = immediate(SUB_INFINITY, 0);
     /// The double negative infinity.
     pub const NEGATIVE_INFINITY: Value = immediate(SUB_NEGATIVE_INFINITY, 0);
-    /// The one double that is not a number; payloads of other NaNs are dropped.
+    /// The only NaN; payloads of other NaNs are dropped.
     pub const NAN: Value = immediate(SUB_NAN, 0);
-    /// What debug builds write over freed memory. No live object holds it.
+    /// Written over freed memory by debug builds. No live object holds it.
     pub const POISON: Value = immediate(SUB_POISON, 0xBAD_F00D);
 
     /// Least fixnum, −2^61.
@@ -111,16 +112,17 @@ impl Value {
     /// One more than the greatest generation of a handle.
     pub const GENERATION_LIMIT: u32 = 1 << 29;
 
-    /// The word itself, for tables keyed by identity of what is not an address, and for the interpreter.
+    /// Returns the word itself, for the interpreter and for tables keyed by the identity of what has no
+    /// address.
     ///
-    /// An address must not decide anything that a program can see; see `Heap::identity` for a number that
-    /// may.
+    /// An address must not decide anything that a program can see; see
+    /// [`Heap::identity`](crate::Heap::identity) for a number that may.
     #[inline(always)]
     pub const fn bits(self) -> u64 {
         self.0
     }
 
-    /// Takes a word as a value.
+    /// Returns the value with this word.
     ///
     /// # Safety
     /// The word was made by [`Value::bits`], or it has neither the tag of a cons nor that of an object.
@@ -131,47 +133,47 @@ impl Value {
 
     // Fixnums.
 
-    /// The fixnum `n`, or nothing when `n` does not fit into 62 bits.
+    /// Returns the fixnum `n`; `None` if `n` does not fit into 62 bits.
     #[inline(always)]
     pub const fn fixnum(n: i64) -> Option<Value> {
         if n >= Self::FIXNUM_MIN && n <= Self::FIXNUM_MAX { Some(Value((n << 2) as u64)) } else { None }
     }
 
-    /// The fixnum `n`; for counts and small constants.
+    /// Returns the fixnum `n`, for counts and small constants.
     #[inline(always)]
     pub const fn small(n: i32) -> Value {
         Value(((n as i64) << 2) as u64)
     }
 
-    /// The length or index `n`.
+    /// Returns the fixnum for a length or index.
     ///
     /// # Panics
-    /// In debug builds, when `n` is not below 2^61, which no length is.
+    /// In debug builds, if `n` is not below 2^61. No length reaches that.
     #[inline(always)]
     pub const fn index(n: usize) -> Value {
         debug_assert!(n as u64 <= Self::FIXNUM_MAX as u64);
         Value((n as u64) << 2)
     }
 
-    /// Whether this is a fixnum.
+    /// Returns whether this is a fixnum.
     #[inline(always)]
     pub const fn is_fixnum(self) -> bool {
         self.0 & 3 == 0
     }
 
-    /// Whether both are fixnums, in one test.
+    /// Returns whether both are fixnums, in one test.
     #[inline(always)]
     pub const fn both_fixnums(a: Value, b: Value) -> bool {
         (a.0 | b.0) & 3 == 0
     }
 
-    /// The integer, if this is a fixnum.
+    /// Returns the integer, if this is a fixnum.
     #[inline(always)]
     pub const fn as_fixnum(self) -> Option<i64> {
         if self.is_fixnum() { Some(self.0 as i64 >> 2) } else { None }
     }
 
-    /// The integer, if this is a fixnum and not negative and fits an index.
+    /// Returns the integer, if this is a fixnum that is not negative.
     #[inline(always)]
     pub const fn as_index(self) -> Option<usize> {
         if self.is_fixnum() && self.0 as i64 >= 0 { Some((self.0 >> 2) as usize) } else { None }
@@ -179,16 +181,16 @@ impl Value {
 
     // Doubles.
 
-    /// The double `x` if it needs no box: inside the window, zero, infinite, or not a number.
+    /// Returns the double `x`, if it needs no box: inside the window, zero, infinite, or not a number.
     ///
-    /// `Heap::float` takes every double.
+    /// [`Heap::float`](crate::Heap::float) takes every double.
     #[inline(always)]
     pub const fn double(x: f64) -> Option<Value> {
         let word = x.to_bits().wrapping_add(Self::DOUBLE_BIAS).rotate_left(3);
         if word & 3 == 3 { Some(Value(word)) } else { Self::special_double(x) }
     }
 
-    /// The doubles that have a constant of their own.
+    /// Returns a double that has a constant of its own.
     #[cold]
     const fn special_double(x: f64) -> Option<Value> {
         const NEGATIVE_ZERO_BITS: u64 = 1 << 63;
@@ -201,25 +203,28 @@ impl Value {
         }
     }
 
-    /// Whether this is a double inside the window. Zero, the infinities and NaN are not, nor are boxed ones.
+    /// Returns whether this is a double inside the window. Zero, the infinities, NaN and boxed doubles are
+    /// not.
     #[inline(always)]
     pub const fn is_windowed_double(self) -> bool {
         self.0 & 3 == 3
     }
 
-    /// Whether both are doubles inside the window, in one test.
+    /// Returns whether both are doubles inside the window, in one test.
     #[inline(always)]
     pub const fn both_windowed_doubles(a: Value, b: Value) -> bool {
         a.0 & b.0 & 3 == 3
     }
 
-    /// The double of a value of which [`Value::is_windowed_double`] is true; any other gives some number.
+    /// Returns the double, for a value that [`Value::is_windowed_double`]; any other gives an arbitrary
+    /// number.
     #[inline(always)]
     pub const fn windowed_double(self) -> f64 {
         f64::from_bits(self.0.rotate_right(3).wrapping_sub(Self::DOUBLE_BIAS))
     }
 
-    /// The double, if this is one without a box. `Heap::as_double` knows the boxed ones too.
+    /// Returns the double, if this is one without a box. [`Heap::as_double`](crate::Heap::as_double) knows
+    /// boxed ones too.
     #[inline(always)]
     pub const fn as_double(self) -> Option<f64> {
         if self.is_windowed_double() { Some(self.windowed_double()) } else { self.as_special_double() }
@@ -239,64 +244,64 @@ impl Value {
 
     // Immediates.
 
-    /// `t` for true, `nil` for false.
+    /// Returns `t` for true, `nil` for false.
     #[inline(always)]
     pub const fn boolean(b: bool) -> Value {
         if b { Self::T } else { Self::NIL }
     }
 
-    /// Whether this is `nil`.
+    /// Returns whether this is `nil`.
     #[inline(always)]
     pub const fn is_nil(self) -> bool {
         self.0 == Self::NIL.0
     }
 
-    /// Whether this is anything but `nil`.
+    /// Returns whether this is anything but `nil`.
     #[inline(always)]
     pub const fn is_true(self) -> bool {
         !self.is_nil()
     }
 
-    /// The character with this code, or nothing at [`Value::CHARACTER_LIMIT`] and above. Surrogates are
-    /// characters, as they are in SBCL.
+    /// Returns the character with this code; `None` from [`Value::CHARACTER_LIMIT`] on. Surrogates are
+    /// characters, as in SBCL.
     #[inline(always)]
     pub const fn character(code: u32) -> Option<Value> {
         if code < Self::CHARACTER_LIMIT { Some(immediate(SUB_CHARACTER, code as u64)) } else { None }
     }
 
-    /// Whether this is a character.
+    /// Returns whether this is a character.
     #[inline(always)]
     pub const fn is_character(self) -> bool {
         self.0 & 0xFF == SUB_CHARACTER << 3 | TAG_IMMEDIATE
     }
 
-    /// The code, if this is a character.
+    /// Returns the code, if this is a character.
     #[inline(always)]
     pub const fn as_character(self) -> Option<u32> {
         if self.is_character() { Some((self.0 >> 8) as u32) } else { None }
     }
 
-    // What only the logical database sees.
+    // Terms of the logical database.
 
-    /// The entry with this index among the terms of the database. Never seen by a program.
+    /// Returns the entry with this index among the terms of the database. Never seen by a program.
     #[inline(always)]
     pub const fn term(index: u32) -> Value {
         immediate(SUB_TERM, index as u64)
     }
 
-    /// The index, if this is an entry among the terms of the database.
+    /// Returns the index, if this is an entry among the terms of the database.
     #[inline(always)]
     pub const fn as_term(self) -> Option<u32> {
         if self.0 & 0xFF == SUB_TERM << 3 | TAG_IMMEDIATE { Some((self.0 >> 8) as u32) } else { None }
     }
 
-    /// The logical variable with this number. Never seen by a program.
+    /// Returns the logical variable with this number. Never seen by a program.
     #[inline(always)]
     pub const fn variable(number: u32) -> Value {
         immediate(SUB_VARIABLE, number as u64)
     }
 
-    /// The number, if this is a logical variable.
+    /// Returns the number, if this is a logical variable.
     #[inline(always)]
     pub const fn as_variable(self) -> Option<u32> {
         if self.0 & 0xFF == SUB_VARIABLE << 3 | TAG_IMMEDIATE { Some((self.0 >> 8) as u32) } else { None }
@@ -304,7 +309,7 @@ impl Value {
 
     // Handles.
 
-    /// The handle with this index and generation, or nothing at [`Value::GENERATION_LIMIT`] and above.
+    /// Returns the handle with this index and generation; `None` from [`Value::GENERATION_LIMIT`] on.
     #[inline(always)]
     pub const fn handle(index: u32, generation: u32) -> Option<Value> {
         if generation < Self::GENERATION_LIMIT {
@@ -314,7 +319,7 @@ impl Value {
         }
     }
 
-    /// Index and generation, if this is a handle.
+    /// Returns index and generation, if this is a handle.
     #[inline(always)]
     pub const fn as_handle(self) -> Option<(u32, u32)> {
         if self.0 & TAG_MASK == TAG_HANDLE {
@@ -324,59 +329,59 @@ impl Value {
         }
     }
 
-    // Addresses. Following one is the business of `heap` and the interpreter.
+    // Addresses, which the heap and the interpreter follow.
 
-    /// Whether this is a cons.
+    /// Returns whether this is a cons.
     #[inline(always)]
     pub const fn is_cons(self) -> bool {
         self.0 & TAG_MASK == TAG_CONS
     }
 
-    /// Whether this is a cons or `nil`.
+    /// Returns whether this is a cons or `nil`.
     #[inline(always)]
     pub const fn is_list(self) -> bool {
         self.is_cons() || self.is_nil()
     }
 
-    /// Whether this is an object with a header; its kind is asked of the heap.
+    /// Returns whether this is an object with a header; the heap knows its kind.
     #[inline(always)]
     pub const fn is_object(self) -> bool {
         self.0 & TAG_MASK == TAG_OBJECT
     }
 
-    /// Whether this is an address: a cons or an object. The collector follows these and no others.
+    /// Returns whether this is an address: a cons or an object. The collector follows these and no others.
     #[inline(always)]
     pub const fn is_address(self) -> bool {
         self.0 & 3 == 1
     }
 
-    /// The address of the cons, if this is one.
+    /// Returns the address of the cons, if this is one.
     #[inline(always)]
     pub fn as_cons_ptr(self) -> Option<*mut Cons> {
         if self.is_cons() { Some(self.cons_ptr()) } else { None }
     }
 
-    /// The address of the object, if this is one.
+    /// Returns the address of the object, if this is one.
     #[inline(always)]
     pub fn as_object_ptr(self) -> Option<*mut Header> {
         if self.is_object() { Some(self.object_ptr()) } else { None }
     }
 
-    /// The address of the cons; without meaning unless this is one.
+    /// Returns the address of the cons; any other value gives an address without meaning.
     #[inline(always)]
     pub fn cons_ptr(self) -> *mut Cons {
         debug_assert!(self.is_cons());
         std::ptr::with_exposed_provenance_mut((self.0 - TAG_CONS) as usize)
     }
 
-    /// The address of the object; without meaning unless this is one.
+    /// Returns the address of the object; any other value gives an address without meaning.
     #[inline(always)]
     pub fn object_ptr(self) -> *mut Header {
         debug_assert!(self.is_object());
         std::ptr::with_exposed_provenance_mut((self.0 - TAG_OBJECT) as usize)
     }
 
-    /// The cons at `cons`.
+    /// Returns the value for the cons at `cons`.
     ///
     /// # Safety
     /// `cons` is the address of an initialised cons in the heap of this VM.
@@ -387,7 +392,7 @@ impl Value {
         Value(address + TAG_CONS)
     }
 
-    /// The object at `object`.
+    /// Returns the value for the object at `object`.
     ///
     /// # Safety
     /// `object` is the address of an object in the heap of this VM, all of it initialised.
@@ -405,7 +410,8 @@ impl From<bool> for Value {
     }
 }
 
-/// For developers: the tag and what the word alone tells. Addresses are shown, so no program may see this.
+/// For developers: shows the tag and the content of the word. Addresses are shown, so no program may see
+/// this.
 impl fmt::Debug for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(n) = self.as_fixnum() {

@@ -110,11 +110,11 @@ fn read(files: &[PathBuf]) -> Result<Vec<Source>, u8> {
     files.iter().map(|file| command::read_source(file)).collect()
 }
 
-/// Compiles sources and prints the diagnostics. Returns the program, unless there was an error.
-fn compiled(sources: &[Source], path: &ModulePath, modules: Modules, style: &Style) -> Result<Program, u8> {
+/// Compiles sources and prints the diagnostics. Returns the program, if there was no error.
+fn compiled(sources: &[Source], path: &ModulePath, modules: Modules, style: &Style) -> Result<Compiled, u8> {
     let compiled = program::compile_with(sources, path, modules);
     print_diagnostics(&compiled, style);
-    compiled.program.ok_or(NOT_COMPILED)
+    if compiled.has_errors() { Err(NOT_COMPILED) } else { Ok(compiled) }
 }
 
 fn print_diagnostics(compiled: &Compiled, style: &Style) {
@@ -137,8 +137,12 @@ fn compile(
     modules: Modules,
     style: &Style,
 ) -> Result<u8, u8> {
-    let program = compiled(&read(files)?, path, modules, style)?;
-    write(&program, output)
+    let sources = read(files)?;
+    command::refuse_overwriting(output, files.iter().map(PathBuf::as_path))?;
+    let compiled = compiled(&sources, path, modules, style)?;
+    // The modules that it requires are known now.
+    command::refuse_overwriting(output, compiled.sources.names().map(Path::new))?;
+    write(&compiled.program.ok_or(NOT_COMPILED)?, output)
 }
 
 fn compile_each(files: &[PathBuf], folders: &[PathBuf], style: &Style) -> Result<u8, u8> {
@@ -181,7 +185,9 @@ fn check(files: &[PathBuf], path: &ModulePath, style: &Style) -> Result<u8, u8> 
 fn disassemble(file: &Path, path: &ModulePath, style: &Style) -> Result<u8, u8> {
     let program = match command::read_program(file)? {
         ProgramFile::Compiled(program) => program,
-        ProgramFile::Source(source) => compiled(&[source], path, Modules::Apart, style)?,
+        ProgramFile::Source(source) => {
+            compiled(&[source], path, Modules::Apart, style)?.program.ok_or(NOT_COMPILED)?
+        }
     };
     print(&program.disassemble())
 }

@@ -9,11 +9,12 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand};
 use esl::Config;
 use esl::command::{self, NOT_COMPILED, ProgramFile, USAGE, complain};
-use esl::host::{FileAccess, RealHost};
+use esl::host::{FileAccess, ProcessSignal, RealHost};
 use esl::module_path::ModulePath;
 use esl::program::{self, Ended, Modules, Program, Summary};
 use esl::timeline::Timeline;
 use esl_compiler::diagnostic::{Format, Renderer};
+use esl_vm::value::Value;
 use esl_vm::vm::Vm;
 
 /// The virtual machine of ESL, the Execution Support Language.
@@ -33,7 +34,8 @@ enum Action {
     ///
     /// Exit status: 0 success, or the status that the program asks for; 1 a failure left the main task; 2
     /// wrong usage, or a file that cannot be read or written; 3 the program does not compile or is refused; 4
-    /// no task can ever run again; 5 the budget or the memory is spent; 130 interrupted.
+    /// no task can ever run again; 5 the budget or the memory is spent; 129, 130, 143 ended by SIGHUP, SIGINT
+    /// or SIGTERM. However the run ends, the cleanups of its tasks are run.
     Run {
         #[command(flatten)]
         options: MachineOptions,
@@ -96,15 +98,23 @@ struct MachineOptions {
     /// Most memory for objects, such as 64M or 2G
     #[arg(long, value_name = "SIZE", default_value = "1G", value_parser = command::parse_size)]
     memory: usize,
+    /// Most seconds that the cleanups of an aborted task may take, also at the end of the run
+    #[arg(long, value_name = "SECONDS", default_value_t = 60)]
+    cleanup_time: u32,
+    /// Most memory for the stack of a task, such as 16M
+    #[arg(long, value_name = "SIZE", default_value = "512K", value_parser = command::parse_stack)]
+    stack: usize,
 }
 
 impl MachineOptions {
     fn config(&self) -> Config {
         Config {
             memory: self.memory,
+            stack: self.stack / size_of::<Value>(),
             slice: self.slice,
             budget: self.budget,
             seed: self.seed,
+            cleanup_time: u64::from(self.cleanup_time) * 1_000_000_000,
             ..Config::default()
         }
     }
@@ -150,6 +160,9 @@ fn run(
     trace: &[String],
     path: &ModulePath,
 ) -> Result<u8, u8> {
+    if let Some(timeline) = timeline {
+        command::refuse_overwriting(timeline, [file])?;
+    }
     let program = program(file, path)?;
     let setup = |error| {
         complain(error);
@@ -159,9 +172,8 @@ fn run(
     if options.clock == Clock::Virtual {
         host = host.with_virtual_time();
     }
-    let waker = host.waker();
     let mut machine = program::machine(options.config(), Box::new(host)).map_err(setup)?;
-    command::end_on_signal(machine.interrupt_flag(), waker);
+    command::end_on_signal(machine.inbox());
     program::set_module_path(&mut machine, path).map_err(setup)?;
     program::set_traces(&mut machine, trace).map_err(setup)?;
     if let Some(stats) = stats {
@@ -183,8 +195,13 @@ fn run(
         status = not_written(path, &error);
     }
     match summary.ended {
-        Ended::BudgetSpent => complain(format_args!("the budget of {} ticks is spent", summary.ticks)),
-        Ended::Interrupted => complain("interrupted"),
+        Ended::BudgetSpent => {
+            let budget = options.budget.unwrap_or(summary.ticks);
+            complain(format_args!("the budget of {budget} ticks is spent"));
+        }
+        Ended::Signalled(ProcessSignal::HangUp) => complain("hung up"),
+        Ended::Signalled(ProcessSignal::Interrupt) => complain("interrupted"),
+        Ended::Signalled(ProcessSignal::Terminate) => complain("terminated"),
         _ => {}
     }
     if let Some(stats) = stats {

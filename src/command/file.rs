@@ -50,6 +50,21 @@ pub fn read_program(path: &Path) -> Result<ProgramFile, u8> {
     })
 }
 
+/// Refuses to write to a file that is one of `inputs`, by whatever path.
+///
+/// # Errors
+/// The exit status, after a message.
+pub fn refuse_overwriting<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<(), u8> {
+    let Ok(output) = output.canonicalize() else { return Ok(()) };
+    for input in inputs {
+        if input.canonicalize().is_ok_and(|input| input == output) {
+            complain(format_args!("{} is read and cannot be written as well", input.display()));
+            return Err(USAGE);
+        }
+    }
+    Ok(())
+}
+
 fn read_bytes(path: &Path) -> Result<(String, Vec<u8>), u8> {
     let is_stdin = path.as_os_str() == "-";
     let name = if is_stdin { "<stdin>".into() } else { path.display().to_string() };

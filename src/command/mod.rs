@@ -12,7 +12,7 @@
 
 mod file;
 #[cfg(feature = "cli")]
-mod interrupt;
+mod signal;
 mod size;
 
 use std::path::Path;
@@ -22,10 +22,10 @@ use esl_compiler::diagnostic::{Format, Renderer};
 
 use crate::program::{Compiled, Ended};
 
-pub use file::{ProgramFile, read_program, read_source};
+pub use file::{ProgramFile, read_program, read_source, refuse_overwriting};
 #[cfg(feature = "cli")]
-pub use interrupt::{end_on_signal, interrupt_on_signal};
-pub use size::{SizeError, parse_size};
+pub use signal::{Interrupts, end_on_signal, interrupt_on_signal};
+pub use size::{SizeError, parse_size, parse_stack};
 
 /// Exit status of success.
 pub const SUCCESS: u8 = 0;
@@ -39,8 +39,8 @@ pub const NOT_COMPILED: u8 = 3;
 pub const DEADLOCKED: u8 = 4;
 /// Exit status of a run that has spent its budget, or needs more memory than it may have.
 pub const BUDGET_OR_MEMORY_SPENT: u8 = 5;
-/// Exit status of a run ended from outside, as shells report a command that Ctrl-C has ended.
-pub const INTERRUPTED: u8 = 130;
+/// Exit status of a run that a signal has ended, less the number of the signal, as shells report it.
+pub const SIGNALLED: u8 = 128;
 
 /// Returns the exit status of a run.
 pub fn exit_status(ended: Ended) -> u8 {
@@ -49,7 +49,7 @@ pub fn exit_status(ended: Ended) -> u8 {
         Ended::Failed => FAILED,
         Ended::Deadlocked => DEADLOCKED,
         Ended::BudgetSpent | Ended::HeapExhausted => BUDGET_OR_MEMORY_SPENT,
-        Ended::Interrupted => INTERRUPTED,
+        Ended::Signalled(signal) => SIGNALLED + signal.number(),
     }
 }
 
@@ -66,8 +66,9 @@ pub fn complain(text: impl std::fmt::Display) {
 
 /// Prints the diagnostics of a compilation and, for people, their number.
 pub fn print_diagnostics(compiled: &Compiled, renderer: &Renderer) {
+    let after = if renderer.format == Format::Json { "" } else { "\n" };
     for diagnostic in &compiled.diagnostics {
-        eprintln!("{}\n", renderer.render(diagnostic, &compiled.sources));
+        eprintln!("{}{after}", renderer.render(diagnostic, &compiled.sources));
     }
     if renderer.format == Format::Json || compiled.diagnostics.is_empty() {
         return;

@@ -9,6 +9,8 @@ pub enum SizeError {
     NotANumber,
     /// The library alone needs more.
     TooSmall,
+    /// The library needs more stack.
+    StackTooSmall,
     /// The size is beyond the range of addresses.
     TooLarge,
 }
@@ -18,6 +20,7 @@ impl fmt::Display for SizeError {
         f.write_str(match self {
             SizeError::NotANumber => "expected a number, optionally followed by K, M or G",
             SizeError::TooSmall => "the library alone takes more; give at least 4M",
+            SizeError::StackTooSmall => "the library needs more stack; give at least 64K",
             SizeError::TooLarge => "that is more than there can be",
         })
     }
@@ -25,11 +28,30 @@ impl fmt::Display for SizeError {
 
 impl std::error::Error for SizeError {}
 
-/// Parses a size in bytes; K, M or G multiply it by a power of 1024.
+/// Parses the size of a machine's memory, in bytes; K, M or G multiply it by a power of 1024.
 ///
 /// # Errors
 /// [`SizeError`].
 pub fn parse_size(text: &str) -> Result<usize, SizeError> {
+    match parse_bytes(text)? {
+        size if size < 4 << 20 => Err(SizeError::TooSmall),
+        size => Ok(size),
+    }
+}
+
+/// Parses the limit of a task's stack, in bytes; K, M or G multiply it by a power of 1024.
+///
+/// # Errors
+/// [`SizeError`].
+pub fn parse_stack(text: &str) -> Result<usize, SizeError> {
+    match parse_bytes(text)? {
+        size if size < 64 << 10 => Err(SizeError::StackTooSmall),
+        size if size > 8 << 30 => Err(SizeError::TooLarge),
+        size => Ok(size),
+    }
+}
+
+fn parse_bytes(text: &str) -> Result<usize, SizeError> {
     let (digits, unit) = match text.char_indices().last() {
         Some((last, 'K' | 'k')) => (&text[..last], 1 << 10),
         Some((last, 'M' | 'm')) => (&text[..last], 1 << 20),
@@ -37,9 +59,5 @@ pub fn parse_size(text: &str) -> Result<usize, SizeError> {
         _ => (text, 1),
     };
     let number: usize = digits.parse().map_err(|_| SizeError::NotANumber)?;
-    match number.checked_mul(unit) {
-        Some(size) if size >= 4 << 20 => Ok(size),
-        Some(_) => Err(SizeError::TooSmall),
-        None => Err(SizeError::TooLarge),
-    }
+    number.checked_mul(unit).ok_or(SizeError::TooLarge)
 }

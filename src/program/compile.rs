@@ -40,7 +40,8 @@ pub enum Modules {
 }
 
 /// Compiles sources to one program that runs them in order. They are one unit: functions may be called before
-/// the source that defines them, and macros used after it. Each begins in the package `ESL-USER`.
+/// the source that defines them, and macros used after it. Each begins in the package `ESL-USER`, or in
+/// `COMMON-LISP-USER` if its name ends in `.lisp`.
 ///
 /// Macros run in a machine of their own, whose definitions are gone when the compilation is over. The sources
 /// cannot require modules.

@@ -5,7 +5,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::session::Compiler;
 use esl_vm::heap::HeapStats;
-use esl_vm::host::Host;
+use esl_vm::host::{Host, ProcessSignal};
 use esl_vm::run::RunOutcome;
 use esl_vm::task::{TaskId, TaskResult};
 use esl_vm::vm::{Config, Vm};
@@ -27,8 +27,8 @@ pub enum Ended {
     BudgetSpent,
     /// Every task waits for an event that no task can signal.
     Deadlocked,
-    /// The run was interrupted from outside.
-    Interrupted,
+    /// A signal of the process has ended the run.
+    Signalled(ProcessSignal),
 }
 
 /// Figures of a run.
@@ -92,7 +92,7 @@ fn call_with_list(machine: &mut Vm, function: &str, items: impl Iterator<Item = 
     let list = Datum::list(items.collect::<Vec<_>>(), Span::default());
     let list = machine.import(&list).map_err(|_| Error::NoMemory("the settings"))?;
     let function = machine.library_function(function)?;
-    machine.call(function, &[list], u64::MAX)?;
+    machine.call_without_budget(function, &[list], u64::MAX)?;
     Ok(())
 }
 
@@ -126,8 +126,19 @@ pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Summary, Error> {
     let main = begin(machine, program)?;
     let outcome = machine.run(u64::MAX);
     let ended = end(machine, main, outcome);
+    end_rest(machine);
     let (tasks, turns, switches) = machine.tasks_turns_and_switches();
     Ok(Summary { ended, ticks: machine.ticks(), tasks, turns, switches, heap: machine.heap_stats() })
+}
+
+/// Aborts the tasks that are left at the end of a run, runs their cleanups, and says what does not end.
+pub(crate) fn end_rest(machine: &mut Vm) {
+    let left = machine.end_run();
+    machine.flush();
+    if !left.is_empty() {
+        let lines: Vec<String> = left.iter().map(|left| format!("  {left}\n")).collect();
+        machine.complain(&format!("The end of the run was cut short. Left are\n{}", lines.concat()));
+    }
 }
 
 /// Returns how a program with this main task has ended, and writes the reports of its failure or deadlock.
@@ -136,7 +147,14 @@ pub(crate) fn end(machine: &mut Vm, main: TaskId, outcome: RunOutcome) -> Ended 
     if let Some(report) = machine.report(main) {
         machine.complain(&report);
     }
-    match (outcome, machine.result(main)) {
+    let result = machine.result(main);
+    if let Some(signal) = machine.ended_by()
+        && machine.exit_status().is_none()
+        && !matches!(result, TaskResult::Failed(_))
+    {
+        return Ended::Signalled(signal);
+    }
+    match (outcome, result) {
         (RunOutcome::BudgetSpent, _) => Ended::BudgetSpent,
         (RunOutcome::Waiting, _) => {
             let report = machine.deadlock_report();
@@ -145,13 +163,7 @@ pub(crate) fn end(machine: &mut Vm, main: TaskId, outcome: RunOutcome) -> Ended 
         }
         (_, TaskResult::Failed(condition)) if machine.is_heap_exhausted(condition) => Ended::HeapExhausted,
         (_, TaskResult::Failed(_)) => Ended::Failed,
-        (_, TaskResult::Aborted) if machine.exit_status().is_none() => {
-            if machine.was_interrupted() {
-                Ended::Interrupted
-            } else {
-                Ended::Failed
-            }
-        }
+        (_, TaskResult::Aborted) if machine.exit_status().is_none() => Ended::Failed,
         _ => Ended::Normally(machine.exit_status().unwrap_or(0)),
     }
 }

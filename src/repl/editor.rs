@@ -11,7 +11,7 @@ use super::screen::Screen;
 
 /// The helper of the line editor.
 #[derive(Default, Helper, Hinter, Highlighter, Validator, Completer)]
-struct Names {
+struct EditorHelper {
     #[rustyline(Completer)]
     completer: NameCompleter,
 }
@@ -51,7 +51,7 @@ impl rustyline::completion::Completer for NameCompleter {
 
 /// A terminal with line editing.
 pub(super) struct Editor {
-    editor: Option<rustyline::Editor<Names, DefaultHistory>>,
+    editor: Option<rustyline::Editor<EditorHelper, DefaultHistory>>,
     history: Option<PathBuf>,
 }
 
@@ -59,14 +59,14 @@ impl Editor {
     /// Creates an editor with the history of earlier sessions. From now on `screen` prints above the line
     /// that is edited.
     pub(super) fn new(screen: &Screen) -> Editor {
-        let mut editor = rustyline::Editor::<Names, DefaultHistory>::new().ok();
+        let mut editor = rustyline::Editor::<EditorHelper, DefaultHistory>::new().ok();
         let external = editor.as_mut().and_then(|editor| editor.create_external_printer().ok());
         if let Some(external) = external {
             screen.print_through(Box::new(external));
         }
         let history = std::env::home_dir().map(|home| home.join(".esl-history"));
         if let (Some(editor), Some(history)) = (&mut editor, &history) {
-            editor.set_helper(Some(Names::default()));
+            editor.set_helper(Some(EditorHelper::default()));
             // The first session has none.
             _ = editor.load_history(history);
         }

@@ -33,7 +33,7 @@ use esl_vm::task::{TaskId, TaskResult};
 use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
 
-use crate::command::{NOT_COMPILED, SUCCESS, USAGE, complain, interrupt_on_signal};
+use crate::command::{Interrupts, NOT_COMPILED, SUCCESS, USAGE, complain, interrupt_on_signal};
 use crate::module_path::ModulePath;
 use crate::program;
 use lines::Line;
@@ -60,7 +60,6 @@ pub fn run(config: Config, virtual_time: bool, path: &ModulePath) -> Result<u8, 
     if virtual_time {
         host = host.with_virtual_time();
     }
-    let waker = host.waker();
     let setup = |error| {
         complain(error);
         USAGE
@@ -68,18 +67,15 @@ pub fn run(config: Config, virtual_time: bool, path: &ModulePath) -> Result<u8, 
     let mut machine = program::machine(config, Box::new(host)).map_err(setup)?;
     program::set_module_path(&mut machine, path).map_err(setup)?;
     machine.complain_to(Output::Standard);
-    let typing =
-        Typing::begin(is_interactive, screen, machine.stop_flag(), waker.clone()).map_err(|error| {
-            complain(format_args!("no thread can be made to read standard input: {error}"));
-            USAGE
-        })?;
-    let mut repl = Repl { machine, typing, virtual_time, failure: None };
+    let typing = Typing::begin(is_interactive, screen, machine.inbox()).map_err(|error| {
+        complain(format_args!("no thread can be made to read standard input: {error}"));
+        USAGE
+    })?;
+    let interrupts = interrupt_on_signal(machine.inbox());
+    let mut repl = Repl { machine, typing, interrupts, virtual_time, failure: None };
     repl.call("%REPL-BEGIN", "");
-    interrupt_on_signal(repl.machine.interrupt_flag(), waker);
     let status = repl.talk();
-    repl.machine.abort_all();
-    repl.machine.run(u64::MAX);
-    repl.machine.flush();
+    program::end_rest(&mut repl.machine);
     status
 }
 
@@ -90,6 +86,7 @@ const BACKGROUND_TICKS: u64 = 100_000;
 struct Repl {
     machine: Vm,
     typing: Typing,
+    interrupts: Interrupts,
     /// Whether time passes only while a form is evaluated.
     virtual_time: bool,
     /// Report of the last failure, for `:bt`.
@@ -237,6 +234,7 @@ impl Repl {
             self.run(task);
         }
         self.machine.set_interruptible(None);
+        self.interrupts.forget();
         let result = self.machine.result(task);
         let report = self.machine.report(task);
         self.machine.forget(task);

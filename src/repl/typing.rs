@@ -3,11 +3,9 @@
 //! The thread reads a line only on request, so that a form that is being evaluated has the standard input to
 //! itself.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use esl_vm::host::Waker;
+use esl_vm::host::{Inbox, Incoming};
 
 use super::editor::Editor;
 use super::lines::{Line, Lines, Pipe};
@@ -28,8 +26,6 @@ enum Request {
 pub(super) struct Typing {
     requests: Sender<Request>,
     lines: Receiver<Line>,
-    /// Set when a line has come, so that the machine stops its background tasks.
-    has_come: Arc<AtomicBool>,
     /// Whether a person types at a terminal.
     pub(super) is_interactive: bool,
     /// Settings of the terminal when the session began.
@@ -39,19 +35,13 @@ pub(super) struct Typing {
 
 impl Typing {
     /// Starts the thread: it reads from a terminal, with an editor that prints through `screen`, or from a
-    /// pipe. When a line comes, it sets the flag and wakes the machine.
+    /// pipe. When a line comes, it has the machine come back from its background tasks.
     ///
     /// # Errors
     /// If the system makes no thread.
-    pub(super) fn begin(
-        is_interactive: bool,
-        screen: Screen,
-        has_come: Arc<AtomicBool>,
-        waker: Waker,
-    ) -> std::io::Result<Typing> {
+    pub(super) fn begin(is_interactive: bool, screen: Screen, inbox: Inbox) -> std::io::Result<Typing> {
         let (requests, asked) = channel();
         let (answer, lines) = channel();
-        let flag = has_come.clone();
         let terminal = if is_interactive { Terminal::now() } else { None };
         let above = screen.clone();
         std::thread::Builder::new().name("typing".into()).spawn(move || {
@@ -61,19 +51,17 @@ impl Typing {
                 match request {
                     Request::Line(prompt) => {
                         let line = source.next(prompt);
-                        // The flag is cleared when the line is taken, so it comes first.
-                        flag.store(true, Ordering::Relaxed);
                         if answer.send(line).is_err() {
                             return;
                         }
-                        waker.wake();
+                        inbox.put(Incoming::Stop);
                     }
                     Request::Remember(form) => source.remember(&form),
                     Request::Learn(names) => source.learn(names),
                 }
             }
         })?;
-        Ok(Typing { requests, lines, has_come, is_interactive, terminal, screen })
+        Ok(Typing { requests, lines, is_interactive, terminal, screen })
     }
 
     fn request(&self, request: Request) {
@@ -110,13 +98,11 @@ impl Typing {
 
     /// Takes the requested line, if it has come.
     pub(super) fn take(&self) -> Option<Line> {
-        self.lines.try_recv().ok().inspect(|_| self.has_come.store(false, Ordering::Relaxed))
+        self.lines.try_recv().ok()
     }
 
     /// Waits for the requested line.
     pub(super) fn wait(&self) -> Line {
-        let line = self.lines.recv();
-        self.has_come.store(false, Ordering::Relaxed);
-        line.unwrap_or_else(|_| Line::Failed("the thread that reads it has ended".into()))
+        self.lines.recv().unwrap_or_else(|_| Line::Failed("the thread that reads it has ended".into()))
     }
 }

@@ -45,7 +45,7 @@ enum Picture {
 }
 
 /// Observer of the run, which shares the file with its [`Timeline`].
-struct Watch(Arc<Mutex<Picture>>);
+struct PictureObserver(Arc<Mutex<Picture>>);
 
 fn lock(picture: &Mutex<Picture>) -> MutexGuard<'_, Picture> {
     // A panic elsewhere leaves the picture as it was.
@@ -66,7 +66,7 @@ impl Timeline {
             Picture::Trace(Trace::new(BufWriter::new(file)))
         };
         let shared = Arc::new(Mutex::new(picture));
-        machine.add_observer(Box::new(Watch(shared.clone())));
+        machine.add_observer(Box::new(PictureObserver(shared.clone())));
         Ok(Timeline(shared))
     }
 
@@ -83,7 +83,7 @@ impl Timeline {
     }
 }
 
-impl Observer for Watch {
+impl Observer for PictureObserver {
     fn see(&mut self, time: u64, task: TaskNumber, seen: Seen<'_>) {
         match &mut *lock(&self.0) {
             Picture::Trace(trace) => trace.see(time, task, seen),

@@ -60,8 +60,29 @@ mod tests {
         let image = ModuleImage::open_trusted(ImageBytes::Static(IMAGE)).expect("the image is sound");
         let count = image.toplevel().expect("the image is sound").len();
         assert!(
-            count <= 16,
+            count <= 9,
             "{count} forms of the library run at each start; `esl_vm::load::prepare` notes plain definitions"
         );
+    }
+
+    #[test]
+    fn each_name_is_defined_once() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+        let mut places = std::collections::BTreeMap::<String, Vec<String>>::new();
+        for file in std::fs::read_dir(folder).expect("the folder can be read") {
+            let path = file.expect("the folder can be read").path();
+            if path.extension().is_none_or(|extension| extension != "esl") {
+                continue;
+            }
+            let text = std::fs::read_to_string(&path).expect("the file can be read");
+            let names = text.lines().filter_map(|line| {
+                let rest = line.strip_prefix("(defun ").or_else(|| line.strip_prefix("(defmacro "))?;
+                rest.split([' ', ')']).next().filter(|name| !name.starts_with('('))
+            });
+            let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            names.for_each(|name| places.entry(name.to_owned()).or_default().push(file.clone()));
+        }
+        let twice: Vec<_> = places.into_iter().filter(|(_, files)| files.len() > 1).collect();
+        assert!(twice.is_empty(), "the later definition replaces the earlier one: {twice:?}");
     }
 }

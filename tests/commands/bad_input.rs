@@ -244,3 +244,37 @@ fn an_interrupt_ends_a_wait_for_input() {
     drop(input);
     check(&done, 130, "interrupted");
 }
+
+#[test]
+fn no_command_writes_over_what_it_reads() {
+    let text = "(require \"part\")\n(print (part))\n";
+    let folder = Folder::with("overwrite", &[("program.esl", text), ("part.esl", "(defun part () 1)")]);
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (program, part) = (path("program.esl"), path("part.esl"));
+    let message = "is read and cannot be written";
+    let indirect = path("../overwrite/program.esl");
+    for output in [&program, &part] {
+        check(&run(&mut eslc(&["compile", &program, "-o", output]), b""), 2, message);
+    }
+    if std::fs::exists(&indirect).expect("the folder can be read") {
+        check(&run(&mut eslc(&["compile", &program, "-o", &indirect]), b""), 2, message);
+    }
+    check(&run(&mut eslvm(&["run", "--timeline", &program, &program]), b""), 2, message);
+    assert_eq!(std::fs::read_to_string(program).expect("it is there"), text);
+}
+
+#[test]
+fn a_budget_of_nothing_is_spent_at_once() {
+    let folder = Folder::new("no-budget");
+    let path = folder.file("program.esl", "(print 1)");
+    check(&run(&mut eslvm(&["run", "--budget", "0", &path]), b""), 5, "the budget of 0 ticks is spent");
+}
+
+#[test]
+fn messages_for_tools_have_one_object_a_line() {
+    let folder = Folder::new("json-lines");
+    let path = folder.file("program.esl", "(car)\n(undefined x)\n(print 1))\n");
+    let done = run(&mut eslc(&["check", "--messages", "json", &path]), b"");
+    assert!(done.errors.lines().count() >= 3, "{}", done.errors);
+    assert!(done.errors.lines().all(|line| line.starts_with('{') && line.ends_with('}')), "{}", done.errors);
+}

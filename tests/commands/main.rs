@@ -11,6 +11,8 @@ mod real_time;
 mod terminal;
 mod timeline;
 mod traces;
+#[cfg(unix)]
+mod ways_out;
 
 use std::process::Command;
 

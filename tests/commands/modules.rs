@@ -99,6 +99,19 @@ fn a_source_is_run_with_its_modules() {
 }
 
 #[test]
+fn a_file_of_common_lisp_begins_in_its_package() {
+    let text = "(defun f (x) (assert (> x 0)) (list x *package*))\n(print (f 1))";
+    let expected = "(1 #<PACKAGE \"COMMON-LISP-USER\">)";
+    let main = "(print *package*) (load \"a.lisp\") (print *package*) (require \"a\" \"a.lisp\")";
+    let folder = Folder::with("modules-lisp", &[("a.lisp", text), ("main.esl", main)]);
+    folder.check_run(&["a.lisp"], expected);
+    folder.compile(&["a.lisp"]);
+    folder.check_run(&["a.eslb"], expected);
+    let user = "#<PACKAGE \"ESL-USER\">";
+    folder.check_run(&["main.esl"], &format!("{user}\n{expected}\n{user}\n{expected}"));
+}
+
+#[test]
 fn a_whole_program_is_one_file() {
     let folder = program("whole");
     folder.compile(&["main.esl", "--library", "lib", "-o", "out.eslb"]);

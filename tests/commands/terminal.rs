@@ -2,12 +2,12 @@
 
 use std::fs::File;
 use std::io::{Read, Write};
-use std::process::Stdio;
+use std::process::{Child, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-use rustix::termios::tcgetattr;
+use rustix::termios::{Termios, tcgetattr};
 
 use crate::eslvm;
 
@@ -37,25 +37,42 @@ fn await_text(output: &Receiver<String>, text: &str) -> String {
     all
 }
 
+/// A session with an editor.
+struct Session {
+    person: File,
+    terminal: File,
+    /// Settings of the terminal before the session.
+    before: Termios,
+    child: Child,
+    output: Receiver<String>,
+}
+
+impl Session {
+    fn begin() -> Session {
+        let person = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("there are terminals");
+        grantpt(&person).and_then(|()| unlockpt(&person)).expect("it is ours");
+        let name = ptsname(&person, Vec::new()).expect("it has a name").into_string().expect("text");
+        let terminal = File::options().read(true).write(true).open(name).expect("it can be opened");
+        let before = tcgetattr(&terminal).expect("it is a terminal");
+        let stdio = || Stdio::from(terminal.try_clone().expect("it can be shared"));
+        let child = eslvm(&["repl"])
+            .env("TERM", "xterm")
+            .env("HOME", env!("CARGO_TARGET_TMPDIR"))
+            .stdin(stdio())
+            .stdout(stdio())
+            .stderr(stdio())
+            .spawn()
+            .expect("the command can be run");
+        let person = File::from(person);
+        let output = read_on(person.try_clone().expect("it can be shared"));
+        Session { person, terminal, before, child, output }
+    }
+}
+
 /// It does so while the next line is edited, and leaves the terminal as it was.
 #[test]
 fn a_task_ends_the_session_at_once() {
-    let person = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("there are terminals");
-    grantpt(&person).and_then(|()| unlockpt(&person)).expect("it is ours");
-    let name = ptsname(&person, Vec::new()).expect("it has a name").into_string().expect("text");
-    let terminal = File::options().read(true).write(true).open(name).expect("it can be opened");
-    let before = tcgetattr(&terminal).expect("it is a terminal");
-    let stdio = || Stdio::from(terminal.try_clone().expect("it can be shared"));
-    let mut child = eslvm(&["repl"])
-        .env("TERM", "xterm")
-        .env("HOME", env!("CARGO_TARGET_TMPDIR"))
-        .stdin(stdio())
-        .stdout(stdio())
-        .stderr(stdio())
-        .spawn()
-        .expect("the command can be run");
-    let mut person = File::from(person);
-    let output = read_on(person.try_clone().expect("it can be shared"));
+    let Session { mut person, terminal, before, mut child, output } = Session::begin();
     await_text(&output, "? ");
     let form =
         "(progn (spawn (sleep 0.2) (unwind-protect (exit 7) (print (list 'cleaned 'up)))) (list 'go))\r";
@@ -66,4 +83,22 @@ fn a_task_ends_the_session_at_once() {
     await_text(&output, "(CLEANED UP)");
     let after = tcgetattr(&terminal).expect("it is still a terminal");
     assert_eq!((after.local_modes, after.input_modes), (before.local_modes, before.input_modes));
+}
+
+/// It is all evaluated, although the terminal delivers it in large pieces.
+#[test]
+fn what_is_typed_ahead_is_kept() {
+    let Session { mut person, mut child, output, .. } = Session::begin();
+    await_text(&output, "? ");
+    let forms: String = (0..200).map(|n| format!("(list 'form {n})\r")).collect();
+    person.write_all(forms.as_bytes()).expect("it is read");
+    let mut seen = String::new();
+    for n in 0..200 {
+        let value = format!("(FORM {n})");
+        if !seen.contains(&value) {
+            seen += &await_text(&output, &value);
+        }
+    }
+    person.write_all(b"(exit 3)\r").expect("it is read");
+    assert_eq!(child.wait().expect("it ends").code(), Some(3));
 }

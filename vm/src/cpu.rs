@@ -102,11 +102,21 @@ impl Cpu {
         self.stack_end = stack_end;
     }
 
+    /// Returns the ticks that are left in the slice; negative if it is overdrawn.
+    pub(crate) fn left(&self) -> i64 {
+        i64::from(self.reserve) + i64::from(self.ticks)
+    }
+
+    /// Returns the ticks of the slice that were used.
+    pub(crate) fn used(&self) -> u64 {
+        (i64::from(self.granted) - self.left()).max(0) as u64
+    }
+
     /// Takes the ticks of the slice that were used.
     pub(crate) fn take_used(&mut self) -> u64 {
-        let left = i64::from(self.reserve) + i64::from(self.ticks);
+        let used = self.used();
         self.reserve = 0;
-        (i64::from(self.granted) - left).max(0) as u64
+        used
     }
 }
 

@@ -2,8 +2,6 @@
 //! settings.
 
 use std::fmt;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use esl_bytecode::datum::Datum;
 
@@ -16,12 +14,12 @@ use crate::datum;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;
 use crate::heap::{AllocError, HeapConfig, HeapStats};
-use crate::host::{Host, Output};
+use crate::host::{Host, Inbox, Incoming, Output, ProcessSignal};
 use crate::interp::start::make_starter;
 use crate::observe::Watch;
 use crate::outside::Outside;
 use crate::raise::Exit;
-use crate::schedule::{Choices, Scheduler};
+use crate::schedule::{Choices, Clock, Scheduler};
 use crate::task::TaskId;
 use crate::trust;
 use crate::value::Value;
@@ -30,7 +28,7 @@ use crate::wait::event;
 use crate::world::{World, class};
 
 pub use crate::datum::DatumError as ExportError;
-pub use crate::outside::HostFunction;
+pub use crate::outside::{DataFunction, HostFunction};
 
 /// Reason why a function of the library could not be called.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,7 +66,7 @@ impl Vm {
             world,
             compiler: Compiler::default(),
             database: Database::default(),
-            scheduler: Scheduler::new(config.seed, starter, any_event),
+            scheduler: Scheduler::new(config.seed, Clock::of(&*host), starter, any_event),
             outside: Outside::new(host),
             cpu: Cpu::new(),
             natives: &NATIVES,
@@ -91,16 +89,17 @@ impl Vm {
         &self.config
     }
 
-    /// Returns a flag that makes the machine abort the task of [`Vm::set_interruptible`] when it is set, at
-    /// the end of a slice.
-    pub fn interrupt_flag(&self) -> Arc<AtomicBool> {
-        self.embedder.interrupt.clone()
+    /// Returns the inbox, through which other threads reach the run.
+    pub fn inbox(&self) -> Inbox {
+        self.outside.inbox.clone()
     }
 
-    /// Returns a flag that makes the run under way, or the next one, come back when it is set, at the end of
-    /// a slice.
-    pub fn stop_flag(&self) -> Arc<AtomicBool> {
-        self.embedder.stop.clone()
+    /// Returns the canary of the run so far: a hash of the turns of its tasks and of the questions to its
+    /// host, with which runs are compared. It does not depend on addresses, nor on the portions of the run.
+    pub fn canary(&self) -> u64 {
+        let mut canary = self.scheduler.canary;
+        canary.mix(self.outside.host.canary().value());
+        canary.value()
     }
 
     /// Returns the status that the program has asked to end with.
@@ -108,17 +107,21 @@ impl Vm {
         self.outside.exit_status
     }
 
-    /// Names the task that an interrupt aborts; reports call it the main task.
+    /// Names the task that a signal of the process aborts; reports call it the main task. A signal that has
+    /// come while there was none is for this one.
     pub fn set_interruptible(&mut self, id: Option<TaskId>) {
         self.embedder.interruptible = id;
         if let Some(task) = id.and_then(|id| self.scheduler.tasks.get(id)) {
             self.scheduler.main_number = Some(task.number);
+            if let Some(signal) = self.embedder.signal_waits.take() {
+                self.outside.inbox.put(Incoming::Signal(signal));
+            }
         }
     }
 
-    /// Returns whether the embedder has interrupted the program.
-    pub fn was_interrupted(&self) -> bool {
-        self.embedder.was_interrupted
+    /// Returns the signal of the process that has ended the run, or the task that was named for it.
+    pub fn ended_by(&self) -> Option<ProcessSignal> {
+        self.embedder.ended_by
     }
 
     /// Sets how choices are made where the language leaves the order of tasks open.
@@ -141,10 +144,10 @@ impl Vm {
         self.embedder.unpin(value);
     }
 
-    /// Adds a function of the embedder's, and returns its number, for `%call-host`.
-    pub fn add_host_function(&mut self, function: HostFunction) -> usize {
-        self.outside.functions.push(function);
-        self.outside.functions.len() - 1
+    /// Adds a function of the embedder's, which `%call-host` or `%begin-operation` reach by its name, in
+    /// place of an earlier one of this name.
+    pub fn add_host_function(&mut self, name: &str, function: HostFunction) {
+        self.outside.functions.insert(name.into(), function);
     }
 
     /// Returns a value as data. Objects that no data stands for, such as functions and hash tables, become a

@@ -55,6 +55,46 @@ impl Charges {
     }
 }
 
+/// The entry that was found last in a hash table, by which the next one is guessed.
+///
+/// A key is often the one that was looked up last, as in `(push item (gethash key table))`. And keys that are
+/// integers were often entered in order: their entries lie at one distance from them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LastLookup {
+    key: Value,
+    entry: usize,
+    /// Number of the entry, minus the key if that is an integer.
+    distance: i64,
+    /// Whether the search before led to an entry at the same distance.
+    is_steady: bool,
+}
+
+impl Default for LastLookup {
+    fn default() -> LastLookup {
+        LastLookup { key: Value::UNBOUND, entry: 0, distance: 0, is_steady: false }
+    }
+}
+
+impl LastLookup {
+    /// Returns the number of the entry that probably has `key`.
+    #[inline(always)]
+    pub(crate) fn guess(&self, key: Value) -> Option<usize> {
+        if self.is_steady
+            && let Some(n) = key.as_fixnum()
+        {
+            return Some((n + self.distance) as usize);
+        }
+        if self.key == key { Some(self.entry) } else { None }
+    }
+
+    /// Notes that a search for `key` led to `entry`.
+    #[inline(always)]
+    pub(crate) fn note(&mut self, key: Value, entry: usize) {
+        let distance = entry as i64 - key.as_fixnum().unwrap_or(0);
+        *self = LastLookup { key, entry, distance, is_steady: distance == self.distance };
+    }
+}
+
 /// Side channel between the interpreter and builtins.
 pub(crate) struct Exchange {
     /// The value list: all values of the form that was evaluated last, where they are wanted.
@@ -63,8 +103,8 @@ pub(crate) struct Exchange {
     pub(crate) raised: Option<Raised>,
     /// Call requested by a builtin: the function, then its arguments.
     pub(crate) requested_call: Vec<Value>,
-    /// Key found last in a hash table, and the number of its entry there.
-    pub(crate) last_lookup: (Value, usize),
+    /// What was found last in a hash table.
+    pub(crate) last_lookup: LastLookup,
     /// Charges of builtins, until the interpreter takes them.
     pub(crate) charges: Charges,
     /// Place and time of the last collection for want of room; a second one there would not help.
@@ -78,7 +118,7 @@ impl Exchange {
             values: Vec::new(),
             raised: None,
             requested_call: Vec::new(),
-            last_lookup: (Value::UNBOUND, 0),
+            last_lookup: LastLookup::default(),
             charges: Charges::default(),
             collected_at: None,
         }
@@ -119,6 +159,60 @@ impl Exchange {
     #[cold]
     pub(crate) fn index_error<T>(&mut self, datum: Value, limit: usize) -> Result<T, Exit> {
         self.raise(Raised::Type(datum, Expected::Index(limit)))
+    }
+
+    /// Notes that `datum` is not of the type that `specifier` writes, as [`Expected::Written`].
+    ///
+    /// # Errors
+    /// Always [`Exit::Raise`].
+    #[cold]
+    pub(crate) fn not_written<T>(&mut self, datum: Value, specifier: &'static str) -> Result<T, Exit> {
+        self.raise(Raised::Type(datum, Expected::Written(specifier)))
+    }
+
+    /// Notes that `start` and `end` do not bound a part of a sequence of `length` elements.
+    ///
+    /// # Errors
+    /// Always [`Exit::Raise`].
+    #[cold]
+    pub(crate) fn bounds_error<T>(&mut self, start: Value, end: Value, length: usize) -> Result<T, Exit> {
+        self.raise(Raised::Bounds(start, end, length))
+    }
+
+    /// Returns the part of a sequence of `length` elements from `start` to before `end`. `NIL` stands for the
+    /// beginning or the end.
+    ///
+    /// # Errors
+    /// As [`Exchange::bounds_error`].
+    pub(crate) fn bounds(&mut self, start: Value, end: Value, length: usize) -> Result<(usize, usize), Exit> {
+        let from = if start.is_nil() { Some(0) } else { start.as_index() };
+        let to = if end.is_nil() { Some(length) } else { end.as_index() };
+        match (from, to) {
+            (Some(from), Some(to)) if from <= to && to <= length => Ok((from, to)),
+            _ => self.bounds_error(if start.is_nil() { Value::small(0) } else { start }, end, length),
+        }
+    }
+
+    /// Returns `v` as an index below `length`.
+    ///
+    /// # Errors
+    /// As [`Exchange::index_error`].
+    pub(crate) fn index_below(&mut self, v: Value, length: usize) -> Result<usize, Exit> {
+        match v.as_index() {
+            Some(index) if index < length => Ok(index),
+            _ => self.index_error(v, length),
+        }
+    }
+
+    /// Returns `v` as a number of things.
+    ///
+    /// # Errors
+    /// As [`Exchange::type_error`].
+    pub(crate) fn count(&mut self, v: Value) -> Result<usize, Exit> {
+        match v.as_index() {
+            Some(count) => Ok(count),
+            None => self.type_error(v, "UNSIGNED-BYTE"),
+        }
     }
 
     /// Notes a wrong call or form.

@@ -19,6 +19,7 @@ pub mod vm;
 
 pub use world::load;
 
+mod canary;
 mod compiler;
 mod config;
 mod cpu;

@@ -24,6 +24,8 @@ pub enum Expected {
     Index(usize),
     /// A type specifier made by the program.
     Specifier(Value),
+    /// The type specifier written here with parentheses, names of `COMMON-LISP` and integers.
+    Written(&'static str),
 }
 
 /// Failure of an operation, before it becomes a condition.
@@ -33,6 +35,8 @@ pub enum Raised {
     Type(Value, Expected),
     /// `type-error`: the value of this special variable is not of the expected type.
     Variable(Value, Value, Expected),
+    /// `type-error`: start and end that do not bound a part of a sequence of so many elements.
+    Bounds(Value, Value, usize),
     /// `division-by-zero`: name of the operation in `COMMON-LISP`, operands.
     DivisionByZero(&'static str, [Value; 2]),
     /// `arithmetic-error` with a text: the result does not exist or is too large.
@@ -119,8 +123,36 @@ impl Expected {
                 heap.list(&[integer, Value::small(0), limit])
             }
             Expected::Specifier(specifier) => Ok(specifier),
+            Expected::Written(text) => read_specifier(heap, world, text),
         }
     }
+}
+
+/// Returns the type specifier that `text` writes with parentheses, names of `COMMON-LISP` and integers.
+fn read_specifier(heap: &mut Heap, world: &mut World, text: &str) -> Result<Value, AllocError> {
+    let spaced = text.replace('(', " ( ").replace(')', " ) ");
+    let mut lists: Vec<Vec<Value>> = vec![Vec::new()];
+    for word in spaced.split_whitespace() {
+        let item = match word {
+            "(" => {
+                lists.push(Vec::new());
+                continue;
+            }
+            ")" => {
+                let items = lists.pop().unwrap_or_default();
+                heap.list(&items)?
+            }
+            word => match word.parse().ok().and_then(Value::fixnum) {
+                Some(n) => n,
+                None => world.intern_cl(heap, word)?,
+            },
+        };
+        match lists.last_mut() {
+            Some(list) => list.push(item),
+            None => lists.push(vec![item]),
+        }
+    }
+    Ok(lists.pop().and_then(|items| items.first().copied()).unwrap_or(Value::T))
 }
 
 impl Raised {
@@ -135,6 +167,12 @@ impl Raised {
             }
             Raised::Variable(symbol, datum, expected) => {
                 ("VARIABLE-TYPE-ERROR", smallvec![*symbol, *datum, expected.specifier(heap, world)?])
+            }
+            Raised::Bounds(start, end, length) => {
+                let least = start.as_index().unwrap_or(0);
+                let specifier = format!("(CONS (INTEGER 0 {length}) (INTEGER {least} {length}))");
+                let bounds = heap.cons(*start, *end)?;
+                ("TYPE-ERROR", smallvec![bounds, read_specifier(heap, world, &specifier)?])
             }
             Raised::DivisionByZero(operation, operands) => {
                 let operation = world.intern_cl(heap, operation)?;
@@ -182,6 +220,7 @@ impl Raised {
                     visit(*specifier);
                 }
             }
+            Raised::Bounds(start, end, _) => [*start, *end].into_iter().for_each(visit),
             Raised::DivisionByZero(_, operands) => operands.iter().copied().for_each(visit),
             Raised::UnboundVariable(value)
             | Raised::UndefinedFunction(value)

@@ -20,7 +20,7 @@ use crate::compiler::Compiler;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;
 use crate::observe::{Figures, Observers, Watch};
-use crate::outside::Outside;
+use crate::outside::{Operations, Outside};
 use crate::schedule::{Accounts, Clock, Counts, EndOfAll, Points, RunQueues, Scheduler, Timers, Turn};
 use crate::task::{Control, Extra, Running, Task};
 use crate::vm::Vm;
@@ -76,7 +76,10 @@ state! {
     /// Visits the content of a scheduler.
     Scheduler by VisitScheduler :: scheduler_content {
         content { tasks, timers }
-        course { choices, readers, end_of_all, main, main_number, serial, spent, any_event, starter }
+        course {
+            choices, readers, end_of_all, main, main_number, serial, spent, rounds, canary, open_turn, any_event,
+            starter,
+        }
         parts { queues, accounts, deliveries, counts, clock, points, turn }
         transient { running }
     }
@@ -94,7 +97,7 @@ state! {
 state! {
     /// Visits the content of the rarely used parts of a task.
     Extra by VisitExtra :: extra_content {
-        content { limits, interrupts }
+        content { limits, interrupts, fund }
         course { report, end, values }
     }
 }
@@ -110,6 +113,7 @@ state! {
     /// Visits the content of a running cleanup.
     Running by VisitRunning :: running_content {
         content { pending, values, allowance }
+        derived { entry }
     }
 }
 
@@ -135,19 +139,20 @@ state! {
 state! {
     /// Visits the content of the outside.
     Outside by VisitOutside :: outside_content {
-        content { exit_status, console }
+        content { exit_status, console, operations }
         transient { answer }
-        process { host, functions, complaints }
+        process { host, inbox, functions, complaints }
     }
 }
 
+list_state! { Operations { open: Run, begun: Run } }
 list_state! { RunQueues { queues: Run, occupied: Derived, urgent: Run, turns: Run } }
 list_state! { Timers { heap: Run, sequence: Run, sweep_at: Run } }
 list_state! { Accounts { accounts: Run, free: Run } }
 list_state! { Deliveries { signals: Run, held: Run } }
-list_state! { EndOfAll { next: Run, newest: Run, except: Run } }
+list_state! { EndOfAll { left: Run } }
 list_state! { Counts { alive: Run, foreground: Run, made: Run, turns: Run, switches: Run } }
-list_state! { Clock { now: Run, looked_at: Run, moved_at: Run, more_is_due: Run } }
+list_state! { Clock { is_virtual: Process, now: Run, looked_at: Run, moved_at: Run, more_is_due: Run, idled: Run } }
 list_state! { Points { grain: Process, is_open: Run } }
 list_state! { Turn {
     index: Run,
@@ -168,17 +173,17 @@ list_state! { Exchange {
 } }
 list_state! { Embedder {
     pinned: Run,
-    interrupt: Process,
-    stop: Process,
     interruptible: Run,
-    was_interrupted: Run,
+    signal_waits: Run,
+    ended_by: Run,
+    is_ending: Run,
+    is_cut_short: Run,
     last_words: Run,
     last_place: Run,
 } }
 list_state! { Watch { is_watched: Derived, observers: Process, figures: Process, traces_tasks: Process } }
 list_state! { Observers {
     list: Process,
-    is_virtual: Process,
     start: Process,
     latest: Process,
     unsaid: Process,
@@ -188,7 +193,7 @@ list_state! { Figures { pauses: Process, are_wanted: Process, of_tasks: Process,
 
 #[cfg(test)]
 mod tests {
-    use esl_heap::state::{Field, Listed, Role};
+    use esl_heap::state::{Field, FieldRole, Listed};
 
     use super::*;
 
@@ -197,9 +202,9 @@ mod tests {
         fields
             .iter()
             .map(|field| match field.role {
-                Role::Run => 1,
-                Role::Parts(parts) => fields_of_run(parts),
-                Role::Derived | Role::Process => 0,
+                FieldRole::Run => 1,
+                FieldRole::Parts(parts) => fields_of_run(parts),
+                FieldRole::Derived | FieldRole::Process => 0,
             })
             .sum()
     }

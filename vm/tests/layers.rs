@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 
 /// The modules, lowest first.
 const LAYERS: &[&str] = &[
-    // Below everything: settings, the outside, promises on which unsafe code relies.
+    // Below everything: hashes, settings, the outside, promises on which unsafe code relies.
+    "canary",
     "config",
     "host",
     "shape",

@@ -13,12 +13,12 @@ pub(super) struct Cursor<'a> {
 }
 
 impl<'a> Cursor<'a> {
-    /// The bytes of `section`, which begins at `offset` of the file. `None` is the header.
+    /// Returns the bytes of `section`, which begins at `offset` of the file. `None` is the header.
     pub(super) fn new(bytes: &'a [u8], offset: usize, section: Option<Section>) -> Cursor<'a> {
         Cursor { rest: bytes, offset, section }
     }
 
-    /// The error that there is `problem` at this place.
+    /// Returns the error that there is `problem` at this place.
     pub(super) fn damaged(&self, problem: Problem) -> ReadError {
         ReadError::Damaged { section: self.section, offset: self.offset, problem }
     }
@@ -28,7 +28,7 @@ impl<'a> Cursor<'a> {
         self.rest
     }
 
-    /// A cursor over `bytes` only, which are found at this place.
+    /// Returns a cursor over `bytes` only, which are found at this place.
     pub(super) fn narrowed(&self, bytes: &'a [u8]) -> Cursor<'a> {
         Cursor { rest: bytes, ..*self }
     }
@@ -60,7 +60,8 @@ impl<'a> Cursor<'a> {
         Ok(u64::from_le_bytes(self.array()?))
     }
 
-    /// A number of things that take at least `size` bytes each; there are bytes enough for all of them.
+    /// Returns a number of things that take at least `size` bytes each; there are bytes enough for all of
+    /// them.
     pub(super) fn count(&mut self, size: usize) -> Result<usize, ReadError> {
         let count = self.u32()?;
         let expected = u64::from(count) * size as u64;
@@ -79,7 +80,7 @@ impl<'a> Cursor<'a> {
         Ok(self.bytes(length)?.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)))
     }
 
-    /// A length and as many bytes of UTF-8.
+    /// Returns a length and as many bytes of UTF-8.
     pub(super) fn text(&mut self) -> Result<&'a str, ReadError> {
         let length = self.count(1)?;
         let here = self.clone();
@@ -87,7 +88,7 @@ impl<'a> Cursor<'a> {
         std::str::from_utf8(bytes).map_err(|_| here.damaged(Problem::Utf8))
     }
 
-    /// A number below `count`, the index of one `of` these.
+    /// Returns a number below `count`, the index of one `of` these.
     pub(super) fn index(&mut self, of: &'static str, count: usize) -> Result<u32, ReadError> {
         let here = self.clone();
         let found = self.u32()?;
@@ -97,7 +98,7 @@ impl<'a> Cursor<'a> {
         Ok(found)
     }
 
-    /// A number in LEB128, seven bits a byte, the low ones first.
+    /// Returns a number in LEB128, seven bits a byte, the low ones first.
     pub(super) fn leb(&mut self) -> Result<u32, ReadError> {
         let here = self.clone();
         let mut value: u64 = 0;
@@ -111,7 +112,7 @@ impl<'a> Cursor<'a> {
         Err(here.damaged(Problem::Number))
     }
 
-    /// A signed number in LEB128, the sign in the lowest bit.
+    /// Returns a signed number in LEB128, the sign in the lowest bit.
     pub(super) fn signed_leb(&mut self) -> Result<i32, ReadError> {
         let bits = self.leb()?;
         Ok((bits >> 1) as i32 ^ -((bits & 1) as i32))
@@ -125,9 +126,9 @@ impl<'a> Cursor<'a> {
 
 /// Bytes under construction.
 #[derive(Debug, Default)]
-pub(super) struct Output(pub(super) Vec<u8>);
+pub(super) struct ByteOutput(pub(super) Vec<u8>);
 
-impl Output {
+impl ByteOutput {
     pub(super) fn u8(&mut self, value: u8) {
         self.0.push(value);
     }

@@ -8,10 +8,11 @@
 //!     key, constant                  u32: constant of the pool
 //!     capture                        u8: 0 register, 1 capture, 2 later; + 0x80 if boxed; u8: its number
 //!     code                           u32
-//! lines                              count u32, then for each: pc, source, line, column as LEB128 differences to the entry before
+//! lines                              count u32, then for each: pc, source, line, column, as
+//!                                    LEB128 differences to the entry before
 //! ```
 
-use super::cursor::{Cursor, Output};
+use super::cursor::{ByteOutput, Cursor};
 use super::{NONE, Problem, ReadError};
 use crate::module::{Capture, CaptureSource, Function, LineEntry, Parameters, PoolIdx};
 
@@ -25,7 +26,7 @@ const CAPTURE_LATER: u8 = 2;
 const CAPTURE_BOXED: u8 = 0x80;
 
 /// Appends the record of `function`.
-pub(super) fn write(function: &Function, out: &mut Output) {
+pub(super) fn write(function: &Function, out: &mut ByteOutput) {
     for place in [function.name, function.lambda_list, function.documentation] {
         out.u32(place.map_or(NONE, |PoolIdx(index)| index));
     }
@@ -66,7 +67,7 @@ pub(super) fn write(function: &Function, out: &mut Output) {
     }
 }
 
-fn write_pool_indexes(indexes: &[PoolIdx], out: &mut Output) {
+fn write_pool_indexes(indexes: &[PoolIdx], out: &mut ByteOutput) {
     out.u32(indexes.len() as u32);
     for &PoolIdx(index) in indexes {
         out.u32(index);
@@ -108,7 +109,7 @@ pub(super) fn read(mut from: Cursor<'_>, pool: usize) -> Result<Function, ReadEr
     Ok(Function { name, lambda_list, documentation, parameters, registers, captures, constants, code, lines })
 }
 
-/// The number of captures in a record.
+/// Returns the number of captures in a record.
 pub(super) fn capture_count(mut from: Cursor<'_>) -> Result<usize, ReadError> {
     // Name, lambda list, documentation; required, optional, registers.
     from.bytes(3 * 4 + 3)?;

@@ -106,17 +106,17 @@ pub enum ConstantRecord<'a> {
 pub struct PoolIndexes<'a>(&'a [[u8; 4]]);
 
 impl<'a> PoolIndexes<'a> {
-    /// How many there are.
+    /// Returns how many there are.
     pub fn len(self) -> usize {
         self.0.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are none.
     pub fn is_empty(self) -> bool {
         self.0.is_empty()
     }
 
-    /// The one with this position.
+    /// Returns the one with this position.
     pub fn get(self, position: usize) -> Option<PoolIdx> {
         self.0.get(position).map(|word| PoolIdx(u32::from_le_bytes(*word)))
     }
@@ -189,7 +189,7 @@ impl ModuleImage {
         Cursor::new(&self.bytes[range], start, Some(section))
     }
 
-    /// A part of `section`, for reading: `length` bytes from `offset` of the section on.
+    /// Returns a part of `section`, for reading: `length` bytes from `offset` of the section on.
     fn part(&self, section: Section, offset: usize, length: usize) -> Result<Cursor<'_>, ReadError> {
         let mut all = self.section(section);
         all.bytes(offset)?;
@@ -243,12 +243,12 @@ impl ModuleImage {
         Ok(packages)
     }
 
-    /// How many symbols there are.
+    /// Returns how many symbols there are.
     pub fn symbol_count(&self) -> usize {
         self.symbol_count
     }
 
-    /// All symbols, by number.
+    /// Returns all symbols, by number.
     pub fn symbols(&self) -> impl ExactSizeIterator<Item = Result<SymbolRecord<'_>, ReadError>> {
         (0..self.symbol_count as u32).map(|number| self.symbol(number))
     }
@@ -279,7 +279,7 @@ impl ModuleImage {
         Ok(SymbolRecord { home, name: text })
     }
 
-    /// How many constants there are.
+    /// Returns how many constants there are.
     pub fn constant_count(&self) -> usize {
         self.constant_count
     }
@@ -349,7 +349,7 @@ impl ModuleImage {
         })
     }
 
-    /// How many functions there are.
+    /// Returns how many functions there are.
     pub fn function_count(&self) -> usize {
         self.function_count
     }
@@ -363,7 +363,7 @@ impl ModuleImage {
         function::read(self.part(Section::Functions, offset as usize, length as usize)?, self.constant_count)
     }
 
-    /// How many captures a function has, without decoding all of it.
+    /// Returns how many captures a function has, without decoding all of it.
     ///
     /// # Errors
     /// [`ReadError::Damaged`], also if there is no such function.
@@ -386,7 +386,7 @@ impl ModuleImage {
         Ok((entry.u32()?, entry.u32()?))
     }
 
-    /// The functions that run the top-level forms.
+    /// Returns the functions that run the top-level forms.
     ///
     /// # Errors
     /// [`ReadError::Damaged`].
@@ -402,7 +402,7 @@ impl ModuleImage {
     }
 }
 
-/// Checks magic, version and tables, and gives the places of the sections.
+/// Checks magic, version and tables. Returns the places of the sections.
 fn read_header(bytes: &[u8]) -> Result<[Range<usize>; Section::ALL.len()], ReadError> {
     let mut header = Cursor::new(bytes, 0, None);
     if !bytes.starts_with(&MAGIC) {

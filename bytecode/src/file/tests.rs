@@ -6,7 +6,7 @@ use crate::module::{
 use crate::symbol::Symbol;
 use num_bigint::BigInt;
 
-/// A module with one of everything.
+/// Returns a module with one of everything.
 fn sample() -> Module {
     let constants = vec![
         Constant::Nil,

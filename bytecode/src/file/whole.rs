@@ -8,8 +8,8 @@ use crate::module::{Constant, FunctionNumber, Module, PoolIdx};
 use crate::symbol::Symbol;
 
 impl ModuleImage {
-    /// The whole module. Records must lie one after the other: so one byte of the file ends up in one place
-    /// only, and a small file cannot become a large module.
+    /// Returns the whole module. Records must lie one after the other: so one byte of the file ends up in one
+    /// place only, and a small file cannot become a large module.
     ///
     /// # Errors
     /// [`ReadError::Damaged`].

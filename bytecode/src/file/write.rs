@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use num_bigint::BigInt;
 
-use super::cursor::Output;
+use super::cursor::ByteOutput;
 use super::fingerprint::{BUILTIN_TABLE, OPCODE_TABLE};
 use super::{FORMAT_VERSION, HEADER_LENGTH, MAGIC, NONE, Section, WriteError, function, tag};
 use crate::module::{Constant, FunctionNumber, Module, PoolIdx};
 use crate::symbol::{Home, Symbol};
 
-/// The file that holds `module`.
+/// Returns the file that holds `module`.
 ///
 /// # Errors
 /// [`WriteError::Object`] if a constant is an object of the running program, [`WriteError::TooLong`] for a
@@ -30,14 +30,14 @@ pub fn write(module: &Module) -> Result<Vec<u8>, WriteError> {
         write_toplevel(module),
     ];
     let mut file =
-        Output(Vec::with_capacity(HEADER_LENGTH + sections.iter().map(|s| s.0.len()).sum::<usize>()));
+        ByteOutput(Vec::with_capacity(HEADER_LENGTH + sections.iter().map(|s| s.0.len()).sum::<usize>()));
     file.0.extend(MAGIC);
     file.u32(FORMAT_VERSION);
     file.u32(Section::ALL.len() as u32);
     file.u64(OPCODE_TABLE);
     file.u64(BUILTIN_TABLE);
     let mut offset = HEADER_LENGTH as u32;
-    for (section, Output(bytes)) in Section::ALL.into_iter().zip(&sections) {
+    for (section, ByteOutput(bytes)) in Section::ALL.into_iter().zip(&sections) {
         let length = u32::try_from(bytes.len()).map_err(|_| WriteError::TooLong(section))?;
         file.u32(section as u32);
         file.u32(offset);
@@ -47,14 +47,14 @@ pub fn write(module: &Module) -> Result<Vec<u8>, WriteError> {
     }
     let checksum = crc32fast::hash(&file.0);
     file.u32(checksum);
-    for Output(bytes) in sections {
+    for ByteOutput(bytes) in sections {
         file.0.extend(bytes);
     }
     Ok(file.0)
 }
 
-fn write_names(lists: &[&[String]]) -> Output {
-    let mut out = Output::default();
+fn write_names(lists: &[&[String]]) -> ByteOutput {
+    let mut out = ByteOutput::default();
     for names in lists {
         out.u32(names.len() as u32);
         for name in *names {
@@ -64,7 +64,7 @@ fn write_names(lists: &[&[String]]) -> Output {
     out
 }
 
-fn write_text(text: &str, out: &mut Output) {
+fn write_text(text: &str, out: &mut ByteOutput) {
     out.u32(text.len() as u32);
     out.0.extend(text.as_bytes());
 }
@@ -75,12 +75,12 @@ struct SymbolTable {
     numbers: HashMap<Symbol, u32>,
     package_numbers: HashMap<Arc<str>, u32>,
     packages: Vec<Arc<str>>,
-    records: Output,
-    names: Output,
+    records: ByteOutput,
+    names: ByteOutput,
 }
 
 impl SymbolTable {
-    /// The number of `symbol`, a new one if it was not met before.
+    /// Returns the number of `symbol`, a new one if it was not met before.
     fn number(&mut self, symbol: &Symbol) -> u32 {
         if let Some(&number) = self.numbers.get(symbol) {
             return number;
@@ -106,8 +106,8 @@ impl SymbolTable {
         })
     }
 
-    fn finish(self) -> Output {
-        let mut out = Output::default();
+    fn finish(self) -> ByteOutput {
+        let mut out = ByteOutput::default();
         out.u32(self.packages.len() as u32);
         for package in &self.packages {
             write_text(package, &mut out);
@@ -119,9 +119,9 @@ impl SymbolTable {
     }
 }
 
-fn write_constants(constants: &[Constant], symbols: &mut SymbolTable) -> Result<Output, WriteError> {
-    let mut out = Output::default();
-    let mut records = Output::default();
+fn write_constants(constants: &[Constant], symbols: &mut SymbolTable) -> Result<ByteOutput, WriteError> {
+    let mut out = ByteOutput::default();
+    let mut records = ByteOutput::default();
     out.u32(constants.len() as u32);
     for (index, constant) in constants.iter().enumerate() {
         out.u32(records.0.len() as u32);
@@ -135,7 +135,7 @@ fn write_constant(
     constant: &Constant,
     index: PoolIdx,
     symbols: &mut SymbolTable,
-    out: &mut Output,
+    out: &mut ByteOutput,
 ) -> Result<(), WriteError> {
     match constant {
         Constant::Nil => out.u8(tag::NIL),
@@ -201,22 +201,22 @@ fn write_constant(
     Ok(())
 }
 
-fn write_integer(value: &BigInt, out: &mut Output) {
+fn write_integer(value: &BigInt, out: &mut ByteOutput) {
     let bytes = value.to_signed_bytes_le();
     out.u32(bytes.len() as u32);
     out.0.extend(bytes);
 }
 
-fn write_items(items: &[PoolIdx], out: &mut Output) {
+fn write_items(items: &[PoolIdx], out: &mut ByteOutput) {
     out.u32(items.len() as u32);
     for &PoolIdx(item) in items {
         out.u32(item);
     }
 }
 
-fn write_functions(module: &Module) -> (Output, Output) {
-    let mut records = Output::default();
-    let mut index = Output::default();
+fn write_functions(module: &Module) -> (ByteOutput, ByteOutput) {
+    let mut records = ByteOutput::default();
+    let mut index = ByteOutput::default();
     index.u32(module.functions.len() as u32);
     for function in &module.functions {
         let start = records.0.len();
@@ -227,8 +227,8 @@ fn write_functions(module: &Module) -> (Output, Output) {
     (records, index)
 }
 
-fn write_toplevel(module: &Module) -> Output {
-    let mut out = Output::default();
+fn write_toplevel(module: &Module) -> ByteOutput {
+    let mut out = ByteOutput::default();
     out.u32(module.toplevel.len() as u32);
     for &FunctionNumber(number) in &module.toplevel {
         out.u32(number);

@@ -1,8 +1,8 @@
 //! The packages that every program finds.
 
-use super::{Entry, PackageId, Packages};
+use super::{NameEntry, PackageId, Packages};
 use crate::builtin::{BUILTINS, Visibility};
-use crate::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, USER_PACKAGE};
+use crate::symbol::{CL_PACKAGE, CL_USER_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, USER_PACKAGE};
 
 /// The external names of `COMMON-LISP`, sorted. All of the standard's, also those that ESL leaves out: so a
 /// program cannot take one for a name of its own by mistake, and messages can say what to use instead.
@@ -25,7 +25,7 @@ impl PackageId {
 }
 
 impl Packages {
-    /// The standard packages, with the names of Common Lisp and of the builtins.
+    /// Returns the standard packages, with the names of Common Lisp and of the builtins.
     ///
     /// `ESL` uses `COMMON-LISP` and exports its names again, but for those that it takes over. So a package
     /// that uses only `ESL`, as `ESL-USER` does, has all of the language. `COMMON-LISP-USER` is for programs
@@ -38,7 +38,7 @@ impl Packages {
             (PackageId::KEYWORD, KEYWORD_PACKAGE, None),
             (PackageId::ESL, ESL_PACKAGE, None),
             (PackageId::USER, USER_PACKAGE, Some("USER")),
-            (PackageId::CL_USER, "COMMON-LISP-USER", Some("CL-USER")),
+            (PackageId::CL_USER, CL_USER_PACKAGE, Some("CL-USER")),
         ] {
             let added = packages.add(name.into(), nickname.map(Into::into).into_iter().collect());
             debug_assert_eq!(added, id);
@@ -49,7 +49,7 @@ impl Packages {
         packages.table[PackageId::USER].uses = vec![PackageId::ESL];
         packages.table[PackageId::CL_USER].uses = vec![PackageId::CL];
         for name in TAKEN_OVER {
-            let entry = Entry { home: PackageId::ESL, external: true, shadowing: true, symbol: None };
+            let entry = NameEntry { home: PackageId::ESL, external: true, shadowing: true, symbol: None };
             packages.table[PackageId::ESL].symbols.insert(name.into(), entry);
         }
         let of_esl = BUILTINS.iter().filter(|row| row.visibility != Visibility::Cl);
@@ -61,7 +61,7 @@ impl Packages {
     }
 }
 
-/// The words of `text`.
+/// Returns the words of `text`.
 const fn split<const N: usize>(text: &'static str) -> [&'static str; N] {
     let mut words = [""; N];
     let bytes = text.as_bytes();

@@ -9,14 +9,14 @@ use crate::module::{FunctionNumber, MAX_CAPTURES, MAX_CODE, MAX_CONTROL, MAX_REG
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VerifyError {
     /// Where in the module.
-    pub place: Place,
+    pub place: FaultPlace,
     /// What is wrong there.
     pub fault: Fault,
 }
 
 /// A place in a module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum FaultPlace {
     /// A constant.
     Constant(PoolIdx),
     /// A function as a whole.
@@ -155,10 +155,12 @@ pub enum Fault {
 impl fmt::Display for VerifyError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.place {
-            Place::Constant(PoolIdx(index)) => write!(f, "constant {index}: ")?,
-            Place::Function(FunctionNumber(number)) => write!(f, "function {number}: ")?,
-            Place::Instruction(FunctionNumber(number), pc) => write!(f, "function {number}, word {pc}: ")?,
-            Place::Toplevel(index) => write!(f, "top-level form {index}: ")?,
+            FaultPlace::Constant(PoolIdx(index)) => write!(f, "constant {index}: ")?,
+            FaultPlace::Function(FunctionNumber(number)) => write!(f, "function {number}: ")?,
+            FaultPlace::Instruction(FunctionNumber(number), pc) => {
+                write!(f, "function {number}, word {pc}: ")?
+            }
+            FaultPlace::Toplevel(index) => write!(f, "top-level form {index}: ")?,
         }
         self.fault.fmt(f)
     }

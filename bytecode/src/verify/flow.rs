@@ -7,14 +7,14 @@
 
 use std::collections::BTreeSet;
 
-use super::error::{Fault, Place, VerifyError};
+use super::error::{Fault, FaultPlace, VerifyError};
 use super::pool;
 use super::registers::{Class, Registers};
-use super::shape::Shape;
-use super::state::{Entry, EntryKind, Landing, State};
+use super::shape::CodeShape;
+use super::state::{EntryKind, KnownEntry, LandingState, State};
 use crate::module::{CaptureSource, Constant, Function, FunctionNumber, MAX_CONTROL, Module, Parameters};
-use crate::opcode::{Call, Instr, Substitute};
-use crate::operand::{Base, Count, FunctionIdx, Role, Want};
+use crate::opcode::{Call, Instr, RegisterAccess, Substitute};
+use crate::operand::{Count, FunctionIdx, Role, Want, Window};
 
 /// Work for each instruction: how often it may be gone through, times the control entries that then stand.
 const WORK_PER_INSTRUCTION: usize = 1024;
@@ -24,9 +24,9 @@ const WORK_FOR_ALL: usize = 16_384;
 const MAX_STATE_WEIGHT: usize = 200_000;
 
 /// Checks the function, whose instructions by themselves are in order.
-pub(super) fn verify(module: &Module, number: FunctionNumber, shape: &Shape) -> Result<(), VerifyError> {
+pub(super) fn verify(module: &Module, number: FunctionNumber, shape: &CodeShape) -> Result<(), VerifyError> {
     let function = pool::function(module, number)
-        .map_err(|fault| VerifyError { place: Place::Function(number), fault })?;
+        .map_err(|fault| VerifyError { place: FaultPlace::Function(number), fault })?;
     let mut flow = Flow {
         module,
         function,
@@ -36,13 +36,13 @@ pub(super) fn verify(module: &Module, number: FunctionNumber, shape: &Shape) -> 
         work: WORK_FOR_ALL + shape.instructions * WORK_PER_INSTRUCTION,
         weight: 0,
     };
-    flow.run().map_err(|(pc, fault)| VerifyError { place: Place::Instruction(number, pc as u32), fault })
+    flow.run().map_err(|(pc, fault)| VerifyError { place: FaultPlace::Instruction(number, pc as u32), fault })
 }
 
 struct Flow<'a> {
     module: &'a Module,
     function: &'a Function,
-    shape: &'a Shape,
+    shape: &'a CodeShape,
     /// For words that control gets to from elsewhere: what is known there.
     states: Vec<Option<Box<State>>>,
     /// Words whose state has changed since they were gone through.
@@ -162,11 +162,6 @@ impl Flow<'_> {
                     state.set_closure(dst.0, function);
                 }
             }
-            Instr::LoadNil { first, count } => assign(state, first, count),
-            Instr::List { dst, first, count } => {
-                read_all(state, first, count)?;
-                state.set(dst.0, Some(Class::Value));
-            }
             Instr::JumpIfSupplied { test, to } => {
                 if state.registers.class(test.0) != Some(Class::MaybeUnsupplied) {
                     return Err(Fault::NotParameter(test.0));
@@ -234,7 +229,7 @@ impl Flow<'_> {
                 return leave(state);
             }
             Instr::ReturnValues { first, count } => {
-                read_all(state, first, count)?;
+                read_all(state, first.0, count)?;
                 return leave(state);
             }
             Instr::ReturnAll {} => {
@@ -243,12 +238,12 @@ impl Flow<'_> {
             }
 
             Instr::SetValues { first, count } => {
-                read_all(state, first, count)?;
+                read_all(state, first.0, count)?;
                 state.registers.value_list = true;
             }
             Instr::GetValues { first, count } => {
                 expect_value_list(value_list)?;
-                assign(state, first, count);
+                assign(state, first.0, count.0);
             }
             Instr::ValuesToList { dst } => {
                 expect_value_list(value_list)?;
@@ -262,24 +257,24 @@ impl Flow<'_> {
             Instr::PushCatch { window, tag, want, to } => {
                 read(state, tag.0)?;
                 let (results, value_list) = (want.registers(), want == Want::ALL);
-                let landing = Landing { to: target(next, to.0) as u32, results, value_list };
+                let landing = LandingState { to: target(next, to.0) as u32, results, value_list };
                 self.push(state, EntryKind::Catch, window, Some(landing))?;
             }
             Instr::PushCleanup { window, to } => {
-                let landing = Landing { to: target(next, to.0) as u32, results: 0, value_list: false };
+                let landing = LandingState { to: target(next, to.0) as u32, results: 0, value_list: false };
                 self.push(state, EntryKind::Cleanup, window, Some(landing))?;
             }
             Instr::PushRecovery { window, state: table, to } => {
                 read(state, table.0)?;
-                let landing = Landing { to: target(next, to.0) as u32, results: 2, value_list: false };
+                let landing = LandingState { to: target(next, to.0) as u32, results: 2, value_list: false };
                 self.push(state, EntryKind::Recovery, window, Some(landing))?;
             }
             Instr::PushFailureCleanup { window, to } => {
-                let landing = Landing { to: target(next, to.0) as u32, results: 0, value_list: false };
+                let landing = LandingState { to: target(next, to.0) as u32, results: 0, value_list: false };
                 self.push(state, EntryKind::FailureCleanup, window, Some(landing))?;
             }
             Instr::PushHandlerCase { window, to, .. } => {
-                let landing = Landing { to: target(next, to.0) as u32, results: 2, value_list: false };
+                let landing = LandingState { to: target(next, to.0) as u32, results: 2, value_list: false };
                 self.push(state, EntryKind::HandlerCase, window, Some(landing))?;
             }
             Instr::PushHandlers { window, handlers } => {
@@ -323,23 +318,27 @@ impl Flow<'_> {
         Ok(true)
     }
 
-    /// The instructions of which operands tell everything: reads before writes, and perhaps a jump.
+    /// Checks an instruction whose operands tell everything: reads, then writes, then perhaps a jump.
     fn step_plain(&mut self, state: &mut State, instr: Instr, next: usize) -> Result<bool, Fault> {
-        let mut fault = None;
-        let mut written = None;
-        let mut distance = None;
-        instr.visit_operands(|role| match role {
-            Role::Read(register) => fault = fault.or(read(state, register).err()),
-            Role::Write(register) => written = Some(register),
-            Role::Forward(to) | Role::Backward(to) => distance = Some(to),
-            _ => {}
+        let (mut fault, mut distance) = (None, None);
+        instr.visit_registers(|access| {
+            if let RegisterAccess::Read { first, count } = access {
+                fault = fault.or(read_all(state, first, Count(count)).err());
+            }
         });
         if let Some(fault) = fault {
             return Err(fault);
         }
-        if let Some(register) = written {
-            state.set(register, Some(Class::Value));
-        }
+        instr.visit_registers(|access| {
+            if let RegisterAccess::Write { first, count } = access {
+                assign(state, first, count);
+            }
+        });
+        instr.visit_operands(|role| {
+            if let Role::Forward(to) | Role::Backward(to) = role {
+                distance = Some(to);
+            }
+        });
         if let Some(distance) = distance {
             if distance < 0 {
                 // A tick: others may run.
@@ -383,15 +382,15 @@ impl Flow<'_> {
         &mut self,
         state: &mut State,
         kind: EntryKind,
-        window: Base,
-        landing: Option<Landing>,
+        window: Window,
+        landing: Option<LandingState>,
     ) -> Result<(), Fault> {
         expect_window(state, window)?;
         if state.entries.len() == MAX_CONTROL {
             return Err(Fault::ControlDepth);
         }
         let bindings_below = std::mem::take(&mut state.bindings);
-        state.entries.push(Entry { kind, window: window.0, bindings_below, landing, entered: None });
+        state.entries.push(KnownEntry { kind, window: window.0, bindings_below, landing, entered: None });
         self.land(state, state.entries.len() - 1)
     }
 }
@@ -410,7 +409,7 @@ fn on_entry(parameters: &Parameters) -> Registers {
     registers
 }
 
-/// The word that a jump goes to; the linear pass has seen that it is in the code.
+/// Returns the word that a jump goes to; the linear pass has seen that it is in the code.
 fn target(next: usize, distance: i32) -> usize {
     next.saturating_add_signed(distance as isize)
 }
@@ -424,7 +423,7 @@ fn readable(state: &State, register: u8) -> Result<Class, Fault> {
     }
 }
 
-/// `register` must hold an object of the program.
+/// Checks that `register` holds an object of the program.
 fn read(state: &State, register: u8) -> Result<(), Fault> {
     match readable(state, register)? {
         Class::Box => Err(Fault::Box(register)),
@@ -432,7 +431,7 @@ fn read(state: &State, register: u8) -> Result<(), Fault> {
     }
 }
 
-/// `register` must hold a box.
+/// Checks that `register` holds a box.
 fn read_box(state: &State, register: u8) -> Result<(), Fault> {
     match readable(state, register)? {
         Class::Box => Ok(()),
@@ -440,27 +439,27 @@ fn read_box(state: &State, register: u8) -> Result<(), Fault> {
     }
 }
 
-fn read_all(state: &State, first: Base, count: Count) -> Result<(), Fault> {
-    (0..count.0).try_for_each(|i| read(state, first.0 + i))
+fn read_all(state: &State, first: u8, count: Count) -> Result<(), Fault> {
+    (0..count.0).try_for_each(|i| read(state, first + i))
 }
 
-fn assign(state: &mut State, first: Base, count: Count) {
-    for i in 0..count.0 {
-        state.set(first.0 + i, Some(Class::Value));
+fn assign(state: &mut State, first: u8, count: u8) {
+    for i in 0..count {
+        state.set(first + i, Some(Class::Value));
     }
 }
 
-/// A call with the arguments of a window; the frames of callees lie over what is above it. Says whether
-/// control goes on with the next instruction.
+/// Checks a call with the arguments of a window, which clobbers the registers above it. Returns whether
+/// control continues with the next instruction.
 fn call(state: &mut State, Call { callee, window, count, want }: Call) -> Result<bool, Fault> {
     if callee.is_in_window() {
         read(state, window.0)?;
     }
-    read_all(state, Base(window.0 + 2), count)?;
+    read_all(state, window.0 + 2, count)?;
     let Some(want) = want else { return leave(state) };
     expect_window(state, window)?;
     state.keep_below(window.0);
-    assign(state, window, Count(want.registers()));
+    assign(state, window.0, want.registers());
     state.registers.value_list = want == Want::ALL;
     Ok(true)
 }
@@ -469,7 +468,7 @@ fn pop(state: &mut State, Count(count): Count) -> Result<(), Fault> {
     for _ in 0..count {
         match state.entries.pop() {
             None => return Err(Fault::PopCount(count)),
-            Some(Entry { kind: found @ (EntryKind::Cleanup | EntryKind::RunningCleanup), .. }) => {
+            Some(KnownEntry { kind: found @ (EntryKind::Cleanup | EntryKind::RunningCleanup), .. }) => {
                 let expected = "an entry that may be popped";
                 return Err(Fault::Entry { expected, found: Some(found) });
             }
@@ -500,7 +499,7 @@ fn expect_entry(state: &State, kind: EntryKind, expected: &'static str) -> Resul
     if found == Some(kind) { Ok(()) } else { Err(Fault::Entry { expected, found }) }
 }
 
-fn expect_window(state: &State, Base(window): Base) -> Result<(), Fault> {
+fn expect_window(state: &State, Window(window): Window) -> Result<(), Fault> {
     let entry = state.floor();
     if window < entry { Err(Fault::WindowBelowEntry { window, entry }) } else { Ok(()) }
 }

@@ -3,7 +3,7 @@
 use num_bigint::BigInt;
 use num_integer::Integer;
 
-use super::error::{Fault, Place, VerifyError};
+use super::error::{Fault, FaultPlace, VerifyError};
 use crate::module::{Constant, FunctionNumber, Module, PoolIdx};
 
 /// The largest numerator or denominator whose ratio is checked for lowest terms: 8192 bits.
@@ -16,7 +16,7 @@ pub(super) fn verify(module: &Module) -> Result<(), VerifyError> {
     for (index, constant) in module.constants.iter().enumerate() {
         let index = PoolIdx(index as u32);
         verify_constant(module, index, constant)
-            .map_err(|fault| VerifyError { place: Place::Constant(index), fault })?;
+            .map_err(|fault| VerifyError { place: FaultPlace::Constant(index), fault })?;
     }
     Ok(())
 }
@@ -80,12 +80,12 @@ pub(super) fn verify_data(module: &Module, index: PoolIdx) -> Result<(), Fault> 
     if data { Ok(()) } else { Err(Fault::NotData) }
 }
 
-/// The constant `index`, if there is one.
+/// Returns the constant `index`, if there is one.
 pub(super) fn constant(module: &Module, index: PoolIdx) -> Result<&Constant, Fault> {
     module.constants.get(index.0 as usize).ok_or(Fault::PoolIndex(index))
 }
 
-/// The function `number`, if there is one.
+/// Returns the function `number`, if there is one.
 pub(super) fn function(module: &Module, number: FunctionNumber) -> Result<&crate::module::Function, Fault> {
     module.functions.get(number.0 as usize).ok_or(Fault::FunctionNumber(number))
 }

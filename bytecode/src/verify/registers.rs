@@ -104,7 +104,7 @@ impl Registers {
         self.closures.sort_unstable();
     }
 
-    /// The function whose closure, made by this frame, is in `register`, if that is known.
+    /// Returns the function whose closure, made by this frame, is in `register`, if that is known.
     pub(super) fn closure(&self, register: u8) -> Option<u32> {
         self.closures.iter().find(|&&(holder, _)| holder == register).map(|&(_, function)| function)
     }

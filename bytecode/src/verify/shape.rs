@@ -1,50 +1,50 @@
 //! The linear pass over a function: what can be seen of each instruction on its own (V1 to V5, and captures
 //! of V8).
 
-use super::error::{Fault, Place, VerifyError};
+use super::error::{Fault, FaultPlace, VerifyError};
 use super::pool;
 use crate::builtin::Builtin;
 use crate::module::{
     Constant, Function, FunctionNumber, MAX_CAPTURES, MAX_CODE, MAX_REGISTERS, Module, PoolIdx,
 };
-use crate::opcode::{Call, Callee, Instr, Opcode, TypeCode};
+use crate::opcode::{Call, Callee, Instr, Opcode, RegisterAccess, TypeCode};
 use crate::operand::{Count, Role, Want};
 
 /// Where instructions begin, and to which of them control may come from elsewhere than the one before.
 #[derive(Clone, Debug)]
-pub(super) struct Shape {
+pub(super) struct CodeShape {
     /// For each word of the code.
-    words: Vec<Word>,
+    words: Vec<WordUse>,
     /// How many instructions there are.
     pub(super) instructions: usize,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Word {
+enum WordUse {
     Aux,
     Start,
     Target,
 }
 
-impl Shape {
-    /// Whether a jump goes to this word, or an unwinding can land there.
+impl CodeShape {
+    /// Returns whether a jump goes to this word, or an unwinding can land there.
     pub(super) fn is_target(&self, pc: usize) -> bool {
-        self.words.get(pc) == Some(&Word::Target)
+        self.words.get(pc) == Some(&WordUse::Target)
     }
 }
 
 /// Checks the function as a whole, and each instruction on its own.
-pub(super) fn verify(module: &Module, number: FunctionNumber) -> Result<Shape, VerifyError> {
-    let place = Place::Function(number);
+pub(super) fn verify(module: &Module, number: FunctionNumber) -> Result<CodeShape, VerifyError> {
+    let place = FaultPlace::Function(number);
     let function = pool::function(module, number).map_err(|fault| VerifyError { place, fault })?;
     verify_header(module, function).map_err(|fault| VerifyError { place, fault })?;
     let code = &function.code;
-    let mut shape = Shape { words: vec![Word::Aux; code.len()], instructions: 0 };
+    let mut shape = CodeShape { words: vec![WordUse::Aux; code.len()], instructions: 0 };
     let mut jumps: Vec<(usize, i64)> = Vec::new();
     let mut pc = 0;
     while pc < code.len() {
         let check = Check { module, function, next: 0 };
-        let here = |fault| VerifyError { place: Place::Instruction(number, pc as u32), fault };
+        let here = |fault| VerifyError { place: FaultPlace::Instruction(number, pc as u32), fault };
         let number = code[pc] as u8;
         let opcode = Opcode::from_number(number).ok_or_else(|| here(Fault::UnknownOpcode(number)))?;
         let instr = Instr::decode(code, pc).ok_or_else(|| here(Fault::MissingAux))?;
@@ -54,15 +54,15 @@ pub(super) fn verify(module: &Module, number: FunctionNumber) -> Result<Shape, V
         let next = pc + opcode.words();
         let target = Check { next, ..check }.instruction(instr).map_err(here)?;
         jumps.extend(target.map(|target| (pc, target)));
-        shape.words[pc] = Word::Start;
+        shape.words[pc] = WordUse::Start;
         shape.instructions += 1;
         pc = next;
     }
     for (pc, target) in jumps {
         match usize::try_from(target).ok().and_then(|target| shape.words.get_mut(target)) {
-            Some(word @ (Word::Start | Word::Target)) => *word = Word::Target,
+            Some(word @ (WordUse::Start | WordUse::Target)) => *word = WordUse::Target,
             _ => {
-                let place = Place::Instruction(number, pc as u32);
+                let place = FaultPlace::Instruction(number, pc as u32);
                 return Err(VerifyError { place, fault: Fault::JumpTarget(target) });
             }
         }
@@ -126,13 +126,19 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// Checks `instr`, and gives the word that it jumps to or has control land at.
+    /// Checks `instr`. Returns the word that it jumps to, or at which its entry lands.
     fn instruction(self, instr: Instr) -> Result<Option<i64>, Fault> {
         let mut target = None;
         let mut fault = None;
         instr.visit_operands(|role| {
             if fault.is_none() {
                 fault = self.operand(role, &mut target).err();
+            }
+        });
+        instr.visit_registers(|access| {
+            let (RegisterAccess::Read { first, count } | RegisterAccess::Write { first, count }) = access;
+            if fault.is_none() {
+                fault = self.range(first.into(), count.into()).err();
             }
         });
         match fault {
@@ -143,9 +149,9 @@ impl Check<'_> {
 
     fn operand(self, role: Role, target: &mut Option<i64>) -> Result<(), Fault> {
         match role {
-            Role::Read(register) | Role::Write(register) => self.range(u32::from(register), 1),
-            // The rule of the opcode says how far it goes.
-            Role::Base(_) | Role::Number(_) => Ok(()),
+            // These are looked at together, and a window by the rule of the opcode.
+            Role::Read(_) | Role::Write(_) | Role::ReadRange(_) | Role::WriteRange(_) => Ok(()),
+            Role::Window(_) | Role::Count(_) | Role::Number(_) => Ok(()),
             Role::Pad(0) => Ok(()),
             Role::Pad(_) => Err(Fault::SpareBits),
             Role::Want(Want::ONE | Want::ALL | Want(2..=Want::MAX)) => Ok(()),
@@ -161,7 +167,7 @@ impl Check<'_> {
                 self.kind(index, "a class", |constant| matches!(constant, Constant::Class(_)))
             }
             Role::VectorConstant(index) => self.type_specifiers(index),
-            Role::Forward(distance) | Role::Backward(distance) => {
+            Role::Forward(distance) | Role::Backward(distance) | Role::Landing(distance) => {
                 if (distance < 0) != matches!(role, Role::Backward(_)) {
                     return Err(Fault::JumpDirection(distance));
                 }
@@ -213,11 +219,6 @@ impl Check<'_> {
             return self.call(instr, call);
         }
         match instr {
-            Instr::LoadNil { first, count }
-            | Instr::List { first, count, .. }
-            | Instr::ReturnValues { first, count }
-            | Instr::SetValues { first, count }
-            | Instr::GetValues { first, count } => self.range(first.0.into(), count.0.into()),
             Instr::PushCatch { window, want, .. } => self.range(window.0.into(), want.registers().into()),
             Instr::PushHandlerCase { window, .. } | Instr::PushRecovery { window, .. } => {
                 self.range(window.0.into(), 2)
@@ -255,14 +256,14 @@ impl Check<'_> {
         self.range(window.0.into(), want.map_or(0, Want::registers).into())
     }
 
-    /// Whether the capture, which must be there, is a box.
+    /// Returns whether the capture, which must be there, is a box.
     fn capture(self, index: u8) -> Result<bool, Fault> {
         let capture = self.function.captures.get(usize::from(index)).ok_or(Fault::Capture(index))?;
         Ok(capture.boxed)
     }
 }
 
-/// Whether the builtin that is an operand of `instr` takes so many arguments.
+/// Returns whether the builtin that is an operand of `instr` takes so many arguments.
 fn takes(instr: Instr, count: Count) -> bool {
     let mut builtin = None;
     instr.visit_operands(|role| {

@@ -29,7 +29,7 @@ pub enum EntryKind {
 
 /// Where control goes when an unwinding ends at an entry, or passes a cleanup.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Landing {
+pub(super) struct LandingState {
     /// Word of the code.
     pub(super) to: u32,
     /// How many registers from the entry's window on are filled.
@@ -40,12 +40,12 @@ pub(super) struct Landing {
 
 /// A control entry.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Entry {
+pub(super) struct KnownEntry {
     pub(super) kind: EntryKind,
     pub(super) window: u8,
     /// Bindings made before it was pushed, since the entry below it.
     pub(super) bindings_below: u32,
-    pub(super) landing: Option<Landing>,
+    pub(super) landing: Option<LandingState>,
     /// For a running cleanup: what is known when it came about by `enter-cleanup`, or by a failure that it is
     /// for. `None` if it never does.
     pub(super) entered: Option<Box<Registers>>,
@@ -58,14 +58,14 @@ pub(super) struct State {
     /// Bindings made since the innermost entry.
     pub(super) bindings: u32,
     /// The entries, the innermost last. Their windows do not decrease.
-    pub(super) entries: Vec<Entry>,
+    pub(super) entries: Vec<KnownEntry>,
     /// Whether something about a register below an entry's window was known a moment ago and is not now. Code
     /// that such an entry lands at must then be told.
     pub(super) lost: bool,
 }
 
 impl State {
-    /// A frame of which nothing is known but `registers`.
+    /// Returns a frame of which nothing is known but `registers`.
     pub(super) fn new(registers: Registers) -> State {
         State { registers, bindings: 0, entries: Vec::new(), lost: false }
     }
@@ -75,7 +75,7 @@ impl State {
         self.entries.last().map_or(0, |entry| entry.window)
     }
 
-    /// All views of the registers: as they are, and as they are if running cleanups came about by
+    /// Returns all views of the registers: as they are, and as they are if running cleanups came about by
     /// `enter-cleanup`.
     fn views(&mut self) -> impl Iterator<Item = &mut Registers> {
         let entered = self.entries.iter_mut().filter_map(|entry| entry.entered.as_deref_mut());
@@ -103,8 +103,8 @@ impl State {
         self.views().for_each(|view| view.keep_below(end));
     }
 
-    /// The state in which an unwinding leaves the frame that ends at entry `at`, which has a landing.
-    pub(super) fn landed(&self, at: usize, landing: Landing) -> State {
+    /// Returns the state in which an unwinding leaves the frame that ends at entry `at`, which has a landing.
+    pub(super) fn landed(&self, at: usize, landing: LandingState) -> State {
         let entry = &self.entries[at];
         let mut state = State {
             registers: self.registers.clone(),
@@ -125,7 +125,7 @@ impl State {
                 Box::new(registers)
             });
             state.bindings = 0;
-            state.entries.push(Entry {
+            state.entries.push(KnownEntry {
                 kind: EntryKind::RunningCleanup,
                 landing: None,
                 entered,
@@ -161,10 +161,10 @@ impl State {
         Ok(changed)
     }
 
-    /// How much memory and time it takes to copy this, as a multiple of a small state.
+    /// Returns how much memory and time it takes to copy this, as a multiple of a small state.
     pub(super) fn weight(&self) -> usize {
         let of_entry =
-            |entry: &Entry| 1 + entry.entered.as_ref().map_or(0, |registers| 4 + registers.weight());
+            |entry: &KnownEntry| 1 + entry.entered.as_ref().map_or(0, |registers| 4 + registers.weight());
         1 + self.registers.weight() + self.entries.iter().map(of_entry).sum::<usize>()
     }
 }

@@ -44,7 +44,7 @@ fn with_captures(captures: impl IntoIterator<Item = Capture>) -> Function {
     Function { captures: captures.into_iter().collect(), ..function("load-true r0 \n return r0") }
 }
 
-/// A module with `first` as its function 0.
+/// Returns a module with `first` as its function 0.
 fn module(first: Function) -> Module {
     Module {
         sources: vec!["a.esl".to_owned()],

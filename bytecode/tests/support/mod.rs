@@ -75,7 +75,7 @@ pub(crate) fn module_with_random_code(random: &mut Random) -> Module {
     constants.extend((1..6).map(function));
     constants.push(Constant::Class(Symbol::esl("POINT")));
     constants.push(Constant::Vector(vec![PoolIdx(SYMBOL)]));
-    let code: Vec<u32> = vec![Instr::ReturnValues { first: Base(0), count: Count(0) }.encode().0];
+    let code: Vec<u32> = vec![Instr::ReturnValues { first: Items(0), count: Count(0) }.encode().0];
     let captures = [
         vec![],
         vec![Capture::value(CaptureSource::Register(1))],
@@ -307,8 +307,8 @@ fn encode(opcodes: &[Opcode], palette: &Palette, random: &mut Random) -> Vec<u32
         let instr = build(opcode, |kind| match kind {
             "Reg" | "Dst" => random.below(palette.registers) as u32,
             "Count" if opcode == Opcode::LoadNil => random.below(5) as u32,
-            "Base" if opcode == Opcode::LoadNil => 0,
-            "Base" => random.below(palette.registers) as u32,
+            "Room" if opcode == Opcode::LoadNil => 0,
+            "Items" | "Room" | "Window" => random.below(palette.registers) as u32,
             "Count" if matches!(opcode, Opcode::PopControl | Opcode::Unbind) && !random.once_in(10) => 1,
             "Count" => random.below(3) as u32,
             "Want" => random.pick(&[0, 0, 2, 255]),
@@ -320,20 +320,9 @@ fn encode(opcodes: &[Opcode], palette: &Palette, random: &mut Random) -> Vec<u32
             "VectorIdx" => TYPES,
             "Pad" => 0,
             "Index" => random.below(2) as u32,
-            "Jump" | "Jump16" | "Jump24" => {
-                let pushes = matches!(
-                    opcode,
-                    Opcode::PushCatch
-                        | Opcode::PushCleanup
-                        | Opcode::PushHandlerCase
-                        | Opcode::PushRecovery
-                        | Opcode::PushFailureCleanup
-                );
-                let target = if pushes && !random.once_in(10) {
-                    region_end(opcodes, index)
-                } else {
-                    (index + 1 + random.below(4)).min(opcodes.len() - 1)
-                };
+            "Landing" if !random.once_in(10) => (starts[region_end(opcodes, index)] - next) as u32,
+            "Jump" | "Jump16" | "Jump24" | "Landing" => {
+                let target = (index + 1 + random.below(4)).min(opcodes.len() - 1);
                 (starts[target] - next) as u32
             }
             "Back" | "Back16" | "Back24" => {

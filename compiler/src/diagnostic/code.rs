@@ -423,6 +423,11 @@ LOCKED_NAME = "locked-name" Error
     fails: "(defun car (x)\n  x)\n"
     repaired: "(defun my-car (x)\n  x)\n"
 
+LOCKED_NAME_INSIDE = "locked-name-inside" Warning
+    /// A definition of a name that belongs to the language, inside of another form: it fails if it is run.
+    fails: "(unless (fboundp 'car)\n  (defun car (x)\n    x))\n"
+    repaired: "(unless (fboundp 'my-car)\n  (defun my-car (x)\n    x))\n"
+
 }
 Lowering {
 

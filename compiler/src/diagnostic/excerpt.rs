@@ -44,7 +44,7 @@ pub(super) struct Excerpt<'a> {
 }
 
 /// A label with its place in the text.
-struct Placed<'a> {
+struct PlacedMark<'a> {
     start: usize,
     end: usize,
     first_line: u32,
@@ -60,7 +60,7 @@ pub(super) fn excerpts<'a>(
     sources: &Sources,
 ) -> Vec<Excerpt<'a>> {
     let labels = std::iter::once((primary, true)).chain(secondary.iter().map(|label| (label, false)));
-    let mut placed: Vec<Placed<'_>> =
+    let mut placed: Vec<PlacedMark<'_>> =
         labels.filter_map(|(label, is_primary)| place(label, is_primary, sources)).collect();
     placed.sort_by_key(|placed| (placed.label.span.source, placed.start));
     let mut excerpts: Vec<Excerpt<'a>> = placed
@@ -74,7 +74,7 @@ pub(super) fn excerpts<'a>(
 }
 
 /// Fits a label into its text: moves its ends to character boundaries, and reduces many lines to the first.
-fn place<'a>(label: &'a Label, is_primary: bool, sources: &Sources) -> Option<Placed<'a>> {
+fn place<'a>(label: &'a Label, is_primary: bool, sources: &Sources) -> Option<PlacedMark<'a>> {
     let text = sources.text(label.span.source)?;
     let start = text.floor_char_boundary(label.span.start as usize);
     let mut end = text.ceil_char_boundary(label.span.end as usize).max(start);
@@ -84,10 +84,10 @@ fn place<'a>(label: &'a Label, is_primary: bool, sources: &Sources) -> Option<Pl
     }
     let line =
         |at: usize| sources.place(Span::new(label.span.source, at as u32, at as u32)).map(|place| place.line);
-    Some(Placed { start, end, first_line: line(start)?, last_line: line(end)?, label, is_primary })
+    Some(PlacedMark { start, end, first_line: line(start)?, last_line: line(end)?, label, is_primary })
 }
 
-fn excerpt<'a>(group: &[Placed<'a>], sources: &Sources) -> Excerpt<'a> {
+fn excerpt<'a>(group: &[PlacedMark<'a>], sources: &Sources) -> Excerpt<'a> {
     let source = group[0].label.span.source;
     let text = sources.text(source).expect("labels have a text");
     let end = group.iter().map(|placed| placed.end).max().unwrap_or(0);
@@ -139,7 +139,7 @@ fn excerpt<'a>(group: &[Placed<'a>], sources: &Sources) -> Excerpt<'a> {
 }
 
 /// Returns the part of a long line to keep: the neighbourhood of its first label, or its beginning.
-fn cut(text: &str, line: &Range<usize>, group: &[Placed<'_>]) -> Range<usize> {
+fn cut(text: &str, line: &Range<usize>, group: &[PlacedMark<'_>]) -> Range<usize> {
     let label = group.iter().find(|placed| placed.start < line.end && placed.end >= line.start);
     let (start, end) = label.map_or((line.start, line.start), |placed| {
         let start = placed.start.max(line.start);

@@ -7,7 +7,7 @@ use esl_bytecode::compile::{LineIndex, Part, Place, SourcePlace};
 use esl_bytecode::span::{SourceId, Span};
 
 #[derive(Clone, Debug)]
-struct Source {
+struct KnownSource {
     name: String,
     text: Option<Arc<str>>,
     /// Part of the text that is compiled, and the line in which it begins.
@@ -19,7 +19,7 @@ struct Source {
 /// The sources of a compilation, in the order of their numbers.
 #[derive(Clone, Debug, Default)]
 pub struct Sources {
-    sources: Vec<Source>,
+    sources: Vec<KnownSource>,
 }
 
 impl Sources {
@@ -42,13 +42,18 @@ impl Sources {
 
     fn add_source(&mut self, name: String, text: Option<Arc<str>>, part: (Range<usize>, u32)) -> SourceId {
         let id = SourceId(u32::try_from(self.sources.len()).expect("fewer than 2^32 sources"));
-        self.sources.push(Source { name, text, part, lines: OnceLock::new() });
+        self.sources.push(KnownSource { name, text, part, lines: OnceLock::new() });
         id
     }
 
     /// Returns the name of a source.
     pub fn name(&self, id: SourceId) -> Option<&str> {
         self.get(id).map(|source| source.name.as_str())
+    }
+
+    /// Returns the names of all sources, in order.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.sources.iter().map(|source| source.name.as_str())
     }
 
     /// Returns the text of a source, if it is known.
@@ -72,10 +77,10 @@ impl Sources {
         Some(source.lines.get_or_init(lines).place(text, span))
     }
 
-    /// Returns the source that a place names, and the byte of the place in its text; `None` if the text is unknown or
-    /// does not contain the place.
+    /// Returns the source that a place names, and the byte of the place in its text; `None` if the text is
+    /// unknown or does not contain the place.
     pub fn offset_of(&self, place: &SourcePlace) -> Option<(SourceId, usize)> {
-        let is_named = |source: &Source| source.name == place.source && source.text.is_some();
+        let is_named = |source: &KnownSource| source.name == place.source && source.text.is_some();
         let index = self.sources.iter().rposition(is_named)?;
         let text = self.sources[index].text.as_ref()?;
         let (line, column) = (place.line.checked_sub(1)? as usize, place.column.checked_sub(1)? as usize);
@@ -92,7 +97,7 @@ impl Sources {
         self.place(Span::new(span.source, span.end, span.end))
     }
 
-    fn get(&self, id: SourceId) -> Option<&Source> {
+    fn get(&self, id: SourceId) -> Option<&KnownSource> {
         self.sources.get(id.0 as usize)
     }
 }

@@ -51,7 +51,7 @@ impl Expander {
 }
 
 /// A binding of a `let`: the name as written, its symbol, and the form of the value.
-struct Binding {
+struct VariableBinding {
     datum: Datum,
     symbol: Symbol,
     value: Datum,
@@ -62,7 +62,7 @@ fn bindings(
     environment: &dyn Environment,
     form: &Form,
     shape: &str,
-) -> Checked<Vec<Binding>> {
+) -> Checked<Vec<VariableBinding>> {
     let Some(list) = form.args.first() else { return Err(form.missing(shape)) };
     let Some(items) = list.as_list() else {
         let what = format!("{shape}, not {}", quoted(list));
@@ -92,7 +92,7 @@ fn bindings(
         }
         let symbol = expander.variable_name(environment, datum, form, Deed::Bind)?;
         let value = value.unwrap_or_else(|| Datum::nil(form.at(datum.span())));
-        bindings.push(Binding { datum: datum.clone(), symbol, value });
+        bindings.push(VariableBinding { datum: datum.clone(), symbol, value });
     }
     Ok(bindings)
 }
@@ -133,7 +133,7 @@ fn expand_let(
     let mut entries = Vec::new();
     let mut variables = Vec::new();
     let mut bound = Vec::new();
-    for Binding { datum, symbol, value } in found {
+    for VariableBinding { datum, symbol, value } in found {
         let (node, job) = expander.part(value, to);
         let (variable, entry) = expander.bound_variable(environment, &symbol, &datum, &body, form, to);
         variables.push((variable, node));
@@ -229,7 +229,7 @@ pub(super) fn symbol_macros(
     check_distinct(found.iter().map(|binding| (&binding.symbol, binding.datum.span())), form)?;
     let body = expander.take_body(&form.args[1..], false, form, origin)?;
     let mut entries = Vec::new();
-    for Binding { datum, symbol, value } in found {
+    for VariableBinding { datum, symbol, value } in found {
         if expander.is_special(environment, &symbol, &body) {
             let what = format!("cannot give {} an expansion: it is a special variable", name(&symbol));
             return Err(form.malformed_at(datum.span(), &what));

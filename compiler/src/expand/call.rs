@@ -201,7 +201,7 @@ impl Expander {
             self.report(wrong_count(&function.name.shown(), arity, count, to.span), to.origin);
             return Ok(Callee::Global(function.cell.clone()));
         }
-        self.check_defining(environment, builtin, form)?;
+        self.check_defining(environment, builtin, form, to)?;
         Ok(Callee::Builtin(builtin))
     }
 

@@ -19,17 +19,32 @@ use crate::core::{Callee, NodeKind};
 use crate::diagnostic::code;
 
 impl Expander {
-    /// Refuses a definition of `symbol` as a function or macro if the name belongs to the language.
-    pub(super) fn check_definable(
-        &self,
+    /// Refuses the definition of `symbol`, at `span` in `form`, as a function or macro if the name belongs to
+    /// the language.
+    ///
+    /// Returns whether the unit may count on the definition: one that is written inside of another form is
+    /// only warned of, since it may never run.
+    fn check_definable(
+        &mut self,
         environment: &dyn Environment,
         symbol: &Symbol,
         span: Span,
-    ) -> Checked {
-        if environment.global(symbol).locked { Err(locked(symbol, span)) } else { Ok(()) }
+        form: &Form,
+        to: To,
+    ) -> Checked<bool> {
+        if !environment.global(symbol).locked {
+            return Ok(true);
+        }
+        if to.is_whole_chunk() || self.origins.is_of_library(form.span, to.origin) {
+            return Err(locked(symbol, span));
+        }
+        let message =
+            format!("{} belongs to the language, and this definition fails if it is run", name(symbol));
+        self.report(code::LOCKED_NAME_INSIDE.at(span, message).help("choose another name"), to.origin);
+        Ok(false)
     }
 
-    /// As [`Expander::check_definable`], for a local definition; macros of the library may make those.
+    /// Refuses the local definition of a name of the language; macros of the library may make those.
     pub(super) fn check_locally_definable(
         &self,
         environment: &dyn Environment,
@@ -37,10 +52,10 @@ impl Expander {
         span: Span,
         origin: Option<OriginId>,
     ) -> Checked {
-        if self.origins.is_of_library(span, origin) {
+        if self.origins.is_of_library(span, origin) || !environment.global(symbol).locked {
             Ok(())
         } else {
-            self.check_definable(environment, symbol, span)
+            Err(locked(symbol, span))
         }
     }
 
@@ -51,6 +66,7 @@ impl Expander {
         environment: &dyn Environment,
         builtin: Builtin,
         form: &Form,
+        to: To,
     ) -> Checked {
         let defines = matches!(
             builtin,
@@ -60,7 +76,9 @@ impl Expander {
             return Ok(());
         }
         let Some(symbol) = form.args.iter().find_map(quoted_symbol) else { return Ok(()) };
-        if environment.global(&symbol).locked {
+        // Of a macro defined inside of another form, `defmacro` has warned.
+        let is_warned_of = builtin == Builtin::SetMacro && !to.is_whole_chunk();
+        if environment.global(&symbol).locked && !is_warned_of {
             return Err(locked(&symbol, form.span));
         }
         if matches!(builtin, Builtin::ProclaimSpecial | Builtin::DefineConstant) {
@@ -102,7 +120,8 @@ fn define_function(
     function: &WrittenName,
     to: To,
 ) -> Checked {
-    expander.check_definable(environment, &function.name.symbol, form.at(function.datum.span()))?;
+    let span = form.at(function.datum.span());
+    let is_definable = expander.check_definable(environment, &function.name.symbol, span, form, to)?;
     form.takes(2..=usize::MAX, "needs a name and a lambda list")?;
     let parts = FunctionParts {
         name: Some(&function.datum),
@@ -111,7 +130,9 @@ fn define_function(
         body: &form.args[2..],
     };
     let text = expander.lambda_text(environment, parts, form, to.origin)?;
-    expander.globals.note_definition(function.name.clone(), text.arity());
+    if is_definable {
+        expander.globals.note_definition(function.name.clone(), text.arity());
+    }
 
     let mut call = to;
     if function.name.is_setf {
@@ -136,8 +157,9 @@ pub(super) fn defmacro(
     to: To,
 ) -> Checked {
     let symbol = form.symbol(0, "needs a symbol as its first part, and a lambda list")?;
-    expander.check_definable(environment, &symbol, form.at(form.args[0].span()))?;
-    expander.note_macro(&symbol);
+    if expander.check_definable(environment, &symbol, form.at(form.args[0].span()), &form, to)? {
+        expander.note_macro(&symbol);
+    }
     form.takes(2..=usize::MAX, "needs a name and a lambda list")?;
     // The definition keeps its place in the source, so that its unused variables are reported.
     let make = Make(form.datum.span());

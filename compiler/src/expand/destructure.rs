@@ -23,7 +23,7 @@ use super::job::{Job, To};
 use super::lambda_list::{LambdaList, LambdaListKind, OptionalSpec};
 
 /// A variable or pattern, and the form whose value it receives.
-type Binding = (Datum, Datum);
+type FormBinding = (Datum, Datum);
 
 /// Bindings made from a pattern. Patterns among them are still to be taken apart.
 struct Row<'e> {
@@ -31,7 +31,7 @@ struct Row<'e> {
     environment: &'e mut dyn Environment,
     /// Quoted name of the macro, or quoted pattern.
     context: Datum,
-    bindings: Vec<Binding>,
+    bindings: Vec<FormBinding>,
 }
 
 impl Row<'_> {
@@ -49,9 +49,9 @@ impl Row<'_> {
 
     /// Takes all patterns apart, from left to right, each in its place; returns the bindings, now of
     /// variables only. Nesting takes no native stack.
-    fn finish(mut self, form: &Form) -> Checked<Vec<Binding>> {
-        let mut finished: Vec<Binding> = Vec::new();
-        let mut waiting: Vec<Binding> = std::mem::take(&mut self.bindings);
+    fn finish(mut self, form: &Form) -> Checked<Vec<FormBinding>> {
+        let mut finished: Vec<FormBinding> = Vec::new();
+        let mut waiting: Vec<FormBinding> = std::mem::take(&mut self.bindings);
         waiting.reverse();
         while let Some((variable, form)) = waiting.pop() {
             if variable.as_symbol().is_some() {

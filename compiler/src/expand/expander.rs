@@ -141,9 +141,9 @@ impl Expander {
         findings
     }
 
-    /// Whether an error has been found.
-    pub fn has_failed(&self) -> bool {
-        self.errors > 0
+    /// Returns the number of errors found so far.
+    pub fn errors(&self) -> usize {
+        self.errors
     }
 
     /// Whether the compiler itself expands forms of the operator `symbol`.

@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use esl_bytecode::compile::Environment;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::package::TAKEN_OVER;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{ESL_PACKAGE, Symbol};
 use rustc_hash::FxHashMap;
@@ -149,6 +150,24 @@ pub(super) fn name(symbol: &Symbol) -> String {
     format!("`{}`", plain(symbol))
 }
 
+/// Returns a name between backticks, after its package.
+pub(super) fn name_with_package(symbol: &Symbol) -> String {
+    let package = symbol.package().map(|package| package.to_string().to_lowercase() + ":");
+    format!("`{}{}`", package.unwrap_or_default(), plain(symbol))
+}
+
+/// Adds to a finding about a use of `symbol`, if ESL has taken over that name of Common Lisp, how to refer to
+/// what it means there.
+pub(super) fn with_namesake(diagnostic: Diagnostic, symbol: &Symbol) -> Diagnostic {
+    if !symbol.is_in(ESL_PACKAGE) || !TAKEN_OVER.contains(&symbol.name()) {
+        return diagnostic;
+    }
+    let standard = name_with_package(&Symbol::cl(symbol.name()));
+    let help = format!("this is ESL's own {}; Common Lisp's is {standard}", name(symbol));
+    let help = diagnostic.help.as_ref().map_or(help.clone(), |first| format!("{first}; {help}"));
+    diagnostic.help(help)
+}
+
 /// Returns a name as [`name`], without the backticks.
 pub(super) fn plain(symbol: &Symbol) -> String {
     let text = symbol.to_string();
@@ -168,51 +187,51 @@ pub(super) fn quoted(datum: &Datum) -> String {
 /// Returns a datum on one line, in lower case. A form may be as long as a file, so the text is cut soon after
 /// `limit` characters.
 pub(super) fn on_one_line(datum: &Datum, limit: usize) -> String {
-    enum Part<'a> {
+    enum PrintPart<'a> {
         Datum(&'a Datum),
         Tail(&'a Datum),
         Text(&'static str),
     }
     let mut text = String::new();
-    let mut parts = vec![Part::Datum(datum)];
+    let mut parts = vec![PrintPart::Datum(datum)];
     while let Some(part) = parts.pop() {
         // The count of bytes decides only whether to count characters.
         if text.len() > 4 * limit || text.len() > limit && text.chars().count() > limit {
             break;
         }
         match part {
-            Part::Text(piece) => text.push_str(piece),
-            Part::Tail(tail) => match tail.kind() {
+            PrintPart::Text(piece) => text.push_str(piece),
+            PrintPart::Tail(tail) => match tail.kind() {
                 DatumKind::Nil => text.push(')'),
                 DatumKind::Cons(car, cdr) => {
                     text.push(' ');
-                    parts.extend([Part::Tail(cdr), Part::Datum(car)]);
+                    parts.extend([PrintPart::Tail(cdr), PrintPart::Datum(car)]);
                 }
                 _ => {
                     text.push_str(" . ");
-                    parts.extend([Part::Text(")"), Part::Datum(tail)]);
+                    parts.extend([PrintPart::Text(")"), PrintPart::Datum(tail)]);
                 }
             },
-            Part::Datum(datum) => match datum.kind() {
+            PrintPart::Datum(datum) => match datum.kind() {
                 DatumKind::Nil => text.push_str("()"),
                 DatumKind::Symbol(symbol) => text.push_str(&plain(symbol)),
                 DatumKind::Cons(car, cdr) => match abbreviation(car, cdr) {
                     Some((mark, quoted)) => {
                         text.push_str(mark);
-                        parts.push(Part::Datum(quoted));
+                        parts.push(PrintPart::Datum(quoted));
                     }
                     None => {
                         text.push('(');
-                        parts.extend([Part::Tail(cdr), Part::Datum(car)]);
+                        parts.extend([PrintPart::Tail(cdr), PrintPart::Datum(car)]);
                     }
                 },
                 DatumKind::Vector(items) => {
                     text.push_str("#(");
-                    parts.push(Part::Text(")"));
+                    parts.push(PrintPart::Text(")"));
                     for (index, item) in items.iter().take(limit).enumerate().rev() {
-                        parts.push(Part::Datum(item));
+                        parts.push(PrintPart::Datum(item));
                         if index > 0 {
-                            parts.push(Part::Text(" "));
+                            parts.push(PrintPart::Text(" "));
                         }
                     }
                 }

@@ -8,7 +8,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::form::{name, plain};
+use super::form::{name, name_with_package, plain, with_namesake};
 use super::function::FunctionName;
 use crate::diagnostic::code;
 
@@ -133,7 +133,8 @@ impl GlobalUses {
             if let (Some(arity), Some(count)) = (arity, call.arguments)
                 && !accepts(arity, count)
             {
-                findings.push(wrong_count(&call.function.shown(), arity, count, call.span));
+                let warning = wrong_count(&call.function.shown(), arity, count, call.span);
+                findings.push(with_namesake(warning, &call.function.symbol));
             }
         }
         let mut reported = FxHashSet::default();
@@ -236,6 +237,9 @@ impl Similar<'_> {
         }
         self.left -= 1;
         match self.environment.similar(symbol, variable).first() {
+            Some(similar) if similar.name() == symbol.name() => {
+                diagnostic.help(format!("did you mean {}?", name_with_package(similar)))
+            }
             Some(similar) => diagnostic.help(format!("did you mean {}?", name(similar))),
             None => diagnostic,
         }

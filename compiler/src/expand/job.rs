@@ -32,6 +32,11 @@ pub(super) struct To {
 }
 
 impl To {
+    /// Whether this is the place of the whole form of a chunk.
+    pub(super) fn is_whole_chunk(self) -> bool {
+        self.node == NodeId(0)
+    }
+
     /// Returns the same destination at the place of `form`, if that is known.
     pub(super) fn at(self, form: &Datum) -> To {
         if is_known(form.span()) { To { span: form.span(), ..self } } else { self }

@@ -66,7 +66,7 @@ pub(super) struct LambdaList {
 
 /// Section of a lambda list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Section {
+enum ParameterSection {
     Required,
     Optional,
     Rest,
@@ -79,7 +79,7 @@ enum Section {
 impl LambdaList {
     /// Parses a lambda list. `span` is the place of data without a place of their own.
     pub(super) fn parse(list: &Datum, kind: LambdaListKind, span: Span) -> Checked<LambdaList> {
-        Parser { kind, span, section: Section::Required, parsed: LambdaList::default() }.parse(list)
+        Parser { kind, span, section: ParameterSection::Required, parsed: LambdaList::default() }.parse(list)
     }
 
     /// Returns how many arguments a function of this lambda list takes.
@@ -93,7 +93,7 @@ impl LambdaList {
 struct Parser {
     kind: LambdaListKind,
     span: Span,
-    section: Section,
+    section: ParameterSection,
     parsed: LambdaList,
 }
 
@@ -123,14 +123,14 @@ impl Parser {
         if !tail.is_nil() {
             if self.kind == LambdaListKind::Ordinary
                 || self.parsed.rest.is_some()
-                || self.section > Section::Optional
+                || self.section > ParameterSection::Optional
             {
                 return Err(self.wrong(tail, "expected `)` at the end of a lambda list, found a dot"));
             }
             self.variable(tail)?;
             self.parsed.rest = Some(tail.clone());
         }
-        if self.section == Section::Rest {
+        if self.section == ParameterSection::Rest {
             let keyword = list.elements().last().unwrap_or(list);
             return Err(self.wrong(keyword, "`&rest` needs the name of a variable after it"));
         }
@@ -139,14 +139,16 @@ impl Parser {
 
     fn keyword(&mut self, keyword: &Symbol, item: &Datum, follower: Option<&Datum>) -> Checked {
         let name = keyword.name();
-        let goes_on = |section| self.section < section && self.section != Section::Rest;
+        let goes_on = |section| self.section < section && self.section != ParameterSection::Rest;
         let next = match name {
-            "&OPTIONAL" if goes_on(Section::Optional) => Section::Optional,
-            "&REST" if goes_on(Section::Rest) => Section::Rest,
-            "&BODY" if goes_on(Section::Rest) && self.kind != LambdaListKind::Ordinary => Section::Rest,
-            "&KEY" if goes_on(Section::Key) => Section::Key,
-            "&ALLOW-OTHER-KEYS" if self.section == Section::Key => Section::AfterKey,
-            "&AUX" if goes_on(Section::Aux) => Section::Aux,
+            "&OPTIONAL" if goes_on(ParameterSection::Optional) => ParameterSection::Optional,
+            "&REST" if goes_on(ParameterSection::Rest) => ParameterSection::Rest,
+            "&BODY" if goes_on(ParameterSection::Rest) && self.kind != LambdaListKind::Ordinary => {
+                ParameterSection::Rest
+            }
+            "&KEY" if goes_on(ParameterSection::Key) => ParameterSection::Key,
+            "&ALLOW-OTHER-KEYS" if self.section == ParameterSection::Key => ParameterSection::AfterKey,
+            "&AUX" if goes_on(ParameterSection::Aux) => ParameterSection::Aux,
             "&WHOLE" if self.kind != LambdaListKind::Ordinary && self.is_fresh() => {
                 let Some(variable) = follower else {
                     return Err(self.wrong(item, "`&whole` needs the name of a variable after it"));
@@ -175,8 +177,8 @@ impl Parser {
             }
         };
         match next {
-            Section::Key => self.parsed.keys = Some(Vec::new()),
-            Section::AfterKey => self.parsed.allow_other_keys = true,
+            ParameterSection::Key => self.parsed.keys = Some(Vec::new()),
+            ParameterSection::AfterKey => self.parsed.allow_other_keys = true,
             _ => {}
         }
         self.section = next;
@@ -185,7 +187,7 @@ impl Parser {
 
     /// Whether nothing has been parsed.
     fn is_fresh(&self) -> bool {
-        self.section == Section::Required
+        self.section == ParameterSection::Required
             && self.parsed.required.is_empty()
             && self.parsed.whole.is_none()
             && self.parsed.environment.is_none()
@@ -193,32 +195,34 @@ impl Parser {
 
     fn parameter(&mut self, item: &Datum) -> Checked {
         match self.section {
-            Section::Required => {
+            ParameterSection::Required => {
                 self.variable(item)?;
                 self.parsed.required.push(item.clone());
             }
-            Section::Optional => {
+            ParameterSection::Optional => {
                 let optional = self.optional(item)?;
                 self.parsed.optional.push(optional);
             }
-            Section::Rest => {
+            ParameterSection::Rest => {
                 self.variable(item)?;
                 self.parsed.rest = Some(item.clone());
-                self.section = Section::AfterRest;
+                self.section = ParameterSection::AfterRest;
             }
-            Section::Key => {
+            ParameterSection::Key => {
                 let key = self.key(item)?;
                 self.parsed.keys.get_or_insert_default().push(key);
             }
-            Section::Aux => {
+            ParameterSection::Aux => {
                 let OptionalSpec { variable, default, supplied } = self.optional(item)?;
                 if let Some(extra) = supplied {
                     return Err(self.wrong(&extra, "an `&aux` variable takes a value only"));
                 }
                 self.parsed.aux.push((variable, default));
             }
-            Section::AfterRest => return Err(self.wrong(item, "only one name can follow `&rest`")),
-            Section::AfterKey => return Err(self.wrong(item, "no name can follow `&allow-other-keys`")),
+            ParameterSection::AfterRest => return Err(self.wrong(item, "only one name can follow `&rest`")),
+            ParameterSection::AfterKey => {
+                return Err(self.wrong(item, "no name can follow `&allow-other-keys`"));
+            }
         }
         Ok(())
     }

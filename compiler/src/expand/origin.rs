@@ -28,6 +28,8 @@ pub(super) struct Origin {
     pub(super) span: Span,
     /// Whether the macro belongs to the language, so that an error in its expansion is not its fault.
     pub(super) is_standard: bool,
+    /// Whether the macro of the innermost of these calls belongs to the language.
+    is_made_by_standard: bool,
     /// Number of macro calls around this one.
     chain: u32,
 }
@@ -71,10 +73,11 @@ impl Origins {
             let message = format!("the expansion of {} does not end", name(outermost));
             return Err(Box::new(code::MACRO_FAILED.at(span, message)));
         }
+        let is_made_by_standard = is_standard;
         let origin = match parent {
             // A call that a macro has made is shown as the call of that macro.
-            Some(parent) if parent.span == span => Origin { chain, ..parent.clone() },
-            _ => Origin { name: operator.clone(), span, is_standard, chain },
+            Some(parent) if parent.span == span => Origin { is_made_by_standard, chain, ..parent.clone() },
+            _ => Origin { name: operator.clone(), span, is_standard, is_made_by_standard, chain },
         };
         self.expansions += 1;
         self.calls.push(origin);
@@ -91,6 +94,6 @@ impl Origins {
     /// Whether a macro of the language made a form at `span`.
     pub(super) fn is_of_library(&self, span: Span, origin: Option<OriginId>) -> bool {
         let is_made = !is_known(self.written(span, origin));
-        is_made && origin.is_some_and(|origin| self.get(origin).is_standard)
+        is_made && origin.is_some_and(|origin| self.get(origin).is_made_by_standard)
     }
 }

@@ -37,9 +37,9 @@ struct Printer<'a> {
 }
 
 /// Numbers the names that occur more than once.
-struct Names(FxHashMap<String, u32>);
+struct NameCounts(FxHashMap<String, u32>);
 
-impl Names {
+impl NameCounts {
     fn name(&mut self, name: &Symbol) -> Datum {
         let text = name.name().to_string();
         let count = self.0.entry(text.clone()).or_insert(0);
@@ -55,12 +55,12 @@ impl Names {
 }
 
 fn variable_names(core: &Core) -> Vec<Datum> {
-    let mut names = Names(FxHashMap::default());
+    let mut names = NameCounts(FxHashMap::default());
     core.variables.iter().map(|variable| names.name(&variable.name)).collect()
 }
 
 fn block_names(core: &Core) -> Vec<Datum> {
-    let mut names = Names(FxHashMap::default());
+    let mut names = NameCounts(FxHashMap::default());
     core.blocks
         .iter()
         .map(|block| names.name(block.name.as_ref().unwrap_or(&Symbol::esl("%BLOCK"))))
@@ -159,7 +159,7 @@ impl Printer<'_> {
                 MAKE.esl("%HANDLER-CASE", std::iter::once(at(form)).chain(clauses))
             }
             NodeKind::Recovery { table, procedures, body } => {
-                MAKE.esl("%WITH-RECOVERY", [table.clone(), at(procedures), at(body)])
+                MAKE.esl("%WITH-RECOVERY", [at(table), at(procedures), at(body)])
             }
             NodeKind::FailureCleanup(body, cleanup) => {
                 MAKE.esl("%WITH-FAILURE-CLEANUP", [at(cleanup), at(body)])

@@ -2,12 +2,11 @@
 //! `with-cleanup-procedure`; and the checks of recovery clauses.
 
 use esl_bytecode::compile::Environment;
-use esl_bytecode::datum::DatumKind;
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashSet;
 
 use super::expander::Expander;
-use super::form::{Checked, Form, Make, is_esl, name, operator};
+use super::form::{Checked, Form, Make, is_esl, name, operator, with_namesake};
 use super::job::{Job, To};
 use super::scope::Visible;
 use crate::core::*;
@@ -20,15 +19,15 @@ const LEAVING_STANDARD: &[&str] = &["ERROR", "INVOKE-RESTART", "ABORT"];
 /// `(%with-recovery table (%named-lambda …) . body)`: see [`NodeKind::Recovery`].
 pub(super) fn with_recovery(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(2..=usize::MAX, "needs a table and a function")?;
-    let table = form.args[0].clone();
     let is_function = operator(&form.args[1]).is_some_and(|operator| is_esl(operator, "%NAMED-LAMBDA"));
-    if !matches!(table.kind(), DatumKind::Vector(_)) || !is_function {
-        return Err(form.malformed("needs a vector and a function's text"));
+    if !is_function {
+        return Err(form.malformed("needs a table and a function's text"));
     }
+    let (table, table_job) = expander.part(form.args[0].clone(), to);
     let (procedures, job) = expander.part(form.args[1].clone(), to);
     let body = expander.child(to);
     expander.fill(to, NodeKind::Recovery { table, procedures, body: body.node });
-    let mut jobs = vec![job];
+    let mut jobs = vec![table_job, job];
     jobs.extend(expander.body(form.args[2..].to_vec(), body));
     expander.schedule(jobs);
     Ok(())
@@ -75,7 +74,8 @@ pub(super) fn cause(expander: &mut Expander, _: &mut dyn Environment, form: Form
     Ok(())
 }
 
-/// `(retry)`: runs the body of the recovery form around the clause again.
+/// `(retry)`: runs the body of the recovery form around the clause again. `%on-retry`, a symbol macro of the
+/// clause, is evaluated before.
 pub(super) fn retry(
     expander: &mut Expander,
     environment: &mut dyn Environment,
@@ -93,7 +93,8 @@ pub(super) fn abort(
     form: Form,
     to: To,
 ) -> Checked {
-    form.takes(0..=1, "takes at most a result")?;
+    form.takes(0..=1, "takes at most a result")
+        .map_err(|diagnostic| Box::new(with_namesake(*diagnostic, &form.operator)))?;
     leave(expander, environment, form, to)
 }
 
@@ -103,12 +104,17 @@ fn leave(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -
     if !matches!(expander.scope.variable(&state, expander.level()), Visible::Is(_)) {
         let message = format!("{} stands outside of a recovery clause", name(&form.operator));
         let help = "only clauses of `with-recovery-procedures` can contain it";
-        return Err(Box::new(code::OUTSIDE_CLAUSE.at(form.head(), message).help(help)));
+        let diagnostic = code::OUTSIDE_CLAUSE.at(form.head(), message).help(help);
+        return Err(Box::new(with_namesake(diagnostic, &form.operator)));
     }
     let make = Make(to.span);
     let is_retry = form.operator.name() == "RETRY";
-    let result = form.args.into_iter().next().unwrap_or(make.nil());
-    let first = if is_retry { make.symbol(&state) } else { make.nil() };
+    let result = form.args.into_iter().next();
+    let (first, result) = if is_retry {
+        (make.symbol(&state), make.symbol(&Symbol::esl("%ON-RETRY")))
+    } else {
+        (make.nil(), result.unwrap_or(make.nil()))
+    };
     let throw = make.cl("THROW", [make.symbol(&state), make.cl("VALUES", [first, result])]);
     expander.schedule([Job::Expand(throw, to)]);
     Ok(())

@@ -73,8 +73,9 @@ pub(crate) fn assemble(graph: &Graph, lines: &SourceLines) -> Result<(Vec<u32>, 
                         Some(_) => (instr, taken, other),
                         None => (instr, other, taken),
                     };
-                    if let Some(instr) = over {
-                        placed.push(Placed { instr: retarget(instr, 1), target: None, span: segment.span });
+                    if let Some(mut instr) = over {
+                        instr.retarget(1);
+                        placed.push(Placed { instr, target: None, span: segment.span });
                     }
                     placed.push(Placed { instr: go(first), target: Some(first), span: segment.span });
                     if Some(second) != next {
@@ -109,7 +110,7 @@ fn encode(
         let mut instr = item.instr;
         if let Some(target) = item.target {
             let start = offsets[starts[positions[target.index()]]];
-            instr = retarget(instr, start as i32 - offsets[index + 1] as i32);
+            instr.retarget(start as i32 - offsets[index + 1] as i32);
         }
         if shows_its_line(&instr) {
             note_line(&mut entries, offsets[index], item.span, lines);
@@ -123,14 +124,7 @@ fn encode(
 
 /// Whether a backtrace may point at the instruction, since it can fail, call, or end the task's slice.
 fn shows_its_line(instr: &Instr) -> bool {
-    instr.opcode().substitute() != Substitute::Silent
-        || matches!(
-            instr,
-            Instr::Loop { .. }
-                | Instr::LoopIfNil { .. }
-                | Instr::LoopIfNotNil { .. }
-                | Instr::LoopIfCons { .. }
-        )
+    instr.opcode().substitute() != Substitute::Silent || instr.opcode().is_loop()
 }
 
 fn note_line(entries: &mut Vec<LineEntry>, pc: usize, span: Span, lines: &SourceLines) {
@@ -197,55 +191,4 @@ fn loop_back(cond: Cond, sense: bool) -> Option<Instr> {
         }
         _ => return None,
     })
-}
-
-/// Returns the instruction with the distance of its jump.
-fn retarget(instr: Instr, distance: i32) -> Instr {
-    let near = Jump16(distance as i16);
-    let back = Back16(distance as i16);
-    let far = Jump(distance);
-    let mut instr = instr;
-    match &mut instr {
-        Instr::JumpAlways { to } => *to = Jump24(distance),
-        Instr::JumpIfNil { to, .. }
-        | Instr::JumpIfNotNil { to, .. }
-        | Instr::JumpIfCons { to, .. }
-        | Instr::JumpIfNotCons { to, .. }
-        | Instr::JumpIfSupplied { to, .. } => *to = near,
-        Instr::JumpEq { to, .. }
-        | Instr::JumpNotEq { to, .. }
-        | Instr::JumpEql { to, .. }
-        | Instr::JumpNotEql { to, .. }
-        | Instr::JumpEqlConst { to, .. }
-        | Instr::JumpNotEqlConst { to, .. }
-        | Instr::JumpIfType { to, .. }
-        | Instr::JumpIfNotType { to, .. }
-        | Instr::JumpNumEq { to, .. }
-        | Instr::JumpNotNumEq { to, .. }
-        | Instr::JumpLess { to, .. }
-        | Instr::JumpNotLess { to, .. }
-        | Instr::JumpLessEq { to, .. }
-        | Instr::JumpNotLessEq { to, .. }
-        | Instr::JumpNumEqInt { to, .. }
-        | Instr::JumpNotNumEqInt { to, .. }
-        | Instr::JumpLessInt { to, .. }
-        | Instr::JumpNotLessInt { to, .. }
-        | Instr::JumpGreaterInt { to, .. }
-        | Instr::JumpNotGreaterInt { to, .. }
-        | Instr::JumpIfNotInstance { to, .. }
-        | Instr::PushCatch { to, .. }
-        | Instr::PushCleanup { to, .. }
-        | Instr::PushRecovery { to, .. }
-        | Instr::PushFailureCleanup { to, .. }
-        | Instr::PushHandlerCase { to, .. } => *to = far,
-        Instr::Loop { to } => *to = Back24(distance),
-        Instr::LoopIfNil { to, .. } | Instr::LoopIfNotNil { to, .. } | Instr::LoopIfCons { to, .. } => {
-            *to = back
-        }
-        Instr::LoopLess { to, .. } | Instr::LoopNotLess { to, .. } | Instr::LoopCount { to, .. } => {
-            *to = Back(distance)
-        }
-        _ => unreachable!("only jumps and pushes have a destination"),
-    }
-    instr
 }

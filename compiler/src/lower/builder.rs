@@ -12,7 +12,7 @@ use super::dest::Dest;
 use super::graph::{Exit, Graph, Label};
 use super::lines::SourceLines;
 use super::pool::Pool;
-use super::regalloc::Registers;
+use super::regalloc::RegisterStack;
 use crate::core::*;
 use crate::resolve::{Resolution, resolve};
 
@@ -163,7 +163,7 @@ pub(super) struct FunctionBuilder<'b, 'a> {
     pub(super) lambda: LambdaId,
     pub(super) graph: Graph,
     pub(super) entry: Label,
-    pub(super) registers: Registers,
+    pub(super) registers: RegisterStack,
     /// Open dynamic extents, the innermost last.
     pub(super) extents: Vec<Extent>,
     /// Blocks of this frame around the current form.
@@ -199,7 +199,7 @@ impl<'b, 'a> FunctionBuilder<'b, 'a> {
             lambda,
             graph,
             entry,
-            registers: Registers::new(),
+            registers: RegisterStack::new(),
             extents: Vec::new(),
             blocks: FxHashMap::default(),
             tagbodies: FxHashMap::default(),

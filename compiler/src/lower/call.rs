@@ -156,7 +156,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
             self.finish_apply(window, count, Dest::All);
             return self.finish(Dest::All, dest);
         }
-        let (base, count) = (Base::from(window), Count(count));
+        let (base, count) = (Window::from(window), Count(count));
         if let Dest::Tail = dest {
             self.end(Instr::TailApply { window: base, count, pad: Pad(0) });
             return self.registers.release(window);
@@ -196,7 +196,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
             }
             _ => top,
         };
-        let base = Base::from(window);
+        let base = Window::from(window);
         if target.comes_first() {
             self.load_target(target, window);
         }

@@ -31,8 +31,8 @@ impl FunctionBuilder<'_, '_> {
         };
         let depth = self.extents.len();
         let landing = self.graph.label();
-        let window = Base::from(self.registers.top());
-        self.push_entry(Instr::PushCleanup { window, to: Jump(0) }, landing, Extent::Cleanup);
+        let window = Window::from(self.registers.top());
+        self.push_entry(Instr::PushCleanup { window, to: Landing(0) }, landing, Extent::Cleanup);
         self.form(protected, inner);
         let returns = self.graph.is_open();
         self.emit(Instr::EnterCleanup {});
@@ -57,7 +57,7 @@ impl FunctionBuilder<'_, '_> {
         let depth = self.extents.len();
         let symbols = self.operand(symbols, &[values]);
         let values = self.operand(values, &[]);
-        let window = Base::from(self.registers.top());
+        let window = Window::from(self.registers.top());
         self.emit(Instr::PushScope { window });
         self.open(Extent::Control);
         self.emit(Instr::BindList { symbols, values });
@@ -99,7 +99,7 @@ impl FunctionBuilder<'_, '_> {
         let types = self.module.pool.vector(types);
         let types = VectorIdx(self.constant_index(types));
         self.push_entry(
-            Instr::PushHandlerCase { window: window.into(), types, to: Jump(0) },
+            Instr::PushHandlerCase { window: window.into(), types, to: Landing(0) },
             landing,
             Extent::Control,
         );

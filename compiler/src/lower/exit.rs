@@ -14,14 +14,6 @@ use super::variable::VariableLocation;
 use crate::core::*;
 use crate::resolve::Lexical;
 
-/// Form that throws, as the instruction encodes it.
-#[derive(Clone, Copy)]
-enum ThrowKind {
-    Throw = 0,
-    ReturnFrom = 1,
-    Go = 2,
-}
-
 impl FunctionBuilder<'_, '_> {
     /// Lowers a block.
     pub(super) fn block(&mut self, block: BlockId, body: NodeId, dest: Dest) {
@@ -54,7 +46,7 @@ impl FunctionBuilder<'_, '_> {
         let depth = self.extents.len();
         let (window, want) = (self.registers.top(), inner.want());
         self.registers.reserve(window, usize::from(want.registers()));
-        let push = Instr::PushCatch { window: window.into(), tag, want, to: Jump(0) };
+        let push = Instr::PushCatch { window: window.into(), tag, want, to: Landing(0) };
         self.push_entry(push, end, Extent::Control);
         self.form(body, inner);
         self.close(depth);
@@ -68,7 +60,7 @@ impl FunctionBuilder<'_, '_> {
         let Some(state) = local else {
             self.form(value, Dest::All);
             let register = self.module.blocks[block.index()];
-            return self.throw_to_own(Lexical::Block(block), register, ThrowKind::ReturnFrom, dest);
+            return self.throw_to_own(Lexical::Block(block), register, ThrowKind::RETURN_FROM, dest);
         };
         if self.extents.len() == state.depth {
             self.form(value, state.dest);
@@ -138,7 +130,7 @@ impl FunctionBuilder<'_, '_> {
         self.emit(Instr::LoadInt { dst: number.into(), value: Int16(-1) });
         self.graph.bind(again);
         let depth = self.extents.len();
-        let push = Instr::PushCatch { window: window.into(), tag, want: Want::ONE, to: Jump(0) };
+        let push = Instr::PushCatch { window: window.into(), tag, want: Want::ONE, to: Landing(0) };
         self.push_entry(push, caught, Extent::Control);
         for (index, &label) in tags.iter().enumerate() {
             let next = self.graph.label();
@@ -172,7 +164,7 @@ impl FunctionBuilder<'_, '_> {
         self.emit(Instr::LoadInt { dst: number.into(), value });
         self.emit(Instr::SetValues { first: number.into(), count: Count(1) });
         let register = self.module.tagbodies[tagbody.index()];
-        self.throw_to_own(Lexical::Tagbody(tagbody), register, ThrowKind::Go, dest);
+        self.throw_to_own(Lexical::Tagbody(tagbody), register, ThrowKind::GO, dest);
     }
 
     /// Throws the value list to the tag of a block or tagbody, which is in `register` if this frame owns it.
@@ -185,7 +177,7 @@ impl FunctionBuilder<'_, '_> {
             tag = self.target(Dest::Effect);
             self.fetch(VariableLocation::Capture(index), Dest::Fresh(tag));
         }
-        self.emit(Instr::Throw { tag, kind: Count(kind as u8) });
+        self.emit(Instr::Throw { tag, kind });
         self.deliver_first(dest);
     }
 
@@ -206,7 +198,7 @@ impl FunctionBuilder<'_, '_> {
         let top = self.registers.top();
         let register = self.operand(tag, &[values]);
         self.form(values, Dest::All);
-        self.emit(Instr::Throw { tag: register, kind: Count(ThrowKind::Throw as u8) });
+        self.emit(Instr::Throw { tag: register, kind: ThrowKind::THROW });
         self.registers.release(top);
         self.deliver_first(dest);
     }

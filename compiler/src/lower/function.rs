@@ -155,7 +155,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
             NodeKind::CallValues(function, forms) => self.call_values(*function, forms, dest),
             NodeKind::FirstValues(first, second) => self.first_values(*first, *second, dest),
             NodeKind::HandlerCase(body, clauses) => self.handler_case(*body, clauses, dest),
-            NodeKind::Recovery { table, procedures, body } => self.recovery(table, *procedures, *body, dest),
+            NodeKind::Recovery { table, procedures, body } => self.recovery(*table, *procedures, *body, dest),
             NodeKind::FailureCleanup(body, cleanup) => self.failure_cleanup(*body, *cleanup, dest),
             NodeKind::Handlers(handlers, body) => self.handlers(*handlers, *body, dest),
             NodeKind::Mask(from, body) => self.mask(*from, *body, dest),

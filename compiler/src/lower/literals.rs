@@ -20,7 +20,7 @@ const MAX_LITERALS: usize = 16;
 const MAX_TOP: Reg = Reg(150);
 
 /// Findings of a walk through a loop.
-struct Survey {
+struct LiteralSurvey {
     /// Literals, in the order of their first use.
     literals: Vec<NodeId>,
     entries: FxHashSet<PoolIdx>,
@@ -35,7 +35,7 @@ impl FunctionBuilder<'_, '_> {
         if !self.may_load_literals() {
             return false;
         }
-        let mut survey = Survey { literals: Vec::new(), entries: FxHashSet::default(), turns: false };
+        let mut survey = LiteralSurvey { literals: Vec::new(), entries: FxHashSet::default(), turns: false };
         let mut tags = 0;
         for item in items {
             match item {
@@ -51,7 +51,7 @@ impl FunctionBuilder<'_, '_> {
         if !self.may_load_literals() {
             return false;
         }
-        let mut survey = Survey { literals: Vec::new(), entries: FxHashSet::default(), turns: true };
+        let mut survey = LiteralSurvey { literals: Vec::new(), entries: FxHashSet::default(), turns: true };
         self.survey(&mut survey, body, None);
         self.load_literals(survey)
     }
@@ -62,7 +62,7 @@ impl FunctionBuilder<'_, '_> {
 
     /// Walks through a form of this frame. `back` is a tagbody and the number of its tags in front of the
     /// form.
-    fn survey(&mut self, survey: &mut Survey, form: NodeId, back: Option<(TagbodyId, u32)>) {
+    fn survey(&mut self, survey: &mut LiteralSurvey, form: NodeId, back: Option<(TagbodyId, u32)>) {
         let core = self.core;
         let mut entered: FxHashSet<LambdaId> = FxHashSet::default();
         let mut pending = vec![form];
@@ -100,7 +100,7 @@ impl FunctionBuilder<'_, '_> {
         }
     }
 
-    fn note_literal(&mut self, survey: &mut Survey, literal: NodeId) {
+    fn note_literal(&mut self, survey: &mut LiteralSurvey, literal: NodeId) {
         if survey.literals.len() < MAX_LITERALS
             && let Some(datum) = self.literal(literal).cloned()
             && survey.entries.insert(self.module.pool.datum(&datum))
@@ -109,7 +109,7 @@ impl FunctionBuilder<'_, '_> {
         }
     }
 
-    fn load_literals(&mut self, survey: Survey) -> bool {
+    fn load_literals(&mut self, survey: LiteralSurvey) -> bool {
         if !survey.turns {
             return false;
         }

@@ -19,7 +19,7 @@ type Unary = fn(Dst, Reg) -> Instr;
 
 /// How a builtin is opened up, for a suitable number of arguments.
 #[derive(Clone, Copy)]
-enum Shape {
+enum OperatorShape {
     /// One argument, one instruction.
     Unary(Unary),
     /// Two arguments, one instruction.
@@ -58,9 +58,9 @@ enum Shape {
 }
 
 /// Returns how a call with `count` arguments is opened up, if at all.
-fn shape(builtin: Builtin, count: usize) -> Option<Shape> {
+fn shape(builtin: Builtin, count: usize) -> Option<OperatorShape> {
     use Builtin as B;
-    use Shape::*;
+    use OperatorShape::*;
     Some(match (builtin, count) {
         (B::Add, 2..) => Fold(|dst, left, right| Instr::Add { dst, left, right }),
         (B::Subtract, 2..) => Fold(|dst, left, right| Instr::Sub { dst, left, right }),
@@ -135,12 +135,16 @@ fn shape(builtin: Builtin, count: usize) -> Option<Shape> {
 /// Whether a call takes its argument `index`, if it is a literal, from a register that may be anywhere.
 pub(super) fn takes_literals(core: &Core, builtin: Builtin, arguments: &[NodeId], index: usize) -> bool {
     match shape(builtin, arguments.len()) {
-        Some(Shape::Fold(_)) => addend(core, builtin, arguments[index]).is_none(),
-        Some(Shape::Compare(comparison)) => {
+        Some(OperatorShape::Fold(_)) => addend(core, builtin, arguments[index]).is_none(),
+        Some(OperatorShape::Compare(comparison)) => {
             !comparison.has_literal_form() || literal_int(core, arguments[index]).is_none()
         }
         Some(
-            Shape::Binary(_) | Shape::Quotient(_) | Shape::Store(_) | Shape::Change(_) | Shape::StoreAt(_),
+            OperatorShape::Binary(_)
+            | OperatorShape::Quotient(_)
+            | OperatorShape::Store(_)
+            | OperatorShape::Change(_)
+            | OperatorShape::StoreAt(_),
         ) => true,
         _ => false,
     }
@@ -154,33 +158,35 @@ impl<'a> FunctionBuilder<'_, 'a> {
             return self.emit_call(CallTarget::Builtin(builtin), arguments, dest);
         };
         match (shape, arguments) {
-            (Shape::Unary(instr), [object]) => {
+            (OperatorShape::Unary(instr), [object]) => {
                 let src = self.operand(*object, &[]);
                 self.registers.release(top);
                 self.compute(dest, |dst| instr(dst, src));
             }
-            (Shape::Binary(instr), [left, right]) => {
+            (OperatorShape::Binary(instr), [left, right]) => {
                 let (left, right) = self.operands(*left, *right);
                 self.registers.release(top);
                 self.compute(dest, |dst| instr(dst, left, right));
             }
-            (Shape::Negate, [number]) => {
+            (OperatorShape::Negate, [number]) => {
                 self.with_literal(|dst, x, one| Instr::Mul { dst, left: x, right: one }, *number, -1, dest)
             }
-            (Shape::Reciprocal, [number]) => {
+            (OperatorShape::Reciprocal, [number]) => {
                 self.with_literal(|dst, x, one| Instr::Div { dst, left: one, right: x }, *number, 1, dest);
             }
-            (Shape::Fold(instr), _) => self.fold(builtin, instr, arguments, dest),
-            (Shape::AddInt(value), [number]) => {
+            (OperatorShape::Fold(instr), _) => self.fold(builtin, instr, arguments, dest),
+            (OperatorShape::AddInt(value), [number]) => {
                 let left = self.operand(*number, &[]);
                 self.registers.release(top);
                 self.compute(dest, |dst| Instr::AddInt { dst, left, value: Int8(value) });
             }
-            (Shape::Compare(comparison), [left, right]) => self.compare(comparison, *left, *right, dest),
-            (Shape::CompareInt(comparison, value), [number]) => {
+            (OperatorShape::Compare(comparison), [left, right]) => {
+                self.compare(comparison, *left, *right, dest)
+            }
+            (OperatorShape::CompareInt(comparison, value), [number]) => {
                 self.compare_int(comparison, *number, value, dest)
             }
-            (Shape::Quotient(instr), [_, ..]) if dest.is_single() => match arguments {
+            (OperatorShape::Quotient(instr), [_, ..]) if dest.is_single() => match arguments {
                 [number, divisor] => {
                     let (left, right) = self.operands(*number, *divisor);
                     self.registers.release(top);
@@ -188,35 +194,37 @@ impl<'a> FunctionBuilder<'_, 'a> {
                 }
                 _ => self.with_literal(instr, arguments[0], 1, dest),
             },
-            (Shape::IsType(code), [object]) => self.is_type(code, *object, dest),
-            (Shape::Not, [object]) => self.not(*object, dest),
-            (Shape::Eq, [left, right]) => self.identical(false, *left, *right, dest),
-            (Shape::Eql, [left, right]) => self.identical(true, *left, *right, dest),
-            (Shape::Store(instr), [object, value]) => {
+            (OperatorShape::IsType(code), [object]) => self.is_type(code, *object, dest),
+            (OperatorShape::Not, [object]) => self.not(*object, dest),
+            (OperatorShape::Eq, [left, right]) => self.identical(false, *left, *right, dest),
+            (OperatorShape::Eql, [left, right]) => self.identical(true, *left, *right, dest),
+            (OperatorShape::Store(instr), [object, value]) => {
                 let (object, value) = self.operands(*object, *value);
                 self.emit(instr(object, value));
                 self.registers.release(top);
                 self.deliver(value, dest);
             }
-            (Shape::Change(instr), [object, value]) if matches!(dest, Dest::Effect) => {
+            (OperatorShape::Change(instr), [object, value]) if matches!(dest, Dest::Effect) => {
                 let (object, value) = self.operands(*object, *value);
                 self.emit(instr(object, value));
                 self.registers.release(top);
             }
-            (Shape::StoreAt(instr), [object, index, value]) => {
+            (OperatorShape::StoreAt(instr), [object, index, value]) => {
                 let object = self.operand(*object, &[*index, *value]);
                 let (index, value) = self.operands(*index, *value);
                 self.emit(instr(object, index, value));
                 self.registers.release(top);
                 self.deliver(value, dest);
             }
-            (Shape::List, _) => self.list(arguments, dest),
-            (Shape::ListStar, _) => self.list_star(arguments, dest),
-            (Shape::Identity, [form]) => self.single(*form, dest),
-            (Shape::Values, _) => self.values(arguments, dest),
-            (Shape::ValuesList, [list]) => self.values_list(*list, dest),
-            (Shape::Funcall, [function, arguments @ ..]) => self.call_value(*function, arguments, dest),
-            (Shape::Apply, [function, arguments @ ..]) => {
+            (OperatorShape::List, _) => self.list(arguments, dest),
+            (OperatorShape::ListStar, _) => self.list_star(arguments, dest),
+            (OperatorShape::Identity, [form]) => self.single(*form, dest),
+            (OperatorShape::Values, _) => self.values(arguments, dest),
+            (OperatorShape::ValuesList, [list]) => self.values_list(*list, dest),
+            (OperatorShape::Funcall, [function, arguments @ ..]) => {
+                self.call_value(*function, arguments, dest)
+            }
+            (OperatorShape::Apply, [function, arguments @ ..]) => {
                 self.apply_form(|frame, dest| frame.form(*function, dest), arguments, dest);
             }
             _ => self.emit_call(CallTarget::Builtin(builtin), arguments, dest),

@@ -1,6 +1,5 @@
 //! Recovery procedures, and cleanups for failures.
 
-use esl_bytecode::datum::Datum;
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 use esl_bytecode::symbol::Symbol;
@@ -11,9 +10,9 @@ use super::graph::Cond;
 use crate::core::*;
 
 impl FunctionBuilder<'_, '_> {
-    /// Lowers a body with recovery procedures. Entering it takes two instructions and no memory: the first
-    /// instruction at the landing makes the function that runs the clauses, and the machine executes it when
-    /// a failure needs it.
+    /// Lowers a body with recovery procedures. Entering it with a literal table takes two instructions and no
+    /// memory: the first instruction at the landing makes the function that runs the clauses, and the machine
+    /// executes it when a failure needs it.
     ///
     /// ```text
     ///       state := the table
@@ -24,17 +23,16 @@ impl FunctionBuilder<'_, '_> {
     ///       state := window; loop to `again`
     /// end:
     /// ```
-    pub(super) fn recovery(&mut self, table: &Datum, procedures: NodeId, body: NodeId, dest: Dest) {
+    pub(super) fn recovery(&mut self, table: NodeId, procedures: NodeId, body: NodeId, dest: Dest) {
         let depth = self.extents.len();
         let [again, landing, aborted, retry, end] = std::array::from_fn(|_| self.graph.label());
         let state = self.registers.top();
-        self.constant(table, Dest::Fresh(state));
-        self.registers.take(1);
+        self.form(table, Dest::Fresh(state));
         self.jump(again);
         self.graph.bind(again);
         let window = self.registers.top();
         self.registers.reserve(window, 2);
-        let push = Instr::PushRecovery { window: window.into(), state, to: Jump(0) };
+        let push = Instr::PushRecovery { window: window.into(), state, to: Landing(0) };
         self.push_entry(push, landing, Extent::Control);
         self.form_inside(body, dest, depth);
         self.join(end, dest);
@@ -70,7 +68,7 @@ impl FunctionBuilder<'_, '_> {
         let depth = self.extents.len();
         let [landing, end] = std::array::from_fn(|_| self.graph.label());
         let top = self.registers.top();
-        let push = Instr::PushFailureCleanup { window: top.into(), to: Jump(0) };
+        let push = Instr::PushFailureCleanup { window: top.into(), to: Landing(0) };
         self.push_entry(push, landing, Extent::Control);
         self.form_inside(body, dest, depth);
         self.join(end, dest);

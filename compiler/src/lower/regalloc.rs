@@ -9,16 +9,16 @@ use esl_bytecode::operand::Reg;
 
 /// The register stack of the function that is being lowered.
 #[derive(Debug)]
-pub(super) struct Registers {
+pub(super) struct RegisterStack {
     top: Reg,
     used: u8,
     has_overflowed: bool,
 }
 
-impl Registers {
+impl RegisterStack {
     /// Creates a stack without any register in use.
-    pub(super) fn new() -> Registers {
-        Registers { top: Reg(0), used: 0, has_overflowed: false }
+    pub(super) fn new() -> RegisterStack {
+        RegisterStack { top: Reg(0), used: 0, has_overflowed: false }
     }
 
     /// Returns the first free register.

@@ -20,7 +20,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
                     self.end(Instr::Return { src });
                     return self.registers.release(top);
                 }
-                let (first, count) = (top.into(), Count(forms.len().min(255) as u8));
+                let count = Count(forms.len().min(255) as u8);
                 if forms.len() > MAX_DIRECT {
                     let list = self.target(Dest::Effect);
                     self.list(forms, Dest::Fresh(list));
@@ -30,9 +30,9 @@ impl<'a> FunctionBuilder<'_, 'a> {
                 self.arguments(forms);
                 self.registers.release(top);
                 if let Dest::Tail = dest {
-                    self.end(Instr::ReturnValues { first, count });
+                    self.end(Instr::ReturnValues { first: top.into(), count });
                 } else {
-                    self.emit(Instr::SetValues { first, count });
+                    self.emit(Instr::SetValues { first: top.into(), count });
                 }
             }
             Dest::Values(base, count) => {
@@ -47,7 +47,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
                 self.move_range(base, top, wanted as u8);
                 let missing = count - wanted as u8;
                 if missing > 0 {
-                    let first = Base::from(base.offset(wanted as u8));
+                    let first = base.offset(wanted as u8).into();
                     self.emit(Instr::LoadNil { first, count: Count(missing) });
                 }
             }

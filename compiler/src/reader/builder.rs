@@ -34,7 +34,7 @@ pub(crate) enum Mark {
 }
 
 /// Symbols that the reader itself puts into data.
-struct Names {
+struct KnownNames {
     quote: Symbol,
     function: Symbol,
     backquote: Symbol,
@@ -44,7 +44,7 @@ struct Names {
     keyword: Arc<str>,
 }
 
-static NAMES: LazyLock<Names> = LazyLock::new(|| Names {
+static NAMES: LazyLock<KnownNames> = LazyLock::new(|| KnownNames {
     quote: Symbol::cl("QUOTE"),
     function: Symbol::cl("FUNCTION"),
     backquote: Symbol::esl("%BACKQUOTE"),
@@ -60,6 +60,8 @@ pub(crate) struct DatumBuilder<'a> {
     text: &'a str,
     source: SourceId,
     labels: FxHashMap<u32, Datum>,
+    /// Radix of integers and ratios without a prefix.
+    base: u32,
     /// Elements that `#n(…)` may still fill in.
     room: &'a mut usize,
     buffer: String,
@@ -75,7 +77,8 @@ impl<'a> DatumBuilder<'a> {
         room: &'a mut usize,
     ) -> DatumBuilder<'a> {
         let (labels, errors) = (FxHashMap::default(), Vec::new());
-        DatumBuilder { environment, text, source, labels, room, buffer: String::new(), errors }
+        let base = environment.read_base();
+        DatumBuilder { environment, text, source, labels, base, room, buffer: String::new(), errors }
     }
 
     fn span(&self, start: u32, end: u32) -> Span {
@@ -98,7 +101,7 @@ impl<'a> DatumBuilder<'a> {
     /// A number or a name without escapes.
     pub(super) fn atom(&mut self, start: u32, end: u32) -> Datum {
         let token = self.slice(start, end);
-        if let Some(number) = number::parse(token) {
+        if let Some(number) = number::parse(token, self.base) {
             return self.number(number, start, end);
         }
         if token.len() > MAX_NAME {

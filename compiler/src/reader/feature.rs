@@ -18,14 +18,14 @@ pub(super) struct FeatureError {
 }
 
 /// The part of `(and …)`, `(or …)` or `(not …)` that has been evaluated.
-struct Operation {
-    operator: Operator,
+struct FeatureOperation {
+    operator: FeatureOperator,
     value: bool,
     operands: u32,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Operator {
+enum FeatureOperator {
     And,
     Or,
     Not,
@@ -36,7 +36,7 @@ enum Operator {
 /// # Errors
 /// The first fault.
 pub(super) fn holds(text: &str, lexemes: &[Lexeme]) -> Result<bool, FeatureError> {
-    let mut operations: Vec<Operation> = Vec::new();
+    let mut operations: Vec<FeatureOperation> = Vec::new();
     let mut lexemes = lexemes.iter();
     while let Some(lexeme) = lexemes.next() {
         let value = match lexeme.token {
@@ -44,11 +44,15 @@ pub(super) fn holds(text: &str, lexemes: &[Lexeme]) -> Result<bool, FeatureError
                 let operator = lexemes.next().map_or(Err(lexeme), |next| operator(text, next).ok_or(next));
                 let operator =
                     operator.map_err(|found| fault(found, "expected `and`, `or` or `not`", text))?;
-                operations.push(Operation { operator, value: operator == Operator::And, operands: 0 });
+                operations.push(FeatureOperation {
+                    operator,
+                    value: operator == FeatureOperator::And,
+                    operands: 0,
+                });
                 continue;
             }
             Token::Close => match operations.pop() {
-                Some(Operation { operator: Operator::Not, operands, .. }) if operands != 1 => {
+                Some(FeatureOperation { operator: FeatureOperator::Not, operands, .. }) if operands != 1 => {
                     return Err(fault(lexeme, "expected exactly one feature after `not`", text));
                 }
                 Some(operation) => operation.value,
@@ -63,19 +67,19 @@ pub(super) fn holds(text: &str, lexemes: &[Lexeme]) -> Result<bool, FeatureError
         let Some(outer) = operations.last_mut() else { return Ok(value) };
         outer.operands += 1;
         outer.value = match outer.operator {
-            Operator::And => outer.value && value,
-            Operator::Or => outer.value || value,
-            Operator::Not => !value,
+            FeatureOperator::And => outer.value && value,
+            FeatureOperator::Or => outer.value || value,
+            FeatureOperator::Not => !value,
         };
     }
     Err(FeatureError { start: 0, end: 0, message: "expected a feature".into() })
 }
 
-fn operator(text: &str, lexeme: &Lexeme) -> Option<Operator> {
+fn operator(text: &str, lexeme: &Lexeme) -> Option<FeatureOperator> {
     match feature(text, lexeme)?.as_str() {
-        "AND" => Some(Operator::And),
-        "OR" => Some(Operator::Or),
-        "NOT" => Some(Operator::Not),
+        "AND" => Some(FeatureOperator::And),
+        "OR" => Some(FeatureOperator::Or),
+        "NOT" => Some(FeatureOperator::Not),
         _ => None,
     }
 }

@@ -1,6 +1,6 @@
 //! Numbers: the tokens that are numbers, and their values.
 //!
-//! The syntax is that of Common Lisp in base ten. A token that only resembles a number, such as `1+` or
+//! The syntax is that of Common Lisp. A token that only resembles a number, such as `1+` or
 //! `1/2/3`, is a name. Work is bounded: digits are counted before they are converted, since conversion takes
 //! quadratic time.
 
@@ -32,8 +32,15 @@ pub(super) enum NumberError {
     TooLong(usize),
 }
 
-/// Returns the number that `token` denotes in base ten; `None` if it does not have the syntax of a number.
-pub(super) fn parse(token: &str) -> Option<Result<Number, NumberError>> {
+/// Returns the number that `token` denotes, an integer or a ratio in base `base`, from 2 to 36, if that is
+/// possible; `None` if it does not have the syntax of a number. Floats, and integers before a point, are
+/// decimal.
+pub(super) fn parse(token: &str, base: u32) -> Option<Result<Number, NumberError>> {
+    if base == 10 { decimal(token) } else { parse_radix(token, base).or_else(|| pointed(token)) }
+}
+
+/// Returns the number that `token` denotes in base ten.
+fn decimal(token: &str) -> Option<Result<Number, NumberError>> {
     let unsigned = token.strip_prefix(['+', '-']).unwrap_or(token);
     // Most tokens are names, which the first character rules out.
     if !unsigned.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
@@ -52,6 +59,13 @@ pub(super) fn parse(token: &str) -> Option<Result<Number, NumberError>> {
         }
         _ => float(token, unsigned, whole),
     }
+}
+
+/// Returns the number that `token` denotes if it is decimal in every base: a float, or an integer before a
+/// point.
+fn pointed(token: &str) -> Option<Result<Number, NumberError>> {
+    let is_rational = token.bytes().all(|byte| byte.is_ascii_digit() || matches!(byte, b'+' | b'-' | b'/'));
+    if is_rational { None } else { decimal(token) }
 }
 
 /// Returns the rational number that `token` denotes in base `radix`; `None` if it does not have the syntax of
@@ -150,7 +164,7 @@ mod tests {
     }
 
     fn check(tokens: &[&str], expected: &[&str]) {
-        let shown: Vec<String> = tokens.iter().map(|token| show(parse(token))).collect();
+        let shown: Vec<String> = tokens.iter().map(|token| show(parse(token, 10))).collect();
         assert_eq!(shown, expected);
     }
 
@@ -183,7 +197,7 @@ mod tests {
         let more =
             ["1+e5", "-1/-2", "1e5e5", "/", "1/", "/2", "1_000", "--1", "+-1", "e5", "1e+", "1.5/2", "１"];
         for name in names.iter().chain(&more) {
-            assert_eq!(show(parse(name)), "name", "{name}");
+            assert_eq!(show(parse(name, 10)), "name", "{name}");
         }
     }
 
@@ -202,10 +216,25 @@ mod tests {
     }
 
     #[test]
+    fn another_base_for_what_has_no_prefix() {
+        let check = |token, base, expected| assert_eq!(show(parse(token, base)), expected, "{token}");
+        check("face", 16, "64206");
+        check("1e3", 16, "483");
+        check("1/F", 16, "1/15");
+        check("10.", 16, "10");
+        check("1.5", 16, "1.5");
+        check("1e3", 2, "1000.0");
+        check("12", 2, "name");
+        check("1/2", 2, "name");
+        check("-11", 2, "-3");
+        check("NIL", 36, "30477");
+    }
+
+    #[test]
     fn giant_numbers_are_refused_before_they_are_converted() {
         let digits = "1".repeat(MAX_DIGITS + 1);
-        assert_eq!(show(parse(&digits)), format!("TooLong({MAX_DIGITS})"));
-        assert_eq!(show(parse(&format!("1/{digits}"))), format!("TooLong({MAX_RATIO_DIGITS})"));
-        assert_eq!(show(parse(&digits[1..])).len(), MAX_DIGITS);
+        assert_eq!(show(parse(&digits, 10)), format!("TooLong({MAX_DIGITS})"));
+        assert_eq!(show(parse(&format!("1/{digits}"), 10)), format!("TooLong({MAX_RATIO_DIGITS})"));
+        assert_eq!(show(parse(&digits[1..], 10)).len(), MAX_DIGITS);
     }
 }

@@ -196,7 +196,7 @@ fn print_name(name: &str, out: &mut String) {
     let mut lexer = Token::lexer(name);
     let is_plain = lexer.next() == Some(Ok(Token::Atom))
         && lexer.span() == (0..name.len())
-        && number::parse(name).is_none()
+        && number::parse(name, 10).is_none()
         && !name.contains(':')
         && !name.bytes().all(|byte| byte == b'.')
         && name.chars().all(|c| fold(c) == c);

@@ -21,11 +21,12 @@ pub(crate) fn children(kind: &NodeKind, visit: &mut dyn FnMut(NodeId)) {
         | NodeKind::Slot(_, _, node)
         | NodeKind::IsInstance(_, node)
         | NodeKind::Functions { body: node, .. } => all(&[*node]),
-        NodeKind::If(a, b, c) | NodeKind::Progv(a, b, c) => all(&[*a, *b, *c]),
+        NodeKind::If(a, b, c)
+        | NodeKind::Progv(a, b, c)
+        | NodeKind::Recovery { table: a, procedures: b, body: c } => all(&[*a, *b, *c]),
         NodeKind::Catch(a, b)
         | NodeKind::Throw(a, b)
         | NodeKind::UnwindProtect(a, b)
-        | NodeKind::Recovery { procedures: a, body: b, .. }
         | NodeKind::FailureCleanup(a, b)
         | NodeKind::BindValues(_, a, b)
         | NodeKind::FirstValues(a, b)

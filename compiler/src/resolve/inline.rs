@@ -30,7 +30,7 @@ struct CallSite {
 }
 
 /// Facts on which the decision depends.
-struct Survey {
+struct InlineSurvey {
     functions: FxHashMap<VarId, LambdaId>,
     /// The functions in the order of their definitions.
     order: Vec<VarId>,
@@ -132,8 +132,8 @@ impl Visit {
     }
 }
 
-fn survey(core: &Core, escaping: &[bool]) -> Survey {
-    let mut survey = Survey {
+fn survey(core: &Core, escaping: &[bool]) -> InlineSurvey {
+    let mut survey = InlineSurvey {
         functions: FxHashMap::default(),
         order: Vec::new(),
         sites: vec![Vec::new(); core.variables.len()],

@@ -158,13 +158,13 @@ impl Resolution {
 /// Resolves `core`.
 pub(crate) fn resolve(core: &Core) -> Resolution {
     let inlining = inline::decide(core);
-    let mut walk = Walk::new(core, inlining);
+    let mut walk = ResolveWalk::new(core, inlining);
     walk.run();
     walk.finish()
 }
 
 /// The walk over the form in the order of evaluation. Inlined functions are walked where they run.
-struct Walk<'a> {
+struct ResolveWalk<'a> {
     core: &'a Core,
     frames: Vec<LambdaId>,
     functions: FxHashMap<VarId, LambdaId>,
@@ -201,14 +201,14 @@ enum WalkStep {
     Leave(NodeId),
 }
 
-impl<'a> Walk<'a> {
-    fn new(core: &'a Core, inlining: inline::Inlining) -> Walk<'a> {
+impl<'a> ResolveWalk<'a> {
+    fn new(core: &'a Core, inlining: inline::Inlining) -> ResolveWalk<'a> {
         let root = Site { frame: LambdaId(0), cleanups: 0 };
         let mut used = vec![false; core.lambdas.len()];
         if let Some(first) = used.first_mut() {
             *first = true;
         }
-        Walk {
+        ResolveWalk {
             core,
             frames: inlining.frames,
             functions: inlining.functions,

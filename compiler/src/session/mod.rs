@@ -57,9 +57,10 @@ impl Compiler {
         Texts(CompilationState { listing: Some(String::new()), ..self.texts(&[(name, text)]) })
     }
 
-    /// Begins to compile texts, each with its name, to one module that runs them in order. They see each other's
-    /// definitions like parts of one text, but each is read, and runs, in the package `ESL-USER` until it says
-    /// otherwise. Diagnostics number them from the compiler's source number on.
+    /// Begins to compile texts, each with its name, to one module that runs them in order. They see each
+    /// other's definitions like parts of one text, but each is read, and runs, in the package `ESL-USER`
+    /// until it says otherwise, or in `COMMON-LISP-USER` if its name ends in `.lisp`. Diagnostics number them
+    /// from the compiler's source number on.
     pub fn compile_texts(&self, texts: &[(&str, &str)]) -> Texts {
         Texts(self.texts(texts))
     }
@@ -74,7 +75,7 @@ impl Compiler {
         for &(name, text) in texts {
             let text: Arc<str> = text.into();
             sources.add(name, Some(text.clone()));
-            queue.add(lines.add(name, text.clone()), text);
+            queue.add(name, lines.add(name, text.clone()), text);
         }
         self.session(Input::Texts(queue), lines, sources)
     }
@@ -222,6 +223,9 @@ impl Compilation for CompilationState {
                 }
                 Stop::Done => {
                     self.diagnostics.extend(self.expander.take_diagnostics());
+                    if self.is_package_in_doubt() {
+                        return self.give_up();
+                    }
                     match self.next_form(environment) {
                         Next::Form => {}
                         Next::Require(name, span) => {
@@ -264,7 +268,8 @@ impl CompilationState {
         }
     }
 
-    /// Returns the span of the datum at a place, up to the end of its first line, if the text is one of the compilation.
+    /// Returns the span of the datum at a place, up to the end of its first line, if the text is one of the
+    /// compilation.
     fn span_of(&self, place: &SourcePlace) -> Option<Span> {
         let (SourceId(index), start) = self.sources.offset_of(place)?;
         let text = self.sources.text(SourceId(index))?;
@@ -352,9 +357,27 @@ impl CompilationState {
         }
     }
 
-    /// Ends the compilation.
+    /// Whether the last form was to make or enter a package, and has errors.
+    fn is_package_in_doubt(&self) -> bool {
+        matches!(&self.input, Input::Texts(queue) if queue.is_package_in_doubt(&self.expander))
+    }
+
+    /// Ends the compilation before the end of its texts: all names there would be in doubt.
+    fn give_up(&mut self) -> Step {
+        let mut errors = self.diagnostics.iter_mut().rev();
+        if let Some(last) = errors.find(|diagnostic| diagnostic.severity == Severity::Error) {
+            last.help.get_or_insert("what follows is not compiled, since its names depend on this".into());
+        }
+        self.end()
+    }
+
+    /// Ends the compilation at the end of its texts.
     fn finish(&mut self, environment: &mut dyn Environment) -> Step {
         self.diagnostics.extend(self.expander.finish(environment));
+        self.end()
+    }
+
+    fn end(&mut self) -> Step {
         let mut diagnostics = std::mem::take(&mut self.diagnostics);
         diagnostics.sort_by_key(|diagnostic| {
             let span = diagnostic.primary.span;

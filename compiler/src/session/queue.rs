@@ -1,15 +1,17 @@
 //! The queue of forms of a compilation: its texts, and the modules that they require.
 //!
-//! Each text is read, and runs, in the package `ESL-USER` until it says otherwise. At a form
-//! `(require "name")` of a text the queue asks for the module ([`Next::Require`]), which may be put in the
-//! place of the form. The text of a module stands between `(%enter-module "name")` and
-//! `(%leave-module "name")`, which set the package and note that the module is present. Modules that it
-//! requires itself are put in likewise. Each module is put in once, wherever it is required.
+//! Each text is read, and runs, in the package `ESL-USER` until it says otherwise; that of a file whose name
+//! ends in `.lisp`, in `COMMON-LISP-USER`. At a form `(require "name")` of a text the queue asks for the
+//! module ([`Next::Require`]), which may be put in the place of the form. The text of a module stands between
+//! `(%enter-module "name")` and `(%leave-module "name")`, which set the package and note that the module is
+//! present. Modules that it requires itself are put in likewise. Each module is put in once, wherever it is
+//! required.
 //!
 //! Only a form that stands by itself at top level counts, with a literal name. All others are calls of the
 //! function, which finds modules at run time.
 
 use std::collections::VecDeque;
+use std::path::Path;
 use std::sync::Arc;
 
 use esl_bytecode::compile::Environment;
@@ -17,7 +19,7 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::module::{Constant, Module};
 use esl_bytecode::span::{SourceId, Span};
-use esl_bytecode::symbol::{CL_PACKAGE, Home, Symbol, USER_PACKAGE};
+use esl_bytecode::symbol::{CL_PACKAGE, CL_USER_PACKAGE, Home, Symbol, USER_PACKAGE};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::diagnostic::code;
@@ -64,13 +66,16 @@ pub(super) struct FormQueue {
     required: FxHashSet<String>,
     /// Modules that the texts themselves require.
     apart: Vec<String>,
+    /// Number of errors before the current form, if that makes or enters a package.
+    errors_before_package: Option<usize>,
 }
 
 impl FormQueue {
-    /// Adds a text at the end.
-    pub(super) fn add(&mut self, source: SourceId, text: Arc<str>) {
-        if !self.row.is_empty() {
-            self.row.push_back(Queued::Form(call(Symbol::cl("IN-PACKAGE"), USER_PACKAGE, Span::default())));
+    /// Adds the text called `name` at the end.
+    pub(super) fn add(&mut self, name: &str, source: SourceId, text: Arc<str>) {
+        let package = if is_common_lisp(name) { CL_USER_PACKAGE } else { USER_PACKAGE };
+        if !self.row.is_empty() || package != USER_PACKAGE {
+            self.row.push_back(Queued::Form(call(Symbol::cl("IN-PACKAGE"), package, Span::default())));
         }
         self.row.push_back(Queued::Text(Box::new(Reader::new(source, text))));
     }
@@ -109,6 +114,11 @@ impl FormQueue {
         std::mem::take(&mut self.apart)
     }
 
+    /// Whether the current form was to make or enter a package, and `expander` has found errors in it.
+    pub(super) fn is_package_in_doubt(&self, expander: &Expander) -> bool {
+        self.errors_before_package.is_some_and(|errors| expander.errors() > errors)
+    }
+
     /// Whether the next form belongs to a module that was put in.
     pub(super) fn is_inside_module(&self) -> bool {
         !self.inside.is_empty()
@@ -121,6 +131,7 @@ impl FormQueue {
         expander: &mut Expander,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Next {
+        self.errors_before_package = None;
         while let Some(part) = self.row.front_mut() {
             match part {
                 Queued::Begun(name) => {
@@ -156,6 +167,8 @@ impl FormQueue {
                     Some(Err(diagnostic)) => diagnostics.push(*diagnostic),
                     Some(Ok(form)) => {
                         let Some(name) = required(&form) else {
+                            let is_about_package = is_about_package(&form);
+                            self.errors_before_package = is_about_package.then(|| expander.errors());
                             expander.begin_file_form(form);
                             return Next::Form;
                         };
@@ -178,6 +191,19 @@ impl FormQueue {
         }
         Next::End
     }
+}
+
+/// Whether a form makes a package or enters one.
+fn is_about_package(form: &Datum) -> bool {
+    let operator = form.as_cons().and_then(|(operator, _)| operator.as_symbol());
+    operator.is_some_and(|symbol| {
+        symbol.is_in(CL_PACKAGE) && matches!(symbol.name(), "DEFPACKAGE" | "IN-PACKAGE")
+    })
+}
+
+/// Whether the file called `name` is written for Common Lisp.
+fn is_common_lisp(name: &str) -> bool {
+    Path::new(name).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("lisp"))
 }
 
 /// Returns the name of the module that a form requires. As in names of files, symbols are in lower case.

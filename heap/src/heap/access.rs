@@ -1,13 +1,13 @@
-//! Checked access to objects: the whole heap as safe code sees it.
+//! Checked access to objects: the heap as safe code sees it.
 //!
-//! Guarantees: nothing here can break memory safety, however odd the caller. Each function tests tag and kind
-//! and every index, and answers `None` when one does not fit. That the address itself is good, and what is
+//! Guarantees: nothing here can break memory safety, however odd the caller. Each function tests tag, kind
+//! and index, and returns `None` if one of them does not fit. That the address itself is good, and what is
 //! behind it, are the facts H1 to H5 of [`super`]. A slice of the heap borrows the heap, so nothing can be
 //! stored, allocated or collected while it is in use.
 //!
-//! Every store of a value goes through [`Heap::store`], which is the write barrier; stores of raw data need
-//! none. The parts of objects that the interpreter trusts without a test (the function of a symbol, the code
-//! of a function, the data of an array, the class of a structure) have setters of their own, or none.
+//! Every store of a value goes through [`Heap::store`], the write barrier; stores of raw data need none. Some
+//! parts of objects the interpreter trusts without a test: the function of a symbol, the code of a function,
+//! the data of an array, the class of a structure. These have setters of their own, or none.
 
 use super::Heap;
 use super::layout::{Array, Bignum, Code, Cons, Float, Function, Header, Kind, Structure, Symbol};
@@ -15,29 +15,29 @@ use super::object::is_vouched_for;
 use crate::value::Value;
 use std::slice;
 
-/// Whether a bignum is below zero, and its magnitude, least limb first.
+/// Sign and magnitude of a bignum.
 #[derive(Copy, Clone, PartialEq, Eq, Debug)]
 pub struct BignumRef<'a> {
-    /// Below zero.
+    /// Whether the number is below zero.
     pub negative: bool,
-    /// Magnitude in limbs of 64 bits, least first, the last not zero.
+    /// Magnitude in limbs of 64 bits, least first; the last one is not zero.
     pub limbs: &'a [u64],
 }
 
 impl Heap {
-    /// The kind of an object; `None` for a cons and for all that has no address.
+    /// Returns the kind of an object; `None` for a cons and for a value without an address.
     #[inline(always)]
     pub fn kind(&self, v: Value) -> Option<Kind> {
         Some(self.header(v)?.kind)
     }
 
-    /// Whether `v` is an object of this kind.
+    /// Returns whether `v` is an object of this kind.
     #[inline(always)]
     pub fn is(&self, v: Value, kind: Kind) -> bool {
         self.kind(v) == Some(kind)
     }
 
-    /// The header of an object.
+    /// Returns the header of an object.
     #[inline(always)]
     pub fn header(&self, v: Value) -> Option<Header> {
         // SAFETY: H1, H2: an object value is the address of a live header.
@@ -53,14 +53,14 @@ impl Heap {
 
     // Conses.
 
-    /// The cons, if `v` is one.
+    /// Returns the cons, if `v` is one.
     #[inline(always)]
     pub fn as_cons(&self, v: Value) -> Option<Cons> {
         // SAFETY: H1, H2: a cons value is the address of a live cons.
         v.as_cons_ptr().map(|cons| unsafe { *cons })
     }
 
-    /// The car of a cons, `nil` of `nil`, `None` of anything else.
+    /// Returns the car of a cons, `nil` for `nil`, `None` for anything else.
     #[inline(always)]
     pub fn car(&self, v: Value) -> Option<Value> {
         match self.as_cons(v) {
@@ -70,7 +70,7 @@ impl Heap {
         }
     }
 
-    /// The cdr of a cons, `nil` of `nil`, `None` of anything else.
+    /// Returns the cdr of a cons, `nil` for `nil`, `None` for anything else.
     #[inline(always)]
     pub fn cdr(&self, v: Value) -> Option<Value> {
         match self.as_cons(v) {
@@ -80,7 +80,7 @@ impl Heap {
         }
     }
 
-    /// Sets the car of a cons; `None` if `v` is none.
+    /// Sets the car of a cons; `None` if `v` is not a cons.
     #[inline(always)]
     pub fn set_car(&mut self, v: Value, new: Value) -> Option<()> {
         let cons = v.as_cons_ptr()?;
@@ -89,7 +89,7 @@ impl Heap {
         Some(())
     }
 
-    /// Sets the cdr of a cons; `None` if `v` is none.
+    /// Sets the cdr of a cons; `None` if `v` is not a cons.
     #[inline(always)]
     pub fn set_cdr(&mut self, v: Value, new: Value) -> Option<()> {
         let cons = v.as_cons_ptr()?;
@@ -100,8 +100,8 @@ impl Heap {
 
     // Records.
 
-    /// All slots of a record of this kind, in the order of its layout; `None` if `v` is no such record, or is
-    /// a hash table.
+    /// Returns all slots of a record of this kind, in the order of its layout; `None` if `v` is not one, or
+    /// is a hash table.
     #[inline]
     pub fn record(&self, v: Value, kind: Kind) -> Option<&[Value]> {
         if !kind.is_open_record() {
@@ -112,8 +112,7 @@ impl Heap {
         Some(unsafe { slice::from_raw_parts(object.add(1).cast(), (*object).len as usize) })
     }
 
-    /// Slot `index` of a record, of whatever kind but a hash table; `None` if `v` is none or has no such
-    /// slot.
+    /// Returns slot `index` of a record of any kind; `None` if `v` has no such slot, or is a hash table.
     #[inline(always)]
     pub fn slot(&self, v: Value, index: usize) -> Option<Value> {
         let object = v.as_object_ptr()?;
@@ -127,22 +126,22 @@ impl Heap {
         }
     }
 
-    /// Slot `index` of a record, of whatever kind; `NIL` if `v` is none or has no such slot.
+    /// Returns slot `index` of a record of any kind; `NIL` if `v` has no such slot, or is a hash table.
     #[inline]
     pub fn slot_or_nil(&self, v: Value, index: usize) -> Value {
         self.slot(v, index).unwrap_or(Value::NIL)
     }
 
-    /// Sets slot `index` of a record, of whatever kind; see [`Heap::record_set`].
+    /// Sets slot `index` of a record of any kind; see [`Heap::record_set`].
     #[inline]
     pub fn slot_set(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
         self.record_set(v, self.kind(v)?, index, new)
     }
 
-    /// Sets slot `index` of a record of this kind; `None` if `v` is none or has no such slot.
+    /// Sets slot `index` of a record of this kind; `None` if `v` is not one or has no such slot.
     ///
-    /// Not for symbols, functions, arrays and hash tables, nor the class (slot 0) of a structure: these give
-    /// `None`.
+    /// The slots of symbols, functions, arrays and hash tables, and the class (slot 0) of a structure, cannot
+    /// be set in this way: the result is `None`.
     #[inline]
     pub fn record_set(&mut self, v: Value, kind: Kind, index: usize, new: Value) -> Option<()> {
         if !kind.is_record() || is_vouched_for(kind) && (kind != Kind::Structure || index == 0) {
@@ -165,20 +164,20 @@ impl Heap {
         Some(())
     }
 
-    /// The elements of a simple vector.
+    /// Returns the elements of a simple vector.
     #[inline(always)]
     pub fn vector(&self, v: Value) -> Option<&[Value]> {
         self.record(v, Kind::SimpleVector)
     }
 
-    /// Sets an element of a simple vector; `None` if `v` is none or has no such element.
+    /// Sets an element of a simple vector; `None` if `v` is not one or has no such element.
     #[inline(always)]
     pub fn vector_set(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
         self.set_slot(v, Kind::SimpleVector, index, new)
     }
 
-    /// Copies elements of a simple vector over those of another, or of the same, as if by way of a third;
-    /// `None` if one is none or has not so many.
+    /// Copies `count` elements of a simple vector to another one, or to the same: then as if by way of a
+    /// third. `None` if one is not a simple vector or has too few elements.
     pub fn vector_copy(
         &mut self,
         from: Value,
@@ -202,8 +201,8 @@ impl Heap {
         Some(())
     }
 
-    /// Sets the elements of a simple vector from `start` to before `end`; `None` if `v` is none or has not so
-    /// many.
+    /// Sets the elements of a simple vector from `start` to before `end`; `None` if `v` is not one or has too
+    /// few elements.
     pub fn vector_fill(&mut self, v: Value, start: usize, end: usize, value: Value) -> Option<()> {
         let count = self.vector(v)?.get(start..end)?.len();
         let object = self.object_of(v, Kind::SimpleVector)?;
@@ -218,19 +217,19 @@ impl Heap {
         Some(())
     }
 
-    /// The slots of a structure, without its class.
+    /// Returns the slots of a structure, without its class.
     #[inline]
     pub fn structure_slots(&self, v: Value) -> Option<&[Value]> {
         self.record(v, Kind::Structure).map(|slots| &slots[1..])
     }
 
-    /// The class of a structure.
+    /// Returns the class of a structure.
     #[inline]
     pub fn structure_class(&self, v: Value) -> Option<Value> {
         self.record(v, Kind::Structure).map(|slots| slots[0])
     }
 
-    /// Sets a slot of a structure, the class not counted; `None` if `v` is none or has no such slot.
+    /// Sets a slot of a structure, where the class does not count; `None` if `v` has no such slot.
     #[inline]
     pub fn structure_set(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
         self.set_slot(v, Kind::Structure, index.checked_add(1)?, new)
@@ -252,7 +251,7 @@ impl Heap {
 
     // Symbols and functions.
 
-    /// The symbol object, if `v` is one (`nil` and `t` as values of a program are not).
+    /// Returns the symbol object, if `v` is one. The values `nil` and `t` are not.
     #[inline(always)]
     pub fn symbol(&self, v: Value) -> Option<&Symbol> {
         let object = self.object_of(v, Kind::Symbol)?;
@@ -260,12 +259,12 @@ impl Heap {
         Some(unsafe { &*object.cast() })
     }
 
-    /// Sets the value cell of a symbol; `None` if `v` is none.
+    /// Sets the global value of a symbol; `None` if `v` is not a symbol object.
     pub fn symbol_set_value(&mut self, v: Value, new: Value) -> Option<()> {
         self.set_slot(v, Kind::Symbol, 2, new)
     }
 
-    /// Sets the function of a symbol; `None` if `v` is none or `new` is not a function.
+    /// Sets the function of a symbol; `None` if `v` is not a symbol object or `new` not a function.
     pub fn symbol_set_function(&mut self, v: Value, new: Value) -> Option<()> {
         if !self.is(new, Kind::Function) {
             return None;
@@ -273,17 +272,17 @@ impl Heap {
         self.set_slot(v, Kind::Symbol, 3, new)
     }
 
-    /// Sets the macro function of a symbol; `None` if `v` is none.
+    /// Sets the macro function of a symbol; `None` if `v` is not a symbol object.
     pub fn symbol_set_macro_function(&mut self, v: Value, new: Value) -> Option<()> {
         self.set_slot(v, Kind::Symbol, 4, new)
     }
 
-    /// Sets the property list of a symbol; `None` if `v` is none.
+    /// Sets the property list of a symbol; `None` if `v` is not a symbol object.
     pub fn symbol_set_plist(&mut self, v: Value, new: Value) -> Option<()> {
         self.set_slot(v, Kind::Symbol, 5, new)
     }
 
-    /// The code of a function.
+    /// Returns the code of a function.
     #[inline(always)]
     pub fn function_code(&self, v: Value) -> Option<Value> {
         let object = self.object_of(v, Kind::Function)?;
@@ -291,7 +290,7 @@ impl Heap {
         Some(unsafe { (*object.cast::<Function>()).code })
     }
 
-    /// Puts other code in place of a function's; `None` if `v` is no function or `code` no Code.
+    /// Replaces the code of a function; `None` if `v` is not a function or `code` not a Code.
     ///
     /// # Safety
     /// The old code of the function is not being executed, and the new code reads no capture that the
@@ -303,7 +302,7 @@ impl Heap {
         self.set_slot(v, Kind::Function, 0, code)
     }
 
-    /// Sets a constant of code; `None` if `v` is no Code or has no such constant.
+    /// Sets a constant of code; `None` if `v` is not a Code or has no such constant.
     ///
     /// # Safety
     /// The code's words may run with the new constant: it is of the sort that they take for granted.
@@ -319,21 +318,21 @@ impl Heap {
         Some(())
     }
 
-    /// The captured values of a function.
+    /// Returns the captures of a function.
     pub fn function_captures(&self, v: Value) -> Option<&[Value]> {
         self.record(v, Kind::Function).map(|slots| &slots[1..])
     }
 
-    /// Sets a captured value of a function; `None` if `v` is none or has no such capture.
+    /// Sets a capture of a function; `None` if `v` is not a function or has no such capture.
     ///
     /// # Safety
-    /// The function's code may read the new value where it expects the old one: a box where the capture is
+    /// The function's code may read the new value in place of the old one: a box where the capture is
     /// declared as boxed.
     pub unsafe fn function_set_capture(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
         self.set_slot(v, Kind::Function, index.checked_add(1)?, new)
     }
 
-    /// The fixed part of code.
+    /// Returns the fixed part of code.
     #[inline(always)]
     pub fn code(&self, v: Value) -> Option<&Code> {
         let object = self.object_of(v, Kind::Code)?;
@@ -341,7 +340,7 @@ impl Heap {
         Some(unsafe { &*object.cast() })
     }
 
-    /// The constants of code.
+    /// Returns the constants of code.
     pub fn code_constants(&self, v: Value) -> Option<&[Value]> {
         let object = self.object_of(v, Kind::Code)?;
         // SAFETY: H3: a Code has `nconsts` values at a fixed offset; H5: they are borrowed with the heap.
@@ -351,7 +350,7 @@ impl Heap {
         }
     }
 
-    /// The instruction words of code, as they are now.
+    /// Returns the instruction words of code.
     pub fn code_words(&self, v: Value) -> Option<&[u32]> {
         let object = self.object_of(v, Kind::Code)?;
         // SAFETY: H3: a Code has `nwords` words after its constants; H5: they are borrowed with the heap.
@@ -363,30 +362,30 @@ impl Heap {
 
     // Arrays.
 
-    /// Whether `v` may be what an array keeps its elements in.
+    /// Returns whether `v` may be the data of an array.
     pub fn is_array_data(&self, v: Value) -> bool {
         matches!(self.kind(v), Some(Kind::SimpleVector | Kind::String | Kind::Bytes))
     }
 
-    /// The fixed part of an array that is not simple.
+    /// Returns the fixed part of an array that is not simple.
     pub fn array(&self, v: Value) -> Option<&Array> {
         let object = self.object_of(v, Kind::Array)?;
         // SAFETY: H3: the kind says that this is an Array; H5: it is borrowed with the heap.
         Some(unsafe { &*object.cast() })
     }
 
-    /// The dimensions of an array that is not simple.
+    /// Returns the dimensions of an array that is not simple.
     pub fn array_dimensions(&self, v: Value) -> Option<&[Value]> {
         self.record(v, Kind::Array).map(|slots| &slots[2..])
     }
 
-    /// Sets the fill pointer of an array that is not simple; `None` if `v` is none.
+    /// Sets the fill pointer of an array that is not simple; `None` if `v` is not one.
     pub fn array_set_fill(&mut self, v: Value, fill: Value) -> Option<()> {
         self.set_slot(v, Kind::Array, 1, fill)
     }
 
-    /// Gives an array other elements; `None` if `v` is no array or `data` none of SimpleVector, String,
-    /// Bytes.
+    /// Replaces the data of an array that is not simple; `None` if `v` is not one, or `data` is none of
+    /// SimpleVector, String, Bytes.
     pub fn array_set_data(&mut self, v: Value, data: Value) -> Option<()> {
         if !self.is_array_data(data) {
             return None;
@@ -394,14 +393,14 @@ impl Heap {
         self.set_slot(v, Kind::Array, 0, data)
     }
 
-    /// Sets a dimension of an array that is not simple; `None` if `v` is none or has no such dimension.
+    /// Sets a dimension of an array that is not simple; `None` if `v` is not one or has no such dimension.
     pub fn array_set_dimension(&mut self, v: Value, axis: usize, size: Value) -> Option<()> {
         self.set_slot(v, Kind::Array, axis.checked_add(2)?, size)
     }
 
     // Numbers.
 
-    /// The double, boxed or not.
+    /// Returns the double, boxed or not.
     #[inline]
     pub fn as_double(&self, v: Value) -> Option<f64> {
         v.as_double().or_else(|| {
@@ -411,60 +410,60 @@ impl Heap {
         })
     }
 
-    /// Sign and limbs of a bignum.
+    /// Returns sign and limbs of a bignum.
     pub fn bignum(&self, v: Value) -> Option<BignumRef<'_>> {
         let limbs = self.raw(v, Kind::Bignum)?;
         Some(BignumRef { negative: self.header(v)?.flags & Bignum::NEGATIVE != 0, limbs })
     }
 
-    /// Numerator and denominator of a ratio.
+    /// Returns numerator and denominator of a ratio.
     pub fn ratio(&self, v: Value) -> Option<(Value, Value)> {
         self.record(v, Kind::Ratio).map(|slots| (slots[0], slots[1]))
     }
 
     // Raw data.
 
-    /// The code points of a string.
+    /// Returns the code points of a string.
     #[inline(always)]
     pub fn string(&self, v: Value) -> Option<&[u32]> {
         self.raw(v, Kind::String)
     }
 
-    /// The code points of a string, to be changed in place.
+    /// Returns the code points of a string, to be changed in place.
     #[inline(always)]
     pub fn string_mut(&mut self, v: Value) -> Option<&mut [u32]> {
         self.raw_mut(v, Kind::String)
     }
 
-    /// The text of a string; what is no Unicode scalar value comes out as U+FFFD.
+    /// Returns the text of a string; U+FFFD stands for a code point that is not a Unicode scalar value.
     pub fn string_text(&self, v: Value) -> Option<String> {
         let text = |&code: &u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
         Some(self.string(v)?.iter().map(text).collect())
     }
 
-    /// Words of 32 bits.
+    /// Returns the elements of a Words32 object.
     #[inline(always)]
     pub fn words(&self, v: Value) -> Option<&[u32]> {
         self.raw(v, Kind::Words32)
     }
 
-    /// Words of 32 bits, to be changed in place.
+    /// Returns the elements of a Words32 object, to be changed in place.
     #[inline(always)]
     pub fn words_mut(&mut self, v: Value) -> Option<&mut [u32]> {
         self.raw_mut(v, Kind::Words32)
     }
 
-    /// Bytes.
+    /// Returns the elements of a Bytes object.
     pub fn bytes(&self, v: Value) -> Option<&[u8]> {
         self.raw(v, Kind::Bytes)
     }
 
-    /// Bytes, to be changed in place.
+    /// Returns the elements of a Bytes object, to be changed in place.
     pub fn bytes_mut(&mut self, v: Value) -> Option<&mut [u8]> {
         self.raw_mut(v, Kind::Bytes)
     }
 
-    /// The elements of a raw object. `T` must be the integer of the size of its elements.
+    /// Returns the elements of a raw object. `T` must be the integer of their size.
     #[inline(always)]
     fn raw<T: RawElement>(&self, v: Value, kind: Kind) -> Option<&[T]> {
         debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
@@ -485,14 +484,14 @@ impl Heap {
 
     // Flags.
 
-    /// The flags of an object of this kind.
+    /// Returns the flags of an object of this kind.
     #[inline]
     pub fn flags(&self, v: Value, kind: Kind) -> Option<u8> {
         self.object_of(v, kind)?;
         Some(self.header(v)?.flags)
     }
 
-    /// Sets the flags of an object of this kind; `None` if `v` is none.
+    /// Sets the flags of an object of this kind; `None` if `v` is not one.
     pub fn set_flags(&mut self, v: Value, kind: Kind, flags: u8) -> Option<()> {
         let object = self.object_of(v, kind)?;
         // SAFETY: `object_of` has found a live object; H3: neither size nor contents depend on the flags.
@@ -500,7 +499,7 @@ impl Heap {
         Some(())
     }
 
-    /// Sets `aux` of an object of this kind; `None` if `v` is none, or for arrays, where it is the rank.
+    /// Sets `aux` of an object of this kind; `None` if `v` is not one, or is an array, whose rank it is.
     pub fn set_aux(&mut self, v: Value, kind: Kind, aux: u16) -> Option<()> {
         if kind == Kind::Array {
             return None;
@@ -512,7 +511,7 @@ impl Heap {
         Some(())
     }
 
-    /// The write barrier and the store behind it: the one way by which a value overwrites another in the
+    /// Stores a value behind the write barrier: the only way in which a value overwrites another one in the
     /// heap.
     ///
     /// # Safety
@@ -527,7 +526,7 @@ impl Heap {
     }
 }
 
-/// Elements of raw objects.
+/// An element of a raw object.
 trait RawElement: Copy {}
 impl RawElement for u8 {}
 impl RawElement for u32 {}

@@ -1,14 +1,14 @@
 //! Allocation: bump pointers into the holes that the last sweep left.
 //!
-//! Two regions cut objects off the front of their current hole. The first takes every object that fits; when
+//! Two regions cut objects off the front of their current hole. The first takes every object that fits. If
 //! one does not, a small object (up to [`SMALL`]) moves the first region on to its next hole, and a medium
-//! one goes to the second region, so that a big object does not throw away the rest of a small hole. Large
-//! objects have memory of their own (`large`). Regions walk the blocks in order of address, sweeping what
-//! they come to, then take a new arena, and at the limit the small holes that they passed over.
+//! one goes to the second region, so that a big object does not waste the rest of a small hole. Large objects
+//! have memory of their own (`large`). Regions walk the blocks in order of address and sweep those they come
+//! to; then they take a new arena, and at the limit the small holes that they passed over.
 //!
-//! Guarantees: nothing here collects. What is allocated while marking counts as marked. A refill sweeps at
-//! most [`REFILL_SWEEPS`] blocks while the heap may grow. The same allocations give the same addresses
-//! relative to their arenas, and ask for slices at the same points, in every run.
+//! Guarantees: nothing here collects. Objects allocated while marking count as marked. A refill sweeps at
+//! most [`REFILL_SWEEPS`] blocks while the heap may grow. In every run the same allocations return the same
+//! addresses relative to their arenas, and ask for slices at the same points.
 //!
 //! Invariants: `next <= end <= hole_end`; the granules from `next` to `hole_end` are free and in one block
 //! whose state is Taken; their metadata is zero, or the epoch while marking (see `metadata`, invariant 3).
@@ -21,22 +21,22 @@ use super::{Heap, Phase};
 use crate::list_state;
 use std::ptr::NonNull;
 
-/// Greatest object, in bytes, for which the first region moves on to its next hole.
+/// Size of the greatest object, in bytes, for which the first region moves on to its next hole.
 const SMALL: usize = 256;
-/// A hole is used in pieces of this many bytes, so that slices come in time; also what one slice is owed for.
-/// Together with `SLICE_VISITS` this is the pace: one visit for every cons allocated.
+/// Bytes of the pieces in which a hole is used, so that slices come in time; also the bytes that one slice
+/// pays for. Together with `SLICE_VISITS` this sets the pace: one visit for every cons allocated.
 pub(super) const PIECE: usize = 16 << 10;
-/// Blocks that one refill sweeps in vain before it takes a new arena, if it may.
+/// Number of blocks that one refill sweeps in vain before it takes a new arena, if it may.
 const REFILL_SWEEPS: usize = 8;
-/// The first region leaves a block with less than this many free bytes alone until the limit is reached.
+/// Least number of free bytes for which the first region uses a block before the limit is reached.
 const WORTHWHILE: usize = BLOCK / 16;
 
-/// Why there was no memory.
+/// Reason why there is no memory.
 #[derive(Copy, Clone, PartialEq, Eq, Debug)]
 pub enum AllocError {
     /// The limit would be passed: collect, try again, and raise `:heap-exhausted` if that fails too.
     NeedCollection,
-    /// A single object beyond what the limit, or the length of an object, could ever hold.
+    /// A single object is larger than the limit, or longer than any object can be.
     TooLarge {
         /// Bytes asked for.
         requested: usize,
@@ -54,27 +54,27 @@ impl std::fmt::Display for AllocError {
 
 impl std::error::Error for AllocError {}
 
-/// Which region.
+/// One of the two regions.
 #[derive(Copy, Clone, PartialEq, Eq)]
 enum Which {
     First,
     Second,
 }
 
-/// The current hole of a region, and where it looks for the next.
+/// Current hole of a region, and the place where it looks for the next one.
 #[derive(Debug)]
 pub(super) struct Region {
-    /// Where the next object goes.
+    /// Address of the next object.
     next: usize,
     /// End of the current piece of the hole.
     end: usize,
     /// End of the hole.
     hole_end: usize,
-    /// Objects below this were counted.
+    /// Address below which objects have been counted.
     counted: usize,
-    /// Objects of this hole at or above this were allocated while marking.
+    /// Address from which on the objects of this hole were allocated while marking.
     black_from: usize,
-    /// Arena, block and granule from where to look for further holes, in the current block.
+    /// Arena, block and granule from which on to look for further holes in the current block.
     scan: Option<(usize, usize, usize)>,
     /// Arena and block to consider next.
     cursor: (usize, usize),
@@ -122,18 +122,18 @@ impl Region {
         Some(unsafe { NonNull::new_unchecked(std::ptr::with_exposed_provenance_mut(start)) })
     }
 
-    /// Bytes allocated and not counted yet.
+    /// Returns the number of bytes allocated and not counted yet.
     pub(super) fn uncounted(&self) -> usize {
         self.next - self.counted
     }
 
-    /// From here on what is allocated in the current hole counts as marked.
+    /// Begins to count objects allocated in the current hole as marked.
     pub(super) fn begin_marking(&mut self, epoch: u8) {
         self.black_from = self.next;
         fill_metadata(self.next, self.hole_end, epoch);
     }
 
-    /// Gives up the current hole. While marking, what was allocated black becomes one extent.
+    /// Gives up the current hole. While marking, all objects allocated black in it become one extent.
     fn retire(&mut self, marking: bool) {
         if marking && self.next < self.hole_end {
             fill_metadata(self.next, self.hole_end, 0);
@@ -163,17 +163,18 @@ fn fill_metadata(start: usize, end: usize, byte: u8) {
 }
 
 impl Heap {
-    /// Memory of `bytes`, a multiple of the granule, if the current hole has it.
+    /// Returns memory of `bytes`, a multiple of the granule, if the current hole has it.
     #[inline(always)]
     pub(super) fn bump(&mut self, bytes: usize) -> Option<NonNull<u8>> {
         self.first.bump(bytes)
     }
 
-    /// Memory of `bytes`, a multiple of the granule, not initialised.
+    /// Returns uninitialised memory of `bytes`, a multiple of the granule.
     #[inline(always)]
     pub(super) fn allocate(&mut self, bytes: usize) -> Result<NonNull<u8>, AllocError> {
         debug_assert!(bytes != 0 && bytes.is_multiple_of(GRANULE));
-        // The size decides where an object lives, room in the hole or not: the marker goes by the size alone.
+        // The size alone decides where an object lives, even if there is room in the hole, since the marker
+        // goes by the size.
         match if is_large(bytes) { None } else { self.bump(bytes) } {
             Some(p) => Ok(p),
             None => self.allocate_slow(bytes),
@@ -242,9 +243,9 @@ impl Heap {
         }
     }
 
-    /// A swept block with room for `bytes`, now taken.
+    /// Takes a swept block with room for `bytes`, and returns it.
     fn next_block(&mut self, which: Which, bytes: usize) -> Result<(usize, usize), AllocError> {
-        // 1. What is left of the arena that this region had to ask for.
+        // 1. The rest of the arena that this region had to ask for.
         while let Some((arena, block)) = self.region(which).fresh {
             self.region(which).fresh = if block < BLOCKS { Some((arena, block + 1)) } else { None };
             if self.take_if(arena, block, |block| block.is_empty()) {
@@ -261,11 +262,11 @@ impl Heap {
             }
             self.region(which).cursor = if block < BLOCKS { (arena, block + 1) } else { (arena + 1, 1) };
             swept_in_vain += usize::from(self.sweep_if_needed(arena, block));
-            let fits = |block: &super::arena::Block| match which {
+            let fits = |block: &super::arena::BlockInfo| match which {
                 Which::First => {
-                    block.summary.free * GRANULE >= WORTHWHILE && block.summary.largest * GRANULE >= bytes
+                    block.counts.free * GRANULE >= WORTHWHILE && block.counts.largest * GRANULE >= bytes
                 }
-                Which::Second => block.summary.largest * GRANULE >= super::arena::LARGE,
+                Which::Second => block.counts.largest * GRANULE >= super::arena::LARGE,
             };
             if self.take_if(arena, block, fits) {
                 return Ok((arena, block));
@@ -283,7 +284,7 @@ impl Heap {
         for arena in 0..self.arenas.len() {
             for block in 1..=BLOCKS {
                 self.sweep_if_needed(arena, block);
-                if self.take_if(arena, block, |block| block.summary.largest * GRANULE >= bytes) {
+                if self.take_if(arena, block, |block| block.counts.largest * GRANULE >= bytes) {
                     return Ok((arena, block));
                 }
             }
@@ -291,8 +292,13 @@ impl Heap {
         Err(AllocError::NeedCollection)
     }
 
-    /// Takes a block if it is swept and fits.
-    fn take_if(&mut self, arena: usize, block: usize, fits: impl Fn(&super::arena::Block) -> bool) -> bool {
+    /// Takes a block if it is swept and `fits`. Returns whether it did.
+    fn take_if(
+        &mut self,
+        arena: usize,
+        block: usize,
+        fits: impl Fn(&super::arena::BlockInfo) -> bool,
+    ) -> bool {
         let Some(arena) = self.arenas.get_mut(arena).and_then(Option::as_mut) else { return false };
         let takes = arena.block(block).state == BlockState::Swept && fits(arena.block(block));
         if takes {
@@ -301,7 +307,7 @@ impl Heap {
         takes
     }
 
-    /// Bytes that may be taken from the system, with the reserve if it is open.
+    /// Returns the number of bytes that may be taken from the system, with the reserve if it is open.
     pub(super) fn limit_now(&self) -> usize {
         if self.reserve_open { self.limit.saturating_add(super::RESERVE) } else { self.limit }
     }
@@ -342,7 +348,7 @@ impl Heap {
         Ok(object)
     }
 
-    /// Counts what was allocated, and asks for the collector when it is time.
+    /// Counts bytes allocated, and asks for the collector when it is time.
     fn count_allocated(&mut self, bytes: usize) {
         self.stats.allocated += bytes as u64;
         self.pacing.since_cycle += bytes as u64;
@@ -358,7 +364,7 @@ impl Heap {
         }
     }
 
-    /// Counts what the regions have allocated in their current holes.
+    /// Counts the bytes that the regions have allocated in their current holes.
     pub(super) fn count_regions(&mut self) {
         for which in [Which::First, Which::Second] {
             let region = self.region(which);

@@ -5,9 +5,9 @@
 //! | ArenaHeader | metadata of blocks 1 to 15 | objects ...
 //! ```
 //!
-//! One byte of metadata for 16 bytes is a sixteenth, so the metadata of all blocks is just the size of one
+//! One byte of metadata for 16 bytes is a sixteenth, so the metadata of all blocks has just the size of one
 //! block, and the bytes that would describe block 0 itself make room for the header. From any address in an
-//! arena, masking gives the header, shifting the byte of its granule.
+//! arena, masking leads to the header, and shifting to the byte of the granule.
 //!
 //! Unsafe invariants:
 //! 1. An arena is live, and its metadata initialised, from [`Arena::new`] until it is dropped; its provenance
@@ -16,13 +16,13 @@
 //!    function.
 
 use super::layout::GRANULE;
-use super::metadata::{self, Summary};
+use super::metadata::{self, SweepCounts};
 use crate::list_state;
 use std::alloc::{Layout, alloc, dealloc};
 use std::ops::Range;
 use std::ptr::NonNull;
 
-/// Bytes of a block. Smaller under Miri, which would otherwise spend its time on metadata.
+/// Bytes of a block. Blocks are smaller under Miri, which would otherwise spend its time on metadata.
 pub(super) const BLOCK: usize = if cfg!(miri) { 4 << 10 } else { 64 << 10 };
 /// Bytes of an arena, and its alignment.
 pub(super) const ARENA: usize = BLOCK * 16;
@@ -38,21 +38,21 @@ const LAYOUT: Layout = match Layout::from_size_align(ARENA, ARENA) {
     Err(_) => unreachable!(),
 };
 
-/// What stands at the start of an arena: what must be found from an address alone.
+/// Header at the start of an arena: the fields that must be found from an address alone.
 #[repr(C)]
 pub(super) struct ArenaHeader {
     /// Index in the heap's table.
     pub(super) number: u32,
-    /// Granules marked gray.
+    /// Number of granules marked gray.
     pub(super) grays: u32,
 }
 
 const _: () = assert!(size_of::<ArenaHeader>() <= BLOCK / GRANULE);
 
-/// Where a block stands between two cycles.
+/// State of a block between two cycles.
 #[derive(Copy, Clone, PartialEq, Eq, Debug)]
 pub(super) enum BlockState {
-    /// Holds what the last cycle did not mark; not to be allocated from.
+    /// Holds objects that the last cycle did not mark; not to be allocated from.
     Unswept,
     /// Canonical, and not allocated from since.
     Swept,
@@ -60,39 +60,39 @@ pub(super) enum BlockState {
     Taken,
 }
 
-/// What is known of a block. The counts are those of the last sweep.
+/// State of a block, and the counts of the last sweep.
 #[derive(Copy, Clone, Debug)]
-pub(super) struct Block {
+pub(super) struct BlockInfo {
     pub(super) state: BlockState,
-    pub(super) summary: Summary,
+    pub(super) counts: SweepCounts,
 }
 
 list_state! { ArenaHeader { number: Derived, grays: Derived } }
-list_state! { Block { state: Run, summary: Parts } }
+list_state! { BlockInfo { state: Run, counts: Parts } }
 
-impl Block {
-    const EMPTY: Block = Block {
+impl BlockInfo {
+    const EMPTY: BlockInfo = BlockInfo {
         state: BlockState::Swept,
-        summary: Summary { free: BLOCK_GRANULES, largest: BLOCK_GRANULES },
+        counts: SweepCounts { free: BLOCK_GRANULES, largest: BLOCK_GRANULES },
     };
 
-    /// Whether nothing at all lives in the block.
+    /// Returns whether nothing at all lives in the block.
     pub(super) fn is_empty(&self) -> bool {
-        self.state == BlockState::Swept && self.summary.free == BLOCK_GRANULES
+        self.state == BlockState::Swept && self.counts.free == BLOCK_GRANULES
     }
 }
 
-/// An arena.
+/// Arena of the heap, owned.
 pub(super) struct Arena {
     base: NonNull<u8>,
-    blocks: [Block; BLOCKS + 1],
+    blocks: [BlockInfo; BLOCKS + 1],
 }
 
 // The objects and metadata behind `base` are the run's, their address is the process's.
 list_state! { Arena { base: Run, blocks: Parts } }
 
 impl Arena {
-    /// A new arena with empty blocks, or nothing if the system has no memory.
+    /// Creates an arena with empty blocks; `None` if the system has no memory.
     pub(super) fn new(number: u32) -> Option<Arena> {
         // SAFETY: the size is not zero. The metadata block is zeroed and the header written before anything
         // reads them.
@@ -101,7 +101,7 @@ impl Arena {
             base.write_bytes(0, BLOCK);
             base.cast().write(ArenaHeader { number, grays: 0 });
             base.as_ptr().expose_provenance();
-            let arena = Arena { base, blocks: [Block::EMPTY; BLOCKS + 1] };
+            let arena = Arena { base, blocks: [BlockInfo::EMPTY; BLOCKS + 1] };
             if cfg!(debug_assertions) {
                 for block in 1..=BLOCKS {
                     poison(arena.address(block), 0..BLOCK_GRANULES);
@@ -111,14 +111,14 @@ impl Arena {
         }
     }
 
-    /// Address of the first byte of a block.
+    /// Returns the address of the first byte of a block.
     pub(super) fn address(&self, block: usize) -> usize {
         debug_assert!((1..=BLOCKS).contains(&block));
         self.base.addr().get() + block * BLOCK
     }
 
-    /// What is known of a block.
-    pub(super) fn block(&self, block: usize) -> &Block {
+    /// Returns the state and counts of a block.
+    pub(super) fn block(&self, block: usize) -> &BlockInfo {
         &self.blocks[block]
     }
 
@@ -128,9 +128,9 @@ impl Arena {
         self.blocks[block].state = BlockState::Taken;
     }
 
-    /// Whether nothing lives in any block.
+    /// Returns whether nothing lives in any block.
     pub(super) fn is_empty(&self) -> bool {
-        self.blocks[1..].iter().all(Block::is_empty)
+        self.blocks[1..].iter().all(BlockInfo::is_empty)
     }
 
     /// Notes that a marking has ended: all blocks but empty ones are to be swept.
@@ -142,21 +142,21 @@ impl Arena {
         }
     }
 
-    /// Sweeps a block, and gives the bytes that live in it.
+    /// Sweeps a block, and returns the number of bytes that live in it.
     pub(super) fn sweep(&mut self, block: usize, epoch: u8) -> usize {
         debug_assert_eq!(self.blocks[block].state, BlockState::Unswept);
         let address = self.address(block);
-        let summary = metadata::sweep(self.metadata_mut(block), epoch, |hole| {
+        let counts = metadata::sweep(self.metadata_mut(block), epoch, |hole| {
             if cfg!(debug_assertions) {
                 // SAFETY: H2: a hole of a block just swept holds nothing that anyone will read.
                 unsafe { poison(address, hole) };
             }
         });
-        self.blocks[block] = Block { state: BlockState::Swept, summary };
-        (BLOCK_GRANULES - summary.free) * GRANULE
+        self.blocks[block] = BlockInfo { state: BlockState::Swept, counts };
+        (BLOCK_GRANULES - counts.free) * GRANULE
     }
 
-    /// The metadata of a block.
+    /// Returns the metadata of a block.
     pub(super) fn metadata(&self, block: usize) -> &[u8] {
         debug_assert!((1..=BLOCKS).contains(&block));
         // SAFETY: invariant 1: the arena is live; the bytes of block b stand at offset b * BLOCK / 16;
@@ -167,7 +167,7 @@ impl Arena {
         }
     }
 
-    /// The metadata of a block, to be changed.
+    /// Returns the metadata of a block, to be changed.
     pub(super) fn metadata_mut(&mut self, block: usize) -> &mut [u8] {
         debug_assert!((1..=BLOCKS).contains(&block));
         // SAFETY: invariant 1: the arena is live; the bytes of block b stand at offset b * BLOCK / 16;
@@ -178,14 +178,14 @@ impl Arena {
         }
     }
 
-    /// The header.
+    /// Returns the header, to be changed.
     pub(super) fn header_mut(&mut self) -> &mut ArenaHeader {
         // SAFETY: invariant 1: the arena is live and begins with its header, which is borrowed mutably with
         // it.
         unsafe { self.base.cast().as_mut() }
     }
 
-    /// The header.
+    /// Returns the header.
     pub(super) fn header(&self) -> &ArenaHeader {
         // SAFETY: invariant 1: the arena is live and begins with its header, which is borrowed with it.
         unsafe { self.base.cast().as_ref() }
@@ -199,20 +199,20 @@ impl Drop for Arena {
     }
 }
 
-/// The header of the arena that an address lies in.
+/// Returns the header of the arena around an address.
 #[inline(always)]
 pub(super) fn header_of(address: usize) -> *mut ArenaHeader {
     std::ptr::with_exposed_provenance_mut(address & !(ARENA - 1))
 }
 
-/// The metadata byte of the granule at an address in an arena.
+/// Returns the metadata byte of the granule at an address in an arena.
 #[inline(always)]
 pub(super) fn metadata_of(address: usize) -> *mut u8 {
     let offset = address & (ARENA - 1);
     std::ptr::with_exposed_provenance_mut((address - offset) + offset / GRANULE)
 }
 
-/// Writes a value that no program holds over granules of the block at `address`.
+/// Writes a value that no program has over granules of the block at `address`.
 ///
 /// # Safety
 /// Nobody will read the granules before they are allocated again.

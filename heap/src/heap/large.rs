@@ -1,12 +1,12 @@
-//! Large objects: above an eighth of a block, each in memory of its own, which the sweep gives back to the
-//! system, piece by piece: the system takes as long for that as it took to provide the memory.
+//! Large objects: those above an eighth of a block. Each has memory of its own. The sweep gives it back to
+//! the system piece by piece, since the system takes as long for that as it took to provide the memory.
 //!
 //! ```text
 //! | LargeHeader (32 bytes) | Header | elements ...
 //!                          ^ the address in the value
 //! ```
 //!
-//! Whether an object is large follows from its size, so from its header: the marker needs no table.
+//! The size of an object, and so its header, tells whether it is large: the marker needs no table.
 
 use super::arena::LARGE;
 use super::layout::{GRANULE, Header};
@@ -14,20 +14,20 @@ use crate::list_state;
 use std::alloc::{Layout, alloc, dealloc, realloc};
 use std::ptr::NonNull;
 
-/// What stands before a large object.
+/// Header before a large object.
 #[repr(C, align(16))]
 pub(super) struct LargeHeader {
-    /// Bytes of the whole, this header included.
+    /// Bytes of the whole allocation, this header included.
     pub(super) bytes: usize,
-    /// Counts up with every large object of the heap; gives it its identity.
+    /// Ordinal among the large objects of the heap, and so the object's identity.
     pub(super) number: u64,
-    /// Index in the heap's list.
+    /// Index in the heap's list of large objects.
     pub(super) index: usize,
-    /// The epoch that it was marked in, or allocated in.
+    /// Epoch in which the object was marked or allocated.
     pub(super) epoch: u8,
-    /// Marked, but still to be followed.
+    /// Whether the object is marked, but still to be followed.
     pub(super) gray: bool,
-    /// Elements that were filled, of an object that is unfinished.
+    /// Number of elements that have been filled, if the object is unfinished.
     pub(super) filled: u32,
 }
 
@@ -44,25 +44,25 @@ list_state! {
     }
 }
 
-/// Bytes that an object of this size takes from the system.
+/// Returns the bytes that an object of this size takes from the system.
 pub(super) const fn footprint(bytes: usize) -> usize {
     bytes + size_of::<LargeHeader>()
 }
 
-/// Whether an object of this size is large.
+/// Returns whether an object of this size is large.
 #[inline(always)]
 pub(super) const fn is_large(bytes: usize) -> bool {
     bytes > LARGE
 }
 
-/// A large object, owned.
+/// Large object, owned.
 pub(super) struct LargeObject(NonNull<LargeHeader>);
 
 // The header and the object are the run's, their address is the process's.
 list_state! { LargeObject { 0: Parts } }
 
 impl LargeObject {
-    /// Memory for an object of `bytes`, or nothing if the system has none.
+    /// Allocates memory for an object of `bytes`; `None` if the system has none.
     pub(super) fn new(bytes: usize, number: u64, index: usize, epoch: u8) -> Option<LargeObject> {
         let bytes = footprint(bytes);
         let layout = Layout::from_size_align(bytes, GRANULE).ok()?;
@@ -75,14 +75,15 @@ impl LargeObject {
         }
     }
 
-    /// Address of the object proper.
+    /// Returns the address of the object proper.
     pub(super) fn object(&self) -> NonNull<u8> {
         // SAFETY: the allocation is longer than the header.
         unsafe { self.0.add(1).cast() }
     }
 
-    /// Gives about so many bytes from the end of an object that nobody uses any more back to the system; how
-    /// many that were. None if few would be left, or the system does not want them: then it is to be dropped.
+    /// Gives about `bytes` from the end of an object that is no longer in use back to the system, and returns
+    /// their number. `None` if few would be left, or the system does not want them: then the object is to be
+    /// dropped.
     pub(super) fn shrink(&mut self, bytes: usize) -> Option<usize> {
         let old = self.header().bytes;
         let bytes = bytes / GRANULE * GRANULE;
@@ -97,13 +98,13 @@ impl LargeObject {
         Some(bytes)
     }
 
-    /// The header.
+    /// Returns the header.
     pub(super) fn header(&self) -> &LargeHeader {
         // SAFETY: `new` has written the header, which lives until `self` is dropped and is borrowed with it.
         unsafe { self.0.as_ref() }
     }
 
-    /// The header.
+    /// Returns the header, to be changed.
     pub(super) fn header_mut(&mut self) -> &mut LargeHeader {
         // SAFETY: `new` has written the header, which lives until `self` is dropped and is borrowed mutably
         // with it.
@@ -119,7 +120,7 @@ impl Drop for LargeObject {
     }
 }
 
-/// The header before a large object.
+/// Returns the header before a large object.
 ///
 /// # Safety
 /// `object` is a live large object.

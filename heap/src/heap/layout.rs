@@ -1,4 +1,4 @@
-//! The layouts of heap objects, fixed to the byte: the interpreter, and later compiled code, reach into them
+//! Layouts of heap objects, fixed to the byte: the interpreter, and later compiled code, reach into them
 //! directly.
 //!
 //! ```text
@@ -6,13 +6,13 @@
 //! object    | kind u8 | flags u8 | aux u16 | len u32 | elements... |
 //! ```
 //!
-//! Guarantees: an object is one of three sorts, told by its kind: all slots are values ([`Kind::is_record`]),
-//! none is ([`Kind::is_raw`]), or it is [`Kind::Code`]. `len` counts the elements after the header in the
-//! unit of the kind (values, limbs, characters, words, bytes), so kind and `len` alone give the size, and
-//! neither ever changes, but for the kind of an unfinished vector or string, once: into that of a finished
-//! one. A header carries nothing of the collector.
+//! Guarantees: there are three sorts of objects, told by the kind: all slots are values
+//! ([`Kind::is_record`]), none is ([`Kind::is_raw`]), or it is [`Kind::Code`]. `len` counts the elements
+//! after the header in the unit of the kind (values, limbs, characters, words, bytes), so kind and `len`
+//! alone give the size. Neither ever changes, with one exception: the kind of an unfinished vector or string
+//! becomes that of a finished one. A header carries nothing of the collector.
 //!
-//! Not here: making objects (`object`), checked access (`access`), tracing (`mark`).
+//! Not here: creating objects (`object`), checked access (`access`), tracing (`mark`).
 
 use crate::value::Value;
 
@@ -22,10 +22,10 @@ pub const GRANULE: usize = 16;
 /// Greatest number of elements of one object, whatever the unit: 2^31.
 pub const MAX_LENGTH: usize = 1 << 31;
 
-/// What an object is.
+/// Kind of an object.
 ///
-/// The numbers carry meaning: below 0x20 all slots are values, below 0x1F anyone may read them, from 0x40 no
-/// slot is a value; the high half gives the size of an element. They may change with any version; nothing
+/// The numbers have a meaning: below 0x20 all slots are values, below 0x1F anyone may read them, from 0x40 on
+/// no slot is a value; the high half gives the size of an element. They may change with any version; nothing
 /// stores them outside of a running heap.
 #[repr(u8)]
 #[derive(Copy, Clone, PartialEq, Eq, Debug, Hash)]
@@ -42,11 +42,11 @@ pub enum Kind {
     Array = 0x05,
     /// A ratio in lowest terms: numerator, denominator.
     Ratio = 0x06,
-    /// An instance of a structure, condition types included: class, then the slots. [`Structure`].
+    /// An instance of a structure or condition type: class, then the slots. [`Structure`].
     Structure = 0x08,
     /// The description of a structure or condition type.
     Class = 0x09,
-    /// An identity that no program can forge, for blocks, tagbodies and the like; one value rides along.
+    /// An identity that no program can forge, for blocks, tagbodies and the like. It carries one value.
     Tag = 0x0A,
     /// A package.
     Package = 0x0B,
@@ -73,13 +73,13 @@ pub enum Kind {
     Bignum = 0x41,
     /// Words of 64 bits, for indexes.
     Words64 = 0x42,
-    /// A large simple vector to be, not all of which has been filled: nobody reads it until then.
+    /// A large simple vector under construction. Nobody reads its elements before all are filled.
     UnfinishedVector = 0x43,
     /// A string: code points of 32 bits.
     String = 0x50,
     /// Words of 32 bits, for indexes.
     Words32 = 0x51,
-    /// A large string to be, as [`Kind::UnfinishedVector`].
+    /// A large string under construction, like [`Kind::UnfinishedVector`].
     UnfinishedString = 0x52,
     /// Bytes.
     Bytes = 0x60,
@@ -116,48 +116,48 @@ pub const KINDS: [Kind; 26] = [
 ];
 
 impl Kind {
-    /// Whether all slots are values.
+    /// Returns whether all slots are values.
     #[inline(always)]
     pub const fn is_record(self) -> bool {
         (self as u8) < 0x20
     }
 
-    /// Whether all slots are values that anyone may read. Those of a hash table are for its own functions,
-    /// which rely on what the storage behind them holds.
+    /// Returns whether all slots are values that anyone may read. Those of a hash table are for its own
+    /// functions, which rely on the content of the storage behind them.
     #[inline(always)]
     pub const fn is_open_record(self) -> bool {
         (self as u8) < Kind::HashTable as u8
     }
 
-    /// Whether no slot is a value, so that the collector need not look inside.
+    /// Returns whether no slot is a value, so that the collector need not look inside.
     #[inline(always)]
     pub const fn is_raw(self) -> bool {
         self as u8 & 0x40 != 0
     }
 
-    /// Binary logarithm of the size of an element in bytes.
+    /// Returns the binary logarithm of the size of an element in bytes.
     #[inline(always)]
     pub const fn element_shift(self) -> u32 {
         const SHIFTS: [u8; 8] = [3, 3, 3, 3, 3, 2, 0, 0];
         SHIFTS[(self as u8 >> 4) as usize & 7] as u32
     }
 
-    /// Bytes of an object with `len` elements, header included, rounded up to granules.
+    /// Returns the bytes of an object with `len` elements, header included, rounded up to granules.
     #[inline(always)]
     pub const fn size(self, len: usize) -> usize {
         (size_of::<Header>() + (len << self.element_shift()) + GRANULE - 1) & !(GRANULE - 1)
     }
 }
 
-/// What every object but a cons starts with.
+/// Header of every object but a cons.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
 pub struct Header {
-    /// What the object is.
+    /// Kind of the object.
     pub kind: Kind,
-    /// Bits that the kind gives a meaning to.
+    /// Flags, whose meaning depends on the kind.
     pub flags: u8,
-    /// A small number that the kind gives a meaning to.
+    /// Small number, whose meaning depends on the kind.
     pub aux: u16,
     /// Number of elements, in the unit of the kind. Never changes.
     pub len: u32,
@@ -166,7 +166,7 @@ pub struct Header {
 const _: () = assert!(size_of::<Header>() == 8);
 
 impl Header {
-    /// Bytes of the object, rounded up to granules.
+    /// Returns the bytes of the object, rounded up to granules.
     #[inline(always)]
     pub const fn size(&self) -> usize {
         self.kind.size(self.len as usize)
@@ -185,23 +185,23 @@ pub struct Cons {
 
 const _: () = assert!(size_of::<Cons>() == GRANULE);
 
-/// A symbol. `name` is always a String and `function` always a Function; the heap sees to both.
+/// A symbol. The heap guarantees that `name` is a String and `function` a Function.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
 pub struct Symbol {
     /// Kind, length 6, and the flags below.
     pub header: Header,
-    /// Its name, a String.
+    /// Name, a String.
     pub name: Value,
-    /// Its home package, or `nil`.
+    /// Home package, or `nil`.
     pub package: Value,
-    /// Its value outside of all bindings, or [`Value::UNBOUND`].
+    /// Value outside of all bindings, or [`Value::UNBOUND`].
     pub value: Value,
-    /// Its function; a stub that fails when it has none, so that calling needs no test.
+    /// Function. A symbol without one has a stub that fails, so that calling needs no test.
     pub function: Value,
-    /// Its macro function, or `nil`.
+    /// Macro function, or `nil`.
     pub macro_function: Value,
-    /// Its property list.
+    /// Property list.
     pub plist: Value,
 }
 
@@ -212,7 +212,7 @@ impl Symbol {
     pub const SPECIAL: u8 = 1;
     /// Flag: a constant, not to be set or bound.
     pub const CONSTANT: u8 = 2;
-    /// Flag: some task has bound it dynamically; while clear, its value is the value in every task.
+    /// Flag: some task has bound it dynamically. While the flag is clear, every task sees `value`.
     pub const EVER_BOUND: u8 = 4;
     /// Flag: belongs to the system and may not be redefined.
     pub const LOCKED: u8 = 8;
@@ -222,15 +222,15 @@ impl Symbol {
 
 const _: () = assert!(size_of::<Symbol>() == 8 + 8 * Symbol::LEN);
 
-/// A function: code and the variables it has captured. `code` is always a Code object; the heap sees to it.
+/// A function: code and captured variables. The heap guarantees that `code` is a Code.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
 pub struct Function {
     /// Kind; length 1 + number of captures.
     pub header: Header,
-    /// Its code, a Code object.
+    /// Code, a Code object.
     pub code: Value,
-    /// The captured values or boxes, `header.len - 1` of them.
+    /// Captured values or boxes, `header.len - 1` of them.
     pub captures: [Value; 0],
 }
 
@@ -245,15 +245,15 @@ const _: () = assert!(size_of::<Function>() == 16);
 pub struct Code {
     /// Kind; length in units of 8 bytes of all that follows the header.
     pub header: Header,
-    /// What names it in a backtrace.
+    /// Name in a backtrace.
     pub name: Value,
     /// Debug information: a value, or `nil`.
     pub debug: Value,
-    /// What it belongs to: a value, or `nil`.
+    /// Owner, such as the module that the code belongs to: a value, or `nil`.
     pub owner: Value,
-    /// Where execution begins; normally the first of the words.
+    /// Address at which execution begins; normally that of the first word.
     pub entry: *const u32,
-    /// The exact number of arguments, or [`Code::ANY_ARITY`] when a call has to go the slow way.
+    /// Exact number of arguments, or [`Code::ANY_ARITY`] if a call has to go the slow way.
     pub arity: u32,
     /// Number of registers of a frame.
     pub nregs: u32,
@@ -261,24 +261,24 @@ pub struct Code {
     pub nconsts: u32,
     /// Number of instruction words.
     pub nwords: u32,
-    /// For counters and compiled code.
+    /// For the owner's use: the loader keeps the packed shape and the number of captures here.
     pub spare: [u64; 2],
-    /// The constants, `nconsts` of them, at a fixed offset; the words follow.
+    /// Constants, `nconsts` of them, at a fixed offset; the words follow.
     pub constants: [Value; 0],
 }
 
 impl Code {
-    /// `arity` of code that takes optional, rest or keyword arguments.
+    /// Value of `arity` for code that takes optional, rest or keyword arguments.
     pub const ANY_ARITY: u32 = u32::MAX;
     /// Offset of the first constant from the start of the object, in bytes.
     pub const CONSTANTS_OFFSET: usize = std::mem::offset_of!(Code, constants);
 
-    /// `header.len` for this many constants and words.
+    /// Returns `header.len` for this many constants and words.
     pub(crate) const fn len(nconsts: usize, nwords: usize) -> usize {
         (Self::CONSTANTS_OFFSET - size_of::<Header>()) / 8 + nconsts + nwords.div_ceil(2)
     }
 
-    /// Offset of the first word from the start of the object, in bytes.
+    /// Returns the offset of the first word from the start of the object, in bytes.
     #[inline(always)]
     pub const fn words_offset(&self) -> usize {
         Self::CONSTANTS_OFFSET + 8 * self.nconsts as usize
@@ -293,7 +293,7 @@ const _: () = assert!(size_of::<Code>() == 72 && Code::CONSTANTS_OFFSET == 72);
 pub struct Boxed {
     /// Kind, length 1.
     pub header: Header,
-    /// The variable.
+    /// Value of the variable.
     pub value: Value,
 }
 
@@ -305,7 +305,7 @@ const _: () = assert!(size_of::<Boxed>() == GRANULE);
 pub struct Vector {
     /// Kind and number of elements.
     pub header: Header,
-    /// The elements, `header.len` of them.
+    /// Elements, `header.len` of them.
     pub elements: [Value; 0],
 }
 
@@ -315,30 +315,30 @@ pub struct Vector {
 pub struct Str {
     /// Kind and number of characters.
     pub header: Header,
-    /// The code points, `header.len` of them.
+    /// Code points, `header.len` of them.
     pub characters: [u32; 0],
 }
 
-/// An array with a fill pointer, or adjustable, or not of one dimension. `aux` is its rank.
+/// An array that has a fill pointer, or is adjustable, or is not of one dimension. `aux` is its rank.
 ///
-/// `data` is always a SimpleVector, a String or Bytes; the heap sees to it.
+/// The heap guarantees that `data` is a SimpleVector, a String or Bytes.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
 pub struct Array {
     /// Kind, flags below, rank; length 2 + rank.
     pub header: Header,
-    /// The elements in row-major order.
+    /// Object with the elements, in row-major order.
     pub data: Value,
-    /// The fill pointer, a fixnum, or `nil`.
+    /// Fill pointer, a fixnum, or `nil`.
     pub fill: Value,
-    /// The dimensions, fixnums, `header.aux` of them.
+    /// Dimensions, fixnums, `header.aux` of them.
     pub dimensions: [Value; 0],
 }
 
 impl Array {
     /// Flag: has a fill pointer.
     pub const HAS_FILL_POINTER: u8 = 1;
-    /// Flag: made to be adjustable.
+    /// Flag: created as adjustable.
     pub const ADJUSTABLE: u8 = 2;
 }
 
@@ -350,7 +350,7 @@ const _: () = assert!(size_of::<Array>() == 24);
 pub struct Float {
     /// Kind, length 1.
     pub header: Header,
-    /// The number.
+    /// Value of the number.
     pub value: f64,
 }
 
@@ -362,7 +362,7 @@ const _: () = assert!(size_of::<Float>() == GRANULE);
 pub struct Bignum {
     /// Kind, sign in the flags, and number of limbs.
     pub header: Header,
-    /// The magnitude, least limb first, `header.len` of them.
+    /// Magnitude, least limb first, `header.len` of them.
     pub limbs: [u64; 0],
 }
 
@@ -371,30 +371,30 @@ impl Bignum {
     pub const NEGATIVE: u8 = 1;
 }
 
-/// A hash table. `used` and `room` are counts, `entries` and `heads` directories of segments; the heap sees
-/// to that (`table`).
+/// A hash table. The heap guarantees that `used` and `room` are counts, `entries` and `heads` directories of
+/// segments (`table`).
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
 pub struct HashTable {
-    /// Kind, length 9, and which test in `aux`.
+    /// Kind, length 9, and the number of the test in `aux`.
     pub header: Header,
     /// Number of keys.
     pub count: Value,
     /// Number of entries that were ever in use.
     pub used: Value,
-    /// The entry freed last, one too high.
+    /// Number of the entry freed last, plus one; 0 if none is free.
     pub free: Value,
-    /// Entries for which there is room.
+    /// Number of entries for which there is room.
     pub room: Value,
     /// Directory of the segments of entries.
     pub entries: Value,
     /// Directory of the segments of heads.
     pub heads: Value,
-    /// The test, a function of the program, or `nil`.
+    /// Test, a function of the program, or `nil`.
     pub test: Value,
-    /// The hash function of the program, or `nil`.
+    /// Hash function of the program, or `nil`.
     pub hash: Value,
-    /// Changes whenever a key comes or goes.
+    /// Number that changes whenever a key comes or goes.
     pub serial: Value,
 }
 
@@ -406,9 +406,9 @@ const _: () = assert!(size_of::<HashTable>() == 80);
 pub struct Structure {
     /// Kind; length 1 + number of slots.
     pub header: Header,
-    /// Its class, a Class object; the heap sees to it, and that it never changes.
+    /// Class, a Class object. The heap guarantees that, and that it never changes.
     pub class: Value,
-    /// The slots, `header.len - 1` of them.
+    /// Slots, `header.len - 1` of them.
     pub slots: [Value; 0],
 }
 

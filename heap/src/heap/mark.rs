@@ -1,23 +1,23 @@
-//! Marking: which objects are reachable from the roots as they were when the cycle began.
+//! Marking: finds the objects that are reachable from the roots as they were when the cycle began.
 //!
-//! The collector is incremental, snapshot-at-the-beginning (Yuasa 1990). Whatever was reachable when the
-//! cycle began survives it, whatever the program does meanwhile: before a value in the heap is overwritten it
-//! is marked. What is allocated during the cycle survives it too, without being followed. So a cycle may take
-//! as many slices as it likes, and nothing is ever scanned twice; what became garbage during the cycle is
-//! found by the next.
+//! The collector is incremental, snapshot-at-the-beginning (Yuasa 1990). Every object reachable when the
+//! cycle began survives it, whatever the program does meanwhile: a value in the heap is marked before it is
+//! overwritten. Objects allocated during the cycle survive it too, without being followed. So a cycle may
+//! take as many slices as it likes, and nothing is ever scanned twice; garbage that arises during the cycle
+//! is found by the next.
 //!
-//! Stacks are not scanned at the beginning. Each is scanned once in the cycle, before its task runs in it, or
-//! by the marker at its leisure. That is sound because only the task itself reads its stack: until it is
-//! scanned nothing leaves it, and what others write into it comes from stacks scanned, from marked objects,
-//! or from new ones.
+//! Stacks are not scanned at the beginning. Each is scanned once in the cycle: before its task runs in it, or
+//! by the marker at its leisure. That is sound because only the task itself reads its stack. Nothing leaves a
+//! stack before it is scanned, and whatever others write into it comes from scanned stacks, from marked
+//! objects, or from new ones.
 //!
 //! ```text
-//! begin_cycle, mark(fixed roots) -> slice ... slice -> Drained -> mark_slice(stack), slice ... -> end_marking
+//! begin_cycle, mark(fixed roots) -> slice ... -> Drained -> mark_slice(stack), slice ... -> end_marking
 //! ```
 //!
-//! Guarantees: no recursion on the native stack; the mark stack has a fixed capacity, beyond which objects
-//! wait as gray bytes in the metadata; the work of a slice is bounded by its visits; a vector is followed in
-//! pieces of [`PIECE_LENGTH`] elements.
+//! Guarantees: there is no recursion on the native stack. The mark stack has a fixed capacity; beyond it
+//! objects wait as gray bytes in the metadata. The work of a slice is bounded by its visits; a vector is
+//! followed in pieces of [`PIECE_LENGTH`] elements.
 //!
 //! Invariants while marking:
 //! 1. A marked object that may hold unmarked addresses of the snapshot is on the mark stack, in `pieces`, or
@@ -33,22 +33,22 @@ use super::{Heap, Phase, SliceOutcome};
 use crate::list_state;
 use crate::value::Value;
 
-/// Elements of a record that are followed at once.
+/// Number of elements of a record that are followed at once.
 const PIECE_LENGTH: usize = if cfg!(miri) { 64 } else { 1024 };
-/// Elements that count as one visit.
+/// Number of elements that count as one visit.
 const ELEMENTS_PER_VISIT: i64 = 4;
-/// Visits that the search for gray bytes in one arena counts as.
+/// Number of visits that the search for gray bytes in one arena counts as.
 const GRAY_SEARCH_VISITS: i64 = 256;
 
-/// What is to be followed.
+/// The marked objects that are still to be followed.
 pub(super) struct Marker {
-    /// Marked objects that were not looked into.
+    /// Marked objects that have not been visited.
     stack: Vec<Value>,
-    /// Most entries of `stack`.
+    /// Greatest number of entries of `stack`.
     capacity: usize,
-    /// Records that were followed in part, and where to go on.
+    /// Records that have been followed in part, with the slot to go on at.
     pieces: Vec<(Value, usize)>,
-    /// Gray granules in arenas, and gray large objects.
+    /// Number of gray granules in arenas and of gray large objects.
     grays: usize,
     /// Bytes marked in this cycle.
     pub(super) bytes: u64,
@@ -65,7 +65,7 @@ impl Marker {
         self.stack.is_empty() && self.pieces.is_empty() && self.grays == 0
     }
 
-    /// Moves gray objects of an arena to the stack, as many as fit.
+    /// Moves gray objects of an arena to the stack, as many as there is room for.
     fn take_grays_of(&mut self, arena: &mut Arena) {
         for block in 1..=BLOCKS {
             let start = arena.address(block);
@@ -95,8 +95,8 @@ impl Marker {
 }
 
 impl Heap {
-    /// Begins a cycle. The caller marks the fixed roots at once, before anything else runs. Does nothing
-    /// while marking; a sweep under way is finished first.
+    /// Begins a cycle. The caller marks the fixed roots at once, before anything else runs. While marking is
+    /// under way nothing happens; a sweep under way is finished first.
     pub fn begin_cycle(&mut self) {
         match self.phase {
             Phase::Marking => return,
@@ -120,8 +120,8 @@ impl Heap {
         self.second.begin_marking(self.epoch);
     }
 
-    /// Marks a value: it, and what it leads to, outlives this cycle. Does nothing when no marking is under
-    /// way.
+    /// Marks a value: it outlives this cycle with everything reachable from it. Without a marking under way
+    /// nothing happens.
     #[inline]
     pub fn mark(&mut self, v: Value) {
         if self.marking && v.is_address() && self.set_mark(v) {
@@ -129,15 +129,15 @@ impl Heap {
         }
     }
 
-    /// Marks all values of a root or stack. Raw instruction addresses among them do no harm.
+    /// Marks all values of a root or stack. Addresses of instructions among them do no harm.
     pub fn mark_slice(&mut self, values: &[Value]) {
         for &v in values {
             self.mark(v);
         }
     }
 
-    /// Whether `v` is marked in the cycle under way; of no meaning when none is. What has no address counts
-    /// as marked.
+    /// Returns whether `v` is marked in the cycle under way; without one the answer means nothing. A value
+    /// without an address counts as marked.
     pub fn is_marked(&self, v: Value) -> bool {
         if !v.is_address() {
             return true;
@@ -154,7 +154,7 @@ impl Heap {
         }
     }
 
-    /// Sets the mark of an address; whether it was unmarked and has to be followed.
+    /// Sets the mark of an address. Returns whether it was unmarked and has to be followed.
     #[inline]
     fn set_mark(&mut self, v: Value) -> bool {
         debug_assert!(v != Value::POISON && v.is_address());
@@ -225,8 +225,9 @@ impl Heap {
         }
     }
 
-    /// Runs a slice of marking or sweeping of about `max_visits` objects, twice as many when the heap has run
-    /// ahead. Every slice pays for 16 KiB allocated; ask [`Heap::gc_due`] whether the next is due already.
+    /// Runs a slice of marking or sweeping of about `max_visits` objects, twice as many if allocation has run
+    /// ahead. Every slice pays for 16 KiB allocated; [`Heap::gc_due`] tells whether the next one is due
+    /// already.
     pub fn slice(&mut self, max_visits: u32) -> SliceOutcome {
         let behind = self.pacing.since_cycle > 2 * self.pacing.threshold + self.stats.live;
         let budget = i64::from(max_visits) * if behind { 2 } else { 1 };
@@ -246,7 +247,7 @@ impl Heap {
         outcome
     }
 
-    /// Follows what is marked until nothing is left or the budget is spent.
+    /// Follows marked objects until none is left or the budget is spent.
     fn follow(&mut self, left: &mut i64) -> SliceOutcome {
         while *left > 0 {
             debug_assert!(self.marker.stack.len() <= self.marker.capacity);
@@ -263,7 +264,7 @@ impl Heap {
         SliceOutcome::More
     }
 
-    /// Follows a marked object, and on along the first unmarked cons or object that it leads to.
+    /// Follows a marked object, then the first unmarked cons or object that it leads to, and so on.
     fn visit(&mut self, mut v: Value, left: &mut i64) {
         while v.is_cons() {
             if *left <= 0 {
@@ -316,8 +317,8 @@ impl Heap {
         *left -= 1 + (end - from) as i64 / ELEMENTS_PER_VISIT;
     }
 
-    /// Moves gray objects to the empty mark stack: as many as fit, from one arena or from among the large
-    /// objects.
+    /// Moves gray objects to the empty mark stack: as many as there is room for, from one arena or from among
+    /// the large objects.
     fn collect_grays(&mut self, left: &mut i64) {
         debug_assert!(self.marker.stack.is_empty());
         *left -= GRAY_SEARCH_VISITS;
@@ -332,7 +333,7 @@ impl Heap {
         }
     }
 
-    /// Ends marking; what was neither marked nor allocated in this cycle will be freed.
+    /// Ends marking. Everything that was neither marked nor allocated in this cycle will be freed.
     ///
     /// # Safety
     /// Every value that anyone will still use was marked, is reachable from what was marked, or was allocated
@@ -355,7 +356,7 @@ impl Heap {
         self.begin_sweep();
     }
 
-    /// Forgets the marking under way. Its marks stay in the metadata; the sweep of the next cycle clears
+    /// Gives up the marking under way. Its marks stay in the metadata; the sweep of the next cycle clears
     /// them.
     fn abandon_marking(&mut self) {
         self.count_regions();
@@ -371,8 +372,8 @@ impl Heap {
         self.phase = Phase::Idle;
     }
 
-    /// A whole cycle at once: drops one in progress, calls `mark_roots`, follows everything, and frees the
-    /// rest.
+    /// Runs a whole cycle at once: gives up one in progress, calls `mark_roots`, follows everything, and
+    /// frees the rest.
     ///
     /// # Safety
     /// The contract of [`Heap::end_marking`], for what `mark_roots` marks.
@@ -392,7 +393,7 @@ impl Heap {
     }
 }
 
-/// The address of a cons or object.
+/// Returns the address of a cons or object.
 #[inline(always)]
 pub(super) fn address_of(v: Value) -> usize {
     (v.bits() & !crate::value::TAG_MASK) as usize

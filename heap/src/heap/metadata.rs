@@ -13,17 +13,17 @@
 //! *hole* is a maximal run outside of extents.
 //!
 //! Invariants:
-//! 1. *Canonical* is a block in which the bytes of extents are `epoch body … body end` and all others are
-//!    zero. [`sweep`] makes it so, and allocation begins only in canonical blocks. Allocating writes no
-//!    metadata: what was allocated since the last sweep looks like a hole, which is why a hole is handed out
+//! 1. In a *canonical* block the bytes of extents are `epoch body … body end` and all others are zero.
+//!    [`sweep`] makes a block canonical, and allocation begins only in canonical blocks. Allocating writes no
+//!    metadata: objects allocated since the last sweep look like a hole, which is why a hole is handed out
 //!    once per sweep and never looked for again behind the allocator. Marking writes into extents, but never
 //!    a zero; so the zeros of a canonical block are its holes at any time.
 //! 2. An end bit is only ever set on the last granule of an object, so a stale one never cuts a live object
 //!    in two.
 //! 3. While marking, a hole is filled with the epoch before it is handed out: every object that starts in it
 //!    is marked already. When the hole is given up the used part becomes one extent and the rest zero.
-//! 4. Every block is swept between two cycles, so the epoch of a new cycle stands nowhere but where it was
-//!    put.
+//! 4. Every block is swept between two cycles, so the epoch of a new cycle stands only where that cycle has
+//!    put it.
 //!
 //! Source: one byte per granule, end bits and bump allocation into the holes are Nofl's (Wingo 2025, arXiv
 //! 2503.16971). We differ in writing no byte when allocating, and in treating all that was allocated while
@@ -32,34 +32,34 @@
 use crate::list_state;
 use std::ops::Range;
 
-/// Mask of the epoch.
+/// Mask of the epoch's bits.
 pub(super) const EPOCH: u8 = 3;
-/// The last granule of an extent.
+/// Bit of the last granule of an extent.
 pub(super) const END: u8 = 4;
-/// Marked but to be followed later.
+/// Bit of a granule that is marked and to be followed later.
 pub(super) const GRAY: u8 = 8;
-/// Beside [`GRAY`]: a cons.
+/// Bit beside [`GRAY`]: the granule is a cons.
 pub(super) const GRAY_CONS: u8 = 16;
-/// A granule of an extent that is neither its first nor its last.
+/// Bit of a granule of an extent that is neither its first nor its last.
 const BODY: u8 = 32;
 
-/// The epoch after `epoch`.
+/// Returns the epoch after `epoch`.
 pub(super) const fn next_epoch(epoch: u8) -> u8 {
     epoch % 3 + 1
 }
 
-/// What a sweep found in a block, in granules.
+/// Result of sweeping a block, in granules.
 #[derive(Copy, Clone, PartialEq, Eq, Debug)]
-pub(super) struct Summary {
-    /// All granules outside of extents.
+pub(super) struct SweepCounts {
+    /// Number of granules outside of extents.
     pub(super) free: usize,
-    /// The longest hole.
+    /// Length of the longest hole.
     pub(super) largest: usize,
 }
 
-list_state! { Summary { free: Run, largest: Run } }
+list_state! { SweepCounts { free: Run, largest: Run } }
 
-/// The eight bytes at `at`, if there are as many and `at` is a multiple of eight.
+/// Returns the eight bytes at `at`, if there are that many and `at` is a multiple of eight.
 #[inline(always)]
 fn word(bytes: &[u8], at: usize) -> Option<u64> {
     if at & 7 != 0 {
@@ -72,9 +72,10 @@ const fn splat(byte: u8) -> u64 {
     byte as u64 * 0x0101_0101_0101_0101
 }
 
-/// Makes a block canonical: keeps the extents of `epoch`, clears all else, and calls `dead` with each hole.
-pub(super) fn sweep(bytes: &mut [u8], epoch: u8, mut dead: impl FnMut(Range<usize>)) -> Summary {
-    let mut summary = Summary { free: 0, largest: 0 };
+/// Makes a block canonical: keeps the extents of `epoch`, clears everything else, and calls `dead` with each
+/// hole.
+pub(super) fn sweep(bytes: &mut [u8], epoch: u8, mut dead: impl FnMut(Range<usize>)) -> SweepCounts {
+    let mut summary = SweepCounts { free: 0, largest: 0 };
     let mut close = |hole: Range<usize>| {
         if !hole.is_empty() {
             summary.free += hole.len();
@@ -123,7 +124,8 @@ pub(super) fn sweep(bytes: &mut [u8], epoch: u8, mut dead: impl FnMut(Range<usiz
     summary
 }
 
-/// The first hole of at least `min` granules at or after `from`, in a block that is canonical from there on.
+/// Returns the first hole of at least `min` granules at or after `from`, in a block that is canonical from
+/// there on.
 pub(super) fn next_hole(bytes: &[u8], from: usize, min: usize) -> Option<Range<usize>> {
     let mut at = from;
     loop {
@@ -144,7 +146,7 @@ pub(super) fn next_hole(bytes: &[u8], from: usize, min: usize) -> Option<Range<u
     }
 }
 
-/// The first gray granule at or after `from`.
+/// Returns the first gray granule at or after `from`.
 pub(super) fn next_gray(bytes: &[u8], from: usize) -> Option<usize> {
     let mut at = from;
     while at < bytes.len() {
@@ -159,8 +161,8 @@ pub(super) fn next_gray(bytes: &[u8], from: usize) -> Option<usize> {
     None
 }
 
-/// Whether a block is canonical for `epoch`, and what a sweep would count.
-pub(super) fn check_canonical(bytes: &[u8], epoch: u8) -> Result<Summary, String> {
+/// Checks that a block is canonical for `epoch`, and returns the counts of a sweep.
+pub(super) fn check_canonical(bytes: &[u8], epoch: u8) -> Result<SweepCounts, String> {
     let mut copy = bytes.to_vec();
     let summary = sweep(&mut copy, epoch, |_| {});
     match bytes.iter().zip(&copy).position(|(is, should)| is != should) {
@@ -194,7 +196,7 @@ mod tests {
         let mut dead = vec![false; bytes.len()];
         let summary = sweep(&mut bytes, 2, |hole| dead[hole].iter_mut().for_each(|d| *d = true));
         assert_eq!(bytes, parse(after));
-        assert_eq!(summary, Summary { free, largest });
+        assert_eq!(summary, SweepCounts { free, largest });
         assert_eq!(dead.iter().filter(|&&d| d).count(), free);
         assert_eq!(check_canonical(&bytes, 2), Ok(summary));
     }

@@ -1,16 +1,16 @@
-//! The heap: where everything lives that a [`Value`] has the address of.
+//! The heap: memory for every object that a [`Value`] refers to by address.
 //!
 //! ```text
-//! object    making objects, a function per kind          access    checked reading and writing of objects
+//! object    creating objects, a function per kind        access    checked reading and writing of objects
 //! layout    their form, to the byte                      alloc     bump allocation into holes
 //! mark      incremental marking                          sweep     lazy sweeping
 //! arena     1 MiB pieces of memory, in blocks            large     big objects, one by one
-//! metadata  one byte per granule                         table    the storage of hash tables
+//! metadata  one byte per granule
 //! ```
 //!
 //! Objects never move. A cycle of the collector marks what is reachable, in slices between which the program
-//! runs, then what was not marked is swept, in slices and as the allocator needs it. When to run depends on
-//! nothing but the number of bytes allocated, so a run repeats exactly.
+//! runs; then it sweeps what was not marked, in slices and as the allocator needs memory. The times of cycles
+//! and slices depend on the number of bytes allocated and on nothing else, so a run repeats exactly.
 //!
 //! Guarantees: safe code cannot break memory safety through this interface, however odd it is. The facts
 //! behind that, which the `SAFETY:` notes name:
@@ -30,21 +30,21 @@
 //! * **H5, borrows.** Access borrows the heap, so nothing is stored or collected while a slice of it is in
 //!   use. Every store of a value passes the write barrier.
 //!
-//! What the VM does at a tick when [`Heap::gc_due`]:
+//! When [`Heap::gc_due`], the VM takes one of these steps at the next tick:
 //!
 //! ```text
 //! Idle       begin_cycle, mark the fixed roots
-//! Marking    slice; when Drained: scan a stack not yet scanned in this cycle (cycle_id tells) with the visits left
-//!            over, or end_marking when there is none
+//! Marking    slice; when Drained: scan a stack not yet scanned in this cycle (cycle_id tells) with the visits
+//!            left over, or end_marking when there is none
 //! Sweeping   slice
 //! ```
 //!
-//! Roots are of three sorts. *Fixed* roots are marked at the beginning, and whoever overwrites one later
-//! calls [`Heap::log_if_marking`] with the old value first. *Stacks* are scanned once per cycle, before their
-//! task runs in it (why that is sound: `mark`). *Few and changing* roots may be marked at the beginning and
-//! all again before the end.
+//! There are three sorts of roots. *Fixed* roots are marked when the cycle begins; whoever overwrites one
+//! later first calls [`Heap::log_if_marking`] with the old value. *Stacks* are scanned once per cycle, before
+//! their task runs in it (`mark` says why that is sound). Roots that are *few and change often* may be marked
+//! at the beginning and all again before the end.
 //!
-//! Not here: which roots there are, when to run a slice, weak references.
+//! Not here: the choice of roots; when to run a slice; weak references.
 
 #![allow(unsafe_code)]
 
@@ -72,24 +72,25 @@ use large::LargeObject;
 use mark::Marker;
 use sweep::Sweep;
 
-/// Bytes that [`Heap::open_reserve`] adds to the limit.
+/// Bytes added to the limit by [`Heap::open_reserve`].
 pub const RESERVE: usize = 1 << 20;
 
-/// Visits of an ordinary slice.
+/// Number of visits of an ordinary slice.
 ///
 /// With 100 MB live a slice takes 3 µs on a list in order of allocation, 85 µs on a random graph of vectors,
 /// and 200 µs on a list linked in random order, where every visit waits for memory (cloud Xeon, 2.5 GHz).
 pub const SLICE_VISITS: u32 = 1000;
 
-/// What a heap may use, and when it collects.
+/// Limit of a heap, and settings of its collector.
 #[derive(Clone, Debug)]
 pub struct HeapConfig {
     /// Bytes that the heap may take from the system, metadata included; at least one arena of 1 MiB.
     pub limit: usize,
-    /// A cycle starts when this much was allocated since the last one, or as much as was live then if that is
-    /// more. Near the limit it starts sooner.
+    /// Bytes to allocate between the end of one cycle and the start of the next. If the last cycle found more
+    /// than that live, the next one starts after as many bytes as were live; near the limit it starts sooner.
     pub cycle_floor: usize,
-    /// Most objects on the mark stack, of 8 bytes each; more of them wait in the metadata, which is slower.
+    /// Capacity of the mark stack, in objects of 8 bytes each. More objects wait in the metadata, which is
+    /// slower.
     pub mark_stack: usize,
 }
 
@@ -99,42 +100,42 @@ impl Default for HeapConfig {
     }
 }
 
-/// What the collector is doing.
+/// State of the collector.
 #[derive(Copy, Clone, PartialEq, Eq, Debug)]
 pub enum Phase {
-    /// Nothing; a cycle starts when enough was allocated.
+    /// Between two cycles.
     Idle,
     /// Marking what is reachable; stores log what they overwrite.
     Marking,
-    /// Giving back what was not marked.
+    /// Freeing what was not marked.
     Sweeping,
 }
 
-/// What a slice has left to do.
+/// Work left after a slice.
 #[derive(Copy, Clone, PartialEq, Eq, Debug)]
 #[must_use]
 pub enum SliceOutcome {
-    /// More of the same.
+    /// The phase goes on.
     More,
-    /// All that was marked has been followed: mark the stacks not yet scanned, or end marking.
+    /// Everything marked has been followed: mark a stack that was not yet scanned, or end marking.
     Drained {
-        /// Visits not used; a scanned slot may count as a quarter of one.
+        /// Visits not used. A scanned word of a stack may count as a quarter of one.
         left: u32,
     },
     /// The cycle is over.
     Finished,
 }
 
-/// Figures of a heap since it was made.
+/// Figures of a heap since its creation.
 #[derive(Copy, Clone, Default, Debug, PartialEq, Eq)]
 pub struct HeapStats {
-    /// Cycles completed.
+    /// Number of completed cycles.
     pub cycles: u64,
-    /// Slices run.
+    /// Number of slices.
     pub slices: u64,
-    /// Visits of the longest slice.
+    /// Number of visits of the longest slice.
     pub longest_slice: u64,
-    /// Bytes found live by the last cycle, what was allocated during it included.
+    /// Bytes found live by the last cycle; whatever was allocated during the cycle counts as live.
     pub live: u64,
     /// Bytes allocated.
     pub allocated: u64,
@@ -144,23 +145,23 @@ pub struct HeapStats {
     pub peak: u64,
 }
 
-/// When to run, in bytes allocated.
+/// Pace of the collector, in bytes allocated.
 struct Pacing {
     /// `HeapConfig::cycle_floor`.
     floor: u64,
-    /// A cycle starts at this much.
+    /// Value of `since_cycle` at which a cycle starts.
     threshold: u64,
-    /// Allocated since the last marking ended.
+    /// Allocated since the end of the last marking.
     since_cycle: u64,
-    /// Allocated since the marking under way began.
+    /// Allocated since the beginning of the marking under way.
     black: u64,
-    /// Allocated during the cycle, and not worked off by slices.
+    /// Allocated during the cycle and not yet worked off by slices.
     owed: u64,
 }
 
-/// A heap. See the module documentation for the rules of its use.
+/// Heap of a machine. The module's documentation has the rules for its use.
 pub struct Heap {
-    // What the interpreter's fast paths touch comes first.
+    // The fields that the interpreter's fast paths touch come first.
     first: Region,
     second: Region,
     marking: bool,
@@ -227,7 +228,7 @@ list_state! {
 unsafe impl Send for Heap {}
 
 impl Heap {
-    /// Makes an empty heap.
+    /// Creates an empty heap.
     ///
     /// # Safety
     /// The caller promises that a value with an address is used only with the heap that it came from, and not
@@ -256,15 +257,15 @@ impl Heap {
         }
     }
 
-    /// A heap for the unit tests of this crate.
+    /// Creates a heap for a unit test of this crate.
     #[cfg(test)]
     pub(crate) fn for_tests() -> Heap {
         // SAFETY: H1: a test of this crate uses the values of one heap, while it has it.
         unsafe { Heap::new(HeapConfig::default()) }
     }
 
-    /// The write barrier: whoever overwrites a value in the heap, or in a fixed root, calls this with the old
-    /// value first.
+    /// Logs a value that is about to be overwritten, in the heap or in a fixed root, while marking is under
+    /// way: the write barrier.
     #[inline(always)]
     pub fn log_if_marking(&mut self, old: Value) {
         if self.marking {
@@ -278,25 +279,25 @@ impl Heap {
         self.mark(old);
     }
 
-    /// Whether the collector wants to run at the next tick: begin a cycle when idle, else run a slice.
-    /// Changes only when allocation takes its slow path, and by the collector's own functions.
+    /// Returns whether the collector wants to run at the next tick: to begin a cycle if idle, else to run a
+    /// slice. The answer changes only on the slow path of allocation and by the collector's own functions.
     #[inline(always)]
     pub fn gc_due(&self) -> bool {
         self.due
     }
 
-    /// What the collector is doing.
+    /// Returns the state of the collector.
     pub fn phase(&self) -> Phase {
         self.phase
     }
 
-    /// Number of the cycle that runs or ran last; a task stack notes it when it was scanned.
+    /// Returns the number of the cycle under way, or else of the last one. A task's stack notes it when it is
+    /// scanned.
     pub fn cycle_id(&self) -> u64 {
         self.cycle_id
     }
 
-    /// Notes how many bytes outside of the heap count against its limit. What there is stays, whatever the
-    /// answer.
+    /// Sets the number of bytes outside of the heap that count against its limit, even if they are too many.
     ///
     /// # Errors
     /// [`AllocError::NeedCollection`] if the limit is passed.
@@ -309,19 +310,19 @@ impl Heap {
         }
     }
 
-    /// Opens the reserve above the limit for the clause that handles `:heap-exhausted`; false if it is open
-    /// already.
+    /// Opens the reserve above the limit, for the clause that handles `:heap-exhausted`. Returns false if it
+    /// is open already.
     pub fn open_reserve(&mut self) -> bool {
         !std::mem::replace(&mut self.reserve_open, true)
     }
 
-    /// Closes the reserve. What it holds stays; the next allocation beyond the limit fails again.
+    /// Closes the reserve. Objects in it stay; the next allocation beyond the limit fails again.
     pub fn close_reserve(&mut self) {
         self.reserve_open = false;
     }
 
-    /// A number that tells a value from all others alive at the same time, the same in every run of the same
-    /// program: what `eq` hash tables hash.
+    /// Returns a number that distinguishes a value from all others alive at the same time, and is the same in
+    /// every run of the same program. Hash tables by `eq` use it as the hash.
     pub fn identity(&self, v: Value) -> u64 {
         if !v.is_address() {
             return v.bits();
@@ -339,7 +340,7 @@ impl Heap {
         }
     }
 
-    /// Figures since the heap was made.
+    /// Returns the figures of this heap.
     pub fn stats(&self) -> HeapStats {
         let uncounted = (self.first.uncounted() + self.second.uncounted()) as u64;
         HeapStats {

@@ -1,40 +1,39 @@
-//! Making objects: one function per kind.
+//! Creating objects: one function for each kind.
 //!
-//! Guarantees: no function here collects, so values in the caller's hands stay good; every object is
-//! initialised in full before its address becomes a [`Value`]; on an error nothing has changed that a program
-//! could see. Initialising stores need no barrier, since nothing was overwritten.
+//! Guarantees: no function here collects, so values in the caller's hands stay good. Every object is
+//! initialised completely before its address becomes a [`Value`]. After an error nothing has changed that a
+//! program could see. Initialising stores need no barrier, since they overwrite nothing.
 //!
-//! The promises about contents that the interpreter relies on are asserted here: the code of a function is a
-//! Code, the function of a symbol is a Function, its name a String, the class of a structure a Class, the
-//! data of an array a SimpleVector, String or Bytes.
+//! The functions assert the contents that the interpreter relies on (H4 in [`super`]).
 
 use super::layout::{Bignum, Boxed, Code, Cons, Float, Function, Header, Kind, MAX_LENGTH, Symbol, Vector};
 use super::{AllocError, Heap};
 use crate::value::Value;
 
-/// What a Code object is made from.
+/// Parts of a Code object.
 #[derive(Copy, Clone, Debug)]
 pub struct CodeParts<'a> {
-    /// What names it in a backtrace.
+    /// Name in a backtrace.
     pub name: Value,
     /// Debug information, or `nil`.
     pub debug: Value,
-    /// What it belongs to, or `nil`.
+    /// Owner, or `nil`.
     pub owner: Value,
-    /// The exact number of arguments, or [`Code::ANY_ARITY`].
+    /// Exact number of arguments, or [`Code::ANY_ARITY`].
     pub arity: u32,
     /// Number of registers of a frame.
     pub nregs: u32,
     /// Two words of the caller's own, such as the number of captures.
     pub spare: [u64; 2],
-    /// The constants.
+    /// Constants.
     pub constants: &'a [Value],
-    /// The instruction words. `entry` will be the first of them.
+    /// Instruction words. `entry` will be the first of them.
     pub words: &'a [u32],
 }
 
 impl Heap {
-    /// A cons, if there is room in the current hole: the part of [`Heap::cons`] to inline into a hot loop.
+    /// Creates a cons, if there is room in the current hole: the part of [`Heap::cons`] to inline into a hot
+    /// loop.
     #[inline(always)]
     pub fn cons_in_hole(&mut self, car: Value, cdr: Value) -> Option<Value> {
         let cons = self.bump(size_of::<Cons>())?.as_ptr().cast::<Cons>();
@@ -46,7 +45,7 @@ impl Heap {
         }
     }
 
-    /// A new cons.
+    /// Creates a cons.
     ///
     /// # Errors
     /// As for every allocation, see [`AllocError`].
@@ -69,17 +68,17 @@ impl Heap {
         }
     }
 
-    /// A new list of `items`.
+    /// Creates a list of `items`.
     pub fn list(&mut self, items: &[Value]) -> Result<Value, AllocError> {
         self.list_with_tail(items, Value::NIL)
     }
 
-    /// A new list of `items` that ends in `tail` (`list*`).
+    /// Creates a list of `items` that ends in `tail` (`list*`).
     pub fn list_with_tail(&mut self, items: &[Value], tail: Value) -> Result<Value, AllocError> {
         items.iter().rev().try_fold(tail, |rest, &item| self.cons(item, rest))
     }
 
-    /// A new box.
+    /// Creates a box.
     #[inline]
     pub fn alloc_box(&mut self, value: Value) -> Result<Value, AllocError> {
         let boxed = self.allocate(size_of::<Boxed>())?.as_ptr().cast::<Boxed>();
@@ -91,7 +90,7 @@ impl Heap {
         }
     }
 
-    /// The double `x`, boxed if it has to be.
+    /// Returns the double `x`, boxed if necessary.
     #[inline]
     pub fn float(&mut self, x: f64) -> Result<Value, AllocError> {
         match Value::double(x) {
@@ -111,11 +110,11 @@ impl Heap {
         }
     }
 
-    /// A new record of values.
+    /// Creates a record of values.
     ///
     /// # Panics
-    /// When `kind` is not a record, or is one whose contents the heap vouches for (symbol, function, array,
-    /// structure), which have functions of their own.
+    /// If `kind` is not a record, or is one whose contents the heap guarantees (symbol, function, array,
+    /// structure, hash table): these have functions of their own.
     pub fn alloc_record(
         &mut self,
         kind: Kind,
@@ -127,7 +126,7 @@ impl Heap {
         self.record_from(kind, flags, aux, &[], slots)
     }
 
-    /// A new record of `len` slots, all `fill`. For kinds as [`Heap::alloc_record`].
+    /// Creates a record of `len` slots, all `fill`, of a kind that [`Heap::alloc_record`] takes.
     ///
     /// # Panics
     /// As [`Heap::alloc_record`].
@@ -151,17 +150,17 @@ impl Heap {
         }
     }
 
-    /// A new simple vector of `elements`.
+    /// Creates a simple vector of `elements`.
     pub fn alloc_vector(&mut self, elements: &[Value]) -> Result<Value, AllocError> {
         self.record_from(Kind::SimpleVector, 0, 0, &[], elements)
     }
 
-    /// A new simple vector of `len` elements, all `fill`.
+    /// Creates a simple vector of `len` elements, all `fill`.
     pub fn alloc_vector_filled(&mut self, len: usize, fill: Value) -> Result<Value, AllocError> {
         self.alloc_record_filled(Kind::SimpleVector, 0, len, fill)
     }
 
-    /// A vector or string to be, of `len` elements, which [`Heap::fill_more`] fills piece by piece: the
+    /// Creates a vector or string of `len` elements for [`Heap::fill_more`] to fill piece by piece, since the
     /// system takes its time for memory that is touched for the first time. One that is not large is filled
     /// at once, with 0 or the character of code 0.
     pub fn begin_vector(&mut self, len: usize, is_string: bool) -> Result<Value, AllocError> {
@@ -179,9 +178,9 @@ impl Heap {
         Ok(unsafe { Value::from_object(object) })
     }
 
-    /// Fills the next elements of what [`Heap::begin_vector`] began, at most so many; whether that were the
-    /// last, and it is a vector or string now. A value with an address is not filled in, but 0 in its place.
-    /// `None` if `v` is not unfinished.
+    /// Fills at most `count` more elements of an object from [`Heap::begin_vector`]. Returns whether these
+    /// were the last ones: then it is a vector or string now. In place of a value with an address, 0 is
+    /// filled in. `None` if `v` is not unfinished.
     pub fn fill_more(&mut self, v: Value, fill: Value, count: usize) -> Option<bool> {
         let object = v.as_object_ptr()?;
         // SAFETY: H1, H2: an object value is the address of a live object. If it is unfinished it is large,
@@ -201,7 +200,7 @@ impl Heap {
                 let characters = object.add(1).cast::<u32>();
                 (from..to).for_each(|i| characters.add(i).write(code));
             } else {
-                // What has an address would have to be found by the collector.
+                // The collector does not look inside, so it would not find an address.
                 let fill = if fill.is_address() { Value::small(0) } else { fill };
                 let values = object.add(1).cast::<Value>();
                 (from..to).for_each(|i| values.add(i).write(fill));
@@ -214,7 +213,8 @@ impl Heap {
         }
     }
 
-    /// How many elements of an unfinished object have been filled, of how many; `None` if `v` is none.
+    /// Returns the number of filled elements of an unfinished object, and the number of all; `None` if `v` is
+    /// not unfinished.
     pub fn filled(&self, v: Value) -> Option<(usize, usize)> {
         let object = v.as_object_ptr()?;
         // SAFETY: H1, H2: an object value is the address of a live object; an unfinished one is large, so
@@ -225,29 +225,29 @@ impl Heap {
         }
     }
 
-    /// A new ratio. That it is in lowest terms and its denominator above one is up to the caller.
+    /// Creates a ratio. The caller sees to it that it is in lowest terms with a denominator above one.
     pub fn alloc_ratio(&mut self, numerator: Value, denominator: Value) -> Result<Value, AllocError> {
         self.record_from(Kind::Ratio, 0, 0, &[], &[numerator, denominator])
     }
 
-    /// A new identity; `value` rides along.
+    /// Creates an identity that carries `value`.
     pub fn alloc_tag(&mut self, value: Value) -> Result<Value, AllocError> {
         self.record_from(Kind::Tag, 0, 0, &[], &[value])
     }
 
-    /// A new instance of `class` with these slots.
+    /// Creates an instance of `class` with these slots.
     ///
     /// # Panics
-    /// When `class` is not a Class.
+    /// If `class` is not a Class.
     pub fn alloc_structure(&mut self, class: Value, slots: &[Value]) -> Result<Value, AllocError> {
         assert_eq!(self.kind(class), Some(Kind::Class), "the class of a structure is a Class");
         self.record_from(Kind::Structure, 0, 0, &[class], slots)
     }
 
-    /// A new array that is not simple. `aux` becomes the number of dimensions.
+    /// Creates an array that is not simple. `aux` becomes the number of dimensions.
     ///
     /// # Panics
-    /// When `data` is none of SimpleVector, String, Bytes, or there are more than 65 535 dimensions.
+    /// If `data` is none of SimpleVector, String, Bytes, or there are more than 65 535 dimensions.
     pub fn alloc_array(
         &mut self,
         flags: u8,
@@ -260,10 +260,10 @@ impl Heap {
         self.record_from(Kind::Array, flags, rank, &[data, fill], dimensions)
     }
 
-    /// A new symbol without value, macro function and properties.
+    /// Creates a symbol without value, macro function and properties.
     ///
     /// # Panics
-    /// When `name` is not a String or `function` not a Function.
+    /// If `name` is not a String or `function` not a Function.
     pub fn alloc_symbol(
         &mut self,
         flags: u8,
@@ -277,19 +277,19 @@ impl Heap {
         self.record_from(Kind::Symbol, flags, 0, &[], &slots)
     }
 
-    /// A new function: code with captured variables.
+    /// Creates a function: code with captured variables.
     ///
     /// # Safety
     /// The captures are what the code reads: as many, and boxes where it declares them as boxed.
     ///
     /// # Panics
-    /// When `code` is not a Code.
+    /// If `code` is not a Code.
     pub unsafe fn alloc_function(&mut self, code: Value, captures: &[Value]) -> Result<Value, AllocError> {
         assert_eq!(self.kind(code), Some(Kind::Code), "the code of a function is a Code");
         self.record_from(Kind::Function, 0, 0, &[code], captures)
     }
 
-    /// A new function whose captures the caller fills in, for the interpreter: they start out `nil`.
+    /// Creates a function for the interpreter, which fills in the captures: they start out `nil`.
     ///
     /// # Safety
     /// `code` is a Code.
@@ -313,7 +313,7 @@ impl Heap {
         Ok(function)
     }
 
-    /// New code.
+    /// Creates code.
     ///
     /// # Safety
     /// Words, constants, registers and arity have passed the verifier together, or were made by the VM to the
@@ -351,17 +351,44 @@ impl Heap {
         }
     }
 
-    /// A new string of these code points.
+    /// Creates a string of these code points.
     pub fn alloc_string(&mut self, characters: &[u32]) -> Result<Value, AllocError> {
         self.raw_from(Kind::String, 0, characters)
     }
 
-    /// A new string of `len` times the code point `fill`.
+    /// Creates a string of `len` characters: those of `part(heap, 0)` and so on for `count` parts, and code
+    /// point 0 for what they lack.
+    pub fn alloc_string_of(
+        &mut self,
+        len: usize,
+        count: usize,
+        part: impl for<'a> Fn(&'a Heap, usize) -> &'a [u32],
+    ) -> Result<Value, AllocError> {
+        let object = self.begin_object(Kind::String, 0, 0, len)?;
+        // SAFETY: `begin_object` gave room for `len` code points, which nobody else can reach before the
+        // value is made; all are written by then.
+        unsafe {
+            let characters = object.add(1).cast::<u32>();
+            let mut written = 0;
+            for index in 0..count {
+                let part = part(self, index);
+                let fitting = part.len().min(len - written);
+                std::ptr::copy_nonoverlapping(part.as_ptr(), characters.add(written), fitting);
+                written += fitting;
+            }
+            for lacking in written..len {
+                characters.add(lacking).write(0);
+            }
+            Ok(Value::from_object(object))
+        }
+    }
+
+    /// Creates a string of `len` times the code point `fill`.
     pub fn alloc_string_filled(&mut self, len: usize, fill: u32) -> Result<Value, AllocError> {
         self.raw_filled(Kind::String, len, fill)
     }
 
-    /// A new string with the text of `text`.
+    /// Creates a string with this text.
     pub fn alloc_str(&mut self, text: &str) -> Result<Value, AllocError> {
         let object = self.begin_object(Kind::String, 0, 0, text.chars().count())?;
         // SAFETY: `begin_object` gave room for as many words as `text` has characters; they are written
@@ -375,34 +402,35 @@ impl Heap {
         }
     }
 
-    /// A new bignum. Leading zero limbs are cut off; that the number is no fixnum is up to the caller.
+    /// Creates a bignum. Leading zero limbs are cut off; the caller sees to it that the number is not a
+    /// fixnum.
     pub fn alloc_bignum(&mut self, negative: bool, limbs: &[u64]) -> Result<Value, AllocError> {
         let significant = limbs.iter().rposition(|&limb| limb != 0).map_or(0, |last| last + 1);
         let flags = if negative { Bignum::NEGATIVE } else { 0 };
         self.raw_from(Kind::Bignum, flags, &limbs[..significant])
     }
 
-    /// New words of 32 bits, all `fill`.
+    /// Creates a Words32 object of `len` elements, all `fill`.
     pub fn alloc_words(&mut self, len: usize, fill: u32) -> Result<Value, AllocError> {
         self.raw_filled(Kind::Words32, len, fill)
     }
 
-    /// New words of 64 bits, all 0.
+    /// Creates a Words64 object of `len` elements, all 0.
     pub(crate) fn alloc_words64(&mut self, len: usize) -> Result<Value, AllocError> {
         self.raw_filled(Kind::Words64, len, 0u64)
     }
 
-    /// New bytes.
+    /// Creates a Bytes object of these bytes.
     pub fn alloc_bytes(&mut self, bytes: &[u8]) -> Result<Value, AllocError> {
         self.raw_from(Kind::Bytes, 0, bytes)
     }
 
-    /// New bytes, all `fill`.
+    /// Creates a Bytes object of `len` bytes, all `fill`.
     pub fn alloc_bytes_filled(&mut self, len: usize, fill: u8) -> Result<Value, AllocError> {
         self.raw_filled(Kind::Bytes, len, fill)
     }
 
-    /// Memory for an object, its header written, its `len` elements not.
+    /// Allocates an object. Its header is written, its `len` elements are not.
     #[inline]
     fn begin_object(
         &mut self,
@@ -420,8 +448,8 @@ impl Heap {
         Ok(object)
     }
 
-    /// A new record of a kind whose contents the heap vouches for; that they are as they should be is up to
-    /// the caller.
+    /// Creates a record of a kind whose contents the heap guarantees; the caller sees to it that they are
+    /// right.
     pub(crate) fn vouched_record(
         &mut self,
         kind: Kind,
@@ -431,7 +459,7 @@ impl Heap {
         self.record_from(kind, 0, aux, &[], slots)
     }
 
-    /// A record of the values of `first` and then those of `rest`.
+    /// Creates a record of the values of `first` and then those of `rest`.
     fn record_from(
         &mut self,
         kind: Kind,
@@ -477,7 +505,7 @@ impl Heap {
     }
 }
 
-/// Kinds of which the heap guarantees something about the contents.
+/// Returns whether the heap guarantees the contents of objects of this kind.
 pub(super) const fn is_vouched_for(kind: Kind) -> bool {
     matches!(kind, Kind::Symbol | Kind::Function | Kind::Array | Kind::Structure | Kind::HashTable)
 }
@@ -486,8 +514,18 @@ pub(super) const fn is_vouched_for(kind: Kind) -> bool {
 mod tests {
     use super::*;
 
-    /// Elements of a large vector, few enough for Miri.
+    /// Number of elements of a large vector, small enough for Miri.
     const LONG: usize = crate::heap::arena::LARGE;
+
+    #[test]
+    fn strings_are_made_of_parts_of_others() {
+        let mut heap = Heap::for_tests();
+        let word = heap.alloc_str("word").unwrap();
+        let joined = heap.alloc_string_of(6, 2, |heap, part| &heap.string(word).unwrap()[part + 1..]);
+        assert_eq!(heap.string_text(joined.unwrap()).unwrap(), "ordrd\0");
+        let cut = heap.alloc_string_of(3, 2, |heap, _| heap.string(word).unwrap());
+        assert_eq!(heap.string_text(cut.unwrap()).unwrap(), "wor");
+    }
 
     #[test]
     fn long_vectors_are_filled_in_pieces() {
@@ -524,7 +562,8 @@ mod tests {
         assert_eq!(heap.fill_more(v, Value::NIL, 1), None);
     }
 
-    /// What is found nowhere else must not be in there: nobody looks inside until it is finished.
+    /// A value that is found nowhere else must not be in there: nobody looks inside until the object is
+    /// finished.
     #[test]
     fn nothing_with_an_address_is_filled_in() {
         let mut heap = Heap::for_tests();
@@ -548,7 +587,7 @@ mod tests {
         heap.check().unwrap();
     }
 
-    /// The collector is given what is copied over, as if it had been stored over.
+    /// The collector gets the values that a copy overwrites, as if they had been stored over.
     #[test]
     fn copying_over_elements_keeps_the_snapshot() {
         let mut heap = Heap::for_tests();

@@ -1,11 +1,11 @@
-//! Sweeping: what the last marking did not reach is free.
+//! Sweeping: frees the objects that the last marking did not reach.
 //!
-//! Blocks are swept when the allocator comes to them, or by slices, whichever is first; large objects by
-//! slices only. An arena in which nothing is left goes back to the system, but for those that will be filled
-//! before the next cycle: to take them from the system again would cost more than to fill them.
+//! Blocks are swept by slices, or when the allocator comes to them, whichever is first; large objects by
+//! slices only. An arena in which nothing is left goes back to the system, except for those that will be
+//! filled before the next cycle: to take them from the system again would cost more than to fill them.
 //!
-//! Guarantees: every block is swept once between two markings. What is allocated while sweeping is not
-//! touched by it.
+//! Guarantees: every block is swept once between two markings. Sweeping does not touch objects allocated
+//! since it began.
 
 use super::alloc::PIECE;
 use super::arena::{ARENA, BLOCKS, BlockState};
@@ -14,27 +14,27 @@ use super::metadata::check_canonical;
 use super::{Heap, Phase, SliceOutcome};
 use crate::list_state;
 
-/// Visits that the sweep of a block counts as.
+/// Number of visits that the sweep of a block counts as.
 const BLOCK_VISITS: i64 = 512;
-/// Visits that freeing a large object counts as, besides its bytes.
+/// Number of visits that freeing a large object counts as, besides its bytes.
 const FREE_VISITS: i64 = 64;
-/// Bytes given back to the system that count as one visit.
+/// Number of bytes given back to the system that count as one visit.
 const BYTES_PER_VISIT: usize = 256;
-/// Bytes of a large object that are given back at once.
+/// Number of bytes of a large object that are given back at once.
 const FREE_PIECE: usize = 64 << 10;
 /// Least allocation, in bytes, between two cycles, however close the limit is.
 const LEAST_THRESHOLD: u64 = 256 << 10;
 
-/// How far the sweep has come.
+/// Progress of the sweep.
 #[derive(Default)]
 pub(super) struct Sweep {
     /// Arena and block to sweep next.
     at: (usize, usize),
-    /// Large objects below this index are still to be looked at, from the end on.
+    /// Large objects below this index are still to be looked at, the last one first.
     large: usize,
-    /// Empty arenas kept so far.
+    /// Number of empty arenas kept so far.
     spares: usize,
-    /// Bytes found live.
+    /// Number of bytes found live.
     live: u64,
 }
 
@@ -48,8 +48,8 @@ impl Heap {
             arena.expect_sweep();
         }
         self.sweep = Sweep { at: (0, 1), large: self.large.len(), spares: 0, live: 0 };
-        // What was allocated during the cycle is mostly garbage: it counts as live here, but does not put off
-        // the next.
+        // Most objects allocated during the cycle are garbage: they count as live here, but do not put off
+        // the next cycle.
         let room = (self.limit as u64).saturating_sub(self.stats.live) / 2;
         self.pacing.threshold = self.marker.bytes.max(self.pacing.floor).min(room.max(LEAST_THRESHOLD));
         self.pacing.since_cycle = 0;
@@ -57,7 +57,7 @@ impl Heap {
         self.due = false;
     }
 
-    /// Sweeps a block if that is still to be done; whether it was.
+    /// Sweeps a block if that is still to be done. Returns whether it was.
     pub(super) fn sweep_if_needed(&mut self, arena: usize, block: usize) -> bool {
         let Some(arena) = self.arenas.get_mut(arena).and_then(Option::as_mut) else { return false };
         if arena.block(block).state != BlockState::Unswept {
@@ -67,7 +67,7 @@ impl Heap {
         true
     }
 
-    /// Sweeps until all is done or the budget is spent.
+    /// Sweeps until everything is swept or the budget is spent.
     pub(super) fn sweep_slice(&mut self, left: &mut i64) -> SliceOutcome {
         while *left > 0 {
             if self.sweep.at.0 < self.arenas.len() {
@@ -77,7 +77,7 @@ impl Heap {
                 if block == BLOCKS {
                     self.sweep.at = (arena + 1, 1);
                     if self.release_if_empty(arena) {
-                        // The system takes its time for so much.
+                        // To give back so much takes the system a while.
                         *left = (*left).min(0);
                     }
                 }
@@ -94,15 +94,15 @@ impl Heap {
         SliceOutcome::More
     }
 
-    /// Sweeps all that is left.
+    /// Sweeps everything that is left.
     pub(super) fn finish_sweep(&mut self) {
         while self.phase == Phase::Sweeping
             && self.sweep_slice(&mut i64::from(u32::MAX)) == SliceOutcome::More
         {}
     }
 
-    /// Gives an arena in which nothing lives back to the system, unless it is to be kept; whether it did.
-    /// None is kept beyond the limit.
+    /// Gives an arena in which nothing lives back to the system, unless it is to be kept. Returns whether it
+    /// did. Beyond the limit no arena is kept.
     fn release_if_empty(&mut self, arena: usize) -> bool {
         if self.arenas[arena].as_ref().is_none_or(|arena| !arena.is_empty()) {
             return false;
@@ -117,7 +117,7 @@ impl Heap {
     }
 
     /// Looks at the last large object that was not looked at, and frees it unless it was marked: as much of
-    /// it as the budget is for.
+    /// it as the budget allows.
     fn free_large_if_dead(&mut self, index: usize, left: &mut i64) {
         let header = self.large[index].header();
         debug_assert!(!header.gray && header.index == index);
@@ -145,11 +145,11 @@ impl Heap {
         }
     }
 
-    /// Looks for contradictions in the metadata and the books; for tests. Says nothing of blocks still to be
-    /// swept.
+    /// Checks the metadata and the counts for contradictions, for tests. Blocks still to be swept are left
+    /// out.
     ///
     /// # Errors
-    /// What was found.
+    /// The contradiction.
     pub fn check(&self) -> Result<(), String> {
         let mut committed = 0;
         for (number, arena) in self.arenas.iter().enumerate() {
@@ -167,9 +167,9 @@ impl Heap {
                     continue;
                 }
                 match check_canonical(arena.metadata(block), self.epoch) {
-                    Ok(summary) if summary == is.summary => {}
-                    Ok(summary) => {
-                        return Err(format!("arena {number} block {block}: {:?} is {summary:?}", is.summary));
+                    Ok(counts) if counts == is.counts => {}
+                    Ok(counts) => {
+                        return Err(format!("arena {number} block {block}: {:?} is {counts:?}", is.counts));
                     }
                     Err(e) => return Err(format!("arena {number} block {block}: {e}")),
                 }

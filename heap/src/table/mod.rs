@@ -1,19 +1,21 @@
 //! Hash tables: entries in the order of insertion, found by linear hashing.
 //!
-//! A link leads to an entry: the hash of its key (32 bits), its number, one too high (28 bits; 0 leads
-//! nowhere), and whether the chain goes on behind it. The heads of the chains are links, and each entry has
-//! the link to the next of its chain. So a search knows the hash of a key before it goes there, and a key
-//! that is not there is mostly missed without a look at any entry. `storage` has how all this is stored.
+//! A link leads to an entry. It consists of the hash of the entry's key (32 bits), the entry's number plus
+//! one (28 bits; 0 leads nowhere), and whether the chain goes on behind the entry. Heads of chains are links,
+//! and each entry has the link to the next one of its chain. So a search knows the hash of a key before it
+//! goes there, and can mostly tell that a key is missing without a look at any entry. `storage` says how
+//! all this is stored.
 //!
-//! Invariant: a table has `PER_ENTRY` chains for each entry that was ever in use (and for one at least). So
-//! each new entry adds as many, and each of these takes its share from one other; nothing is ever rehashed at
-//! once, and no operation takes time in proportion to the size of the table. What was removed leaves a free
-//! entry, and the last one freed is the first to be taken again, which is also where SBCL puts a new key: the
-//! order of iteration is the same.
+//! Invariant: a table has `PER_ENTRY` chains for each entry that was ever in use, and for one at least. So
+//! each new entry adds that many chains, each of which takes its share from one older chain; nothing is ever
+//! rehashed at once, and no operation takes time in proportion to the size of the table. A removed key leaves
+//! a free entry, and the entry freed last is taken first. SBCL puts a new key there too, so the order of
+//! iteration is the same.
 //!
-//! Not here: tests that are functions of the program. ESL calls them, over [`Table::candidates`], and
-//! [`Table::serial`] says whether keys came or went meanwhile. Source: Larson, "Dynamic hash tables", 1988,
-//! for growing by one bucket. We keep the entries apart from the buckets, for the order.
+//! Not here: tests that are functions of the program. ESL calls them for [`Table::candidates`], and
+//! [`Table::serial`] says whether keys came or went meanwhile.
+//! Source: Larson, "Dynamic hash tables", 1988, for growing by one bucket. We keep the entries apart from the
+//! buckets, for the sake of their order.
 
 use crate::equality::{self, Test};
 use crate::heap::{AllocError, Heap, Kind};
@@ -22,27 +24,27 @@ use storage::{Counter, ENTRY, MOST, PER_ENTRY, SEGMENT, Storage};
 
 mod storage;
 
-/// Entries for which a new table has room.
+/// Room of a new table, in entries, at least.
 const LEAST: usize = 8;
 
-/// Bits of a link that are the number of an entry.
+/// Number of bits of a link for the number of an entry.
 const NUMBER_BITS: u32 = MOST.ilog2() + 1;
 
-/// The link to an entry.
+/// Link to an entry.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Link(u64);
 
 impl Link {
     const END: Link = Link(0);
 
-    /// The link to an entry whose key has this hash, and behind which the chain goes on with `next`.
+    /// Creates the link to an entry whose key has this hash; `next` goes on behind it.
     #[inline(always)]
     fn new(hash: u32, entry: usize, next: Link) -> Link {
         let goes_on = u64::from(next != Link::END);
         Link((u64::from(hash) << NUMBER_BITS | (entry as u64 + 1)) << 1 | goes_on)
     }
 
-    /// The link in an entry.
+    /// Returns the link in the last word of an entry.
     #[inline(always)]
     fn of(v: Value) -> Link {
         Link(v.bits() >> 2)
@@ -53,45 +55,45 @@ impl Link {
         Value::index(self.0 as usize)
     }
 
-    /// The hash of the key of the entry.
+    /// Returns the hash of the entry's key.
     #[inline(always)]
     fn hash(self) -> u32 {
         (self.0 >> (NUMBER_BITS + 1)) as u32
     }
 
-    /// The entry, if there is one.
+    /// Returns the number of the entry, if there is one.
     #[inline(always)]
     fn entry(self) -> Option<usize> {
         ((self.0 >> 1 & ((1 << NUMBER_BITS) - 1)) as usize).checked_sub(1)
     }
 
-    /// Whether there may be another entry in the chain; if not, there is none.
+    /// Returns whether there may be another entry in the chain; if not, there is none.
     #[inline(always)]
     fn goes_on(self) -> bool {
         self.0 & 1 != 0
     }
 }
 
-/// The link in the entry that a link leads to.
+/// Returns the link in the entry that a link leads to.
 #[inline]
 fn next(storage: &Storage<'_>, link: Link) -> Link {
     let entry = link.entry().and_then(|entry| storage.entry(entry));
     entry.map_or(Link::END, |[_, _, next]| Link::of(next))
 }
 
-/// How a table compares keys.
+/// The way in which a table compares keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Comparison {
+pub enum KeyComparison {
     /// By a test of the machine.
     Native(Test),
     /// By a function of the program.
     Program,
 }
 
-/// Why an operation was not done.
+/// Reason why an operation was not done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trouble {
-    /// The comparison of keys takes too much work, or a function of the program.
+    /// The comparison of keys takes too much work, or needs a function of the program.
     Slowly,
     /// There is no room.
     Room(AllocError),
@@ -103,47 +105,47 @@ impl From<AllocError> for Trouble {
     }
 }
 
-/// A table, checked to be one.
+/// A hash table.
 #[derive(Clone, Copy, Debug)]
 pub struct Table(Value);
 
 impl Table {
-    /// The table that `v` is, if it is one.
+    /// Returns the table that `v` is, if it is one.
     #[inline(always)]
     pub fn of(heap: &Heap, v: Value) -> Option<Table> {
         if heap.is(v, Kind::HashTable) { Some(Table(v)) } else { None }
     }
 
-    /// A new table with room for about `size` entries. `test` and `hash` are the functions of the program, or
-    /// `NIL`.
+    /// Creates a table with room for about `size` entries. `functions` are the program's functions for test
+    /// and hash, or `NIL`.
     ///
     /// # Errors
     /// As for every allocation.
     pub fn make(
         heap: &mut Heap,
-        comparison: Comparison,
+        comparison: KeyComparison,
         size: usize,
         functions: [Value; 2],
     ) -> Result<Value, AllocError> {
         let number = match comparison {
-            Comparison::Native(Test::Eq) => 0,
-            Comparison::Native(Test::Eql) => 1,
-            Comparison::Native(Test::Equal) => 2,
-            Comparison::Native(Test::Equalp) => 3,
-            Comparison::Program => 4,
+            KeyComparison::Native(Test::Eq) => 0,
+            KeyComparison::Native(Test::Eql) => 1,
+            KeyComparison::Native(Test::Equal) => 2,
+            KeyComparison::Native(Test::Equalp) => 3,
+            KeyComparison::Program => 4,
         };
         heap.alloc_table(number, size.clamp(LEAST, SEGMENT), functions)
     }
 
-    /// How it compares keys.
+    /// Returns how the table compares keys.
     #[inline(always)]
-    pub fn comparison(self, heap: &Heap) -> Comparison {
+    pub fn comparison(self, heap: &Heap) -> KeyComparison {
         match self.storage(heap).which_test() {
-            0 => Comparison::Native(Test::Eq),
-            1 => Comparison::Native(Test::Eql),
-            2 => Comparison::Native(Test::Equal),
-            3 => Comparison::Native(Test::Equalp),
-            _ => Comparison::Program,
+            0 => KeyComparison::Native(Test::Eq),
+            1 => KeyComparison::Native(Test::Eql),
+            2 => KeyComparison::Native(Test::Equal),
+            3 => KeyComparison::Native(Test::Equalp),
+            _ => KeyComparison::Program,
         }
     }
 
@@ -159,27 +161,27 @@ impl Table {
         heap.table_counter(self.0, counter).unwrap_or(0)
     }
 
-    /// Number of keys.
+    /// Returns the number of keys.
     pub fn count(self, heap: &Heap) -> usize {
         self.counter(heap, Counter::Count)
     }
 
-    /// Number of entries that were ever in use: where iteration ends.
+    /// Returns the number of entries that were ever in use, where iteration ends.
     pub fn used(self, heap: &Heap) -> usize {
         self.storage(heap).used()
     }
 
-    /// Entries for which there is room without more memory.
+    /// Returns the number of entries for which there is room without more memory.
     pub fn room(self, heap: &Heap) -> usize {
         heap.table_room(self.0).unwrap_or(0)
     }
 
-    /// The functions of the program by which it compares and hashes, or `NIL`.
+    /// Returns the program's functions for test and hash, or `NIL`.
     pub fn functions(self, heap: &Heap) -> [Value; 2] {
         heap.table_functions(self.0).unwrap_or([Value::NIL; 2])
     }
 
-    /// A number that changes whenever a key comes or goes.
+    /// Returns a number that changes whenever a key comes or goes.
     pub fn serial(self, heap: &Heap) -> usize {
         self.counter(heap, Counter::Serial)
     }
@@ -190,7 +192,7 @@ impl Table {
         heap.table_set_counter(self.0, Counter::Serial, next);
     }
 
-    /// The entries whose keys have this hash, with the keys.
+    /// Returns the entries whose keys have this hash, with the keys.
     pub fn candidates(self, heap: &Heap, hash: u32) -> Vec<(usize, Value)> {
         let storage = self.storage(heap);
         let mut found = Vec::new();
@@ -205,27 +207,30 @@ impl Table {
         found
     }
 
-    /// Key and value of an entry; `None` for one that is free or was never used.
+    /// Returns key and value of an entry; `None` if it is free or was never used.
     #[inline]
     pub fn entry(self, heap: &Heap, entry: usize) -> Option<(Value, Value)> {
         let [key, value, _] = self.storage(heap).entry(entry)?;
         if key == Value::UNBOUND { None } else { Some((key, value)) }
     }
 
-    /// The value of an entry, if it has this very key.
+    /// Returns the value of an entry, if it has this very key.
     #[inline(always)]
     pub fn value_of(self, heap: &Heap, entry: usize, key: Value) -> Option<Value> {
         let [candidate, value, _] = self.storage(heap).entry(entry)?;
         if candidate == key && key != Value::UNBOUND { Some(value) } else { None }
     }
 
-    /// Gives an entry another value.
+    /// Sets the value of an entry.
     #[inline(always)]
     pub fn set_value(self, heap: &mut Heap, entry: usize, value: Value) {
         heap.table_set_entry(self.0, entry, 1, [value]);
     }
 
-    /// The entry of `key` and its value, with a test of the machine; `hash` is the key's.
+    /// Finds the entry of `key`, whose hash is `hash`, by a test of the machine: its number and its value.
+    ///
+    /// # Errors
+    /// [`Trouble::Slowly`] if `work` is used up, or only ESL can compare two of the keys.
     #[inline(always)]
     pub fn find(
         self,
@@ -238,7 +243,8 @@ impl Table {
         let storage = self.storage(heap);
         let mut link = Link(storage.first(hash));
         loop {
-            // Where hashes differ, so do keys; that one key is another's very object is seen faster still.
+            // Keys of different hashes differ. The test for the very same object is the fastest, so it comes
+            // first.
             if link.hash() == hash
                 && let Some(entry) = link.entry()
             {
@@ -262,7 +268,7 @@ impl Table {
         }
     }
 
-    /// Adds an entry for a key that the table does not have.
+    /// Adds an entry for a key that is not in the table.
     ///
     /// # Errors
     /// As for every allocation; nothing has changed then.
@@ -290,7 +296,8 @@ impl Table {
         Ok(())
     }
 
-    /// Frees an entry that is in use and whose key has this hash; whether it was found in the chain of that.
+    /// Frees an entry that is in use and whose key has this hash. Returns whether the entry was in the chain
+    /// of that hash.
     pub fn delete(self, heap: &mut Heap, entry: usize, hash: u32) -> bool {
         let storage = self.storage(heap);
         let chain = storage.head_of(hash);
@@ -317,7 +324,7 @@ impl Table {
         false
     }
 
-    /// Forgets all entries.
+    /// Removes all keys.
     ///
     /// # Errors
     /// As for every allocation; nothing has changed then.
@@ -327,13 +334,13 @@ impl Table {
         Ok(())
     }
 
-    /// Moves to the new chain `new`, which comes from no other new one, what belongs there from the chain
-    /// that has held it so far.
+    /// Moves the entries that belong to the chain `new`, which is new, there from the older chain that has
+    /// held them.
     fn split(self, heap: &mut Heap, new: usize) {
         let old = new - (1 << new.ilog2());
         let mut link = Link(self.storage(heap).head(old));
         let (mut stay, mut move_on) = (Link::END, Link::END);
-        // Both chains come out in reverse, which no search can tell.
+        // Both chains come out in reverse, which makes no difference to a search.
         while let Some(entry) = link.entry() {
             let storage = self.storage(heap);
             let [_, _, next] = storage.entry(entry).unwrap_or(FREE);
@@ -347,7 +354,7 @@ impl Table {
     }
 }
 
-/// What an entry is that was never in use; no link leads there.
+/// Content of an entry that was never in use; no link leads there.
 const FREE: [Value; ENTRY] = [Value::UNBOUND, Value::NIL, Value::small(0)];
 
 #[cfg(test)]
@@ -356,7 +363,7 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::HashMap;
 
-    /// What a table must be: slots in order, the last one freed taken first.
+    /// Model of a table: slots in order, the last one freed taken first.
     #[derive(Default)]
     struct Model {
         slots: Vec<Option<(i32, i32)>>,
@@ -392,7 +399,7 @@ mod tests {
     }
 
     fn new(heap: &mut Heap, test: Test) -> Table {
-        let v = Table::make(heap, Comparison::Native(test), 0, [Value::NIL; 2]).unwrap();
+        let v = Table::make(heap, KeyComparison::Native(test), 0, [Value::NIL; 2]).unwrap();
         Table::of(heap, v).unwrap()
     }
 
@@ -418,7 +425,17 @@ mod tests {
         used.filter_map(|entry| table.entry(heap, entry)).map(|(k, v)| (small(k), small(v))).collect()
     }
 
+    /// Miri is slow, and a program that it runs has no files to keep failures in.
+    fn config() -> ProptestConfig {
+        match cfg!(miri) {
+            true => ProptestConfig { cases: 4, failure_persistence: None, ..ProptestConfig::default() },
+            false => ProptestConfig::default(),
+        }
+    }
+
     proptest! {
+        #![proptest_config(config())]
+
         #[test]
         fn agrees_with_the_model(
             range in prop_oneof![Just(4), Just(30), Just(500)],

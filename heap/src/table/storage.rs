@@ -1,5 +1,5 @@
-//! The storage of hash tables: entries and heads of chains, read without tests of what the heap itself sees
-//! to.
+//! Storage of hash tables: entries and heads of chains. Reading them needs no tests, since the heap
+//! guarantees the layout.
 //!
 //! ```text
 //! table     | count | used | free | room | entries | heads | test | hash | serial |      header.aux: which test
@@ -7,14 +7,14 @@
 //! heads     directory of Words64:         | link | link | link | ...
 //! ```
 //!
-//! A directory lists segments of [`SEGMENT`] entries, or of the [`PER_ENTRY`] heads of each; only the first
-//! one grows, by doubling, so nothing here takes time in proportion to the size of a table.
+//! A directory lists segments of [`SEGMENT`] entries, or of the [`PER_ENTRY`] heads of each. Only the first
+//! segment grows, by doubling, so nothing here takes time in proportion to the size of a table.
 //!
 //! Invariant: the segments in the directories hold `room` entries and [`PER_ENTRY`] heads for each of them,
-//! `used` is at most `room`, and nobody else has the directories or segments. So a number of an entry below
-//! `used` is good, and so is one of a head below `Storage::heads`.
+//! `used` is at most `room`, and nobody else has the directories or segments. So every entry with a number
+//! below `used` is there, and every head with one below `Storage::heads`.
 //!
-//! Not here: what is in the entries and how keys are found ([`super`]).
+//! Not here: the content of entries, and how keys are found ([`super`]).
 
 #![allow(unsafe_code)]
 
@@ -24,21 +24,21 @@ use crate::heap::layout::{HashTable, Kind};
 use crate::heap::{AllocError, Heap};
 use crate::value::Value;
 
-/// Entries of a segment.
+/// Number of entries of a segment.
 pub(super) const SEGMENT: usize = 1 << SHIFT;
 const SHIFT: usize = if cfg!(miri) { 4 } else { 12 };
-/// Chains for each entry. With one, a search for a key that is not there meets one entry on the average; with
-/// two half of one.
+/// Number of chains for each entry. With one, a search for a missing key would meet one entry on the average;
+/// with two it meets half of one.
 pub(super) const PER_ENTRY: usize = 2;
-/// Values of an entry in its segment: key, value, link.
+/// Number of values of an entry in its segment: key, value, link.
 pub(super) const ENTRY: usize = 3;
-/// Entries that a table may have; a table of as many takes 10 GB.
+/// Greatest number of entries of a table; such a table takes 10 GB.
 pub(super) const MOST: usize = (1 << 28) - SEGMENT;
 
-/// What a free entry holds for a key: no program has it.
+/// Content of a free entry in place of a key: no program has it.
 const FREE: Value = Value::UNBOUND;
 
-/// The storage of a table, to be read.
+/// Read access to the storage of a table.
 #[derive(Clone, Copy)]
 pub(super) struct Storage<'a> {
     which_test: u16,
@@ -49,25 +49,27 @@ pub(super) struct Storage<'a> {
 }
 
 impl Storage<'_> {
-    /// Which test the table was made with.
+    /// Returns the number of the test that the table was made with.
     #[inline(always)]
     pub(super) fn which_test(&self) -> u16 {
         self.which_test
     }
 
-    /// Number of entries that were ever in use.
+    /// Returns the number of entries that were ever in use.
     #[inline(always)]
     pub(super) fn used(&self) -> usize {
         self.used
     }
 
-    /// Number of heads in use: [`PER_ENTRY`] for each entry that was ever in use, and for one at least.
+    /// Returns the number of heads in use: [`PER_ENTRY`] for each entry that was ever in use, and for one at
+    /// least.
     #[inline(always)]
     fn heads(&self) -> usize {
         PER_ENTRY * self.used.max(1)
     }
 
-    /// The head of the chain of a hash: its low bits, one fewer where that chain is still to come.
+    /// Returns the head of the chain of a hash: the low bits of the hash, one bit fewer if that chain does
+    /// not exist yet.
     #[inline(always)]
     pub(super) fn head_of(&self, hash: u32) -> usize {
         let heads = self.heads();
@@ -76,7 +78,7 @@ impl Storage<'_> {
         if head < heads { head } else { head - half }
     }
 
-    /// What the head of the chain of a hash holds.
+    /// Returns the content of the head of the chain of a hash.
     #[inline(always)]
     pub(super) fn first(&self, hash: u32) -> u64 {
         // SAFETY: what `head_of` gives is less than `heads`: if the low bits are not, they are at least
@@ -85,7 +87,7 @@ impl Storage<'_> {
         unsafe { *self.place_of_head(self.head_of(hash)) }
     }
 
-    /// A head; 0 for one that is not in use.
+    /// Returns the content of a head; 0 if it is not in use.
     #[inline(always)]
     pub(super) fn head(&self, head: usize) -> u64 {
         if head >= self.heads() {
@@ -95,7 +97,7 @@ impl Storage<'_> {
         unsafe { *self.place_of_head(head) }
     }
 
-    /// Key, value and link of an entry; `None` if it was never in use.
+    /// Returns key, value and link of an entry; `None` if it was never in use.
     #[inline(always)]
     pub(super) fn entry(&self, entry: usize) -> Option<[Value; ENTRY]> {
         if entry >= self.used {
@@ -105,7 +107,7 @@ impl Storage<'_> {
         Some(unsafe { *self.place_of_entry(entry).cast::<[Value; ENTRY]>() })
     }
 
-    /// Where an entry begins.
+    /// Returns the address of an entry.
     ///
     /// # Safety
     /// `entry` is less than the table's room.
@@ -115,7 +117,7 @@ impl Storage<'_> {
         unsafe { elements::<Value>(*self.entries.add(entry >> SHIFT)).add(ENTRY * (entry & (SEGMENT - 1))) }
     }
 
-    /// Where a head is.
+    /// Returns the address of a head.
     ///
     /// # Safety
     /// `head` is less than [`PER_ENTRY`] times the table's room.
@@ -127,7 +129,7 @@ impl Storage<'_> {
     }
 }
 
-/// Where the elements of an object begin.
+/// Returns the address of the first element of an object.
 ///
 /// # Safety
 /// `object` is a live object.
@@ -137,20 +139,20 @@ unsafe fn elements<T>(object: Value) -> *mut T {
     unsafe { object.object_ptr().add(1).cast() }
 }
 
-/// The counters of a table.
+/// A counter of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Counter {
     /// Number of keys.
     Count,
-    /// The entry freed last, one too high; 0 if none is free.
+    /// The number of the entry freed last, plus one; 0 if none is free.
     Free,
     /// A number that changes whenever a key comes or goes.
     Serial,
 }
 
 impl Heap {
-    /// A new table with room for `room` entries, at most [`SEGMENT`]. `functions` are its test and its hash
-    /// function, or `NIL`.
+    /// Creates a table with room for `room` entries, at most [`SEGMENT`]. `functions` are the program's
+    /// functions for test and hash, or `NIL`.
     ///
     /// # Errors
     /// As for every allocation.
@@ -173,7 +175,7 @@ impl Heap {
         Some(self.object_of(v, Kind::HashTable)?.cast())
     }
 
-    /// The storage of a table.
+    /// Returns the storage of a table.
     #[inline(always)]
     pub(super) fn table_storage(&self, v: Value) -> Option<Storage<'_>> {
         let table = self.table_object(v)?;
@@ -189,19 +191,19 @@ impl Heap {
         }
     }
 
-    /// Entries for which a table has room without more memory.
+    /// Returns the number of entries for which a table has room without more memory.
     pub(super) fn table_room(&self, v: Value) -> Option<usize> {
         // SAFETY: H3: the kind says that this is a HashTable.
         self.table_object(v).and_then(|table| unsafe { (*table).room }.as_index())
     }
 
-    /// The functions of the program by which a table compares and hashes, or `NIL`.
+    /// Returns the program's functions for test and hash of a table, or `NIL`.
     pub(super) fn table_functions(&self, v: Value) -> Option<[Value; 2]> {
         // SAFETY: H3: the kind says that this is a HashTable.
         self.table_object(v).map(|table| unsafe { [(*table).test, (*table).hash] })
     }
 
-    /// A counter of a table.
+    /// Returns a counter of a table.
     #[inline]
     pub(super) fn table_counter(&self, v: Value, counter: Counter) -> Option<usize> {
         let table = self.table_object(v)?;
@@ -216,7 +218,7 @@ impl Heap {
         value.as_index()
     }
 
-    /// Sets a counter of a table; `None` if `v` is none.
+    /// Sets a counter; `None` if `v` is not a table.
     #[inline]
     pub(super) fn table_set_counter(&mut self, v: Value, counter: Counter, n: usize) -> Option<()> {
         let table = self.table_object(v)?;
@@ -232,7 +234,7 @@ impl Heap {
         Some(())
     }
 
-    /// Sets what an entry holds, from value number `first` of it on; `None` if it was never in use.
+    /// Sets the values of an entry, from number `first` on; `None` if it was never in use.
     #[inline(always)]
     pub(super) fn table_set_entry<const N: usize>(
         &mut self,
@@ -255,7 +257,7 @@ impl Heap {
         Some(())
     }
 
-    /// Sets a head; `None` if it is not in use.
+    /// Sets the content of a head; `None` if it is not in use.
     #[inline]
     pub(super) fn table_set_head(&mut self, v: Value, head: usize, link: u64) -> Option<()> {
         let storage = self.table_storage(v)?;
@@ -267,7 +269,7 @@ impl Heap {
         Some(())
     }
 
-    /// Takes one more entry into use, and its heads: the number of the entry.
+    /// Takes one more entry and its heads into use, and returns the number of the entry.
     ///
     /// # Errors
     /// As for every allocation; nothing has changed then.
@@ -285,7 +287,7 @@ impl Heap {
         Ok(used)
     }
 
-    /// Forgets all entries, and counts none in use or free. The functions stay.
+    /// Removes all entries; none is in use or free afterwards. The functions stay.
     ///
     /// # Errors
     /// As for every allocation; nothing has changed then.
@@ -306,7 +308,7 @@ impl Heap {
         Ok(())
     }
 
-    /// Makes room for one entry at least: twice the first segment, or one segment more.
+    /// Makes room for one entry at least: doubles the first segment, or adds a segment.
     fn grow_table(&mut self, table: *mut HashTable, room: usize) -> Result<(), AllocError> {
         if room >= MOST {
             return Err(AllocError::TooLarge { requested: 8 * ENTRY * room });
@@ -335,8 +337,8 @@ impl Heap {
         let mut directories = [old_entries, old_heads];
         for (directory, segment) in directories.iter_mut().zip([entries, heads]) {
             if self.vector_set(*directory, segments, segment).is_none() {
-                // The directories are a small part of a thousandth of the table, so copying them is a small
-                // matter.
+                // A directory is a tiny part of the table, less than a thousandth, so copying it hardly
+                // counts.
                 let mut longer = self.vector(*directory).unwrap_or_default().to_vec();
                 longer.push(segment);
                 longer.resize(2 * segments, Value::NIL);
@@ -353,7 +355,7 @@ impl Heap {
         Ok(())
     }
 
-    /// Directories with one empty segment each.
+    /// Allocates directories with one empty segment each.
     fn fresh_directories(&mut self, room: usize) -> Result<[Value; 2], AllocError> {
         let entries = self.alloc_vector_filled(ENTRY * room, FREE)?;
         let heads = self.alloc_words64(PER_ENTRY * room)?;
@@ -369,7 +371,7 @@ mod tests {
         [Value::index(n), Value::index(2 * n), Value::index(3 * n)]
     }
 
-    /// Over the doubling of the first segment, and over that of the directories.
+    /// The test covers the doubling of the first segment and that of the directories.
     #[test]
     fn what_was_stored_stays_as_a_table_grows() {
         let mut heap = Heap::for_tests();

@@ -3,94 +3,91 @@
 //! What keeps the elements decides what they may be: any value, characters, or integers below 256.
 //! [`esl_heap::array`] reads them.
 
-pub(crate) use esl_heap::array::{Elements, all_elements, data_of, vector_elements, vector_length};
+pub(crate) use esl_heap::array::{ArrayElements, all_elements, data_of, vector_elements, vector_length};
 use esl_heap::array::{dimensions, total_size};
 
-use crate::heap::Kind;
+use crate::builtins::list::list_items;
+use crate::builtins::sequence::copy_elements;
 use crate::heap::layout::Array;
+use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
-use super::expect::exactly;
-
 use super::COPY_LIMIT;
+use super::expect::exactly;
 
 /// Elements of a long vector that is being made that are filled at once.
 const FILLED_AT_ONCE: usize = 1 << 13;
 /// The greatest number of dimensions.
 const MAX_RANK: usize = 64;
 
-impl Vm {
-    /// What may be put in an array over `data`: the code or byte of `value` where it is not any value.
-    pub(crate) fn check_element(&mut self, data: Value, value: Value) -> Result<(), Exit> {
-        match self.heap.kind(data) {
-            Some(Kind::String) if !value.is_character() => self.exchange.type_error(value, "CHARACTER"),
-            Some(Kind::Bytes) if value.as_index().is_none_or(|byte| byte > 255) => {
-                self.specifier_error(value, "(UNSIGNED-BYTE 8)")
-            }
-            _ => Ok(()),
+/// What may be put in an array over `data`: the code or byte of `value` where it is not any value.
+pub(crate) fn check_element(vm: &mut Vm, data: Value, value: Value) -> Result<(), Exit> {
+    match vm.heap.kind(data) {
+        Some(Kind::String) if !value.is_character() => vm.exchange.type_error(value, "CHARACTER"),
+        Some(Kind::Bytes) if value.as_index().is_none_or(|byte| byte > 255) => {
+            vm.exchange.not_written(value, "(UNSIGNED-BYTE 8)")
         }
+        _ => Ok(()),
     }
+}
 
-    /// Stores an element of what keeps the elements of an array. `value` has been checked, and `index` is in
-    /// range.
-    pub(crate) fn store_element(&mut self, data: Value, index: usize, value: Value) {
-        if self.heap.vector_set(data, index, value).is_some() {
-            return;
-        }
-        if let Some(code) = value.as_character()
-            && let Some(slot) = self.heap.string_mut(data).and_then(|characters| characters.get_mut(index))
-        {
-            *slot = code;
-        } else if let Some(byte) = value.as_index()
-            && let Some(slot) = self.heap.bytes_mut(data).and_then(|bytes| bytes.get_mut(index))
-        {
-            *slot = byte as u8;
-        }
+/// Stores an element of what keeps the elements of an array. `value` has been checked, and `index` is in
+/// range.
+pub(crate) fn store_element(heap: &mut Heap, data: Value, index: usize, value: Value) {
+    if heap.vector_set(data, index, value).is_some() {
+        return;
     }
-
-    /// Where the subscripts point, in row-major order.
-    fn row_major_index(&mut self, array: Value, subscripts: &[Value]) -> Result<usize, Exit> {
-        let Some(dimensions) = dimensions(&self.heap, array) else {
-            return self.exchange.type_error(array, "ARRAY");
-        };
-        if dimensions.len() != subscripts.len() {
-            return self.exchange.raise(Raised::Simple(format!(
-                "wrong number of subscripts, {}, for an array of rank {}",
-                subscripts.len(),
-                dimensions.len()
-            )));
-        }
-        let mut index = 0;
-        for (&subscript, &dimension) in subscripts.iter().zip(&dimensions) {
-            index = index * dimension + self.index_below(subscript, dimension)?;
-        }
-        Ok(index)
+    if let Some(code) = value.as_character()
+        && let Some(slot) = heap.string_mut(data).and_then(|characters| characters.get_mut(index))
+    {
+        *slot = code;
+    } else if let Some(byte) = value.as_index()
+        && let Some(slot) = heap.bytes_mut(data).and_then(|bytes| bytes.get_mut(index))
+    {
+        *slot = byte as u8;
     }
+}
 
-    fn element(&mut self, array: Value, index: usize) -> Outcome {
-        match all_elements(&self.heap, array).and_then(|elements| elements.get(index)) {
-            Some(value) => Ok(value),
-            None => {
-                self.exchange.index_error(Value::index(index), total_size(&self.heap, array).unwrap_or(0))
-            }
-        }
+/// Where the subscripts point, in row-major order.
+fn row_major_index(vm: &mut Vm, array: Value, subscripts: &[Value]) -> Result<usize, Exit> {
+    let Some(dimensions) = dimensions(&vm.heap, array) else {
+        return vm.exchange.type_error(array, "ARRAY");
+    };
+    if dimensions.len() != subscripts.len() {
+        return vm.exchange.raise(Raised::Simple(format!(
+            "wrong number of subscripts, {}, for an array of rank {}",
+            subscripts.len(),
+            dimensions.len()
+        )));
     }
-
-    fn set_element(&mut self, array: Value, index: usize, value: Value) -> Outcome {
-        let Some(data) = data_of(&self.heap, array) else { return self.exchange.type_error(array, "ARRAY") };
-        self.check_element(data, value)?;
-        self.store_element(data, index, value);
-        Ok(value)
+    let mut index = 0;
+    for (&subscript, &dimension) in subscripts.iter().zip(&dimensions) {
+        index = index * dimension + vm.exchange.index_below(subscript, dimension)?;
     }
+    Ok(index)
+}
 
-    /// The array with a fill pointer that `v` is, and its fill pointer.
-    fn with_fill_pointer(&mut self, v: Value) -> Result<(Array, usize), Exit> {
-        match self.heap.array(v) {
-            Some(&array) if let Some(fill) = array.fill.as_index() => Ok((array, fill)),
-            _ => self.specifier_error(v, "(AND VECTOR (SATISFIES ARRAY-HAS-FILL-POINTER-P))"),
-        }
+fn element(vm: &mut Vm, array: Value, index: usize) -> Outcome {
+    match all_elements(&vm.heap, array).and_then(|elements| elements.get(index)) {
+        Some(value) => Ok(value),
+        None => vm.exchange.index_error(Value::index(index), total_size(&vm.heap, array).unwrap_or(0)),
+    }
+}
+
+fn set_element(vm: &mut Vm, array: Value, index: usize, value: Value) -> Outcome {
+    let Some(data) = data_of(&vm.heap, array) else { return vm.exchange.type_error(array, "ARRAY") };
+    check_element(vm, data, value)?;
+    store_element(&mut vm.heap, data, index, value);
+    Ok(value)
+}
+
+/// Returns the array with a fill pointer that `v` is, and its fill pointer.
+fn with_fill_pointer(vm: &mut Vm, v: Value) -> Result<(Array, usize), Exit> {
+    match vm.heap.array(v) {
+        Some(&array) if let Some(fill) = array.fill.as_index() => Ok((array, fill)),
+        _ => vm.exchange.not_written(v, "(AND VECTOR (SATISFIES ARRAY-HAS-FILL-POINTER-P))"),
     }
 }
 
@@ -118,7 +115,7 @@ pub(super) fn set_svref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(length) = vm.heap.vector(vector).map(<[Value]>::len) else {
         return vm.exchange.type_error(vector, "SIMPLE-VECTOR");
     };
-    let index = vm.index_below(index, length)?;
+    let index = vm.exchange.index_below(index, length)?;
     vm.heap.vector_set(vector, index, value);
     Ok(value)
 }
@@ -126,39 +123,39 @@ pub(super) fn set_svref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if let [array, index] = *arguments
         && let Some(index) = index.as_index()
-        && let Some(elements) = Elements::of_data(&vm.heap, array)
+        && let Some(elements) = ArrayElements::of_data(&vm.heap, array)
         && let Some(value) = elements.get(index)
     {
         return Ok(value);
     }
-    let index = vm.row_major_index(arguments[0], &arguments[1..])?;
-    vm.element(arguments[0], index)
+    let index = row_major_index(vm, arguments[0], &arguments[1..])?;
+    element(vm, arguments[0], index)
 }
 
 pub(super) fn set_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [array, subscripts @ .., value] = arguments else {
         return vm.exchange.program_error("a value and subscripts are expected");
     };
-    let index = vm.row_major_index(*array, subscripts)?;
-    vm.set_element(*array, index, *value)
+    let index = row_major_index(vm, *array, subscripts)?;
+    set_element(vm, *array, index, *value)
 }
 
 pub(super) fn row_major_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [array, index] = exactly(arguments);
     let size = array_size(vm, array)?;
-    let index = vm.index_below(index, size)?;
-    vm.element(array, index)
+    let index = vm.exchange.index_below(index, size)?;
+    element(vm, array, index)
 }
 
 pub(super) fn set_row_major_aref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [array, index, value] = exactly(arguments);
     let size = array_size(vm, array)?;
-    let index = vm.index_below(index, size)?;
-    vm.set_element(array, index, value)
+    let index = vm.exchange.index_below(index, size)?;
+    set_element(vm, array, index, value)
 }
 
 pub(super) fn array_row_major_index(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.row_major_index(arguments[0], &arguments[1..]).map(Value::index)
+    row_major_index(vm, arguments[0], &arguments[1..]).map(Value::index)
 }
 
 pub(super) fn array_in_bounds_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -167,7 +164,7 @@ pub(super) fn array_in_bounds_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     };
     let subscripts = &arguments[1..];
     if dimensions.len() != subscripts.len() {
-        return vm.row_major_index(arguments[0], subscripts).map(|_| Value::NIL);
+        return row_major_index(vm, arguments[0], subscripts).map(|_| Value::NIL);
     }
     for &subscript in subscripts {
         vm.integer(subscript)?;
@@ -208,7 +205,7 @@ pub(super) fn array_dimension(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [array, axis] = exactly(arguments);
     match dimensions(&vm.heap, array) {
         Some(dimensions) => {
-            let axis = vm.index_below(axis, dimensions.len())?;
+            let axis = vm.exchange.index_below(axis, dimensions.len())?;
             Ok(Value::index(dimensions[axis]))
         }
         None => vm.exchange.type_error(array, "ARRAY"),
@@ -234,57 +231,57 @@ pub(super) fn array_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn fill_pointer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.with_fill_pointer(arguments[0]).map(|(_, fill)| Value::index(fill))
+    with_fill_pointer(vm, arguments[0]).map(|(_, fill)| Value::index(fill))
 }
 
 pub(super) fn set_fill_pointer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [vector, index] = exactly(arguments);
-    vm.with_fill_pointer(vector)?;
+    with_fill_pointer(vm, vector)?;
     let size = array_size(vm, vector)?;
-    let fill = vm.index_below(index, size + 1)?;
+    let fill = vm.exchange.index_below(index, size + 1)?;
     vm.heap.array_set_fill(vector, Value::index(fill));
     Ok(index)
 }
 
 pub(super) fn vector_push(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [value, vector] = exactly(arguments);
-    let (array, fill) = vm.with_fill_pointer(vector)?;
+    let (array, fill) = with_fill_pointer(vm, vector)?;
     if fill >= array_size(vm, vector)? {
         return Ok(Value::NIL);
     }
-    vm.check_element(array.data, value)?;
-    vm.store_element(array.data, fill, value);
+    check_element(vm, array.data, value)?;
+    store_element(&mut vm.heap, array.data, fill, value);
     vm.heap.array_set_fill(vector, Value::index(fill + 1));
     Ok(Value::index(fill))
 }
 
 pub(super) fn vector_push_extend(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (value, vector) = (arguments[0], arguments[1]);
-    let (array, fill) = vm.with_fill_pointer(vector)?;
+    let (array, fill) = with_fill_pointer(vm, vector)?;
     let size = array_size(vm, vector)?;
     if fill < size {
         return vector_push(vm, &arguments[..2]);
     }
-    vm.check_element(array.data, value)?;
+    check_element(vm, array.data, value)?;
     // As SBCL: twice the size, unless the caller says by how much at least.
     let extension = match arguments.get(2) {
         Some(&extension) => match extension.as_index() {
             Some(extension) if extension > 0 => extension,
-            _ => return vm.specifier_error(extension, "(INTEGER 1)"),
+            _ => return vm.exchange.not_written(extension, "(INTEGER 1)"),
         },
         None => size.max(1),
     };
     let data = extended(vm, array.data, size.saturating_add(extension))?;
     vm.heap.array_set_data(vector, data);
     vm.heap.array_set_dimension(vector, 0, Value::index(size + extension));
-    vm.store_element(data, fill, value);
+    store_element(&mut vm.heap, data, fill, value);
     vm.heap.array_set_fill(vector, Value::index(fill + 1));
     Ok(Value::index(fill))
 }
 
-/// A copy of `data` with room for `size` elements, the new ones zero, `NUL` or `0`.
+/// Returns a copy of `data` with room for `size` elements, the new ones zero, `NUL` or `0`.
 fn extended(vm: &mut Vm, data: Value, size: usize) -> Outcome {
-    let length = Elements::of_data(&vm.heap, data).map_or(0, Elements::len);
+    let length = ArrayElements::of_data(&vm.heap, data).map_or(0, ArrayElements::len);
     if size > COPY_LIMIT {
         return Err(Exit::Slowly);
     }
@@ -294,23 +291,23 @@ fn extended(vm: &mut Vm, data: Value, size: usize) -> Outcome {
         _ => vm.heap.alloc_vector_filled(size, Value::small(0))?,
     };
     vm.exchange.charge_elements(size);
-    vm.copy_elements(data, 0, new, 0, length)?;
+    copy_elements(vm, data, 0, new, 0, length)?;
     Ok(new)
 }
 
 pub(super) fn vector_pop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (_, fill) = vm.with_fill_pointer(arguments[0])?;
+    let (_, fill) = with_fill_pointer(vm, arguments[0])?;
     let Some(last) = fill.checked_sub(1) else {
         return vm.exchange.raise(Raised::Simple("there is nothing left to pop".into()));
     };
-    let value = vm.element(arguments[0], last)?;
+    let value = element(vm, arguments[0], last)?;
     vm.heap.array_set_fill(arguments[0], Value::index(last));
     Ok(value)
 }
 
 pub(super) fn make_vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [size, object] = exactly(arguments);
-    let size = vm.count(size)?;
+    let size = vm.exchange.count(size)?;
     if size > COPY_LIMIT {
         return Err(Exit::Slowly);
     }
@@ -321,7 +318,7 @@ pub(super) fn make_vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn begin_vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [size, string_p] = exactly(arguments);
-    let size = vm.count(size)?;
+    let size = vm.exchange.count(size)?;
     Ok(vm.heap.begin_vector(size, string_p.is_true())?)
 }
 
@@ -367,10 +364,10 @@ pub(super) fn adjust_array(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// Dimensions and fill pointer that suit the data.
 fn shape(vm: &mut Vm, dimensions: Value, data: Value, fill: Value) -> Result<(Vec<Value>, Value), Exit> {
-    let Some(room) = Elements::of_data(&vm.heap, data).map(Elements::len) else {
+    let Some(room) = ArrayElements::of_data(&vm.heap, data).map(ArrayElements::len) else {
         return vm.exchange.type_error(data, "VECTOR");
     };
-    let sizes = match vm.list_items(dimensions, MAX_RANK) {
+    let sizes = match list_items(vm, dimensions, MAX_RANK) {
         Err(Exit::Slowly) => {
             return vm.exchange.raise(Raised::Simple(format!("an array has at most {MAX_RANK} dimensions")));
         }
@@ -378,7 +375,7 @@ fn shape(vm: &mut Vm, dimensions: Value, data: Value, fill: Value) -> Result<(Ve
     };
     let mut total = Some(1usize);
     for &size in &sizes {
-        total = total.zip(Some(vm.count(size)?)).and_then(|(total, size)| total.checked_mul(size));
+        total = total.zip(Some(vm.exchange.count(size)?)).and_then(|(total, size)| total.checked_mul(size));
     }
     if total.is_none_or(|total| total > room) {
         return vm.exchange.raise(Raised::Simple("the dimensions do not suit the number of elements".into()));
@@ -390,6 +387,6 @@ fn shape(vm: &mut Vm, dimensions: Value, data: Value, fill: Value) -> Result<(Ve
         return vm.exchange.raise(Raised::Simple("only vectors can have fill pointers".into()));
     }
     let size = sizes[0].as_index().unwrap_or(0);
-    let fill = if fill == Value::T { size } else { vm.index_below(fill, size + 1)? };
+    let fill = if fill == Value::T { size } else { vm.exchange.index_below(fill, size + 1)? };
     Ok((sizes, Value::index(fill)))
 }

@@ -1,14 +1,15 @@
 //! Characters: codes, case, classes, digits, names, comparison.
 
+use crate::builtins::string::string_designator;
 use crate::character;
 use crate::raise::{Exit, Outcome};
+use crate::types::is_string;
 use crate::value::Value;
 use crate::vm::Vm;
 
 use super::integer::radix;
-use crate::types::is_string;
 
-/// The code of the character that `v` is; a type error for anything else.
+/// Returns the code of the character that `v` is; a type error for anything else.
 fn code(vm: &mut Vm, v: Value) -> Result<u32, Exit> {
     match v.as_character() {
         Some(code) => Ok(code),
@@ -38,10 +39,10 @@ pub(super) fn to_character(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return Ok(v);
     }
     let is_designator = is_string(&vm.heap, v) || vm.world.is_symbol(&vm.heap, v);
-    let string = if is_designator { vm.string_designator(v)? } else { Value::NIL };
+    let string = if is_designator { string_designator(vm, v)? } else { Value::NIL };
     match crate::equality::characters_of(&vm.heap, string) {
         Some(&[code]) => Ok(character_of(code)),
-        _ => vm.specifier_error(v, "(OR CHARACTER (STRING 1))"),
+        _ => vm.exchange.not_written(v, "(OR CHARACTER (STRING 1))"),
     }
 }
 
@@ -100,7 +101,7 @@ pub(super) fn char_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn name_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let string = vm.string_designator(arguments[0])?;
+    let string = string_designator(vm, arguments[0])?;
     let characters = crate::equality::characters_of(&vm.heap, string).unwrap_or_default();
     if characters.len() > 64 {
         return Ok(Value::NIL);
@@ -109,8 +110,8 @@ pub(super) fn name_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(name.and_then(|name| character::named(&name)).map_or(Value::NIL, character_of))
 }
 
-/// Whether `holds` is true of all neighbours, as codes. All arguments are checked, also behind a pair for
-/// which it is not.
+/// Returns whether `holds` is true of all neighbours, as codes. All arguments are checked, also behind a pair
+/// for which it is not.
 fn chain(vm: &mut Vm, arguments: &[Value], fold: bool, holds: impl Fn(u32, u32) -> bool) -> Outcome {
     let mut codes = Vec::with_capacity(arguments.len());
     for &v in arguments {
@@ -146,7 +147,7 @@ comparisons! {
     char_greater_equal char_not_lessp = |a, b| a >= b;
 }
 
-/// Whether no two characters are the same.
+/// Returns whether no two characters are the same.
 fn all_differ(vm: &mut Vm, arguments: &[Value], fold: bool) -> Outcome {
     chain(vm, arguments, fold, |_, _| true)?;
     let key = |v: &Value| v.as_character().map(|code| if fold { character::fold(code) } else { code });

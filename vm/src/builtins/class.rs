@@ -1,69 +1,69 @@
 //! Structures and their classes.
 
 use crate::builtins::LIMIT;
-use crate::heap::Kind;
+use crate::builtins::define::definable;
+use crate::builtins::list::list_items;
+use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
-
-use super::expect::exactly;
 use crate::world::class::{self, MAX_DEPTH, class_slot, slot};
 
-impl Vm {
-    /// The class that `v` is or names.
-    ///
-    /// # Errors
-    /// A failure if there is none.
-    fn class(&mut self, v: Value) -> Result<Value, Exit> {
-        if self.heap.is(v, Kind::Class) {
-            return Ok(v);
-        }
-        if let Some(class) = self.world.find_class(v) {
-            return Ok(class);
-        }
-        if !self.world.is_symbol(&self.heap, v) {
-            return self.exchange.type_error(v, "CLASS");
-        }
-        let name = self.describe(v);
-        self.exchange.program_error(format!("there is no structure or condition type {name}"))
-    }
+use super::expect::exactly;
 
-    /// Returns the classes that the list `supers` holds or names, for a class that inherits from them.
-    ///
-    /// # Errors
-    /// `type-error` or `program-error` if an item is not a class, or its inheritance is at the maximum depth.
-    pub(super) fn superclasses(&mut self, supers: Value) -> Result<Vec<Value>, Exit> {
-        let mut classes = Vec::new();
-        for class in self.list_items(supers, LIMIT)? {
-            classes.push(self.class(class)?);
-        }
-        let is_too_deep = classes.iter().any(|&class| {
-            class_slot(&self.heap, class, slot::DEPTH).as_index().is_some_and(|depth| depth >= MAX_DEPTH)
-        });
-        if is_too_deep {
-            let text = format!("types include each other more than {MAX_DEPTH} levels deep");
-            return self.exchange.program_error(text);
-        }
-        Ok(classes)
+/// Returns the class that `v` is or names.
+///
+/// # Errors
+/// A failure if there is none.
+fn expect_class(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
+    if vm.heap.is(v, Kind::Class) {
+        return Ok(v);
     }
+    if let Some(class) = vm.world.find_class(v) {
+        return Ok(class);
+    }
+    if !vm.world.is_symbol(&vm.heap, v) {
+        return vm.exchange.type_error(v, "CLASS");
+    }
+    let name = vm.describe(v);
+    vm.exchange.program_error(format!("there is no structure or condition type {name}"))
+}
 
-    /// Notes that `datum` is no instance of `class`.
-    fn instance_error<T>(&mut self, datum: Value, class: Value) -> Result<T, Exit> {
-        let name = if self.heap.is(class, Kind::Class) { class::name_of(&self.heap, class) } else { class };
-        self.exchange.raise(Raised::Type(datum, Expected::Specifier(name)))
+/// Returns the classes that the list `supers` holds or names, for a class that inherits from them.
+///
+/// # Errors
+/// `type-error` or `program-error` if an item is not a class, or its inheritance is at the maximum depth.
+pub(super) fn superclasses(vm: &mut Vm, supers: Value) -> Result<Vec<Value>, Exit> {
+    let mut classes = Vec::new();
+    for class in list_items(vm, supers, LIMIT)? {
+        classes.push(expect_class(vm, class)?);
     }
+    let is_too_deep = classes.iter().any(|&class| {
+        class_slot(&vm.heap, class, slot::DEPTH).as_index().is_some_and(|depth| depth >= MAX_DEPTH)
+    });
+    if is_too_deep {
+        let text = format!("types include each other more than {MAX_DEPTH} levels deep");
+        return vm.exchange.program_error(text);
+    }
+    Ok(classes)
+}
 
-    fn index_in(&mut self, instance: Value, index: Value) -> Result<usize, Exit> {
-        let Some(slots) = self.heap.structure_slots(instance) else {
-            return self.instance_error(instance, self.world.known.structure_object);
-        };
-        let length = slots.len();
-        self.index_below(index, length)
-    }
+/// Notes that `datum` is not an instance of `class`.
+fn instance_error<T>(vm: &mut Vm, datum: Value, class: Value) -> Result<T, Exit> {
+    let name = if vm.heap.is(class, Kind::Class) { class::name_of(&vm.heap, class) } else { class };
+    vm.exchange.raise(Raised::Type(datum, Expected::Specifier(name)))
+}
 
-    fn slot_value(&self, instance: Value, index: usize) -> Value {
-        self.heap.structure_slots(instance).and_then(|slots| slots.get(index)).copied().unwrap_or(Value::NIL)
-    }
+fn index_in(vm: &mut Vm, instance: Value, index: Value) -> Result<usize, Exit> {
+    let Some(slots) = vm.heap.structure_slots(instance) else {
+        return instance_error(vm, instance, vm.world.known.structure_object);
+    };
+    let length = slots.len();
+    vm.exchange.index_below(index, length)
+}
+
+fn slot_value(heap: &Heap, instance: Value, index: usize) -> Value {
+    heap.structure_slots(instance).and_then(|slots| slots.get(index)).copied().unwrap_or(Value::NIL)
 }
 
 pub(super) fn make_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -77,8 +77,8 @@ pub(super) fn make_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             .exchange
             .program_error(format!("{name} belongs to the language and cannot be redefined as a type"));
     }
-    let classes = vm.superclasses(supers)?;
-    let slots = vm.list_items(slots, LIMIT)?;
+    let classes = superclasses(vm, supers)?;
+    let slots = list_items(vm, slots, LIMIT)?;
     Ok(vm.world.define_class(&mut vm.heap, name, &classes, &slots, data)?)
 }
 
@@ -95,42 +95,42 @@ pub(super) fn classp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn class_name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let class = vm.class(arguments[0])?;
+    let class = expect_class(vm, arguments[0])?;
     Ok(class::name_of(&vm.heap, class))
 }
 
 pub(super) fn class_supers(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let class = vm.class(arguments[0])?;
+    let class = expect_class(vm, arguments[0])?;
     Ok(class_slot(&vm.heap, class, slot::SUPERS))
 }
 
 pub(super) fn class_slots(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let class = vm.class(arguments[0])?;
+    let class = expect_class(vm, arguments[0])?;
     Ok(class_slot(&vm.heap, class, slot::SLOTS))
 }
 
 pub(super) fn class_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let class = vm.class(arguments[0])?;
+    let class = expect_class(vm, arguments[0])?;
     Ok(class_slot(&vm.heap, class, slot::DATA))
 }
 
 pub(super) fn set_class_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [class, data] = exactly(arguments);
-    let class = vm.class(class)?;
+    let class = expect_class(vm, class)?;
     vm.heap.record_set(class, Kind::Class, slot::DATA, data);
     Ok(data)
 }
 
 pub(super) fn subclass_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [class, ancestor] = exactly(arguments);
-    let class = vm.class(class)?;
-    let ancestor = vm.class(ancestor)?;
+    let class = expect_class(vm, class)?;
+    let ancestor = expect_class(vm, ancestor)?;
     Ok(Value::boolean(vm.world.is_subclass(&vm.heap, class, ancestor)))
 }
 
 /// Slots without a value are `NIL`.
 pub(super) fn make_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let class = vm.class(arguments[0])?;
+    let class = expect_class(vm, arguments[0])?;
     let count = class_slot(&vm.heap, class, slot::COUNT).as_index().unwrap_or(0);
     let values = &arguments[1..];
     if values.len() == count {
@@ -151,10 +151,10 @@ pub(super) fn copy_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (Some(class), Some(slots)) =
         (vm.heap.structure_class(arguments[0]), vm.heap.structure_slots(arguments[0]))
     else {
-        return vm.instance_error(arguments[0], vm.world.known.structure_object);
+        return instance_error(vm, arguments[0], vm.world.known.structure_object);
     };
     if vm.heap.is_instance(arguments[0]) {
-        return vm.instance_error(arguments[0], vm.world.known.structure_object);
+        return instance_error(vm, arguments[0], vm.world.known.structure_object);
     }
     let slots = slots.to_vec();
     vm.exchange.charge(slots.len());
@@ -163,13 +163,13 @@ pub(super) fn copy_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn structure_ref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [instance, index] = exactly(arguments);
-    let index = vm.index_in(instance, index)?;
-    Ok(vm.slot_value(instance, index))
+    let index = index_in(vm, instance, index)?;
+    Ok(slot_value(&vm.heap, instance, index))
 }
 
 pub(super) fn set_structure_ref(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [instance, index, value] = exactly(arguments);
-    let index = vm.index_in(instance, index)?;
+    let index = index_in(vm, instance, index)?;
     vm.heap.structure_set(instance, index, value);
     Ok(value)
 }
@@ -180,11 +180,11 @@ pub(super) fn structurep(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn define_accessor(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [name, class, index, read_only] = exactly(arguments);
-    vm.definable(name, "function")?;
+    definable(vm, name, "function")?;
     if !vm.heap.is(class, Kind::Symbol) {
         return vm.exchange.type_error(class, "SYMBOL");
     }
-    vm.index_below(index, usize::from(u16::MAX))?;
+    vm.exchange.index_below(index, usize::from(u16::MAX))?;
     let record = vm.heap.cons(index, read_only)?;
     let record = vm.heap.cons(class, record)?;
     let indicator = vm.world.known.accessor;

@@ -36,7 +36,7 @@ fn checked<T>(vm: &mut Vm, outcome: Result<T, FormulaError>) -> Result<T, Exit> 
     }
 }
 
-/// Whether the table `locks` has entries: then a change has to be made where they are told of it.
+/// Returns whether the table `locks` has entries: then a change has to be made where they are told of it.
 fn has_locks(vm: &Vm, locks: Value) -> bool {
     Table::of(&vm.heap, locks).is_some_and(|table| table.count(&vm.heap) > 0)
 }
@@ -61,7 +61,7 @@ pub(super) fn make_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !vm.world.is_symbol(&vm.heap, name) {
         return vm.exchange.type_error(name, "SYMBOL");
     }
-    let width = vm.count(width)?;
+    let width = vm.exchange.count(width)?;
     let mut work = 0;
     let made = vm.database.define_property(&mut vm.heap, name, width, &mut work)?;
     vm.exchange.charge(4 * work);
@@ -119,9 +119,9 @@ pub(super) fn open_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::index(checked(vm, outcome)? as usize))
 }
 
-/// The query that a number names.
+/// Returns the query that a number names.
 fn query(vm: &mut Vm, v: Value) -> Result<u64, Exit> {
-    Ok(vm.count(v)? as u64)
+    Ok(vm.exchange.count(v)? as u64)
 }
 
 /// What goes on where there may be no query of that number.

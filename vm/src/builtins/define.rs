@@ -11,7 +11,7 @@ use super::expect::exactly;
 
 pub(crate) fn set_function(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [name, function] = exactly(arguments);
-    let symbol = vm.definable(name, "function")?;
+    let symbol = definable(vm, name, "function")?;
     if !vm.heap.is(function, Kind::Function) {
         return vm.exchange.type_error(function, "FUNCTION");
     }
@@ -27,7 +27,7 @@ pub(crate) fn set_function(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(crate) fn set_macro(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [name, function] = exactly(arguments);
-    let symbol = vm.definable(name, "macro")?;
+    let symbol = definable(vm, name, "macro")?;
     if !vm.heap.is(function, Kind::Function) {
         return vm.exchange.type_error(function, "FUNCTION");
     }
@@ -38,7 +38,7 @@ pub(crate) fn set_macro(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(crate) fn proclaim_special(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let name = arguments[0];
-    let symbol = vm.symbol_object(name)?;
+    let symbol = symbol_object(vm, name)?;
     let flags = vm.heap.flags(symbol, Kind::Symbol).unwrap_or(0);
     if flags & Symbol::CONSTANT != 0 {
         let name = vm.describe(name);
@@ -50,7 +50,7 @@ pub(crate) fn proclaim_special(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(crate) fn define_constant(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [name, value] = exactly(arguments);
-    let symbol = vm.symbol_object(name)?;
+    let symbol = symbol_object(vm, name)?;
     let flags = vm.heap.flags(symbol, Kind::Symbol).unwrap_or(0);
     let old = vm.heap.symbol(symbol).map_or(Value::UNBOUND, |symbol| symbol.value);
     if flags & Symbol::CONSTANT != 0 {
@@ -69,30 +69,28 @@ pub(crate) fn define_constant(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(name)
 }
 
-impl Vm {
-    /// The object of a symbol.
-    ///
-    /// # Errors
-    /// `type-error` if `v` is no symbol.
-    pub(crate) fn symbol_object(&mut self, v: Value) -> Result<Value, Exit> {
-        match self.world.object_of(&self.heap, v) {
-            Some(object) => Ok(object),
-            None => self.exchange.type_error(v, "SYMBOL"),
-        }
+/// Returns the object of a symbol.
+///
+/// # Errors
+/// `type-error` if `v` is not a symbol.
+pub(crate) fn symbol_object(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
+    match vm.world.object_of(&vm.heap, v) {
+        Some(object) => Ok(object),
+        None => vm.exchange.type_error(v, "SYMBOL"),
     }
+}
 
-    /// The object of a symbol that may be given a definition as a `what`.
-    ///
-    /// # Errors
-    /// `type-error` if `v` is no symbol, `program-error` if it belongs to the language.
-    pub(crate) fn definable(&mut self, v: Value, what: &str) -> Result<Value, Exit> {
-        let object = self.symbol_object(v)?;
-        if self.world.is_locked(&self.heap, v) {
-            let name = self.describe(v);
-            return self.exchange.program_error(format!(
-                "{name} belongs to the language and cannot be redefined as a {what}"
-            ));
-        }
-        Ok(object)
+/// Returns the object of a symbol that may be given a definition as a `what`.
+///
+/// # Errors
+/// `type-error` if `v` is not a symbol, `program-error` if it belongs to the language.
+pub(crate) fn definable(vm: &mut Vm, v: Value, what: &str) -> Result<Value, Exit> {
+    let object = symbol_object(vm, v)?;
+    if vm.world.is_locked(&vm.heap, v) {
+        let name = vm.describe(v);
+        return vm
+            .exchange
+            .program_error(format!("{name} belongs to the language and cannot be redefined as a {what}"));
     }
+    Ok(object)
 }

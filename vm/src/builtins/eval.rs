@@ -25,148 +25,168 @@ use esl_bytecode::span::Span;
 use esl_bytecode::verify::verify;
 
 use crate::builtins::expect::optional;
-use crate::builtins::stream::Source;
-use crate::compiler::{ActiveCompilation, CompilerJob, FormText, JobId};
+use crate::builtins::stream::{Then, file_error, more_input, skip_source, source};
+use crate::builtins::symbol::{designated_text, text_between, text_of};
+use crate::compiler::{ActiveCompilation, Compiler, CompilerJob, FormText, JobId};
 use crate::datum::Unit;
 use crate::environment;
+use crate::equality::characters_of;
+use crate::host::Host;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::load::{Alone, load};
 
 use super::expect::exactly;
+use super::integer::radix;
 
-/// Whether a diagnostic with this code says that a text ends in the middle of a datum.
+/// Number of characters in which the next datum of a text is looked for at first; twice as many whenever it
+/// may go on after them. So reading all data of a text takes time in proportion to its length.
+const FIRST_PART: usize = 256;
+
+/// Returns whether a diagnostic with this code says that a text ends in the middle of a datum.
 fn is_unfinished(code: &str) -> bool {
     code.starts_with("unclosed-") || code.starts_with("unfinished-")
 }
 
-impl Vm {
-    /// Begins a compilation and returns its handle. `is_nameless` says whether its form comes from a text
-    /// without a name.
-    fn begin(&mut self, compilation: Box<dyn Compilation>, unit: Unit, is_nameless: bool) -> Value {
-        let running = ActiveCompilation { compilation, unit, step: None, keeps: false, is_nameless };
-        self.compiler.add(CompilerJob::Compilation(Box::new(running)))
-    }
+/// Begins a compilation and returns its handle. `is_nameless` says whether its form comes from a text
+/// without a name.
+fn begin(compiler: &mut Compiler, compilation: Box<dyn Compilation>, unit: Unit, is_nameless: bool) -> Value {
+    let running = ActiveCompilation { compilation, unit, step: None, keeps: false, is_nameless };
+    compiler.add(CompilerJob::Compilation(Box::new(running)))
+}
 
-    /// Takes the job that `handle` names out of the table, until `Compiler::put_back`.
-    fn take_job(&mut self, handle: Value) -> Result<(JobId, CompilerJob), Exit> {
-        match self.compiler.take(handle) {
-            Some(taken) => Ok(taken),
-            None => self.exchange.program_error("this compilation is over"),
+/// Takes the job that `handle` names out of the table, until `Compiler::put_back`.
+fn take_job(vm: &mut Vm, handle: Value) -> Result<(JobId, CompilerJob), Exit> {
+    match vm.compiler.take(handle) {
+        Some(taken) => Ok(taken),
+        None => vm.exchange.program_error("this compilation is over"),
+    }
+}
+
+/// `value` as data of a compilation.
+fn as_form(vm: &mut Vm, unit: &mut Unit, value: Value, span: Span) -> Result<Datum, Exit> {
+    let datum = unit.datum_of(&vm.heap, &vm.world, value, span);
+    vm.exchange.charge(unit.take_work() as usize);
+    match datum {
+        Ok(datum) => Ok(datum),
+        Err(error) => vm.exchange.program_error(error.to_string()),
+    }
+}
+
+/// Returns the outcome of the last step, as the program tells it.
+fn answer(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Value) -> Result<Answer, Exit> {
+    let kind = designated_text(vm, kind)?;
+    let unit = &mut running.unit;
+    Ok(match &*kind {
+        "START" => Answer::Start,
+        "EXPANSION" => match unit.datum_of(&vm.heap, &vm.world, outcome, Span::default()) {
+            Ok(expansion) => Answer::Expansion(expansion),
+            Err(error) => Answer::Failed(error.to_string().into()),
+        },
+        "LOADED" if running.keeps => Answer::Object(unit.pin(outcome)),
+        "LOADED" => Answer::Loaded,
+        "FAILED" => Answer::Failed(designated_text(vm, outcome)?.into()),
+        _ => return vm.exchange.program_error(format!("{kind} is no outcome of a step")),
+    })
+}
+
+/// Tells the program what a compilation wants.
+fn tell(vm: &mut Vm, compilation: &dyn Compilation, step: &Step) -> Outcome {
+    let mut results = [Value::NIL; 4];
+    let kind = match step {
+        Step::Expand(call) => {
+            let prepared = environment::macro_call(vm, call);
+            match vm.exchange.loaded(prepared)? {
+                Some(call) => results[1..].copy_from_slice(&call),
+                None => return vm.exchange.program_error("the macro is not defined any more"),
+            }
+            "EXPAND"
         }
-    }
-
-    /// `value` as data of a compilation.
-    fn as_form(&mut self, unit: &mut Unit, value: Value, span: Span) -> Result<Datum, Exit> {
-        let datum = unit.datum_of(&self.heap, &self.world, value, span);
-        self.exchange.charge(unit.take_work() as usize);
-        match datum {
-            Ok(datum) => Ok(datum),
-            Err(error) => self.exchange.program_error(error.to_string()),
+        Step::Load { module, keep } => {
+            let functions = environment::load_in_unit(vm, module);
+            results[1] = vm.exchange.loaded(functions)?;
+            results[2] = Value::boolean(*keep);
+            "LOAD"
         }
-    }
+        Step::Require(name) => {
+            results[1] = vm.heap.alloc_str(name)?;
+            "REQUIRE"
+        }
+        Step::Done(module, diagnostics) => {
+            if let Some(module) = module {
+                let functions = environment::load_in_unit(vm, module);
+                results[1] = vm.exchange.loaded(functions)?;
+            }
+            results[2] = list_of_diagnostics(vm, compilation, diagnostics)?;
+            "DONE"
+        }
+    };
+    results[0] = vm.world.keyword(&mut vm.heap, kind)?;
+    vm.give_values(&results)
+}
 
-    /// The outcome of the last step, as the program tells it.
-    fn answer(
-        &mut self,
-        running: &mut ActiveCompilation,
-        kind: Value,
-        outcome: Value,
-    ) -> Result<Answer, Exit> {
-        let kind = self.designated_text(kind)?;
-        let unit = &mut running.unit;
-        Ok(match &*kind {
-            "START" => Answer::Start,
-            "EXPANSION" => match unit.datum_of(&self.heap, &self.world, outcome, Span::default()) {
-                Ok(expansion) => Answer::Expansion(expansion),
-                Err(error) => Answer::Failed(error.to_string().into()),
-            },
-            "LOADED" if running.keeps => Answer::Object(unit.pin(outcome)),
-            "LOADED" => Answer::Loaded,
-            "FAILED" => Answer::Failed(self.designated_text(outcome)?.into()),
-            _ => return self.exchange.program_error(format!("{kind} is no outcome of a step")),
-        })
-    }
-
-    /// Tells the program what a compilation wants.
-    fn tell(&mut self, compilation: &dyn Compilation, step: &Step) -> Outcome {
-        let mut results = [Value::NIL; 4];
-        let kind = match step {
-            Step::Expand(call) => {
-                let prepared = environment::macro_call(self, call);
-                match self.exchange.loaded(prepared)? {
-                    Some(call) => results[1..].copy_from_slice(&call),
-                    None => return self.exchange.program_error("the macro is not defined any more"),
-                }
-                "EXPAND"
-            }
-            Step::Load { module, keep } => {
-                let functions = environment::load_in_unit(self, module);
-                results[1] = self.exchange.loaded(functions)?;
-                results[2] = Value::boolean(*keep);
-                "LOAD"
-            }
-            Step::Require(name) => {
-                results[1] = self.heap.alloc_str(name)?;
-                "REQUIRE"
-            }
-            Step::Done(module, diagnostics) => {
-                if let Some(module) = module {
-                    let functions = environment::load_in_unit(self, module);
-                    results[1] = self.exchange.loaded(functions)?;
-                }
-                results[2] = self.diagnostics(compilation, diagnostics)?;
-                "DONE"
-            }
+fn list_of_diagnostics(vm: &mut Vm, compilation: &dyn Compilation, diagnostics: &[Diagnostic]) -> Outcome {
+    let mut list = Value::NIL;
+    for diagnostic in diagnostics.iter().rev() {
+        let text = compilation.render(diagnostic);
+        vm.exchange.charge(text.len());
+        let severity = match diagnostic.severity {
+            Severity::Warning => "WARNING",
+            Severity::Error => "ERROR",
         };
-        results[0] = self.world.keyword(&mut self.heap, kind)?;
-        self.give_values(&results)
+        let severity = vm.world.keyword(&mut vm.heap, severity)?;
+        let code = vm.world.keyword(&mut vm.heap, &diagnostic.code.to_uppercase())?;
+        let text = vm.heap.alloc_str(&text)?;
+        let entry = vm.heap.list(&[severity, code, text])?;
+        list = vm.heap.cons(entry, list)?;
     }
+    Ok(list)
+}
 
-    fn diagnostics(&mut self, compilation: &dyn Compilation, diagnostics: &[Diagnostic]) -> Outcome {
-        let mut list = Value::NIL;
-        for diagnostic in diagnostics.iter().rev() {
-            let text = compilation.render(diagnostic);
-            self.exchange.charge(text.len());
-            let severity = match diagnostic.severity {
-                Severity::Warning => "WARNING",
-                Severity::Error => "ERROR",
-            };
-            let severity = self.world.keyword(&mut self.heap, severity)?;
-            let code = self.world.keyword(&mut self.heap, &diagnostic.code.to_uppercase())?;
-            let text = self.heap.alloc_str(&text)?;
-            let entry = self.heap.list(&[severity, code, text])?;
-            list = self.heap.cons(entry, list)?;
+/// Reads a datum of `text`, which may have a name, from byte `start` on.
+fn read_datum(vm: &mut Vm, text: &str, start: usize, name: Option<&str>) -> Result<Read, Exit> {
+    if let Some(base) = vm.symbol_value(vm.world.known.read_base) {
+        radix(vm, base)?;
+    }
+    let read = environment::with_compiler(vm, |vm, compiler| {
+        let read = compiler.read(vm, text, start);
+        read.map_err(|diagnostic| ReadFault { text: compiler.render(&diagnostic, name, text), diagnostic })
+    })?;
+    let end = read.as_ref().map_or(text.len(), |&(_, end)| end);
+    vm.exchange.charge(end.saturating_sub(start));
+    match read {
+        Ok((Some(datum), end)) => Ok(Read::Datum(datum, end)),
+        Ok((None, _)) => Ok(Read::End),
+        Err(fault) => Ok(Read::Fault(fault)),
+    }
+}
+
+/// Reads the first datum of `text`. Returns whether there was one, the object, and the number of characters
+/// up to its end; `None` if what comes after the text may belong to the datum.
+fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<(Value, Value, usize)>, Exit> {
+    let count = |end: usize| text[..end].chars().count();
+    Ok(Some(match read_datum(vm, text, 0, None)? {
+        Read::Datum(_, end) if then != Then::End && end == text.len() && !text.ends_with([')', '"']) => {
+            return Ok(None);
         }
-        Ok(list)
-    }
-
-    /// Reads a datum of `text`, which may have a name, from byte `start` on.
-    fn read_datum(&mut self, text: &str, start: usize, name: Option<&str>) -> Result<Read, Exit> {
-        let read = environment::with_compiler(self, |vm, compiler| {
-            let read = compiler.read(vm, text, start);
-            read.map_err(|diagnostic| ReadFault {
-                text: compiler.render(&diagnostic, name, text),
-                diagnostic,
-            })
-        })?;
-        let end = read.as_ref().map_or(text.len(), |&(_, end)| end);
-        self.exchange.charge(end.saturating_sub(start));
-        match read {
-            Ok((Some(datum), end)) => Ok(Read::Datum(datum, end)),
-            Ok((None, _)) => Ok(Read::End),
-            Err(fault) => Ok(Read::Fault(fault)),
+        Read::Datum(datum, end) => (Value::T, read_object(vm, &datum)?, count(end)),
+        // What is faulty where the text is cut may be part of something else.
+        Read::Fault(fault) if then != Then::Rest && !fault.is_unfinished() => {
+            return vm.exchange.raise(Raised::Reader(fault.text));
         }
-    }
+        Read::End | Read::Fault(_) if then != Then::End => return Ok(None),
+        Read::End => (Value::NIL, Value::NIL, count(text.len())),
+        Read::Fault(_) => (vm.world.known.unfinished, Value::NIL, count(text.len())),
+    }))
+}
 
-    /// A datum that was read, as an object.
-    fn read_object(&mut self, datum: &Datum) -> Outcome {
-        let mut unit = Unit::default();
-        let value = unit.value_of(&mut self.heap, &mut self.world, datum);
-        self.exchange.charge(unit.take_work() as usize);
-        Ok(value?)
-    }
+/// Returns a datum that was read, as an object.
+fn read_object(vm: &mut Vm, datum: &Datum) -> Outcome {
+    let mut unit = Unit::default();
+    let value = unit.value_of(&mut vm.heap, &mut vm.world, datum);
+    vm.exchange.charge(unit.take_work() as usize);
+    Ok(value?)
 }
 
 /// Result of reading.
@@ -195,25 +215,27 @@ impl ReadFault {
 
 pub(super) fn begin_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut unit = Unit::default();
-    let form = vm.as_form(&mut unit, arguments[0], Span::default())?;
+    let form = as_form(vm, &mut unit, arguments[0], Span::default())?;
     let compilation = environment::with_compiler(vm, |_, compiler| compiler.compile_form(form, None))?;
-    Ok(vm.begin(compilation, unit, false))
+    Ok(begin(&mut vm.compiler, compilation, unit, false))
 }
 
 pub(super) fn begin_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [name, text] = exactly(arguments);
-    let name = vm.designated_text(name)?;
-    let Some(text) = vm.text_of(text) else { return vm.exchange.type_error(text, "STRING") };
+    let name = designated_text(vm, name)?;
+    let Some(text) = text_of(&vm.heap, text) else { return vm.exchange.type_error(text, "STRING") };
     vm.exchange.charge(text.len());
     let compilation = environment::with_compiler(vm, |_, compiler| compiler.compile_text(&name, &text))?;
-    Ok(vm.begin(compilation, Unit::default(), false))
+    Ok(begin(&mut vm.compiler, compilation, Unit::default(), false))
 }
 
 pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
+    let Some(path) = text_of(&vm.heap, arguments[0]) else {
+        return vm.exchange.type_error(arguments[0], "STRING");
+    };
     let bytes = match vm.outside.host.read_file(&path) {
         Ok(bytes) => bytes,
-        Err(error) => return vm.file_error("read", &path, &error),
+        Err(error) => return file_error(&mut vm.exchange, "read", &path, &error),
     };
     vm.exchange.charge(bytes.len() * 4);
     let sound = file::read(&bytes).map_err(|error| error.to_string());
@@ -228,18 +250,20 @@ pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn open_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(text) = vm.text_of(arguments[0]) else { return vm.exchange.type_error(arguments[0], "STRING") };
+    let Some(text) = text_of(&vm.heap, arguments[0]) else {
+        return vm.exchange.type_error(arguments[0], "STRING");
+    };
     vm.exchange.charge(text.len());
     let name = match optional(arguments, 1) {
         name if name.is_nil() => None,
-        name => Some(vm.designated_text(name)?),
+        name => Some(designated_text(vm, name)?),
     };
     let text = FormText { text: text.into(), name, position: 0, line: 0, column: 0 };
     Ok(vm.compiler.add(CompilerJob::Text(text)))
 }
 
 pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (id, mut job) = vm.take_job(arguments[0])?;
+    let (id, mut job) = take_job(vm, arguments[0])?;
     let next = match &mut job {
         CompilerJob::Text(text) => begin_form(vm, text),
         _ => vm.exchange.program_error("there are no forms in a compilation"),
@@ -249,7 +273,7 @@ pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 fn begin_form(vm: &mut Vm, text: &mut FormText) -> Outcome {
-    match vm.read_datum(&text.text, text.position, text.name.as_deref())? {
+    match read_datum(vm, &text.text, text.position, text.name.as_deref())? {
         Read::End => Ok(Value::NIL),
         Read::Fault(fault) => {
             if text.name.is_none() {
@@ -263,14 +287,14 @@ fn begin_form(vm: &mut Vm, text: &mut FormText) -> Outcome {
             let compilation =
                 environment::with_compiler(vm, |_, compiler| compiler.compile_form(datum, part))?;
             text.pass(end);
-            Ok(vm.begin(compilation, Unit::default(), is_nameless))
+            Ok(begin(&mut vm.compiler, compilation, Unit::default(), is_nameless))
         }
     }
 }
 
 pub(super) fn compilation_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [handle, kind, outcome] = exactly(arguments);
-    let (id, mut job) = vm.take_job(handle)?;
+    let (id, mut job) = take_job(vm, handle)?;
     let told = match &mut job {
         CompilerJob::Compilation(running) => step(vm, running, kind, outcome),
         _ => vm.exchange.program_error("a text is no compilation"),
@@ -283,7 +307,7 @@ fn step(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Valu
     let step = match running.step.take() {
         Some(step) => step,
         None => {
-            let answer = vm.answer(running, kind, outcome)?;
+            let answer = answer(vm, running, kind, outcome)?;
             let outer = vm.compiler.unit.replace(std::mem::take(&mut running.unit));
             let mut nodes = 0;
             let step = running.compilation.step(vm, answer, &mut |more| nodes += more);
@@ -298,7 +322,7 @@ fn step(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Valu
         }
     };
     let outer = vm.compiler.unit.replace(std::mem::take(&mut running.unit));
-    let told = vm.tell(&*running.compilation, &step);
+    let told = tell(vm, &*running.compilation, &step);
     running.unit = vm.compiler.unit.replace(outer);
     let work = running.unit.take_work();
     vm.exchange.charge(work as usize);
@@ -316,52 +340,36 @@ pub(super) fn end_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 /// The first value is `NIL` at the end of the string, and `:unfinished` if the datum goes on behind it.
 pub(super) fn read_from_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let characters = vm.characters(arguments[0], optional(arguments, 1), optional(arguments, 2))?;
-    let first = optional(arguments, 1).as_index().unwrap_or(0);
-    let text: String =
-        characters.iter().map(|&code| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
-    match vm.read_datum(&text, 0, None)? {
-        Read::Datum(datum, end) => {
-            let object = vm.read_object(&datum)?;
-            let end = first + text[..end].chars().count();
-            vm.give_values(&[Value::T, object, Value::index(end)])
+    let string = arguments[0];
+    let Some(length) = characters_of(&vm.heap, string).map(<[u32]>::len) else {
+        return vm.exchange.type_error(string, "STRING");
+    };
+    let (start, end) = vm.exchange.bounds(optional(arguments, 1), optional(arguments, 2), length)?;
+    let mut part = FIRST_PART;
+    loop {
+        let limit = end.min(start.saturating_add(part));
+        let text = text_between(&vm.heap, string, start, limit);
+        let then = if limit < end { Then::Rest } else { Then::End };
+        if let Some((status, object, length)) = read_first(vm, &text, then)? {
+            return vm.give_values(&[status, object, Value::index(start + length)]);
         }
-        Read::End => vm.give_values(&[Value::NIL, Value::NIL, Value::index(first + characters.len())]),
-        Read::Fault(fault) if fault.is_unfinished() => {
-            let unfinished = vm.world.known.unfinished;
-            vm.give_values(&[unfinished, Value::NIL, Value::index(first + characters.len())])
-        }
-        Read::Fault(fault) => vm.exchange.raise(Raised::Reader(fault.text)),
+        part = part.saturating_mul(2);
     }
 }
 
 /// What was read is taken from the stream.
 pub(super) fn read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = optional(arguments, 0);
+    let mut part = FIRST_PART;
     loop {
-        let source = vm.source(stream)?;
-        let (text, may_grow) = match &source {
-            Source::Text(text) => (text.clone(), false),
-            Source::Console { text, is_at_end } => (text.clone(), !is_at_end),
-        };
-        let (status, object, end) = match vm.read_datum(&text, 0, None)? {
-            // What ends where the input does may go on in what is still to come.
-            Read::Datum(_, end) if may_grow && end == text.len() && !text.ends_with([')', '"']) => {
-                vm.more_input()?;
-                continue;
-            }
-            Read::Datum(datum, end) => (Value::T, vm.read_object(&datum)?, end),
-            Read::Fault(fault) if !fault.is_unfinished() => {
-                return vm.exchange.raise(Raised::Reader(fault.text));
-            }
-            Read::End | Read::Fault(_) if may_grow => {
-                vm.more_input()?;
-                continue;
-            }
-            Read::End => (Value::NIL, Value::NIL, text.len()),
-            Read::Fault(_) => (vm.world.known.unfinished, Value::NIL, text.len()),
-        };
-        vm.skip_source(stream, &source, text[..end].chars().count());
-        return vm.give_values(&[status, object]);
+        let source = source(vm, stream, part)?;
+        if let Some((status, object, length)) = read_first(vm, &source.text, source.then)? {
+            skip_source(vm, stream, &source, length);
+            return vm.give_values(&[status, object]);
+        }
+        match source.then {
+            Then::Input => more_input(vm)?,
+            Then::Rest | Then::End => part = part.saturating_mul(2),
+        }
     }
 }

@@ -3,75 +3,86 @@
 //! A builtin that waits parks its task and is done again, from the start, when the task goes on: then the
 //! task's `wait` is what it was parked at.
 
-use crate::builtins::LIMIT;
+use crate::builtins::list::list_items;
 use crate::heap::Kind;
 use crate::raise::{Exit, Outcome};
 use crate::schedule::TurnEnd;
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::wait::{WaitOptions, event, link};
 
 use super::expect::exactly;
-use crate::wait::{WaitOptions, event, link};
 
 /// The latest time, in nanoseconds: far beyond the life of a machine, and a fixnum.
 const LATEST: u64 = 1 << 60;
 
-impl Vm {
-    /// Seconds as nanoseconds; what is negative counts as zero.
-    ///
-    /// # Errors
-    /// A failure if `seconds` is no real number.
-    pub(crate) fn nanoseconds(&mut self, seconds: Value) -> Result<u64, Exit> {
-        if let Some(n) = seconds.as_fixnum() {
-            return Ok((n.max(0) as u64).saturating_mul(1_000_000_000).min(LATEST));
-        }
-        let seconds = self.double_of("SLEEP", seconds, "REAL")?;
-        // A conversion of floats saturates, and makes 0 of what is not a number.
-        Ok(((seconds * 1e9).round() as u64).min(LATEST))
+/// Seconds as nanoseconds; what is negative counts as zero.
+///
+/// # Errors
+/// A failure if `seconds` is not a real number.
+pub(crate) fn nanoseconds(vm: &mut Vm, seconds: Value) -> Result<u64, Exit> {
+    if let Some(n) = seconds.as_fixnum() {
+        return Ok((n.max(0) as u64).saturating_mul(1_000_000_000).min(LATEST));
     }
+    // What is too large for a double is infinite; a conversion of floats saturates.
+    let seconds = vm.nearest_double(seconds, "REAL")?;
+    Ok(((seconds * 1e9).round() as u64).min(LATEST))
+}
 
-    /// The sum of the counts of an event or of a list of events.
-    fn count_of_events(&mut self, events: Value) -> Result<i64, Exit> {
-        if !events.is_list() {
-            return if event::is_event(&self.heap, events) {
-                Ok(event::count(&self.heap, events))
-            } else {
-                self.exchange.not_a(events, self.world.known.event)
-            };
-        }
-        let mut sum = 0_i64;
-        for event in self.list_items(events, LIMIT)? {
-            if !event::is_event(&self.heap, event) {
-                return self.exchange.not_a(event, self.world.known.event);
-            }
-            sum = sum.wrapping_add(event::count(&self.heap, event));
-        }
-        Ok(sum)
+/// Returns the sum of the counts of an event or of a list of events.
+fn count_of_events(vm: &mut Vm, events: Value) -> Result<i64, Exit> {
+    if !events.is_list() {
+        return if event::is_event(&vm.heap, events) {
+            Ok(event::count(&vm.heap, events))
+        } else {
+            vm.exchange.not_a(events, vm.world.known.event)
+        };
     }
+    let mut sum = 0_i64;
+    for event in listed_events(vm, events)? {
+        if !event::is_event(&vm.heap, event) {
+            return vm.exchange.not_a(event, vm.world.known.event);
+        }
+        sum = sum.wrapping_add(event::count(&vm.heap, event));
+    }
+    Ok(sum)
+}
 
-    /// Whether a wait need not begin because the events were signalled since they were counted.
-    fn was_signalled_since(&mut self, events: Value, count: Value) -> Result<bool, Exit> {
-        match count.as_fixnum() {
-            Some(count) => Ok(self.count_of_events(events)? != count),
-            None if count.is_nil() => Ok(false),
-            None => self.exchange.type_error(count, "INTEGER"),
+/// Returns the items of a list of events to wait for.
+///
+/// # Errors
+/// A failure if it is not a list, or has more items than one wait may be for.
+fn listed_events(vm: &mut Vm, events: Value) -> Result<Vec<Value>, Exit> {
+    match list_items(vm, events, MAX_EVENTS) {
+        Err(Exit::Slowly) => {
+            vm.exchange.program_error(format!("a wait is for at most {MAX_EVENTS} events, found more"))
         }
+        items => items,
     }
+}
 
-    fn give_list(&mut self, list: Value) -> Outcome {
-        let mut rest = list;
-        if let Some(pair) = self.heap.as_cons(list)
-            && (pair.cdr.is_nil() || self.cpu.wants_one)
-        {
-            return Ok(pair.car);
-        }
-        self.exchange.values.clear();
-        while let Some(pair) = self.heap.as_cons(rest) {
-            self.exchange.values.push(pair.car);
-            rest = pair.cdr;
-        }
-        Err(Exit::Values)
+/// Returns whether a wait need not begin because the events were signalled since they were counted.
+fn was_signalled_since(vm: &mut Vm, events: Value, count: Value) -> Result<bool, Exit> {
+    match count.as_fixnum() {
+        Some(count) => Ok(count_of_events(vm, events)? != count),
+        None if count.is_nil() => Ok(false),
+        None => vm.exchange.type_error(count, "INTEGER"),
     }
+}
+
+fn give_list(vm: &mut Vm, list: Value) -> Outcome {
+    let mut rest = list;
+    if let Some(pair) = vm.heap.as_cons(list)
+        && (pair.cdr.is_nil() || vm.cpu.wants_one)
+    {
+        return Ok(pair.car);
+    }
+    vm.exchange.values.clear();
+    while let Some(pair) = vm.heap.as_cons(rest) {
+        vm.exchange.values.push(pair.car);
+        rest = pair.cdr;
+    }
+    Err(Exit::Values)
 }
 
 pub(super) fn make_event(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -98,7 +109,7 @@ pub(super) fn event_count(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn count_events(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point_of_read()?;
-    let sum = vm.count_of_events(arguments[0])?;
+    let sum = count_of_events(vm, arguments[0])?;
     Ok(Value::fixnum(sum).unwrap_or(Value::small(0)))
 }
 
@@ -135,7 +146,7 @@ pub(super) fn begin_wait(vm: &mut Vm, events: Value, options: WaitOptions) -> Ou
         return vm.exchange.not_a(events, vm.world.known.event);
     }
     let mut list = Vec::new();
-    for event in vm.list_items(events, MAX_EVENTS)? {
+    for event in listed_events(vm, events)? {
         if !event::is_event(&vm.heap, event) {
             return vm.exchange.not_a(event, vm.world.known.event);
         }
@@ -157,21 +168,21 @@ pub(super) fn take_or_park(vm: &mut Vm, events: Value, options: WaitOptions) -> 
     vm.scheduler.park_at(wait, None)
 }
 
-/// Waits for a signal of `events` that comes after they were counted, if `count` is not `NIL`, and gives its
-/// arguments.
+/// Waits for a signal of `events`, and returns its arguments. If `count` is not `NIL`, any signal after they
+/// were counted will do.
 fn wait_for_signal(vm: &mut Vm, events: Value, count: Value, what: Value) -> Outcome {
     let wait = vm.scheduler.task().wait;
     if wait.is_true() {
         return match link::signalled(&vm.heap, wait) {
             Some(arguments) => {
                 vm.scheduler.leave_signalled(&mut vm.heap);
-                vm.give_list(arguments)
+                give_list(vm, arguments)
             }
             None => vm.scheduler.park_at(wait, None),
         };
     }
     vm.scheduler.point()?;
-    if vm.was_signalled_since(events, count)? {
+    if was_signalled_since(vm, events, count)? {
         return Ok(Value::NIL);
     }
     let wait = begin_wait(vm, events, WaitOptions { what, ..WaitOptions::default() })?;
@@ -196,10 +207,10 @@ pub(super) fn open_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let deadline = if seconds.is_nil() {
         None
     } else {
-        let nanoseconds = vm.nanoseconds(seconds)?;
-        Some(vm.scheduler.clock.read(&mut *vm.outside.host).saturating_add(nanoseconds).min(LATEST))
+        let nanoseconds = nanoseconds(vm, seconds)?;
+        Some(vm.scheduler.clock.read(&mut vm.outside.host).saturating_add(nanoseconds).min(LATEST))
     };
-    if vm.was_signalled_since(events, count)? {
+    if was_signalled_since(vm, events, count)? {
         return Ok(Value::NIL);
     }
     begin_wait(vm, events, WaitOptions { keeps: true, deadline, what, ..WaitOptions::default() })
@@ -208,7 +219,8 @@ pub(super) fn open_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn take_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let wait = arguments[0];
     if !vm.heap.is(wait, Kind::Wait) {
-        return vm.exchange.type_error(wait, "ATOM");
+        let text = format!("{} is not a wait that has been opened", vm.describe(wait));
+        return vm.exchange.program_error(text);
     }
     vm.scheduler.task_mut().wait = Value::NIL;
     if let Some(arguments) = link::take_kept(&mut vm.heap, wait) {
@@ -217,7 +229,7 @@ pub(super) fn take_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     // A signal that is on its way comes before a timeout.
     vm.scheduler.wait_for_deliveries()?;
     match link::deadline(&vm.heap, wait) {
-        Some(deadline) if vm.scheduler.clock.read(&mut *vm.outside.host) >= deadline => {
+        Some(deadline) if vm.scheduler.clock.read(&mut vm.outside.host) >= deadline => {
             Ok(vm.world.known.timeout)
         }
         deadline => vm.scheduler.park_at(wait, deadline),
@@ -230,8 +242,8 @@ pub(super) fn close_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn deadline(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let nanoseconds = vm.nanoseconds(arguments[0])?;
-    let time = vm.scheduler.clock.read(&mut *vm.outside.host).saturating_add(nanoseconds).min(LATEST);
+    let nanoseconds = nanoseconds(vm, arguments[0])?;
+    let time = vm.scheduler.clock.read(&mut vm.outside.host).saturating_add(nanoseconds).min(LATEST);
     Ok(Value::fixnum(time as i64).unwrap_or(Value::NIL))
 }
 
@@ -239,7 +251,7 @@ pub(super) fn sleep_until(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(deadline) = arguments[0].as_index() else {
         return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
     };
-    let now = vm.scheduler.clock.read(&mut *vm.outside.host);
+    let now = vm.scheduler.clock.read(&mut vm.outside.host);
     if now >= deadline as u64 {
         Ok(Value::NIL)
     } else {

@@ -81,7 +81,7 @@ pub(super) fn make_ratio(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.integer(numerator)?;
     let below = vm.integer(denominator)?;
     if below.is_negative() || below.is_zero() || denominator == Value::small(1) {
-        return vm.specifier_error(denominator, "(INTEGER 2)");
+        return vm.exchange.not_written(denominator, "(INTEGER 2)");
     }
     Ok(vm.heap.alloc_ratio(numerator, denominator)?)
 }
@@ -114,7 +114,7 @@ pub(super) fn to_float(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.heap.float(x)?)
 }
 
-/// The double that `v` is; a type error for any other number.
+/// Returns the double that `v` is; a type error for any other number.
 fn the_float(vm: &mut Vm, v: Value) -> Result<f64, Exit> {
     match vm.heap.as_double(v) {
         Some(x) => Ok(x),
@@ -122,7 +122,7 @@ fn the_float(vm: &mut Vm, v: Value) -> Result<f64, Exit> {
     }
 }
 
-/// The finite double that `v` is.
+/// Returns the finite double that `v` is.
 fn finite_float(vm: &mut Vm, op: &'static str, v: Value) -> Result<f64, Exit> {
     let x = the_float(vm, v)?;
     if x.is_finite() {
@@ -218,6 +218,6 @@ pub(super) fn random(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [limit, state] = exactly(arguments);
     match crate::number::sign_of(&vm.heap, limit) {
         Some(1) if vm.heap.ratio(limit).is_none() => random::random(vm, limit, state),
-        _ => vm.specifier_error(limit, "(OR (INTEGER 1) (FLOAT (0)))"),
+        _ => vm.exchange.not_written(limit, "(OR (INTEGER 1) (FLOAT (0)))"),
     }
 }

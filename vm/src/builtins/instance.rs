@@ -9,6 +9,7 @@
 //! Guarantee: a cache that does not fit, whatever it contains, leads to the library's function that looks the
 //! slot up.
 
+use crate::builtins::class::superclasses;
 use crate::heap::layout::Structure;
 use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Outcome};
@@ -96,7 +97,7 @@ pub(super) fn update_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !vm.heap.is(class, Kind::Class) {
         return vm.exchange.type_error(class, "CLASS");
     }
-    let supers = vm.superclasses(supers)?;
+    let supers = superclasses(vm, supers)?;
     if supers.iter().any(|&parent| vm.world.is_subclass(&vm.heap, parent, class)) {
         let name = vm.describe(class_slot(&vm.heap, class, slot::NAME));
         return vm.exchange.program_error(format!("the class {name} cannot inherit from itself"));

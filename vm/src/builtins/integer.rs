@@ -144,9 +144,7 @@ fn field(vm: &mut Vm, size: Value, position: Value) -> Result<(u64, u64), Exit> 
 pub(super) fn load_byte(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [size, position, integer] = exactly(arguments);
     let (size, position) = field(vm, size, position)?;
-    let n = vm.integer(integer)?;
-    let byte = bits::field(vm, size, position, &n)?;
-    vm.integer_value("LDB", &byte)
+    bits::field(vm, size, position, integer)
 }
 
 pub(super) fn deposit_byte(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -200,11 +198,11 @@ pub(super) fn isqrt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     power::isqrt(vm, arguments[0])
 }
 
-/// A radix from 2 to 36.
+/// Returns a radix from 2 to 36.
 pub(crate) fn radix(vm: &mut Vm, v: Value) -> Result<u32, Exit> {
     match v.as_index() {
         Some(radix @ 2..=36) => Ok(radix as u32),
-        _ => vm.specifier_error(v, "(INTEGER 2 36)"),
+        _ => vm.exchange.not_written(v, "(INTEGER 2 36)"),
     }
 }
 
@@ -223,7 +221,7 @@ pub(super) fn parse_integer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(length) = characters_of(&vm.heap, string).map(<[u32]>::len) else {
         return vm.exchange.type_error(string, "STRING");
     };
-    let (start, end) = vm.bounds(start, end, length)?;
+    let (start, end) = vm.exchange.bounds(start, end, length)?;
     if end - start > COPY_LIMIT {
         return Err(Exit::Slowly);
     }

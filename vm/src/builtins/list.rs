@@ -3,6 +3,7 @@
 //! A walk visits at most [`LIMIT`] pairs and then leaves to the function's ESL twin, which can be
 //! interrupted; so a circular list is not a hang.
 
+use crate::heap::Heap;
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -10,74 +11,72 @@ use crate::vm::Vm;
 use super::LIMIT;
 use super::expect::{exactly, optional};
 
-impl Vm {
-    /// The items of a proper list of at most `limit` items; longer ones are for the ESL twin.
-    pub(crate) fn list_items(&mut self, list: Value, limit: usize) -> Result<Vec<Value>, Exit> {
-        let mut items = Vec::new();
-        let mut rest = list;
-        while let Some(pair) = self.heap.as_cons(rest) {
-            if items.len() == limit {
-                return Err(Exit::Slowly);
-            }
-            items.push(pair.car);
-            rest = pair.cdr;
+/// Returns the items of a proper list of at most `limit` items; longer ones are for the ESL twin.
+pub(crate) fn list_items(vm: &mut Vm, list: Value, limit: usize) -> Result<Vec<Value>, Exit> {
+    let mut items = Vec::new();
+    let mut rest = list;
+    while let Some(pair) = vm.heap.as_cons(rest) {
+        if items.len() == limit {
+            return Err(Exit::Slowly);
         }
-        if !rest.is_nil() {
-            return self.exchange.type_error(rest, "LIST");
-        }
-        self.exchange.charge_elements(items.len());
-        Ok(items)
+        items.push(pair.car);
+        rest = pair.cdr;
     }
+    if !rest.is_nil() {
+        return vm.exchange.type_error(rest, "LIST");
+    }
+    vm.exchange.charge_elements(items.len());
+    Ok(items)
+}
 
-    /// Number of pairs of a list and what ends it, `NIL` if it is proper; too long ones are for the ESL twin.
-    fn measure(&mut self, list: Value) -> Result<(usize, Value), Exit> {
-        let mut rest = list;
-        for length in 0..=LIMIT {
-            match self.heap.as_cons(rest) {
-                Some(pair) => rest = pair.cdr,
-                None if length == 0 && !rest.is_nil() => return self.exchange.type_error(rest, "LIST"),
-                None => {
-                    self.exchange.charge_elements(length);
-                    return Ok((length, rest));
-                }
+/// Number of pairs of a list and what ends it, `NIL` if it is proper; too long ones are for the ESL twin.
+fn measure(vm: &mut Vm, list: Value) -> Result<(usize, Value), Exit> {
+    let mut rest = list;
+    for length in 0..=LIMIT {
+        match vm.heap.as_cons(rest) {
+            Some(pair) => rest = pair.cdr,
+            None if length == 0 && !rest.is_nil() => return vm.exchange.type_error(rest, "LIST"),
+            None => {
+                vm.exchange.charge_elements(length);
+                return Ok((length, rest));
             }
         }
-        Err(Exit::Slowly)
     }
+    Err(Exit::Slowly)
+}
 
-    /// The items of the first `count` pairs, which are there.
-    fn leading_items(&mut self, list: Value, count: usize) -> Vec<Value> {
-        let mut rest = list;
-        let mut items = Vec::with_capacity(count);
-        while items.len() < count
-            && let Some(pair) = self.heap.as_cons(rest)
-        {
-            items.push(pair.car);
-            rest = pair.cdr;
-        }
-        items
+/// Returns the items of the first `count` pairs, which are there.
+fn leading_items(heap: &Heap, list: Value, count: usize) -> Vec<Value> {
+    let mut rest = list;
+    let mut items = Vec::with_capacity(count);
+    while items.len() < count
+        && let Some(pair) = heap.as_cons(rest)
+    {
+        items.push(pair.car);
+        rest = pair.cdr;
     }
+    items
+}
 
-    /// The list without its first `count` pairs, `NIL` where it is shorter. `count` is within the limit.
-    fn tail(&mut self, list: Value, count: usize) -> Outcome {
-        let mut rest = list;
-        for _ in 0..count {
-            rest = match self.heap.as_cons(rest) {
-                Some(pair) => pair.cdr,
-                None if rest.is_nil() => return Ok(rest),
-                None => return self.exchange.type_error(rest, "LIST"),
-            };
-        }
-        self.exchange.charge_elements(count);
-        Ok(rest)
+/// Returns the list without its first `count` pairs, `NIL` where it is shorter. `count` is within the limit.
+fn tail(vm: &mut Vm, list: Value, count: usize) -> Outcome {
+    let mut rest = list;
+    for _ in 0..count {
+        rest = match vm.heap.as_cons(rest) {
+            Some(pair) => pair.cdr,
+            None if rest.is_nil() => return Ok(rest),
+            None => return vm.exchange.type_error(rest, "LIST"),
+        };
     }
+    vm.exchange.charge_elements(count);
+    Ok(rest)
+}
 
-    fn part(&mut self, v: Value, step: u8) -> Outcome {
-        let part = if step == b'a' { self.heap.car(v) } else { self.heap.cdr(v) };
-        match part {
-            Some(part) => Ok(part),
-            None => self.exchange.type_error(v, "LIST"),
-        }
+fn part(vm: &mut Vm, v: Value, step: u8) -> Outcome {
+    let part = if step == b'a' { vm.heap.car(v) } else { vm.heap.cdr(v) };
+    match part {
+        Some(part) => Ok(part),
+        None => vm.exchange.type_error(v, "LIST"),
     }
 }
 
@@ -87,7 +86,7 @@ macro_rules! parts {
         $(
             #[doc = concat!("The part `c", $path, "r`.")]
             pub(super) fn $name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-                $path.bytes().rev().try_fold(arguments[0], |v, step| vm.part(v, step))
+                $path.bytes().rev().try_fold(arguments[0], |v, step| part(vm, v, step))
             }
         )*
     };
@@ -110,8 +109,8 @@ macro_rules! items {
         $(
             #[doc = concat!("Item ", $index, " of a list.")]
             pub(super) fn $name(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-                let tail = vm.tail(arguments[0], $index)?;
-                vm.part(tail, b'a')
+                let tail = tail(vm, arguments[0], $index)?;
+                part(vm, tail, b'a')
             }
         )*
     };
@@ -164,7 +163,7 @@ pub(super) fn endp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn nth(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let tail = nthcdr(vm, arguments)?;
-    vm.part(tail, b'a')
+    part(vm, tail, b'a')
 }
 
 pub(super) fn nthcdr(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -175,17 +174,17 @@ pub(super) fn nthcdr(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
     let count = skipped.as_index().unwrap_or(usize::MAX);
     if count <= LIMIT {
-        return vm.tail(list, count);
+        return tail(vm, list, count);
     }
     // A long way down a short list is short.
-    match vm.measure(list)? {
+    match measure(vm, list)? {
         (_, end) if end.is_nil() => Ok(end),
         (_, end) => vm.exchange.type_error(end, "LIST"),
     }
 }
 
 pub(super) fn list_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    match vm.measure(arguments[0])? {
+    match measure(vm, arguments[0])? {
         (length, end) if end.is_nil() => Ok(Value::index(length)),
         (_, end) => vm.exchange.type_error(end, "LIST"),
     }
@@ -206,7 +205,7 @@ pub(super) fn list_star(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn make_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [size, item] = exactly(arguments);
-    let size = vm.count(size)?;
+    let size = vm.exchange.count(size)?;
     if size > LIMIT {
         return Err(Exit::Slowly);
     }
@@ -226,31 +225,31 @@ pub(super) fn acons(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn last(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let count = count_of(vm, arguments)?;
-    let (length, _) = vm.measure(arguments[0])?;
-    vm.tail(arguments[0], length.saturating_sub(count))
+    let (length, _) = measure(vm, arguments[0])?;
+    tail(vm, arguments[0], length.saturating_sub(count))
 }
 
 pub(super) fn butlast(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let count = count_of(vm, arguments)?;
-    let (length, _) = vm.measure(arguments[0])?;
-    let items = vm.leading_items(arguments[0], length.saturating_sub(count));
+    let (length, _) = measure(vm, arguments[0])?;
+    let items = leading_items(&vm.heap, arguments[0], length.saturating_sub(count));
     Ok(vm.heap.list(&items)?)
 }
 
 pub(super) fn nbutlast(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let count = count_of(vm, arguments)?;
-    let (length, _) = vm.measure(arguments[0])?;
+    let (length, _) = measure(vm, arguments[0])?;
     match length.saturating_sub(count) {
         0 => Ok(Value::NIL),
         kept => {
-            let end = vm.tail(arguments[0], kept - 1)?;
+            let end = tail(vm, arguments[0], kept - 1)?;
             vm.heap.set_cdr(end, Value::NIL);
             Ok(arguments[0])
         }
     }
 }
 
-/// How many pairs at the end: 1 unless said otherwise.
+/// Returns how many pairs at the end: 1 unless said otherwise.
 fn count_of(vm: &mut Vm, arguments: &[Value]) -> Result<usize, Exit> {
     match arguments.get(1) {
         None => Ok(1),
@@ -268,7 +267,7 @@ pub(super) fn append(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some((&last, lists)) = arguments.split_last() else { return Ok(Value::NIL) };
     let mut items = Vec::new();
     for &list in lists {
-        items.extend(vm.list_items(list, LIMIT - items.len())?);
+        items.extend(list_items(vm, list, LIMIT - items.len())?);
     }
     Ok(vm.heap.list_with_tail(&items, last)?)
 }
@@ -279,13 +278,13 @@ pub(super) fn nconc(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut ends = Vec::with_capacity(lists.len());
     let mut visited = 0;
     for &list in lists {
-        let (length, _) = vm.measure(list)?;
+        let (length, _) = measure(vm, list)?;
         visited += length;
         if visited > LIMIT {
             return Err(Exit::Slowly);
         }
         if length > 0 {
-            ends.push((list, vm.tail(list, length - 1)?));
+            ends.push((list, tail(vm, list, length - 1)?));
         }
     }
     let heads = ends.iter().map(|&(list, _)| list).skip(1).chain([last]);
@@ -298,14 +297,14 @@ pub(super) fn nconc(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn revappend(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [list, tail] = exactly(arguments);
-    let mut items = vm.list_items(list, LIMIT)?;
+    let mut items = list_items(vm, list, LIMIT)?;
     items.reverse();
     Ok(vm.heap.list_with_tail(&items, tail)?)
 }
 
 pub(super) fn nreconc(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [list, tail] = exactly(arguments);
-    let (_, end) = vm.measure(list)?;
+    let (_, end) = measure(vm, list)?;
     if !end.is_nil() {
         return vm.exchange.type_error(end, "LIST");
     }
@@ -324,13 +323,13 @@ pub(super) fn reverse_in_place(vm: &mut Vm, list: Value, tail: Value) -> Value {
 }
 
 pub(super) fn copy_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (length, end) = vm.measure(arguments[0])?;
-    let items = vm.leading_items(arguments[0], length);
+    let (length, end) = measure(vm, arguments[0])?;
+    let items = leading_items(&vm.heap, arguments[0], length);
     Ok(vm.heap.list_with_tail(&items, end)?)
 }
 
 pub(super) fn copy_alist(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let mut items = vm.list_items(arguments[0], LIMIT)?;
+    let mut items = list_items(vm, arguments[0], LIMIT)?;
     for item in &mut items {
         if let Some(pair) = vm.heap.as_cons(*item) {
             *item = vm.heap.cons(pair.car, pair.cdr)?;
@@ -367,7 +366,7 @@ pub(super) fn copy_tree(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn ldiff(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [list, object] = exactly(arguments);
-    let (length, end) = vm.measure(list)?;
+    let (length, end) = measure(vm, list)?;
     let mut items = Vec::new();
     let mut rest = list;
     for _ in 0..length {
@@ -385,7 +384,7 @@ pub(super) fn ldiff(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn tailp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [object, list] = exactly(arguments);
-    let (length, end) = vm.measure(list)?;
+    let (length, end) = measure(vm, list)?;
     let mut rest = list;
     for _ in 0..length {
         if rest == object {
@@ -397,8 +396,8 @@ pub(super) fn tailp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn pairlis(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let keys = vm.list_items(arguments[0], LIMIT)?;
-    let data = vm.list_items(arguments[1], LIMIT)?;
+    let keys = list_items(vm, arguments[0], LIMIT)?;
+    let data = list_items(vm, arguments[1], LIMIT)?;
     if keys.len() != data.len() {
         return vm
             .exchange

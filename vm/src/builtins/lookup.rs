@@ -2,6 +2,7 @@
 //!
 //! The functions with keyword arguments are written in ESL over these.
 
+use crate::builtins::list::list_items;
 use crate::equality::{self, Test};
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
@@ -31,7 +32,7 @@ fn find_pair(
     Err(Exit::Slowly)
 }
 
-/// Whether two objects are the same by `test`, within what is left of `work`.
+/// Returns whether two objects are the same by `test`, within what is left of `work`.
 fn same(vm: &Vm, test: Test, a: Value, b: Value, work: &mut usize) -> Result<bool, Exit> {
     equality::same(&vm.heap, test, a, b, work).ok_or(Exit::Slowly)
 }
@@ -42,7 +43,7 @@ fn member(vm: &mut Vm, test: Test, arguments: &[Value]) -> Outcome {
     find_pair(vm, arguments[1], |vm, candidate| same(vm, test, item, candidate, &mut work))
 }
 
-/// The first pair of an alist whose key, or value, is the same as `item`.
+/// Returns the first pair of an alist whose key, or value, is the same as `item`.
 fn assoc(vm: &mut Vm, test: Test, arguments: &[Value], by_value: bool) -> Outcome {
     let item = arguments[0];
     let mut work = LIMIT;
@@ -87,8 +88,8 @@ pub(super) fn adjoin_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if found.is_true() { Ok(arguments[1]) } else { Ok(vm.heap.cons(arguments[0], arguments[1])?) }
 }
 
-/// The pair with an indicator in a property list and the pair with its value, `NIL` and `NIL` if it is not
-/// there, and the pair in front of them.
+/// Returns the pair with an indicator in a property list and the pair with its value, `NIL` and `NIL` if it
+/// is not there, and the pair in front of them.
 fn find_property(vm: &mut Vm, plist: Value, indicator: Value) -> Result<Option<[Value; 3]>, Exit> {
     let (mut before, mut rest) = (Value::NIL, plist);
     for visited in 0..LIMIT {
@@ -130,7 +131,7 @@ pub(super) fn remf(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.give_values(&[rest, Value::boolean(was_there)])
 }
 
-/// A property list without a property, and whether it had it.
+/// Returns a property list without a property, and whether it had it.
 pub(super) fn without_property(vm: &mut Vm, plist: Value, indicator: Value) -> Result<(Value, bool), Exit> {
     Ok(match find_property(vm, plist, indicator)? {
         Some([before, _, pair]) => {
@@ -148,7 +149,7 @@ pub(super) fn without_property(vm: &mut Vm, plist: Value, indicator: Value) -> R
 
 pub(super) fn get_properties(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [plist, indicators] = exactly(arguments);
-    let indicators = vm.list_items(indicators, LIMIT)?;
+    let indicators = list_items(vm, indicators, LIMIT)?;
     let mut rest = plist;
     let mut work = 0;
     while let Some(pair) = vm.heap.as_cons(rest) {

@@ -71,6 +71,7 @@ mod list;
 mod lookup;
 mod net;
 mod number;
+mod operation;
 mod outside;
 mod package;
 mod print;

@@ -7,44 +7,57 @@ use smallvec::{SmallVec, smallvec};
 
 use crate::builtins::LIMIT;
 use crate::builtins::event::begin_wait;
-use crate::heap::Kind;
+use crate::builtins::task::has_ended;
+use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Outcome};
 use crate::run::{self, SpawnOptions};
 use crate::task::TaskId;
 use crate::value::Value;
 use crate::vm::Vm;
-
-use super::expect::exactly;
 use crate::wait::{WaitOptions, event, link};
 
-impl Vm {
-    /// The wait of a net.
-    ///
-    /// # Errors
-    /// A failure if it is none.
-    fn wait_of_net(&mut self, net: Value) -> Result<Value, Exit> {
-        match self.heap.as_cons(net) {
-            Some(pair) if self.heap.is(pair.car, Kind::Wait) => Ok(pair.car),
-            _ => self.exchange.type_error(net, "LIST"),
-        }
-    }
+use super::expect::exactly;
 
-    /// The first task of a net of which something is true.
-    fn find_in_net(&self, net: Value, test: impl Fn(Value) -> bool) -> Option<Value> {
-        let mut rest = self.heap.cdr(net)?;
-        for _ in 0..LIMIT {
-            let pair = self.heap.as_cons(rest)?;
-            if test(pair.car) {
-                return Some(pair.car);
-            }
-            rest = pair.cdr;
-        }
-        None
+/// Returns the wait of a net.
+///
+/// # Errors
+/// A failure if it is none.
+fn wait_of_net(vm: &mut Vm, net: Value) -> Result<Value, Exit> {
+    match vm.heap.as_cons(net) {
+        Some(pair) if vm.heap.is(pair.car, Kind::Wait) => Ok(pair.car),
+        _ => vm.exchange.type_error(net, "LIST"),
     }
+}
 
-    fn has_net_ended(&self, net: Value) -> bool {
-        self.find_in_net(net, |task| !self.has_ended(task)).is_none()
+/// Returns the first task of a net of which something is true.
+fn find_in_net(heap: &Heap, net: Value, test: impl Fn(Value) -> bool) -> Option<Value> {
+    let mut rest = heap.cdr(net)?;
+    for _ in 0..LIMIT {
+        let pair = heap.as_cons(rest)?;
+        if test(pair.car) {
+            return Some(pair.car);
+        }
+        rest = pair.cdr;
     }
+    None
+}
+
+fn has_net_ended(heap: &Heap, net: Value) -> bool {
+    find_in_net(heap, net, |task| !has_ended(heap, task)).is_none()
+}
+
+/// Returns whether a task has ended with one of `statuses`, a list of at most three.
+fn has_status(heap: &Heap, task: Value, statuses: Value) -> bool {
+    let status = heap.slot_or_nil(task, event::STATE);
+    let mut rest = statuses;
+    for _ in 0..3 {
+        let Some(pair) = heap.as_cons(rest) else { return false };
+        if pair.car == status {
+            return true;
+        }
+        rest = pair.cdr;
+    }
+    false
 }
 
 pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -80,18 +93,18 @@ pub(super) fn spawn_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn await_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [net, status] = exactly(arguments);
-    let wait = vm.wait_of_net(net)?;
+    let [net, statuses] = exactly(arguments);
+    let wait = wait_of_net(vm, net)?;
     vm.scheduler.task_mut().wait = Value::NIL;
     while let Some(task) = link::take_kept(&mut vm.heap, wait) {
         vm.exchange.charge(1);
-        if vm.heap.slot_or_nil(task, event::STATE) == status {
+        if has_status(&vm.heap, task, statuses) {
             return Ok(task);
         }
     }
-    if vm.has_net_ended(net) {
+    if has_net_ended(&vm.heap, net) {
         // One that has ended when there was no room to say so has not been in the queue.
-        let ended = vm.find_in_net(net, |task| vm.heap.slot_or_nil(task, event::STATE) == status);
+        let ended = find_in_net(&vm.heap, net, |task| has_status(&vm.heap, task, statuses));
         return Ok(ended.unwrap_or(Value::NIL));
     }
     vm.scheduler.park_at(wait, None)
@@ -99,5 +112,9 @@ pub(super) fn await_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn end_net(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point_of_read()?;
-    if arguments[0].is_nil() || vm.has_net_ended(arguments[0]) { Ok(Value::NIL) } else { Err(Exit::Slowly) }
+    if arguments[0].is_nil() || has_net_ended(&vm.heap, arguments[0]) {
+        Ok(Value::NIL)
+    } else {
+        Err(Exit::Slowly)
+    }
 }

@@ -68,8 +68,8 @@ pub(super) fn decrement(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     number::subtract(vm, arguments[0], ONE)
 }
 
-/// Whether `holds` is true of all neighbours. All arguments are checked, also behind a pair for which it is
-/// not.
+/// Returns whether `holds` is true of all neighbours. All arguments are checked, also behind a pair for which
+/// it is not.
 fn chain(
     vm: &mut Vm,
     numbers: &[Value],

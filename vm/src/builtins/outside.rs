@@ -1,9 +1,13 @@
 //! What a program asks of the outside: its arguments, the time, and the embedder's functions.
 
+use crate::builtins::operation::host_call;
 use crate::datum;
-use crate::raise::{Outcome, Raised};
+use crate::host::{Failure, Host};
+use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
+use esl_bytecode::datum::Datum;
+use esl_bytecode::span::Span;
 
 /// Seconds from the beginning of 1900 to that of 1970.
 const UNIX_EPOCH: i64 = 2_208_988_800;
@@ -26,43 +30,53 @@ pub(super) fn internal_real_time(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     Ok(Value::fixnum((vm.outside.host.monotonic() / 1000) as i64).unwrap_or(Value::NIL))
 }
 
+pub(super) fn internal_run_time(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    let run = vm.outside.host.monotonic().saturating_sub(vm.scheduler.clock.idled);
+    Ok(Value::fixnum((run / 1000) as i64).unwrap_or(Value::NIL))
+}
+
 pub(super) fn universal_time(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     let seconds = vm.outside.host.wall_clock().div_euclid(1_000_000_000);
     Ok(Value::fixnum(seconds.saturating_add(UNIX_EPOCH)).unwrap_or(Value::NIL))
 }
 
 pub(super) fn call_host(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let number = arguments[0].as_index().filter(|&number| number < vm.outside.functions.len());
-    let Some(number) = number else {
-        return vm.exchange.index_error(arguments[0], vm.outside.functions.len());
-    };
-    let mut data = Vec::with_capacity(arguments.len());
-    for &argument in &arguments[1..] {
-        match datum::export(&vm.heap, &vm.world, argument) {
-            Ok((datum, work)) => {
-                vm.exchange.charge(work);
-                data.push(datum);
-            }
-            Err(error) => return vm.exchange.raise(Raised::Simple(error.to_string())),
-        }
-    }
+    let (name, data) = host_call(vm, arguments)?;
     // The function has effects that cannot be done twice, so what it gives is kept until there is room for
     // it.
     let answer = match vm.outside.answer.take() {
         Some(answer) => answer,
-        None => (vm.outside.functions[number])(&data),
-    };
-    match answer {
-        Ok(datum) => match datum::import(&mut vm.heap, &mut vm.world, &datum) {
-            Ok((value, work)) => {
-                vm.exchange.charge(work);
-                Ok(value)
-            }
-            Err(error) => {
-                vm.outside.answer = Some(Ok(datum));
-                Err(error.into())
-            }
+        None => match vm.outside.call(&name, &data) {
+            Some(answer) => answer,
+            None => return vm.exchange.raise(Raised::Cause("NOT-IN-THIS-WORLD", arguments[0])),
         },
-        Err(text) => vm.exchange.raise(Raised::Simple(text)),
+    };
+    match give_answer(vm, &answer) {
+        Err(Exit::Collect) => {
+            vm.outside.answer = Some(answer);
+            Err(Exit::Collect)
+        }
+        outcome => outcome,
     }
+}
+
+/// Returns the value of an embedder's function, or requests a call that fails as the function has failed.
+fn give_answer(vm: &mut Vm, answer: &Result<Datum, Failure>) -> Outcome {
+    match answer {
+        Ok(datum) => import(vm, datum),
+        Err(failure) => {
+            let cause = vm.world.keyword(&mut vm.heap, &failure.cause)?;
+            let list = Datum::list(failure.arguments.iter().cloned(), Span::default());
+            let list = import(vm, &list)?;
+            vm.exchange.request_call(vm.world.known.fail_as_host, &[cause, list]);
+            Err(Exit::Call)
+        }
+    }
+}
+
+/// Returns data as a value, and charges for it.
+fn import(vm: &mut Vm, datum: &Datum) -> Outcome {
+    let (value, work) = datum::import(&mut vm.heap, &mut vm.world, datum)?;
+    vm.exchange.charge(work);
+    Ok(value)
 }

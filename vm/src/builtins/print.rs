@@ -14,7 +14,7 @@ use super::expect::exactly;
 
 use super::COPY_LIMIT;
 
-/// The string in quotes, with `\` before `"` and `\`.
+/// Returns the string in quotes, with `\` before `"` and `\`.
 pub(super) fn string_escaped(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(characters) = characters_of(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "STRING");
@@ -92,8 +92,8 @@ fn in_case(characters: &[u32], case: Value) -> Vec<u32> {
     characters.iter().map(change).collect()
 }
 
-/// Whether a name read as it stands would be another symbol, or none, or has a character that would do that
-/// elsewhere.
+/// Returns whether a name read as it stands would be another symbol, or none, or has a character that would
+/// do that elsewhere.
 fn needs_bars(characters: &[u32]) -> bool {
     let is_plain = |&code: &u32| {
         let c = char::from_u32(code).unwrap_or(' ');
@@ -108,9 +108,9 @@ fn needs_bars(characters: &[u32]) -> bool {
         || looks_like_a_number(characters)
 }
 
-/// Whether a token is what the standard calls a potential number (2.3.1.1): it has a digit, begins with a
-/// digit, sign, point or `^` or `_`, does not end with a sign, and consists of these, `/`, and letters none
-/// of which are neighbours.
+/// Returns whether a token is what the standard calls a potential number (2.3.1.1): it has a digit, begins
+/// with a digit, sign, point or `^` or `_`, does not end with a sign, and consists of these, `/`, and letters
+/// none of which are neighbours.
 fn looks_like_a_number(characters: &[u32]) -> bool {
     let token: Option<Vec<u8>> = characters.iter().map(|&code| u8::try_from(code).ok()).collect();
     let Some(token) = token else { return false };

@@ -1,7 +1,8 @@
 //! Searching sequences by `eql` and `equal`: what `find`, `position`, `count` and `remove` do without a
 //! function of the program.
 
-use crate::builtins::array::{Elements, vector_elements};
+use crate::builtins::array::{ArrayElements, vector_elements};
+use crate::builtins::list::list_items;
 use crate::equality::{self, Test};
 use crate::number;
 use crate::raise::{Exit, Outcome};
@@ -9,24 +10,24 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 use super::expect::exactly;
-
 use super::{COPY_LIMIT, LIMIT};
 
-/// The index of an element that is the same as `item`, between two bounds, the first or the last of them.
+/// Returns the index of an element that is the same as `item`, between two bounds, the first or the last of
+/// them.
 fn position(vm: &mut Vm, test: Test, arguments: &[Value]) -> Outcome {
     let [item, sequence, start, end, from_end] = exactly(arguments);
     let from_end = from_end.is_true();
     if let Some(elements) = vector_elements(&vm.heap, sequence) {
         let length = elements.len();
-        let (start, end) = vm.bounds(start, end, length)?;
+        let (start, end) = vm.exchange.bounds(start, end, length)?;
         let found = in_vector(vm, test, item, sequence, start..end, from_end)?;
         return Ok(found.map_or(Value::NIL, Value::index));
     }
     if !sequence.is_list() {
         return vm.exchange.type_error(sequence, "SEQUENCE");
     }
-    let items = vm.list_items(sequence, LIMIT)?;
-    let (start, end) = vm.bounds(start, end, items.len())?;
+    let items = list_items(vm, sequence, LIMIT)?;
+    let (start, end) = vm.exchange.bounds(start, end, items.len())?;
     let mut work = LIMIT;
     let mut found = None;
     for (at, &candidate) in items.iter().enumerate().take(end).skip(start) {
@@ -58,12 +59,12 @@ fn in_vector(
         false => range,
     };
     let found = match (elements.part(range.start, range.end), item.as_character()) {
-        (Elements::Characters(characters), Some(code)) => {
+        (ArrayElements::Characters(characters), Some(code)) => {
             let mut matches = characters.iter();
             let is_it = |&other: &u32| other == code;
             Ok(if from_end { matches.rposition(is_it) } else { matches.position(is_it) })
         }
-        (Elements::Characters(_), None) => Ok(None),
+        (ArrayElements::Characters(_), None) => Ok(None),
         (part, _) => {
             let mut work = LIMIT;
             let heap = &vm.heap;
@@ -113,7 +114,7 @@ pub(super) fn count_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [item, sequence, start, end] = exactly(arguments);
     if let Some(elements) = vector_elements(&vm.heap, sequence) {
         let length = elements.len();
-        let (start, end) = vm.bounds(start, end, length)?;
+        let (start, end) = vm.exchange.bounds(start, end, length)?;
         if end - start > COPY_LIMIT {
             return Err(Exit::Slowly);
         }
@@ -129,15 +130,15 @@ pub(super) fn count_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !sequence.is_list() {
         return vm.exchange.type_error(sequence, "SEQUENCE");
     }
-    let items = vm.list_items(sequence, LIMIT)?;
-    let (start, end) = vm.bounds(start, end, items.len())?;
+    let items = list_items(vm, sequence, LIMIT)?;
+    let (start, end) = vm.exchange.bounds(start, end, items.len())?;
     let is_it = |candidate: &&Value| number::eql(&vm.heap, item, **candidate);
     Ok(Value::index(items[start..end].iter().filter(is_it).count()))
 }
 
 pub(super) fn remove_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [item, list] = exactly(arguments);
-    let items = vm.list_items(list, LIMIT)?;
+    let items = list_items(vm, list, LIMIT)?;
     let kept: Vec<Value> = items.iter().copied().filter(|&v| !number::eql(&vm.heap, item, v)).collect();
     // As it was, where there was nothing to remove.
     if kept.len() == items.len() { Ok(list) } else { Ok(vm.heap.list(&kept)?) }

@@ -3,67 +3,65 @@
 //! Lists are walked up to [`LIMIT`] pairs. Vectors are copied up to [`COPY_LIMIT`] elements, which takes
 //! about as long.
 
-use smallvec::SmallVec;
-
+use crate::builtins::array::{check_element, store_element};
+use crate::builtins::list::list_items;
 use crate::heap::Kind;
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
 
-use super::array::{Elements, all_elements, data_of, vector_elements, vector_length};
+use super::array::{ArrayElements, all_elements, data_of, vector_elements, vector_length};
 use super::expect::{exactly, optional};
 use super::list::reverse_in_place;
 use super::{COPY_LIMIT, LIMIT};
 
-impl Vm {
-    /// Copies `count` elements between what keeps the elements of two arrays, as if by way of a third. The
-    /// ranges are inside.
-    ///
-    /// # Errors
-    /// `type-error` for the first element that the target cannot keep; nothing has been copied then.
-    pub(crate) fn copy_elements(
-        &mut self,
-        from: Value,
-        from_start: usize,
-        to: Value,
-        to_start: usize,
-        count: usize,
-    ) -> Result<(), Exit> {
-        self.exchange.charge_elements(count);
-        if self.heap.vector_copy(from, from_start, to, to_start, count).is_some() {
-            return Ok(());
-        }
-        let Some(elements) = all_elements(&self.heap, from) else { return Ok(()) };
-        let elements = Owned::of(elements.part(from_start, from_start + count));
-        if let Owned::Characters(characters) = &elements
-            && let Some(target) = self.heap.string_mut(to)
-        {
-            target[to_start..to_start + count].copy_from_slice(characters);
-            return Ok(());
-        }
-        let accepts_all = self.heap.is(to, Kind::SimpleVector);
-        let values = elements.into_values();
-        if !accepts_all {
-            for &value in &values {
-                self.check_element(to, value)?;
-            }
-        }
-        for (offset, &value) in values.iter().enumerate() {
-            self.store_element(to, to_start + offset, value);
-        }
-        Ok(())
+/// Copies `count` elements between what keeps the elements of two arrays, as if by way of a third. The
+/// ranges are inside.
+///
+/// # Errors
+/// `type-error` for the first element that the target cannot keep; nothing has been copied then.
+pub(crate) fn copy_elements(
+    vm: &mut Vm,
+    from: Value,
+    from_start: usize,
+    to: Value,
+    to_start: usize,
+    count: usize,
+) -> Result<(), Exit> {
+    vm.exchange.charge_elements(count);
+    if vm.heap.vector_copy(from, from_start, to, to_start, count).is_some() {
+        return Ok(());
     }
-
-    /// The length of a vector; a type error for anything else.
-    pub(crate) fn vector_length(&mut self, v: Value) -> Result<usize, Exit> {
-        match vector_length(&self.heap, v) {
-            Some(length) => Ok(length),
-            None => self.exchange.type_error(v, "VECTOR"),
+    let Some(elements) = all_elements(&vm.heap, from) else { return Ok(()) };
+    let elements = Owned::of(elements.part(from_start, from_start + count));
+    if let Owned::Characters(characters) = &elements
+        && let Some(target) = vm.heap.string_mut(to)
+    {
+        target[to_start..to_start + count].copy_from_slice(characters);
+        return Ok(());
+    }
+    let accepts_all = vm.heap.is(to, Kind::SimpleVector);
+    let values = elements.into_values();
+    if !accepts_all {
+        for &value in &values {
+            check_element(vm, to, value)?;
         }
+    }
+    for (offset, &value) in values.iter().enumerate() {
+        store_element(&mut vm.heap, to, to_start + offset, value);
+    }
+    Ok(())
+}
+
+/// Returns the length of a vector; a type error for anything else.
+pub(crate) fn expect_length(vm: &mut Vm, v: Value) -> Result<usize, Exit> {
+    match vector_length(&vm.heap, v) {
+        Some(length) => Ok(length),
+        None => vm.exchange.type_error(v, "VECTOR"),
     }
 }
 
-/// A new simple vector with these elements, of the kind that keeps them.
+/// Returns a new simple vector with these elements, of the kind that keeps them.
 fn new_vector(vm: &mut Vm, elements: &Owned) -> Outcome {
     Ok(match elements {
         Owned::Values(values) => vm.heap.alloc_vector(values)?,
@@ -80,11 +78,11 @@ enum Owned {
 }
 
 impl Owned {
-    fn of(elements: Elements<'_>) -> Owned {
+    fn of(elements: ArrayElements<'_>) -> Owned {
         match elements {
-            Elements::Values(values) => Owned::Values(values.to_vec()),
-            Elements::Characters(characters) => Owned::Characters(characters.to_vec()),
-            Elements::Bytes(bytes) => Owned::Bytes(bytes.to_vec()),
+            ArrayElements::Values(values) => Owned::Values(values.to_vec()),
+            ArrayElements::Characters(characters) => Owned::Characters(characters.to_vec()),
+            ArrayElements::Bytes(bytes) => Owned::Bytes(bytes.to_vec()),
         }
     }
 
@@ -132,10 +130,10 @@ pub(super) fn elt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn set_elt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [sequence, index, value] = exactly(arguments);
     if let Some(length) = vector_length(&vm.heap, sequence) {
-        let index = vm.index_below(index, length)?;
+        let index = vm.exchange.index_below(index, length)?;
         let data = data_of(&vm.heap, sequence).unwrap_or(sequence);
-        vm.check_element(data, value)?;
-        vm.store_element(data, index, value);
+        check_element(vm, data, value)?;
+        store_element(&mut vm.heap, data, index, value);
         return Ok(value);
     }
     let pair = list_element(vm, sequence, index)?;
@@ -143,7 +141,7 @@ pub(super) fn set_elt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(value)
 }
 
-/// The pair of a list that has its element `index`.
+/// Returns the pair of a list that has its element `index`.
 fn list_element(vm: &mut Vm, list: Value, index: Value) -> Outcome {
     if !list.is_list() {
         return vm.exchange.type_error(list, "SEQUENCE");
@@ -168,14 +166,15 @@ pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (sequence, start, end) = (arguments[0], arguments[1], optional(arguments, 2));
     if let Some(elements) = vector_elements(&vm.heap, sequence) {
         let length = elements.len();
-        let (start, end) = vm.bounds(start, end, length)?;
+        let (start, end) = vm.exchange.bounds(start, end, length)?;
         if end - start > COPY_LIMIT {
             return Err(Exit::Slowly);
         }
         vm.exchange.charge_elements(end - start);
-        if let Some(characters) = vm.heap.string(sequence) {
-            let part: SmallVec<[u32; 64]> = SmallVec::from_slice(&characters[start..end]);
-            return Ok(vm.heap.alloc_string(&part)?);
+        if vm.heap.string(sequence).is_some() {
+            return Ok(vm.heap.alloc_string_of(end - start, 1, |heap, _| {
+                heap.string(sequence).and_then(|all| all.get(start..end)).unwrap_or_default()
+            })?);
         }
         let part = vector_elements(&vm.heap, sequence).map(|elements| Owned::of(elements.part(start, end)));
         return part.map_or(Ok(Value::NIL), |part| new_vector(vm, &part));
@@ -184,8 +183,8 @@ pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return vm.exchange.type_error(sequence, "SEQUENCE");
     }
     if end.is_nil() || end.as_index().is_none_or(|end| end > LIMIT) {
-        let items = vm.list_items(sequence, LIMIT)?;
-        let (start, end) = vm.bounds(start, end, items.len())?;
+        let items = list_items(vm, sequence, LIMIT)?;
+        let (start, end) = vm.exchange.bounds(start, end, items.len())?;
         return Ok(vm.heap.list(&items[start..end])?);
     }
     // Of a long list only the part up to the end is walked.
@@ -198,17 +197,17 @@ pub(super) fn subseq(vm: &mut Vm, arguments: &[Value]) -> Outcome {
                 items.push(pair.car);
                 rest = pair.cdr;
             }
-            None if rest.is_nil() => return vm.bounds_error(start, end, items.len()),
+            None if rest.is_nil() => return vm.exchange.bounds_error(start, end, items.len()),
             None => return vm.exchange.type_error(rest, "LIST"),
         }
     }
     vm.exchange.charge_elements(wanted);
     if start.as_index().is_none_or(|start| start > wanted) {
         // The failure tells how long the list is.
-        let length = vm.list_items(sequence, LIMIT)?.len();
-        return vm.bounds_error(start, end, length);
+        let length = list_items(vm, sequence, LIMIT)?.len();
+        return vm.exchange.bounds_error(start, end, length);
     }
-    let (start, end) = vm.bounds(start, end, wanted)?;
+    let (start, end) = vm.exchange.bounds(start, end, wanted)?;
     Ok(vm.heap.list(&items[start..end])?)
 }
 
@@ -231,7 +230,7 @@ pub(super) fn reverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !sequence.is_list() {
         return vm.exchange.type_error(sequence, "SEQUENCE");
     }
-    let mut items = vm.list_items(sequence, LIMIT)?;
+    let mut items = list_items(vm, sequence, LIMIT)?;
     items.reverse();
     Ok(vm.heap.list(&items)?)
 }
@@ -251,8 +250,8 @@ pub(super) fn nreverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         for (low, high) in (0..length / 2).map(|low| (low, length - 1 - low)) {
             let elements = all_elements(&vm.heap, data);
             if let Some((a, b)) = elements.and_then(|elements| elements.get(low).zip(elements.get(high))) {
-                vm.store_element(data, low, b);
-                vm.store_element(data, high, a);
+                store_element(&mut vm.heap, data, low, b);
+                store_element(&mut vm.heap, data, high, a);
             }
         }
         return Ok(sequence);
@@ -267,13 +266,13 @@ pub(super) fn nreverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn fill(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [vector, item, start, end] = exactly(arguments);
-    let length = vm.vector_length(vector)?;
-    let (start, end) = vm.bounds(start, end, length)?;
+    let length = expect_length(vm, vector)?;
+    let (start, end) = vm.exchange.bounds(start, end, length)?;
     if end - start > COPY_LIMIT {
         return Err(Exit::Slowly);
     }
     let data = data_of(&vm.heap, vector).unwrap_or(vector);
-    vm.check_element(data, item)?;
+    check_element(vm, data, item)?;
     vm.exchange.charge_elements(end - start);
     if let Some(code) = item.as_character()
         && let Some(characters) = vm.heap.string_mut(data)
@@ -285,7 +284,7 @@ pub(super) fn fill(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return Ok(vector);
     }
     for index in start..end {
-        vm.store_element(data, index, item);
+        store_element(&mut vm.heap, data, index, item);
     }
     Ok(vector)
 }
@@ -293,26 +292,26 @@ pub(super) fn fill(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// The arguments of `%replace`, whose sequences are vectors.
 pub(super) fn replace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [target, source, start1, end1, start2, end2] = exactly(arguments);
-    let (to_length, from_length) = (vm.vector_length(target)?, vm.vector_length(source)?);
-    let (to, to_end) = vm.bounds(start1, end1, to_length)?;
-    let (from, from_end) = vm.bounds(start2, end2, from_length)?;
+    let (to_length, from_length) = (expect_length(vm, target)?, expect_length(vm, source)?);
+    let (to, to_end) = vm.exchange.bounds(start1, end1, to_length)?;
+    let (from, from_end) = vm.exchange.bounds(start2, end2, from_length)?;
     let count = (to_end - to).min(from_end - from);
     if count > COPY_LIMIT {
         return Err(Exit::Slowly);
     }
     let to_data = data_of(&vm.heap, target).unwrap_or(target);
     let from_data = data_of(&vm.heap, source).unwrap_or(source);
-    vm.copy_elements(from_data, from, to_data, to, count)?;
+    copy_elements(vm, from_data, from, to_data, to, count)?;
     Ok(target)
 }
 
 pub(super) fn list_vector(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let items = vm.list_items(arguments[0], LIMIT)?;
+    let items = list_items(vm, arguments[0], LIMIT)?;
     Ok(vm.heap.alloc_vector(&items)?)
 }
 
 pub(super) fn list_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let items = vm.list_items(arguments[0], LIMIT)?;
+    let items = list_items(vm, arguments[0], LIMIT)?;
     let mut characters = Vec::with_capacity(items.len());
     for item in items {
         match item.as_character() {
@@ -325,8 +324,8 @@ pub(super) fn list_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn vector_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [vector, start, end] = exactly(arguments);
-    let length = vm.vector_length(vector)?;
-    let (start, end) = vm.bounds(start, end, length)?;
+    let length = expect_length(vm, vector)?;
+    let (start, end) = vm.exchange.bounds(start, end, length)?;
     if end - start > LIMIT {
         return Err(Exit::Slowly);
     }

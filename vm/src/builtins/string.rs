@@ -5,67 +5,64 @@
 
 use std::cmp::Ordering;
 
-use smallvec::SmallVec;
-
-use crate::builtins::array::{all_elements, data_of};
+use crate::builtins::array::{all_elements, check_element, data_of, store_element};
+use crate::builtins::list::list_items;
 use crate::character;
 use crate::equality::characters_of;
 use crate::raise::{Exit, Outcome};
+use crate::types::is_string;
 use crate::value::Value;
 use crate::vm::Vm;
 
 use super::COPY_LIMIT;
 use super::expect::{exactly, optional};
-use crate::types::is_string;
 
 /// Length of a pattern times that of the string in which it may be looked for at once.
 const SEARCH_LIMIT: usize = 1 << 20;
 
-impl Vm {
-    /// The string that a designator stands for: a string itself, the name of a symbol, a character as a
-    /// string of one.
-    pub(crate) fn string_designator(&mut self, v: Value) -> Outcome {
-        if characters_of(&self.heap, v).is_some() {
-            return Ok(v);
-        }
-        if let Some(code) = v.as_character() {
-            return Ok(self.heap.alloc_string(&[code])?);
-        }
-        match self.world.object_of(&self.heap, v).and_then(|object| self.heap.symbol(object)) {
-            Some(symbol) => Ok(symbol.name),
-            None => self.specifier_error(v, "(OR STRING SYMBOL CHARACTER)"),
-        }
+/// Returns the string that a designator stands for: a string itself, the name of a symbol, a character as a
+/// string of one.
+pub(crate) fn string_designator(vm: &mut Vm, v: Value) -> Outcome {
+    if characters_of(&vm.heap, v).is_some() {
+        return Ok(v);
     }
-
-    /// A designator's string, and the bounds of a part of it.
-    fn designated_part(&mut self, v: Value, start: Value, end: Value) -> Result<(Value, usize, usize), Exit> {
-        let string = self.string_designator(v)?;
-        let (start, end) = self.bounds(start, end, text(self, string).len())?;
-        if end - start > COPY_LIMIT {
-            return Err(Exit::Slowly);
-        }
-        self.exchange.charge_elements(end - start);
-        Ok((string, start, end))
+    if let Some(code) = v.as_character() {
+        return Ok(vm.heap.alloc_string(&[code])?);
+    }
+    match vm.world.object_of(&vm.heap, v).and_then(|object| vm.heap.symbol(object)) {
+        Some(symbol) => Ok(symbol.name),
+        None => vm.exchange.not_written(v, "(OR STRING SYMBOL CHARACTER)"),
     }
 }
 
-/// The characters of a string.
+/// Returns a designator's string, and the bounds of a part of it.
+fn designated_part(vm: &mut Vm, v: Value, start: Value, end: Value) -> Result<(Value, usize, usize), Exit> {
+    let string = string_designator(vm, v)?;
+    let (start, end) = vm.exchange.bounds(start, end, text(vm, string).len())?;
+    if end - start > COPY_LIMIT {
+        return Err(Exit::Slowly);
+    }
+    vm.exchange.charge_elements(end - start);
+    Ok((string, start, end))
+}
+
+/// Returns the characters of a string.
 fn text(vm: &Vm, string: Value) -> &[u32] {
     characters_of(&vm.heap, string).unwrap_or_default()
 }
 
 pub(super) fn string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    vm.string_designator(arguments[0])
+    string_designator(vm, arguments[0])
 }
 
-/// The string and the index that `char` and its like are given.
+/// Returns the string and the index that `char` and its like are given.
 fn string_and_index(vm: &mut Vm, string: Value, index: Value) -> Result<usize, Exit> {
     if !is_string(&vm.heap, string) {
         return vm.exchange.type_error(string, "STRING");
     }
     // Like `aref`, it sees the characters behind a fill pointer.
     let size = all_elements(&vm.heap, string).map_or(0, |elements| elements.len());
-    vm.index_below(index, size)
+    vm.exchange.index_below(index, size)
 }
 
 pub(super) fn char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -83,14 +80,14 @@ pub(super) fn set_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [string, index, character] = exactly(arguments);
     let index = string_and_index(vm, string, index)?;
     let data = data_of(&vm.heap, string).unwrap_or(string);
-    vm.check_element(data, character)?;
-    vm.store_element(data, index, character);
+    check_element(vm, data, character)?;
+    store_element(&mut vm.heap, data, index, character);
     Ok(character)
 }
 
 pub(super) fn make_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [size, character] = exactly(arguments);
-    let size = vm.count(size)?;
+    let size = vm.exchange.count(size)?;
     let Some(code) = character.as_character() else { return vm.exchange.type_error(character, "CHARACTER") };
     if size > COPY_LIMIT {
         return Err(Exit::Slowly);
@@ -103,9 +100,9 @@ pub(super) fn make_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// How two parts of strings compare, and where in the first they begin to differ.
 fn compare(vm: &mut Vm, arguments: &[Value], fold: bool) -> Result<(Ordering, usize), Exit> {
     let (a, start1, end1) =
-        vm.designated_part(arguments[0], optional(arguments, 2), optional(arguments, 3))?;
+        designated_part(vm, arguments[0], optional(arguments, 2), optional(arguments, 3))?;
     let (b, start2, end2) =
-        vm.designated_part(arguments[1], optional(arguments, 4), optional(arguments, 5))?;
+        designated_part(vm, arguments[1], optional(arguments, 4), optional(arguments, 5))?;
     let (left, right) = (&text(vm, a)[start1..end1], &text(vm, b)[start2..end2]);
     let key = |code: u32| if fold { character::fold(code) } else { code };
     let differ = left.iter().zip(right).position(|(&a, &b)| a != b && key(a) != key(b));
@@ -115,7 +112,8 @@ fn compare(vm: &mut Vm, arguments: &[Value], fold: bool) -> Result<(Ordering, us
     })
 }
 
-/// Whether two parts of strings are the same; of different lengths they are not, without a look at them.
+/// Returns whether two parts of strings are the same; of different lengths they are not, without a look at
+/// them.
 fn same(vm: &mut Vm, arguments: &[Value], fold: bool) -> Outcome {
     if let [a, b] = *arguments
         && let (Some(left), Some(right)) = (characters_of(&vm.heap, a), characters_of(&vm.heap, b))
@@ -162,9 +160,9 @@ impl Case {
     }
 }
 
-/// A fresh string with a part of it in another case.
+/// Returns a fresh string with a part of it in another case.
 fn converted(vm: &mut Vm, arguments: &[Value], case: Case) -> Outcome {
-    let (string, start, end) = vm.designated_part(arguments[0], arguments[1], arguments[2])?;
+    let (string, start, end) = designated_part(vm, arguments[0], arguments[1], arguments[2])?;
     let mut characters = text(vm, string).to_vec();
     if characters.len() > COPY_LIMIT {
         return Err(Exit::Slowly);
@@ -173,12 +171,12 @@ fn converted(vm: &mut Vm, arguments: &[Value], case: Case) -> Outcome {
     Ok(vm.heap.alloc_string(&characters)?)
 }
 
-/// The string itself, a part of it changed.
+/// Returns the string itself, a part of it changed.
 fn converted_in_place(vm: &mut Vm, arguments: &[Value], case: Case) -> Outcome {
     if !is_string(&vm.heap, arguments[0]) {
         return vm.exchange.type_error(arguments[0], "STRING");
     }
-    let (string, start, end) = vm.designated_part(arguments[0], arguments[1], arguments[2])?;
+    let (string, start, end) = designated_part(vm, arguments[0], arguments[1], arguments[2])?;
     let data = data_of(&vm.heap, string).unwrap_or(string);
     if let Some(characters) = vm.heap.string_mut(data) {
         case.convert(&mut characters[start..end]);
@@ -210,16 +208,16 @@ pub(super) fn capitalize_in_place(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     converted_in_place(vm, arguments, Case::Capital)
 }
 
-/// The string without the characters of a bag at its ends.
+/// Returns the string without the characters of a bag at its ends.
 fn trimmed(vm: &mut Vm, arguments: &[Value], left: bool, right: bool) -> Outcome {
     let bag = match super::array::vector_elements(&vm.heap, arguments[0]) {
         Some(elements) => {
             (0..elements.len().min(COPY_LIMIT)).filter_map(|index| elements.get(index)).collect()
         }
-        None if arguments[0].is_list() => vm.list_items(arguments[0], COPY_LIMIT)?,
+        None if arguments[0].is_list() => list_items(vm, arguments[0], COPY_LIMIT)?,
         None => return vm.exchange.type_error(arguments[0], "SEQUENCE"),
     };
-    let (string, start, end) = vm.designated_part(arguments[1], Value::NIL, Value::NIL)?;
+    let (string, start, end) = designated_part(vm, arguments[1], Value::NIL, Value::NIL)?;
     let characters = &text(vm, string)[start..end];
     let bag: Vec<u32> = bag.into_iter().filter_map(Value::as_character).collect();
     let is_kept = |code: &u32| !bag.contains(code);
@@ -244,19 +242,20 @@ pub(super) fn right_trim(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     trimmed(vm, arguments, false, true)
 }
 
+/// The twin takes other sequences too.
 pub(super) fn concat(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let mut characters: SmallVec<[u32; 64]> = SmallVec::new();
+    let mut length = 0;
     for &string in arguments {
-        let Some(more) = characters_of(&vm.heap, string) else {
-            return vm.exchange.type_error(string, "STRING");
-        };
-        if characters.len() + more.len() > COPY_LIMIT {
-            return Err(Exit::Slowly);
-        }
-        characters.extend_from_slice(more);
+        let Some(more) = characters_of(&vm.heap, string) else { return Err(Exit::Slowly) };
+        length += more.len();
     }
-    vm.exchange.charge_elements(characters.len());
-    Ok(vm.heap.alloc_string(&characters)?)
+    if length > COPY_LIMIT {
+        return Err(Exit::Slowly);
+    }
+    vm.exchange.charge_elements(length);
+    Ok(vm.heap.alloc_string_of(length, arguments.len(), |heap, index| {
+        characters_of(heap, arguments[index]).unwrap_or_default()
+    })?)
 }
 
 pub(super) fn search(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -266,7 +265,7 @@ pub(super) fn search(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             return vm.exchange.type_error(v, "STRING");
         }
     }
-    let (start, end) = vm.bounds(start, end, text(vm, string).len())?;
+    let (start, end) = vm.exchange.bounds(start, end, text(vm, string).len())?;
     let length = text(vm, pattern).len();
     // A long string is searched in part: what is often found there need not be left to the twin.
     let limit = COPY_LIMIT.min(SEARCH_LIMIT / length.max(1));

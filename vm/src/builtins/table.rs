@@ -8,7 +8,7 @@
 use crate::equality::{self, Test};
 use crate::number;
 use crate::raise::{Exit, Outcome};
-use crate::table::{Comparison, Table, Trouble};
+use crate::table::{KeyComparison, Table, Trouble};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -24,7 +24,7 @@ impl From<Trouble> for Exit {
     }
 }
 
-/// The table that `v` is; a type error for anything else.
+/// Returns the table that `v` is; a type error for anything else.
 fn table(vm: &mut Vm, v: Value) -> Result<Table, Exit> {
     match Table::of(&vm.heap, v) {
         Some(table) => Ok(table),
@@ -32,18 +32,14 @@ fn table(vm: &mut Vm, v: Value) -> Result<Table, Exit> {
     }
 }
 
-/// The entry of a key, if it has one; and its hash, if that was needed to know.
-///
-/// The key is often the one that was looked up last, as in `(push item (gethash key table))`: that entry is
-/// tried first.
+/// Returns the entry of a key, if it has one; and its hash, if that was needed to know.
 #[inline(always)]
-fn find(vm: &mut Vm, table: Table, key: Value) -> Result<Place, Exit> {
-    let Comparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
-    let (last_key, last_entry) = vm.exchange.last_lookup;
-    if last_key == key
-        && let Some(value) = table.value_of(&vm.heap, last_entry, key)
+fn find(vm: &mut Vm, table: Table, key: Value) -> Result<KeyPlace, Exit> {
+    let KeyComparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
+    if let Some(entry) = vm.exchange.last_lookup.guess(key)
+        && let Some(value) = table.value_of(&vm.heap, entry, key)
     {
-        return Ok(Place::Entry(last_entry, value));
+        return Ok(KeyPlace::Entry(entry, value));
     }
     match key.as_fixnum() {
         // A fixnum is the same as itself alone.
@@ -54,13 +50,13 @@ fn find(vm: &mut Vm, table: Table, key: Value) -> Result<Place, Exit> {
 
 /// As [`find`], for keys of any kind.
 #[inline(never)]
-fn find_other(vm: &mut Vm, table: Table, test: Test, key: Value) -> Result<Place, Exit> {
+fn find_other(vm: &mut Vm, table: Table, test: Test, key: Value) -> Result<KeyPlace, Exit> {
     let hash = equality::hash(&vm.heap, test, key);
     search(vm, table, test, key, hash)
 }
 
 #[inline(always)]
-fn search(vm: &mut Vm, table: Table, test: Test, key: Value, hash: u32) -> Result<Place, Exit> {
+fn search(vm: &mut Vm, table: Table, test: Test, key: Value, hash: u32) -> Result<KeyPlace, Exit> {
     let mut work = LIMIT;
     let found = table.find(&vm.heap, test, key, hash, &mut work)?;
     if work != LIMIT {
@@ -68,15 +64,15 @@ fn search(vm: &mut Vm, table: Table, test: Test, key: Value, hash: u32) -> Resul
     }
     Ok(match found {
         Some((entry, value)) => {
-            vm.exchange.last_lookup = (key, entry);
-            Place::Entry(entry, value)
+            vm.exchange.last_lookup.note(key, entry);
+            KeyPlace::Entry(entry, value)
         }
-        None => Place::None(hash),
+        None => KeyPlace::None(hash),
     })
 }
 
 /// What a search comes to.
-enum Place {
+enum KeyPlace {
     /// The entry with the key, and its value.
     Entry(usize, Value),
     /// There is none; the hash of the key.
@@ -86,14 +82,14 @@ enum Place {
 pub(super) fn make_hash_table(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [test, size, test_function, hash_function] = exactly(arguments);
     let comparison = match test.as_index() {
-        Some(0) => Comparison::Native(Test::Eq),
-        Some(1) => Comparison::Native(Test::Eql),
-        Some(2) => Comparison::Native(Test::Equal),
-        Some(3) => Comparison::Native(Test::Equalp),
-        Some(4) => Comparison::Program,
+        Some(0) => KeyComparison::Native(Test::Eq),
+        Some(1) => KeyComparison::Native(Test::Eql),
+        Some(2) => KeyComparison::Native(Test::Equal),
+        Some(3) => KeyComparison::Native(Test::Equalp),
+        Some(4) => KeyComparison::Program,
         _ => return vm.exchange.index_error(test, 5),
     };
-    let size = vm.count(size)?;
+    let size = vm.exchange.count(size)?;
     let table = Table::make(&mut vm.heap, comparison, size, [test_function, hash_function])?;
     vm.exchange.charge_elements(size.min(LIMIT));
     Ok(table)
@@ -102,8 +98,8 @@ pub(super) fn make_hash_table(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn gethash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[1])?;
     match find(vm, table, arguments[0])? {
-        Place::Entry(_, value) => vm.give_values(&[value, Value::T]),
-        Place::None(_) => vm.give_values(&[optional(arguments, 2), Value::NIL]),
+        KeyPlace::Entry(_, value) => vm.give_values(&[value, Value::T]),
+        KeyPlace::None(_) => vm.give_values(&[optional(arguments, 2), Value::NIL]),
     }
 }
 
@@ -111,8 +107,8 @@ pub(super) fn puthash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [key, table_value, value] = exactly(arguments);
     let table = table(vm, table_value)?;
     match find(vm, table, key)? {
-        Place::Entry(entry, _) => table.set_value(&mut vm.heap, entry, value),
-        Place::None(hash) => add(vm, table, hash, key, value)?,
+        KeyPlace::Entry(entry, _) => table.set_value(&mut vm.heap, entry, value),
+        KeyPlace::None(hash) => add(vm, table, hash, key, value)?,
     }
     Ok(value)
 }
@@ -122,8 +118,8 @@ pub(super) fn add_to_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, table_value)?;
     let place = find(vm, table, key)?;
     let old = match place {
-        Place::Entry(_, value) => value,
-        Place::None(_) => default,
+        KeyPlace::Entry(_, value) => value,
+        KeyPlace::None(_) => default,
     };
     let sum = match number::add(vm, old, delta) {
         Err(Exit::Collect) => return Err(Exit::Collect),
@@ -132,8 +128,8 @@ pub(super) fn add_to_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         Ok(sum) => sum,
     };
     match place {
-        Place::Entry(entry, _) => table.set_value(&mut vm.heap, entry, sum),
-        Place::None(hash) => add(vm, table, hash, key, sum)?,
+        KeyPlace::Entry(entry, _) => table.set_value(&mut vm.heap, entry, sum),
+        KeyPlace::None(hash) => add(vm, table, hash, key, sum)?,
     }
     Ok(sum)
 }
@@ -149,7 +145,7 @@ fn add(vm: &mut Vm, table: Table, hash: u32, key: Value, value: Value) -> Result
 pub(super) fn remhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [key, table_value] = exactly(arguments);
     let table = table(vm, table_value)?;
-    let Comparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
+    let KeyComparison::Native(test) = table.comparison(&vm.heap) else { return Err(Exit::Slowly) };
     let hash = equality::hash(&vm.heap, test, key);
     let mut work = LIMIT;
     let found = table.find(&vm.heap, test, key, hash, &mut work)?;
@@ -176,11 +172,11 @@ pub(super) fn hash_table_size(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn hash_table_test(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
     let number = match table.comparison(&vm.heap) {
-        Comparison::Native(Test::Eq) => 0,
-        Comparison::Native(Test::Eql) => 1,
-        Comparison::Native(Test::Equal) => 2,
-        Comparison::Native(Test::Equalp) => 3,
-        Comparison::Program => 4,
+        KeyComparison::Native(Test::Eq) => 0,
+        KeyComparison::Native(Test::Eql) => 1,
+        KeyComparison::Native(Test::Equal) => 2,
+        KeyComparison::Native(Test::Equalp) => 3,
+        KeyComparison::Program => 4,
     };
     let [test, hash] = table.functions(&vm.heap);
     vm.give_values(&[Value::small(number), test, hash])
@@ -189,7 +185,7 @@ pub(super) fn hash_table_test(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn table_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [table_value, position] = exactly(arguments);
     let table = table(vm, table_value)?;
-    let position = vm.count(position)?;
+    let position = vm.exchange.count(position)?;
     let used = table.used(&vm.heap);
     for at in position..used.min(position.saturating_add(LIMIT)) {
         if let Some((key, value)) = table.entry(&vm.heap, at) {
@@ -207,7 +203,7 @@ pub(super) fn table_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn table_skip(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [table_value, position] = exactly(arguments);
     let table = table(vm, table_value)?;
-    let position = vm.count(position)?;
+    let position = vm.exchange.count(position)?;
     let end = table.used(&vm.heap).min(position.saturating_add(LIMIT)).max(position);
     vm.exchange.charge_elements(end - position);
     let next = (position..end).find(|&at| table.entry(&vm.heap, at).is_some());
@@ -218,14 +214,14 @@ pub(super) fn table_hash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [table_value, key] = exactly(arguments);
     let table = table(vm, table_value)?;
     let test = match table.comparison(&vm.heap) {
-        Comparison::Native(test) => test,
-        Comparison::Program => Test::Equalp,
+        KeyComparison::Native(test) => test,
+        KeyComparison::Program => Test::Equalp,
     };
     Ok(Value::index(equality::hash(&vm.heap, test, key) as usize))
 }
 
-/// The 32 bits of a hash: a fixnum as [`table_hash`] gives it, or any integer of a hash function of the
-/// program.
+/// Returns the 32 bits of a hash: a fixnum as [`table_hash`] gives it, or any integer of a hash function of
+/// the program.
 fn hash_argument(vm: &mut Vm, v: Value) -> Result<u32, Exit> {
     match v.as_index().and_then(|hash| u32::try_from(hash).ok()) {
         Some(hash) => Ok(hash),
@@ -252,10 +248,10 @@ pub(super) fn table_serial(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::index(table.serial(&vm.heap)))
 }
 
-/// The table, and the entry with its value if it still has this very key.
+/// Returns the table, and the entry with its value if it still has this very key.
 fn entry_of_key(vm: &mut Vm, arguments: &[Value]) -> Result<(Table, Option<(usize, Value)>), Exit> {
     let table = table(vm, arguments[0])?;
-    let entry = vm.count(arguments[1])?;
+    let entry = vm.exchange.count(arguments[1])?;
     let value = table.entry(&vm.heap, entry).filter(|&(key, _)| key == arguments[2]).map(|(_, value)| value);
     Ok((table, value.map(|value| (entry, value))))
 }

@@ -1,61 +1,56 @@
 //! Tasks: making them, what is known of them, ending them, limits, guards and critical sections.
 
 use crate::builtins::LIMIT;
-use crate::builtins::event::take_or_park;
-use crate::heap::Kind;
+use crate::builtins::event::{nanoseconds, take_or_park};
+use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Outcome};
 use crate::run::{self, SpawnOptions};
-use crate::task::End;
-use crate::task::guard;
-use crate::task::{DEFAULT_PRIORITY, PRIORITIES, TaskIndex, TaskNumber, TaskState};
+use crate::schedule::Scheduler;
+use crate::task::{DEFAULT_PRIORITY, End, PRIORITIES, TaskIndex, TaskNumber, TaskState, guard};
 use crate::value::Value;
 use crate::vm::Vm;
-
-use super::expect::exactly;
 use crate::wait::{WaitOptions, event};
 
-impl Vm {
-    /// The task that `v` is.
-    ///
-    /// # Errors
-    /// A failure if it is none.
-    pub(super) fn expect_task(&mut self, v: Value) -> Result<Value, Exit> {
-        if self.heap.is(v, Kind::Task) { Ok(v) } else { self.exchange.not_a(v, self.world.known.task) }
-    }
+use super::expect::exactly;
 
-    /// Whether a task has ended.
-    pub(super) fn has_ended(&self, task: Value) -> bool {
-        !self.heap.slot_or_nil(task, event::STATE).is_fixnum()
-    }
+/// Returns the task that `v` is.
+///
+/// # Errors
+/// A failure if it is none.
+pub(super) fn expect_task(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
+    if vm.heap.is(v, Kind::Task) { Ok(v) } else { vm.exchange.not_a(v, vm.world.known.task) }
+}
 
-    /// A number of ticks.
-    fn ticks_argument(&mut self, v: Value) -> Result<u64, Exit> {
-        match v.as_index() {
-            Some(ticks) => Ok(ticks as u64),
-            None if self.heap.is(v, Kind::Bignum) => Ok(i64::MAX as u64),
-            None => self.exchange.type_error(v, "UNSIGNED-BYTE"),
-        }
-    }
+/// Returns whether a task has ended.
+pub(super) fn has_ended(heap: &Heap, task: Value) -> bool {
+    !heap.slot_or_nil(task, event::STATE).is_fixnum()
+}
 
-    /// Waits for the end of a task. `None` once it has ended.
-    fn wait_for_end(&mut self, task: Value, urgent: bool, child: bool) -> Option<Outcome> {
-        if self.has_ended(task) {
-            self.scheduler.cancel_wait(&mut self.heap);
-            return None;
-        }
-        let what = self.world.known.task_end;
-        let options = WaitOptions { urgent, child, what, ..WaitOptions::default() };
-        Some(take_or_park(self, task, options))
+/// Returns a number of ticks.
+fn ticks_argument(vm: &mut Vm, v: Value) -> Result<u64, Exit> {
+    match v.as_index() {
+        Some(ticks) => Ok(ticks as u64),
+        None if vm.heap.is(v, Kind::Bignum) => Ok(i64::MAX as u64),
+        None => vm.exchange.type_error(v, "UNSIGNED-BYTE"),
     }
 }
 
-impl Vm {
-    /// Number and object of the task with this index, if it is one that is listed.
-    fn listed_task(&self, index: usize, shows_hidden: bool) -> Option<(TaskNumber, Value)> {
-        let task = self.scheduler.find(TaskIndex(index as u32))?;
-        let is_listed = task.state != TaskState::Ended && (shows_hidden || !task.flags.hidden());
-        is_listed.then_some((task.number, task.object))
+/// Waits for the end of a task. `None` once it has ended.
+fn wait_for_end(vm: &mut Vm, task: Value, urgent: bool, child: bool) -> Option<Outcome> {
+    if has_ended(&vm.heap, task) {
+        vm.scheduler.cancel_wait(&mut vm.heap);
+        return None;
     }
+    let what = vm.world.known.task_end;
+    let options = WaitOptions { urgent, child, what, ..WaitOptions::default() };
+    Some(take_or_park(vm, task, options))
+}
+
+/// Number and object of the task with this index, if it is one that is listed.
+fn listed_task(scheduler: &Scheduler, index: usize, shows_hidden: bool) -> Option<(TaskNumber, Value)> {
+    let task = scheduler.find(TaskIndex(index as u32))?;
+    let is_listed = task.state != TaskState::Ended && (shows_hidden || !task.flags.hidden());
+    is_listed.then_some((task.number, task.object))
 }
 
 pub(super) fn spawn(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -65,12 +60,12 @@ pub(super) fn spawn(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         v if v.is_nil() => DEFAULT_PRIORITY,
         v => match v.as_index().filter(|&priority| priority < PRIORITIES) {
             Some(priority) => priority as u8,
-            None => return vm.specifier_error(v, "(INTEGER 0 7)"),
+            None => return vm.exchange.not_written(v, "(INTEGER 0 7)"),
         },
     };
     let budget = match argument(3) {
         v if v.is_nil() => None,
-        v => Some(vm.ticks_argument(v)?),
+        v => Some(ticks_argument(vm, v)?),
     };
     let daemon = argument(4);
     let options = SpawnOptions {
@@ -95,7 +90,7 @@ pub(super) fn taskp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point_of_read()?;
-    let task = vm.expect_task(arguments[0])?;
+    let task = expect_task(vm, arguments[0])?;
     let state = vm.heap.slot_or_nil(task, event::STATE);
     let Some(index) = event::task_index(&vm.heap, task) else { return Ok(state) };
     let known = &vm.world.known;
@@ -106,7 +101,7 @@ pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn task_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let task = vm.expect_task(arguments[0])?;
+    let task = expect_task(vm, arguments[0])?;
     let Some(index) = event::task_index(&vm.heap, task) else { return Ok(Value::NIL) };
     let number = vm.scheduler.find(index).map_or(TaskNumber::NONE, |task| task.number);
     let parent = vm.heap.slot_or_nil(task, event::RESULT);
@@ -114,7 +109,7 @@ pub(super) fn task_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn task_ticks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let task = vm.expect_task(arguments[0])?;
+    let task = expect_task(vm, arguments[0])?;
     let Some(index) = event::task_index(&vm.heap, task) else { return Ok(Value::NIL) };
     let ticks = vm.scheduler.find(index).map_or(0, |task| task.ticks);
     Ok(Value::index(ticks as usize))
@@ -122,11 +117,11 @@ pub(super) fn task_ticks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn task_end(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point_of_read()?;
-    let task = vm.expect_task(arguments[0])?;
-    if vm.has_ended(task) { give_end(vm, task) } else { Ok(Value::NIL) }
+    let task = expect_task(vm, arguments[0])?;
+    if has_ended(&vm.heap, task) { give_end(vm, task) } else { Ok(Value::NIL) }
 }
 
-/// The status of a task that has ended, then its values, or the condition.
+/// Returns the status of a task that has ended, then its values, or the condition.
 fn give_end(vm: &mut Vm, task: Value) -> Outcome {
     let (status, result) =
         (vm.heap.slot_or_nil(task, event::STATE), vm.heap.slot_or_nil(task, event::RESULT));
@@ -146,7 +141,7 @@ fn give_end(vm: &mut Vm, task: Value) -> Outcome {
 }
 
 pub(super) fn task_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let task = vm.expect_task(arguments[0])?;
+    let task = expect_task(vm, arguments[0])?;
     if vm.heap.slot_or_nil(task, event::STATE) != vm.world.known.succeeded {
         return Ok(Value::NIL);
     }
@@ -161,7 +156,7 @@ pub(super) fn all_tasks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
     let mut tasks: Vec<(TaskNumber, Value)> = Vec::new();
     for index in 0..vm.scheduler.tasks.places() {
-        tasks.extend(vm.listed_task(index, arguments[0].is_true()));
+        tasks.extend(listed_task(&vm.scheduler, index, arguments[0].is_true()));
     }
     tasks.sort_unstable_by_key(|&(number, _)| number);
     vm.exchange.charge(64 * tasks.len());
@@ -175,7 +170,7 @@ pub(super) fn tasks_from(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let end = vm.scheduler.tasks.places().min(place.saturating_add(LIMIT));
     let mut objects = Vec::new();
     for index in place..end {
-        objects.extend(vm.listed_task(index, hidden.is_true()).map(|(_, object)| object));
+        objects.extend(listed_task(&vm.scheduler, index, hidden.is_true()).map(|(_, object)| object));
     }
     let list = vm.heap.list(&objects)?;
     vm.exchange.charge(LIMIT + 8 * objects.len());
@@ -188,8 +183,8 @@ pub(super) fn join(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if vm.scheduler.task().wait.is_nil() {
         vm.scheduler.point()?;
     }
-    let task = vm.expect_task(task)?;
-    match vm.wait_for_end(task, false, child.is_true()) {
+    let task = expect_task(vm, task)?;
+    match wait_for_end(vm, task, false, child.is_true()) {
         Some(outcome) => outcome,
         None => give_end(vm, task),
     }
@@ -197,7 +192,7 @@ pub(super) fn join(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn request_abort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
-    let task = vm.expect_task(arguments[0])?;
+    let task = expect_task(vm, arguments[0])?;
     if let Some(index) = event::task_index(&vm.heap, task)
         && let Some(id) = vm.scheduler.tasks.id_at(index)
     {
@@ -207,7 +202,7 @@ pub(super) fn request_abort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn abort_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let task = vm.expect_task(arguments[0])?;
+    let task = expect_task(vm, arguments[0])?;
     if vm.scheduler.task().wait.is_nil() {
         if task == vm.scheduler.task().object {
             if vm.scheduler.task().runs_cleanup() || vm.scheduler.task().critical > 0 {
@@ -222,7 +217,7 @@ pub(super) fn abort_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             return Ok(Value::NIL);
         }
     }
-    vm.wait_for_end(task, true, false).unwrap_or(Ok(Value::NIL))
+    wait_for_end(vm, task, true, false).unwrap_or(Ok(Value::NIL))
 }
 
 pub(super) fn add_checkpoint(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -237,8 +232,20 @@ pub(super) fn add_checkpoint(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn checkpoints(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point_of_read()?;
-    let task = vm.expect_task(arguments[0])?;
+    let task = expect_task(vm, arguments[0])?;
     Ok(vm.heap.slot_or_nil(task, event::CHECKPOINTS))
+}
+
+pub(super) fn held(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    Ok(vm.heap.slot_or_nil(vm.scheduler.task().object, event::HELD))
+}
+
+pub(super) fn set_held(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    if !arguments[0].is_list() {
+        return vm.exchange.type_error(arguments[0], "LIST");
+    }
+    vm.heap.slot_set(vm.scheduler.task().object, event::HELD, arguments[0]);
+    Ok(arguments[0])
 }
 
 pub(super) fn make_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -271,9 +278,18 @@ pub(super) fn close_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn open_limit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [tag, seconds, ticks] = exactly(arguments);
-    let time = if seconds.is_nil() { None } else { Some(vm.nanoseconds(seconds)?) };
-    let ticks = if ticks.is_nil() { None } else { Some(vm.ticks_argument(ticks)?) };
+    let time = if seconds.is_nil() { None } else { Some(nanoseconds(vm, seconds)?) };
+    let ticks = if ticks.is_nil() { None } else { Some(ticks_argument(vm, ticks)?) };
     Ok(Value::boolean(run::open_limit(vm, tag, time, ticks)))
+}
+
+pub(super) fn expire_limit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [task, tag, cause] = exactly(arguments);
+    vm.scheduler.point()?;
+    if let Some(index) = event::task_index(&vm.heap, task) {
+        run::expire_limit(vm, index, tag, cause);
+    }
+    Ok(Value::NIL)
 }
 
 pub(super) fn begin_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {

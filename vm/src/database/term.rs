@@ -12,7 +12,7 @@
 use super::bucket::{Buckets, finish, mix};
 use crate::equality::{self, Test};
 use crate::heap::{AllocError, Heap};
-use crate::table::{Comparison, Table};
+use crate::table::{KeyComparison, Table};
 use crate::value::Value;
 
 /// Greatest number of pairs in a term.
@@ -311,7 +311,7 @@ impl Terms {
         if self.objects.is_true() {
             return Ok(None);
         }
-        self.objects = Table::make(heap, Comparison::Native(Test::Eq), 8, [Value::NIL; 2])?;
+        self.objects = Table::make(heap, KeyComparison::Native(Test::Eq), 8, [Value::NIL; 2])?;
         Ok(Some(self.objects))
     }
 

@@ -314,7 +314,8 @@ impl Unit {
         datum
     }
 
-    /// Returns the datum that an object was made from. Of an atom that has none, returns a datum without a place.
+    /// Returns the datum that an object was made from. Of an atom that has none, returns a datum without a
+    /// place.
     pub(crate) fn origin_of(&mut self, heap: &Heap, world: &World, object: Value) -> Option<Datum> {
         let known = self.data.get(&object.bits()).map(|(_, datum)| datum.clone());
         known.or_else(|| match parts_of(heap, object) {

@@ -191,11 +191,11 @@ fn runner_module() -> Module {
         4,
         &[],
         &[
-            Instr::LoadNil { first: Base(1), count: Count(1) },
+            Instr::LoadNil { first: Room(1), count: Count(1) },
             Instr::JumpIfNotCons { test: Reg(0), to: Jump16(6) },
             Instr::Car { dst: Dst(2), list: Reg(0) },
             Instr::Cdr { dst: Dst(0), list: Reg(0) },
-            Instr::Call { window: Base(2), count: Count(0), want: Want::ONE, pad: Pad(0) },
+            Instr::Call { window: Window(2), count: Count(0), want: Want::ONE, pad: Pad(0) },
             Instr::Move { dst: Dst(1), src: Reg(2) },
             Instr::LoopIfCons { test: Reg(0), to: Back16(-6) },
             Instr::Return { src: Reg(1) },
@@ -222,7 +222,8 @@ impl CompileTimeHost for Vm {
             Err((error, condition)) => {
                 let culprits = self.culprits(condition);
                 let place = self.embedder.last_place.take();
-                return Err(CompileTimeFailure { report: error.to_string(), place, culprits });
+                let report = self.expander_text(condition).unwrap_or_else(|| error.to_string());
+                return Err(CompileTimeFailure { report, place, culprits });
             }
         };
         let expansion = values.first().copied().unwrap_or(Value::NIL);
@@ -245,6 +246,19 @@ impl CompileTimeHost for Vm {
 }
 
 impl Vm {
+    /// Returns the library's text about the condition with which a macro has failed. There is none if it did
+    /// not fail but was stopped, and none while the library is being built.
+    fn expander_text(&mut self, condition: Value) -> Option<String> {
+        let writer = self.world.known.expander_text;
+        if condition.is_nil() || !self.world.is_defined(&self.heap, writer) {
+            return None;
+        }
+        self.embedder.pin(&mut self.heap, condition);
+        let text = self.call(writer, &[condition], MACRO_TICKS);
+        self.embedder.unpin(condition);
+        self.heap.string_text(*text.ok()?.first()?)
+    }
+
     /// Returns the objects that a condition is about, as data of the unit: the values of its slots, and the
     /// items of those that are lists.
     fn culprits(&self, condition: Value) -> Vec<Datum> {

@@ -75,6 +75,11 @@ impl Environment for Vm {
         self.read_symbol(package, name, internal)
     }
 
+    fn read_base(&self) -> u32 {
+        let base = self.symbol_value(self.world.known.read_base).and_then(Value::as_fixnum);
+        base.and_then(|base| u32::try_from(base).ok()).filter(|base| (2..=36).contains(base)).unwrap_or(10)
+    }
+
     fn fresh(&mut self) -> u32 {
         self.world.fresh()
     }

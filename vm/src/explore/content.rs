@@ -12,7 +12,7 @@ use crate::state::{
     VisitCompiler, VisitControl, VisitExtra, VisitOutside, VisitRunning, VisitScheduler, VisitTask, VisitVm,
     VisitWorld,
 };
-use crate::task::{Control, Entry, Extra, Running, Task, TaskState};
+use crate::task::{Allowance, Control, Entry, Extra, Running, Task, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::World;
@@ -145,6 +145,17 @@ impl VisitExtra for Walk<'_> {
     fn interrupts(&mut self, extra: &Extra) {
         self.values(&extra.interrupts);
     }
+
+    fn fund(&mut self, extra: &Extra) {
+        match extra.fund {
+            Some(fund) => {
+                self.word(fund.depth as u64);
+                self.word(fund.floor.map_or(u64::MAX, |floor| floor as u64));
+                self.time(fund.ends.time);
+            }
+            None => self.word(0),
+        }
+    }
 }
 
 impl VisitControl for Walk<'_> {
@@ -190,6 +201,7 @@ impl VisitRunning for Walk<'_> {
 
     fn allowance(&mut self, running: &Running) {
         match running.allowance {
+            Some(Allowance::OVER) => self.word(1),
             Some(allowance) => self.time(allowance.time),
             None => self.word(0),
         }
@@ -241,5 +253,12 @@ impl VisitOutside for Walk<'_> {
 
     fn console(&mut self, outside: &Outside) {
         self.word(outside.console.noted());
+    }
+
+    fn operations(&mut self, outside: &Outside) {
+        for open in outside.operations.open.values() {
+            self.value(open.handle);
+            self.word(u64::from(open.is_cancelled));
+        }
     }
 }

@@ -71,13 +71,13 @@ impl Fingerprints {
         self.codes.clear();
     }
 
-    /// The fingerprint of the state of a machine in which no task runs.
+    /// Returns the fingerprint of the state of a machine in which no task runs.
     pub(super) fn of(&mut self, vm: &mut Vm) -> u128 {
         if self.cycle != vm.heap.cycle_id() {
             self.cycle = vm.heap.cycle_id();
             self.codes.clear();
         }
-        let now = vm.scheduler.clock.read(&mut *vm.outside.host);
+        let now = vm.scheduler.clock.read(&mut vm.outside.host);
         let mut walk = Walk {
             vm,
             known: self,
@@ -331,7 +331,7 @@ impl Walk<'_> {
         digest
     }
 
-    /// The registers that a function may still read, by place.
+    /// Returns the registers that a function may still read, by place.
     pub(super) fn live(&mut self, function: Value) -> Rc<Live> {
         let digest = self.code_of_function(function);
         if let Some(live) = self.known.live.get(&digest) {

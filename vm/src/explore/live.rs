@@ -5,8 +5,8 @@
 //! a landing of a control entry reads is live everywhere in its function.
 
 use esl_bytecode::module::CaptureSource;
-use esl_bytecode::opcode::{Call, Instr};
-use esl_bytecode::operand::{Base, Count, Role};
+use esl_bytecode::opcode::{Call, Instr, RegisterAccess};
+use esl_bytecode::operand::{Role, Window};
 
 use crate::heap::Heap;
 use crate::shape::capture_source;
@@ -14,9 +14,9 @@ use crate::value::Value;
 
 /// A set of registers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct RegisterSet([u64; 4]);
+pub(super) struct LiveRegisters([u64; 4]);
 
-impl RegisterSet {
+impl LiveRegisters {
     pub(super) fn contains(self, register: usize) -> bool {
         self.0[register >> 6 & 3] >> (register & 63) & 1 != 0
     }
@@ -25,24 +25,25 @@ impl RegisterSet {
         self.0[register >> 6 & 3] |= 1 << (register & 63);
     }
 
-    fn insert_range(&mut self, first: usize, count: usize) {
-        (first..(first + count).min(256)).for_each(|register| self.insert(register));
+    fn insert_range(&mut self, first: u8, count: u8) {
+        (usize::from(first)..(usize::from(first) + usize::from(count)).min(256))
+            .for_each(|register| self.insert(register));
     }
 
-    pub(super) fn with(self, other: RegisterSet) -> RegisterSet {
-        RegisterSet(std::array::from_fn(|word| self.0[word] | other.0[word]))
+    pub(super) fn with(self, other: LiveRegisters) -> LiveRegisters {
+        LiveRegisters(std::array::from_fn(|word| self.0[word] | other.0[word]))
     }
 
-    fn without(self, other: RegisterSet) -> RegisterSet {
-        RegisterSet(std::array::from_fn(|word| self.0[word] & !other.0[word]))
+    fn without(self, other: LiveRegisters) -> LiveRegisters {
+        LiveRegisters(std::array::from_fn(|word| self.0[word] & !other.0[word]))
     }
 }
 
 /// An instruction's effect on liveness.
 struct LiveStep {
     at: usize,
-    reads: RegisterSet,
-    writes: RegisterSet,
+    reads: LiveRegisters,
+    writes: LiveRegisters,
     /// Words at which control may continue.
     next: [Option<usize>; 2],
     /// Landing of the control entry that it pushes.
@@ -51,7 +52,7 @@ struct LiveStep {
 
 /// The live registers for each word at which an instruction begins.
 #[derive(Debug, Default)]
-pub(super) struct Live(Vec<RegisterSet>);
+pub(super) struct Live(Vec<LiveRegisters>);
 
 impl Live {
     /// Analyses a function with these words and constants.
@@ -62,8 +63,8 @@ impl Live {
             steps.push(step(heap, constants, at, instruction));
             at += instruction.opcode().words();
         }
-        let mut live = vec![RegisterSet::default(); words.len() + 1];
-        let mut landed = RegisterSet::default();
+        let mut live = vec![LiveRegisters::default(); words.len() + 1];
+        let mut landed = LiveRegisters::default();
         let mut has_changed = true;
         while has_changed {
             has_changed = false;
@@ -83,53 +84,37 @@ impl Live {
     }
 
     /// Returns the registers that may be read from word `at` on.
-    pub(super) fn at(&self, at: usize) -> RegisterSet {
+    pub(super) fn at(&self, at: usize) -> LiveRegisters {
         self.0.get(at).copied().unwrap_or_default()
     }
 }
 
 fn step(heap: &Heap, constants: &[Value], at: usize, instruction: Instr) -> LiveStep {
     let after = at + instruction.opcode().words();
-    let (mut reads, mut writes) = (RegisterSet::default(), RegisterSet::default());
-    let mut jump = None;
-    instruction.visit_operands(|role| match role {
-        Role::Read(register) => reads.insert(usize::from(register)),
-        Role::Write(register) => writes.insert(usize::from(register)),
-        Role::Forward(by) | Role::Backward(by) => jump = after.checked_add_signed(by as isize),
-        _ => {}
+    let (mut reads, mut writes) = (LiveRegisters::default(), LiveRegisters::default());
+    instruction.visit_registers(|access| match access {
+        RegisterAccess::Read { first, count } => reads.insert_range(first, count),
+        RegisterAccess::Write { first, count } => writes.insert_range(first, count),
     });
-    let range = |set: &mut RegisterSet, Base(first): Base, skipped: usize, Count(count): Count| {
-        set.insert_range(usize::from(first) + skipped, usize::from(count));
-    };
-    if let Some(Call { callee, window, count, .. }) = instruction.call() {
+    if let Some(Call { callee, window: Window(window), count, .. }) = instruction.call() {
         if callee.is_in_window() {
-            reads.insert(usize::from(window.0));
+            reads.insert(usize::from(window));
         }
-        range(&mut reads, window, 2, count);
-        range(&mut writes, window, 0, Count(u8::MAX));
+        reads.insert_range(window.saturating_add(2), count.0);
+        writes.insert_range(window, u8::MAX);
     }
-    let falls_through = instruction.opcode().falls_through();
-    let mut lands = false;
-    match instruction {
-        Instr::List { first, count, .. }
-        | Instr::SetValues { first, count }
-        | Instr::ReturnValues { first, count } => range(&mut reads, first, 0, count),
-        Instr::LoadNil { first, count } | Instr::GetValues { first, count } => {
-            range(&mut writes, first, 0, count);
-        }
-        Instr::MakeClosure { function, .. } => {
-            for register in captured_registers(heap, constants.get(usize::from(function.0)).copied()) {
+    let (mut jump, mut landing) = (None, None);
+    instruction.visit_operands(|role| match role {
+        Role::Forward(by) | Role::Backward(by) => jump = after.checked_add_signed(by as isize),
+        Role::Landing(by) => landing = after.checked_add_signed(by as isize),
+        Role::FunctionConstant(index) => {
+            for register in captured_registers(heap, constants.get(index as usize).copied()) {
                 reads.insert(register);
             }
         }
-        Instr::PushCatch { .. }
-        | Instr::PushCleanup { .. }
-        | Instr::PushHandlerCase { .. }
-        | Instr::PushRecovery { .. }
-        | Instr::PushFailureCleanup { .. } => lands = true,
         _ => {}
-    }
-    let landing = if lands { jump.take() } else { None };
+    });
+    let falls_through = instruction.opcode().falls_through();
     LiveStep { at, reads, writes, next: [falls_through.then_some(after), jump], landing }
 }
 

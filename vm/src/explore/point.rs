@@ -43,6 +43,10 @@ pub(super) fn run_by_points(
 ) -> Option<RunOutcome> {
     let mut last = TaskNumber(u64::MAX);
     loop {
+        vm.scheduler.rounds += 1;
+        if vm.outside.inbox.is_rung() && run::take_in(vm) {
+            return Some(RunOutcome::Stopped);
+        }
         if vm.scheduler.is_budget_spent(&vm.config) {
             return Some(RunOutcome::BudgetSpent);
         }

@@ -48,7 +48,7 @@ fn machine(tasks: &[&[Instr]]) -> Vm {
 
 fn call(builtin: Builtin, count: u8) -> Instr {
     Instr::CallBuiltin {
-        window: Base(0),
+        window: Window(0),
         count: Count(count),
         want: Want::ONE,
         builtin: BuiltinIdx(builtin as u32),
@@ -126,7 +126,7 @@ fn it_gives_up_after_the_given_number_of_states() {
 fn a_fingerprint_depends_on_the_state_alone() {
     let mut fingerprints = Fingerprints::default();
     let mut of = |prepare: &dyn Fn(&mut Vm, Value)| {
-        let mut vm = machine(&[&[Instr::ReturnValues { first: Base(0), count: Count(0) }]]);
+        let mut vm = machine(&[&[Instr::ReturnValues { first: Items(0), count: Count(0) }]]);
         let symbol = vm.world.find(&Symbol::esl("F")).unwrap();
         prepare(&mut vm, symbol);
         fingerprints.begin_machine();
@@ -161,7 +161,7 @@ fn a_fingerprint_depends_on_the_state_alone() {
 #[test]
 fn facts_and_their_order_belong_to_a_state() {
     let of = |facts: &[i32]| {
-        let mut vm = machine(&[&[Instr::ReturnValues { first: Base(0), count: Count(0) }]]);
+        let mut vm = machine(&[&[Instr::ReturnValues { first: Items(0), count: Count(0) }]]);
         let objects = vm.database.prepare(&mut vm.heap).unwrap().unwrap();
         vm.pin(objects);
         for &number in facts {
@@ -200,11 +200,11 @@ fn registers_are_live_while_they_may_be_read() {
     assert_eq!(at(6), [5]);
     // A register read by a landing is live as long as the control entry is in place.
     let code = words(&[
-        Instr::PushCleanup { window: Base(4), to: Jump(1) }, // 0, 1
-        Instr::EnterCleanup {},                              // 2
-        Instr::Move { dst: Dst(0), src: Reg(3) },            // 3
-        Instr::EndCleanup {},                                // 4
-        Instr::Return { src: Reg(1) },                       // 5
+        Instr::PushCleanup { window: Window(4), to: Landing(1) }, // 0, 1
+        Instr::EnterCleanup {},                                   // 2
+        Instr::Move { dst: Dst(0), src: Reg(3) },                 // 3
+        Instr::EndCleanup {},                                     // 4
+        Instr::Return { src: Reg(1) },                            // 5
     ]);
     let live = Live::of(&vm.heap, &code, &[]);
     assert!(live.at(0).contains(3) && live.at(2).contains(3) && !live.at(0).contains(0));

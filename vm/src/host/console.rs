@@ -153,10 +153,15 @@ impl Console {
         self.at_end
     }
 
-    /// Returns the input that has arrived and was not read.
-    pub(crate) fn pending(&self) -> String {
+    /// Returns the number of characters of the input that have arrived and were not read.
+    pub(crate) fn pending(&self) -> usize {
+        self.input.len()
+    }
+
+    /// Returns the first of these characters, at most `limit`.
+    pub(crate) fn first_pending(&self, limit: usize) -> String {
         let text = |&code: &u32| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER);
-        self.input.iter().map(text).collect()
+        self.input.iter().take(limit).map(text).collect()
     }
 
     /// Drops this number of characters of the input.

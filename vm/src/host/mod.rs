@@ -1,12 +1,12 @@
-//! The outside of the virtual machine, as a trait: clocks, standard streams, files, arguments, messages from
-//! other threads.
+//! The outside of the virtual machine, as a trait: clocks, standard streams, files, arguments, and the inbox
+//! for everything that comes unasked.
 //!
 //! Guarantees: nothing else in this crate names clocks, files, threads, the environment or randomness (a test
 //! checks this), so a run depends only on the program, the seed and the answers of its host. All functions
 //! here return plain data, so a host can be recorded ([`RecordingHost`]) and replayed ([`ReplayHost`]).
 //!
-//! Not here: when the host is asked. The scheduler reads the clock once per round and drains the inbox
-//! between slices.
+//! Not here: when the host is asked. The machine asks whether timers are due, and looks into the inbox,
+//! between two turns.
 //!
 //! A host decides what it makes available. File access is a grant: [`VirtualHost`] has only the files that it
 //! was given.
@@ -15,14 +15,23 @@ use std::fmt;
 
 use esl_bytecode::datum::Datum;
 
+mod asked;
 mod console;
+mod inbox;
+mod operation;
 mod real;
 mod record;
+mod signal;
 mod virtual_host;
 
+pub(crate) use asked::Asked;
 pub(crate) use console::{Console, Taken, column_after, encode};
-pub use real::{FileAccess, MessageSender, RealHost, Screen, Waker};
+pub use inbox::{Inbox, Incoming};
+pub(crate) use operation::Canceller;
+pub use operation::{Failure, News, Operation};
+pub use real::{FileAccess, RealHost, Screen};
 pub use record::{Record, Recording, RecordingHost, ReplayHost};
+pub use signal::ProcessSignal;
 pub use virtual_host::{Captured, VirtualHost};
 
 /// A stream that bytes are written to.
@@ -58,6 +67,9 @@ pub enum WriteMode {
     Create,
 }
 
+/// Time of day at which virtual time begins: the beginning of the year 2000, in nanoseconds since 1970, UTC.
+pub const VIRTUAL_BEGINNING: i64 = 946_684_800_000_000_000;
+
 /// Why the host did not carry out a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HostError {
@@ -87,13 +99,13 @@ impl fmt::Display for HostError {
 
 impl std::error::Error for HostError {}
 
-/// A message from another thread.
-#[derive(Clone, Debug)]
-pub struct Message {
-    /// Purpose of the message, by which the program dispatches.
-    pub channel: String,
-    /// Contents. No datum in them may be an object.
-    pub arguments: Vec<Datum>,
+/// What a host waits for beside a time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Awaited {
+    /// Whether tasks wait for standard input.
+    pub input: bool,
+    /// Whether something is expected in the inbox, because an operation is under way.
+    pub news: bool,
 }
 
 /// Why a wait ended.
@@ -101,9 +113,9 @@ pub struct Message {
 pub enum Wake {
     /// The deadline has passed.
     Time,
-    /// A message or input has arrived.
+    /// Something has come into the inbox, or standard input has data.
     Arrival,
-    /// Nothing can ever arrive: there is no deadline, no input, and no sender of messages.
+    /// Nothing can ever arrive: there is no deadline, no input, and nobody from whom to expect anything.
     Never,
 }
 
@@ -115,9 +127,14 @@ pub trait Host {
     /// Returns the nanoseconds since 1970-01-01 00:00 UTC.
     fn wall_clock(&mut self) -> i64;
 
-    /// Waits until the monotonic clock shows `deadline` nanoseconds, a message arrives or, if `for_input`,
-    /// standard input has data or ends. May wake too early.
-    fn wait(&mut self, deadline: Option<u64>, for_input: bool) -> Wake;
+    /// Returns the time of the monotonic clock in nanoseconds, if it is `deadline` or later.
+    fn due(&mut self, deadline: u64) -> Option<u64> {
+        Some(self.monotonic()).filter(|&now| now >= deadline)
+    }
+
+    /// Waits until the monotonic clock shows `deadline` nanoseconds, something comes into the inbox or, if
+    /// `awaited` says so, standard input has data or ends. May wake too early.
+    fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake;
 
     /// Returns nanoseconds of real time, for figures and timelines of a run, on which nothing in the run
     /// depends. 0 if there is no real time.
@@ -177,16 +194,39 @@ pub trait Host {
     /// [`HostError`], and [`HostError::Refused`] if the embedder does not grant it.
     fn delete_file(&mut self, path: &str) -> Result<(), HostError>;
 
-    /// Returns the messages that have arrived, in order.
-    fn receive(&mut self) -> Vec<Message>;
+    /// Has a function of the embedder's called, and returns its result.
+    ///
+    /// # Errors
+    /// The failure of the function.
+    fn call(
+        &mut self,
+        name: &str,
+        arguments: &[Datum],
+        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, Failure>,
+    ) -> Result<Datum, Failure> {
+        let _ = name;
+        function(arguments)
+    }
+
+    /// Has an operation begun by a function of the embedder's. The inbox hears of it.
+    fn begin(&mut self, name: &str, arguments: &[Datum], function: &mut dyn FnMut(&[Datum])) {
+        let _ = name;
+        function(arguments);
+    }
+
+    /// Returns the inbox of the machine that this is the host of.
+    fn inbox(&self) -> Inbox;
+
+    /// Takes everything out of the inbox, in the round of the machine with this number. Called while the
+    /// inbox is rung.
+    fn poll(&mut self, round: u64) -> Vec<Incoming> {
+        let _ = round;
+        self.inbox().take()
+    }
 
     /// Returns the exit status of a program whose standard output nobody reads any more, which is not the
     /// program's fault.
     fn broken_output_status(&self) -> u8 {
         0
     }
-
-    /// Returns whether more messages may be sent. While this holds, a run in which everything waits is not
-    /// deadlocked if something waits for a message.
-    fn has_senders(&self) -> bool;
 }

@@ -1,66 +1,16 @@
 //! The real host: the system's clocks, streams and files.
 //!
-//! A single channel carries everything from other threads: messages, and chunks of standard input. A thread
-//! reads standard input, one chunk per request of the program. So waiting for either, up to a deadline, is
-//! one operation, and input that was not requested stays with the system.
+//! A thread reads standard input, one chunk per request of the program, and then puts a note into the inbox.
+//! So waiting for either, up to a deadline, is one operation, and input that was not requested stays with the
+//! system.
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use super::{Host, HostError, Input, Message, Output, Wake, WriteMode};
-
-/// An arrival from another thread.
-enum Incoming {
-    Message(Message),
-    Input(Input),
-    /// A sender of messages is gone, perhaps the last.
-    SenderGone,
-    /// The current wait is to end.
-    Wake,
-}
-
-/// Ends a wait of the host from any thread, to interrupt the machine while nothing runs.
-#[derive(Clone)]
-pub struct Waker(Sender<Incoming>);
-
-impl Waker {
-    /// Ends the current wait, or the next one.
-    pub fn wake(&self) {
-        // Without a host there is nothing to wake.
-        let _ = self.0.send(Incoming::Wake);
-    }
-}
-
-/// Sends messages to a virtual machine, from any thread.
-pub struct MessageSender {
-    channel: Sender<Incoming>,
-    /// Token counted by the host, which thereby knows whether messages can still arrive.
-    alive: Option<Arc<()>>,
-}
-
-impl MessageSender {
-    /// Sends a message. Returns whether there is a receiver.
-    pub fn send(&self, message: Message) -> bool {
-        self.channel.send(Incoming::Message(message)).is_ok()
-    }
-}
-
-impl Clone for MessageSender {
-    fn clone(&self) -> MessageSender {
-        MessageSender { channel: self.channel.clone(), alive: self.alive.clone() }
-    }
-}
-
-impl Drop for MessageSender {
-    fn drop(&mut self) {
-        // The token is dropped first, because the host counts when it has received the notice.
-        self.alive = None;
-        let _ = self.channel.send(Incoming::SenderGone);
-    }
-}
+use super::{Awaited, Host, HostError, Inbox, Incoming, Input, Output, VIRTUAL_BEGINNING, Wake, WriteMode};
 
 /// Which files a program may read and write.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -77,20 +27,27 @@ pub enum FileAccess {
 /// Receives the bytes written by a program.
 pub type Screen = Box<dyn FnMut(&[u8]) -> std::io::Result<()> + Send>;
 
+/// Chunk of standard input that was read and not taken yet.
+#[derive(Clone, Default)]
+struct Arrived(Arc<Mutex<Option<Input>>>);
+
+impl Arrived {
+    fn lock(&self) -> MutexGuard<'_, Option<Input>> {
+        // The chunk is whole at every moment, so a panic elsewhere does not corrupt it.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 /// The outside as provided by the operating system.
 pub struct RealHost {
     start: Instant,
     arguments: Vec<String>,
     files: FileAccess,
-    incoming: Receiver<Incoming>,
-    sender: Sender<Incoming>,
-    alive: Arc<()>,
-    messages: Vec<Message>,
-    input: Option<Input>,
+    inbox: Inbox,
+    input: Arrived,
     /// Requests a chunk from the reading thread, which is started at the first request.
     reader: Option<Sender<()>>,
     is_reading: bool,
-    is_woken: bool,
     /// Destination of both output streams, in place of the process's own.
     screen: Option<Screen>,
     /// Nanoseconds of virtual time, if time is virtual.
@@ -100,19 +57,14 @@ pub struct RealHost {
 impl RealHost {
     /// Creates a host with these arguments for the program, and without access to files.
     pub fn new(arguments: Vec<String>) -> RealHost {
-        let (sender, incoming) = channel();
         RealHost {
             start: Instant::now(),
             arguments,
             files: FileAccess::None,
-            incoming,
-            sender,
-            alive: Arc::new(()),
-            messages: Vec::new(),
-            input: None,
+            inbox: Inbox::new(),
+            input: Arrived::default(),
             reader: None,
             is_reading: false,
-            is_woken: false,
             screen: None,
             virtual_time: None,
         }
@@ -132,56 +84,34 @@ impl RealHost {
         self
     }
 
-    /// Makes time virtual: it starts at zero, and passes only when the program waits or the host is told so.
+    /// Makes time virtual: it starts at zero, the beginning of the year 2000, and passes only when the program
+    /// waits or the host is told so.
     #[must_use]
     pub fn with_virtual_time(mut self) -> RealHost {
         self.virtual_time = Some(0);
         self
     }
 
-    /// Returns a sender of messages to this host's program.
-    pub fn sender(&self) -> MessageSender {
-        MessageSender { channel: self.sender.clone(), alive: Some(self.alive.clone()) }
-    }
-
-    /// Returns a handle that ends this host's waits.
-    pub fn waker(&self) -> Waker {
-        Waker(self.sender.clone())
-    }
-
-    fn take_in(&mut self, incoming: Incoming) {
-        match incoming {
-            Incoming::Message(message) => self.messages.push(message),
-            Incoming::Input(input) => {
-                self.is_reading = false;
-                self.input = Some(input);
-            }
-            Incoming::SenderGone => {}
-            Incoming::Wake => self.is_woken = true,
-        }
-    }
-
-    fn drain(&mut self) {
-        while let Ok(incoming) = self.incoming.try_recv() {
-            self.take_in(incoming);
-        }
-    }
-
     /// Makes sure that a chunk of input is requested.
     fn ask_for_input(&mut self) {
-        if self.is_reading || self.input.is_some() {
+        if self.is_reading || self.input.lock().is_some() {
             return;
         }
         if self.reader.is_none() {
             let (ask, asked) = channel();
-            let answer = self.sender.clone();
-            let spawned = std::thread::Builder::new()
-                .name("standard-input".into())
-                .spawn(move || read_on_demand(&asked, &answer));
+            let (arrived, inbox) = (self.input.clone(), self.inbox.clone());
+            // Where time is virtual, input takes none of it: the program notices when all its tasks wait.
+            let is_virtual = self.virtual_time.is_some();
+            let spawned = std::thread::Builder::new().name("standard-input".into()).spawn(move || {
+                while asked.recv().is_ok() {
+                    *arrived.lock() = Some(read_chunk());
+                    if is_virtual { inbox.ring() } else { inbox.put(Incoming::Input) }
+                }
+            });
             match spawned {
                 Ok(_) => self.reader = Some(ask),
                 Err(error) => {
-                    self.input = Some(Input::Failed(error_of(&error)));
+                    *self.input.lock() = Some(Input::Failed(error_of(&error)));
                     return;
                 }
             }
@@ -221,20 +151,15 @@ fn resolve(path: &Path, must_exist: bool) -> Result<PathBuf, HostError> {
     }
 }
 
-/// Body of the thread that reads standard input.
-fn read_on_demand(asked: &Receiver<()>, answer: &Sender<Incoming>) {
+/// Waits for a chunk of standard input.
+fn read_chunk() -> Input {
     let mut buffer = [0; 4096];
-    while asked.recv().is_ok() {
-        let input = loop {
-            match std::io::stdin().lock().read(&mut buffer) {
-                Ok(0) => break Input::End,
-                Ok(n) => break Input::Data(buffer[..n].to_vec()),
-                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-                Err(error) => break Input::Failed(error_of(&error)),
-            }
-        };
-        if answer.send(Incoming::Input(input)).is_err() {
-            return;
+    loop {
+        match std::io::stdin().lock().read(&mut buffer) {
+            Ok(0) => return Input::End,
+            Ok(n) => return Input::Data(buffer[..n].to_vec()),
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(error) => return Input::Failed(error_of(&error)),
         }
     }
 }
@@ -272,6 +197,9 @@ impl Host for RealHost {
     }
 
     fn wall_clock(&mut self) -> i64 {
+        if let Some(time) = self.virtual_time {
+            return VIRTUAL_BEGINNING.saturating_add_unsigned(time);
+        }
         let since = |time: Result<Duration, std::time::SystemTimeError>| match time {
             Ok(after) => i64::try_from(after.as_nanos()).unwrap_or(i64::MAX),
             Err(before) => i64::try_from(before.duration().as_nanos()).map_or(i64::MIN, |n| -n),
@@ -279,41 +207,29 @@ impl Host for RealHost {
         since(SystemTime::now().duration_since(UNIX_EPOCH))
     }
 
-    fn wait(&mut self, deadline: Option<u64>, for_input: bool) -> Wake {
-        self.drain();
-        if for_input {
+    fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
+        if awaited.input {
             self.ask_for_input();
         }
-        loop {
-            let is_woken = std::mem::take(&mut self.is_woken);
-            if is_woken || !self.messages.is_empty() || for_input && self.input.is_some() {
-                return Wake::Arrival;
-            }
-            if let (Some(now), Some(deadline), false) = (self.virtual_time, deadline, for_input) {
-                // Input takes no virtual time, so that it arrives at the same time in each run; nothing else
-                // is waited for.
+        if self.inbox.is_rung() || awaited.input && self.input.lock().is_some() {
+            return Wake::Arrival;
+        }
+        let deadline = match (self.virtual_time, deadline) {
+            // Input takes no virtual time, so that it arrives at the same time in each run; nothing else is
+            // waited for.
+            (Some(_), _) if awaited.input => None,
+            (Some(now), Some(deadline)) => {
                 self.virtual_time = Some(now.max(deadline));
                 return Wake::Time;
             }
-            let deadline = if self.virtual_time.is_some() { None } else { deadline };
-            let received = match deadline {
-                None if !for_input && !self.has_senders() => return Wake::Never,
-                None => self.incoming.recv().map_err(|_| RecvTimeoutError::Disconnected),
-                Some(deadline) => {
-                    let now = self.monotonic();
-                    if now >= deadline {
-                        return Wake::Time;
-                    }
-                    self.incoming.recv_timeout(Duration::from_nanos(deadline - now))
-                }
-            };
-            match received {
-                Ok(incoming) => self.take_in(incoming),
-                Err(RecvTimeoutError::Timeout) => return Wake::Time,
-                // The host itself holds a sender.
-                Err(RecvTimeoutError::Disconnected) => return Wake::Never,
-            }
-        }
+            (_, deadline) => deadline,
+        };
+        let time = match deadline {
+            None if awaited == Awaited::default() => return Wake::Never,
+            None => None,
+            Some(deadline) => Some(Duration::from_nanos(deadline.saturating_sub(self.monotonic()))),
+        };
+        if self.inbox.wait(time) { Wake::Arrival } else { Wake::Time }
     }
 
     fn seed(&mut self) -> u64 {
@@ -339,14 +255,17 @@ impl Host for RealHost {
     }
 
     fn read_input(&mut self) -> Input {
-        self.drain();
-        match self.input.take() {
+        let arrived = self.input.lock().take();
+        match arrived {
             // The end is permanent and is not requested again.
             Some(Input::End) => {
-                self.input = Some(Input::End);
+                *self.input.lock() = Some(Input::End);
                 Input::End
             }
-            Some(input) => input,
+            Some(input) => {
+                self.is_reading = false;
+                input
+            }
             None => {
                 self.ask_for_input();
                 Input::WouldBlock
@@ -384,13 +303,8 @@ impl Host for RealHost {
         std::fs::remove_file(path).map_err(|error| error_of(&error))
     }
 
-    fn receive(&mut self) -> Vec<Message> {
-        self.drain();
-        std::mem::take(&mut self.messages)
-    }
-
-    fn has_senders(&self) -> bool {
-        Arc::strong_count(&self.alive) > 1
+    fn inbox(&self) -> Inbox {
+        self.inbox.clone()
     }
 }
 
@@ -398,42 +312,22 @@ impl Host for RealHost {
 mod tests {
     use super::*;
 
-    fn message(channel: &str) -> Message {
-        Message { channel: channel.into(), arguments: Vec::new() }
-    }
-
     #[test]
-    fn messages_of_another_thread_arrive_in_order_and_end_a_wait() {
+    fn what_comes_into_the_inbox_ends_a_wait() {
         let mut host = RealHost::new(Vec::new());
-        let sender = host.sender();
-        let thread = std::thread::spawn(move || {
-            assert!(sender.send(message("a")));
-            assert!(sender.clone().send(message("b")));
-        });
-        let mut channels = Vec::new();
-        while host.wait(None, false) == Wake::Arrival {
-            channels.extend(host.receive().into_iter().map(|message| message.channel));
-        }
-        assert_eq!(channels, ["a", "b"]);
-        assert!(!host.has_senders());
+        let inbox = host.inbox();
+        let thread = std::thread::spawn(move || inbox.put(Incoming::Stop));
+        assert_eq!(host.wait(Some(u64::MAX), Awaited::default()), Wake::Arrival);
+        assert!(matches!(host.poll(1)[..], [Incoming::Stop]));
+        assert_eq!(host.wait(None, Awaited::default()), Wake::Never);
         assert!(thread.join().is_ok());
-    }
-
-    #[test]
-    fn a_waker_ends_a_wait_without_a_deadline() {
-        let mut host = RealHost::new(Vec::new());
-        let _sender = host.sender();
-        let waker = host.waker();
-        let thread = std::thread::spawn(move || waker.wake());
-        assert_eq!(host.wait(None, false), Wake::Arrival);
-        thread.join().unwrap();
     }
 
     #[test]
     fn a_deadline_ends_a_wait() {
         let mut host = RealHost::new(Vec::new());
         let deadline = host.monotonic() + 1;
-        assert_eq!(host.wait(Some(deadline), false), Wake::Time);
+        assert_eq!(host.wait(Some(deadline), Awaited::default()), Wake::Time);
         assert!(host.monotonic() >= deadline);
     }
 

@@ -1,5 +1,8 @@
 //! Recording the answers of a host, and replaying them.
 //!
+//! There are two sorts of records: answers, in the order of the questions, and what comes when it comes: the
+//! contents of the inbox, by rounds of the machine, and timers that are due, by the number of questions.
+//!
 //! Guarantees: a program that is deterministic but for its host does the same under a [`ReplayHost`] as it
 //! did under the [`RecordingHost`], without touching anything outside. When it makes a different request than
 //! it did then, the replay has diverged: this is recorded, and further answers are those of a host without
@@ -8,7 +11,10 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::{Captured, Host, HostError, Input, Message, Output, Wake, WriteMode};
+use esl_bytecode::datum::Datum;
+use esl_bytecode::span::Span;
+
+use super::{Awaited, Captured, Failure, Host, HostError, Inbox, Incoming, Input, Output, Wake, WriteMode};
 
 /// Defines [`Record`] and, for each kind of answer, how it is recorded and replayed.
 macro_rules! define_records {
@@ -67,10 +73,14 @@ define_records! {
     Interactive(bool);
     /// Contents of a file.
     FileRead(Result<Vec<u8>, HostError>);
-    /// Whether a file exists, or a sender of messages.
+    /// Whether a file exists.
     Exists(bool);
-    /// Messages.
-    Received(Vec<Message>);
+    /// Result of a function of the embedder's.
+    Called(Result<Datum, Failure>);
+    /// How many questions before it were answered no, and the time, for a timer that is due.
+    Due((u64, u64));
+    /// Round of the machine, and the contents of the inbox then.
+    Received((u64, Vec<Incoming>));
 }
 
 /// The answers of a host in order, while they are being recorded.
@@ -93,12 +103,14 @@ impl Recording {
 pub struct RecordingHost<H> {
     host: H,
     recording: Recording,
+    /// Number of questions whether a timer is due that were answered no.
+    not_due: u64,
 }
 
 impl<H: Host> RecordingHost<H> {
     /// Records the answers of `host`.
     pub fn new(host: H) -> RecordingHost<H> {
-        RecordingHost { host, recording: Recording::default() }
+        RecordingHost { host, recording: Recording::default(), not_due: 0 }
     }
 
     /// Returns the recording, which grows with each request.
@@ -123,8 +135,8 @@ impl<H: Host> Host for RecordingHost<H> {
         self.note(answer).0
     }
 
-    fn wait(&mut self, deadline: Option<u64>, for_input: bool) -> Wake {
-        let answer = Waited(self.host.wait(deadline, for_input));
+    fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
+        let answer = Waited(self.host.wait(deadline, awaited));
         self.note(answer).0
     }
 
@@ -188,15 +200,35 @@ impl<H: Host> Host for RecordingHost<H> {
         self.note(answer).0
     }
 
-    fn receive(&mut self) -> Vec<Message> {
-        let answer = Received(self.host.receive());
+    fn due(&mut self, deadline: u64) -> Option<u64> {
+        let Some(now) = self.host.due(deadline) else {
+            self.not_due += 1;
+            return None;
+        };
+        Some(self.note(Due((self.not_due, now))).0.1)
+    }
+
+    fn call(
+        &mut self,
+        name: &str,
+        arguments: &[Datum],
+        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, Failure>,
+    ) -> Result<Datum, Failure> {
+        let answer = Called(self.host.call(name, arguments, function));
         self.note(answer).0
     }
 
-    fn has_senders(&self) -> bool {
-        let answer = self.host.has_senders();
-        self.recording.records().push(Record::Exists(answer));
-        answer
+    fn begin(&mut self, name: &str, arguments: &[Datum], function: &mut dyn FnMut(&[Datum])) {
+        self.host.begin(name, arguments, function);
+    }
+
+    fn inbox(&self) -> Inbox {
+        self.host.inbox()
+    }
+
+    fn poll(&mut self, round: u64) -> Vec<Incoming> {
+        let contents = self.host.poll(round);
+        if contents.is_empty() { contents } else { self.note(Received((round, contents))).0.1 }
     }
 }
 
@@ -205,6 +237,8 @@ impl<H: Host> Host for RecordingHost<H> {
 struct Remaining {
     records: VecDeque<Record>,
     diverged: bool,
+    /// Number of questions whether a timer is due that were answered no.
+    not_due: u64,
 }
 
 /// A host that replays recorded answers. It captures what the program writes.
@@ -212,13 +246,20 @@ struct Remaining {
 pub struct ReplayHost {
     remaining: Arc<Mutex<Remaining>>,
     captured: Captured,
+    inbox: Inbox,
 }
 
 impl ReplayHost {
     /// Creates a host that replays these answers.
     pub fn new(records: Vec<Record>) -> ReplayHost {
-        let remaining = Remaining { records: records.into(), diverged: false };
-        ReplayHost { remaining: Arc::new(Mutex::new(remaining)), captured: Captured::default() }
+        let remaining = Remaining { records: records.into(), ..Remaining::default() };
+        let replay = ReplayHost {
+            remaining: Arc::new(Mutex::new(remaining)),
+            captured: Captured::default(),
+            inbox: Inbox::new(),
+        };
+        replay.ring_if_needed();
+        replay
     }
 
     fn remaining(&self) -> MutexGuard<'_, Remaining> {
@@ -248,7 +289,16 @@ impl ReplayHost {
         }
         let answer = remaining.records.pop_front().and_then(A::from_record);
         remaining.diverged = answer.is_none();
+        drop(remaining);
+        self.ring_if_needed();
         answer
+    }
+
+    /// Has the machine look into the inbox in each round until the next record, if that is of the inbox.
+    fn ring_if_needed(&self) {
+        if matches!(self.remaining().records.front(), Some(Record::Received(_))) {
+            self.inbox.ring();
+        }
     }
 }
 
@@ -261,7 +311,7 @@ impl Host for ReplayHost {
         self.next::<WallClock>().map_or(0, |answer| answer.0)
     }
 
-    fn wait(&mut self, _deadline: Option<u64>, _for_input: bool) -> Wake {
+    fn wait(&mut self, _deadline: Option<u64>, _awaited: Awaited) -> Wake {
         self.next::<Waited>().map_or(Wake::Never, |answer| answer.0)
     }
 
@@ -307,12 +357,45 @@ impl Host for ReplayHost {
         self.next::<Written>().map_or(Err(HostError::Refused), |answer| answer.0)
     }
 
-    fn receive(&mut self) -> Vec<Message> {
-        self.next::<Received>().map_or(Vec::new(), |answer| answer.0)
+    fn due(&mut self, _deadline: u64) -> Option<u64> {
+        let mut remaining = self.remaining();
+        let is_due =
+            matches!(remaining.records.front(), Some(&Record::Due((n, _))) if n == remaining.not_due);
+        if !is_due {
+            remaining.not_due += 1;
+            return None;
+        }
+        drop(remaining);
+        self.next::<Due>().map(|answer| answer.0.1)
     }
 
-    fn has_senders(&self) -> bool {
-        self.next::<Exists>().is_some_and(|answer| answer.0)
+    fn call(
+        &mut self,
+        name: &str,
+        _arguments: &[Datum],
+        _function: &mut dyn FnMut(&[Datum]) -> Result<Datum, Failure>,
+    ) -> Result<Datum, Failure> {
+        let is_missing = || Failure {
+            cause: "NOT-IN-THIS-WORLD".into(),
+            arguments: vec![Datum::string(name, Span::default())],
+        };
+        self.next::<Called>().map_or_else(|| Err(is_missing()), |answer| answer.0)
+    }
+
+    /// Nothing is begun; what was heard then is heard again.
+    fn begin(&mut self, _name: &str, _arguments: &[Datum], _function: &mut dyn FnMut(&[Datum])) {}
+
+    fn inbox(&self) -> Inbox {
+        self.inbox.clone()
+    }
+
+    fn poll(&mut self, round: u64) -> Vec<Incoming> {
+        self.inbox.take();
+        let is_now =
+            matches!(self.remaining().records.front(), Some(&Record::Received((n, _))) if n == round);
+        let contents = if is_now { self.next::<Received>() } else { None };
+        self.ring_if_needed();
+        contents.map_or(Vec::new(), |answer| answer.0.1)
     }
 }
 
@@ -324,7 +407,7 @@ mod tests {
     /// A stand-in for a program: describes what it learns from `host`.
     fn run(host: &mut dyn Host) -> String {
         let mut log = format!("{} {:?} ", host.seed(), host.arguments());
-        log += &format!("{:?} {} ", host.wait(Some(30), false), host.monotonic());
+        log += &format!("{:?} {} ", host.wait(Some(30), Awaited::default()), host.monotonic());
         log += &format!("{:?} {:?} ", host.read_input(), host.read_file("f"));
         log += &format!("{:?} {}", host.write(Output::Standard, b"hello"), host.file_exists("g"));
         log
@@ -340,6 +423,30 @@ mod tests {
         assert_eq!(run(&mut replay), first);
         assert!(replay.is_at_end() && !replay.has_diverged());
         assert_eq!(replay.captured().output(), "hello");
+    }
+
+    #[test]
+    fn what_came_comes_again_in_the_same_round_and_at_the_same_question() {
+        let host = VirtualHost::new().with_arrival(0, Incoming::Stop).with_arrival(20, Incoming::Input);
+        let mut recording_host = RecordingHost::new(host);
+        let recording = recording_host.recording();
+        let rounds = |host: &mut dyn Host| {
+            let look = |host: &mut dyn Host, round| {
+                if host.inbox().is_rung() { host.poll(round) } else { Vec::new() }
+            };
+            let mut log = String::new();
+            for round in 1..5 {
+                log += &format!("{:?} {:?}; ", look(host, round), host.due(15));
+                host.advance(10);
+            }
+            log
+        };
+        let first = rounds(&mut recording_host);
+        assert_eq!(first, "[Stop] None; [] None; [Input] Some(20); [] Some(30); ");
+        assert_eq!(recording.to_records().len(), 4);
+        let mut replay = ReplayHost::new(recording.to_records());
+        assert_eq!(rounds(&mut replay), first);
+        assert!(replay.is_at_end() && !replay.has_diverged());
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::{Host, HostError, Input, Message, Output, Wake, WriteMode};
+use super::{Awaited, Host, HostError, Inbox, Incoming, Input, Output, VIRTUAL_BEGINNING, Wake, WriteMode};
 
 /// The output of a program and its files, shared between a [`VirtualHost`] and its observers.
 #[derive(Clone, Default)]
@@ -50,12 +50,14 @@ impl Captured {
 #[derive(Default)]
 pub struct VirtualHost {
     now: u64,
-    wall_clock_start: i64,
+    /// Nanoseconds from the usual beginning of virtual time to this host's.
+    wall_clock_offset: i64,
     seed: u64,
     arguments: Vec<String>,
     input: VecDeque<Vec<u8>>,
-    /// Messages by their times of arrival, the earliest first.
-    messages: VecDeque<(u64, Message)>,
+    inbox: Inbox,
+    /// What is to come into the inbox, by the times of arrival, the earliest first.
+    arrivals: VecDeque<(u64, Incoming)>,
     captured: Captured,
     /// Number of bytes that may still be written to standard output before it breaks.
     output_limit: Option<usize>,
@@ -63,7 +65,7 @@ pub struct VirtualHost {
 }
 
 impl VirtualHost {
-    /// Creates a host without input, messages and files, at time zero.
+    /// Creates a host without input and files, at time zero.
     pub fn new() -> VirtualHost {
         VirtualHost::default()
     }
@@ -100,7 +102,7 @@ impl VirtualHost {
     /// Sets the wall clock at time zero, in nanoseconds since 1970.
     #[must_use]
     pub fn with_wall_clock(mut self, start: i64) -> VirtualHost {
-        self.wall_clock_start = start;
+        self.wall_clock_offset = start.saturating_sub(VIRTUAL_BEGINNING);
         self
     }
 
@@ -111,12 +113,23 @@ impl VirtualHost {
         self
     }
 
-    /// Adds a message that arrives at a time in nanoseconds.
+    /// Has something come into the inbox at a time in nanoseconds.
     #[must_use]
-    pub fn with_message(mut self, time: u64, message: Message) -> VirtualHost {
-        let at = self.messages.partition_point(|&(other, _)| other <= time);
-        self.messages.insert(at, (time, message));
+    pub fn with_arrival(mut self, time: u64, incoming: Incoming) -> VirtualHost {
+        let at = self.arrivals.partition_point(|&(other, _)| other <= time);
+        self.arrivals.insert(at, (time, incoming));
+        self.move_to(self.now);
         self
+    }
+
+    /// Moves the clock, and lets into the inbox what comes until then.
+    fn move_to(&mut self, now: u64) {
+        self.now = now;
+        while self.arrivals.front().is_some_and(|&(time, _)| time <= now)
+            && let Some((_, incoming)) = self.arrivals.pop_front()
+        {
+            self.inbox.put(incoming);
+        }
     }
 
     /// Breaks standard output after this number of bytes.
@@ -144,23 +157,25 @@ impl Host for VirtualHost {
     }
 
     fn wall_clock(&mut self) -> i64 {
-        self.wall_clock_start.saturating_add_unsigned(self.now)
+        VIRTUAL_BEGINNING.saturating_add(self.wall_clock_offset).saturating_add_unsigned(self.now)
     }
 
-    fn wait(&mut self, deadline: Option<u64>, for_input: bool) -> Wake {
-        if for_input {
+    fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
+        if awaited.input || self.inbox.is_rung() {
             // Input is available or has ended; there is nothing to wait for.
             return Wake::Arrival;
         }
-        match (deadline, self.messages.front()) {
+        match (deadline, self.arrivals.front()) {
             (deadline, Some(&(arrival, _))) if deadline.is_none_or(|deadline| arrival <= deadline) => {
-                self.now = self.now.max(arrival);
+                self.move_to(self.now.max(arrival));
                 Wake::Arrival
             }
             (Some(deadline), _) => {
-                self.now = self.now.max(deadline);
+                self.move_to(self.now.max(deadline));
                 Wake::Time
             }
+            // Operations take no virtual time: those that another thread performs are waited for.
+            (None, _) if awaited.news && self.inbox.wait(None) => Wake::Arrival,
             (None, _) => Wake::Never,
         }
     }
@@ -170,7 +185,7 @@ impl Host for VirtualHost {
     }
 
     fn advance(&mut self, nanoseconds: u64) {
-        self.now = self.now.saturating_add(nanoseconds);
+        self.move_to(self.now.saturating_add(nanoseconds));
     }
 
     fn seed(&mut self) -> u64 {
@@ -226,13 +241,8 @@ impl Host for VirtualHost {
         self.captured.contents().files.remove(path).map(|_| ()).ok_or(HostError::NotFound)
     }
 
-    fn receive(&mut self) -> Vec<Message> {
-        let arrived = self.messages.partition_point(|&(time, _)| time <= self.now);
-        self.messages.drain(..arrived).map(|(_, message)| message).collect()
-    }
-
-    fn has_senders(&self) -> bool {
-        !self.messages.is_empty()
+    fn inbox(&self) -> Inbox {
+        self.inbox.clone()
     }
 }
 
@@ -242,14 +252,13 @@ mod tests {
 
     #[test]
     fn time_jumps_to_what_happens_first() {
-        let message = Message { channel: "bump".into(), arguments: Vec::new() };
-        let mut host = VirtualHost::new().with_wall_clock(1000).with_message(70, message);
-        assert_eq!(host.wait(Some(50), false), Wake::Time);
+        let mut host = VirtualHost::new().with_wall_clock(1000).with_arrival(70, Incoming::Stop);
+        assert_eq!(host.wait(Some(50), Awaited::default()), Wake::Time);
         assert_eq!((host.monotonic(), host.wall_clock()), (50, 1050));
-        assert!(host.receive().is_empty());
-        assert_eq!(host.wait(Some(100), false), Wake::Arrival);
-        assert_eq!((host.monotonic(), host.receive().len()), (70, 1));
-        assert_eq!(host.wait(None, false), Wake::Never);
+        assert!(host.due(51).is_none() && !host.inbox().is_rung());
+        assert_eq!(host.wait(Some(100), Awaited::default()), Wake::Arrival);
+        assert_eq!((host.due(60), host.poll(1).len()), (Some(70), 1));
+        assert_eq!(host.wait(None, Awaited::default()), Wake::Never);
         host.advance(5);
         assert_eq!(host.monotonic(), 75);
     }

@@ -53,7 +53,7 @@ pub(super) unsafe fn slow_call(vm: &mut Vm) -> Signal {
         let (pc, base) = (vm.cpu.pc(), vm.cpu.base());
         let word = word_at(pc);
         let window = base.add(word.a());
-        let given = std::slice::from_raw_parts(window.add(2), word.b());
+        let given = std::ptr::slice_from_raw_parts(window.add(2), word.b());
         let sort = word.opcode().and_then(Opcode::callee);
         let callee = match sort {
             Some(Callee::Global) => constant(base, aux_at(pc) as usize),
@@ -62,22 +62,28 @@ pub(super) unsafe fn slow_call(vm: &mut Vm) -> Signal {
         };
         let place = FramePlace::for_instruction(word);
         if sort == Some(Callee::Applied) {
-            let mut arguments = Arguments::from_slice(given);
+            let mut arguments = Arguments::from_slice(&*given);
             if let Err(exit) = spread(vm, &mut arguments) {
                 return Signal::Exit(exit);
             }
-            return call(vm, callee, &arguments, place);
+            return call(vm, callee, &*arguments, place);
         }
         call(vm, callee, given, place)
     }
 }
 
 /// Calls `callee` with `arguments`, which may lie in the running frame: they are copied before the stack
-/// moves.
+/// moves. They are passed as a pointer, since a reference would have to outlive the call.
 ///
 /// # Safety
 /// The contract of [`super::settle`]; for [`FramePlace::Window`] at an instruction that has a window.
-pub(super) unsafe fn call(vm: &mut Vm, callee: Value, arguments: &[Value], place: FramePlace) -> Signal {
+/// `arguments` may be read as long as the stack stays in place.
+pub(super) unsafe fn call(
+    vm: &mut Vm,
+    callee: Value,
+    arguments: *const [Value],
+    place: FramePlace,
+) -> Signal {
     let function = match vm.callable(callee) {
         Ok(function) => function,
         Err(exit) => return Signal::Exit(exit),
@@ -93,8 +99,8 @@ pub(super) unsafe fn call(vm: &mut Vm, callee: Value, arguments: &[Value], place
     }
     let mut arranged = Arguments::new();
     // SAFETY: `code` and `shape` are those of the function, which is neither native nor a stub: `callable`
-    // has loaded it.
-    if let Err(exit) = unsafe { arrange(vm, function, code, shape, arguments, &mut arranged) } {
+    // has loaded it. The stack is still in place.
+    if let Err(exit) = unsafe { arrange(vm, function, code, shape, &*arguments, &mut arranged) } {
         return Signal::Exit(exit);
     }
     // SAFETY: F2: the new frame lies in the window of the running one (V3), behind its registers, or in its
@@ -141,16 +147,18 @@ pub(super) unsafe fn call(vm: &mut Vm, callee: Value, arguments: &[Value], place
 ///
 /// # Safety
 /// The contract of [`call`].
-unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: FramePlace) -> Signal {
+unsafe fn call_native(vm: &mut Vm, number: u16, arguments: *const [Value], place: FramePlace) -> Signal {
     vm.cpu.wants_one = false;
     let info = &BUILTINS[usize::from(number)];
-    let count = arguments.len() as u32;
-    if count < info.arity.min || info.arity.max.is_some_and(|max| count > max) {
-        let text = format!("{} was called with {}", info.name, count_of_arguments(arguments.len()));
+    let count = arguments.len();
+    let max = info.arity.max.map_or(usize::MAX, |max| max as usize);
+    if count < info.arity.min as usize || count > max {
+        let text = format!("{} was called with {}", info.name, count_of_arguments(count));
         let text = format!("{text}; it takes {}", describe_arity(info.arity.min as usize, info.arity.max));
         return failure(vm, Raised::Program(text));
     }
-    match vm.natives[usize::from(number)](vm, arguments) {
+    // SAFETY: the contract: no builtin writes to the stack or moves it.
+    match vm.natives[usize::from(number)](vm, unsafe { &*arguments }) {
         Ok(value) => {
             vm.exchange.values.clear();
             vm.exchange.values.push(value);
@@ -168,7 +176,7 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Fram
             let (function, arguments) = vm.exchange.take_requested_call();
             // SAFETY: the builtin has left `vm.cpu` as it was, so the contract still holds. A builtin that
             // asks for itself would go on for ever, and none does.
-            return unsafe { call(vm, function, &arguments, place) };
+            return unsafe { call(vm, function, &*arguments, place) };
         }
         Err(exit) => return Signal::Exit(exit),
     }
@@ -194,7 +202,7 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: &[Value], place: Fram
 }
 
 impl Vm {
-    /// The function to run when `callee` is called: itself, or that of a symbol, loaded.
+    /// Returns the function to run when `callee` is called: itself, or that of a symbol, loaded.
     ///
     /// # Errors
     /// `undefined-function`, or `type-error` for what is neither function nor symbol.

@@ -35,7 +35,7 @@ unsafe fn finish(base: *mut Value, dst: usize, outcome: Outcome) -> Signal {
     }
 }
 
-/// The opcode with this number.
+/// Returns the opcode with this number.
 const fn opcode(number: u8) -> Opcode {
     match Opcode::from_number(number) {
         Some(opcode) => opcode,
@@ -43,8 +43,8 @@ const fn opcode(number: u8) -> Opcode {
     }
 }
 
-/// The builtin that the row of an opcode names. An arm that leaves an instruction without one to [`compute`]
-/// or [`test`] does not compile.
+/// Returns the builtin that the row of an opcode names. An arm that leaves an instruction without one to
+/// [`compute`] or [`test`] does not compile.
 pub(super) const fn builtin(opcode: Opcode) -> Builtin {
     match opcode.builtin() {
         Some(builtin) => builtin,
@@ -55,8 +55,7 @@ pub(super) const fn builtin(opcode: Opcode) -> Builtin {
 /// The largest number of arguments that an instruction gives its builtin.
 const MAX_ARGUMENTS: usize = 3;
 
-/// Has the builtin that the row of an instruction names do its work; gives the outcome, and the register for
-/// it.
+/// Calls the builtin that the row of an instruction names. Returns the outcome, and the register for it.
 ///
 /// # Safety
 /// See the module's header; `pc` is at an instruction with this opcode.
@@ -104,8 +103,7 @@ unsafe fn apply_builtin<const OPCODE: u8>(
     (outcome, dst)
 }
 
-/// Has the ESL twin of a builtin do what is too much work for one instruction: its call takes the
-/// instruction's place.
+/// Requests a call of a builtin's ESL twin in place of an instruction that is too much work.
 #[cold]
 fn ask_twin(vm: &mut Vm, builtin: Builtin, arguments: &[Value]) -> Outcome {
     let function = vm.twin_of(builtin.info())?;
@@ -168,7 +166,7 @@ pub(super) unsafe fn loop_count(vm: &mut Vm, pc: *const u32, base: *mut Value) -
     }
 }
 
-/// Whether two values are `eql`.
+/// Returns whether two values are `eql`.
 #[inline(always)]
 pub(super) fn eql(vm: &Vm, a: Value, b: Value) -> bool {
     a == b || (a.is_object() && b.is_object() && eql_objects(vm, a, b))
@@ -180,7 +178,7 @@ fn eql_objects(vm: &Vm, a: Value, b: Value) -> bool {
     number::eql(&vm.heap, a, b)
 }
 
-/// Whether `value` is of the type with this code.
+/// Returns whether `value` is of the type with this code.
 #[inline(always)]
 pub(super) fn is_type(vm: &Vm, value: Value, code: u8) -> bool {
     // The commonest tests of immediate values need no look at the heap.
@@ -215,7 +213,7 @@ pub(super) unsafe fn list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sign
     }
 }
 
-/// `slot`: the first time at a place, of an instance of a subclass, and of what is no instance.
+/// `slot` of an instance of a subclass or of another object, and the first `slot` at a place.
 #[cold]
 #[inline(never)]
 pub(super) unsafe fn slot(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
@@ -260,7 +258,7 @@ fn expect_slot(vm: &mut Vm, instance: Value, slot: usize, class: Value) -> Resul
     Err(failure(vm, Raised::Type(instance, expected)))
 }
 
-/// Whether `value` is an instance of the class that is constant `index`, or of a subclass.
+/// Returns whether `value` is an instance of the class that is constant `index`, or of a subclass.
 ///
 /// # Safety
 /// The frame at `base` is the running one, and constant `index` of its function is for a class.
@@ -272,8 +270,9 @@ pub(super) unsafe fn is_instance(vm: &mut Vm, base: *mut Value, value: Value, in
     vm.world.is_instance(&vm.heap, value, class)
 }
 
-/// The class that is a constant of the running function. As loaded the constant is the name of the class; the
-/// class, as it is now, is put in its place, also when the class of that name has become another one.
+/// Returns the class that is a constant of the running function. As loaded the constant is the name of the
+/// class; the class, as it is now, is put in its place, also when the class of that name has become another
+/// one.
 ///
 /// # Safety
 /// The frame at `base` is the running one, and constant `index` of its function is for a class.
@@ -324,7 +323,7 @@ pub(super) unsafe fn make_closure(vm: &mut Vm, pc: *const u32, base: *mut Value)
     }
 }
 
-/// The closure of `code` made in the frame at `base`.
+/// Returns the closure of `code` made in the frame at `base`.
 ///
 /// # Safety
 /// `make-closure` may stand where that frame is: V8.

@@ -8,6 +8,7 @@ use super::{Leave, code_of};
 use crate::compiler::Compiler;
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Phase, SLICE_VISITS, SliceOutcome};
+use crate::outside::Operations;
 use crate::saved_pc::SavedPc;
 use crate::schedule::{Scheduler, TurnEnd};
 use crate::task::{Task, Tasks};
@@ -71,6 +72,7 @@ fn mark_roots(
     exchange: &Exchange,
     pinned: &[Value],
     deliveries: &Deliveries,
+    operations: &Operations,
 ) {
     world.roots(&mut |value| heap.mark(value));
     compiler.roots(&mut |value| heap.mark(value));
@@ -81,6 +83,7 @@ fn mark_roots(
         raised.visit(&mut |value| heap.mark(value));
     }
     deliveries.visit(&mut |value| heap.mark(value));
+    operations.visit(&mut |value| heap.mark(value));
 }
 
 /// Marks more: a slice of what is known to be reachable, then the tasks whose stacks have yet to be scanned.
@@ -137,6 +140,12 @@ impl Vm {
         Some(Leave::Slice)
     }
 
+    /// Returns whether the slice of the running task may go on, as far as its turn and the collector are
+    /// concerned.
+    pub(crate) fn slice_may_go_on(&self) -> bool {
+        self.scheduler.turn.end == TurnEnd::Spent && self.cpu.collections < TURNS_IN_SLICE
+    }
+
     /// Arranges for the next tick to be a safepoint, if one is wanted there.
     pub(super) fn arm(&mut self) {
         let wanted = self.config.collect_always || self.heap.gc_due();
@@ -147,7 +156,8 @@ impl Vm {
         }
     }
 
-    /// Whether a builtin or an allocation wants the next tick to be a safepoint, or has charged ticks.
+    /// Returns whether a builtin or an allocation wants the next tick to be a safepoint, or has charged
+    /// ticks.
     #[inline(always)]
     pub(super) fn wants_safepoint(&self) -> bool {
         !self.exchange.charges.is_empty() || self.heap.gc_due()
@@ -184,16 +194,24 @@ impl Vm {
         task.pc = pc;
     }
 
-    /// A whole cycle at once: because there is no room, or because every safepoint is to be one.
+    /// Completes a whole cycle: for want of room, or since each safepoint is to collect.
     pub(crate) fn collect_fully(&mut self) {
         let pause = self.begin_pause();
-        let Vm { heap, world, compiler, scheduler, exchange, embedder, .. } = self;
+        let Vm { heap, world, compiler, scheduler, outside, exchange, embedder, .. } = self;
         let Scheduler { running, tasks, deliveries, .. } = scheduler;
         // SAFETY: all roots and all tasks are marked; `begin_pause` has noted the running frame of the
         // running task, those of the others were noted at the switch.
         unsafe {
             heap.collect_fully(|heap| {
-                mark_roots(heap, world, compiler, exchange, &embedder.pinned, deliveries);
+                mark_roots(
+                    heap,
+                    world,
+                    compiler,
+                    exchange,
+                    &embedder.pinned,
+                    deliveries,
+                    &outside.operations,
+                );
                 for task in running.as_deref_mut().into_iter().chain(tasks.iter_mut()) {
                     _ = scan(heap, task);
                 }
@@ -205,7 +223,7 @@ impl Vm {
     /// The collector's turn.
     pub(crate) fn collect_slice(&mut self) {
         let pause = self.begin_pause();
-        let Vm { heap, world, compiler, scheduler, exchange, embedder, .. } = self;
+        let Vm { heap, world, compiler, scheduler, outside, exchange, embedder, .. } = self;
         let Scheduler { running, tasks, deliveries, .. } = scheduler;
         match heap.phase() {
             Phase::Marking => mark_more(heap, tasks),
@@ -213,7 +231,15 @@ impl Vm {
             Phase::Idle => {
                 heap.begin_cycle();
                 tasks.begin_cycle();
-                mark_roots(heap, world, compiler, exchange, &embedder.pinned, deliveries);
+                mark_roots(
+                    heap,
+                    world,
+                    compiler,
+                    exchange,
+                    &embedder.pinned,
+                    deliveries,
+                    &outside.operations,
+                );
                 if let Some(task) = running {
                     // SAFETY: `begin_pause` has noted the base of its running frame.
                     _ = unsafe { scan(heap, task) };
@@ -230,18 +256,18 @@ impl Vm {
             self.save_cpu();
         }
         let Vm { watch, outside, scheduler, .. } = self;
-        watch.is_watched.then(|| watch.begin_pause(&mut *outside.host, scheduler))
+        watch.is_watched.then(|| watch.begin_pause(&mut outside.host, scheduler))
     }
 
     /// Ends a turn of the collector.
     fn end_pause(&mut self, began: Option<u64>) {
         if let Some(began) = began {
             let is_last = self.heap.phase() == Phase::Idle;
-            self.watch.end_pause(&mut *self.outside.host, &self.scheduler, began, is_last);
+            self.watch.end_pause(&mut self.outside.host, &self.scheduler, began, is_last);
         }
     }
 
-    /// Sees to it that a task's stack has been scanned in the cycle under way before the task runs.
+    /// Scans the stack of a task that is about to run, unless the cycle under way has scanned it.
     pub(crate) fn scan_before_running(&mut self) {
         if self.heap.phase() != Phase::Marking {
             return;

@@ -22,7 +22,7 @@ mod register {
 
     static BIAS: Operand = Operand([Value::DOUBLE_BIAS, 0]);
 
-    /// The double in a register, of which [`Value::is_windowed_double`] is true.
+    /// Returns the double in a register, of which [`Value::is_windowed_double`] is true.
     ///
     /// # Safety
     /// `register` points to a value.
@@ -87,7 +87,7 @@ mod register {
 mod register {
     use crate::value::Value;
 
-    /// The double in a register, of which [`Value::is_windowed_double`] is true.
+    /// Returns the double in a register, of which [`Value::is_windowed_double`] is true.
     ///
     /// # Safety
     /// `register` points to a value.

@@ -29,7 +29,7 @@ pub(super) unsafe fn exit(vm: &mut Vm, exit: Exit) -> Signal {
             Exit::Call => {
                 let (function, arguments) = vm.exchange.take_requested_call();
                 let place = FramePlace::for_instruction(word_at(vm.cpu.pc()));
-                call(vm, function, &arguments, place)
+                call(vm, function, &*arguments, place)
             }
             Exit::Park => Signal::Park,
             Exit::Again => Signal::Again,
@@ -37,7 +37,7 @@ pub(super) unsafe fn exit(vm: &mut Vm, exit: Exit) -> Signal {
     }
 }
 
-/// Has the library function that is named in the builtin's row do the work.
+/// Calls the library function that the builtin's row names in place of the builtin.
 ///
 /// # Safety
 /// The contract of [`super::settle`], at `call-builtin` or `tail-call-builtin`. No other instruction gives
@@ -51,7 +51,7 @@ unsafe fn take_over(vm: &mut Vm) -> Signal {
             Ok(function) => function,
             Err(exit) => return Signal::Exit(exit),
         };
-        let given = std::slice::from_raw_parts(vm.cpu.base().add(word.a() + 2), word.b());
+        let given = std::ptr::slice_from_raw_parts(vm.cpu.base().add(word.a() + 2), word.b());
         call(vm, function, given, FramePlace::for_instruction(word))
     }
 }
@@ -77,7 +77,7 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
         return Signal::Unwind;
     }
     // SAFETY: F1 holds by the contract, and a frame above the running one needs no window.
-    unsafe { call(vm, function, &arguments, FramePlace::Above) }
+    unsafe { call(vm, function, &*arguments, FramePlace::Above) }
 }
 
 /// Collects, so that the instruction at `vm.cpu.pc()` is done again with more room; if that did not help the

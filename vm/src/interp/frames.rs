@@ -1,5 +1,5 @@
-//! Walks over the frames of a task's stack: for backtraces, for reports, for what recovers from a failure,
-//! for a fingerprint of the task's state.
+//! Walks over the frames of a task's stack, for backtraces, reports, recoveries from failures, and
+//! fingerprints of the task's state.
 
 use std::marker::PhantomData;
 
@@ -45,8 +45,8 @@ impl<'a> Frame<'a> {
         unsafe { pc_from_value(*self.base.sub(1)) }
     }
 
-    /// Whether its function was called by name, or by the machine in the place of an instruction, and not as
-    /// a value that the caller was given.
+    /// Returns whether its function was called by name, or by the machine in the place of an instruction, and
+    /// not as a value that the caller was given.
     fn is_called_by_name(&self) -> bool {
         let return_to = self.return_address();
         // SAFETY: F2: two words before a return address is the word of the call.
@@ -55,7 +55,7 @@ impl<'a> Frame<'a> {
             || matches!(call.opcode().and_then(Opcode::callee), Some(Callee::Global | Callee::Running))
     }
 
-    /// Whether its function is one of the library.
+    /// Returns whether its function is one of the library.
     fn is_of_library(&self) -> bool {
         // SAFETY: F2: the function of a frame is a Function.
         unsafe { (*code_of(self.function)).owner.is_fixnum() }
@@ -134,7 +134,8 @@ unsafe fn word_in(code: *mut Code, pc: *const u32) -> usize {
     pc.addr().wrapping_sub(start.addr()) / size_of::<u32>()
 }
 
-/// The word of the code of its frame at which an entry of a task that does not run lands, if it has one.
+/// Returns the word of the code of its frame at which an entry of a task that does not run lands, if it has
+/// one.
 pub(crate) fn entry_word(task: &Task, entry: &Entry) -> Option<usize> {
     if entry.pc.is_none() {
         return None;
@@ -147,6 +148,16 @@ pub(crate) fn entry_word(task: &Task, entry: &Entry) -> Option<usize> {
 }
 
 impl Vm {
+    /// Returns the word of the code of its frame at which the running task stands, 0 if that is in a stub.
+    pub(crate) fn word_of_pc(&self) -> usize {
+        // SAFETY: F1, F2: below the base is the function of the running frame.
+        let (word, words) = unsafe {
+            let code = code_of(*self.cpu.base().sub(2));
+            (word_in(code, self.cpu.pc()), (*code).nwords as usize)
+        };
+        if word < words { word } else { 0 }
+    }
+
     /// Returns the frames of the running task. `vm.cpu` is in order when a builtin that the interpreter
     /// called asks for them only up to its innermost frame's pc, so that one is given as it was saved.
     pub(crate) fn frames(&self) -> impl Iterator<Item = Frame<'_>> {

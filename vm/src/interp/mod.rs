@@ -35,8 +35,10 @@ mod call;
 mod cold;
 mod collect;
 mod double;
+mod end;
 mod exit;
 pub(crate) mod frames;
+mod in_window;
 mod interrupt;
 mod reserve;
 pub(crate) mod start;
@@ -115,7 +117,7 @@ pub(crate) enum Leave {
     Parked,
 }
 
-/// The code of a function.
+/// Returns the code of a function.
 ///
 /// # Safety
 /// `function` is a Function.
@@ -125,7 +127,7 @@ pub(crate) unsafe fn code_of(function: Value) -> *mut Code {
     unsafe { (*function.object_ptr().cast::<Function>()).code.object_ptr().cast() }
 }
 
-/// The constants of a code.
+/// Returns the constants of a code.
 ///
 /// # Safety
 /// `code` points to a Code.
@@ -145,7 +147,7 @@ unsafe fn constant(base: *mut Value, index: usize) -> Value {
     unsafe { *constants_of(code_of(*base.sub(2))).add(index) }
 }
 
-/// The word of the instruction at `pc`.
+/// Returns the word of the instruction at `pc`.
 ///
 /// # Safety
 /// `pc` points into code.
@@ -155,7 +157,7 @@ unsafe fn word_at(pc: *const u32) -> Word {
     Word(unsafe { *pc })
 }
 
-/// The aux word of the instruction at `pc`.
+/// Returns the aux word of the instruction at `pc`.
 ///
 /// # Safety
 /// `pc` is at an instruction of two words.
@@ -165,7 +167,7 @@ unsafe fn aux_at(pc: *const u32) -> u32 {
     unsafe { *pc.add(1) }
 }
 
-/// The operation of a word.
+/// Returns the operation of a word.
 ///
 /// # Safety
 /// The word is one of code that has passed the verifier, or of a stub.
@@ -176,14 +178,14 @@ unsafe fn operation(word: Word) -> Operation {
     unsafe { std::mem::transmute(word.number()) }
 }
 
-/// A pc as a word of a stack: its low bits are clear, so it looks like a fixnum.
+/// Returns a pc as a word of a stack: its low bits are clear, so it looks like a fixnum.
 #[inline(always)]
 fn pc_as_value(pc: *const u32) -> Value {
     // SAFETY: the bits of a fixnum, since a word of code is aligned to four bytes.
     unsafe { Value::from_bits(pc.expose_provenance() as u64) }
 }
 
-/// The pc that is in a word of a stack.
+/// Returns the pc that is in a word of a stack.
 #[inline(always)]
 fn pc_from_value(word: Value) -> *const u32 {
     std::ptr::with_exposed_provenance(word.bits() as usize)
@@ -288,7 +290,7 @@ unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
                 Signal::Call => call::slow_call(vm),
                 Signal::ReturnAll => substitute::return_all(vm),
                 Signal::Unwind => unwind::unwind(vm),
-                Signal::TaskExit => return Err(Leave::Ended),
+                Signal::TaskExit => return end::end_task(vm),
             };
         }
     }
@@ -381,7 +383,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                 };
             }
-            // Sees to what a builtin or an allocation has left.
+            // Handles the charges of a builtin and the requests of an allocation.
             macro_rules! attend {
                 () => {
                     if vm.wants_safepoint() {
@@ -502,7 +504,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 ($window:expr, $function:expr, $code:expr, $return_to:expr) => {{
                     let (window, code): (*mut Value, *mut Code) = ($window, $code);
                     let registers = window.add(2);
-                    if registers.add((*code).nregs as usize) > vm.cpu.stack_end() {
+                    // The registers may end behind the stack, where `add` has no meaning.
+                    if registers.wrapping_add((*code).nregs as usize) > vm.cpu.stack_end() {
                         break Signal::Call;
                     }
                     *window = $function;
@@ -513,22 +516,40 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     continue;
                 }};
             }
+            // As `enter!`, after the arguments have been put in the order of the function's parameters.
+            macro_rules! enter_arranged {
+                ($window:expr, $function:expr, $code:expr, $return_to:expr) => {{
+                    if in_window::arrange(vm, $code, $window.add(2), word.b()).is_some() {
+                        enter!($window, $function, $code, $return_to);
+                    }
+                }};
+            }
             // As `enter!`, in place of the running frame, if the function takes so many arguments.
             macro_rules! enter_in_place {
                 ($window:expr, $function:expr) => {{
                     let (window, function): (*mut Value, Value) = ($window, $function);
                     let code = code_of(function);
                     if (*code).arity == word.b() as u32
-                        && base.add((*code).nregs as usize) <= vm.cpu.stack_end()
+                        && base.wrapping_add((*code).nregs as usize) <= vm.cpu.stack_end()
                     {
-                        for i in 0..word.b() {
-                            *base.add(i) = *window.add(2 + i);
-                        }
-                        *base.sub(2) = function;
-                        k = constants_of(code);
-                        pc = (*code).entry;
-                        continue;
+                        replace_frame!(window, function, code, word.b());
                     }
+                    if let Some(parameters) = in_window::arrange(vm, code, window.add(2), word.b()) {
+                        replace_frame!(window, function, code, parameters);
+                    }
+                }};
+            }
+            // Puts the frame of a function, whose first registers lie in the window, in place of the running
+            // one.
+            macro_rules! replace_frame {
+                ($window:expr, $function:expr, $code:expr, $count:expr) => {{
+                    for i in 0..$count {
+                        *base.add(i) = *$window.add(2 + i);
+                    }
+                    *base.sub(2) = $function;
+                    k = constants_of($code);
+                    pc = (*$code).entry;
+                    continue;
                 }};
             }
             // Calls the builtin of the instruction with the arguments in its window.
@@ -1043,6 +1064,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         if (*code).arity == word.b() as u32 {
                             enter!(window, function, code, pc.add(2));
                         }
+                        enter_arranged!(window, function, code, pc.add(2));
                     }
                     break Signal::Call;
                 }
@@ -1055,6 +1077,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     if (*code).arity == word.b() as u32 {
                         enter!(base.add(word.a()), function, code, pc.add(2));
                     }
+                    enter_arranged!(base.add(word.a()), function, code, pc.add(2));
                     break Signal::Call;
                 }
                 Operation::CallSelf => {
@@ -1183,7 +1206,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
     signal
 }
 
-/// Whether `value` is an instance of just this class, not of a subclass.
+/// Returns whether `value` is an instance of just this class, not of a subclass.
 #[inline(always)]
 unsafe fn is_instance_of_exactly(value: Value, class: Value) -> bool {
     // SAFETY: an object's value is the address of a live header; in a structure its class follows.

@@ -77,7 +77,10 @@ impl Vm {
     /// it, which the library has put into a catch, so that the failure goes on outward. Without that, the
     /// task ends with `cause`.
     pub(crate) fn leave_reserve(&mut self, cause: Value) {
-        match self.scheduler.task().control.find_catch(self.world.known.reserve) {
+        let control = &self.scheduler.task().control;
+        let (found, height) = (control.find_catch(self.world.known.reserve), control.entries.len());
+        self.exchange.charge(height - found.unwrap_or(0));
+        match found {
             Some(index) => {
                 let unwinding = Unwinding { target: Target::Entry(index), values: Vec::new() };
                 self.scheduler.task_mut().control.unwinding = Some(unwinding);

@@ -2,7 +2,7 @@
 
 use esl_bytecode::module::Parameters;
 use esl_bytecode::opcode::Instr;
-use esl_bytecode::operand::{Base, Count, Pad};
+use esl_bytecode::operand::{Count, Pad, Window};
 
 use super::{code_of, stubs};
 use crate::heap::layout::Code;
@@ -12,21 +12,28 @@ use crate::shape::{Shape, Sort};
 use crate::task::LazyControl;
 use crate::task::Task;
 use crate::value::Value;
+use crate::vm::Vm;
+
+/// Offset in a task's stack of the base of the frame in which the stub at the end of the task runs.
+const EXIT_BASE: u32 = 2;
+
+/// Offset in a task's stack of the base of its first frame.
+pub(super) const FIRST_BASE: u32 = 4;
 
 /// Words of the stack of a task that begins with `function` and the list of `arguments`.
 pub(crate) fn first_words(heap: &Heap, function: Value, arguments: Value) -> usize {
     4 + direct_code(heap, function, arguments).map_or(3, |code| code.nregs as usize)
 }
 
-/// The code of `function`, if it can be entered without arguments just as it is.
+/// Returns the code of `function`, if it can be entered without arguments just as it is.
 fn direct_code(heap: &Heap, function: Value, arguments: Value) -> Option<&Code> {
     let code = heap.code(heap.function_code(function)?)?;
     (arguments.is_nil() && code.arity == 0 && Shape::unpack(code.spare[0]).sort == Sort::Bytecode)
         .then_some(code)
 }
 
-/// Gives a new task its first frame: that of `function`, or a starter that calls it with the list of
-/// arguments in its place.
+/// Makes the first frame of a new task: that of `function`, or that of a starter, which calls the function
+/// with the list of arguments.
 pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function: Value, arguments: Value) {
     let stub = stubs::task_exit();
     if let Some(code) = direct_code(heap, function, arguments) {
@@ -40,7 +47,7 @@ pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function
             *start.add(3) = Value::from_bits(stub.expose_provenance() as u64);
         }
         task.pc = SavedPc::new(code.entry);
-        task.base = 4;
+        task.base = FIRST_BASE;
         return;
     }
     // SAFETY: the task was made with `first_words`: room for two links and the three registers of the
@@ -56,31 +63,56 @@ pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function
         *start.add(6) = arguments;
         task.pc = SavedPc::new((*code_of(starter)).entry);
     }
-    task.base = 4;
+    task.base = FIRST_BASE;
 }
 
-/// What the second word of a task's stack holds: the code with which the task began, for those who want to
-/// know where that was written when a tail call has taken the place of its frame. Not the function, which
-/// would keep what it has captured.
+/// Restarts the running task, which has left all its frames, with a call of `function` with a list of
+/// arguments.
+pub(super) fn begin_again(vm: &mut Vm, function: Value, arguments: Value) {
+    let words = first_words(&vm.heap, function, arguments);
+    let starter = vm.scheduler.starter;
+    let task = vm.scheduler.task_mut();
+    if task.stack.capacity() < words {
+        task.stack.grow(words);
+    }
+    first_frame(&vm.heap, task, starter, function, arguments);
+    let (pc, stack_end) = (task.pc.get(), vm.stack_end());
+    let task = vm.scheduler.task();
+    // SAFETY: F1: the task stands at the first instruction of its first frame, whose base lies in its stack,
+    // which ends at `stack_end`.
+    unsafe {
+        vm.cpu.set_pc(pc);
+        vm.cpu.set_base(task.stack.start().add(task.base as usize));
+        vm.cpu.set_stack_end(stack_end);
+    }
+}
+
+/// Returns the second word of a task's stack: the code with which the task began. Reports show its place in
+/// the source when a tail call has replaced its frame. The function itself would keep its captures alive.
 fn first_code(heap: &Heap, function: Value) -> Value {
     heap.function_code(function).unwrap_or(Value::NIL)
 }
 
-/// The code with which a task began.
+/// Returns the code with which a task began.
 pub(crate) fn first_code_of(task: &Task) -> Value {
     task.stack.words(2).get(1).copied().unwrap_or(Value::NIL)
 }
 
-/// Lets go of everything that a task that has ended holds on its stacks.
-pub(crate) fn drop_frames(task: &mut Task) {
+/// Lets go of everything that the running task, which has ended, holds on its stacks. The frame of the stub at
+/// its end is left.
+pub(crate) fn drop_frames(vm: &mut Vm) {
+    let task = vm.scheduler.task_mut();
     task.control = LazyControl::default();
-    task.base = 2;
-    task.stack.wipe(2);
+    task.base = EXIT_BASE;
+    task.stack.wipe(EXIT_BASE as usize);
+    // A collection may still come in this turn, and takes the running frame from the registers.
+    // SAFETY: F1: every stack begins with the link of the frame whose base this is.
+    unsafe { vm.cpu.set_base(task.stack.start().add(EXIT_BASE as usize)) };
 }
 
 /// Makes the function with which every task begins: `(apply R0 R2)` as a tail call.
 pub(crate) fn make_starter(heap: &mut Heap) -> Result<Value, AllocError> {
-    let instruction = Instr::TailApply { window: Base(0), count: Count(1), pad: Pad(0) };
+    let instruction = Instr::TailApply { window: Window(0), count: Count(1), pad: Pad(0) };
     let (word, aux) = instruction.encode();
     let parts = CodeParts {
         name: Value::NIL,

@@ -20,7 +20,7 @@ pub(super) const ERROR_RETURN: u8 = 0xC3;
 /// Number of the operation after a function that ran where its task was interrupted.
 pub(super) const INTERRUPT_RETURN: u8 = 0xC4;
 
-/// A call word whose window is register `window` and that wants all values.
+/// Returns a call word whose window is register `window` and that wants all values.
 const fn call_word(window: u8) -> u32 {
     Opcode::Call as u32 | (window as u32) << 8 | (Want::ALL.0 as u32) << 24
 }
@@ -45,29 +45,34 @@ static ERROR_RETURN_CODE: [[u32; 3]; 256] = returns_to(ERROR_RETURN);
 /// For each window, return to an instruction before which the task was interrupted.
 static INTERRUPT_RETURN_CODE: [[u32; 3]; 256] = returns_to(INTERRUPT_RETURN);
 
+/// Returns the address of the operation of a stub, from which the words before it can be read.
+fn operation_of(stub: &'static [u32; 3]) -> *const u32 {
+    stub.as_ptr().wrapping_add(2)
+}
+
 /// Return address of a task's first function.
 pub(crate) fn task_exit() -> *const u32 {
-    &raw const TASK_EXIT_CODE[2]
+    operation_of(&TASK_EXIT_CODE)
 }
 
 /// Return address of a function whose window is register `window` of the frame with the failed instruction.
 pub(crate) fn error_return(window: u8) -> *const u32 {
-    &raw const ERROR_RETURN_CODE[usize::from(window)][2]
+    operation_of(&ERROR_RETURN_CODE[usize::from(window)])
 }
 
 /// Return address of a function that runs in an interrupted frame, whose window is this register of the
 /// frame.
 pub(crate) fn interrupt_return(window: u8) -> *const u32 {
-    &raw const INTERRUPT_RETURN_CODE[usize::from(window)][2]
+    operation_of(&INTERRUPT_RETURN_CODE[usize::from(window)])
 }
 
-/// Whether a return address is one of [`error_return`] or [`interrupt_return`]: the frame has its pc behind
-/// its registers.
+/// Returns whether a return address is one of [`error_return`] or [`interrupt_return`]: the frame has its pc
+/// behind its registers.
 pub(crate) fn is_return_above(pc: *const u32) -> bool {
     is_in(&ERROR_RETURN_CODE, pc) || is_in(&INTERRUPT_RETURN_CODE, pc)
 }
 
-/// Whether a return address is one of [`error_return`].
+/// Returns whether a return address is one of [`error_return`].
 pub(crate) fn is_error_return(pc: *const u32) -> bool {
     is_in(&ERROR_RETURN_CODE, pc)
 }

@@ -11,7 +11,7 @@ use super::{Signal, aux_at, cold, constant, failure, word_at};
 use crate::heap::layout::Kind;
 use crate::raise::{Exit, Raised};
 use crate::saved_pc::SavedPc;
-use crate::task::{Entry, EntryKind, Running, Target, Unwinding};
+use crate::task::{Allowance, Entry, EntryKind, Running, Target, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -28,7 +28,7 @@ pub(super) unsafe fn new_tag(vm: &mut Vm, pc: *const u32, base: *mut Value) -> S
     }
 }
 
-/// The entry that the instruction with this word pushes, as far as all kinds have it in common.
+/// Returns the entry that the instruction with this word pushes, as far as all kinds have it in common.
 fn entry(kind: EntryKind, word: Word) -> Entry {
     let window = word.a() as u8;
     Entry { data: Value::NIL, pc: SavedPc::NONE, base: 0, bindings: 0, window, want: 0, kind }
@@ -214,7 +214,10 @@ pub(super) unsafe fn throw(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sig
         let word = word_at(pc);
         (*base.add(word.a()), word.b())
     };
-    match vm.scheduler.task().control.find_catch(tag) {
+    let control = &vm.scheduler.task().control;
+    let (found, height) = (control.find_catch(tag), control.entries.len());
+    vm.exchange.charge(height - found.unwrap_or(0));
+    match found {
         Some(index) => {
             let values = std::mem::take(&mut vm.exchange.values);
             vm.scheduler.task_mut().control.unwinding =
@@ -267,6 +270,12 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
             }
             _ => {}
         }
+        // The tick comes before the step, so that a slice that ends here leaves the step to the next one.
+        vm.cpu.ticks -= 1;
+        if vm.cpu.ticks < 0 {
+            task.control.unwinding = Some(unwinding);
+            return Signal::Tick;
+        }
         let Some(entry) = task.control.entries.pop() else { return Signal::Reload };
         match entry.kind {
             EntryKind::FailureCleanup if !unwinding.target.is_final() => {
@@ -275,16 +284,17 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
             }
             EntryKind::Cleanup | EntryKind::FailureCleanup => {
                 let is_forced = unwinding.target.is_forced();
-                let allowance = if is_forced {
-                    Some(vm.scheduler.new_allowance(&mut *vm.outside.host, &vm.config))
+                let allowance = if is_forced { vm.allow_cleanup(unwinding.target, height - 1) } else { None };
+                if is_forced && allowance.is_none() {
+                    // What these cleanups may use together is spent.
+                    vm.scheduler.task_mut().control.unwinding = Some(unwinding);
                 } else {
-                    None
-                };
-                let running = Running { pending: Some(unwinding), allowance, ..Running::default() };
-                vm.scheduler.task_mut().control.run_cleanup(entry, running);
-                // SAFETY: F5: the entry's frame is live, and its pc is the cleanup's first instruction.
-                unsafe { vm.resume_at(&entry) };
-                return Signal::Reload;
+                    let running = Running { pending: Some(unwinding), allowance, ..Running::default() };
+                    vm.scheduler.task_mut().control.run_cleanup(entry, running);
+                    // SAFETY: F5: the entry's frame is live, and its pc is the cleanup's first instruction.
+                    unsafe { vm.resume_at(&entry) };
+                    return Signal::Reload;
+                }
             }
             EntryKind::Running => {
                 let interrupted = task.control.running.pop().and_then(|running| running.pending);
@@ -307,10 +317,6 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
                 }
             }
             _ => task.control.unwinding = Some(unwinding),
-        }
-        vm.cpu.ticks -= 1;
-        if vm.cpu.ticks < 0 {
-            return Signal::Tick;
         }
     }
 }
@@ -348,7 +354,7 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
 }
 
 impl Vm {
-    /// The function that runs the clauses of the recovery procedures of an entry, made as the first
+    /// Returns the function that runs the clauses of the recovery procedures of an entry, made as the first
     /// instruction at its landing says; `None` if there is no such entry or instruction.
     pub(crate) fn recovery_function(&mut self, index: usize) -> Result<Option<Value>, Exit> {
         let Some(entry) = self.scheduler.task().control.entries.get(index).copied() else { return Ok(None) };
@@ -372,6 +378,23 @@ impl Vm {
                 _ => Ok(None),
             }
         }
+    }
+
+    /// Returns the allowance of the cleanup at the control entry `index`, which a forced unwinding to
+    /// `target` meets. `None` if it is not to be run.
+    fn allow_cleanup(&mut self, target: Target, index: usize) -> Option<Allowance> {
+        let depth = match target {
+            Target::Cleanup(_) => None,
+            target => Some(target.depth()),
+        };
+        let Vm { scheduler, outside, config, cpu, exchange, .. } = self;
+        let allowance = scheduler.allow_cleanup(depth, index, cpu.used(), &mut outside.host, config)?;
+        let left = allowance.ticks.saturating_sub(scheduler.task().ticks.saturating_add(cpu.used()));
+        if cpu.left() > left as i64 {
+            // The slice is longer than the cleanup may take.
+            exchange.charges.end_slice();
+        }
+        Some(allowance)
     }
 
     /// Makes the frame and place of an entry the running ones.

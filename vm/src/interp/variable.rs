@@ -87,7 +87,7 @@ pub(super) unsafe fn function_ref(vm: &mut Vm, pc: *const u32, base: *mut Value)
 }
 
 impl Vm {
-    /// The value of a special variable in the running task; `None` if it has none.
+    /// Returns the value of a special variable in the running task; `None` if it has none.
     pub(crate) fn symbol_value(&self, symbol: Value) -> Option<Value> {
         let cell = self.heap.symbol(symbol)?;
         let value = if cell.header.flags & Symbol::EVER_BOUND == 0 {

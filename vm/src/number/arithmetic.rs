@@ -7,12 +7,19 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 /// Returns `a + b`.
+#[inline]
 pub(crate) fn add(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     if let (Some(x), Some(y)) = (a.as_fixnum(), b.as_fixnum())
         && let Some(result) = Value::fixnum(x + y)
     {
         return Ok(result);
     }
+    add_others(vm, a, b)
+}
+
+/// Adds what are no fixnums, or have no fixnum for their sum.
+#[inline(never)]
+fn add_others(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     if let Some((x, y)) = unboxed_doubles(a, b) {
         return vm.float_value("+", x + y);
     }

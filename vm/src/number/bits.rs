@@ -4,6 +4,7 @@ use num_bigint::BigInt;
 use num_traits::Signed;
 
 use super::Int;
+use super::limbs::{BigOperand, Limbs};
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -44,6 +45,24 @@ pub(crate) fn complement(vm: &mut Vm, a: Value) -> Outcome {
 
 /// Implements `(ash a count)`.
 pub(crate) fn shift(vm: &mut Vm, a: Value, count: Value) -> Outcome {
+    if let Some(distance) = count.as_fixnum()
+        && let Some((bits, is_negative)) = magnitude_bits(vm, a)
+        && (distance >= 0 || !is_negative)
+    {
+        let limbs = (bits / 64) as usize;
+        if distance > 0 && bits > 0 {
+            vm.check_bits("ASH", bits + distance.unsigned_abs())?;
+            vm.exchange.charge(limbs + distance as usize / 64);
+        } else {
+            vm.exchange.charge(limbs);
+        }
+        let shifted = BigOperand::of(&vm.heap, a, &mut [0]).map(|n| match u64::try_from(distance) {
+            Ok(shift) if bits > 0 => n.shifted_left(shift),
+            Ok(_) => Limbs::new(),
+            Err(_) => n.field(distance.unsigned_abs(), u64::MAX),
+        });
+        return vm.limbs_value("ASH", is_negative, &shifted.unwrap_or_default());
+    }
     let (n, count) = (vm.integer(a)?, vm.integer(count)?);
     vm.exchange.charge(n.len());
     if n.is_zero() {
@@ -72,14 +91,24 @@ pub(crate) fn bit(vm: &mut Vm, index: Value, a: Value) -> Result<bool, Exit> {
     }
 }
 
+/// Returns the length of the magnitude of an integer in bits, and whether the integer is negative. `None` for
+/// any other value.
+fn magnitude_bits(vm: &Vm, v: Value) -> Option<(u64, bool)> {
+    BigOperand::of(&vm.heap, v, &mut [0]).map(|n| (n.bits(), n.is_negative()))
+}
+
 /// Returns `size` bits of `a` from bit `position` up, as an integer that is not negative.
-pub(crate) fn field(vm: &mut Vm, size: u64, position: u64, a: &Int) -> Result<Int, Exit> {
-    vm.exchange.charge(a.len());
-    let shifted = a.shifted_right(position);
-    // A number that is not negative has only zeros above its length.
-    let size = if shifted.is_negative() { size } else { size.min(shifted.bits()) };
+pub(crate) fn field(vm: &mut Vm, size: u64, position: u64, a: Value) -> Outcome {
+    if let Some((bits, false)) = magnitude_bits(vm, a) {
+        vm.exchange.charge((size.min(bits) / 64) as usize);
+        let field = BigOperand::of(&vm.heap, a, &mut [0]).map(|n| n.field(position, size));
+        return vm.limbs_value("LDB", false, &field.unwrap_or_default());
+    }
+    let n = vm.integer(a)?;
     vm.check_bits("LDB", size)?;
-    Ok(shifted.joined(BitOperation::And, &mask(size)))
+    vm.exchange.charge(n.len() + size as usize / 64);
+    let field = n.shifted_right(position).joined(BitOperation::And, &mask(size));
+    vm.integer_value("LDB", &field)
 }
 
 /// Returns `a` with the field of `size` bits from `position` up replaced by the lowest bits of `new`.

@@ -1,4 +1,5 @@
-//! Sums, differences and products of magnitudes in the heap's representation: limbs of 64 bits, least first.
+//! Sums, differences, products and shifts of magnitudes in the heap's representation: limbs of 64 bits, least
+//! first.
 //!
 //! Most operations on big integers are sums, or products with a small factor. Here they work on the heap's
 //! limbs directly, without a conversion and without native allocation. Products of two long numbers are left
@@ -45,6 +46,21 @@ impl<'a> BigOperand<'a> {
     /// Returns the length of the magnitude in bits.
     pub(crate) fn bits(&self) -> u64 {
         self.limbs.last().map_or(0, |last| 64 * self.limbs.len() as u64 - u64::from(last.leading_zeros()))
+    }
+
+    /// Returns whether the integer is below zero.
+    pub(crate) fn is_negative(&self) -> bool {
+        self.negative
+    }
+
+    /// Returns the magnitude times `2^shift`.
+    pub(crate) fn shifted_left(&self, shift: u64) -> Limbs {
+        shifted_left(self.limbs, shift)
+    }
+
+    /// Returns `size` bits of the magnitude from bit `position` up.
+    pub(crate) fn field(&self, position: u64, size: u64) -> Limbs {
+        field(self.limbs, position, size)
     }
 
     /// Compares with `other`.
@@ -120,6 +136,44 @@ fn difference(a: &[u64], b: &[u64]) -> Limbs {
     result
 }
 
+/// Returns `a · 2^shift`. The number of limbs of the result must fit in memory.
+fn shifted_left(a: &[u64], shift: u64) -> Limbs {
+    let (zeros, offset) = ((shift / 64) as usize, shift % 64);
+    let mut result = Limbs::with_capacity(zeros + a.len() + 1);
+    result.resize(zeros, 0);
+    if offset == 0 {
+        result.extend_from_slice(a);
+        return result;
+    }
+    let mut below = 0;
+    for &limb in a {
+        result.push(limb << offset | below);
+        below = limb >> (64 - offset);
+    }
+    result.push(below);
+    result
+}
+
+/// Returns `size` bits of `a` from bit `position` up.
+fn field(a: &[u64], position: u64, size: u64) -> Limbs {
+    let (first, offset) = (usize::try_from(position / 64).unwrap_or(usize::MAX), position % 64);
+    let Some(a) = a.get(first..) else { return Limbs::new() };
+    let count = usize::try_from(size.div_ceil(64)).unwrap_or(usize::MAX).min(a.len());
+    let mut result = Limbs::from_slice(&a[..count]);
+    if offset != 0 {
+        let above = a.iter().skip(1).copied().chain([0]);
+        for (limb, above) in result.iter_mut().zip(above) {
+            *limb = *limb >> offset | above << (64 - offset);
+        }
+    }
+    // `count` limbs may hold more bits than the field.
+    let excess = (64 * count as u64).saturating_sub(size);
+    if let Some(last) = result.last_mut() {
+        *last &= u64::MAX >> excess;
+    }
+    result
+}
+
 fn product(long: &[u64], short: &[u64]) -> Limbs {
     let mut result = Limbs::from_elem(0, long.len() + short.len());
     for (offset, &factor) in short.iter().enumerate() {
@@ -187,6 +241,15 @@ mod tests {
                 let (a, b) = (BigOperand { negative, limbs: &a }, BigOperand { negative, limbs: &b });
                 prop_assert_eq!(a.compare(&b), expected);
             }
+        }
+
+        #[test]
+        fn shifts_agree_with_num_bigint(a in magnitude(), shift in 0u64..300, size in 0u64..300) {
+            prop_assert_eq!(big(&shifted_left(&a, shift)), big(&a) << shift);
+            let mask = (BigUint::from(1u32) << size) - 1u32;
+            prop_assert_eq!(big(&field(&a, shift, size)), (big(&a) >> shift) & mask);
+            prop_assert_eq!(big(&field(&a, shift, u64::MAX)), big(&a) >> shift);
+            prop_assert!(field(&a, u64::MAX, u64::MAX).is_empty());
         }
     }
 }

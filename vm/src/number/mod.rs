@@ -114,15 +114,23 @@ impl Vm {
         if let Some(x) = v.as_double() {
             return Ok(x);
         }
+        let x = self.nearest_double(v, expected)?;
+        if x.is_finite() { Ok(x) } else { self.exchange.raise(Raised::FloatOverflow(op)) }
+    }
+
+    /// Returns the real number `v` as the nearest double, which is infinite if `v` is too large for one.
+    pub(crate) fn nearest_double(&mut self, v: Value, expected: &'static str) -> Result<f64, Exit> {
+        if let Some(x) = v.as_double() {
+            return Ok(x);
+        }
         if let Some(n) = v.as_fixnum() {
             return Ok(n as f64);
         }
-        let x = match self.number(v, expected)? {
-            Number::Float(x) => return Ok(x),
+        Ok(match self.number(v, expected)? {
+            Number::Float(x) => x,
             Number::Int(n) => n.to_f64(),
             Number::Ratio(r) => r.to_f64(),
-        };
-        if x.is_finite() { Ok(x) } else { self.exchange.raise(Raised::FloatOverflow(op)) }
+        })
     }
 
     /// Returns the integer `n` as a value. Fails as operation `op` if it has too many bits.

@@ -54,7 +54,7 @@ fn words_of(vm: &mut Vm, state: Value) -> Outcome {
 /// Returns a number from 0 to below `limit`, of the type of `limit`.
 pub(crate) fn random(vm: &mut Vm, limit: Value, state: Value) -> Outcome {
     let object = words_of(vm, state)?;
-    let mut generator = Generator::load(vm, object);
+    let mut generator = RandomState::load(vm, object);
     let result = match Number::of(&vm.heap, limit) {
         Some(Number::Float(x)) if x > 0.0 && x.is_finite() => loop {
             let y = (generator.next() >> 11) as f64 / (1u64 << 53) as f64 * x;
@@ -74,13 +74,13 @@ pub(crate) fn random(vm: &mut Vm, limit: Value, state: Value) -> Outcome {
     Ok(result)
 }
 
-struct Generator([u64; 4]);
+struct RandomState([u64; 4]);
 
-impl Generator {
-    fn load(vm: &Vm, object: Value) -> Generator {
+impl RandomState {
+    fn load(vm: &Vm, object: Value) -> RandomState {
         let words = vm.heap.words(object).unwrap_or_default();
         let word = |i: usize| words.get(i).copied().map_or(1, u64::from);
-        Generator([0, 1, 2, 3].map(|i| word(2 * i) | word(2 * i + 1) << 32))
+        RandomState([0, 1, 2, 3].map(|i| word(2 * i) | word(2 * i + 1) << 32))
     }
 
     fn store(&self, vm: &mut Vm, object: Value) {

@@ -56,6 +56,16 @@ enum Division {
     Float(Int, f64),
 }
 
+impl Division {
+    fn quotient(&self) -> &Int {
+        match self {
+            Division::Ints(quotient, _) | Division::Ratio(quotient, _) | Division::Float(quotient, _) => {
+                quotient
+            }
+        }
+    }
+}
+
 /// Returns the remainder of `floor`.
 pub(crate) fn modulo(vm: &mut Vm, a: Value, b: Value) -> Outcome {
     rest(vm, Rounding::Floor, a, b)
@@ -72,32 +82,29 @@ pub(crate) fn both(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Outco
         Some((quotient, remainder)) => Division::Ints(quotient, remainder),
         None => division(vm, rounding, a, b)?,
     };
-    let quotient = match &division {
-        Division::Ints(quotient, _) | Division::Ratio(quotient, _) | Division::Float(quotient, _) => {
-            vm.integer_value("/", quotient)?
-        }
-    };
+    let quotient = vm.integer_value("/", division.quotient())?;
     let remainder = remainder_value(vm, division)?;
     vm.give_values(&[quotient, remainder])
 }
 
 /// Returns the quotient as a float, and the remainder: `ffloor` and its family.
+///
+/// The quotient of floats may be minus zero, but for `fround`, whose quotient is that of `round`.
 pub(crate) fn both_with_float(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Outcome {
-    let division = division(vm, rounding, a, b)?;
-    let (Division::Ints(quotient, _) | Division::Ratio(quotient, _) | Division::Float(quotient, _)) =
-        &division;
-    let mut x = quotient.to_f64();
-    if quotient.is_zero() && rounding != Rounding::Floor && rounding != Rounding::Round {
-        // A float quotient between -1 and 0 becomes minus zero.
-        if let Division::Float(_, remainder) = &division
-            && (*remainder < 0.0) != (super::sign(vm, b, "REAL")? < 0)
-            && *remainder != 0.0
-        {
-            x = -0.0;
+    let (quotient, remainder) = match real_operands(vm, a, b)? {
+        Pair::Floats(x, y) if rounding != Rounding::Round => {
+            let whole = float_quotient(vm, [a, b], x, y)?.trunc();
+            let (step, remainder) = float_remainder(rounding, x, y, whole);
+            // A zero added would take the sign of minus zero away.
+            let quotient = if step == 0 { whole } else { whole + f64::from(step) };
+            (quotient, vm.float_value("/", remainder)?)
         }
-    }
-    let quotient = vm.float_value("/", x)?;
-    let remainder = remainder_value(vm, division)?;
+        operands => {
+            let division = divide(vm, rounding, [a, b], operands)?;
+            (division.quotient().to_f64(), remainder_value(vm, division)?)
+        }
+    };
+    let quotient = vm.float_value("/", quotient)?;
     vm.give_values(&[quotient, remainder])
 }
 
@@ -131,18 +138,30 @@ fn small(rounding: Rounding, a: Value, b: Value) -> Option<(Int, Int)> {
 }
 
 fn division(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Result<Division, Exit> {
+    let operands = real_operands(vm, a, b)?;
+    divide(vm, rounding, [a, b], operands)
+}
+
+fn real_operands(vm: &mut Vm, a: Value, b: Value) -> Result<Pair, Exit> {
     if let Some(x) = a.as_double()
         && let Some(y) = b.as_double().or_else(|| b.as_fixnum().map(|n| n as f64))
     {
-        return float_division(vm, rounding, [a, b], x, y);
+        return Ok(Pair::Floats(x, y));
     }
-    match typed_operands(vm, "/", a, b, "REAL")? {
-        Pair::Ints(_, y) if y.is_zero() => vm.exchange.raise(Raised::DivisionByZero("/", [a, b])),
+    typed_operands(vm, "/", a, b, "REAL")
+}
+
+/// Divides numbers of one type, which the values `operands` are.
+fn divide(vm: &mut Vm, rounding: Rounding, operands: [Value; 2], numbers: Pair) -> Result<Division, Exit> {
+    match numbers {
+        Pair::Ints(_, y) if y.is_zero() => vm.exchange.raise(Raised::DivisionByZero("/", operands)),
         Pair::Ints(x, y) => {
             let (quotient, remainder) = int_division(vm, rounding, &x, &y)?;
             Ok(Division::Ints(quotient, remainder))
         }
-        Pair::Ratios(_, y) if y.numerator.is_zero() => vm.exchange.raise(Raised::DivisionByZero("/", [a, b])),
+        Pair::Ratios(_, y) if y.numerator.is_zero() => {
+            vm.exchange.raise(Raised::DivisionByZero("/", operands))
+        }
         Pair::Ratios(x, y) => {
             check_ratios(vm, &x, &y)?;
             // x / y is the integer quotient n / d; its remainder belongs over the common denominator.
@@ -151,7 +170,12 @@ fn division(vm: &mut Vm, rounding: Rounding, a: Value, b: Value) -> Result<Divis
             let (quotient, remainder) = int_division(vm, rounding, &n, &d)?;
             Ok(Division::Ratio(quotient, Ratio::reduced(&remainder, &x.denominator.times(&y.denominator))))
         }
-        Pair::Floats(x, y) => float_division(vm, rounding, [a, b], x, y),
+        Pair::Floats(x, y) => {
+            // An integer quotient has no minus zero, so that the remainder of minus zero is minus zero.
+            let whole = float_quotient(vm, operands, x, y)?.trunc() + 0.0;
+            let (step, remainder) = float_remainder(rounding, x, y, whole);
+            Ok(Division::Float(Int::from_f64(whole).plus(&Int::from(i64::from(step))), remainder))
+        }
     }
 }
 
@@ -171,30 +195,28 @@ fn int_division(vm: &mut Vm, rounding: Rounding, a: &Int, b: &Int) -> Result<(In
     })
 }
 
-fn float_division(
-    vm: &mut Vm,
-    rounding: Rounding,
-    operands: [Value; 2],
-    x: f64,
-    y: f64,
-) -> Result<Division, Exit> {
+/// Returns the quotient of the doubles `x` and `y`, which the values `operands` are.
+fn float_quotient(vm: &mut Vm, operands: [Value; 2], x: f64, y: f64) -> Result<f64, Exit> {
     if y == 0.0 && x != 0.0 {
         return vm.exchange.raise(Raised::DivisionByZero("/", operands));
     }
-    let exact = x / y;
-    if !exact.is_finite() {
-        return vm.float_value("/", exact).map(|_| unreachable!("the value is not finite"));
+    let quotient = x / y;
+    if !quotient.is_finite() {
+        return vm.float_value("/", quotient).map(|_| unreachable!("the value is not finite"));
     }
-    let whole = exact.trunc();
-    let mut quotient = Int::from_f64(whole);
-    let mut remainder = x - whole * y;
-    if remainder != 0.0 {
-        let half = (2.0 * remainder.abs()).partial_cmp(&y.abs()).unwrap_or(Ordering::Less);
-        // The rounded quotient may exceed the exact one; the sign of the remainder then names the wrong side.
-        let is_negative = if rounding == Rounding::Round { remainder < 0.0 } else { x < 0.0 };
-        let step = rounding.step(is_negative, y < 0.0, quotient.is_odd(), half);
-        quotient = quotient.plus(&Int::from(i64::from(step)));
-        remainder -= f64::from(step) * y;
+    Ok(quotient)
+}
+
+/// Returns the correction of the truncated quotient `whole` of two doubles, and the remainder that goes with
+/// it.
+fn float_remainder(rounding: Rounding, x: f64, y: f64, whole: f64) -> (i32, f64) {
+    let remainder = x - whole * y;
+    if remainder == 0.0 {
+        return (0, remainder);
     }
-    Ok(Division::Float(quotient, remainder))
+    let half = (2.0 * remainder.abs()).partial_cmp(&y.abs()).unwrap_or(Ordering::Less);
+    // The rounded quotient may exceed the exact one; the sign of the remainder then names the wrong side.
+    let is_negative = if rounding == Rounding::Round { remainder < 0.0 } else { x < 0.0 };
+    let step = rounding.step(is_negative, y < 0.0, whole % 2.0 != 0.0, half);
+    (step, remainder - f64::from(step) * y)
 }

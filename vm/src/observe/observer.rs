@@ -66,8 +66,6 @@ pub trait Observer: Send {
 pub(crate) struct Observers {
     /// The observers.
     pub(crate) list: Vec<Box<dyn Observer>>,
-    /// Whether time is virtual.
-    pub(crate) is_virtual: bool,
     /// Time at which the first of them came.
     pub(crate) start: u64,
     /// Latest time that they were told.
@@ -82,13 +80,12 @@ impl Observers {
     /// Notes the time, if the first observer is about to come.
     pub(crate) fn begin(&mut self, host: &mut dyn Host, scheduler: &Scheduler) {
         if self.list.is_empty() {
-            self.is_virtual = host.is_virtual();
             self.start = self.clock(host, scheduler);
         }
     }
 
     fn clock(&self, host: &mut dyn Host, scheduler: &Scheduler) -> u64 {
-        if self.is_virtual { scheduler.clock.now + scheduler.spent } else { host.stopwatch() }
+        if scheduler.clock.is_virtual { scheduler.clock.now + scheduler.spent } else { host.stopwatch() }
     }
 
     /// Returns the time since the first observer came.

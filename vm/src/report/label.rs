@@ -5,7 +5,7 @@ use crate::heap::{Heap, Kind};
 use crate::task::{Task, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::{event, link};
+use crate::wait::{event, link, operation};
 use crate::world::class;
 
 /// Returns what reports call the task that `object` stands for.
@@ -38,6 +38,9 @@ pub(crate) fn event_label(vm: &Vm, event: Value) -> String {
         return "nothing".into();
     }
     match vm.heap.slot_or_nil(event, event::NAME) {
+        name if operation::is_handle(&vm.heap, event) => {
+            format!("operation {} {}", describe(&vm.heap, name), operation::number(&vm.heap, event))
+        }
         _ if event == vm.scheduler.any_event => "any event".into(),
         name if name.is_true() => format!("event {}", describe(&vm.heap, name)),
         _ => "an event".into(),
@@ -59,6 +62,7 @@ pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
         return match describe(&vm.heap, pair.car).as_str() {
             ":CHECKPOINT" => format!("checkpoint {datum} of {}", event_label(vm, first)),
             ":UNTIL" => format!("{datum} to be true"),
+            ":RESOURCE" => resources_label(vm, pair.cdr),
             _ => vm.heap.string_text(pair.cdr).unwrap_or(datum),
         };
     }
@@ -68,6 +72,40 @@ pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
         [label] if vm.heap.is(first, Kind::Task) => format!("a signal of {label}"),
         labels => labels.join(" or "),
     }
+}
+
+/// Longest part of a list of resources, or of their holders, that is shown.
+const SHOWN: usize = 8;
+
+/// Returns what reports call the resources of a request, with their holders. `resources.esl` says what they are.
+fn resources_label(vm: &Vm, resources: Value) -> String {
+    let labels: Vec<String> = items(vm, resources).map(|resource| resource_label(vm, resource)).collect();
+    labels.join(" and ")
+}
+
+fn resource_label(vm: &Vm, resource: Value) -> String {
+    let mut fields = items(vm, resource);
+    let name = describe(&vm.heap, fields.next().unwrap_or(Value::NIL));
+    let holders = fields.next().unwrap_or(Value::NIL);
+    let holders: Vec<String> = items(vm, holders)
+        .map(|request| task_label(vm, vm.heap.car(request).unwrap_or(Value::NIL)))
+        .collect();
+    if holders.is_empty() {
+        format!("resource {name}")
+    } else {
+        format!("resource {name}, held by {}", holders.join(" and "))
+    }
+}
+
+/// Returns the first items of a list.
+fn items(vm: &Vm, list: Value) -> impl Iterator<Item = Value> {
+    let mut rest = list;
+    let next = move || {
+        let pair = vm.heap.as_cons(rest)?;
+        rest = pair.cdr;
+        Some(pair.car)
+    };
+    std::iter::from_fn(next).take(SHOWN)
 }
 
 /// Returns how a task has ended, in a word.

@@ -11,5 +11,5 @@ pub(crate) use label::{
     cause_label, end_label, event_label, label_of, reason_of, report_in_short, task_label,
 };
 pub(crate) use observe::{show, tell_of_failure, tell_of_signal, tell_of_waking};
-pub(crate) use tasks::place_in_program;
+pub(crate) use tasks::{operations_left, place_in_program, tasks_left};
 pub(crate) use trace::{Happening, note, trace_end};

@@ -10,10 +10,10 @@ impl Vm {
     /// Lets an observer watch the run from now on. It learns of the tasks that are there.
     pub fn add_observer(&mut self, observer: Box<dyn Observer>) {
         let Vm { watch, outside, scheduler, .. } = self;
-        watch.observers.begin(&mut *outside.host, scheduler);
+        watch.observers.begin(&mut outside.host, scheduler);
         watch.observers.list.push(observer);
         watch.update_is_watched();
-        let time = watch.observers.time(&mut *outside.host, scheduler);
+        let time = watch.observers.time(&mut outside.host, scheduler);
         let tasks: Vec<(TaskNumber, String, bool, Option<String>)> = self
             .scheduler
             .tasks
@@ -42,7 +42,7 @@ impl Vm {
 
 /// Tells observers of something, if there are any.
 pub(crate) fn show(vm: &mut Vm, task: TaskNumber, seen: Seen<'_>) {
-    vm.watch.show(&mut *vm.outside.host, &vm.scheduler, task, seen);
+    vm.watch.show(&mut vm.outside.host, &vm.scheduler, task, seen);
 }
 
 /// Tells observers that a signal of `event` by a task has woken the one with this index.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use esl_bytecode::compile::SourcePlace;
 use esl_bytecode::opcode::Opcode;
 
-use super::{reason_of, task_label};
+use super::{event_label, reason_of, task_label};
 use crate::interp::frames::{Frame, Frames};
 use crate::interp::start::first_code_of;
 use crate::task::{Task, TaskState};
@@ -123,6 +123,27 @@ impl Vm {
     }
 }
 
+/// Returns what is said of the tasks of the program that have not ended: what they are called, and where they
+/// are.
+pub(crate) fn tasks_left(vm: &Vm) -> Vec<String> {
+    let alive = vm.scheduler.tasks.iter();
+    let mut tasks: Vec<&Task> =
+        alive.filter(|task| task.state != TaskState::Ended && !task.flags.hidden()).collect();
+    tasks.sort_unstable_by_key(|task| task.number);
+    let say = |task: &Task| {
+        let what = if task.runs_cleanup() { ", in a cleanup" } else { "" };
+        let place = program_place(vm, task).map_or(String::new(), |place| format!(", {place}"));
+        format!("{}{what}{place}", task_label(vm, task.object))
+    };
+    tasks.iter().take(SHOWN).map(|task| say(task)).collect()
+}
+
+/// Returns what the operations are called that are under way and that somebody waits for.
+pub(crate) fn operations_left(vm: &Vm) -> Vec<String> {
+    let awaited = vm.outside.operations.open.values().filter(|open| !open.is_detached);
+    awaited.take(SHOWN).map(|open| event_label(vm, open.handle)).collect()
+}
+
 /// Returns the text of the innermost place of the program at which a parked task stands.
 fn program_place(vm: &Vm, task: &Task) -> Option<String> {
     let place = place_in_program(vm, task, Frames::of_task(task))?;
@@ -130,8 +151,8 @@ fn program_place(vm: &Vm, task: &Task) -> Option<String> {
 }
 
 /// Returns the innermost place of the program, not of the library, at which a task with these frames stands.
-/// If tail calls have left no frame of the program, it is that of the tail call in the function with which the
-/// task began, or of its beginning if there are several.
+/// If tail calls have left no frame of the program, it is that of the tail call in the function with which
+/// the task began, or of its beginning if there are several.
 pub(crate) fn place_in_program<'a>(
     vm: &Vm,
     task: &Task,

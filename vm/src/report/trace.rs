@@ -83,6 +83,6 @@ pub(crate) fn trace_end(vm: &mut Vm, name: Value, status: Value) {
 }
 
 fn write_trace_line(vm: &mut Vm, label: &str, what: &str) {
-    let seconds = vm.scheduler.clock.read(&mut *vm.outside.host) as f64 / 1e9;
+    let seconds = vm.scheduler.clock.read(&mut vm.outside.host) as f64 / 1e9;
     vm.outside.complain(&format!("; {seconds:.6} {label} {what}\n"));
 }

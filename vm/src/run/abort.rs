@@ -3,7 +3,7 @@
 use super::wake::call_attention;
 use crate::report::{self, Happening};
 use crate::schedule::EndOfAll;
-use crate::task::{TaskId, TaskIndex, TaskNumber, TaskState};
+use crate::task::{TaskId, TaskNumber, TaskState};
 use crate::vm::Vm;
 
 /// Tasks that are asked to end in one step.
@@ -31,12 +31,17 @@ impl Vm {
     }
 }
 
-/// Asks every task but the running one to end. Where there are many, the rest are asked between turns, and
-/// only those that are being ended have turns until then.
+/// Asks every task but the running one to end, the newest first. Where there are many, the rest are asked
+/// between turns, and only those that are being ended have turns until then.
 pub(crate) fn abort_others(vm: &mut Vm) {
-    let except = vm.scheduler.running_number();
-    let newest = TaskNumber(vm.scheduler.counts.made);
-    vm.scheduler.end_of_all = Some(EndOfAll { next: 0, newest, except });
+    let tasks = &vm.scheduler.tasks;
+    let alive = tasks.ids().into_iter().filter_map(|id| {
+        let task = tasks.get(id).filter(|task| task.state != TaskState::Ended)?;
+        Some((task.number, id))
+    });
+    let mut alive: Vec<(TaskNumber, TaskId)> = alive.collect();
+    alive.sort_unstable_by_key(|&(number, _)| number);
+    vm.scheduler.end_of_all = Some(EndOfAll { left: alive.into_iter().map(|(_, id)| id).collect() });
     abort_more(vm);
     if vm.scheduler.end_of_all.is_some()
         && let Some(task) = &mut vm.scheduler.running
@@ -47,18 +52,8 @@ pub(crate) fn abort_others(vm: &mut Vm) {
 
 /// Asks the next tasks to end, if all are to.
 pub(super) fn abort_more(vm: &mut Vm) {
-    let Some(all) = vm.scheduler.end_of_all else { return };
-    let end = vm.scheduler.tasks.places().min(all.next + AT_ONCE);
-    for index in all.next..end {
-        let index = TaskIndex(index as u32);
-        if let Some(task) = vm.scheduler.tasks.at(index)
-            && task.number <= all.newest
-            && task.number != all.except
-            && let Some(id) = vm.scheduler.tasks.id_at(index)
-        {
-            vm.abort(id);
-        }
-    }
-    let is_over = end == vm.scheduler.tasks.places();
-    vm.scheduler.end_of_all = if is_over { None } else { Some(EndOfAll { next: end, ..all }) };
+    let Some(mut all) = vm.scheduler.end_of_all.take() else { return };
+    let next = all.left.split_off(all.left.len().saturating_sub(AT_ONCE));
+    next.into_iter().rev().for_each(|id| vm.abort(id));
+    vm.scheduler.end_of_all = (!all.left.is_empty()).then_some(all);
 }

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::RunOutcome;
+use super::ending::end_task;
 use crate::observe::Seen;
 use crate::report;
 use crate::task::{End, Task, TaskId, TaskResult};
@@ -52,7 +53,8 @@ impl fmt::Display for CallError {
 impl std::error::Error for CallError {}
 
 impl Vm {
-    /// Calls a function in a task of its own and runs tasks until it has ended, at most for `ticks`.
+    /// Calls a function in a task of its own and runs tasks until it has ended, at most for `ticks`. If it
+    /// has not ended then, or cannot, it is aborted, and its cleanups run.
     ///
     /// # Errors
     /// [`CallError`].
@@ -65,6 +67,22 @@ impl Vm {
         self.call_or_condition(function, arguments, ticks).map_err(|(error, _)| error)
     }
 
+    /// As [`Vm::call`], whatever is left of the run's budget.
+    ///
+    /// # Errors
+    /// [`CallError`].
+    pub fn call_without_budget(
+        &mut self,
+        function: Value,
+        arguments: &[Value],
+        ticks: u64,
+    ) -> Result<Vec<Value>, CallError> {
+        let budget = self.config.budget.take();
+        let result = self.call(function, arguments, ticks);
+        self.config.budget = budget;
+        result
+    }
+
     /// As [`Vm::call`]; the error comes with the condition of the failure, or `NIL`.
     pub(crate) fn call_or_condition(
         &mut self,
@@ -75,6 +93,7 @@ impl Vm {
         let id = self.spawn(function, arguments).map_err(|_| (CallError::NoMemory, Value::NIL))?;
         let outcome = self.run_until(Some(id), ticks);
         let result = self.result(id);
+        end_task(self, id);
         let report = self.report(id);
         self.forget(id);
         let error = match (result, outcome) {

@@ -39,8 +39,8 @@ pub(super) fn finish_task(vm: &mut Vm) {
     let is_awaited = event::is_awaited(&vm.heap, object);
     let task = vm.scheduler.task_mut();
     let notify = std::mem::replace(&mut task.notify, Value::NIL);
-    interp::start::drop_frames(task);
     let account = std::mem::replace(&mut task.account, AccountId::NONE);
+    interp::start::drop_frames(vm);
     vm.scheduler.accounts.leave(account);
     report::trace_end(vm, vm.heap.slot_or_nil(object, event::NAME), status);
     report_end(vm, end, is_awaited || notify.is_true());

@@ -13,7 +13,7 @@ use crate::vm::Vm;
 pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, ticks: Option<u64>) -> bool {
     let scheduler = &mut vm.scheduler;
     let number = scheduler.next_limit();
-    let now = scheduler.clock.read(&mut *vm.outside.host);
+    let now = scheduler.clock.read(&mut vm.outside.host);
     let index = scheduler.turn.index;
     let task = scheduler.task_mut();
     let Some(entry) = task.control.entries.last_mut() else { return false };
@@ -45,6 +45,16 @@ pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, ticks: Opti
 pub(super) fn charge_account(vm: &mut Vm, id: AccountId, ticks: u64) {
     for (index, number) in vm.scheduler.accounts.charge(id, ticks) {
         expire(vm, index, number, vm.world.known.budget_exhausted);
+    }
+}
+
+/// Notes that the limit of a task that was opened for `tag` has expired, if it is still open.
+pub(crate) fn expire_limit(vm: &mut Vm, index: TaskIndex, tag: Value, cause: Value) {
+    let Some(task) = vm.scheduler.find(index) else { return };
+    let limits = task.extra.as_ref().map_or(&[][..], |extra| &extra.limits[..]);
+    let tag_of = |limit: &Limit| task.control.entries.get(limit.entry as usize).map(|entry| entry.data);
+    if let Some(number) = limits.iter().find(|limit| tag_of(limit) == Some(tag)).map(|limit| limit.number) {
+        expire(vm, index, number, cause);
     }
 }
 

@@ -6,7 +6,10 @@
 //! pending   aborts, expired limits    limit     opening limits, and their expiry
 //!           and interrupts, delivered timers    time, and sleeping while nothing can run
 //! finish    its end                   abort     asking for it
-//! call      calling a function from outside, and what became of a task
+//! call      calling a function from   arrival   taking in what has come
+//!           outside, and its result             into the inbox
+//! operation news of operations        cleanup   allowances of cleanups, and cutting off
+//! ending    the end of a run, wherever it stands
 //! ```
 //!
 //! A runnable task has a slice of ticks and goes to the end of its queue; `schedule` says whose turn it is.
@@ -15,9 +18,13 @@
 //! comes from outside.
 
 mod abort;
+mod arrival;
 mod call;
+mod cleanup;
+mod ending;
 mod finish;
 mod limit;
+mod operation;
 mod pending;
 mod signal;
 mod spawn;
@@ -26,8 +33,9 @@ mod turn;
 mod wake;
 
 pub(crate) use abort::abort_others;
+pub(crate) use arrival::take_in;
 pub use call::CallError;
-pub(crate) use limit::open_limit;
+pub(crate) use limit::{expire_limit, open_limit};
 pub(crate) use pending::interrupt_by;
 pub(crate) use signal::deliver_some;
 pub(crate) use spawn::{SpawnOptions, make_task};
@@ -36,6 +44,7 @@ pub(crate) use turn::give_turn;
 
 use abort::abort_more;
 use timers::look_at_clock;
+use turn::go_on_with_turn;
 
 use crate::task::{TaskId, TaskIndex, TaskState};
 use crate::vm::Vm;
@@ -51,13 +60,14 @@ pub enum RunOutcome {
     BudgetSpent,
     /// The ticks that this call was given are used up.
     TicksUsed,
-    /// The embedder has set the flag of [`Vm::stop_flag`].
+    /// [`Incoming::Stop`](crate::host::Incoming::Stop) has come into the inbox, or an interrupt that cuts the
+    /// end of the run short.
     Stopped,
 }
 
 impl Vm {
     /// Runs tasks in turn until all have ended or wait for what cannot come, the budget of the run is spent,
-    /// or `ticks` are used up.
+    /// or `ticks` are used up. Into which portions its ticks are divided changes nothing in a run.
     pub fn run(&mut self, ticks: u64) -> RunOutcome {
         run_tasks(self, None, ticks, true)
     }
@@ -89,12 +99,13 @@ fn run_tasks(vm: &mut Vm, id: Option<TaskId>, ticks: u64, may_wait: bool) -> Run
         if vm.scheduler.spent >= end {
             return RunOutcome::TicksUsed;
         }
-        if vm.embedder.take_stop() {
-            return RunOutcome::Stopped;
+        if let Some(turn) = vm.scheduler.open_turn.take() {
+            go_on_with_turn(vm, turn, end);
+            continue;
         }
-        if let Some(interrupted) = vm.embedder.take_interrupt() {
-            vm.embedder.was_interrupted = true;
-            vm.abort(interrupted);
+        vm.scheduler.rounds += 1;
+        if vm.outside.inbox.is_rung() && take_in(vm) {
+            return RunOutcome::Stopped;
         }
         look_at_clock(vm);
         if !vm.scheduler.deliveries.is_empty() {

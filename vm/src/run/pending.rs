@@ -4,19 +4,15 @@
 //! just before it next runs, where [`deliver_pending`] turns them into an unwinding or a call. While a
 //! cleanup runs they wait, and the cleanup has an allowance from then on; the unwinding of an abort or of an
 //! expired limit gives one to each cleanup that it meets. A cleanup that outruns its allowance is left, and
-//! the unwinding goes on outward: no task is unkillable.
+//! the unwinding goes on outward. All allowances come out of one fund, so no task is unkillable.
 
+use super::cleanup::{allow_cleanups, cut_off_cleanup};
 use super::wake::call_attention;
 use crate::interp::{self, Leave};
-use crate::report;
-use crate::schedule::Due;
-use crate::task::{AccountId, Allowance, Control, End, Target, Unwinding, guard};
+use crate::task::{AccountId, Control, End, Target, Unwinding, guard};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::{event, link};
-
-/// Interval at which a cleanup that waits for the end of a child is looked at again, in nanoseconds.
-const CHILD_INTERVAL: u64 = 1_000_000_000;
+use crate::wait::event;
 
 /// Has `guard` interrupt the task that it guards, if it is open.
 pub(crate) fn interrupt_by(vm: &mut Vm, guard: Value) {
@@ -64,15 +60,14 @@ fn take_pending(vm: &mut Vm) -> Option<Value> {
         return None;
     }
     let scheduler = &mut vm.scheduler;
-    let mut waits = false;
-    if scheduler.task().flags.abort_pending() || scheduler.is_task_spent() {
-        if cleanup.is_none() {
-            end_running_task(vm);
-            return None;
-        }
-        waits = true;
+    let ends = scheduler.task().flags.abort_pending() || scheduler.is_task_spent();
+    if ends && cleanup.is_none() {
+        end_running_task(vm);
+        return None;
     }
-    if let Some((entry, cause)) = scheduler.task().expired_limit() {
+    let mut waits = ends;
+    let expired = scheduler.task().expired_limit();
+    if let Some((entry, cause)) = expired {
         if cleanup.is_none_or(|cleanup| cleanup < entry) {
             unwind_to_limit(vm, entry, cause);
             // What is noted besides is looked at again when that is over.
@@ -81,7 +76,8 @@ fn take_pending(vm: &mut Vm) -> Option<Value> {
         waits = true;
     }
     if waits {
-        allow_cleanups(vm);
+        let depth = if ends { 0 } else { expired.map_or(0, |(entry, _)| entry + 1) };
+        allow_cleanups(vm, depth);
     }
     let interrupt = take_interrupt(vm, cleanup);
     let task = vm.scheduler.task_mut();
@@ -139,56 +135,4 @@ fn take_interrupt(vm: &mut Vm, cleanup: Option<usize>) -> Option<Value> {
     }
     guard::set_open(&mut vm.heap, guard, false);
     Some(vm.heap.slot_or_nil(guard, guard::FUNCTION))
-}
-
-/// Gives an allowance to each running cleanup of the running task that has none.
-fn allow_cleanups(vm: &mut Vm) {
-    let scheduler = &mut vm.scheduler;
-    let time = scheduler.clock.read(&mut *vm.outside.host).saturating_add(vm.config.cleanup_time);
-    let ticks = scheduler.task().ticks.saturating_add(vm.config.cleanup_ticks);
-    let mut is_new = false;
-    for running in &mut scheduler.task_mut().control.running {
-        if running.allowance.is_none() {
-            running.allowance = Some(Allowance { ticks, time });
-            is_new = true;
-        }
-    }
-    if is_new {
-        scheduler.timers.push(time, scheduler.turn.index, Due::Cleanup);
-    }
-}
-
-/// Begins to leave the outermost cleanup of the running task that has outrun its allowance. Returns whether
-/// there is one.
-fn cut_off_cleanup(vm: &mut Vm) -> bool {
-    let scheduler = &mut vm.scheduler;
-    let now = scheduler.clock.read(&mut *vm.outside.host);
-    let task = scheduler.task();
-    let awaits_child = task.wait.is_true() && link::is_for_child(&vm.heap, task.wait);
-    let ticks = task.ticks;
-    let is_spent = |allowance: Allowance| ticks >= allowance.ticks || now >= allowance.time && !awaits_child;
-    let running = &task.control.running;
-    let has_allowance = running.iter().any(|running| running.allowance.is_some());
-    let position = running.iter().position(|running| running.allowance.is_some_and(is_spent));
-    if awaits_child && has_allowance {
-        // Children are bounded in their turn; their end is what this cleanup is for.
-        let index = scheduler.turn.index;
-        scheduler.timers.push(now.saturating_add(CHILD_INTERVAL), index, Due::Cleanup);
-    }
-    let Some(position) = position else { return false };
-    let Some(entry) = scheduler.task().control.cleanup_entry(position) else { return false };
-    scheduler.cancel_wait(&mut vm.heap);
-    let task = scheduler.task_mut();
-    let is_under_way = task
-        .control
-        .unwinding
-        .as_ref()
-        .is_some_and(|unwinding| matches!(unwinding.target, Target::Cleanup(index) if index <= entry));
-    if !is_under_way {
-        task.control.unwinding = Some(Unwinding { target: Target::Cleanup(entry), values: Vec::new() });
-        let object = task.object;
-        let name = report::task_label(vm, object);
-        vm.outside.complain(&format!("A cleanup of {name} takes too long and is left.\n"));
-    }
-    true
 }

@@ -5,10 +5,10 @@
 
 use crate::heap::Kind;
 use crate::interp;
-use crate::raise::Exit;
+use crate::raise::{Exit, Raised};
 use crate::report::{self, Happening};
 use crate::schedule::AccountOwner;
-use crate::task::{DEFAULT_PRIORITY, TaskId, TaskNumber, TaskState};
+use crate::task::{DEFAULT_PRIORITY, Fund, TaskId, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
@@ -91,13 +91,15 @@ fn try_spawn(vm: &mut Vm, function: Value, arguments: &[Value]) -> Result<TaskId
 /// running task.
 ///
 /// # Errors
-/// [`Exit::Collect`] if there is no room for it; then nothing has happened.
+/// [`Exit::Collect`] if there is no room for it, and a failure if it would belong to a form of a cleanup that
+/// is being cut off; then nothing has happened.
 pub(crate) fn make_task(
     vm: &mut Vm,
     function: Value,
     arguments: Value,
     options: SpawnOptions,
 ) -> Result<TaskId, Exit> {
+    let fund = if options.notify.is_true() { fund_of_child(vm)? } else { None };
     let Vm { heap, world, scheduler, exchange, .. } = vm;
     let maker = scheduler.running.as_ref();
     let mut slots = [Value::NIL; event::TASK_LENGTH];
@@ -121,6 +123,9 @@ pub(crate) fn make_task(
     task.notify = options.notify;
     task.flags.set_daemon(options.daemon);
     task.flags.set_hidden(options.hidden);
+    if let Some(fund) = fund {
+        task.extra_mut().fund = Some(fund);
+    }
     if let Some(maker) = &scheduler.running {
         scheduler.accounts.enter(maker.account);
         task.account = maker.account;
@@ -147,4 +152,20 @@ pub(crate) fn make_task(
     scheduler.queues.push(id.index, serial, priority, false);
     report::note(vm, id.index, Happening::Begins);
     Ok(id)
+}
+
+/// Returns what the cleanups of a task may use that belongs to a form of the running task: what is left to
+/// the cleanups of that one, or `None` without bounds.
+///
+/// # Errors
+/// `:budget-exhausted` if nothing is left: the form would not be there to end the new task.
+fn fund_of_child(vm: &mut Vm) -> Result<Option<Fund>, Exit> {
+    let Vm { scheduler, outside, cpu, exchange, .. } = vm;
+    let Some(task) = &scheduler.running else { return Ok(None) };
+    let Some(fund) = task.extra.as_ref().and_then(|extra| extra.fund) else { return Ok(None) };
+    let ticks = task.ticks;
+    if scheduler.is_fund_spent(cpu.used(), &mut outside.host) {
+        return exchange.raise(Raised::Failure("BUDGET-EXHAUSTED"));
+    }
+    Ok(Some(fund.for_child(ticks)))
 }

@@ -3,10 +3,12 @@
 //! Virtual time stands still while tasks run. It moves when all of them wait, to the first time for which one
 //! does, and when so many ticks have run that something else must be meant to happen.
 
+use super::arrival::wake_readers;
 use super::limit::expire;
 use super::wake::{call_attention, make_runnable};
+use crate::host::{Awaited, Host};
 use crate::schedule::Due;
-use crate::task::{Task, TaskState};
+use crate::task::Task;
 use crate::vm::Vm;
 
 /// Ticks between two looks at the clock while tasks are running.
@@ -16,7 +18,7 @@ const VIRTUAL_TICKS: u64 = 10_000_000;
 /// Timers that fire in one step; between two steps tasks have their turns.
 const AT_ONCE: usize = 1000;
 
-/// Reads the clock if it is time to, and fires the timers that are due.
+/// Asks the clock if it is time to, and fires the timers that are due.
 pub(super) fn look_at_clock(vm: &mut Vm) {
     let scheduler = &mut vm.scheduler;
     if scheduler.timers.first().is_none() {
@@ -25,25 +27,31 @@ pub(super) fn look_at_clock(vm: &mut Vm) {
     if scheduler.clock.more_is_due {
         return fire_timers(vm);
     }
-    if vm.outside.host.is_virtual() {
+    if scheduler.clock.is_virtual {
         if scheduler.spent.saturating_sub(scheduler.clock.moved_at) < VIRTUAL_TICKS {
             return;
         }
         let Some(first) = scheduler.first_timer() else { return };
-        let now = vm.outside.host.monotonic();
+        let now = scheduler.clock.read(&mut vm.outside.host);
         vm.outside.host.advance(first.saturating_sub(now));
     } else if scheduler.spent.saturating_sub(scheduler.clock.looked_at) < CLOCK_TICKS {
         return;
     }
-    vm.scheduler.clock.looked_at = vm.scheduler.spent;
+    scheduler.clock.looked_at = scheduler.spent;
     fire_timers(vm);
 }
 
 /// Fires the timers that are due, or as many as one step has room for.
 fn fire_timers(vm: &mut Vm) {
-    let now = vm.scheduler.clock.read(&mut *vm.outside.host);
+    let scheduler = &mut vm.scheduler;
+    let is_due = match scheduler.first_timer() {
+        Some(first) => scheduler.clock.is_due(&mut vm.outside.host, first),
+        None => false,
+    };
+    let now = scheduler.clock.now;
     let mut left = AT_ONCE;
-    while left > 0
+    while is_due
+        && left > 0
         && let Some(timer) = vm.scheduler.timers.take_due(now)
     {
         left -= 1;
@@ -74,17 +82,17 @@ fn fire_timers(vm: &mut Vm) {
 pub(crate) fn idle(vm: &mut Vm) -> bool {
     vm.outside.flush();
     let deadline = vm.scheduler.first_timer();
-    let for_input = !vm.scheduler.readers.is_empty();
-    if deadline.is_none() && !for_input {
+    let awaited =
+        Awaited { input: !vm.scheduler.readers.is_empty(), news: !vm.outside.operations.is_empty() };
+    if deadline.is_none() && awaited == Awaited::default() {
         return false;
     }
-    vm.outside.host.wait(deadline, for_input);
-    if for_input {
-        for id in std::mem::take(&mut vm.scheduler.readers) {
-            if vm.scheduler.tasks.get(id).is_some_and(|task| task.state == TaskState::Reading) {
-                make_runnable(vm, id.index, false);
-            }
-        }
+    let host = &mut vm.outside.host;
+    let begun = vm.scheduler.clock.read(host);
+    host.wait(deadline, awaited);
+    vm.scheduler.clock.idled += vm.scheduler.clock.read(host) - begun;
+    if awaited.input && vm.scheduler.clock.is_virtual {
+        wake_readers(vm);
     }
     vm.scheduler.clock.looked_at = vm.scheduler.spent;
     fire_timers(vm);

@@ -1,4 +1,7 @@
 //! The turn of a task: its slices, from taking its record out of the table to putting it back.
+//!
+//! The ticks of a run come in portions, whose ends say nothing about its turns: a turn that one falls into
+//! stays open (`schedule::portion`), and goes on with the next portion as if nothing had happened.
 
 use super::finish::finish_task;
 use super::limit::charge_account;
@@ -8,24 +11,39 @@ use super::wake::make_runnable;
 use crate::interp::{self, Leave};
 use crate::observe::Seen;
 use crate::report::{self, Happening};
-use crate::schedule::{Due, Parking, TurnEnd};
+use crate::schedule::{Due, OpenSlice, OpenTurn, Parking, TurnEnd};
 use crate::task::{AccountId, Task, TaskIndex, TaskState};
 use crate::vm::Vm;
 
 /// Gives a runnable task its turn: one slice, or as many as it takes to leave a critical section. `end` is
-/// the number of ticks of the run at which it is over in any case.
+/// the number of ticks of the run at which the portion is over; the turn stays open then.
 pub(crate) fn give_turn(vm: &mut Vm, index: TaskIndex, end: u64) {
+    take_turn(vm, index, None, end);
+}
+
+/// Goes on with a turn that the end of the last portion has left open.
+#[cold]
+pub(super) fn go_on_with_turn(vm: &mut Vm, turn: OpenTurn, end: u64) {
+    if vm.scheduler.tasks.contains(turn.task) {
+        take_turn(vm, turn.task.index, turn.slice, end);
+    }
+}
+
+/// Gives a task its turn, which begins with the rest of a slice if one is given.
+fn take_turn(vm: &mut Vm, index: TaskIndex, mut rest: Option<OpenSlice>, end: u64) {
     loop {
-        let limit = end.saturating_sub(vm.scheduler.spent);
-        let leave = run_slice(vm, index, limit);
+        let Some(leave) = run_slice(vm, index, rest.take(), end) else { return };
         let scheduler = &mut vm.scheduler;
         let Some(task) = scheduler.tasks.at_mut(index) else { return };
         match leave {
             Leave::Ended => return,
             Leave::Slice => {
                 let goes_on = task.critical > 0 || scheduler.turn.end == TurnEnd::Cut;
-                if goes_on && scheduler.spent < end && !scheduler.is_budget_spent(&vm.config) {
-                    continue;
+                if goes_on && !scheduler.is_budget_spent(&vm.config) {
+                    if scheduler.spent < end {
+                        continue;
+                    }
+                    return scheduler.leave_open(None);
                 }
                 return match scheduler.turn.end {
                     TurnEnd::Held => scheduler.hold(index),
@@ -37,19 +55,17 @@ pub(crate) fn give_turn(vm: &mut Vm, index: TaskIndex, end: u64) {
     }
 }
 
-/// Gives a runnable task one slice.
-fn run_slice(vm: &mut Vm, index: TaskIndex, limit: u64) -> Leave {
-    if !vm.scheduler.deliveries.is_empty() {
+/// Gives a task a slice, or the rest of one. `None` if the portion has ended before the slice, which then
+/// stays open.
+fn run_slice(vm: &mut Vm, index: TaskIndex, rest: Option<OpenSlice>, end: u64) -> Option<Leave> {
+    if rest.is_none() && !vm.scheduler.deliveries.is_empty() {
         deliver_some(vm);
     }
-    let Some(task) = vm.scheduler.tasks.take(index) else { return Leave::Ended };
-    let account = task.account;
-    begin_slice(vm, index, task);
-    let slice = vm.scheduler.slice_length(&vm.config, limit);
-    interp::load(vm, slice as i32);
-    let leave = match begin_running(vm, account) {
-        Ok(()) => interp::run(vm),
-        Err(leave) => leave,
+    let Some(task) = vm.scheduler.tasks.take(index) else { return Some(Leave::Ended) };
+    let portion = end.saturating_sub(vm.scheduler.spent);
+    let (mut slice, leave) = match rest {
+        None => begin_slice(vm, index, task, portion),
+        Some(slice) => (slice, go_on_with_slice(vm, task, slice, portion)),
     };
     let leave = match leave {
         Leave::Ended if vm.scheduler.stops_before_end(&mut vm.exchange.values) => Leave::Slice,
@@ -59,30 +75,25 @@ fn run_slice(vm: &mut Vm, index: TaskIndex, limit: u64) -> Leave {
         }
         leave => leave,
     };
-    let used = vm.cpu.take_used() + vm.exchange.charges.take().ticks();
-    vm.scheduler.spent += used;
-    if leave != Leave::Ended {
-        vm.save_cpu();
+    let used = vm.cpu.take_used();
+    slice.used += used;
+    if leave == Leave::Slice && used >= portion && used < slice.left && vm.slice_may_go_on() {
+        vm.scheduler.spent += used;
+        slice.left -= used;
+        slice.collections = vm.cpu.collections;
+        leave_slice_open(vm, slice);
+        return None;
     }
-    let task = vm.scheduler.task_mut();
-    task.ticks += used;
-    if task.critical > 0 && !std::mem::take(&mut vm.scheduler.turn.critical_is_new) {
-        vm.scheduler.turn.critical_left -= used as i64;
-    }
-    if account != AccountId::NONE {
-        charge_account(vm, account, used);
-    }
-    if vm.watch.is_watched {
-        tell_how_turn_ended(vm, leave);
-    }
-    put_back(vm, leave);
-    leave
+    let charges = vm.exchange.charges.take().ticks();
+    vm.scheduler.spent += used + charges;
+    end_slice(vm, slice.used + charges, slice.account, leave);
+    Some(leave)
 }
 
-/// Makes a task the running one, at the beginning of a slice.
-fn begin_slice(vm: &mut Vm, index: TaskIndex, mut task: Box<Task>) {
+/// Makes a task the running one, and runs it for a slice, or for a portion of it.
+fn begin_slice(vm: &mut Vm, index: TaskIndex, mut task: Box<Task>, portion: u64) -> (OpenSlice, Leave) {
     task.turns = task.turns.wrapping_add(1);
-    let number = task.number;
+    let account = task.account;
     let scheduler = &mut vm.scheduler;
     let turn = &mut scheduler.turn;
     scheduler.counts.switches += u64::from(index != turn.index);
@@ -90,11 +101,68 @@ fn begin_slice(vm: &mut Vm, index: TaskIndex, mut task: Box<Task>) {
     turn.index = index;
     turn.end = TurnEnd::Spent;
     turn.had_attention = task.flags.attention();
-    scheduler.running = Some(task);
+    make_running(vm, task);
+    let left = vm.scheduler.slice_length(&vm.config);
+    interp::load(vm, left.min(portion) as i32);
+    let leave = match begin_running(vm, account) {
+        Ok(()) => interp::run(vm),
+        Err(leave) => leave,
+    };
+    (OpenSlice { left, used: 0, account, collections: 0 }, leave)
+}
+
+/// Makes a task the running one, and runs it for a further portion of its slice.
+#[cold]
+fn go_on_with_slice(vm: &mut Vm, task: Box<Task>, slice: OpenSlice, portion: u64) -> Leave {
+    make_running(vm, task);
+    interp::load(vm, slice.left.min(portion) as i32);
+    vm.cpu.collections = slice.collections;
+    interp::run(vm)
+}
+
+/// Makes a task the running one.
+fn make_running(vm: &mut Vm, task: Box<Task>) {
+    let number = task.number;
+    vm.scheduler.running = Some(task);
     if vm.watch.is_watched {
         report::show(vm, number, Seen::Runs);
     }
     vm.scan_before_running();
+}
+
+/// Takes the running task, in whose slice the portion has ended, off the processor.
+#[cold]
+fn leave_slice_open(vm: &mut Vm, slice: OpenSlice) {
+    vm.save_cpu();
+    if vm.watch.is_watched {
+        tell_how_turn_ended(vm, Leave::Slice);
+    }
+    put_back(vm, Leave::Slice);
+    vm.scheduler.leave_open(Some(slice));
+}
+
+/// Charges the running task what it has used in its slice, and takes it off the processor.
+fn end_slice(vm: &mut Vm, used: u64, account: AccountId, leave: Leave) {
+    let word = if leave == Leave::Ended {
+        0
+    } else {
+        vm.save_cpu();
+        vm.word_of_pc()
+    };
+    let task = vm.scheduler.task_mut();
+    task.ticks += used;
+    let course = task.number.0.rotate_left(40) ^ used.rotate_left(20) ^ word as u64;
+    if task.critical > 0 && !std::mem::take(&mut vm.scheduler.turn.critical_is_new) {
+        vm.scheduler.turn.critical_left -= used as i64;
+    }
+    vm.scheduler.canary.mix(course);
+    if account != AccountId::NONE {
+        charge_account(vm, account, used);
+    }
+    if vm.watch.is_watched {
+        tell_how_turn_ended(vm, leave);
+    }
+    put_back(vm, leave);
 }
 
 /// Does what has to be done before the first instruction of the slice: delivers what is pending, and ends a
@@ -135,7 +203,7 @@ fn put_back(vm: &mut Vm, leave: Leave) {
 fn tell_how_turn_ended(vm: &mut Vm, leave: Leave) {
     let number = vm.scheduler.task().number;
     match leave {
-        Leave::Slice => vm.watch.end_turn(&mut *vm.outside.host, &vm.scheduler, number),
+        Leave::Slice => vm.watch.end_turn(&mut vm.outside.host, &vm.scheduler, number),
         Leave::Parked => {}
         Leave::Ended => {
             report::note_end_in_figures(vm);

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 /// Source of choices.
 #[derive(Clone, Debug, Default)]
-enum Source {
+enum ChoiceSource {
     /// Always the first.
     #[default]
     First,
@@ -17,7 +17,7 @@ enum Source {
 /// Choices of a run where the language leaves an order open.
 #[derive(Clone, Debug, Default)]
 pub struct Choices {
-    source: Source,
+    source: ChoiceSource,
     record: Option<Vec<u32>>,
 }
 
@@ -29,13 +29,13 @@ impl Choices {
 
     /// Creates choices that follow from a seed; those of the seed 0 are always the first.
     pub fn seeded(seed: u64) -> Choices {
-        let source = if seed == 0 { Source::First } else { Source::Seeded(seed) };
+        let source = if seed == 0 { ChoiceSource::First } else { ChoiceSource::Seeded(seed) };
         Choices { source, record: None }
     }
 
     /// Creates choices that are as given, then always the first.
     pub fn given(list: &[u32]) -> Choices {
-        Choices { source: Source::Given(list.iter().copied().collect()), record: None }
+        Choices { source: ChoiceSource::Given(list.iter().copied().collect()), record: None }
     }
 
     /// Has the choices noted that are made, so that the list of them reproduces the run.
@@ -52,7 +52,7 @@ impl Choices {
 
     #[inline]
     pub(super) fn is_first(&self) -> bool {
-        matches!(self.source, Source::First)
+        matches!(self.source, ChoiceSource::First)
     }
 
     /// Chooses a number below `count`.
@@ -61,9 +61,9 @@ impl Choices {
             return 0;
         }
         let choice = match &mut self.source {
-            Source::First => return 0,
-            Source::Seeded(state) => (next_random(state) % count as u64) as usize,
-            Source::Given(list) => list.pop_front().map_or(0, |choice| choice as usize % count),
+            ChoiceSource::First => return 0,
+            ChoiceSource::Seeded(state) => (next_random(state) % count as u64) as usize,
+            ChoiceSource::Given(list) => list.pop_front().map_or(0, |choice| choice as usize % count),
         };
         if let Some(record) = &mut self.record {
             record.push(choice as u32);

@@ -5,6 +5,8 @@ use crate::host::Host;
 /// When the clock was read, and what it said.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Clock {
+    /// Whether time passes only when all tasks wait.
+    pub(crate) is_virtual: bool,
     /// Time of the last reading, in nanoseconds.
     pub(crate) now: u64,
     /// Ticks spent when timers were looked at last.
@@ -13,9 +15,23 @@ pub(crate) struct Clock {
     pub(crate) moved_at: u64,
     /// Whether timers are due that one step had no room for.
     pub(crate) more_is_due: bool,
+    /// Nanoseconds in which all tasks waited.
+    pub(crate) idled: u64,
 }
 
 impl Clock {
+    /// Creates the readings of a clock that was not read yet.
+    pub(crate) fn of(host: &dyn Host) -> Clock {
+        Clock { is_virtual: host.is_virtual(), ..Clock::default() }
+    }
+
+    /// Returns whether the host's clock shows `deadline`, in nanoseconds, or later.
+    pub(crate) fn is_due(&mut self, host: &mut dyn Host, deadline: u64) -> bool {
+        let due = host.due(deadline);
+        self.now = due.unwrap_or(self.now);
+        due.is_some()
+    }
+
     /// Reads the host's clock, in nanoseconds.
     pub(crate) fn read(&mut self, host: &mut dyn Host) -> u64 {
         self.now = host.monotonic();

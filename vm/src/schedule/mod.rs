@@ -4,16 +4,20 @@
 //! queues    runnable tasks, by priority       choices   which of them, where the order is open
 //! timer     what happens at which time        clock     readings of the host's clock
 //! account   ticks that may be used together   turn      the turn of the running task
+//! allowance what cleanups may use while an abort or an expired limit waits
 //! point     places at which a task lets others go first, while schedules are explored
+//! portion   the turn that the end of a portion of the run's ticks has fallen into
 //! ```
 //!
 //! Guarantees: a task that has not ended is running, in a run queue, held or parked, and only one of these.
 //! Everything here is data with its own operations; what happens to tasks while the machine runs is in `run`.
 
 mod account;
+mod allowance;
 mod choices;
 mod clock;
 mod point;
+mod portion;
 mod queues;
 mod timer;
 mod turn;
@@ -23,29 +27,24 @@ pub use choices::Choices;
 pub(crate) use clock::Clock;
 pub use point::Grain;
 pub(crate) use point::Points;
+pub(crate) use portion::{OpenSlice, OpenTurn};
 pub(crate) use queues::RunQueues;
 pub(crate) use timer::{Due, Timer, Timers};
 pub(crate) use turn::{Parking, Turn, TurnEnd};
 
+use crate::canary::Canary;
 use crate::config::Config;
 use crate::heap::Heap;
-use crate::host::Host;
 use crate::raise::{Exit, Outcome};
-use crate::task::{
-    AccountId, Allowance, LimitNumber, Serial, Task, TaskId, TaskIndex, TaskNumber, TaskState, Tasks,
-};
+use crate::task::{AccountId, LimitNumber, Serial, Task, TaskId, TaskIndex, TaskNumber, TaskState, Tasks};
 use crate::value::Value;
 use crate::wait::{Deliveries, link};
 
 /// Progress of ending all tasks, which takes several steps where there are many.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct EndOfAll {
-    /// Index of the next task to be asked.
-    pub(crate) next: usize,
-    /// Newest task that is to end: those made afterwards are not asked.
-    pub(crate) newest: TaskNumber,
-    /// Task that wants it, which is not asked, or [`TaskNumber::NONE`].
-    pub(crate) except: TaskNumber,
+    /// Tasks that were not asked yet, the newest last.
+    pub(crate) left: Vec<TaskId>,
 }
 
 /// Numbers of tasks and of their turns.
@@ -97,6 +96,12 @@ pub(crate) struct Scheduler {
     pub(crate) clock: Clock,
     /// Ticks used by all tasks together.
     pub(crate) spent: u64,
+    /// Number of rounds of the machine: times that it has looked whose turn it is. Never set back.
+    pub(crate) rounds: u64,
+    /// Canary of the turns.
+    pub(crate) canary: Canary,
+    /// Turn that the end of the last portion has left open.
+    pub(crate) open_turn: Option<OpenTurn>,
     /// The running task.
     pub(crate) running: Option<Box<Task>>,
     /// The turn of the running task.
@@ -107,7 +112,7 @@ pub(crate) struct Scheduler {
 
 impl Scheduler {
     /// Creates a scheduler without tasks.
-    pub(crate) fn new(seed: u64, starter: Value, any_event: Value) -> Scheduler {
+    pub(crate) fn new(seed: u64, clock: Clock, starter: Value, any_event: Value) -> Scheduler {
         Scheduler {
             tasks: Tasks::default(),
             queues: RunQueues::default(),
@@ -123,8 +128,11 @@ impl Scheduler {
             main_number: None,
             counts: Counts::default(),
             serial: Serial::default(),
-            clock: Clock::default(),
+            clock,
             spent: 0,
+            rounds: 0,
+            canary: Canary::default(),
+            open_turn: None,
             running: None,
             turn: Turn::default(),
             points: Points::default(),
@@ -241,9 +249,12 @@ impl Scheduler {
     /// Closes the innermost limit of the running task, because its entry was popped.
     pub(crate) fn close_limit(&mut self) {
         let limit = self.task_mut().extra.as_mut().and_then(|extra| extra.limits.pop());
-        if let Some(limit) = limit
-            && let Some(parent) = self.accounts.close_form(limit.account)
-        {
+        let Some(limit) = limit else { return };
+        if let Some(extra) = &mut self.task_mut().extra {
+            // What the limit was for is done.
+            extra.fund = extra.fund.filter(|fund| fund.depth != limit.entry as usize + 1);
+        }
+        if let Some(parent) = self.accounts.close_form(limit.account) {
             self.task_mut().account = parent;
         }
     }
@@ -253,23 +264,20 @@ impl Scheduler {
         self.accounts.is_spent_for(self.task().account, self.turn.index)
     }
 
-    /// Returns the allowance of a cleanup of the running task that an abort or an expired limit meets now,
-    /// and sets its timer.
-    pub(crate) fn new_allowance(&mut self, host: &mut dyn Host, config: &Config) -> Allowance {
-        let time = self.clock.read(host).saturating_add(config.cleanup_time);
-        self.timers.push(time, self.turn.index, Due::Cleanup);
-        // The ticks of the slice under way are not counted yet, and come on top.
-        Allowance { ticks: self.task().ticks.saturating_add(config.cleanup_ticks), time }
-    }
-
     /// Returns whether the budget of the run is spent.
     pub(crate) fn is_budget_spent(&self, config: &Config) -> bool {
         config.budget.is_some_and(|budget| self.spent >= budget)
     }
 
-    /// Returns the length of the next slice of the running task, of at most `limit` ticks.
-    pub(crate) fn slice_length(&mut self, config: &Config, limit: u64) -> u64 {
-        let mut slice = u64::from(self.choices.slice(config.slice)).min(limit);
+    /// Notes that the turn of the task that ran last goes on with the next portion: with the rest of this
+    /// slice, or with another one.
+    pub(crate) fn leave_open(&mut self, slice: Option<OpenSlice>) {
+        self.open_turn = self.tasks.id_at(self.turn.index).map(|task| OpenTurn { task, slice });
+    }
+
+    /// Returns the length of the next slice of the running task.
+    pub(crate) fn slice_length(&mut self, config: &Config) -> u64 {
+        let mut slice = u64::from(self.choices.slice(config.slice));
         if let Some(budget) = config.budget {
             slice = slice.min(budget.saturating_sub(self.spent));
         }

@@ -29,12 +29,12 @@ pub(crate) struct Binding {
 #[derive(Default)]
 pub(crate) struct Bindings {
     all: Vec<Binding>,
-    table: Option<Box<Table>>,
+    table: Option<Box<BindingTable>>,
 }
 
 /// Table of the older bindings.
 #[derive(Default)]
-struct Table {
+struct BindingTable {
     newest: GivenMap<u64, u32>,
     previous: Vec<u32>,
 }

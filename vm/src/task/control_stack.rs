@@ -113,8 +113,8 @@ impl Target {
         self.is_forced() || matches!(self, Target::Root(_))
     }
 
-    /// Returns its depth: the greater, the further inside.
-    fn depth(self) -> usize {
+    /// Returns the number of control entries that are left at it: the greater, the further inside.
+    pub(crate) fn depth(self) -> usize {
         match self {
             Target::Root(_) => 0,
             Target::Entry(index) | Target::Limit(index) | Target::Cleanup(index) => index + 1,
@@ -135,10 +135,12 @@ pub(crate) struct Unwinding {
 impl Unwinding {
     /// Returns the unwinding that goes on when a cleanup is left: this one, by which it is left, or the one
     /// that the cleanup interrupted. An exit of the program replaces another, but not the end of the task,
-    /// nor an expired limit.
+    /// nor an expired limit. A failure that was about to end the task does not get in the way of a cut-off:
+    /// when the cleanup is left that is cut off, the task goes on as if that one had ended.
     pub(crate) fn or_interrupted(self, interrupted: Option<Unwinding>) -> Unwinding {
         let Some(interrupted) = interrupted else { return self };
-        let is_further = interrupted.target.depth() < self.target.depth();
+        let is_cut_off = matches!(self.target, Target::Cleanup(_)) && !interrupted.target.is_forced();
+        let is_further = interrupted.target.depth() < self.target.depth() && !is_cut_off;
         if interrupted.target.is_final() && (!self.target.is_forced() || is_further) {
             interrupted
         } else {
@@ -150,6 +152,8 @@ impl Unwinding {
 /// Running cleanup: what it has interrupted, and what it may use.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Running {
+    /// Index of its entry in the control stack.
+    pub entry: usize,
     /// Unwinding that goes on when it ends; `None` if the protected form returned.
     pub pending: Option<Unwinding>,
     /// Value list of the protected form.
@@ -224,19 +228,18 @@ impl Control {
     pub(crate) fn run_cleanup(&mut self, entry: Entry, running: Running) {
         let data = Value::index(self.running.len());
         self.bindings.truncate(entry.bindings as usize);
+        self.running.push(Running { entry: self.entries.len(), ..running });
         self.entries.push(Entry { kind: EntryKind::Running, data, ..entry });
-        self.running.push(running);
     }
 
     /// Returns the index of the entry of the innermost running cleanup.
     pub(crate) fn innermost_cleanup(&self) -> Option<usize> {
-        self.cleanup_entry(self.running.len().checked_sub(1)?)
+        Some(self.running.last()?.entry)
     }
 
-    /// Returns the index of the entry of the cleanup at this position of `running`.
-    pub(crate) fn cleanup_entry(&self, position: usize) -> Option<usize> {
-        let data = Value::index(position);
-        self.entries.iter().rposition(|entry| entry.kind == EntryKind::Running && entry.data == data)
+    /// Returns the first allowance of a running cleanup that it has not outrun yet.
+    pub(crate) fn allowance(&self) -> Option<Allowance> {
+        self.running.iter().filter_map(|running| running.allowance).find(|&it| it != Allowance::OVER)
     }
 
     /// Returns the target of an interrupted unwinding that the running cleanup cannot cancel.

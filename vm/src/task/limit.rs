@@ -33,3 +33,105 @@ pub(crate) struct Allowance {
     /// Time at which it ends, in nanoseconds.
     pub time: u64,
 }
+
+impl Allowance {
+    /// The allowance of a cleanup that was cut off: it has none to outrun any more.
+    pub(crate) const OVER: Allowance = Allowance { ticks: u64::MAX, time: u64::MAX };
+
+    /// Returns the allowance of a cleanup that may use `ticks` and `nanoseconds` from `now` on.
+    pub(crate) fn after(now: Allowance, ticks: u64, nanoseconds: u64) -> Allowance {
+        Allowance { ticks: now.ticks.saturating_add(ticks), time: now.time.saturating_add(nanoseconds) }
+    }
+}
+
+/// Ticks that a cleanup may use when the fund that it belongs to is spent.
+const LAST_TICKS: u64 = 1000;
+/// Nanoseconds that it may use then.
+const LAST_TIME: u64 = 1_000_000;
+
+/// What the cleanups that run for one abort, or for one expired limit, may use together.
+///
+/// A fund is twice the allowance of a single cleanup, and each cleanup may use half of what is left. So the
+/// first one that hangs leaves something for those further out, and cleanups that are begun in others that
+/// are cut off use up one fund, however deep. When it is spent, each cleanup that was established before has
+/// a last small allowance, since it may release what others need; those established later are not run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Fund {
+    /// Number of entries of the control stack that are left when the abort, or the limit, has had its way.
+    pub(crate) depth: usize,
+    /// Where it ends.
+    pub(crate) ends: Allowance,
+    /// Index of the control entry from which on cleanups are not run, once it is spent.
+    pub(crate) floor: Option<usize>,
+    /// Whether it was reported that it is spent.
+    pub(crate) is_reported: bool,
+}
+
+impl Fund {
+    /// Creates the fund for an abort or a limit that leaves `depth` entries, if a single cleanup may use
+    /// `ticks` and `nanoseconds`.
+    pub(crate) fn new(depth: usize, now: Allowance, ticks: u64, nanoseconds: u64) -> Fund {
+        let ends = Allowance::after(now, ticks.saturating_mul(2), nanoseconds.saturating_mul(2));
+        Fund { depth, ends, floor: None, is_reported: false }
+    }
+
+    /// Returns the fund of a new task that belongs to a form of this fund's task: the same time, and as many
+    /// ticks.
+    pub(crate) fn for_child(&self, ticks: u64) -> Fund {
+        let ends = Allowance { ticks: self.ends.ticks.saturating_sub(ticks), time: self.ends.time };
+        Fund { depth: 0, ends, floor: None, is_reported: false }
+    }
+
+    /// Returns whether so little is left that cleanups have their last allowance.
+    pub(crate) fn is_spent(&self, now: Allowance) -> bool {
+        now.ticks.saturating_add(LAST_TICKS) > self.ends.ticks
+            || now.time.saturating_add(LAST_TIME) > self.ends.time
+    }
+
+    /// Returns the allowance of the cleanup at the control entry `index`; `None` if it is not to be run.
+    pub(crate) fn allow(&mut self, index: usize, now: Allowance) -> Option<Allowance> {
+        if !self.is_spent(now) {
+            let ticks = (self.ends.ticks - now.ticks) / 2;
+            let nanoseconds = (self.ends.time - now.time) / 2;
+            return Some(Allowance::after(now, ticks, nanoseconds));
+        }
+        if self.floor.is_some_and(|floor| index >= floor) {
+            return None;
+        }
+        self.floor = Some(index);
+        Some(Allowance::after(now, LAST_TICKS, LAST_TIME))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOW: Allowance = Allowance { ticks: 500, time: 7 };
+
+    #[test]
+    fn the_first_cleanup_has_a_whole_allowance_and_the_next_ones_half_of_the_rest() {
+        let mut fund = Fund::new(0, NOW, 1_000_000, 60_000_000_000);
+        let first = fund.allow(10, NOW);
+        assert_eq!(first, Some(Allowance::after(NOW, 1_000_000, 60_000_000_000)));
+        let next = fund.allow(11, first.unwrap());
+        assert_eq!(next, Some(Allowance::after(first.unwrap(), 500_000, 30_000_000_000)));
+    }
+
+    #[test]
+    fn a_spent_fund_lets_run_only_what_was_established_before() {
+        let mut fund = Fund::new(0, NOW, 1_000_000, 60_000_000_000);
+        let end = fund.ends;
+        assert!(fund.is_spent(end));
+        assert!(fund.allow(10, end).is_some());
+        assert_eq!((fund.allow(10, end), fund.allow(11, end)), (None, None));
+        assert!(fund.allow(9, end).is_some());
+    }
+
+    #[test]
+    fn a_child_has_what_is_left() {
+        let fund = Fund::new(3, NOW, 1000, 50);
+        let child = fund.for_child(NOW.ticks);
+        assert_eq!((child.depth, child.ends), (0, Allowance { ticks: 2000, time: 107 }));
+    }
+}

@@ -19,7 +19,7 @@ pub(crate) use binding::{Binding, Bindings};
 pub(crate) use control_stack::{Control, End, Entry, EntryKind, LazyControl, Running, Target, Unwinding};
 pub use id::TaskNumber;
 pub(crate) use id::{LimitNumber, Serial, TaskIndex};
-pub(crate) use limit::{AccountId, Allowance, Limit};
+pub(crate) use limit::{AccountId, Allowance, Fund, Limit};
 pub use tasks::TaskId;
 pub(crate) use tasks::Tasks;
 
@@ -165,6 +165,8 @@ pub(crate) struct Extra {
     pub values: Vec<Value>,
     /// Open limits, outermost first: one for each entry of the control stack of that kind.
     pub limits: Vec<Limit>,
+    /// What its cleanups may use together, while an abort or an expired limit has them run.
+    pub fund: Option<Fund>,
     /// Guards that interrupt it as soon as may be.
     pub interrupts: Vec<Value>,
 }

@@ -21,8 +21,10 @@ pub(crate) const STATE: usize = 4;
 pub(crate) const RESULT: usize = 5;
 /// Slot of a task: checkpoints that it has passed.
 pub(crate) const CHECKPOINTS: usize = 6;
+/// Slot of a task: list of what the library lets go of at its end.
+pub(crate) const HELD: usize = 7;
 /// Number of slots of a task.
-pub(crate) const TASK_LENGTH: usize = 7;
+pub(crate) const TASK_LENGTH: usize = 8;
 
 /// Creates an event.
 ///

@@ -3,6 +3,7 @@
 //! ```text
 //! event | name | count | first | last |          task | as an event | state | result | checkpoints |
 //!                          |       +-----------------------------+
+//! operation | as an event | state | result | progress | number | performer |
 //! link  | owner | event | previous | next | more | queue | deadline |
 //! ```
 //!
@@ -14,6 +15,7 @@
 mod delivery;
 pub(crate) mod event;
 pub(crate) mod link;
+pub(crate) mod operation;
 
 pub(crate) use delivery::{Deliveries, Delivery};
 pub(crate) use link::WaitOptions;

@@ -13,8 +13,8 @@ use esl_bytecode::symbol::Symbol;
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::heap::{AllocError, Heap, Kind};
 use crate::value::Value;
-use crate::world::World;
-use crate::world::load::{self, LoadError};
+use crate::world::load::{self, ImageClass, LoadError};
+use crate::world::{World, class};
 
 impl World {
     /// Adds an image. Returns a list of the functions that run its top-level forms, in order.
@@ -48,19 +48,27 @@ impl World {
             && let Some(last) = self.undefined_yet.len().checked_sub(1)
         {
             let symbol = self.undefined_yet[last].clone();
-            result = self.define(heap, &symbol);
-            if result.is_ok() {
-                // Others may have been added after it.
-                self.undefined_yet.remove(last);
-            }
+            result = self.define(heap, &symbol).map(|is_complete| {
+                if is_complete {
+                    // Others may have been added after it.
+                    self.undefined_yet.remove(last);
+                }
+            });
         }
         self.is_defining = false;
         result
     }
 
-    fn define(&mut self, heap: &mut Heap, symbol: &Symbol) -> Result<(), AllocError> {
-        let Some((image, definition)) = self.images.definition(symbol) else { return Ok(()) };
-        let Some(object) = self.find(symbol).and_then(|v| self.object_of(heap, v)) else { return Ok(()) };
+    /// Applies the image's definition to a symbol. Returns whether that is complete; otherwise the symbols
+    /// that it waits for are the last on the list.
+    fn define(&mut self, heap: &mut Heap, symbol: &Symbol) -> Result<bool, AllocError> {
+        let Some((image, definition)) = self.images.definition(symbol) else { return Ok(true) };
+        let Some(object) = self.find(symbol).and_then(|v| self.object_of(heap, v)) else { return Ok(true) };
+        if let Some(class) = definition.class
+            && !self.define_image_class(heap, image, object, class)?
+        {
+            return Ok(false);
+        }
         if let Some(number) = definition.function {
             let function = load::image_function(heap, self, image, number)?;
             heap.symbol_set_function(object, function);
@@ -93,6 +101,34 @@ impl World {
             let plist = heap.list(&items)?;
             heap.symbol_set_plist(object, plist);
         }
-        Ok(())
+        Ok(true)
+    }
+
+    /// Defines the class called `name`, unless there is one. Returns false, and puts the names of the
+    /// superclasses on the list, if one of these is not defined yet.
+    fn define_image_class(
+        &mut self,
+        heap: &mut Heap,
+        image: usize,
+        name: Value,
+        class: ImageClass,
+    ) -> Result<bool, AllocError> {
+        if self.find_class(name).is_some() {
+            return Ok(true);
+        }
+        let names = load::image_constant(heap, self, image, class.supers)?;
+        let names: Vec<Value> = class::list(heap, names).collect();
+        let supers: Vec<Value> = names.iter().filter_map(|&name| self.find_class(name)).collect();
+        if supers.len() < names.len() {
+            let missing = names.into_iter().filter(|&name| self.find_class(name).is_none());
+            let missing: Vec<Symbol> = missing.filter_map(|name| self.name_of(heap, name)).collect();
+            self.undefined_yet.extend(missing);
+            return Ok(false);
+        }
+        let slots = load::image_constant(heap, self, image, class.slots)?;
+        let slots: Vec<Value> = class::list(heap, slots).collect();
+        let data = load::image_constant(heap, self, image, class.data)?;
+        self.define_class(heap, name, &supers, &slots, data)?;
+        Ok(true)
     }
 }

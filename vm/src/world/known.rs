@@ -47,6 +47,7 @@ macro_rules! define_known {
 define_known! {
     package = cl "*PACKAGE*";
     gensym_counter = cl "*GENSYM-COUNTER*";
+    read_base = cl "*READ-BASE*";
     standard_input = cl "*STANDARD-INPUT*";
     standard_output = cl "*STANDARD-OUTPUT*";
     error_output = cl "*ERROR-OUTPUT*";
@@ -55,18 +56,25 @@ define_known! {
     structure_object = cl "STRUCTURE-OBJECT";
     raise = esl "%RAISE";
     reserve = esl "%RESERVE";
+    expander_text = esl "%EXPANDER-TEXT";
+    release_held = esl "%RELEASE-HELD";
     allow_other_keys = keyword "ALLOW-OTHER-KEYS";
     stack_exhausted = keyword "STACK-EXHAUSTED";
     heap_exhausted = keyword "HEAP-EXHAUSTED";
     budget_exhausted = keyword "BUDGET-EXHAUSTED";
     timeout = keyword "TIMEOUT";
     event = esl "EVENT";
+    operation = esl "OPERATION";
+    fail_as_host = esl "%FAIL-AS-HOST";
     task = esl "TASK";
     restarts = esl "*RESTARTS*";
     recoveries = esl "*RECOVERIES*";
     task_end = keyword "TASK-END";
     succeeded = keyword "SUCCEEDED";
     failed = keyword "FAILED";
+    pending = keyword "PENDING";
+    completed = keyword "COMPLETED";
+    cancelled = keyword "CANCELLED";
     aborted = keyword "ABORTED";
     running = keyword "RUNNING";
     waiting = keyword "WAITING";

@@ -5,7 +5,7 @@ use crate::diagnostic::code;
 use crate::reader::lexer::Token;
 use crate::reader::name;
 
-use super::{LabelState, MAX_DEPTH, Open, Scanner};
+use super::{LabelState, MAX_DEPTH, OpenKind, Scanner};
 
 /// Tokens of the tree that a datum with labels stands for, at most.
 const MAX_TREE: u64 = 1 << 24;
@@ -17,7 +17,7 @@ impl Scanner {
         }
         let span = self.span(start, end);
         if self.backquotes == 0 {
-            let in_array = self.levels.iter().any(|level| level.open == Open::Array);
+            let in_array = self.levels.iter().any(|level| level.open == OpenKind::Array);
             let place = if in_array { "in an array literal" } else { "outside of a backquote" };
             return self.error(
                 code::COMMA_OUTSIDE_BACKQUOTE.at(span, format!("expected no comma {place}, found one")),
@@ -26,13 +26,13 @@ impl Scanner {
         if token == Token::CommaAt {
             let parent = self.levels.last().map(|level| level.open);
             let after_dot = self.lexemes.last().is_some_and(|last| last.token == Token::Dot);
-            if parent == Some(Open::Backquote) {
+            if parent == Some(OpenKind::Backquote) {
                 self.error(
                     code::MISPLACED_SPLICE
                         .at(span, "expected `,@` within a list, found it right after the backquote")
                         .help("put it into a list, or take `,` to insert the value itself"),
                 );
-            } else if parent == Some(Open::List) && after_dot {
+            } else if parent == Some(OpenKind::List) && after_dot {
                 self.error(
                     code::MISPLACED_SPLICE
                         .at(span, "expected one datum after the dot, found `,@`")
@@ -42,16 +42,16 @@ impl Scanner {
         }
     }
 
-    pub(super) fn open_label(&mut self, text: &str, start: u32, end: u32) -> Open {
+    pub(super) fn open_label(&mut self, text: &str, start: u32, end: u32) -> OpenKind {
         if self.excluded > 0 {
-            return Open::Prefix;
+            return OpenKind::Prefix;
         }
         let Some(number) = label_number(text, start, end) else {
             let span = self.span(start, end);
             self.error(
                 code::INVALID_TOKEN.at(span, "expected the number of a label, found one that is too large"),
             );
-            return Open::Prefix;
+            return OpenKind::Prefix;
         };
         if self.labels.insert(number, LabelState::Open).is_some() {
             let span = self.span(start, end);
@@ -59,7 +59,7 @@ impl Scanner {
                 code::UNKNOWN_LABEL.at(span, format!("expected a new label, found another `#{number}=`")),
             );
         }
-        let open = Open::Label { number, deepest: self.deepest, tokens: self.tokens };
+        let open = OpenKind::Label { number, deepest: self.deepest, tokens: self.tokens };
         self.deepest = self.levels.len();
         open
     }

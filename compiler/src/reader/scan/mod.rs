@@ -33,7 +33,7 @@ const NONE: u32 = u32::MAX;
 
 /// A list or mark that is open around the current token.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Open {
+enum OpenKind {
     /// A list or vector, until its `)`.
     List,
     /// A mark that takes one datum.
@@ -59,7 +59,7 @@ enum Open {
 
 #[derive(Clone, Copy, Debug)]
 struct Level {
-    open: Open,
+    open: OpenKind,
     /// Start of its token.
     start: u32,
     end: u32,
@@ -154,7 +154,7 @@ impl Scanner {
                     if token == Token::Open && is_column_0(text, start) {
                         self.note_column_0(start);
                     }
-                    self.push(Open::List, token, start, end);
+                    self.push(OpenKind::List, token, start, end);
                     false
                 }
                 Token::Close => {
@@ -197,18 +197,18 @@ impl Scanner {
     /// Takes a token other than a parenthesis. Returns whether it completes the top-level datum.
     fn token(&mut self, token: Token, text: &str, start: u32, end: u32) -> bool {
         match token {
-            Token::Quote | Token::Function => self.push(Open::Prefix, token, start, end),
+            Token::Quote | Token::Function => self.push(OpenKind::Prefix, token, start, end),
             Token::Backquote => {
-                self.push(Open::Backquote, token, start, end);
+                self.push(OpenKind::Backquote, token, start, end);
                 self.backquotes += 1;
             }
             Token::Comma | Token::CommaAt => {
                 self.check_comma(token, start, end);
-                self.push(Open::Comma, token, start, end);
+                self.push(OpenKind::Comma, token, start, end);
                 self.backquotes = self.backquotes.saturating_sub(1);
             }
             Token::Array => {
-                self.push(Open::Array, token, start, end);
+                self.push(OpenKind::Array, token, start, end);
                 self.backquotes = 0;
             }
             Token::Label => {
@@ -216,12 +216,12 @@ impl Scanner {
                 self.push(open, token, start, end);
             }
             Token::FeaturePresent | Token::FeatureAbsent => {
-                self.push(Open::Feature { wanted: token == Token::FeaturePresent }, token, start, end);
+                self.push(OpenKind::Feature { wanted: token == Token::FeaturePresent }, token, start, end);
                 self.excluded += 1;
             }
             Token::ReadEval | Token::Structure | Token::Pathname | Token::Complex => {
                 self.refuse(token, text, start, end);
-                self.push(Open::Prefix, token, start, end);
+                self.push(OpenKind::Prefix, token, start, end);
             }
             Token::Dot => {
                 self.add(token, start, end);
@@ -245,25 +245,25 @@ impl Scanner {
         self.tokens = self.tokens.saturating_add(1);
     }
 
-    fn push(&mut self, open: Open, token: Token, start: u32, end: u32) {
+    fn push(&mut self, open: OpenKind, token: Token, start: u32, end: u32) {
         if self.levels.len() == MAX_DEPTH {
             self.too_deep(start, end);
             // Marks beyond the limit are dropped; lists are counted, so that the end of the datum is found.
-            self.excess += u64::from(open == Open::List);
+            self.excess += u64::from(open == OpenKind::List);
             return;
         }
         let (lexeme, backquotes) = (self.lexemes.len(), self.backquotes);
         self.levels.push(Level { open, start, end, lexeme, backquotes, column_0: NONE });
-        self.lists += usize::from(open == Open::List);
+        self.lists += usize::from(open == OpenKind::List);
         self.deepest = self.deepest.max(self.levels.len());
         self.add(token, start, end);
     }
 
     fn pop(&mut self) -> Option<Level> {
         let level = self.levels.pop()?;
-        self.lists -= usize::from(level.open == Open::List);
+        self.lists -= usize::from(level.open == OpenKind::List);
         self.backquotes = level.backquotes;
-        if matches!(level.open, Open::Feature { .. } | Open::Conditional { kept: false }) {
+        if matches!(level.open, OpenKind::Feature { .. } | OpenKind::Conditional { kept: false }) {
             self.excluded -= 1;
         }
         Some(level)
@@ -278,9 +278,9 @@ impl Scanner {
         self.add(Token::Close, start, end);
         while let Some(level) = self.pop() {
             match level.open {
-                Open::List => return self.complete(text),
+                OpenKind::List => return self.complete(text),
                 // Excluded data never reach the grammar, so their marks are checked here.
-                Open::Feature { .. } | Open::Conditional { .. } => {
+                OpenKind::Feature { .. } | OpenKind::Conditional { .. } => {
                     let mark = &text[level.start as usize..level.end as usize];
                     let span = self.span(start, end);
                     self.error(
@@ -303,8 +303,8 @@ impl Scanner {
         }
         while let Some(&level) = self.levels.last() {
             match level.open {
-                Open::List => return false,
-                Open::Feature { wanted } => {
+                OpenKind::List => return false,
+                OpenKind::Feature { wanted } => {
                     self.pop();
                     let test = &self.lexemes[level.lexeme + 1..];
                     let kept = match feature::holds(text, test) {
@@ -316,16 +316,16 @@ impl Scanner {
                         }
                     };
                     self.lexemes.truncate(level.lexeme);
-                    self.levels.push(Level { open: Open::Conditional { kept }, ..level });
+                    self.levels.push(Level { open: OpenKind::Conditional { kept }, ..level });
                     self.excluded += u32::from(!kept);
                     return false;
                 }
-                Open::Conditional { kept: false } => {
+                OpenKind::Conditional { kept: false } => {
                     self.pop();
                     self.lexemes.truncate(level.lexeme);
                     return false;
                 }
-                Open::Label { number, deepest, tokens } => {
+                OpenKind::Label { number, deepest, tokens } => {
                     self.pop();
                     let height = self.deepest.saturating_sub(self.levels.len() + 1);
                     self.labels.insert(number, LabelState::Done { height, tokens: self.tokens - tokens });

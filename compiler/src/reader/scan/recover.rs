@@ -4,7 +4,7 @@
 use crate::diagnostic::{Code, code};
 use crate::reader::lexer::{LexError, Lexeme, Token};
 
-use super::{Level, MAX_DEPTH, NONE, Open, Scan, Scanner, Unclosed};
+use super::{Level, MAX_DEPTH, NONE, OpenKind, Scan, Scanner, Unclosed};
 
 /// Strings and names without an end after which reading stops: each makes the rest of the text less certain.
 const MAX_RUNAWAYS: u32 = 8;
@@ -19,7 +19,7 @@ impl Scanner {
             return Scan::Errors(text.len());
         }
         let lists: Vec<Level> =
-            self.levels.iter().filter(|level| level.open == Open::List).copied().collect();
+            self.levels.iter().filter(|level| level.open == OpenKind::List).copied().collect();
         let Some(&outer) = lists.first() else {
             let mark = self.levels[self.levels.len() - 1];
             let span = self.span(mark.start, mark.end);

@@ -1,18 +1,22 @@
 //! Reading characters and lines.
 
-use super::{SKIP_LIMIT, StreamKind, slot};
 use crate::builtins::COPY_LIMIT;
 use crate::builtins::expect::optional;
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
 
+use super::{
+    SKIP_LIMIT, StreamKind, at_end, designated_stream, give_back, input_of, next_character, set_stream_slot,
+    slot, stream_index, stream_slot,
+};
+
 /// `(read-char &optional stream (eof-error-p t) eof-value recursive-p)`
 pub(in crate::builtins) fn read_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (stream, kind) = vm.designated_stream(optional(arguments, 0), true)?;
-    match vm.next_character(stream, kind)? {
+    let (stream, kind) = designated_stream(vm, optional(arguments, 0), true)?;
+    match next_character(vm, stream, kind)? {
         Some(code) => Ok(Value::character(code).unwrap_or(Value::NIL)),
-        None => vm.at_end(stream, arguments, 1),
+        None => at_end(&mut vm.exchange, stream, arguments, 1),
     }
 }
 
@@ -26,10 +30,10 @@ pub(in crate::builtins) fn read_char_no_hang(vm: &mut Vm, arguments: &[Value]) -
 
 /// `(listen &optional stream)`
 pub(in crate::builtins) fn listen(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (stream, kind) = vm.designated_stream(optional(arguments, 0), true)?;
-    match vm.next_character(stream, kind) {
+    let (stream, kind) = designated_stream(vm, optional(arguments, 0), true)?;
+    match next_character(vm, stream, kind) {
         Ok(Some(code)) => {
-            vm.give_back(stream, kind, code);
+            give_back(vm, stream, kind, code);
             Ok(Value::T)
         }
         Ok(None) | Err(Exit::Park) => Ok(Value::NIL),
@@ -40,15 +44,17 @@ pub(in crate::builtins) fn listen(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 /// `(peek-char &optional peek-type stream (eof-error-p t) eof-value recursive-p)`
 pub(in crate::builtins) fn peek_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let wanted = optional(arguments, 0);
-    let (stream, kind) = vm.designated_stream(optional(arguments, 1), true)?;
+    let (stream, kind) = designated_stream(vm, optional(arguments, 1), true)?;
     for _ in 0..SKIP_LIMIT {
-        let Some(code) = vm.next_character(stream, kind)? else { return vm.at_end(stream, arguments, 2) };
+        let Some(code) = next_character(vm, stream, kind)? else {
+            return at_end(&mut vm.exchange, stream, arguments, 2);
+        };
         let is_it = match wanted.as_character() {
             Some(wanted) => code == wanted,
             None => wanted.is_nil() || !char::from_u32(code).is_some_and(char::is_whitespace),
         };
         if is_it {
-            vm.give_back(stream, kind, code);
+            give_back(vm, stream, kind, code);
             return Ok(Value::character(code).unwrap_or(Value::NIL));
         }
     }
@@ -62,17 +68,17 @@ pub(in crate::builtins) fn unread_char(vm: &mut Vm, arguments: &[Value]) -> Outc
     let Some(code) = arguments[0].as_character() else {
         return vm.exchange.type_error(arguments[0], "CHARACTER");
     };
-    let (stream, kind) = vm.designated_stream(optional(arguments, 1), true)?;
-    vm.give_back(stream, kind, code);
+    let (stream, kind) = designated_stream(vm, optional(arguments, 1), true)?;
+    give_back(vm, stream, kind, code);
     Ok(Value::NIL)
 }
 
 /// `(read-line &optional stream (eof-error-p t) eof-value recursive-p)`
 pub(in crate::builtins) fn read_line(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (stream, kind) = vm.designated_stream(optional(arguments, 0), true)?;
+    let (stream, kind) = designated_stream(vm, optional(arguments, 0), true)?;
     let (line, is_cut) = if kind == StreamKind::StandardInput {
-        let taken = vm.outside.console.read_line(&mut *vm.outside.host);
-        let Some((line, is_cut)) = vm.taken(taken)? else { return end_of_line(vm, stream, arguments) };
+        let taken = vm.outside.console.read_line(&mut vm.outside.host);
+        let Some((line, is_cut)) = input_of(vm, taken)? else { return end_of_line(vm, stream, arguments) };
         vm.exchange.charge_elements(line.len());
         match vm.heap.alloc_string(&line) {
             Ok(text) => (text, is_cut),
@@ -83,11 +89,12 @@ pub(in crate::builtins) fn read_line(vm: &mut Vm, arguments: &[Value]) -> Outcom
             }
         }
     } else {
-        let (start, end) = (vm.stream_index(stream, slot::POSITION), vm.stream_index(stream, slot::END));
+        let (start, end) =
+            (stream_index(&vm.heap, stream, slot::POSITION), stream_index(&vm.heap, stream, slot::END));
         if start >= end {
             return end_of_line(vm, stream, arguments);
         }
-        let buffer = vm.stream_slot(stream, slot::BUFFER);
+        let buffer = stream_slot(&vm.heap, stream, slot::BUFFER);
         let rest = vm.heap.string(buffer).map_or(&[][..], |all| &all[start..end]);
         let length = rest.iter().take(COPY_LIMIT).position(|&c| c == u32::from('\n'));
         if length.is_none() && rest.len() > COPY_LIMIT {
@@ -97,13 +104,13 @@ pub(in crate::builtins) fn read_line(vm: &mut Vm, arguments: &[Value]) -> Outcom
         vm.exchange.charge_elements(line.len());
         let text = vm.heap.alloc_string(&line)?;
         let next = start + line.len() + usize::from(length.is_some());
-        vm.set_stream_slot(stream, slot::POSITION, Value::index(next));
+        set_stream_slot(&mut vm.heap, stream, slot::POSITION, Value::index(next));
         (text, length.is_none())
     };
     vm.give_values(&[line, Value::boolean(is_cut)])
 }
 
 fn end_of_line(vm: &mut Vm, stream: Value, arguments: &[Value]) -> Outcome {
-    let value = vm.at_end(stream, arguments, 1)?;
+    let value = at_end(&mut vm.exchange, stream, arguments, 1)?;
     vm.give_values(&[value, Value::T])
 }

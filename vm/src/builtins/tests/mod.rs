@@ -102,7 +102,7 @@ impl Evaluator<'_> {
             "(" => self.list(rest),
             "#(" => {
                 let list = self.list(rest);
-                let items = self.vm.list_items(list, usize::MAX).unwrap();
+                let items = crate::builtins::list::list_items(self.vm, list, usize::MAX).unwrap();
                 self.vm.heap.alloc_vector(&items).unwrap()
             }
             _ => self.atom(&token),
@@ -179,7 +179,7 @@ fn tokens(text: &str) -> Vec<String> {
     tokens
 }
 
-/// An integer (also as `2^70`), a ratio or a float.
+/// Returns an integer (also as `2^70`), a ratio or a float.
 fn parse_number(vm: &mut Vm, token: &str) -> Option<Value> {
     if let Some((numerator, denominator)) = token.split_once('/') {
         let (numerator, denominator) = (parse_number(vm, numerator)?, parse_number(vm, denominator)?);
@@ -207,8 +207,13 @@ fn show_result(vm: &mut Vm, result: &Result<Vec<Value>, Exit>) -> String {
                     Expected::Type(name) => name.to_string(),
                     Expected::Index(limit) => format!("index below {limit}"),
                     Expected::Specifier(specifier) => show(vm, specifier),
+                    Expected::Written(specifier) => specifier.to_string(),
                 };
                 format!("type-error {} {expected}", show(vm, datum))
+            }
+            Some(raised @ Raised::Bounds(..)) => {
+                let arguments = raised.arguments(&mut vm.heap, &mut vm.world).unwrap();
+                format!("type-error {} {}", show(vm, arguments[1]), show(vm, arguments[2]))
             }
             Some(Raised::Variable(symbol, datum, Expected::Type(name))) => {
                 format!("type-error {} of {} {name}", show(vm, datum), show(vm, symbol))
@@ -230,7 +235,7 @@ fn show_result(vm: &mut Vm, result: &Result<Vec<Value>, Exit>) -> String {
     }
 }
 
-/// A datum as `prin1` would write it.
+/// Returns a datum as `prin1` would write it.
 fn show(vm: &Vm, v: Value) -> String {
     let heap = &vm.heap;
     match Number::of(heap, v) {

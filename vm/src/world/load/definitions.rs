@@ -2,8 +2,10 @@
 //!
 //! The table is the last constant of the image, a vector: the symbol `ESL::%DEFINITIONS`; a vector of the
 //! symbols that the package `ESL` exports; then rows of four: a symbol, its function, its macro function, and
-//! its *data* (`NIL` where there is none). Data are a vector: flags, the value, then indicators and values of
-//! properties, in the order of the property list.
+//! its *data* (`NIL` where there is none). Data are a vector: flags, the value, the class that the symbol
+//! names (a list of the names of its superclasses, a list of its slots, and the library's data about it),
+//! then indicators and values of properties, in the order of the property list. Flags say which of them there
+//! are.
 //!
 //! The number of rows is a power of two. A symbol is in the row of its hash, or in the next free one; empty
 //! rows begin with `NIL`. So finding a symbol takes about one look, and loading the table takes none.
@@ -30,6 +32,8 @@ pub(super) const CONSTANT: i64 = 2;
 pub(super) const VALUE: i64 = 4;
 /// Flag of data: the value is the standard stream of this number.
 pub(super) const STREAM: i64 = 8;
+/// Flag of data: the symbol names a class.
+pub(super) const CLASS: i64 = 16;
 
 /// An image's definition of a symbol: functions by number, data by index of the constant.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -46,8 +50,21 @@ pub(crate) struct ImageDefinition {
     pub value: Option<PoolIdx>,
     /// Number of the standard stream that is the value.
     pub stream: Option<usize>,
+    /// The class that the symbol names.
+    pub class: Option<ImageClass>,
     /// Indicators and values of the properties.
     pub properties: Vec<(PoolIdx, PoolIdx)>,
+}
+
+/// An image's definition of a class. All superclasses are classes of the image, too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct ImageClass {
+    /// List of the names of the superclasses.
+    pub supers: PoolIdx,
+    /// List of the names of the slots.
+    pub slots: PoolIdx,
+    /// Data of the library.
+    pub data: PoolIdx,
 }
 
 /// The table of an image. Decoding a vector visits each of its items, so the result is kept.
@@ -134,8 +151,10 @@ fn read_row(image: &ModuleImage, row: &[PoolIdx]) -> ImageDefinition {
         Some(Ok(ConstantRecord::Fixnum(flags))) => flags,
         _ => 0,
     };
-    let value = data.get(1).filter(|_| flags & VALUE != 0);
-    let properties: Vec<PoolIdx> = data.iter().skip(2).collect();
+    let mut items = data.iter().skip(1);
+    let value = if flags & VALUE != 0 { items.next() } else { None };
+    let class = if flags & CLASS != 0 { image_class(&mut items) } else { None };
+    let properties: Vec<PoolIdx> = items.collect();
     ImageDefinition {
         is_special: flags & SPECIAL != 0,
         is_constant: flags & CONSTANT != 0,
@@ -144,9 +163,14 @@ fn read_row(image: &ModuleImage, row: &[PoolIdx]) -> ImageDefinition {
             Ok(ConstantRecord::Fixnum(number)) => usize::try_from(number).ok(),
             _ => None,
         }),
+        class,
         properties: properties.chunks_exact(2).map(|pair| (pair[0], pair[1])).collect(),
         ..functions
     }
+}
+
+fn image_class(items: &mut impl Iterator<Item = PoolIdx>) -> Option<ImageClass> {
+    Some(ImageClass { supers: items.next()?, slots: items.next()?, data: items.next()? })
 }
 
 /// FNV-1a of a symbol's package and name. Tables in images depend on it.

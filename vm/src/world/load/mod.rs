@@ -36,6 +36,7 @@ mod definitions;
 mod image;
 mod prepare;
 
+pub(crate) use definitions::ImageClass;
 pub use esl_bytecode::compile::SourcePlace;
 pub(crate) use image::{
     Images, constant as image_constant, function as image_function, open as open_image,

@@ -14,7 +14,7 @@ use esl_bytecode::module::{Constant, FunctionNumber, Module, PoolIdx};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::symbol::{ESL_PACKAGE, Symbol};
 
-use super::definitions::{CONSTANT, HEAD, MARKER, ROW, SPECIAL, STREAM, VALUE, hash};
+use super::definitions::{CLASS, CONSTANT, HEAD, MARKER, ROW, SPECIAL, STREAM, VALUE, hash};
 
 /// Library function that tells whether a symbol already is a constant with a value.
 const IS_CONSTANT: &str = "%IS-CONSTANT-WITH";
@@ -28,6 +28,16 @@ enum KnownValue {
     Constant(PoolIdx),
     /// The standard stream of this number.
     Stream(i32),
+    /// A class that the form has defined.
+    Class,
+}
+
+/// A class: the names of its superclasses, the names of its slots, and the library's data about it.
+#[derive(Clone, Copy, Debug)]
+struct ClassRow {
+    supers: KnownValue,
+    slots: KnownValue,
+    data: KnownValue,
 }
 
 /// The definition of a symbol.
@@ -38,6 +48,7 @@ struct DefinitionRow {
     macro_function: Option<PoolIdx>,
     flags: i64,
     value: Option<KnownValue>,
+    class: Option<ClassRow>,
     /// Indicators and values, the newest last.
     properties: Vec<(PoolIdx, KnownValue)>,
 }
@@ -85,6 +96,7 @@ enum Effect {
     Constant(PoolIdx, KnownValue),
     Value(PoolIdx, KnownValue),
     Property(PoolIdx, PoolIdx, KnownValue),
+    Class(PoolIdx, ClassRow),
     Export(PoolIdx),
 }
 
@@ -201,6 +213,13 @@ impl FormRun<'_> {
                 self.changes.push(Effect::Property(name?, self.symbol(value?)?, self.data(argument(2)?)?));
                 return argument(2);
             }
+            Builtin::MakeClass => {
+                let (supers, slots) = (value?, self.data(argument(2)?)?);
+                let supers_known = self.list(supers)?.into_iter().all(|class| self.has_class(class));
+                let class = ClassRow { supers, slots, data: self.data(argument(3)?)? };
+                self.changes.push(supers_known.then_some(Effect::Class(name?, class))?);
+                return Some(KnownValue::Class);
+            }
             Builtin::Boundp => {
                 let has_value = self.noted.has_value(self.module, name?);
                 let gets_value = self
@@ -251,9 +270,34 @@ impl FormRun<'_> {
                 Constant::Object(_) | Constant::Class(_) => None,
                 _ => Some(known),
             },
-            KnownValue::Stream(_) => None,
+            KnownValue::Stream(_) | KnownValue::Class => None,
             _ => Some(known),
         }
+    }
+
+    /// Returns the items of a literal proper list.
+    fn list(&self, known: KnownValue) -> Option<Vec<PoolIdx>> {
+        let mut list = match known {
+            KnownValue::Nil => return Some(Vec::new()),
+            KnownValue::Constant(list) => list,
+            _ => return None,
+        };
+        let mut items = Vec::new();
+        while let &Constant::Cons(car, cdr) = self.constant(list) {
+            items.push(car);
+            list = cdr;
+        }
+        (*self.constant(list) == Constant::Nil).then_some(items)
+    }
+
+    /// Returns whether the symbol names a class whose definition is recorded.
+    fn has_class(&self, symbol: PoolIdx) -> bool {
+        let Some(name) = Noted::name(self.module, symbol) else { return false };
+        let now = self.changes.iter().any(|change| match change {
+            &Effect::Class(class, _) => Noted::name(self.module, class).as_ref() == Some(&name),
+            _ => false,
+        });
+        now || self.noted.rows.get(&name).is_some_and(|row| row.class.is_some())
     }
 
     /// Returns whether the value designates the package `ESL`.
@@ -268,19 +312,10 @@ impl FormRun<'_> {
 
     /// Records the export of a symbol, or of a list of symbols, of `ESL`.
     fn export(&mut self, known: KnownValue) -> Option<()> {
-        let KnownValue::Constant(mut list) = known else { return None };
-        let mut symbols = Vec::new();
-        if self.symbol(known).is_some() {
-            symbols.push(list);
-        } else {
-            while let &Constant::Cons(car, cdr) = self.constant(list) {
-                symbols.push(car);
-                list = cdr;
-            }
-            if *self.constant(list) != Constant::Nil {
-                return None;
-            }
-        }
+        let symbols = match self.symbol(known) {
+            Some(symbol) => vec![symbol],
+            None => self.list(known)?,
+        };
         for symbol in symbols {
             match self.constant(symbol) {
                 Constant::Symbol(name) if name.is_in(ESL_PACKAGE) => {
@@ -313,6 +348,7 @@ impl Noted {
         | Effect::Constant(symbol, _)
         | Effect::Value(symbol, _)
         | Effect::Property(symbol, ..)
+        | Effect::Class(symbol, _)
         | Effect::Export(symbol)) = change;
         if let Effect::Export(symbol) = change {
             self.exports.push(symbol);
@@ -330,6 +366,7 @@ impl Noted {
                 row.value = Some(value);
             }
             Effect::Value(_, value) => row.value = Some(value),
+            Effect::Class(_, class) => row.class = Some(class),
             Effect::Property(_, indicator, value) => {
                 let found = row.properties.iter_mut().find(|(other, _)| {
                     module.constants[other.0 as usize] == module.constants[indicator.0 as usize]
@@ -381,7 +418,7 @@ impl PoolAdditions<'_> {
     fn known(&mut self, known: KnownValue) -> PoolIdx {
         match known {
             KnownValue::Constant(index) => index,
-            KnownValue::Nil => self.add(Constant::Nil),
+            KnownValue::Nil | KnownValue::Class => self.add(Constant::Nil),
             KnownValue::True => self.add(Constant::True),
             KnownValue::Integer(value) | KnownValue::Stream(value) => {
                 self.add(Constant::Integer(value.into()))
@@ -391,17 +428,20 @@ impl PoolAdditions<'_> {
 
     /// Returns the data of a row, if it has any.
     fn data(&mut self, row: &DefinitionRow) -> Option<PoolIdx> {
-        if row.flags == 0 && row.value.is_none() && row.properties.is_empty() {
-            return None;
-        }
         let value = match row.value {
             None => 0,
             Some(KnownValue::Stream(_)) => VALUE | STREAM,
             Some(_) => VALUE,
         };
-        let flags = row.flags | value;
+        let flags = row.flags | value | if row.class.is_some() { CLASS } else { 0 };
+        if flags == 0 && row.properties.is_empty() {
+            return None;
+        }
         let mut items = vec![self.add(Constant::Integer(flags.into()))];
-        items.push(self.known(row.value.unwrap_or(KnownValue::Nil)));
+        items.extend(row.value.map(|value| self.known(value)));
+        if let Some(ClassRow { supers, slots, data }) = row.class {
+            items.extend([supers, slots, data].map(|part| self.known(part)));
+        }
         // The newest property comes first.
         for &(indicator, value) in row.properties.iter().rev() {
             items.push(indicator);

@@ -119,6 +119,57 @@ fn definitions_of_an_image_are_there_without_running_it() {
     }
 }
 
+/// `(%make-class 'animal nil '(name) "data")`, `(%make-class 'bird '(animal) '(name) "data")`, and a class
+/// whose parent is unknown.
+fn classes() -> Module {
+    let make = Builtin::MakeClass.number();
+    let form = |constants: &[u32]| {
+        let code = format!(
+            "load-const r2 k0
+             load-const r3 k1
+             load-const r4 k2
+             load-const r5 k3
+             tail-call-builtin r0.. 4 b{make}"
+        );
+        function(6, constants, &code)
+    };
+    Module {
+        constants: vec![
+            Constant::Symbol(Symbol::esl("ANIMAL")),
+            Constant::Symbol(Symbol::esl("BIRD")),
+            Constant::Symbol(Symbol::esl("UNKNOWN")),
+            Constant::Nil,
+            Constant::Cons(PoolIdx(0), PoolIdx(3)),
+            Constant::Cons(PoolIdx(2), PoolIdx(3)),
+            Constant::Symbol(Symbol::esl("NAME")),
+            Constant::Cons(PoolIdx(6), PoolIdx(3)),
+            Constant::String("data".into()),
+        ],
+        functions: vec![form(&[0, 3, 7, 8]), form(&[1, 4, 7, 8]), form(&[2, 5, 7, 8])],
+        toplevel: vec![FunctionNumber(0), FunctionNumber(1), FunctionNumber(2)],
+        ..Module::default()
+    }
+}
+
+#[test]
+fn classes_of_an_image_are_made_when_their_names_are_met_parents_first() {
+    let prepared = prepare(classes());
+    assert_eq!(prepared.toplevel, [FunctionNumber(2)], "a class below an unknown one stays a form");
+    for first in ["ANIMAL", "BIRD"] {
+        let mut vm = Vm::for_tests();
+        let image = image(&prepared);
+        vm.world.open_image(&mut vm.heap, image).unwrap();
+        assert_eq!(vm.world.find(&Symbol::esl("BIRD")), None);
+        vm.world.intern_esl(&mut vm.heap, first).unwrap();
+        let [animal, bird] = ["ANIMAL", "BIRD"].map(|name| {
+            let name = vm.world.intern_esl(&mut vm.heap, name).unwrap();
+            vm.world.find_class(name).expect("the class is made")
+        });
+        assert!(vm.world.is_subclass(&vm.heap, bird, animal), "{first} first");
+        assert!(!vm.world.is_subclass(&vm.heap, animal, bird));
+    }
+}
+
 #[test]
 fn collections_do_not_harm_what_is_loaded() {
     let config = crate::vm::Config { collect_always: true, ..Default::default() };

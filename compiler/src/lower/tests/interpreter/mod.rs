@@ -356,7 +356,7 @@ impl Interpreter<'_> {
         captures.borrow()[usize::from(index)].clone()
     }
 
-    fn push(&mut self, kind: ExtentKind, window: Base, distance: i32) -> Result<bool, Failed> {
+    fn push(&mut self, kind: ExtentKind, window: Window, distance: i32) -> Result<bool, Failed> {
         let to = self.frame().pc.checked_add_signed(distance as isize).expect("a landing inside");
         let (frame, bindings) = (self.frames.len(), self.bindings.len());
         self.control.push(Extent { kind, frame, window: window.0, to, bindings });

@@ -20,7 +20,7 @@ use crate::module::{CaptureSource, Constant, Function, FunctionNumber, LineEntry
 use crate::opcode::{Instr, TypeCode};
 use crate::operand::Role;
 
-/// The text of the whole module: its functions, then which of them the top-level forms are.
+/// Returns the text of the whole module: its functions, then which of them the top-level forms are.
 pub fn module(module: &Module) -> String {
     let mut text = String::new();
     for number in 0..module.functions.len() as u32 {
@@ -35,7 +35,7 @@ pub fn module(module: &Module) -> String {
     text
 }
 
-/// The text of one function; empty if the module has no such function.
+/// Returns the text of one function; empty if the module has no such function.
 pub fn function(module: &Module, number: FunctionNumber) -> String {
     let mut text = String::new();
     if let Some(function) = module.functions.get(number.0 as usize) {
@@ -51,7 +51,7 @@ pub fn function(module: &Module, number: FunctionNumber) -> String {
     text
 }
 
-/// A constant as it is shown beside an instruction: long ones are cut off with `...`.
+/// Returns a constant as it is shown beside an instruction: long ones are cut off with `...`.
 pub fn constant(module: &Module, index: PoolIdx) -> String {
     let mut text = String::new();
     let mut left = SHOWN_NODES;
@@ -127,7 +127,7 @@ fn labels(function: &Function) -> BTreeMap<usize, usize> {
     for (pc, instr) in instructions(function) {
         let Some(instr) = instr else { continue };
         instr.visit_operands(|role| {
-            if let Role::Forward(distance) | Role::Backward(distance) = role {
+            if let Role::Forward(distance) | Role::Backward(distance) | Role::Landing(distance) = role {
                 labels.extend(target(pc, instr, distance).map(|target| (target, 0)));
             }
         });
@@ -183,7 +183,7 @@ impl Listing<'_> {
         let mut comment = String::new();
         instr.visit_texts(|kind, operand, role| {
             match role {
-                Role::Forward(distance) | Role::Backward(distance) => {
+                Role::Forward(distance) | Role::Backward(distance) | Role::Landing(distance) => {
                     let label = target(pc, instr, distance).and_then(|target| self.labels.get(&target));
                     match label {
                         Some(label) => push(&mut text, format_args!(" L{label}")),

@@ -61,7 +61,7 @@ pub enum Qualifier {
 
 /// What a package has under a name.
 #[derive(Clone, Debug)]
-struct Entry {
+struct NameEntry {
     home: PackageId,
     external: bool,
     /// Whether it hides what is inherited under the same name.
@@ -79,13 +79,13 @@ struct Package {
     exports_again: Option<PackageId>,
     /// Names of external symbols that are at home here and may have no entry yet, sorted.
     names: &'static [&'static str],
-    symbols: FxHashMap<Cow<'static, str>, Entry>,
+    symbols: FxHashMap<Cow<'static, str>, NameEntry>,
 }
 
 /// All packages of a program.
 #[derive(Clone, Debug)]
 pub struct Packages {
-    table: Table,
+    table: PackageTable,
     by_name: FxHashMap<Arc<str>, PackageId>,
 }
 
@@ -109,9 +109,9 @@ pub enum PackageError {
 
 /// The packages by number. An index that another table has given is a mistake of the caller.
 #[derive(Clone, Debug, Default)]
-struct Table(Vec<Package>);
+struct PackageTable(Vec<Package>);
 
-impl Index<PackageId> for Table {
+impl Index<PackageId> for PackageTable {
     type Output = Package;
 
     fn index(&self, PackageId(number): PackageId) -> &Package {
@@ -119,7 +119,7 @@ impl Index<PackageId> for Table {
     }
 }
 
-impl IndexMut<PackageId> for Table {
+impl IndexMut<PackageId> for PackageTable {
     fn index_mut(&mut self, PackageId(number): PackageId) -> &mut Package {
         &mut self.0[number as usize]
     }
@@ -127,7 +127,7 @@ impl IndexMut<PackageId> for Table {
 
 impl Packages {
     fn empty() -> Packages {
-        Packages { table: Table::default(), by_name: FxHashMap::default() }
+        Packages { table: PackageTable::default(), by_name: FxHashMap::default() }
     }
 
     fn add(&mut self, name: Arc<str>, nicknames: Vec<Arc<str>>) -> PackageId {
@@ -146,17 +146,17 @@ impl Packages {
         id
     }
 
-    /// All packages, the oldest first.
+    /// Returns all packages, the oldest first.
     pub fn all(&self) -> impl ExactSizeIterator<Item = PackageId> + use<> {
         (0..self.table.0.len() as u32).map(PackageId)
     }
 
-    /// The package of this name or nickname.
+    /// Returns the package of this name or nickname.
     pub fn named(&self, name: &str) -> Option<PackageId> {
         self.by_name.get(name).copied()
     }
 
-    /// The name of a package.
+    /// Returns the name of a package.
     pub fn name(&self, package: PackageId) -> &Arc<str> {
         &self.table[package].name
     }
@@ -166,13 +166,13 @@ impl Packages {
         &self.table[package].nicknames
     }
 
-    /// The packages whose external symbols it inherits.
+    /// Returns the packages whose external symbols it inherits.
     pub fn uses(&self, package: PackageId) -> &[PackageId] {
         &self.table[package].uses
     }
 
-    /// A new package without symbols. `COMMON-LISP` beside `ESL`, which exports all of it again but for what
-    /// it takes over, adds nothing.
+    /// Returns a new package without symbols. `COMMON-LISP` beside `ESL`, which exports all of it again but
+    /// for what it takes over, adds nothing.
     ///
     /// # Errors
     /// [`PackageError::NameTaken`] for a name that is in use; [`PackageError::Conflict`] as for
@@ -202,7 +202,7 @@ impl Packages {
         Ok(id)
     }
 
-    /// Gives a package further nicknames; those that it has already are none.
+    /// Adds nicknames to a package. Those that it has already are ignored.
     ///
     /// # Errors
     /// [`PackageError::NameTaken`] for a name of another package; then none is given.
@@ -222,7 +222,7 @@ impl Packages {
     /// Makes known that the symbol `name` is at home in `package`. For the tables of an image: nothing is
     /// checked.
     pub fn register(&mut self, package: PackageId, name: impl Into<Cow<'static, str>>, external: bool) {
-        let entry = Entry { home: package, external, shadowing: false, symbol: None };
+        let entry = NameEntry { home: package, external, shadowing: false, symbol: None };
         self.table[package].symbols.insert(name.into(), entry);
     }
 
@@ -231,15 +231,16 @@ impl Packages {
         self.table[package].symbols.reserve(symbols);
     }
 
-    /// The home of the external symbol `name` of `package`, and the package of which it is an external entry.
-    fn external(&self, package: PackageId, name: &str) -> Option<Found> {
+    /// Returns the home of the external symbol `name` of `package`, and the package of which it is an
+    /// external entry.
+    fn external(&self, package: PackageId, name: &str) -> Option<FoundName> {
         let mut at = package;
         loop {
             if let Some(entry) = self.table[at].symbols.get(name) {
-                return entry.external.then_some(Found { home: entry.home, entry_of: at });
+                return entry.external.then_some(FoundName { home: entry.home, entry_of: at });
             }
             if self.table[at].names.binary_search(&name).is_ok() {
-                return Some(Found { home: at, entry_of: at });
+                return Some(FoundName { home: at, entry_of: at });
             }
             // A package exports again only what an older one exports.
             at = self.table[at].exports_again?;
@@ -247,11 +248,11 @@ impl Packages {
     }
 
     /// Where the symbol that `name` denotes in `package` comes from.
-    fn look_up(&self, package: PackageId, name: &str) -> Option<(Found, Status)> {
+    fn look_up(&self, package: PackageId, name: &str) -> Option<(FoundName, Status)> {
         let this = &self.table[package];
         if let Some(entry) = this.symbols.get(name) {
             let status = if entry.external { Status::External } else { Status::Internal };
-            return Some((Found { home: entry.home, entry_of: package }, status));
+            return Some((FoundName { home: entry.home, entry_of: package }, status));
         }
         if let Some(found) = self.external(package, name) {
             return Some((found, Status::External));
@@ -260,28 +261,28 @@ impl Packages {
         inherited.map(|found| (found, Status::Inherited))
     }
 
-    /// The symbol that `name` denotes in `package`, if there is one.
+    /// Returns the symbol that `name` denotes in `package`, if there is one.
     pub fn find(&self, package: PackageId, name: &str) -> Option<(Symbol, Status)> {
         let (found, status) = self.look_up(package, name)?;
         let known = self.table[found.entry_of].symbols.get(name).and_then(|entry| entry.symbol.clone());
         Some((known.unwrap_or_else(|| Symbol::new(&self.table[found.home].name, name)), status))
     }
 
-    /// The symbol that `name` denotes in `package`; a new one, at home there, if there was none (then there
-    /// is no status). In `KEYWORD` new symbols are external.
+    /// Returns the symbol that `name` denotes in `package`; a new one, at home there, if there was none (then
+    /// there is no status). In `KEYWORD` new symbols are external.
     pub fn intern(&mut self, package: PackageId, name: &str) -> (Symbol, Option<Status>) {
         match self.look_up(package, name) {
             Some((found, status)) => (self.symbol(found, name), Some(status)),
             None => {
                 self.register(package, name.to_owned(), package == PackageId::KEYWORD);
-                (self.symbol(Found { home: package, entry_of: package }, name), None)
+                (self.symbol(FoundName { home: package, entry_of: package }, name), None)
             }
         }
     }
 
-    /// The symbol that was found, kept for the next time.
-    fn symbol(&mut self, Found { home, entry_of }: Found, name: &str) -> Symbol {
-        if let Some(Entry { symbol: Some(symbol), .. }) = self.table[entry_of].symbols.get(name) {
+    /// Returns the symbol that was found, kept for the next time.
+    fn symbol(&mut self, FoundName { home, entry_of }: FoundName, name: &str) -> Symbol {
+        if let Some(NameEntry { symbol: Some(symbol), .. }) = self.table[entry_of].symbols.get(name) {
             return symbol.clone();
         }
         let symbol = Symbol::new(&self.table[home].name, name);
@@ -289,15 +290,16 @@ impl Packages {
             Some(entry) => entry.symbol = Some(symbol.clone()),
             // It is one of the names that have no entry until they are read.
             None => {
-                let entry = Entry { home, external: true, shadowing: false, symbol: Some(symbol.clone()) };
+                let entry =
+                    NameEntry { home, external: true, shadowing: false, symbol: Some(symbol.clone()) };
                 self.table[entry_of].symbols.insert(name.to_owned().into(), entry);
             }
         }
         symbol
     }
 
-    /// The symbol that a text denotes when it is read: `name` in the `current` package; or `prefix:name`, or,
-    /// if `internal`, `prefix::name`. An empty prefix is that of keywords.
+    /// Returns the symbol that a text denotes when it is read: `name` in the `current` package; or
+    /// `prefix:name`, or, if `internal`, `prefix::name`. An empty prefix is that of keywords.
     ///
     /// # Errors
     /// [`InternError::NoPackage`] if there is none called `prefix`; [`InternError::NotExternal`] if it does
@@ -333,7 +335,7 @@ impl Packages {
             Home::Package(home) => home,
         };
         let home_id = self.named(home);
-        let is_same = |found: Found| Some(found.home) == home_id;
+        let is_same = |found: FoundName| Some(found.home) == home_id;
         if self.look_up(current, symbol.name()).is_some_and(|(found, _)| is_same(found)) {
             return Qualifier::None;
         }
@@ -368,7 +370,7 @@ impl Packages {
         }
         let symbol = symbol.clone();
         let entry =
-            Entry { home: found.home, external: true, shadowing: false, symbol: Some(symbol.clone()) };
+            NameEntry { home: found.home, external: true, shadowing: false, symbol: Some(symbol.clone()) };
         let entry = self.table[package].symbols.entry(Cow::Owned(name_of(&symbol))).or_insert(entry);
         entry.external = true;
         Ok(())
@@ -387,12 +389,31 @@ impl Packages {
             return Err(self.conflict(package, name));
         }
         self.check_open(package)?;
-        let entry = Entry { home, external: false, shadowing: false, symbol: Some(symbol.clone()) };
+        let entry = NameEntry { home, external: false, shadowing: false, symbol: Some(symbol.clone()) };
         self.table[package].symbols.entry(Cow::Owned(name_of(symbol))).or_insert(entry);
         Ok(())
     }
 
-    /// Gives `package` a symbol `name` of its own, that hides any inherited one.
+    /// Makes `symbol` present in `package`, in place of any other of its name, that it has or inherits.
+    ///
+    /// # Errors
+    /// [`PackageError::NotAccessible`] for a symbol without a home; [`PackageError::Standard`] for
+    /// `COMMON-LISP`.
+    pub fn shadowing_import(&mut self, package: PackageId, symbol: &Symbol) -> Result<(), PackageError> {
+        self.check_open(package)?;
+        let home = symbol.package().and_then(|home| self.named(home));
+        let home = home.ok_or_else(|| PackageError::NotAccessible(symbol.clone()))?;
+        let entry = NameEntry { home, external: false, shadowing: true, symbol: Some(symbol.clone()) };
+        let old = self.table[package].symbols.insert(Cow::Owned(name_of(symbol)), entry);
+        if let Some(old) = old.filter(|old| old.home == home)
+            && let Some(entry) = self.table[package].symbols.get_mut(symbol.name())
+        {
+            entry.external = old.external;
+        }
+        Ok(())
+    }
+
+    /// Creates a symbol `name` at home in `package`, which hides any inherited one.
     ///
     /// # Errors
     /// [`PackageError::Standard`] for `COMMON-LISP`.
@@ -435,8 +456,8 @@ impl Packages {
         Ok(())
     }
 
-    /// Whether one of `others` exports again what `used` does: then that one stands for both, and `used` need
-    /// not be used.
+    /// Returns whether one of `others` exports again what `used` does: then that one stands for both, and
+    /// `used` need not be used.
     fn is_offered_again(&self, used: PackageId, others: &[PackageId]) -> bool {
         others.iter().any(|&other| self.table[other].exports_again == Some(used))
     }
@@ -448,7 +469,7 @@ impl Packages {
         for &other in others {
             for name in self.external_names(used) {
                 let has_own = own.is_some_and(|symbols| symbols.contains_key(name));
-                let clash = |found: Found| {
+                let clash = |found: FoundName| {
                     self.external(used, name).is_some_and(|new| new.home != found.home) && !has_own
                 };
                 if self.external(other, name).is_some_and(clash) {
@@ -500,7 +521,7 @@ impl Packages {
 
 /// Where a symbol is at home, and of which package's entry it comes.
 #[derive(Clone, Copy, Debug)]
-struct Found {
+struct FoundName {
     home: PackageId,
     entry_of: PackageId,
 }

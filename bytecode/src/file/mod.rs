@@ -16,10 +16,10 @@
 //! ```text
 //! sources     count, then for each: length, UTF-8; then likewise the modules that it requires
 //! symbols     count of packages, for each: length, UTF-8
-//!             count of symbols, for each 16 bytes: package (or NONE), number of an uninterned symbol (else 0), offset and
-//!             length of the name in the names; then the names, to the end of the section
-//! constants   count, for each: offset of its record in what follows; then the records: a tag byte and its fields.
-//!             A record refers to earlier constants by index
+//!             count of symbols, for each 16 bytes: package (or NONE), number of an uninterned symbol (else 0),
+//!             offset and length of the name in the names; then the names, to the end of the section
+//! constants   count, for each: offset of its record in what follows; then the records: a tag byte and its
+//!             fields. A record refers to earlier constants by index
 //! functions   the records, back to back
 //! index       count, for each function: offset and length of its record in `functions`
 //! top level   count, then function numbers

@@ -1,6 +1,6 @@
 //! Writes `docs/bytecode.md` and `docs/builtins.md` from the tables, and fails when they are stale.
 //!
-//! The text around the tables is in the folder `reference` beside this file. A line `@opcodes FIRST LAST`
+//! The text around the tables is in the Markdown files beside this one. A line `@opcodes FIRST LAST`
 //! there stands for the rows from one mnemonic to the other, in the order of the table; every row must be
 //! asked for once.
 
@@ -28,7 +28,7 @@ fn check(name: &str, expected: &str) {
 #[test]
 fn the_opcode_reference_is_up_to_date() {
     let mut left: BTreeSet<&str> = OPCODES.iter().map(|row| row.mnemonic).collect();
-    let text = expand(include_str!("reference/bytecode.md"), |arguments, text| match *arguments {
+    let text = expand(include_str!("bytecode.md"), |arguments, text| match *arguments {
         ["@opcodes", first, last] => {
             let at = |name| OPCODES.iter().position(|row| row.mnemonic == name).expect("a mnemonic");
             let rows = &OPCODES[at(first)..=at(last)];
@@ -46,7 +46,7 @@ fn the_opcode_reference_is_up_to_date() {
 
 #[test]
 fn the_builtin_reference_is_up_to_date() {
-    let text = expand(include_str!("reference/builtins.md"), |arguments, text| {
+    let text = expand(include_str!("builtins.md"), |arguments, text| {
         let visibility = match *arguments {
             ["@builtins", "cl"] => Visibility::Cl,
             ["@builtins", "esl"] => Visibility::Esl,

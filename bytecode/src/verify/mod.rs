@@ -87,7 +87,7 @@ mod registers;
 mod shape;
 mod state;
 
-pub use error::{Fault, Place, VerifyError};
+pub use error::{Fault, FaultPlace, VerifyError};
 pub use pool::MAX_RATIO_BITS;
 pub use state::EntryKind;
 
@@ -105,7 +105,7 @@ pub fn verify(module: &Module) -> Result<(), VerifyError> {
     pool::verify(module)?;
     for (index, &number) in module.toplevel.iter().enumerate() {
         verify_toplevel(module, number)
-            .map_err(|fault| VerifyError { place: Place::Toplevel(index), fault })?;
+            .map_err(|fault| VerifyError { place: FaultPlace::Toplevel(index), fault })?;
     }
     (0..module.functions.len() as u32).try_for_each(|number| verify_function(module, FunctionNumber(number)))
 }
