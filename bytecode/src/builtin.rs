@@ -905,10 +905,10 @@ macro_rules! for_each_builtin {
 
             // ---- failures and the control stack
             /// The innermost handlers below `height`, or of all if that is `NIL`, that no mask hides: index
-            /// of the entry, its kind, and what goes with it: 0 and a list of `(type . function)`, 1 and the
-            /// types of cases; for a `failure`, its condition or cause, also 2 and the table or state of
-            /// recovery procedures, 3 for a cleanup. `NIL` if there are none. Those who watch the run are
-            /// told of a failure for which all are searched.
+            /// of the entry, its kind, and what goes with it: `:functions` and a list of `(type . function)`,
+            /// `:cases` and their types; for a `failure`, its condition or cause, also `:recovery` and the
+            /// table or state of recovery procedures, or `:cleanup`. `NIL` if there are none. Those who watch
+            /// the run are told of a failure for which all are searched.
             NextHandler = failure::next_handler, internal "%NEXT-HANDLER" ("height failure");
             /// Unwinds to the entry with this index, of the cases of a `handler-case`, and has one of them
             /// take the condition.

@@ -29,13 +29,14 @@ pub(super) fn next_handler(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.exchange.charge(steps);
     let Some(found) = found else { return Ok(Value::NIL) };
     vm.exchange.values.clear();
+    let known = &vm.world.known;
     let kind = match found.kind {
-        EntryKind::HandlerCase => 1,
-        EntryKind::Recovery => 2,
-        EntryKind::FailureCleanup => 3,
-        _ => 0,
+        EntryKind::HandlerCase => known.cases,
+        EntryKind::Recovery => known.recovery,
+        EntryKind::FailureCleanup => known.cleanup,
+        _ => known.functions,
     };
-    vm.exchange.values.extend([Value::index(found.index), Value::small(kind), found.data]);
+    vm.exchange.values.extend([Value::index(found.index), kind, found.data]);
     Err(Exit::Values)
 }
 

@@ -81,6 +81,10 @@ define_known! {
     // Properties under which the machine keeps data on a symbol.
     accessor = esl "%ACCESSOR";
     // Results and options that are keywords.
+    cases = keyword "CASES";
+    functions = keyword "FUNCTIONS";
+    recovery = keyword "RECOVERY";
+    cleanup = keyword "CLEANUP";
     internal = keyword "INTERNAL";
     external = keyword "EXTERNAL";
     inherited = keyword "INHERITED";
