@@ -41,7 +41,7 @@ impl std::error::Error for AssembleError {}
 /// [`AssembleError`] for the first line that cannot be understood.
 pub fn assemble(text: &str) -> Result<Vec<u32>, AssembleError> {
     let mut labels: HashMap<&str, i64> = HashMap::new();
-    let mut lines: Vec<Line<'_>> = Vec::new();
+    let mut lines: Vec<SourceLine<'_>> = Vec::new();
     let mut pc = 0;
     for (number, text) in text.lines().enumerate() {
         let mut words = text.split(';').next().unwrap_or("").split_whitespace().peekable();
@@ -54,7 +54,7 @@ pub fn assemble(text: &str) -> Result<Vec<u32>, AssembleError> {
             || AssembleError { line: number + 1, message: format!("no opcode is called `{mnemonic}`") };
         let opcode = opcode(mnemonic).ok_or_else(error)?;
         pc += opcode.words() as i64;
-        lines.push(Line { number: number + 1, opcode, next: pc, operands: words.collect() });
+        lines.push(SourceLine { number: number + 1, opcode, next: pc, operands: words.collect() });
     }
     let mut code = Vec::new();
     for line in lines {
@@ -75,7 +75,7 @@ pub fn assemble(text: &str) -> Result<Vec<u32>, AssembleError> {
     Ok(code)
 }
 
-struct Line<'a> {
+struct SourceLine<'a> {
     number: usize,
     opcode: Opcode,
     /// The word after the instruction.

@@ -49,19 +49,19 @@ pub enum DatumKind {
 }
 
 #[derive(Debug)]
-struct Node {
+struct DatumNode {
     kind: DatumKind,
     span: Span,
 }
 
 /// A datum: a reference to a shared, immutable node. Cloning is cheap.
 #[derive(Clone)]
-pub struct Datum(Arc<Node>);
+pub struct Datum(Arc<DatumNode>);
 
 impl Datum {
     /// Returns a datum of the given kind.
     pub fn new(kind: DatumKind, span: Span) -> Datum {
-        Datum(Arc::new(Node { kind, span }))
+        Datum(Arc::new(DatumNode { kind, span }))
     }
 
     /// Returns the empty list.
@@ -185,7 +185,7 @@ impl<'a> Iterator for Elements<'a> {
     }
 }
 
-impl Drop for Node {
+impl Drop for DatumNode {
     /// Takes children apart on an explicit stack: a tree may be deeper than the native stack is long.
     fn drop(&mut self) {
         let mut orphans: Vec<Datum> = Vec::new();

@@ -38,7 +38,7 @@ pub fn join(modules: impl IntoIterator<Item = Module>) -> Module {
 struct Linker {
     linked: Module,
     /// Where constants without identity are in the linked pool.
-    known: HashMap<Key, PoolIdx>,
+    known: HashMap<ConstantKey, PoolIdx>,
     /// New numbers of the uninterned symbols of the module that is being added.
     uninterned: HashMap<Symbol, Symbol>,
     /// How many uninterned symbols there are.
@@ -49,7 +49,7 @@ struct Linker {
 
 /// A constant without identity.
 #[derive(PartialEq, Eq, Hash)]
-enum Key {
+enum ConstantKey {
     Nil,
     True,
     Symbol(Symbol),
@@ -62,18 +62,20 @@ enum Key {
     Function(FunctionNumber),
 }
 
-impl Key {
-    fn of(constant: &Constant) -> Option<Key> {
+impl ConstantKey {
+    fn of(constant: &Constant) -> Option<ConstantKey> {
         Some(match constant {
-            Constant::Nil => Key::Nil,
-            Constant::True => Key::True,
-            Constant::Symbol(symbol) => Key::Symbol(symbol.clone()),
-            Constant::Integer(value) => Key::Integer(value.clone()),
-            Constant::Ratio(numerator, denominator) => Key::Ratio(numerator.clone(), denominator.clone()),
-            Constant::Float(value) => Key::Float(value.to_bits()),
-            Constant::Character(value) => Key::Character(*value),
-            Constant::Class(name) => Key::Class(name.clone()),
-            Constant::Function(number) => Key::Function(*number),
+            Constant::Nil => ConstantKey::Nil,
+            Constant::True => ConstantKey::True,
+            Constant::Symbol(symbol) => ConstantKey::Symbol(symbol.clone()),
+            Constant::Integer(value) => ConstantKey::Integer(value.clone()),
+            Constant::Ratio(numerator, denominator) => {
+                ConstantKey::Ratio(numerator.clone(), denominator.clone())
+            }
+            Constant::Float(value) => ConstantKey::Float(value.to_bits()),
+            Constant::Character(value) => ConstantKey::Character(*value),
+            Constant::Class(name) => ConstantKey::Class(name.clone()),
+            Constant::Function(number) => ConstantKey::Function(*number),
             Constant::String(_)
             | Constant::Cons(..)
             | Constant::Vector(_)
@@ -163,7 +165,7 @@ impl Linker {
 
     fn place(&mut self, constant: Constant) -> PoolIdx {
         let next = PoolIdx(self.linked.constants.len() as u32);
-        if let Some(key) = Key::of(&constant) {
+        if let Some(key) = ConstantKey::of(&constant) {
             let index = *self.known.entry(key).or_insert(next);
             if index != next {
                 return index;

@@ -22,8 +22,8 @@
 //!   not. The last operand is the [`Jump`] or [`Back`].
 //! - `effect`: the substitute is dropped.
 //! - `call`: the substitutes are delivered as the results of the call; `tail` is a call in place of the
-//!   running function, whose results they are then. A [`Callee`] says what is called. The operands begin with
-//!   `window` and `count`; then comes `want`, unless it is a tail call.
+//!   running function, whose results they are then. A [`CallTarget`] says what is called. The operands begin
+//!   with `window` and `count`; then comes `want`, unless it is a tail call.
 //! - `never`: nothing could stand for its work, so a recovery can only have the instruction tried again, or
 //!   leave.
 //!
@@ -367,7 +367,7 @@ impl Substitute {
 
 /// What an instruction calls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Callee {
+pub enum CallTarget {
     /// The function in the first register of the window, or the one that the symbol there names.
     Given,
     /// The global function that the constant `symbol` names.
@@ -376,14 +376,14 @@ pub enum Callee {
     Running,
     /// The operand `builtin`.
     Builtin,
-    /// As [`Callee::Given`]; the last argument is a list of further arguments.
+    /// As [`CallTarget::Given`]; the last argument is a list of further arguments.
     Applied,
 }
 
-impl Callee {
+impl CallTarget {
     /// Returns whether the callee is a value in the first register of the window.
     pub const fn is_in_window(self) -> bool {
-        matches!(self, Callee::Given | Callee::Applied)
+        matches!(self, CallTarget::Given | CallTarget::Applied)
     }
 }
 
@@ -391,7 +391,7 @@ impl Callee {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Call {
     /// What is called.
-    pub callee: Callee,
+    pub callee: CallTarget,
     /// First register of the window.
     pub window: Window,
     /// Number of arguments in the window.
@@ -450,10 +450,10 @@ macro_rules! falls_through {
 
 macro_rules! callee {
     (call $callee:ident) => {
-        Some(Callee::$callee)
+        Some(CallTarget::$callee)
     };
     (tail $callee:ident) => {
-        Some(Callee::$callee)
+        Some(CallTarget::$callee)
     };
     ($($other:ident)+) => {
         None
@@ -464,7 +464,7 @@ macro_rules! call {
     ($instr:expr, $name:ident call $callee:ident) => {
         match $instr {
             Instr::$name { window, count, want, .. } => {
-                Some(Call { callee: Callee::$callee, window, count, want: Some(want) })
+                Some(Call { callee: CallTarget::$callee, window, count, want: Some(want) })
             }
             _ => None,
         }
@@ -472,7 +472,7 @@ macro_rules! call {
     ($instr:expr, $name:ident tail $callee:ident) => {
         match $instr {
             Instr::$name { window, count, .. } => {
-                Some(Call { callee: Callee::$callee, window, count, want: None })
+                Some(Call { callee: CallTarget::$callee, window, count, want: None })
             }
             _ => None,
         }
@@ -548,7 +548,7 @@ pub struct OpcodeInfo {
     /// What becomes of a value put in place of the failed instruction.
     pub substitute: Substitute,
     /// What it calls, if it is a call.
-    pub callee: Option<Callee>,
+    pub callee: Option<CallTarget>,
     /// The builtin that it is, if it is one.
     pub builtin: Option<Builtin>,
     /// Name and type of each operand, in order.
@@ -632,7 +632,7 @@ macro_rules! define_opcodes {
             }
 
             /// What it calls; `None` unless it is a call.
-            pub const fn callee(self) -> Option<Callee> {
+            pub const fn callee(self) -> Option<CallTarget> {
                 match self {
                     $( Opcode::$name => callee!($($kind)+), )*
                 }
@@ -779,8 +779,12 @@ const _: () = {
             Substitute::Silent | Substitute::Effect | Substitute::Never => {}
         }
         match callee {
-            Some(Callee::Global) => assert!(is(last, "WideSymbolIdx"), "a call of a symbol needs the symbol"),
-            Some(Callee::Builtin) => assert!(is(last, "BuiltinIdx"), "a call of a builtin needs the builtin"),
+            Some(CallTarget::Global) => {
+                assert!(is(last, "WideSymbolIdx"), "a call of a symbol needs the symbol")
+            }
+            Some(CallTarget::Builtin) => {
+                assert!(is(last, "BuiltinIdx"), "a call of a builtin needs the builtin")
+            }
             _ => {}
         }
         // A return finds the call two words before its return address.

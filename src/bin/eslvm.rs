@@ -74,7 +74,7 @@ enum Stats {
 
 /// Clock of a program.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Clock {
+enum ClockChoice {
     /// Real time
     Real,
     /// Time that stands still until all tasks wait, and then jumps to the first time that one waits for
@@ -85,7 +85,7 @@ enum Clock {
 struct MachineOptions {
     /// Clock of the program
     #[arg(long, value_enum, default_value = "real")]
-    clock: Clock,
+    clock: ClockChoice,
     /// Seed of the choices that the language leaves open, such as which task runs next
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -129,7 +129,7 @@ fn main() -> ExitCode {
         }
         Action::Repl { options } => esl::repl::run(
             options.config(),
-            options.clock == Clock::Virtual,
+            options.clock == ClockChoice::Virtual,
             &ModulePath::new([Path::new("-")], &library),
         ),
     };
@@ -169,7 +169,7 @@ fn run(
         USAGE
     };
     let mut host = RealHost::new(arguments).with_files(FileAccess::All);
-    if options.clock == Clock::Virtual {
+    if options.clock == ClockChoice::Virtual {
         host = host.with_virtual_time();
     }
     let mut machine = program::machine(options.config(), Box::new(host)).map_err(setup)?;

@@ -18,7 +18,7 @@ pub type Job = Pin<Box<dyn Future<Output = ()> + Send>>;
 pub type Executor = Arc<dyn Fn(Job) + Send + Sync>;
 
 /// The future of an operation: ends with the future of its values, or when the operation is cancelled.
-struct Running<F> {
+struct RunningFuture<F> {
     /// Dropped when it has ended, and when it is cancelled.
     future: Option<Pin<Box<F>>>,
     operation: Option<Operation>,
@@ -26,7 +26,7 @@ struct Running<F> {
     waker: Arc<Mutex<Option<Waker>>>,
 }
 
-impl<F, V> Future for Running<F>
+impl<F, V> Future for RunningFuture<F>
 where
     F: Future<Output = Result<V, Failure>>,
     V: Into<Data>,
@@ -73,17 +73,17 @@ where
             waker.wake();
         }
     });
-    Box::pin(Running { future: Some(Box::pin(future)), operation: Some(operation), waker })
+    Box::pin(RunningFuture { future: Some(Box::pin(future)), operation: Some(operation), waker })
 }
 
 /// A job on the engine's own thread; waking it puts it into the queue of the thread again.
-struct Queued {
+struct QueuedJob {
     job: Mutex<Option<Job>>,
-    queue: Sender<Arc<Queued>>,
+    queue: Sender<Arc<QueuedJob>>,
 }
 
-impl Wake for Queued {
-    fn wake(self: Arc<Queued>) {
+impl Wake for QueuedJob {
+    fn wake(self: Arc<QueuedJob>) {
         let queue = self.queue.clone();
         // When the thread has ended, so has the job.
         drop(queue.send(self));
@@ -92,19 +92,19 @@ impl Wake for Queued {
 
 /// Returns an executor that runs all its jobs on one thread, which is started with the first.
 pub(super) fn thread() -> Executor {
-    let running: Mutex<Option<Sender<Arc<Queued>>>> = Mutex::default();
+    let running: Mutex<Option<Sender<Arc<QueuedJob>>>> = Mutex::default();
     Arc::new(move |job| {
         let mut running = running.lock().unwrap_or_else(PoisonError::into_inner);
         let queue = running.get_or_insert_with(start_thread).clone();
-        let queued = Arc::new(Queued { job: Mutex::new(Some(job)), queue: queue.clone() });
+        let queued = Arc::new(QueuedJob { job: Mutex::new(Some(job)), queue: queue.clone() });
         // Without a thread the job is dropped, and its operation fails.
         drop(queue.send(queued));
     })
 }
 
 /// Starts the thread, and returns its queue.
-fn start_thread() -> Sender<Arc<Queued>> {
-    let (queue, queued) = channel::<Arc<Queued>>();
+fn start_thread() -> Sender<Arc<QueuedJob>> {
+    let (queue, queued) = channel::<Arc<QueuedJob>>();
     let work = move || {
         while let Ok(next) = queued.recv() {
             let waker = Waker::from(next.clone());

@@ -7,7 +7,7 @@ use rustyline::history::DefaultHistory;
 use rustyline::{Completer, Helper, Highlighter, Hinter, Validator};
 
 use super::lines::{Line, Lines};
-use super::screen::Screen;
+use super::screen::PromptScreen;
 
 /// The helper of the line editor.
 #[derive(Default, Helper, Hinter, Highlighter, Validator, Completer)]
@@ -58,7 +58,7 @@ pub(super) struct Editor {
 impl Editor {
     /// Creates an editor with the history of earlier sessions. From now on `screen` prints above the line
     /// that is edited.
-    pub(super) fn new(screen: &Screen) -> Editor {
+    pub(super) fn new(screen: &PromptScreen) -> Editor {
         let mut editor = rustyline::Editor::<EditorHelper, DefaultHistory>::new().ok();
         let external = editor.as_mut().and_then(|editor| editor.create_external_printer().ok());
         if let Some(external) = external {

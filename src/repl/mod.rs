@@ -37,7 +37,7 @@ use crate::command::{Interrupts, NOT_COMPILED, SUCCESS, USAGE, complain, interru
 use crate::module_path::ModulePath;
 use crate::program;
 use lines::Line;
-use screen::Screen;
+use screen::PromptScreen;
 use typing::Typing;
 
 /// Prompt for a form.
@@ -52,7 +52,7 @@ const CONTINUATION: &str = "  ";
 pub fn run(config: Config, virtual_time: bool, path: &ModulePath) -> Result<u8, u8> {
     let mut host = RealHost::new(Vec::new()).with_files(FileAccess::All);
     let is_interactive = std::io::stdin().is_terminal();
-    let screen = Screen::default();
+    let screen = PromptScreen::default();
     if is_interactive {
         let screen = screen.clone();
         host = host.with_screen(Box::new(move |bytes| screen.print(bytes)));

@@ -7,9 +7,9 @@ use rustyline::ExternalPrinter;
 
 /// Prints above the line that the person edits, or directly while there is no editor.
 #[derive(Clone, Default)]
-pub(super) struct Screen(Arc<Mutex<Option<Box<dyn ExternalPrinter + Send>>>>);
+pub(super) struct PromptScreen(Arc<Mutex<Option<Box<dyn ExternalPrinter + Send>>>>);
 
-impl Screen {
+impl PromptScreen {
     fn lock(&self) -> MutexGuard<'_, Option<Box<dyn ExternalPrinter + Send>>> {
         // A panic elsewhere leaves the printer as it was.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)

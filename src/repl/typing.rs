@@ -9,7 +9,7 @@ use esl_vm::host::{Inbox, Incoming};
 
 use super::editor::Editor;
 use super::lines::{Line, Lines, Pipe};
-use super::screen::Screen;
+use super::screen::PromptScreen;
 use super::terminal::Terminal;
 
 /// Request to the thread.
@@ -30,7 +30,7 @@ pub(super) struct Typing {
     pub(super) is_interactive: bool,
     /// Settings of the terminal when the session began.
     terminal: Option<Terminal>,
-    screen: Screen,
+    screen: PromptScreen,
 }
 
 impl Typing {
@@ -39,7 +39,7 @@ impl Typing {
     ///
     /// # Errors
     /// If the system makes no thread.
-    pub(super) fn begin(is_interactive: bool, screen: Screen, inbox: Inbox) -> std::io::Result<Typing> {
+    pub(super) fn begin(is_interactive: bool, screen: PromptScreen, inbox: Inbox) -> std::io::Result<Typing> {
         let (requests, asked) = channel();
         let (answer, lines) = channel();
         let terminal = if is_interactive { Terminal::now() } else { None };

@@ -7,7 +7,7 @@ use crate::builtin::Builtin;
 use crate::module::{
     Constant, Function, FunctionNumber, MAX_CAPTURES, MAX_CODE, MAX_REGISTERS, Module, PoolIdx,
 };
-use crate::opcode::{Call, Callee, Instr, Opcode, RegisterAccess, TypeCode};
+use crate::opcode::{Call, CallTarget, Instr, Opcode, RegisterAccess, TypeCode};
 use crate::operand::{Count, Role, Want};
 
 /// Where instructions begin, and to which of them control may come from elsewhere than the one before.
@@ -241,13 +241,13 @@ impl Check<'_> {
     /// word, the arguments and the results.
     fn call(self, instr: Instr, Call { callee, window, count, want }: Call) -> Result<(), Fault> {
         let takes_them = match callee {
-            Callee::Given | Callee::Global => true,
-            Callee::Running => {
+            CallTarget::Given | CallTarget::Global => true,
+            CallTarget::Running => {
                 let parameters = &self.function.parameters;
                 parameters.is_exact() && parameters.required == count.0
             }
-            Callee::Builtin => takes(instr, count),
-            Callee::Applied => count.0 > 0,
+            CallTarget::Builtin => takes(instr, count),
+            CallTarget::Applied => count.0 > 0,
         };
         if !takes_them {
             return Err(Fault::Arguments(count.0));

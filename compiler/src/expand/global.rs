@@ -19,7 +19,7 @@ const COMPARED: usize = 50;
 
 /// A call of a global function.
 #[derive(Debug)]
-struct Call {
+struct PendingCall {
     function: FunctionName,
     /// Number of arguments; `None` if it is unknown, or the function is only referred to.
     arguments: Option<u32>,
@@ -32,7 +32,7 @@ struct Call {
 /// Uses and definitions of global names in a compilation unit.
 #[derive(Debug, Default)]
 pub(super) struct GlobalUses {
-    calls: Vec<Call>,
+    calls: Vec<PendingCall>,
     variables: Vec<(Symbol, Span)>,
     /// Variables that forms of the unit define at run time.
     defined_variables: FxHashSet<Symbol>,
@@ -54,7 +54,7 @@ impl GlobalUses {
         span: Span,
     ) {
         let arguments = arguments.map(|count| u32::try_from(count).unwrap_or(u32::MAX));
-        self.calls.push(Call { function, arguments, name, span });
+        self.calls.push(PendingCall { function, arguments, name, span });
     }
 
     /// Notes a use of a variable that has no definition so far.

@@ -123,7 +123,7 @@ fn leave(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -
 impl Expander {
     /// Warns if control can reach the end of a recovery clause that does not say that its value is meant.
     pub(super) fn check_clause(&mut self, to: To, is_empty: bool) {
-        if is_empty || !ends(self.core(), to.node, End::LeavesOrResumes) {
+        if is_empty || !ends(self.core(), to.node, EndQuestion::LeavesOrResumes) {
             let message = "this clause can end without saying how to go on, and its value then stands for \
                            that of the operation that failed";
             let help = "end it with `(retry)`, `(abort …)` or `(fail …)`, or with `(values …)` to go on \
@@ -136,13 +136,13 @@ impl Expander {
     pub(super) fn check_return(&mut self, function: VarId, lambda: LambdaId) {
         let core = self.core();
         let body = core.lambdas[lambda.index()].body;
-        core.variables[function.index()].never_returns = ends(core, body, End::Leaves(function));
+        core.variables[function.index()].never_returns = ends(core, body, EndQuestion::Leaves(function));
     }
 }
 
 /// A question about the end of a form.
 #[derive(Clone, Copy)]
-enum End {
+enum EndQuestion {
     /// Whether control never reaches it, or the form says that its value is meant.
     LeavesOrResumes,
     /// Whether control never reaches it; the form is the body of this function.
@@ -152,8 +152,8 @@ enum End {
 /// Answers a question about the end of a form. A `NIL` that a macro has put at the end of its expansion, as
 /// `dolist` does, does not say that it is meant. A function that calls itself at its end does not return
 /// there.
-fn ends(core: &Core, node: NodeId, end: End) -> bool {
-    let leaves = matches!(end, End::Leaves(_));
+fn ends(core: &Core, node: NodeId, end: EndQuestion) -> bool {
+    let leaves = matches!(end, EndQuestion::Leaves(_));
     let mut inside: FxHashSet<BlockId> = FxHashSet::default();
     let mut pending = vec![(node, None)];
     while let Some((node, around)) = pending.pop() {
@@ -219,7 +219,7 @@ fn ends(core: &Core, node: NodeId, end: End) -> bool {
                 }
             }
             NodeKind::Call(Callee::Local(function), _) | NodeKind::Apply(Callee::Local(function), _) => {
-                let is_itself = matches!(end, End::Leaves(own) if own == *function);
+                let is_itself = matches!(end, EndQuestion::Leaves(own) if own == *function);
                 if !is_itself && !core.variables[function.index()].never_returns {
                     return false;
                 }

@@ -6,7 +6,7 @@ use esl_bytecode::opcode::{Instr, Substitute};
 use esl_bytecode::operand::*;
 use esl_bytecode::span::Span;
 
-use super::graph::{Cond, Exit, Graph, Label};
+use super::graph::{Cond, Graph, Label, SegmentExit};
 use super::lines::SourceLines;
 
 /// The code of a function is longer than [`MAX_CODE`].
@@ -44,14 +44,14 @@ pub(crate) fn assemble(graph: &Graph, lines: &SourceLines) -> Result<(Vec<u32>, 
             if is_back(label) { Instr::Loop { to: Back24(0) } } else { Instr::JumpAlways { to: Jump24(0) } }
         };
         match segment.exit {
-            Exit::End => {}
-            Exit::Fall(to) => debug_assert_eq!(Some(to), next, "a cleanup follows its protected part"),
-            Exit::Jump(to) => {
+            SegmentExit::End => {}
+            SegmentExit::Fall(to) => debug_assert_eq!(Some(to), next, "a cleanup follows its protected part"),
+            SegmentExit::Jump(to) => {
                 if Some(to) != next {
                     put(go(to), to);
                 }
             }
-            Exit::Branch { cond, holds, fails } => {
+            SegmentExit::Branch { cond, holds, fails } => {
                 // The conditional jump goes to the edge that is not next, or that has a jump of its own.
                 let prefers_fails = Some(holds) == next
                     || (Some(fails) != next && jump(cond, true, is_back(holds)).is_none())

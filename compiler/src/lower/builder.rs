@@ -9,7 +9,7 @@ use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashMap;
 
 use super::dest::Dest;
-use super::graph::{Exit, Graph, Label};
+use super::graph::{Graph, Label, SegmentExit};
 use super::lines::SourceLines;
 use super::pool::Pool;
 use super::regalloc::RegisterStack;
@@ -223,7 +223,7 @@ impl<'b, 'a> FunctionBuilder<'b, 'a> {
     /// Appends an instruction that control does not pass.
     pub(super) fn end(&mut self, instr: Instr) {
         self.emit(instr);
-        self.graph.leave(Exit::End, self.span);
+        self.graph.leave(SegmentExit::End, self.span);
     }
 
     /// Pushes a control entry with a landing.

@@ -5,7 +5,7 @@ use esl_bytecode::operand::{Count, Dst, Reg};
 
 use super::builder::FunctionBuilder;
 use super::dest::Dest;
-use super::graph::{Cond, Exit, Label};
+use super::graph::{Cond, Label, SegmentExit};
 
 impl FunctionBuilder<'_, '_> {
     /// Returns the register in which a single value for `dest` is best computed. It is free, unless `dest`
@@ -157,11 +157,11 @@ impl FunctionBuilder<'_, '_> {
 
     /// Jumps to a segment.
     pub(super) fn jump(&mut self, to: Label) {
-        self.graph.leave(Exit::Jump(to), self.span);
+        self.graph.leave(SegmentExit::Jump(to), self.span);
     }
 
     /// Jumps to one of two segments.
     pub(super) fn branch(&mut self, cond: Cond, holds: Label, fails: Label) {
-        self.graph.leave(Exit::Branch { cond, holds, fails }, self.span);
+        self.graph.leave(SegmentExit::Branch { cond, holds, fails }, self.span);
     }
 }

@@ -5,7 +5,7 @@ use esl_bytecode::operand::*;
 
 use super::builder::{Extent, FunctionBuilder};
 use super::dest::Dest;
-use super::graph::{Cond, Exit};
+use super::graph::{Cond, SegmentExit};
 use crate::core::*;
 
 impl FunctionBuilder<'_, '_> {
@@ -36,7 +36,7 @@ impl FunctionBuilder<'_, '_> {
         self.form(protected, inner);
         let returns = self.graph.is_open();
         self.emit(Instr::EnterCleanup {});
-        self.graph.leave(Exit::Fall(landing), self.span);
+        self.graph.leave(SegmentExit::Fall(landing), self.span);
         self.graph.bind(landing);
         self.form(cleanup, Dest::Effect);
         self.emit(Instr::EndCleanup {});
@@ -123,7 +123,7 @@ impl FunctionBuilder<'_, '_> {
             self.graph.bind(next);
         }
         // Control does not reach the code behind the last clause.
-        self.graph.leave(Exit::Jump(end), self.span);
+        self.graph.leave(SegmentExit::Jump(end), self.span);
         self.registers.release(window);
         if dest.goes_on() {
             self.graph.bind(end);

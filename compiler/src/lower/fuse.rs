@@ -10,7 +10,7 @@
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::Reg;
 
-use super::graph::{Cond, Exit, Graph, Label};
+use super::graph::{Cond, Graph, Label, SegmentExit};
 
 /// Instructions of a test that is copied to the jumps to it, at most.
 const ROTATED_LENGTH: usize = 8;
@@ -38,13 +38,13 @@ fn thread(graph: &mut Graph) {
             if is_back(end) && !is_back(label) && !cond.loops(sense) { label } else { end }
         };
         let exit = match graph.segments[index].exit {
-            Exit::Jump(to) => Exit::Jump(resolve(to)),
-            Exit::Branch { cond, holds, fails } => {
+            SegmentExit::Jump(to) => SegmentExit::Jump(resolve(to)),
+            SegmentExit::Branch { cond, holds, fails } => {
                 let (holds, fails) = (follow(holds, cond, true), follow(fails, cond, false));
                 if holds == fails && cannot_fail(cond) {
-                    Exit::Jump(holds)
+                    SegmentExit::Jump(holds)
                 } else {
-                    Exit::Branch { cond, holds, fails }
+                    SegmentExit::Branch { cond, holds, fails }
                 }
             }
             other => other,
@@ -74,7 +74,7 @@ fn resolve(graph: &Graph, label: Label) -> Label {
     for _ in 0..64 {
         let segment = &graph.segments[end.index()];
         match segment.exit {
-            Exit::Jump(to) if segment.ops.is_empty() && to != end => end = to,
+            SegmentExit::Jump(to) if segment.ops.is_empty() && to != end => end = to,
             _ => return end,
         }
     }
@@ -91,9 +91,9 @@ fn drop_unreachable(graph: &mut Graph) {
         let segment = &graph.segments[label.index()];
         pending.extend(segment.ops.iter().filter_map(|op| op.landing));
         match segment.exit {
-            Exit::End => {}
-            Exit::Jump(to) | Exit::Fall(to) => pending.push(to),
-            Exit::Branch { holds, fails, .. } => pending.extend([holds, fails]),
+            SegmentExit::End => {}
+            SegmentExit::Jump(to) | SegmentExit::Fall(to) => pending.push(to),
+            SegmentExit::Branch { holds, fails, .. } => pending.extend([holds, fails]),
         }
     }
     graph.order.retain(|label| reached[label.index()]);
@@ -104,12 +104,12 @@ fn rotate(graph: &mut Graph) {
     let positions = graph.positions();
     for position in 0..graph.order.len() {
         let index = graph.order[position].index();
-        let Exit::Jump(head) = graph.segments[index].exit else { continue };
+        let SegmentExit::Jump(head) = graph.segments[index].exit else { continue };
         if head.index() == index {
             continue;
         }
         let test = &graph.segments[head.index()];
-        let Exit::Branch { cond, holds, fails } = test.exit else { continue };
+        let SegmentExit::Branch { cond, holds, fails } = test.exit else { continue };
         // The copy pays if a test can then jump back by itself: the copy, from the end of a loop to its body;
         // or the original, if it is at the end already, joined with the code before it.
         let from = position.max(positions[head.index()]);
@@ -132,7 +132,9 @@ fn count(graph: &mut Graph) {
     for position in 0..graph.order.len() {
         let index = graph.order[position].index();
         let segment = &mut graph.segments[index];
-        let Exit::Branch { cond: Cond::Less(counter, limit), holds, fails } = segment.exit else { continue };
+        let SegmentExit::Branch { cond: Cond::Less(counter, limit), holds, fails } = segment.exit else {
+            continue;
+        };
         if positions[holds.index()] > position || counter == limit {
             continue;
         }
@@ -142,6 +144,6 @@ fn count(graph: &mut Graph) {
             continue;
         }
         segment.ops.pop();
-        segment.exit = Exit::Branch { cond: Cond::Count { counter, limit, step }, holds, fails };
+        segment.exit = SegmentExit::Branch { cond: Cond::Count { counter, limit, step }, holds, fails };
     }
 }

@@ -1,9 +1,9 @@
 //! The graph of a function's code: straight segments and the edges between them.
 //!
-//! Lowering appends instructions to the open segment and ends it with an [`Exit`]. Jumps refer to segments by
-//! [`Label`]s, which may be bound later. The order in which segments are bound is the order of the finished
-//! code, so an edge to its own segment or an earlier one is a turn of a loop. Code that is emitted while no
-//! segment is open is unreachable and vanishes.
+//! Lowering appends instructions to the open segment and ends it with a [`SegmentExit`]. Jumps refer to
+//! segments by [`Label`]s, which may be bound later. The order in which segments are bound is the order of
+//! the finished code, so an edge to its own segment or an earlier one is a turn of a loop. Code that is
+//! emitted while no segment is open is unreachable and vanishes.
 //!
 //! Not here: improving the graph ([`super::fuse`]), choosing jump instructions ([`super::assemble`]).
 
@@ -89,7 +89,7 @@ pub(crate) struct Op {
 
 /// How control leaves a segment.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Exit {
+pub(crate) enum SegmentExit {
     /// Not at all: the last instruction is a return or a tail call.
     End,
     /// To a segment.
@@ -113,7 +113,7 @@ pub(crate) struct Segment {
     /// Instructions.
     pub(crate) ops: Vec<Op>,
     /// Exit.
-    pub(crate) exit: Exit,
+    pub(crate) exit: SegmentExit,
     /// Place of the exit in the source.
     pub(crate) span: Span,
 }
@@ -141,7 +141,7 @@ impl Graph {
     /// Creates a label, to be bound later.
     pub(crate) fn label(&mut self) -> Label {
         let label = Label(self.segments.len() as u32);
-        self.segments.push(Segment { ops: Vec::new(), exit: Exit::End, span: Span::default() });
+        self.segments.push(Segment { ops: Vec::new(), exit: SegmentExit::End, span: Span::default() });
         label
     }
 
@@ -158,7 +158,7 @@ impl Graph {
     }
 
     /// Ends the open segment.
-    pub(crate) fn leave(&mut self, exit: Exit, span: Span) {
+    pub(crate) fn leave(&mut self, exit: SegmentExit, span: Span) {
         if let Some(open) = self.open.take() {
             let segment = &mut self.segments[open.index()];
             segment.exit = exit;
@@ -169,7 +169,7 @@ impl Graph {
     /// Opens the segment of `label`, which is bound here and only here. Control continues in it from the open
     /// segment.
     pub(crate) fn bind(&mut self, label: Label) {
-        self.leave(Exit::Jump(label), Span::default());
+        self.leave(SegmentExit::Jump(label), Span::default());
         self.order.push(label);
         self.open = Some(label);
     }

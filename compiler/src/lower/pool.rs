@@ -12,7 +12,7 @@ use rustc_hash::FxHashMap;
 
 /// What makes two constants one: for literals with an identity their node, otherwise their value.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-enum Key {
+enum LiteralKey {
     Nil,
     True,
     Symbol(Symbol),
@@ -32,7 +32,7 @@ enum Key {
 #[derive(Debug, Default)]
 pub(crate) struct Pool {
     constants: Vec<Constant>,
-    known: FxHashMap<Key, PoolIdx>,
+    known: FxHashMap<LiteralKey, PoolIdx>,
 }
 
 impl Pool {
@@ -44,27 +44,27 @@ impl Pool {
     /// Returns the entry for `symbol`, which may be `NIL` or `T`.
     pub(crate) fn symbol(&mut self, symbol: &Symbol) -> PoolIdx {
         if symbol.is_cl("NIL") {
-            self.enter(Key::Nil, Constant::Nil)
+            self.enter(LiteralKey::Nil, Constant::Nil)
         } else if symbol.is_cl("T") {
-            self.enter(Key::True, Constant::True)
+            self.enter(LiteralKey::True, Constant::True)
         } else {
-            self.enter(Key::Symbol(symbol.clone()), Constant::Symbol(symbol.clone()))
+            self.enter(LiteralKey::Symbol(symbol.clone()), Constant::Symbol(symbol.clone()))
         }
     }
 
     /// Returns the entry for an integer.
     pub(crate) fn integer(&mut self, value: &BigInt) -> PoolIdx {
-        self.enter(Key::Integer(value.clone()), Constant::Integer(value.clone()))
+        self.enter(LiteralKey::Integer(value.clone()), Constant::Integer(value.clone()))
     }
 
     /// Returns the entry for a function of the module.
     pub(crate) fn function(&mut self, function: FunctionNumber) -> PoolIdx {
-        self.enter(Key::Function(function), Constant::Function(function))
+        self.enter(LiteralKey::Function(function), Constant::Function(function))
     }
 
     /// Returns the entry for the structure class named `name`.
     pub(crate) fn class(&mut self, name: &Symbol) -> PoolIdx {
-        self.enter(Key::Class(name.clone()), Constant::Class(name.clone()))
+        self.enter(LiteralKey::Class(name.clone()), Constant::Class(name.clone()))
     }
 
     /// Adds an entry for a vector of entries, which is not shared.
@@ -129,7 +129,7 @@ impl Pool {
         }
     }
 
-    fn enter(&mut self, key: Key, constant: Constant) -> PoolIdx {
+    fn enter(&mut self, key: LiteralKey, constant: Constant) -> PoolIdx {
         if let Some(&index) = self.known.get(&key) {
             return index;
         }
@@ -144,19 +144,19 @@ impl Pool {
     }
 }
 
-fn key(datum: &Datum) -> Key {
+fn key(datum: &Datum) -> LiteralKey {
     match datum.kind() {
-        DatumKind::Nil => Key::Nil,
-        DatumKind::Symbol(symbol) if symbol.is_cl("NIL") => Key::Nil,
-        DatumKind::Symbol(symbol) if symbol.is_cl("T") => Key::True,
-        DatumKind::Symbol(symbol) => Key::Symbol(symbol.clone()),
-        DatumKind::Integer(value) => Key::Integer(value.clone()),
-        DatumKind::Ratio(numerator, denominator) => Key::Ratio(numerator.clone(), denominator.clone()),
-        DatumKind::Float(value) => Key::Float(value.to_bits()),
-        DatumKind::Character(c) => Key::Character(*c),
-        DatumKind::Object(id) => Key::Object(id.0),
+        DatumKind::Nil => LiteralKey::Nil,
+        DatumKind::Symbol(symbol) if symbol.is_cl("NIL") => LiteralKey::Nil,
+        DatumKind::Symbol(symbol) if symbol.is_cl("T") => LiteralKey::True,
+        DatumKind::Symbol(symbol) => LiteralKey::Symbol(symbol.clone()),
+        DatumKind::Integer(value) => LiteralKey::Integer(value.clone()),
+        DatumKind::Ratio(numerator, denominator) => LiteralKey::Ratio(numerator.clone(), denominator.clone()),
+        DatumKind::Float(value) => LiteralKey::Float(value.to_bits()),
+        DatumKind::Character(c) => LiteralKey::Character(*c),
+        DatumKind::Object(id) => LiteralKey::Object(id.0),
         DatumKind::String(_) | DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) => {
-            Key::Node(datum.identity())
+            LiteralKey::Node(datum.identity())
         }
     }
 }

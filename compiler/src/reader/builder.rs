@@ -25,7 +25,7 @@ use super::scan::label_number;
 
 /// A mark that abbreviates a list of two elements.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Mark {
+pub(crate) enum Abbreviation {
     Quote,
     Backquote,
     Comma,
@@ -320,13 +320,13 @@ impl<'a> DatumBuilder<'a> {
     }
 
     /// Returns the list of a mark's symbol and `datum`. The mark ends before `middle`.
-    pub(super) fn marked(&mut self, mark: Mark, start: u32, middle: u32, datum: Datum) -> Datum {
+    pub(super) fn marked(&mut self, mark: Abbreviation, start: u32, middle: u32, datum: Datum) -> Datum {
         let symbol = match mark {
-            Mark::Quote => &NAMES.quote,
-            Mark::Function => &NAMES.function,
-            Mark::Backquote => &NAMES.backquote,
-            Mark::Comma => &NAMES.unquote,
-            Mark::CommaAt => &NAMES.splice,
+            Abbreviation::Quote => &NAMES.quote,
+            Abbreviation::Function => &NAMES.function,
+            Abbreviation::Backquote => &NAMES.backquote,
+            Abbreviation::Comma => &NAMES.unquote,
+            Abbreviation::CommaAt => &NAMES.splice,
         };
         let span = self.span(start, middle).to(datum.span());
         Datum::list([Datum::symbol(symbol.clone(), self.span(start, middle)), datum], span)

@@ -88,16 +88,16 @@ impl Reader {
                 return None;
             }
             match read(&mut self.scanner, environment, &self.text, self.position, &mut self.room) {
-                Read::Datum(datum, end) => {
+                ReadStep::Datum(datum, end) => {
                     self.position = end;
                     return Some(Ok(datum));
                 }
-                Read::Errors(mut errors, resume) => {
+                ReadStep::Errors(mut errors, resume) => {
                     self.position = resume;
                     errors.reverse();
                     self.waiting = errors;
                 }
-                Read::End => self.position = self.text.len(),
+                ReadStep::End => self.position = self.text.len(),
             }
         }
         let error = self.waiting.pop()?;
@@ -130,9 +130,9 @@ pub fn read_datum(
     }
     let start = text.ceil_char_boundary(start);
     match read(&mut Scanner::new(source), environment, text, start, &mut { MAX_FILL }) {
-        Read::Datum(datum, end) => Ok((Some(datum), end)),
-        Read::End => Ok((None, text.len())),
-        Read::Errors(mut errors, _) => {
+        ReadStep::Datum(datum, end) => Ok((Some(datum), end)),
+        ReadStep::End => Ok((None, text.len())),
+        ReadStep::Errors(mut errors, _) => {
             let wrong = errors.iter().position(|error| !is_unfinished(error.code));
             Err(Box::new(errors.swap_remove(wrong.unwrap_or(0))))
         }
@@ -179,7 +179,7 @@ pub fn decode(source: SourceId, bytes: Vec<u8>) -> Result<String, Box<Diagnostic
 }
 
 /// Outcome of reading one datum.
-enum Read {
+enum ReadStep {
     Datum(Datum, usize),
     /// Faults in order, at least one, and the offset at which to continue.
     Errors(Vec<Diagnostic>, usize),
@@ -192,11 +192,11 @@ fn read(
     text: &str,
     from: usize,
     room: &mut usize,
-) -> Read {
+) -> ReadStep {
     let end = match scanner.scan(text, from) {
         Scan::Datum(end) => end,
-        Scan::Errors(resume) => return Read::Errors(std::mem::take(&mut scanner.errors), resume),
-        Scan::End => return Read::End,
+        Scan::Errors(resume) => return ReadStep::Errors(std::mem::take(&mut scanner.errors), resume),
+        Scan::End => return ReadStep::End,
     };
     let source = scanner.source();
     let mut builder = DatumBuilder::new(environment, text, source, room);
@@ -204,11 +204,11 @@ fn read(
     let parsed = grammar::DatumParser::new().parse(&mut builder, tokens);
     let mut errors = builder.errors;
     match parsed {
-        Ok(datum) if errors.is_empty() => return Read::Datum(datum, end),
+        Ok(datum) if errors.is_empty() => return ReadStep::Datum(datum, end),
         Ok(_) => {}
         Err(error) => errors.push(explain(&error, &scanner.lexemes, text, source)),
     }
-    Read::Errors(errors, end)
+    ReadStep::Errors(errors, end)
 }
 
 /// Returns the diagnostic for a fault that the grammar found. The tokens are balanced, so the fault concerns

@@ -41,7 +41,7 @@ pub(super) enum Next {
 
 /// An item in the queue.
 #[derive(Debug)]
-enum Queued {
+enum QueueItem {
     /// The rest of a text.
     Text(Box<Reader>),
     /// A form that no text contains.
@@ -59,7 +59,7 @@ enum Queued {
 /// The forms that are still to be compiled.
 #[derive(Debug, Default)]
 pub(super) struct FormQueue {
-    row: VecDeque<Queued>,
+    row: VecDeque<QueueItem>,
     /// Modules whose texts are being read, the innermost last.
     inside: Vec<String>,
     /// Modules that were required, by their names in lower case.
@@ -75,38 +75,38 @@ impl FormQueue {
     pub(super) fn add(&mut self, name: &str, source: SourceId, text: Arc<str>) {
         let package = if is_common_lisp(name) { CL_USER_PACKAGE } else { USER_PACKAGE };
         if !self.row.is_empty() || package != USER_PACKAGE {
-            self.row.push_back(Queued::Form(call(Symbol::cl("IN-PACKAGE"), package, Span::default())));
+            self.row.push_back(QueueItem::Form(call(Symbol::cl("IN-PACKAGE"), package, Span::default())));
         }
-        self.row.push_back(Queued::Text(Box::new(Reader::new(source, text))));
+        self.row.push_back(QueueItem::Text(Box::new(Reader::new(source, text))));
     }
 
     /// Puts the text of a module at the front.
     pub(super) fn enter(&mut self, name: &str, span: Span, source: SourceId, text: Arc<str>) {
-        self.put_in(name, span, Queued::Text(Box::new(Reader::new(source, text))));
+        self.put_in(name, span, QueueItem::Text(Box::new(Reader::new(source, text))));
     }
 
     /// Puts a compiled module at the front.
     pub(super) fn enter_compiled(&mut self, name: &str, span: Span, module: Module) {
         let requires = module.requires.clone();
-        self.put_in(name, span, Queued::Module(Box::new(module), span));
+        self.put_in(name, span, QueueItem::Module(Box::new(module), span));
         for name in requires.into_iter().rev() {
-            self.row.push_front(Queued::Require(name, span));
+            self.row.push_front(QueueItem::Require(name, span));
         }
     }
 
     /// Puts a module at the front, between the forms that enter and leave it.
-    fn put_in(&mut self, name: &str, span: Span, part: Queued) {
+    fn put_in(&mut self, name: &str, span: Span, part: QueueItem) {
         self.add_call(name, span);
-        self.row.push_front(Queued::Left);
-        self.row.push_front(Queued::Form(call(Symbol::esl("%LEAVE-MODULE"), name, span)));
+        self.row.push_front(QueueItem::Left);
+        self.row.push_front(QueueItem::Form(call(Symbol::esl("%LEAVE-MODULE"), name, span)));
         self.row.push_front(part);
-        self.row.push_front(Queued::Form(call(Symbol::esl("%ENTER-MODULE"), name, span)));
-        self.row.push_front(Queued::Begun(name.to_lowercase()));
+        self.row.push_front(QueueItem::Form(call(Symbol::esl("%ENTER-MODULE"), name, span)));
+        self.row.push_front(QueueItem::Begun(name.to_lowercase()));
     }
 
     /// Puts a call of `require`, which finds the module at run time, at the front.
     pub(super) fn add_call(&mut self, name: &str, span: Span) {
-        self.row.push_front(Queued::Form(call(Symbol::cl("REQUIRE"), name, span)));
+        self.row.push_front(QueueItem::Form(call(Symbol::cl("REQUIRE"), name, span)));
     }
 
     /// Takes the modules that the texts themselves require.
@@ -134,33 +134,33 @@ impl FormQueue {
         self.errors_before_package = None;
         while let Some(part) = self.row.front_mut() {
             match part {
-                Queued::Begun(name) => {
+                QueueItem::Begun(name) => {
                     self.inside.push(std::mem::take(name));
                     self.row.pop_front();
                 }
-                Queued::Left => {
+                QueueItem::Left => {
                     self.row.pop_front();
                     self.inside.pop();
                 }
-                Queued::Form(form) => {
+                QueueItem::Form(form) => {
                     let form = std::mem::replace(form, Datum::nil(Span::default()));
                     self.row.pop_front();
                     expander.begin_file_form(form);
                     return Next::Form;
                 }
-                Queued::Require(name, span) => {
+                QueueItem::Require(name, span) => {
                     let (name, span) = (std::mem::take(name), *span);
                     self.row.pop_front();
                     if self.required.insert(name.to_lowercase()) {
                         return Next::Require(name, span);
                     }
                 }
-                Queued::Module(module, span) => {
+                QueueItem::Module(module, span) => {
                     let next = Next::Module(std::mem::take(module), *span);
                     self.row.pop_front();
                     return next;
                 }
-                Queued::Text(reader) => match reader.next(environment) {
+                QueueItem::Text(reader) => match reader.next(environment) {
                     None => {
                         self.row.pop_front();
                     }

@@ -2,9 +2,9 @@
 //! guarantees the layout.
 //!
 //! ```text
-//! table     | count | used | free | room | entries | heads | test | hash | serial |      header.aux: which test
-//! entries   directory of simple vectors:  | key | value | link | key | value | link | ...
-//! heads     directory of Words64:         | link | link | link | ...
+//! table     | count | used | free | room | entries | heads | test | hash | serial |      header.aux: which
+//! test entries   directory of simple vectors:  | key | value | link | key | value | link | ... heads
+//! directory of Words64:         | link | link | link | ...
 //! ```
 //!
 //! A directory lists segments of [`SEGMENT`] entries, or of the [`PER_ENTRY`] heads of each. Only the first

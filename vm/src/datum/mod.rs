@@ -23,7 +23,7 @@ use esl_bytecode::symbol::{Home, Symbol};
 use crate::heap::layout::Array;
 use crate::heap::{AllocError, Heap, Kind};
 use crate::value::Value;
-use crate::world::load::{Shared, array, character, integer, integer_of, ratio};
+use crate::world::load::{SharedObjects, array, character, integer, integer_of, ratio};
 use crate::world::{GivenMap, GivenSet, World};
 
 /// Greatest number of nodes of an object that becomes a datum.
@@ -72,7 +72,7 @@ pub(crate) struct Unit {
     work: u64,
 }
 
-impl Shared for Unit {
+impl SharedObjects for Unit {
     fn uninterned(&self, id: u32) -> Option<Value> {
         self.uninterned.get(&id).copied()
     }

@@ -34,7 +34,7 @@ pub enum Incoming {
 }
 
 #[derive(Default)]
-struct Shared {
+struct InboxState {
     /// Whether something was put in, or the bell rung, since the contents were taken last.
     is_rung: AtomicBool,
     contents: Mutex<Vec<Incoming>>,
@@ -44,7 +44,7 @@ struct Shared {
 
 /// The inbox of one machine, shared by those who put things in and the host that takes them out.
 #[derive(Clone, Default)]
-pub struct Inbox(Arc<Shared>);
+pub struct Inbox(Arc<InboxState>);
 
 impl Inbox {
     /// Creates an empty inbox.

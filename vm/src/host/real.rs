@@ -84,8 +84,8 @@ impl RealHost {
         self
     }
 
-    /// Makes time virtual: it starts at zero, the beginning of the year 2000, and passes only when the program
-    /// waits or the host is told so.
+    /// Makes time virtual: it starts at zero, the beginning of the year 2000, and passes only when the
+    /// program waits or the host is told so.
     #[must_use]
     pub fn with_virtual_time(mut self) -> RealHost {
         self.virtual_time = Some(0);

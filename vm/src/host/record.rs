@@ -26,7 +26,7 @@ macro_rules! define_records {
         }
 
         /// A kind of answer.
-        trait Answer: Sized + Clone {
+        trait RecordedAnswer: Sized + Clone {
             fn into_record(self) -> Record;
             fn from_record(record: Record) -> Option<Self>;
         }
@@ -36,7 +36,7 @@ macro_rules! define_records {
             #[derive(Clone)]
             struct $variant($ty);
 
-            impl Answer for $variant {
+            impl RecordedAnswer for $variant {
                 fn into_record(self) -> Record {
                     Record::$variant(self.0)
                 }
@@ -118,7 +118,7 @@ impl<H: Host> RecordingHost<H> {
         self.recording.clone()
     }
 
-    fn note<A: Answer>(&mut self, answer: A) -> A {
+    fn note<A: RecordedAnswer>(&mut self, answer: A) -> A {
         self.recording.records().push(answer.clone().into_record());
         answer
     }
@@ -282,7 +282,7 @@ impl ReplayHost {
         self.captured.clone()
     }
 
-    fn next<A: Answer>(&self) -> Option<A> {
+    fn next<A: RecordedAnswer>(&self) -> Option<A> {
         let mut remaining = self.remaining();
         if remaining.diverged {
             return None;

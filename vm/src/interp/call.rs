@@ -5,7 +5,7 @@
 //! it was.
 
 use esl_bytecode::builtin::{BUILTINS, BuiltinInfo};
-use esl_bytecode::opcode::{Callee, Opcode, Substitute};
+use esl_bytecode::opcode::{CallTarget, Opcode, Substitute};
 use esl_bytecode::word::Word;
 
 use super::arguments::{arrange, count_of_arguments, describe_arity, spread};
@@ -56,12 +56,12 @@ pub(super) unsafe fn slow_call(vm: &mut Vm) -> Signal {
         let given = std::ptr::slice_from_raw_parts(window.add(2), word.b());
         let sort = word.opcode().and_then(Opcode::callee);
         let callee = match sort {
-            Some(Callee::Global) => constant(base, aux_at(pc) as usize),
-            Some(Callee::Running) => *base.sub(2),
-            Some(Callee::Given | Callee::Applied | Callee::Builtin) | None => *window,
+            Some(CallTarget::Global) => constant(base, aux_at(pc) as usize),
+            Some(CallTarget::Running) => *base.sub(2),
+            Some(CallTarget::Given | CallTarget::Applied | CallTarget::Builtin) | None => *window,
         };
         let place = FramePlace::for_instruction(word);
-        if sort == Some(Callee::Applied) {
+        if sort == Some(CallTarget::Applied) {
             let mut arguments = Arguments::from_slice(&*given);
             if let Err(exit) = spread(vm, &mut arguments) {
                 return Signal::Exit(exit);

@@ -18,9 +18,9 @@ mod register {
 
     /// What an operand in memory has to be for instructions of the vector unit.
     #[repr(align(16))]
-    struct Operand(#[expect(dead_code, reason = "read by instructions only")] [u64; 2]);
+    struct VectorOperand(#[expect(dead_code, reason = "read by instructions only")] [u64; 2]);
 
-    static BIAS: Operand = Operand([Value::DOUBLE_BIAS, 0]);
+    static BIAS: VectorOperand = VectorOperand([Value::DOUBLE_BIAS, 0]);
 
     /// Returns the double in a register, of which [`Value::is_windowed_double`] is true.
     ///

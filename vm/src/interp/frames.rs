@@ -9,7 +9,7 @@ use crate::task::Entry;
 use crate::task::Task;
 use crate::value::Value;
 use crate::vm::Vm;
-use esl_bytecode::opcode::{Callee, Opcode};
+use esl_bytecode::opcode::{CallTarget, Opcode};
 
 /// Words below the first register of a task's outermost frame: the frame of the stub at the task's end has
 /// nothing but its link, and no code of a program stands there.
@@ -52,7 +52,10 @@ impl<'a> Frame<'a> {
         // SAFETY: F2: two words before a return address is the word of the call.
         let call = unsafe { word_at(return_to.sub(2)) };
         stubs::is_error_return(return_to)
-            || matches!(call.opcode().and_then(Opcode::callee), Some(Callee::Global | Callee::Running))
+            || matches!(
+                call.opcode().and_then(Opcode::callee),
+                Some(CallTarget::Global | CallTarget::Running)
+            )
     }
 
     /// Returns whether its function is one of the library.

@@ -98,8 +98,8 @@ pub(crate) fn first_code_of(task: &Task) -> Value {
     task.stack.words(2).get(1).copied().unwrap_or(Value::NIL)
 }
 
-/// Lets go of everything that the running task, which has ended, holds on its stacks. The frame of the stub at
-/// its end is left.
+/// Lets go of everything that the running task, which has ended, holds on its stacks. The frame of the stub
+/// at its end is left.
 pub(crate) fn drop_frames(vm: &mut Vm) {
     let task = vm.scheduler.task_mut();
     task.control = LazyControl::default();

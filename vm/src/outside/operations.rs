@@ -7,7 +7,7 @@ use crate::value::Value;
 
 /// An operation under way.
 #[derive(Clone, Debug)]
-pub(crate) struct Open {
+pub(crate) struct OpenOperation {
     /// Its handle, which is an event.
     pub(crate) handle: Value,
     /// What cancels it.
@@ -21,7 +21,7 @@ pub(crate) struct Open {
 /// The operations under way, by number.
 #[derive(Default)]
 pub(crate) struct Operations {
-    pub(crate) open: BTreeMap<u64, Open>,
+    pub(crate) open: BTreeMap<u64, OpenOperation>,
     /// Number of operations begun so far.
     pub(crate) begun: u64,
 }
@@ -46,7 +46,7 @@ impl Operations {
     /// Adds the next operation.
     pub(crate) fn begin(&mut self, handle: Value, canceller: Canceller, is_detached: bool) {
         self.begun += 1;
-        self.open.insert(self.begun, Open { handle, canceller, is_cancelled: false, is_detached });
+        self.open.insert(self.begun, OpenOperation { handle, canceller, is_cancelled: false, is_detached });
     }
 
     /// Cancels an operation, once. The outside says when it has stopped.

@@ -77,7 +77,8 @@ pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
 /// Longest part of a list of resources, or of their holders, that is shown.
 const SHOWN: usize = 8;
 
-/// Returns what reports call the resources of a request, with their holders. `resources.esl` says what they are.
+/// Returns what reports call the resources of a request, with their holders. `resources.esl` says what they
+/// are.
 fn resources_label(vm: &Vm, resources: Value) -> String {
     let labels: Vec<String> = items(vm, resources).map(|resource| resource_label(vm, resource)).collect();
     labels.join(" and ")

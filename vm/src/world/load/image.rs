@@ -17,7 +17,7 @@ use esl_bytecode::module::{Function, FunctionNumber, PoolIdx};
 use esl_bytecode::symbol::Symbol;
 
 use super::definitions::{Definitions, ImageDefinition, name_of};
-use super::{FunctionParts, LoadError, character, data, debug, integer, make_code, own_constants, ratio};
+use super::{LoadError, LoadedFunction, character, data, debug, integer, make_code, own_constants, ratio};
 use crate::heap::{AllocError, Heap};
 use crate::shape::{Shape, Sort};
 use crate::trust::LAZY_WORD;
@@ -330,7 +330,7 @@ impl ImageLoader<'_> {
             None => Value::NIL,
         };
         let debug = Value::index(number.0 as usize);
-        let parts = FunctionParts { function: &function, constants: &constants, name, debug };
+        let parts = LoadedFunction { function: &function, constants: &constants, name, debug };
         Ok(make_code(self.heap, &Verified::image(), &parts, Value::index(self.image))?)
     }
 }

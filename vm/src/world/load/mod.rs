@@ -84,7 +84,7 @@ impl From<ReadError> for LoadError {
 
 /// Objects that the constants of a module may refer to but do not describe: those shared by the modules of
 /// one compilation.
-pub(crate) trait Shared {
+pub(crate) trait SharedObjects {
     /// Returns the symbol object for an uninterned symbol's number, if there is one.
     fn uninterned(&self, id: u32) -> Option<Value>;
     /// Records the symbol object made for a number.
@@ -97,7 +97,7 @@ pub(crate) trait Shared {
 #[derive(Default)]
 pub(crate) struct Alone(BTreeMap<u32, Value>);
 
-impl Shared for Alone {
+impl SharedObjects for Alone {
     fn uninterned(&self, id: u32) -> Option<Value> {
         self.0.get(&id).copied()
     }
@@ -119,7 +119,7 @@ pub(crate) fn load(
     heap: &mut Heap,
     world: &mut World,
     module: &Module,
-    shared: &mut dyn Shared,
+    shared: &mut dyn SharedObjects,
 ) -> Result<Value, LoadError> {
     let verified = Verified::module(module).map_err(LoadError::Refused)?;
     Loader { heap, world, module, shared, verified, pool: Vec::new(), functions: Vec::new() }.load()
@@ -130,7 +130,7 @@ struct Loader<'a> {
     heap: &'a mut Heap,
     world: &'a mut World,
     module: &'a Module,
-    shared: &'a mut dyn Shared,
+    shared: &'a mut dyn SharedObjects,
     verified: Verified,
     /// Values of the pool.
     pool: Vec<Value>,
@@ -158,8 +158,12 @@ impl Loader<'_> {
         for (function, object) in self.module.functions.iter().zip(&mut self.functions) {
             let constants = own_constants(function, |PoolIdx(index)| self.pool[index as usize]);
             let debug = debug::describe(self.heap, function, &self.pool, sources)?;
-            let parts =
-                FunctionParts { function, constants: &constants, name: name_of(function, &self.pool), debug };
+            let parts = LoadedFunction {
+                function,
+                constants: &constants,
+                name: name_of(function, &self.pool),
+                debug,
+            };
             let code = make_code(self.heap, &self.verified, &parts, Value::NIL)?;
             if object.is_nil() {
                 *object = code;
@@ -229,7 +233,7 @@ impl Loader<'_> {
 pub(crate) const TOP_LEVEL: u16 = 1;
 
 /// The parts from which a Code is made.
-struct FunctionParts<'a> {
+struct LoadedFunction<'a> {
     function: &'a Function,
     /// Constants of the function, then the names of its keys.
     constants: &'a [Value],
@@ -240,7 +244,7 @@ struct FunctionParts<'a> {
 fn make_code(
     heap: &mut Heap,
     verified: &Verified,
-    parts: &FunctionParts<'_>,
+    parts: &LoadedFunction<'_>,
     owner: Value,
 ) -> Result<Value, AllocError> {
     let function = parts.function;
