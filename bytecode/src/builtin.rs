@@ -1313,7 +1313,8 @@ macro_rules! for_each_builtin {
             PassTurn = event::pass_turn, internal "%PASS-TURN" ("");
 
             // ---- tasks
-            /// A new task that calls a function. `daemon` may be `:internal` for one that is not listed.
+            /// A new task that calls a function. `daemon` may be `:internal` for one that is not listed, or
+            /// `:service` for one of these that has no bindings of this task and charges no account of its.
             /// `notify` is a guard that is told of its end.
             Spawn = task::spawn, internal "%SPAWN" ("function &optional name priority budget daemon notify");
             /// New tasks, one for each function and name, that begin together: a net, and the tasks. They

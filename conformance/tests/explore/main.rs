@@ -2,6 +2,7 @@
 
 mod defects;
 mod putting_back;
+mod resources;
 
 use esl::explore::{Behaviour, Exploration, Grain, Settings, explore, follow};
 use esl::program::{self, Ended, Program, Source};

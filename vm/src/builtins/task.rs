@@ -68,12 +68,14 @@ pub(super) fn spawn(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         v => Some(ticks_argument(vm, v)?),
     };
     let daemon = argument(4);
+    let is_service = daemon == vm.world.known.service;
     let options = SpawnOptions {
         name: argument(1),
         priority,
         budget,
         daemon: daemon.is_true(),
-        hidden: daemon == vm.world.known.internal,
+        hidden: daemon == vm.world.known.internal || is_service,
+        is_service,
         notify: argument(5),
     };
     let id = run::make_task(vm, function, Value::NIL, options)?;

@@ -85,17 +85,38 @@ fn resources_label(vm: &Vm, resources: Value) -> String {
 }
 
 fn resource_label(vm: &Vm, resource: Value) -> String {
-    let mut fields = items(vm, resource);
-    let name = describe(&vm.heap, fields.next().unwrap_or(Value::NIL));
-    let holders = fields.next().unwrap_or(Value::NIL);
-    let holders: Vec<String> = items(vm, holders)
-        .map(|request| task_label(vm, vm.heap.car(request).unwrap_or(Value::NIL)))
+    let field = |index| field_of(vm, resource, index);
+    let name = describe(&vm.heap, field(0));
+    let holders: Vec<String> = ring(vm, field(1))
+        .map(|claim| task_label(vm, field_of(vm, field_of(vm, claim, REQUEST), 0)))
         .collect();
     if holders.is_empty() {
         format!("resource {name}")
     } else {
         format!("resource {name}, held by {}", holders.join(" and "))
     }
+}
+
+/// Field of a claim with its request.
+const REQUEST: usize = 4;
+
+/// Returns a field of a record of the library; `NIL` if there is none.
+fn field_of(vm: &Vm, record: Value, index: usize) -> Value {
+    vm.heap.vector(record).and_then(|fields| fields.get(index).copied()).unwrap_or(Value::NIL)
+}
+
+/// Returns the first records of a ring, each of which has the next one in its first field.
+fn ring(vm: &Vm, first: Value) -> impl Iterator<Item = Value> {
+    let mut next = first;
+    let step = move || {
+        let record = next;
+        next = field_of(vm, record, 0);
+        if next == first {
+            next = Value::NIL;
+        }
+        record.is_true().then_some(record)
+    };
+    std::iter::from_fn(step).take(SHOWN)
 }
 
 /// Returns the first items of a list.

@@ -26,6 +26,8 @@ pub(crate) struct SpawnOptions {
     pub daemon: bool,
     /// Whether it belongs to the library.
     pub hidden: bool,
+    /// Whether it works for all: it has no bindings of its maker, and charges no account.
+    pub is_service: bool,
     /// Who is told of its end, see [`crate::task::Task::notify`].
     pub notify: Value,
 }
@@ -38,6 +40,7 @@ impl Default for SpawnOptions {
             budget: None,
             daemon: false,
             hidden: false,
+            is_service: false,
             notify: Value::NIL,
         }
     }
@@ -126,7 +129,7 @@ pub(crate) fn make_task(
     if let Some(fund) = fund {
         task.extra_mut().fund = Some(fund);
     }
-    if let Some(maker) = &scheduler.running {
+    if let Some(maker) = scheduler.running.as_ref().filter(|_| !options.is_service) {
         scheduler.accounts.enter(maker.account);
         task.account = maker.account;
         if let Some(control) = maker.control.get()

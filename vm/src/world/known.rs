@@ -86,6 +86,7 @@ define_known! {
     recovery = keyword "RECOVERY";
     cleanup = keyword "CLEANUP";
     internal = keyword "INTERNAL";
+    service = keyword "SERVICE";
     external = keyword "EXTERNAL";
     inherited = keyword "INHERITED";
     locked = keyword "LOCKED";
