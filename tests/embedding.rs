@@ -7,8 +7,9 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use esl::engine::{Failure, Operation};
-use esl::host::{RealHost, RecordingHost, ReplayHost, VirtualHost};
+use esl::host::{RealHost, RecordingHost, ReplayHost, SendError, Sender, VirtualHost};
 use esl::{Config, Data, Engine, Error};
+use esl_bytecode::datum::Datum;
 
 /// Returns an engine whose time is real and whose output is dropped.
 fn engine() -> Engine {
@@ -310,4 +311,39 @@ fn a_recorded_run_is_replayed_without_the_host() {
     assert_eq!(again, first);
     assert!(host.is_at_end() && !host.has_diverged());
     assert_eq!(calls.load(Ordering::Relaxed), 5, "the host's functions are not called again");
+}
+
+#[test]
+fn senders_outside_signal_inputs_by_name() {
+    let mut engine = engine();
+    check(&mut engine, "(define-input commands :capacity 3)", "COMMANDS");
+    let waiting = "(list (wait-for-event commands) (multiple-value-list (wait-for-event commands)))";
+    assert_eq!(engine.eval(waiting), Err(Error::Deadlocked));
+    let sender = Sender::new(&engine.machine().inbox());
+    let number = |n: i64| Datum::integer(n, Default::default());
+    let thread = std::thread::spawn(move || {
+        sender.signal("commands", vec![number(1)])?;
+        sender.signal("Commands", vec![number(2), number(3)])?;
+        sender.signal("orders", Vec::new())
+    });
+    check(&mut engine, waiting, "(1 (2 3))");
+    assert_eq!(thread.join().ok(), Some(Err(SendError::NoSuchInput("ORDERS".into()))));
+    assert_eq!(engine.eval("(wait-for-event commands)"), Err(Error::Deadlocked));
+}
+
+#[test]
+fn senders_wait_while_an_input_is_full() {
+    let mut engine = engine();
+    check(&mut engine, "(define-input commands :capacity 2 :when-full :wait)", "COMMANDS");
+    let sender = Sender::new(&engine.machine().inbox());
+    let other = sender.clone();
+    let thread = std::thread::spawn(move || {
+        (0..1000).all(|n| other.signal("commands", vec![Datum::integer(n, Default::default())]).is_ok())
+    });
+    check(&mut engine, "(loop for i below 1000 always (eql (wait-for-event commands) i))", "T");
+    assert_eq!(thread.join().ok(), Some(true));
+    let full = (0..3).map(|_| sender.try_signal("commands", Vec::new())).find(Result::is_err);
+    assert_eq!(full, Some(Err(SendError::Full("COMMANDS".into()))));
+    drop(engine);
+    assert_eq!(sender.signal("commands", Vec::new()), Err(SendError::Ended));
 }

@@ -1305,6 +1305,15 @@ macro_rules! for_each_builtin {
             TakeSignal = event::take_signal, internal "%TAKE-SIGNAL" ("wait");
             /// Ends a wait.
             CloseWait = event::close_wait, internal "%CLOSE-WAIT" ("wait");
+            /// The input that the outside knows by a name, a symbol or string: a new one, or one that is there
+            /// already, with this capacity and the rule of this number.
+            AddInput = input::add_input, internal "%ADD-INPUT" ("name capacity rule");
+            /// Has the outside know no input of this name any more.
+            RemoveInput = input::remove_input, internal "%REMOVE-INPUT" ("name");
+            /// How many signals of an input were dropped.
+            InputDropped = input::input_dropped, internal "%INPUT-DROPPED" ("input");
+            /// Whether an object is an input.
+            Inputp = input::inputp, internal "%INPUTP" ("object");
             /// The time in so many seconds, in nanoseconds.
             Deadline = event::deadline, internal "%DEADLINE" ("seconds");
             /// Waits until a time in nanoseconds.

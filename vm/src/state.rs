@@ -139,7 +139,8 @@ state! {
 state! {
     /// Visits the content of the outside.
     Outside by VisitOutside :: outside_content {
-        content { exit_status, console, operations }
+        content { exit_status, console, operations, inputs }
+        course { senders }
         transient { answer }
         process { host, inbox, functions, complaints }
     }

@@ -6,10 +6,11 @@
 use crate::builtins::list::list_items;
 use crate::heap::Kind;
 use crate::raise::{Exit, Outcome};
+use crate::run;
 use crate::schedule::TurnEnd;
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::{WaitOptions, event, link};
+use crate::wait::{WaitOptions, event, input, link};
 
 use super::expect::exactly;
 
@@ -70,6 +71,84 @@ fn was_signalled_since(vm: &mut Vm, events: Value, count: Value) -> Result<bool,
     }
 }
 
+/// Takes the oldest signal that one of `events` keeps, an event or a list of events: the list of its arguments.
+///
+/// # Errors
+/// As [`take_kept_by`].
+fn take_kept_by_one_of(vm: &mut Vm, events: Value) -> Result<Option<Value>, Exit> {
+    let mut rest = events;
+    while let Some(pair) = vm.heap.as_cons(rest) {
+        if let Some(arguments) = take_kept_by(vm, pair.car)? {
+            return Ok(Some(arguments));
+        }
+        rest = pair.cdr;
+    }
+    take_kept_by(vm, events)
+}
+
+/// Takes the oldest signal that `event` keeps, if it is an input, and tells those who wait for room in it.
+///
+/// # Errors
+/// [`Exit::Collect`]; [`Exit::Again`] while signals are under delivery. Then nothing has happened.
+fn take_kept_by(vm: &mut Vm, event: Value) -> Result<Option<Value>, Exit> {
+    if !input::is_input(&vm.heap, event) || input::is_empty(&vm.heap, event) {
+        return Ok(None);
+    }
+    let room = input::room(&vm.heap, event);
+    if event::is_awaited(&vm.heap, room) {
+        vm.scheduler.wait_for_deliveries()?;
+        vm.signal_event(room, &[])?;
+    }
+    let arguments = input::take(&mut vm.heap, event);
+    run::show_kept(vm, event);
+    Ok(arguments)
+}
+
+/// Returns whether one of `events`, an event or a list of events, keeps a signal.
+fn is_one_kept(vm: &Vm, events: Value) -> bool {
+    let keeps = |event: Value| input::is_input(&vm.heap, event) && !input::is_empty(&vm.heap, event);
+    let mut rest = events;
+    while let Some(pair) = vm.heap.as_cons(rest) {
+        if keeps(pair.car) {
+            return true;
+        }
+        rest = pair.cdr;
+    }
+    keeps(rest)
+}
+
+/// Takes the oldest signal that an input keeps for which a wait is.
+fn take_for(vm: &mut Vm, wait: Value) -> Result<Option<Value>, Exit> {
+    let (events, what) = link::waited_for(&vm.heap, wait);
+    for event in events.into_iter().filter(|_| what.is_nil()) {
+        if let Some(arguments) = take_kept_by(vm, event)? {
+            return Ok(Some(arguments));
+        }
+    }
+    Ok(None)
+}
+
+/// Parks the running task until an input has room for a signal.
+///
+/// # Errors
+/// Always, if it has none.
+fn wait_for_room(vm: &mut Vm, event: Value) -> Result<(), Exit> {
+    let wait = vm.scheduler.task().wait;
+    if wait.is_true() {
+        if link::signalled(&vm.heap, wait).is_none() {
+            return vm.scheduler.park_at(wait, None).map(drop);
+        }
+        vm.scheduler.leave_signalled(&mut vm.heap);
+    }
+    if !input::has_senders_wait(&vm.heap, event) {
+        return Ok(());
+    }
+    let what = vm.world.known.room;
+    let room = input::room(&vm.heap, event);
+    let wait = begin_wait(vm, room, WaitOptions { what, ..WaitOptions::default() })?;
+    vm.scheduler.park_at(wait, None).map(drop)
+}
+
 fn give_list(vm: &mut Vm, list: Value) -> Outcome {
     let mut rest = list;
     if let Some(pair) = vm.heap.as_cons(list)
@@ -95,6 +174,9 @@ pub(super) fn signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return vm.exchange.not_a(arguments[0], vm.world.known.event);
     }
     vm.scheduler.wait_for_deliveries()?;
+    if input::is_input(&vm.heap, arguments[0]) {
+        wait_for_room(vm, arguments[0])?;
+    }
     vm.signal_event(arguments[0], &arguments[1..])?;
     Ok(Value::NIL)
 }
@@ -174,14 +256,26 @@ fn wait_for_signal(vm: &mut Vm, events: Value, count: Value, what: Value) -> Out
     let wait = vm.scheduler.task().wait;
     if wait.is_true() {
         return match link::signalled(&vm.heap, wait) {
-            Some(arguments) => {
+            Some(signal) => {
                 vm.scheduler.leave_signalled(&mut vm.heap);
+                let arguments = input::arguments(&vm.heap, signal);
                 give_list(vm, arguments)
             }
-            None => vm.scheduler.park_at(wait, None),
+            None => match take_for(vm, wait)? {
+                Some(arguments) => {
+                    vm.scheduler.cancel_wait(&mut vm.heap);
+                    give_list(vm, arguments)
+                }
+                None => vm.scheduler.park_at(wait, None),
+            },
         };
     }
     vm.scheduler.point()?;
+    if what.is_nil()
+        && let Some(arguments) = take_kept_by_one_of(vm, events)?
+    {
+        return give_list(vm, arguments);
+    }
     if was_signalled_since(vm, events, count)? {
         return Ok(Value::NIL);
     }
@@ -210,7 +304,8 @@ pub(super) fn open_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         let nanoseconds = nanoseconds(vm, seconds)?;
         Some(vm.scheduler.clock.read(&mut vm.outside.host).saturating_add(nanoseconds).min(LATEST))
     };
-    if was_signalled_since(vm, events, count)? {
+    let is_kept = what.is_nil() && is_one_kept(vm, events);
+    if !is_kept && was_signalled_since(vm, events, count)? {
         return Ok(Value::NIL);
     }
     begin_wait(vm, events, WaitOptions { keeps: true, deadline, what, ..WaitOptions::default() })
@@ -223,7 +318,10 @@ pub(super) fn take_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return vm.exchange.program_error(text);
     }
     vm.scheduler.task_mut().wait = Value::NIL;
-    if let Some(arguments) = link::take_kept(&mut vm.heap, wait) {
+    if let Some(signal) = link::take_kept(&mut vm.heap, wait) {
+        return Ok(input::arguments(&vm.heap, signal));
+    }
+    if let Some(arguments) = take_for(vm, wait)? {
         return Ok(arguments);
     }
     // A signal that is on its way comes before a timeout.

@@ -65,6 +65,7 @@ pub(crate) mod event;
 mod expect;
 mod failure;
 mod float;
+mod input;
 mod instance;
 mod integer;
 mod list;

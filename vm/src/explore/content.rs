@@ -261,4 +261,8 @@ impl VisitOutside for Walk<'_> {
             self.word(u64::from(open.is_cancelled));
         }
     }
+
+    fn inputs(&mut self, outside: &Outside) {
+        outside.inputs.values().for_each(|&input| self.value(input));
+    }
 }

@@ -11,6 +11,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use esl_bytecode::datum::Datum;
+
+use super::door::Doors;
 use super::{News, ProcessSignal};
 
 /// Something that reaches a run from outside.
@@ -31,6 +34,17 @@ pub enum Incoming {
         /// What is heard of it.
         news: News,
     },
+    /// A signal of an input of the program.
+    Message {
+        /// Name of the input, in upper case.
+        input: String,
+        /// Arguments of the signal.
+        arguments: Vec<Datum>,
+    },
+    /// There is one more who may send messages.
+    SenderCame,
+    /// One of those has gone.
+    SenderLeft,
 }
 
 #[derive(Default)]
@@ -40,6 +54,7 @@ struct InboxState {
     contents: Mutex<Vec<Incoming>>,
     /// Notified, under the lock of `contents`, when `is_rung` is set.
     bell: Condvar,
+    doors: Doors,
 }
 
 /// The inbox of one machine, shared by those who put things in and the host that takes them out.
@@ -55,6 +70,10 @@ impl Inbox {
     fn contents(&self) -> MutexGuard<'_, Vec<Incoming>> {
         // The contents are whole at every moment, so a panic elsewhere does not corrupt them.
         self.0.contents.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn doors(&self) -> &Doors {
+        &self.0.doors
     }
 
     /// Puts something in, from any thread, and ends the host's wait.

@@ -17,6 +17,7 @@ use esl_bytecode::datum::Datum;
 
 mod asked;
 mod console;
+mod door;
 mod inbox;
 mod operation;
 mod real;
@@ -26,6 +27,7 @@ mod virtual_host;
 
 pub(crate) use asked::Asked;
 pub(crate) use console::{Console, Taken, column_after, encode};
+pub use door::{SendError, Sender};
 pub use inbox::{Inbox, Incoming};
 pub(crate) use operation::Canceller;
 pub use operation::{Failure, News, Operation};
@@ -104,7 +106,8 @@ impl std::error::Error for HostError {}
 pub struct Awaited {
     /// Whether tasks wait for standard input.
     pub input: bool,
-    /// Whether something is expected in the inbox, because an operation is under way.
+    /// Whether something is expected in the inbox, because an operation is under way, or because there is a
+    /// sender.
     pub news: bool,
 }
 

@@ -8,7 +8,7 @@ use super::{Leave, code_of};
 use crate::compiler::Compiler;
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Phase, SLICE_VISITS, SliceOutcome};
-use crate::outside::Operations;
+use crate::outside::Outside;
 use crate::saved_pc::SavedPc;
 use crate::schedule::{Scheduler, TurnEnd};
 use crate::task::{Task, Tasks};
@@ -72,7 +72,7 @@ fn mark_roots(
     exchange: &Exchange,
     pinned: &[Value],
     deliveries: &Deliveries,
-    operations: &Operations,
+    outside: &Outside,
 ) {
     world.roots(&mut |value| heap.mark(value));
     compiler.roots(&mut |value| heap.mark(value));
@@ -83,7 +83,7 @@ fn mark_roots(
         raised.visit(&mut |value| heap.mark(value));
     }
     deliveries.visit(&mut |value| heap.mark(value));
-    operations.visit(&mut |value| heap.mark(value));
+    outside.visit(&mut |value| heap.mark(value));
 }
 
 /// Marks more: a slice of what is known to be reachable, then the tasks whose stacks have yet to be scanned.
@@ -203,15 +203,7 @@ impl Vm {
         // running task, those of the others were noted at the switch.
         unsafe {
             heap.collect_fully(|heap| {
-                mark_roots(
-                    heap,
-                    world,
-                    compiler,
-                    exchange,
-                    &embedder.pinned,
-                    deliveries,
-                    &outside.operations,
-                );
+                mark_roots(heap, world, compiler, exchange, &embedder.pinned, deliveries, outside);
                 for task in running.as_deref_mut().into_iter().chain(tasks.iter_mut()) {
                     _ = scan(heap, task);
                 }
@@ -231,15 +223,7 @@ impl Vm {
             Phase::Idle => {
                 heap.begin_cycle();
                 tasks.begin_cycle();
-                mark_roots(
-                    heap,
-                    world,
-                    compiler,
-                    exchange,
-                    &embedder.pinned,
-                    deliveries,
-                    &outside.operations,
-                );
+                mark_roots(heap, world, compiler, exchange, &embedder.pinned, deliveries, outside);
                 if let Some(task) = running {
                     // SAFETY: `begin_pause` has noted the base of its running frame.
                     _ = unsafe { scan(heap, task) };

@@ -36,6 +36,10 @@ pub(crate) struct Outside {
     pub(crate) answer: Option<Result<Datum, Failure>>,
     /// The operations under way.
     pub(crate) operations: Operations,
+    /// The inputs that the outside may signal, by name.
+    pub(crate) inputs: BTreeMap<String, Value>,
+    /// Number of those outside who may signal them.
+    pub(crate) senders: u64,
     /// Stream that reports are written to.
     pub(crate) complaints: Output,
     /// Status that the program has asked to end with.
@@ -52,6 +56,8 @@ impl Outside {
             functions: BTreeMap::new(),
             answer: None,
             operations: Operations::default(),
+            inputs: BTreeMap::new(),
+            senders: 0,
             complaints: Output::Error,
             exit_status: None,
         }
@@ -87,6 +93,17 @@ impl Outside {
         });
     }
 
+    /// Calls `visit` with every value.
+    pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
+        self.operations.visit(visit);
+        self.inputs.values().for_each(|&input| visit(input));
+    }
+
+    /// Returns whether something is expected in the inbox.
+    pub(crate) fn expects_news(&self) -> bool {
+        !self.operations.is_empty() || self.senders > 0
+    }
+
     /// Writes what programs have printed and is still in a buffer.
     pub(crate) fn flush(&mut self) {
         self.console.flush(&mut self.host);
@@ -101,5 +118,11 @@ impl Outside {
         self.flush();
         self.console.write(&mut self.host, self.complaints, &characters);
         self.flush();
+    }
+}
+
+impl Drop for Outside {
+    fn drop(&mut self) {
+        self.inbox.close_doors();
     }
 }

@@ -5,7 +5,7 @@ use crate::heap::{Heap, Kind};
 use crate::task::{Task, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::{event, link, operation};
+use crate::wait::{event, input, link, operation};
 use crate::world::class;
 
 /// Returns what reports call the task that `object` stands for.
@@ -41,6 +41,7 @@ pub(crate) fn event_label(vm: &Vm, event: Value) -> String {
         name if operation::is_handle(&vm.heap, event) => {
             format!("operation {} {}", describe(&vm.heap, name), operation::number(&vm.heap, event))
         }
+        name if input::is_input(&vm.heap, event) => format!("input {}", describe(&vm.heap, name)),
         _ if event == vm.scheduler.any_event => "any event".into(),
         name if name.is_true() => format!("event {}", describe(&vm.heap, name)),
         _ => "an event".into(),
@@ -70,8 +71,18 @@ pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
     match &labels[..] {
         [label] if what == vm.world.known.task_end => format!("the end of {label}"),
         [label] if vm.heap.is(first, Kind::Task) => format!("a signal of {label}"),
+        [_] if what == vm.world.known.room => {
+            format!("room in input {}", describe(&vm.heap, vm.heap.slot_or_nil(first, event::NAME)))
+        }
         labels => labels.join(" or "),
     }
+}
+
+/// Returns what a deadlock report adds to the reason for which a task waits.
+pub(crate) fn lack_of(vm: &Vm, task: &Task) -> &'static str {
+    let events = if task.wait.is_true() { link::waited_for(&vm.heap, task.wait).0 } else { Vec::new() };
+    let is_for_input = events.into_iter().any(|event| input::is_input(&vm.heap, event));
+    if is_for_input { ", which has no sender left" } else { "" }
 }
 
 /// Longest part of a list of resources, or of their holders, that is shown.

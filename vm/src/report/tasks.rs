@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use esl_bytecode::compile::SourcePlace;
 use esl_bytecode::opcode::Opcode;
 
-use super::{event_label, reason_of, task_label};
+use super::{event_label, lack_of, reason_of, task_label};
 use crate::interp::frames::{Frame, Frames};
 use crate::interp::start::first_code_of;
 use crate::task::{Task, TaskState};
@@ -81,7 +81,8 @@ impl Vm {
         for task in tasks.iter().take(SHOWN) {
             let label = task_label(self, task.object);
             let place = program_place(self, task).map_or(String::new(), |place| format!(", {place}"));
-            text.push_str(&format!("  {label} waits for {}{place}\n", reason_of(self, task)));
+            let (reason, lack) = (reason_of(self, task), lack_of(self, task));
+            text.push_str(&format!("  {label} waits for {reason}{lack}{place}\n"));
         }
         if tasks.len() > SHOWN {
             text.push_str(&format!("  and {} more\n", tasks.len() - SHOWN));

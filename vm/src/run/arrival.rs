@@ -1,9 +1,14 @@
 //! Taking in what has come into the machine's inbox, between two turns.
 
-use super::operation::hear;
+use esl_bytecode::datum::Datum;
+
+use super::finish::allocate_without_retry;
+use super::operation::{hear, import_list};
+use super::signal::signal;
 use super::wake::make_runnable;
 use crate::host::{Host, Incoming, ProcessSignal};
 use crate::task::TaskState;
+use crate::value::Value;
 use crate::vm::Vm;
 
 /// Takes in the contents of the inbox, in the order in which they came. Returns whether the run is to come
@@ -17,6 +22,9 @@ pub(crate) fn take_in(vm: &mut Vm) -> bool {
             Incoming::Stop => stops = true,
             Incoming::Input => wake_readers(vm),
             Incoming::Operation { number, news } => hear(vm, number, news),
+            Incoming::Message { input, arguments } => receive(vm, &input, &arguments),
+            Incoming::SenderCame => vm.outside.senders += 1,
+            Incoming::SenderLeft => vm.outside.senders = vm.outside.senders.saturating_sub(1),
         }
     }
     stops
@@ -40,6 +48,14 @@ fn end_by_signal(vm: &mut Vm, signal: ProcessSignal) -> bool {
         }
     }
     false
+}
+
+/// Signals an input of the program, which knows it by this name.
+fn receive(vm: &mut Vm, name: &str, arguments: &[Datum]) {
+    vm.outside.inbox.note_arrival(name);
+    let Some(&input) = vm.outside.inputs.get(name) else { return };
+    let arguments = import_list(vm, arguments).unwrap_or(Value::NIL);
+    allocate_without_retry(vm, |vm| signal(vm, input, arguments).map(|()| Value::NIL));
 }
 
 /// Has the tasks that wait for standard input try again.

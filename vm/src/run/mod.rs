@@ -37,7 +37,7 @@ pub(crate) use arrival::take_in;
 pub use call::CallError;
 pub(crate) use limit::{expire_limit, open_limit};
 pub(crate) use pending::interrupt_by;
-pub(crate) use signal::deliver_some;
+pub(crate) use signal::{deliver_some, show_kept};
 pub(crate) use spawn::{SpawnOptions, make_task};
 pub(crate) use timers::idle;
 pub(crate) use turn::give_turn;

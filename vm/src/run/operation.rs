@@ -43,7 +43,7 @@ pub(super) fn hear(vm: &mut Vm, number: u64, news: News) {
 }
 
 /// Returns data as a list of the heap; `None` if there is no room for it.
-fn import_list(vm: &mut Vm, items: &[Datum]) -> Option<Value> {
+pub(super) fn import_list(vm: &mut Vm, items: &[Datum]) -> Option<Value> {
     let list = Datum::list(items.iter().cloned(), Span::default());
     // A cons around it tells the empty list from a lack of room.
     let cell = allocate_without_retry(vm, |vm| {

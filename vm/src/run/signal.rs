@@ -14,9 +14,10 @@ use crate::heap::{Heap, Kind};
 use crate::raise::Exit;
 use crate::report;
 use crate::schedule::TurnEnd;
-use crate::task::{AccountId, TaskNumber, TaskState};
+use crate::task::{AccountId, TaskNumber};
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::wait::input::{self, WhenFull};
 use crate::wait::{Delivery, event, link};
 
 /// Waits that get a signal in one step.
@@ -47,6 +48,68 @@ impl Vm {
 /// # Errors
 /// [`Exit::Collect`] without room; then nothing has happened.
 pub(crate) fn signal(vm: &mut Vm, event: Value, arguments: Value) -> Result<(), Exit> {
+    if input::is_input(&vm.heap, event) {
+        return signal_input(vm, event, arguments);
+    }
+    wake_waiters(vm, event, arguments)
+}
+
+/// Signals an input: the tasks that wait for it get the signal, or the input keeps it.
+fn signal_input(vm: &mut Vm, input: Value, arguments: Value) -> Result<(), Exit> {
+    let takers = if input::is_empty(&vm.heap, input) { count_takers(vm, input) } else { 0 };
+    match takers {
+        0 => {
+            let cell = vm.heap.cons(arguments, Value::NIL)?;
+            wake_waiters(vm, input, Value::NIL)?;
+            input::keep(&mut vm.heap, input, cell);
+            show_kept(vm, input);
+            Ok(())
+        }
+        1 => {
+            let loan = input::loan(&mut vm.heap, input, arguments)?;
+            wake_waiters(vm, input, loan)
+        }
+        _ => wake_waiters(vm, input, arguments),
+    }
+}
+
+/// Says outside how many signals an input keeps, if senders wait for room in it.
+pub(crate) fn show_kept(vm: &Vm, input: Value) {
+    if input::when_full(&vm.heap, input) != WhenFull::Wait {
+        return;
+    }
+    let name = vm.heap.slot_or_nil(input, event::NAME);
+    let name = vm.heap.symbol(name).map_or(name, |symbol| symbol.name);
+    if let Some(name) = vm.heap.string_text(name) {
+        vm.outside.inbox.note_kept(&name, input::size(&vm.heap, input));
+    }
+}
+
+/// Returns how many waits would get a signal of an input: none, one, or more than one.
+fn count_takers(vm: &mut Vm, input: Value) -> usize {
+    let (mut count, mut seen) = (0, 0);
+    let mut link = link::first(&vm.heap, input);
+    while link.is_true() && count < 2 {
+        count += usize::from(is_ready(vm, link::wait_of(&vm.heap, link)));
+        seen += 1;
+        link = link::next(&vm.heap, link);
+    }
+    vm.exchange.charge(seen);
+    count
+}
+
+/// Returns whether a wait for an input gets the next signal: one that keeps signals gets it only if its task
+/// is parked there, and otherwise takes it later.
+fn is_ready(vm: &Vm, wait: Value) -> bool {
+    let is_free = !link::keeps(&vm.heap, wait) || vm.scheduler.index_of_parked(&vm.heap, wait).is_some();
+    is_free && link::takes(&vm.heap, wait)
+}
+
+/// Hands a signal to those who wait for an event, and counts it.
+///
+/// # Errors
+/// [`Exit::Collect`] without room; then nothing has happened.
+fn wake_waiters(vm: &mut Vm, event: Value, arguments: Value) -> Result<(), Exit> {
     let any_event = vm.scheduler.any_event;
     let is_awaited = event::is_awaited(&vm.heap, event);
     let any_is_awaited = event::is_awaited(&vm.heap, any_event);
@@ -182,6 +245,12 @@ fn release_held(vm: &mut Vm) {
 /// signals gets the first of `cells`.
 fn hand_over(vm: &mut Vm, link: Value, signal: (Value, TaskNumber), arguments: Value, cells: &mut Value) {
     let wait = link::wait_of(&vm.heap, link);
+    if input::is_input(&vm.heap, signal.0) && link::takes(&vm.heap, wait) {
+        // What an input keeps is taken by the wait itself, when its task looks.
+        if !input::is_empty(&vm.heap, signal.0) || !is_ready(vm, wait) {
+            return;
+        }
+    }
     if link::keeps(&vm.heap, wait) {
         let cell = *cells;
         *cells = vm.heap.cdr(cell).unwrap_or(Value::NIL);
@@ -205,12 +274,8 @@ pub(super) fn keep(vm: &mut Vm, wait: Value, cell: Value, event: Value) {
 
 /// Makes the task runnable that is parked at this wait, if one is.
 fn wake_waiter(vm: &mut Vm, wait: Value, (event, by): (Value, TaskNumber)) {
-    let Some(index) = event::task_index(&vm.heap, link::owner(&vm.heap, wait)) else { return };
     let urgent = link::is_urgent(&vm.heap, wait);
-    if let Some(task) = vm.scheduler.tasks.at(index)
-        && task.state == TaskState::Waiting
-        && task.wait == wait
-    {
+    if let Some(index) = vm.scheduler.index_of_parked(&vm.heap, wait) {
         make_runnable(vm, index, urgent);
         if vm.watch.is_watched {
             report::tell_of_waking(vm, event, by, index);

@@ -82,8 +82,7 @@ fn fire_timers(vm: &mut Vm) {
 pub(crate) fn idle(vm: &mut Vm) -> bool {
     vm.outside.flush();
     let deadline = vm.scheduler.first_timer();
-    let awaited =
-        Awaited { input: !vm.scheduler.readers.is_empty(), news: !vm.outside.operations.is_empty() };
+    let awaited = Awaited { input: !vm.scheduler.readers.is_empty(), news: vm.outside.expects_news() };
     if deadline.is_none() && awaited == Awaited::default() {
         return false;
     }

@@ -38,7 +38,7 @@ use crate::heap::Heap;
 use crate::raise::{Exit, Outcome};
 use crate::task::{AccountId, LimitNumber, Serial, Task, TaskId, TaskIndex, TaskNumber, TaskState, Tasks};
 use crate::value::Value;
-use crate::wait::{Deliveries, link};
+use crate::wait::{Deliveries, event, input, link};
 
 /// Progress of ending all tasks, which takes several steps where there are many.
 #[derive(Clone, Debug)]
@@ -220,9 +220,34 @@ impl Scheduler {
         Err(Exit::Park)
     }
 
-    /// Closes a wait.
+    /// Closes a wait. A signal of an input that it has got, and not handed on, goes back to the input.
     pub(crate) fn close_wait(&mut self, heap: &mut Heap, wait: Value) {
         link::close(heap, &mut self.deliveries, wait);
+        if let Some(input) = input::give_back(heap, wait) {
+            self.wake_takers(heap, input);
+        }
+    }
+
+    /// Has the tasks that wait for an input look what it has kept.
+    #[cold]
+    fn wake_takers(&mut self, heap: &Heap, input: Value) {
+        let mut link = link::first(heap, input);
+        while link.is_true() {
+            let wait = link::wait_of(heap, link);
+            if let Some(index) = self.index_of_parked(heap, wait)
+                && link::takes(heap, wait)
+            {
+                self.make_runnable(index, false);
+            }
+            link = link::next(heap, link);
+        }
+    }
+
+    /// Returns the place of the task that is parked at this wait.
+    pub(crate) fn index_of_parked(&self, heap: &Heap, wait: Value) -> Option<TaskIndex> {
+        let index = event::task_index(heap, link::owner(heap, wait))?;
+        let task = self.tasks.at(index)?;
+        (task.state == TaskState::Waiting && task.wait == wait).then_some(index)
     }
 
     /// Closes the wait at which the running task was parked, because it will not go on there.

@@ -158,6 +158,28 @@ pub(crate) fn waited_for(heap: &Heap, wait: Value) -> (Vec<Value>, Value) {
     (events, link)
 }
 
+/// Returns whether a wait takes what an input has kept: whether it is for the signals themselves, and not to
+/// look at something again.
+pub(crate) fn takes(heap: &Heap, wait: Value) -> bool {
+    waited_for(heap, wait).1.is_nil()
+}
+
+/// Returns the signal that a wait has got and not handed on: the only one, or the first that it has kept.
+pub(crate) fn first_signal(heap: &Heap, wait: Value) -> Option<Value> {
+    if keeps(heap, wait) { heap.car(heap.car(heap.slot_or_nil(wait, QUEUE))?) } else { signalled(heap, wait) }
+}
+
+/// Has a wait forget what it has got.
+pub(crate) fn forget_signals(heap: &mut Heap, wait: Value) {
+    let queue = heap.slot_or_nil(wait, QUEUE);
+    if keeps(heap, wait) {
+        heap.set_car(queue, Value::NIL);
+        heap.set_cdr(queue, Value::NIL);
+    } else {
+        heap.slot_set(wait, QUEUE, Value::NIL);
+    }
+}
+
 /// Appends a link to the list of an event.
 fn append(heap: &mut Heap, link: Value, event: Value) {
     let last = heap.slot_or_nil(event, event::LAST);

@@ -4,6 +4,7 @@
 //! event | name | count | first | last |          task | as an event | state | result | checkpoints |
 //!                          |       +-----------------------------+
 //! operation | as an event | state | result | progress | number | performer |
+//! input | as an event | first kept | last kept | size | capacity | rule | dropped | room |
 //! link  | owner | event | previous | next | more | queue | deadline |
 //! ```
 //!
@@ -14,6 +15,7 @@
 
 mod delivery;
 pub(crate) mod event;
+pub(crate) mod input;
 pub(crate) mod link;
 pub(crate) mod operation;
 

@@ -66,6 +66,8 @@ define_known! {
     event = esl "EVENT";
     operation = esl "OPERATION";
     fail_as_host = esl "%FAIL-AS-HOST";
+    input = esl "INPUT";
+    room = keyword "ROOM";
     task = esl "TASK";
     restarts = esl "*RESTARTS*";
     recoveries = esl "*RECOVERIES*";
