@@ -589,6 +589,7 @@ macro_rules! define_opcodes {
 
         impl Opcode {
             /// Returns the opcode with this number, unless there is none.
+            #[inline(always)]
             pub const fn from_number(number: u8) -> Option<Opcode> {
                 match number {
                     $( $number => Some(Opcode::$name), )*
@@ -604,6 +605,7 @@ macro_rules! define_opcodes {
             }
 
             /// Length of the instruction in words: 1, or 2 with an aux word.
+            #[inline(always)]
             pub const fn words(self) -> usize {
                 match self {
                     $( Opcode::$name => 1 $( + (<$ty as Operand>::WIDTH == 32) as usize )*, )*
@@ -611,6 +613,7 @@ macro_rules! define_opcodes {
             }
 
             /// What becomes of a value put in place of the failed instruction.
+            #[inline(always)]
             pub const fn substitute(self) -> Substitute {
                 match self {
                     $( Opcode::$name => substitute!($($kind)+), )*
@@ -632,6 +635,7 @@ macro_rules! define_opcodes {
             }
 
             /// What it calls; `None` unless it is a call.
+            #[inline(always)]
             pub const fn callee(self) -> Option<CallTarget> {
                 match self {
                     $( Opcode::$name => callee!($($kind)+), )*

@@ -25,6 +25,7 @@ impl Word {
     }
 
     /// Returns the opcode, or `None` if the table has none with this number.
+    #[inline(always)]
     pub fn opcode(self) -> Option<Opcode> {
         Opcode::from_number(self.number())
     }

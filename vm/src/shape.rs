@@ -88,6 +88,12 @@ impl Shape {
             | u64::from(self.number) << 32
     }
 
+    /// Returns whether packed bits are those of instructions that are ready to run.
+    #[inline(always)]
+    pub(crate) fn is_bytecode(bits: u64) -> bool {
+        bits as u8 == Sort::Bytecode as u8
+    }
+
     /// Reads what [`Shape::pack`] made.
     pub(crate) fn unpack(bits: u64) -> Shape {
         let sort = match bits as u8 {

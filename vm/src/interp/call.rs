@@ -180,7 +180,9 @@ unsafe fn call_native(vm: &mut Vm, number: u16, arguments: *const [Value], place
         }
         Err(exit) => return Signal::Exit(exit),
     }
-    vm.cpu.ticks = vm.prepare_safepoint(vm.cpu.ticks);
+    if vm.wants_safepoint() {
+        vm.cpu.ticks = vm.prepare_safepoint(vm.cpu.ticks);
+    }
     // SAFETY: F1 holds by the contract; V3: the instruction of a `Window` has one in its frame.
     unsafe {
         match place {

@@ -6,7 +6,7 @@
 
 use super::constants_of;
 use crate::heap::layout::Code;
-use crate::shape::{Shape, Sort};
+use crate::shape::Shape;
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -20,7 +20,7 @@ const MOST_KEYS: usize = 23;
 /// parameters; `None` if the call has to take the slow way.
 ///
 /// # Safety
-/// `code` is the Code of a function; `registers` lie behind the window of a call in the running frame, which
+/// `code` is the Code of a function with bytecode; `registers` lie behind the window of a call in the running frame, which
 /// holds `count` arguments.
 #[cold]
 #[inline(never)]
@@ -37,8 +37,7 @@ pub(super) unsafe fn arrange(
         let (required, keys) = (usize::from(shape.required), usize::from(shape.number));
         let positional = required + usize::from(shape.optional);
         let others = count.saturating_sub(positional);
-        if shape.sort != Sort::Bytecode
-            || count < required
+        if count < required
             || others > MOST
             || (others > 0 && !shape.rest && !shape.takes_keys)
             // The registers may end behind the stack, where `add` has no meaning.

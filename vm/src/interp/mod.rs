@@ -58,6 +58,7 @@ use esl_bytecode::word::Word;
 use crate::cpu::Cpu;
 use crate::heap::layout::{Boxed, Code, Function, Kind, Structure, Symbol, Vector};
 use crate::raise::{Exit, Raised};
+use crate::shape::Shape;
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -519,7 +520,9 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             // As `enter!`, after the arguments have been put in the order of the function's parameters.
             macro_rules! enter_arranged {
                 ($window:expr, $function:expr, $code:expr, $return_to:expr) => {{
-                    if in_window::arrange(vm, $code, $window.add(2), word.b()).is_some() {
+                    if Shape::is_bytecode((*$code).spare[0])
+                        && in_window::arrange(vm, $code, $window.add(2), word.b()).is_some()
+                    {
                         enter!($window, $function, $code, $return_to);
                     }
                 }};
@@ -534,7 +537,9 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     {
                         replace_frame!(window, function, code, word.b());
                     }
-                    if let Some(parameters) = in_window::arrange(vm, code, window.add(2), word.b()) {
+                    if Shape::is_bytecode((*code).spare[0])
+                        && let Some(parameters) = in_window::arrange(vm, code, window.add(2), word.b())
+                    {
                         replace_frame!(window, function, code, parameters);
                     }
                 }};
