@@ -20,6 +20,7 @@ use esl_bytecode::file;
 use esl_bytecode::span::SourceId;
 use esl_bytecode::verify::verify;
 use esl_compiler::reader::decode;
+use esl_vm::host::Rights;
 use esl_vm::load::LoadError;
 
 /// The environment variable that names further folders, separated as in `PATH`.
@@ -113,6 +114,12 @@ impl ModulePath {
     /// Returns the folders.
     pub fn folders(&self) -> &[PathBuf] {
         &self.folders
+    }
+
+    /// Returns `rights`, with the right to read the modules in these folders.
+    #[must_use]
+    pub fn with_rights(&self, rights: Rights) -> Rights {
+        self.folders.iter().fold(rights, |rights, folder| rights.with_modules(folder.to_string_lossy()))
     }
 
     /// Reads the module of this name for a compilation: its source, or else the compiled file, from the first

@@ -935,6 +935,12 @@ macro_rules! for_each_builtin {
             /// The innermost `limit` frames, each a list of the function's name, and source, line and column
             /// if known. A function that has no name is `(lambda)`, a form at top level `NIL`.
             Backtrace = failure::backtrace, internal "%BACKTRACE" ("limit");
+            /// Takes away, until the scope around it ends, all rights but these: a list of lists of a keyword
+            /// and objects, strings; without objects for all of them. Nothing gives them back.
+            NarrowRights = rights::narrow_rights, internal "%NARROW-RIGHTS" ("rights");
+            /// Fails unless the program has a right, a keyword, to an object. What to use in its place: for a
+            /// path the one to which its links lead.
+            DemandRight = rights::demand_right, internal "%DEMAND-RIGHT" ("right object");
             /// Calls the embedder's function of this name, a symbol, with a list of arguments.
             CallHost = outside::call_host, internal "%CALL-HOST" ("name arguments");
             /// Begins the embedder's operation of this name, a symbol, with a list of arguments; its handle.
@@ -1127,7 +1133,7 @@ macro_rules! for_each_builtin {
             /// A handle of the compilation of a whole text, called `name` in what is said about it.
             BeginFile = eval::begin_file, internal "%BEGIN-FILE" ("name text");
             /// The functions that run the top-level forms of a compiled file, in order.
-            CompiledFile = eval::compiled_file, internal "%COMPILED-FILE" ("path");
+            CompiledFile = eval::compiled_file, internal "%COMPILED-FILE" ("path &optional is-module");
             /// A handle of a text that is compiled form by form. Functions of a text with a name know where
             /// they stand in it.
             OpenText = eval::open_text, internal "%OPEN-TEXT" ("text &optional name");
@@ -1171,9 +1177,10 @@ macro_rules! for_each_builtin {
             /// Closes a stream; with `abort`, what it has gathered is dropped. Whether it was open.
             CloseStream = stream::close, internal "%CLOSE" ("stream abort");
             /// The text of a file.
-            FileText = stream::file_text, internal "%FILE-TEXT" ("path");
-            /// Whether there is a file of this name.
-            FileExistsP = stream::file_exists_p, internal "%FILE-EXISTS-P" ("path");
+            FileText = stream::file_text, internal "%FILE-TEXT" ("path &optional is-module");
+            /// Whether there is a file of this name, which is to be read; with `T`, as a module, with anything
+            /// else, to be written.
+            FileExistsP = stream::file_exists_p, internal "%FILE-EXISTS-P" ("path &optional use");
             /// Removes a file.
             DeleteFile = stream::delete_file, internal "%DELETE-FILE" ("path");
             /// Whether `object` is a stream.

@@ -6,7 +6,7 @@
 use std::time::{Duration, Instant};
 
 use esl::Config;
-use esl::host::VirtualHost;
+use esl::host::{Rights, VirtualHost};
 use esl::program;
 use esl_bytecode::compile::{Compile, drive};
 use esl_bytecode::module::Module;
@@ -24,7 +24,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 fn machine() -> Vm {
     let config = Config { memory: 24 << 20, stack: 1 << 13, budget: Some(3 * TICKS), ..Config::default() };
-    let host = VirtualHost::new().with_output_limit(1 << 20).without_files();
+    let host = VirtualHost::new().with_output_limit(1 << 20).with_rights(Rights::none());
     program::machine(config, Box::new(host)).expect("there is room for the library")
 }
 

@@ -8,8 +8,8 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 use esl::Config;
-use esl::command::{self, NOT_COMPILED, ProgramFile, USAGE, complain};
-use esl::host::{FileAccess, ProcessSignal, RealHost};
+use esl::command::{self, NOT_COMPILED, ProgramFile, RightsOptions, USAGE, complain};
+use esl::host::{ProcessSignal, RealHost};
 use esl::module_path::ModulePath;
 use esl::program::{self, Ended, Modules, Program, Summary};
 use esl::timeline::Timeline;
@@ -104,6 +104,8 @@ struct MachineOptions {
     /// Most memory for the stack of a task, such as 16M
     #[arg(long, value_name = "SIZE", default_value = "512K", value_parser = command::parse_stack)]
     stack: usize,
+    #[command(flatten)]
+    rights: RightsOptions,
 }
 
 impl MachineOptions {
@@ -127,11 +129,10 @@ fn main() -> ExitCode {
             let path = ModulePath::new([file.as_path()], &library);
             run(&file, arguments, &options, stats, timeline.as_deref(), &trace, &path)
         }
-        Action::Repl { options } => esl::repl::run(
-            options.config(),
-            options.clock == ClockChoice::Virtual,
-            &ModulePath::new([Path::new("-")], &library),
-        ),
+        Action::Repl { options } => options.rights.rights().and_then(|rights| {
+            let path = ModulePath::new([Path::new("-")], &library);
+            esl::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)
+        }),
     };
     ExitCode::from(status.unwrap_or_else(|status| status))
 }
@@ -163,12 +164,13 @@ fn run(
     if let Some(timeline) = timeline {
         command::refuse_overwriting(timeline, [file])?;
     }
+    let rights = options.rights.rights()?;
     let program = program(file, path)?;
     let setup = |error| {
         complain(error);
         USAGE
     };
-    let mut host = RealHost::new(arguments).with_files(FileAccess::All);
+    let mut host = RealHost::new(arguments).with_rights(path.with_rights(rights));
     if options.clock == ClockChoice::Virtual {
         host = host.with_virtual_time();
     }

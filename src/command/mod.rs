@@ -12,6 +12,8 @@
 
 mod file;
 #[cfg(feature = "cli")]
+mod rights;
+#[cfg(feature = "cli")]
 mod signal;
 mod size;
 
@@ -23,6 +25,8 @@ use esl_compiler::diagnostic::{Format, Renderer};
 use crate::program::{Compiled, Ended};
 
 pub use file::{ProgramFile, read_program, read_source, refuse_overwriting};
+#[cfg(feature = "cli")]
+pub use rights::RightsOptions;
 #[cfg(feature = "cli")]
 pub use signal::{Interrupts, end_on_signal, interrupt_on_signal};
 pub use size::{SizeError, parse_size, parse_stack};

@@ -5,7 +5,7 @@ use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::span::Span;
 use esl_compiler::diagnostic::{Sources, code};
 use esl_compiler::session::{Compiler, Texts};
-use esl_vm::host::{FileAccess, RealHost};
+use esl_vm::host::{RealHost, Rights};
 use esl_vm::vm::{Config, Vm};
 
 use super::{Program, Source, machine, set_module_path};
@@ -77,10 +77,10 @@ fn compile_texts(texts: &mut Texts, path: &ModulePath) -> Compiled {
     Compiled { program, diagnostics, sources: texts.sources().clone() }
 }
 
-/// Returns the machine in which macros run. It may read the modules of `path`.
+/// Returns the machine in which macros run. It may read the modules of `path`, and nothing else.
 fn compile_time_machine(path: &ModulePath) -> Result<Vm, Error> {
-    let files = FileAccess::Under(path.folders().to_vec());
-    let mut machine = machine(Config::DEFAULT, Box::new(RealHost::new(Vec::new()).with_files(files)))?;
+    let host = RealHost::new(Vec::new()).with_rights(path.with_rights(Rights::none()));
+    let mut machine = machine(Config::DEFAULT, Box::new(host))?;
     set_module_path(&mut machine, path)?;
     Ok(machine)
 }

@@ -9,10 +9,11 @@
 //!
 //! ```
 //! use esl::Config;
+//! use esl::host::Rights;
 //! use esl::module_path::ModulePath;
 //!
 //! // Standard input ends at once here, and so does the session.
-//! let status = esl::repl::run(Config::default(), false, &ModulePath::none());
+//! let status = esl::repl::run(Config::default(), Rights::none(), false, &ModulePath::none());
 //! assert_eq!(status, Ok(0));
 //! ```
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "the REPL talks with people")]
@@ -27,7 +28,7 @@ use std::io::{IsTerminal, Write};
 use std::ops::ControlFlow::{self, Break, Continue};
 
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_vm::host::{FileAccess, Output, RealHost};
+use esl_vm::host::{Output, RealHost, Rights};
 use esl_vm::run::RunOutcome;
 use esl_vm::task::{TaskId, TaskResult};
 use esl_vm::value::Value;
@@ -45,12 +46,13 @@ const PROMPT: &str = "? ";
 /// Prompt for further lines of a form.
 const CONTINUATION: &str = "  ";
 
-/// Runs the REPL until the end of the input or `:quit`, with the modules of `path`. Returns the exit status.
+/// Runs the REPL until the end of the input or `:quit`, with these rights and the modules of `path`. Returns
+/// the exit status.
 ///
 /// # Errors
 /// The exit status, after a message, if the machine could not be made or standard input cannot be read.
-pub fn run(config: Config, virtual_time: bool, path: &ModulePath) -> Result<u8, u8> {
-    let mut host = RealHost::new(Vec::new()).with_files(FileAccess::All);
+pub fn run(config: Config, rights: Rights, virtual_time: bool, path: &ModulePath) -> Result<u8, u8> {
+    let mut host = RealHost::new(Vec::new()).with_rights(path.with_rights(rights));
     let is_interactive = std::io::stdin().is_terminal();
     let screen = PromptScreen::default();
     if is_interactive {

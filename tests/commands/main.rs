@@ -7,6 +7,7 @@ mod examples;
 mod folder;
 mod modules;
 mod real_time;
+mod rights;
 #[cfg(unix)]
 mod terminal;
 mod timeline;

@@ -17,7 +17,7 @@ use crate::heap::{AllocError, HeapConfig, HeapStats};
 use crate::host::{Host, Inbox, Incoming, Output, ProcessSignal};
 use crate::interp::start::make_starter;
 use crate::observe::Watch;
-use crate::outside::Outside;
+use crate::outside::{Given, Outside};
 use crate::raise::Exit;
 use crate::schedule::{Choices, Clock, Scheduler};
 use crate::task::TaskId;
@@ -28,7 +28,7 @@ use crate::wait::event;
 use crate::world::{World, class};
 
 pub use crate::datum::DatumError as ExportError;
-pub use crate::outside::{DataFunction, HostFunction};
+pub use crate::outside::{DataFunction, HostFunction, Need};
 
 /// Reason why a function of the library could not be called.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -147,7 +147,12 @@ impl Vm {
     /// Adds a function of the embedder's, which `%call-host` or `%begin-operation` reach by its name, in
     /// place of an earlier one of this name.
     pub fn add_host_function(&mut self, name: &str, function: HostFunction) {
-        self.outside.functions.insert(name.into(), function);
+        self.add_guarded_function(name, function, &[]);
+    }
+
+    /// As [`Vm::add_host_function`]; a call fails unless the program has the rights that the function needs.
+    pub fn add_guarded_function(&mut self, name: &str, function: HostFunction, needs: &[Need]) {
+        self.outside.functions.insert(name.into(), Given { function, needs: needs.to_vec() });
     }
 
     /// Returns a value as data. Objects that no data stands for, such as functions and hash tables, become a

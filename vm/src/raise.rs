@@ -8,6 +8,7 @@
 use smallvec::{SmallVec, smallvec};
 
 use crate::heap::{AllocError, Heap};
+use crate::host::Right;
 use crate::value::Value;
 use crate::world::World;
 use crate::world::load::LoadError;
@@ -67,6 +68,8 @@ pub enum Raised {
     Simple(String),
     /// A failure of the given cause (a keyword's name) and one argument.
     Cause(&'static str, Value),
+    /// `:permission-denied`: the right, its object, and the flag that would grant it, if one would.
+    Denied(Right, String, Option<String>),
     /// A failure of the given cause without arguments.
     Failure(&'static str),
     /// The task's stack has reached its limit.
@@ -201,6 +204,15 @@ impl Raised {
                 ("PACKAGE-ERROR", smallvec![heap.alloc_str(name)?, heap.alloc_str(text)?])
             }
             Raised::Cause(cause, argument) => ("CAUSE", smallvec![world.keyword(heap, cause)?, *argument]),
+            Raised::Denied(right, object, flag) => {
+                let right = world.keyword(heap, &right.name().to_uppercase())?;
+                let object = heap.alloc_str(object)?;
+                let flag = match flag {
+                    Some(flag) => heap.alloc_str(flag)?,
+                    None => Value::NIL,
+                };
+                ("PERMISSION-DENIED", smallvec![right, object, flag])
+            }
             Raised::Failure(cause) => (cause, smallvec![]),
             Raised::StackExhausted => ("STACK-EXHAUSTED", smallvec![]),
             Raised::HeapExhausted => ("HEAP-EXHAUSTED", smallvec![]),

@@ -123,7 +123,7 @@ state! {
         content { symbols }
         course { fresh, packages, package_objects, classes, is_open, images, undefined_yet }
         transient { is_defining }
-        derived { known, names, homes, runner, streams, nil, t, undefined }
+        derived { known, names, homes, runner, streams, nil, t, rights, undefined }
     }
 }
 

@@ -25,7 +25,8 @@ use esl_bytecode::span::Span;
 use esl_bytecode::verify::verify;
 
 use crate::builtins::expect::optional;
-use crate::builtins::stream::{Then, file_error, more_input, skip_source, source};
+use crate::builtins::rights::demand;
+use crate::builtins::stream::{Then, file_error, more_input, right_to, skip_source, source};
 use crate::builtins::symbol::{designated_text, text_between, text_of};
 use crate::compiler::{ActiveCompilation, Compiler, CompilerJob, FormText, JobId};
 use crate::datum::Unit;
@@ -233,7 +234,8 @@ pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = text_of(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "STRING");
     };
-    let bytes = match vm.outside.host.read_file(&path) {
+    let permitted = demand(vm, right_to(arguments), &path)?;
+    let bytes = match vm.outside.host.read_file(&permitted) {
         Ok(bytes) => bytes,
         Err(error) => return file_error(&mut vm.exchange, "read", &path, &error),
     };

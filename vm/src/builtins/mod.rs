@@ -76,6 +76,7 @@ mod operation;
 mod outside;
 mod package;
 mod print;
+mod rights;
 mod search;
 mod sequence;
 pub(crate) mod stream;

@@ -1,19 +1,21 @@
 //! Operations: beginning and cancelling them, and what has become of them.
 
+use crate::builtins::rights::demand;
 use crate::builtins::task::expect_task;
 use crate::datum;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::operation;
-use esl_bytecode::datum::Datum;
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::span::Span;
 
 use super::expect::exactly;
 
 /// Returns the name of a function of the host, and its arguments, from a symbol and a list.
 ///
 /// # Errors
-/// A failure if an argument is no data.
+/// A failure if an argument is no data, or if the program does not have a right that the function needs.
 pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(String, Vec<Datum>), Exit> {
     let (name, arguments) = (call[0], call[1]);
     let name = vm.heap.symbol(name).and_then(|symbol| vm.heap.string_text(symbol.name));
@@ -29,7 +31,14 @@ pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(String, Vec<Datu
         }
         rest = pair.cdr;
     }
-    Ok((name.unwrap_or_default(), data))
+    let name = name.unwrap_or_default();
+    for need in vm.outside.needs(&name) {
+        if let Some(DatumKind::String(object)) = data.get(need.argument).map(Datum::kind) {
+            let permitted = demand(vm, need.right, &object.to_string())?;
+            data[need.argument] = Datum::string(&permitted, Span::default());
+        }
+    }
+    Ok((name, data))
 }
 
 /// Returns the handle of an operation that `v` is.

@@ -3,7 +3,9 @@
 
 use esl_bytecode::datum::Datum;
 
-use super::{Awaited, Failure, Host, HostError, Inbox, Incoming, Input, Output, Wake, WriteMode};
+use super::{
+    Awaited, Failure, Host, HostError, Inbox, Incoming, Input, Output, Permit, Right, Rights, Wake, WriteMode,
+};
 use crate::canary::Canary;
 
 /// Questions to a host.
@@ -25,6 +27,7 @@ enum Question {
     DeleteFile,
     Call,
     Begin,
+    Permit,
 }
 
 /// A machine's host, and the canary of the questions that it was asked.
@@ -127,6 +130,12 @@ impl Host for Asked {
         self.host.is_interactive()
     }
 
+    fn permit(&mut self, right: Right, object: &str, narrowed: &[Rights]) -> Permit {
+        self.note_bytes(Question::Permit, object.as_bytes());
+        self.canary.mix(right as u64);
+        self.host.permit(right, object, narrowed)
+    }
+
     fn read_file(&mut self, path: &str) -> Result<Vec<u8>, HostError> {
         self.note_bytes(Question::ReadFile, path.as_bytes());
         self.host.read_file(path)
@@ -200,6 +209,8 @@ mod tests {
             canary(|host| _ = host.write_file("a", b"b", WriteMode::Append)),
             canary(|host| _ = host.file_exists("a")),
             canary(|host| _ = host.delete_file("a")),
+            canary(|host| _ = host.permit(Right::Read, "a", &[])),
+            canary(|host| _ = host.permit(Right::Write, "a", &[])),
             canary(|host| host.begin("a", &[], &mut |_| {})),
             canary(|host| host.begin("b", &[], &mut |_| {})),
         ];

@@ -8,8 +8,9 @@
 //! Not here: when the host is asked. The machine asks whether timers are due, and looks into the inbox,
 //! between two turns.
 //!
-//! A host decides what it makes available. File access is a grant: [`VirtualHost`] has only the files that it
-//! was given.
+//! A host decides what it makes available. What a program may reach is granted ([`Rights`]): the machine asks
+//! for a permit before each request that needs a right, and the host carries out what it is asked for then.
+//! [`VirtualHost`] has only the files that it was given.
 
 use std::fmt;
 
@@ -22,6 +23,7 @@ mod inbox;
 mod operation;
 mod real;
 mod record;
+mod rights;
 mod signal;
 mod virtual_host;
 
@@ -31,8 +33,9 @@ pub use door::{SendError, Sender};
 pub use inbox::{Inbox, Incoming};
 pub(crate) use operation::Canceller;
 pub use operation::{Failure, News, Operation};
-pub use real::{FileAccess, RealHost, Screen};
+pub use real::{RealHost, Screen};
 pub use record::{Record, Recording, RecordingHost, ReplayHost};
+pub use rights::{Permit, Right, Rights};
 pub use signal::ProcessSignal;
 pub use virtual_host::{Captured, VirtualHost};
 
@@ -79,7 +82,7 @@ pub enum HostError {
     BrokenPipe,
     /// There is no such file.
     NotFound,
-    /// The host, or the system, does not grant access.
+    /// The system does not grant access.
     Refused,
     /// The file exists already.
     Exists,
@@ -92,7 +95,7 @@ impl fmt::Display for HostError {
         match self {
             HostError::BrokenPipe => f.write_str("nobody reads the other end"),
             HostError::NotFound => f.write_str("there is no such file"),
-            HostError::Refused => f.write_str("access is not granted"),
+            HostError::Refused => f.write_str("the system does not grant access"),
             HostError::Exists => f.write_str("the file exists already"),
             HostError::Other(text) => f.write_str(text),
         }
@@ -176,25 +179,29 @@ pub trait Host {
         false
     }
 
+    /// Returns whether the program has a right to an object, where `narrowed` are in force beside the rights
+    /// of the run.
+    fn permit(&mut self, right: Right, object: &str, narrowed: &[Rights]) -> Permit;
+
     /// Returns the whole contents of a file.
     ///
     /// # Errors
-    /// [`HostError`], and [`HostError::Refused`] if the embedder does not grant it.
+    /// [`HostError`].
     fn read_file(&mut self, path: &str) -> Result<Vec<u8>, HostError>;
 
     /// Writes `bytes` to a file.
     ///
     /// # Errors
-    /// [`HostError`], and [`HostError::Refused`] if the embedder does not grant it.
+    /// [`HostError`].
     fn write_file(&mut self, path: &str, bytes: &[u8], mode: WriteMode) -> Result<(), HostError>;
 
-    /// Returns whether there is a file of this name that the program may know of.
+    /// Returns whether there is a file of this name.
     fn file_exists(&mut self, path: &str) -> bool;
 
     /// Removes a file.
     ///
     /// # Errors
-    /// [`HostError`], and [`HostError::Refused`] if the embedder does not grant it.
+    /// [`HostError`].
     fn delete_file(&mut self, path: &str) -> Result<(), HostError>;
 
     /// Has a function of the embedder's called, and returns its result.

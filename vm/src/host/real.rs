@@ -5,24 +5,15 @@
 //! system.
 
 use std::io::{Read, Write};
-use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use super::{Awaited, Host, HostError, Inbox, Incoming, Input, Output, VIRTUAL_BEGINNING, Wake, WriteMode};
-
-/// Which files a program may read and write.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub enum FileAccess {
-    /// No files.
-    #[default]
-    None,
-    /// Files in these directories and below.
-    Under(Vec<PathBuf>),
-    /// All files that the system lets the process read and write.
-    All,
-}
+use super::rights::{permit, resolve};
+use super::{
+    Awaited, Host, HostError, Inbox, Incoming, Input, Output, Permit, Right, Rights, VIRTUAL_BEGINNING, Wake,
+    WriteMode,
+};
 
 /// Receives the bytes written by a program.
 pub type Screen = Box<dyn FnMut(&[u8]) -> std::io::Result<()> + Send>;
@@ -42,7 +33,7 @@ impl Arrived {
 pub struct RealHost {
     start: Instant,
     arguments: Vec<String>,
-    files: FileAccess,
+    rights: Rights,
     inbox: Inbox,
     input: Arrived,
     /// Requests a chunk from the reading thread, which is started at the first request.
@@ -55,12 +46,12 @@ pub struct RealHost {
 }
 
 impl RealHost {
-    /// Creates a host with these arguments for the program, and without access to files.
+    /// Creates a host with these arguments for the program, which grants no rights.
     pub fn new(arguments: Vec<String>) -> RealHost {
         RealHost {
             start: Instant::now(),
             arguments,
-            files: FileAccess::None,
+            rights: Rights::none(),
             inbox: Inbox::new(),
             input: Arrived::default(),
             reader: None,
@@ -77,10 +68,10 @@ impl RealHost {
         self
     }
 
-    /// Grants access to files.
+    /// Grants rights, in place of those before.
     #[must_use]
-    pub fn with_files(mut self, files: FileAccess) -> RealHost {
-        self.files = files;
+    pub fn with_rights(mut self, rights: Rights) -> RealHost {
+        self.rights = rights;
         self
     }
 
@@ -117,37 +108,6 @@ impl RealHost {
             }
         }
         self.is_reading = self.reader.as_ref().is_some_and(|reader| reader.send(()).is_ok());
-    }
-
-    fn check(&self, path: &str, must_exist: bool) -> Result<PathBuf, HostError> {
-        let directories = match &self.files {
-            FileAccess::None => return Err(HostError::Refused),
-            FileAccess::All => return Ok(path.into()),
-            FileAccess::Under(directories) => directories,
-        };
-        let full = resolve(Path::new(path), must_exist)?;
-        let is_granted = directories.iter().any(|directory| {
-            std::fs::canonicalize(directory).is_ok_and(|directory| full.starts_with(directory))
-        });
-        if is_granted { Ok(full) } else { Err(HostError::Refused) }
-    }
-}
-
-/// Returns the path without links and dots, so that no link leads out of the granted directories.
-fn resolve(path: &Path, must_exist: bool) -> Result<PathBuf, HostError> {
-    match std::fs::canonicalize(path) {
-        Ok(full) => Ok(full),
-        Err(error) if must_exist || error.kind() != std::io::ErrorKind::NotFound => Err(error_of(&error)),
-        // A write would follow a dangling link to a place that was not checked.
-        Err(_) if path.symlink_metadata().is_ok() => Err(HostError::Refused),
-        Err(_) => {
-            let name = path.file_name().ok_or(HostError::NotFound)?;
-            let parent = match path.parent() {
-                Some(parent) if !parent.as_os_str().is_empty() => parent,
-                _ => Path::new("."),
-            };
-            Ok(std::fs::canonicalize(parent).map_err(|error| error_of(&error))?.join(name))
-        }
     }
 }
 
@@ -277,13 +237,15 @@ impl Host for RealHost {
         std::io::IsTerminal::is_terminal(&std::io::stdout())
     }
 
+    fn permit(&mut self, right: Right, object: &str, narrowed: &[Rights]) -> Permit {
+        permit(&self.rights, narrowed, right, object, &resolve)
+    }
+
     fn read_file(&mut self, path: &str) -> Result<Vec<u8>, HostError> {
-        let path = self.check(path, true)?;
         std::fs::read(path).map_err(|error| error_of(&error))
     }
 
     fn write_file(&mut self, path: &str, bytes: &[u8], mode: WriteMode) -> Result<(), HostError> {
-        let path = self.check(path, false)?;
         let mut options = std::fs::OpenOptions::new();
         match mode {
             WriteMode::Replace => options.write(true).create(true).truncate(true),
@@ -295,11 +257,10 @@ impl Host for RealHost {
     }
 
     fn file_exists(&mut self, path: &str) -> bool {
-        self.check(path, true).is_ok_and(|path| path.is_file())
+        std::path::Path::new(path).is_file()
     }
 
     fn delete_file(&mut self, path: &str) -> Result<(), HostError> {
-        let path = self.check(path, true)?;
         std::fs::remove_file(path).map_err(|error| error_of(&error))
     }
 
@@ -332,23 +293,24 @@ mod tests {
     }
 
     #[test]
-    fn files_outside_of_the_grant_are_refused() {
+    fn files_are_reached_by_what_was_permitted() {
         let directory = std::env::temp_dir().join(format!("esl-host-{}", std::process::id()));
         let inside = directory.join("inside");
         std::fs::create_dir_all(&inside).unwrap();
+        let rights = Rights::none().with(Right::Write, inside.to_str().unwrap());
+        let mut host = RealHost::new(Vec::new()).with_rights(rights);
         let path = |name: &str| directory.join(name).to_str().unwrap().to_owned();
-        let mut none = RealHost::new(Vec::new());
-        assert_eq!(none.write_file(&path("inside/x"), b"x", WriteMode::Replace), Err(HostError::Refused));
-
-        let mut host = RealHost::new(Vec::new()).with_files(FileAccess::Under(vec![inside]));
-        assert_eq!(host.write_file(&path("inside/x"), b"one", WriteMode::Create), Ok(()));
-        assert_eq!(host.write_file(&path("inside/x"), b"two", WriteMode::Append), Ok(()));
-        assert_eq!(host.read_file(&path("inside/x")), Ok(b"onetwo".to_vec()));
-        assert_eq!(host.write_file(&path("inside/x"), b"", WriteMode::Create), Err(HostError::Exists));
-        assert_eq!(host.write_file(&path("inside/../y"), b"", WriteMode::Create), Err(HostError::Refused));
+        let mut permitted = |name: &str| host.permit(Right::Write, &path(name), &[]);
+        let Permit::Granted(x) = permitted("inside/x") else { panic!("it is inside") };
+        assert_eq!(permitted("inside/../y"), Permit::NotGranted);
+        assert_eq!(RealHost::new(Vec::new()).permit(Right::Write, &x, &[]), Permit::NotGranted);
+        assert_eq!(host.write_file(&x, b"one", WriteMode::Create), Ok(()));
+        assert_eq!(host.write_file(&x, b"two", WriteMode::Append), Ok(()));
+        assert_eq!(host.read_file(&x), Ok(b"onetwo".to_vec()));
+        assert_eq!(host.write_file(&x, b"", WriteMode::Create), Err(HostError::Exists));
         assert_eq!(host.read_file(&path("inside/none")), Err(HostError::NotFound));
-        assert!(host.file_exists(&path("inside/x")) && !host.file_exists(&path("inside/none")));
-        assert_eq!(host.delete_file(&path("inside/x")), Ok(()));
+        assert!(host.file_exists(&x) && !host.file_exists(&path("inside/none")));
+        assert_eq!(host.delete_file(&x), Ok(()));
         std::fs::remove_dir_all(&directory).unwrap();
     }
 }

@@ -14,7 +14,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 
-use super::{Awaited, Captured, Failure, Host, HostError, Inbox, Incoming, Input, Output, Wake, WriteMode};
+use super::{
+    Awaited, Captured, Failure, Host, HostError, Inbox, Incoming, Input, Output, Permit, Right, Rights, Wake,
+    WriteMode,
+};
 
 /// Defines [`Record`] and, for each kind of answer, how it is recorded and replayed.
 macro_rules! define_records {
@@ -71,6 +74,8 @@ define_records! {
     Read(Input);
     /// Whether a person watches standard output.
     Interactive(bool);
+    /// Whether a right is granted.
+    Permitted(Permit);
     /// Contents of a file.
     FileRead(Result<Vec<u8>, HostError>);
     /// Whether a file exists.
@@ -177,6 +182,11 @@ impl<H: Host> Host for RecordingHost<H> {
 
     fn is_interactive(&mut self) -> bool {
         let answer = Interactive(self.host.is_interactive());
+        self.note(answer).0
+    }
+
+    fn permit(&mut self, right: Right, object: &str, narrowed: &[Rights]) -> Permit {
+        let answer = Permitted(self.host.permit(right, object, narrowed));
         self.note(answer).0
     }
 
@@ -339,6 +349,10 @@ impl Host for ReplayHost {
 
     fn is_interactive(&mut self) -> bool {
         self.next::<Interactive>().is_some_and(|answer| answer.0)
+    }
+
+    fn permit(&mut self, _right: Right, _object: &str, _narrowed: &[Rights]) -> Permit {
+        self.next::<Permitted>().map_or(Permit::NotGranted, |answer| answer.0)
     }
 
     fn read_file(&mut self, _path: &str) -> Result<Vec<u8>, HostError> {

@@ -3,7 +3,11 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::{Awaited, Host, HostError, Inbox, Incoming, Input, Output, VIRTUAL_BEGINNING, Wake, WriteMode};
+use super::rights::{permit, resolve_as_text};
+use super::{
+    Awaited, Host, HostError, Inbox, Incoming, Input, Output, Permit, Right, Rights, VIRTUAL_BEGINNING, Wake,
+    WriteMode,
+};
 
 /// The output of a program and its files, shared between a [`VirtualHost`] and its observers.
 #[derive(Clone, Default)]
@@ -46,8 +50,8 @@ impl Captured {
     }
 }
 
-/// A host in memory. Time passes only when the program waits or the host is told so.
-#[derive(Default)]
+/// A host in memory. Time passes only when the program waits or the host is told so. It grants all rights
+/// unless it is told otherwise, since there is nothing real behind it.
 pub struct VirtualHost {
     now: u64,
     /// Nanoseconds from the usual beginning of virtual time to this host's.
@@ -61,7 +65,24 @@ pub struct VirtualHost {
     captured: Captured,
     /// Number of bytes that may still be written to standard output before it breaks.
     output_limit: Option<usize>,
-    refuses_files: bool,
+    rights: Rights,
+}
+
+impl Default for VirtualHost {
+    fn default() -> VirtualHost {
+        VirtualHost {
+            now: 0,
+            wall_clock_offset: 0,
+            seed: 0,
+            arguments: Vec::new(),
+            input: VecDeque::new(),
+            inbox: Inbox::new(),
+            arrivals: VecDeque::new(),
+            captured: Captured::default(),
+            output_limit: None,
+            rights: Rights::all(),
+        }
+    }
 }
 
 impl VirtualHost {
@@ -139,15 +160,11 @@ impl VirtualHost {
         self
     }
 
-    /// Refuses all access to files.
+    /// Grants these rights only.
     #[must_use]
-    pub fn without_files(mut self) -> VirtualHost {
-        self.refuses_files = true;
+    pub fn with_rights(mut self, rights: Rights) -> VirtualHost {
+        self.rights = rights;
         self
-    }
-
-    fn check_files(&self) -> Result<(), HostError> {
-        if self.refuses_files { Err(HostError::Refused) } else { Ok(()) }
     }
 }
 
@@ -213,13 +230,15 @@ impl Host for VirtualHost {
         self.input.pop_front().map_or(Input::End, Input::Data)
     }
 
+    fn permit(&mut self, right: Right, object: &str, narrowed: &[Rights]) -> Permit {
+        permit(&self.rights, narrowed, right, object, &resolve_as_text)
+    }
+
     fn read_file(&mut self, path: &str) -> Result<Vec<u8>, HostError> {
-        self.check_files()?;
         self.captured.file(path).ok_or(HostError::NotFound)
     }
 
     fn write_file(&mut self, path: &str, bytes: &[u8], mode: WriteMode) -> Result<(), HostError> {
-        self.check_files()?;
         let mut contents = self.captured.contents();
         if mode == WriteMode::Create && contents.files.contains_key(path) {
             return Err(HostError::Exists);
@@ -233,11 +252,10 @@ impl Host for VirtualHost {
     }
 
     fn file_exists(&mut self, path: &str) -> bool {
-        !self.refuses_files && self.captured.contents().files.contains_key(path)
+        self.captured.contents().files.contains_key(path)
     }
 
     fn delete_file(&mut self, path: &str) -> Result<(), HostError> {
-        self.check_files()?;
         self.captured.contents().files.remove(path).map(|_| ()).ok_or(HostError::NotFound)
     }
 
@@ -287,6 +305,6 @@ mod tests {
         assert_eq!(host.read_file("a"), Ok(b"3".to_vec()));
         assert_eq!(host.delete_file("a"), Ok(()));
         assert!(!host.file_exists("a"));
-        assert_eq!(VirtualHost::new().without_files().read_file("a"), Err(HostError::Refused));
+        assert_eq!(host.permit(Right::Read, "./b/../a", &[]), Permit::Granted("a".into()));
     }
 }

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use esl_bytecode::datum::Datum;
 
-use crate::host::{Asked, Canceller, Console, Failure, Host, Inbox, Operation, Output};
+use crate::host::{Asked, Canceller, Console, Failure, Host, Inbox, Operation, Output, Right};
 use crate::value::Value;
 pub(crate) use operations::Operations;
 
@@ -22,6 +22,22 @@ pub enum HostFunction {
     Operation(Box<dyn FnMut(Operation) + Send>),
 }
 
+/// A right that a function of the embedder's needs: to the text that is this argument of a call. The function
+/// is given what was permitted in its place. An argument that is no text needs none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Need {
+    /// The right.
+    pub right: Right,
+    /// Index of the argument.
+    pub argument: usize,
+}
+
+/// A function of the embedder's, and what it needs.
+pub(crate) struct Given {
+    pub(crate) function: HostFunction,
+    pub(crate) needs: Vec<Need>,
+}
+
 /// Everything through which a machine reaches the outside.
 pub(crate) struct Outside {
     /// Clocks, files and streams.
@@ -31,7 +47,7 @@ pub(crate) struct Outside {
     /// The standard streams, buffered.
     pub(crate) console: Console,
     /// The embedder's functions, by name.
-    pub(crate) functions: BTreeMap<String, HostFunction>,
+    pub(crate) functions: BTreeMap<String, Given>,
     /// Answer of one of them, while there is no room for it in the heap.
     pub(crate) answer: Option<Result<Datum, Failure>>,
     /// The operations under way.
@@ -65,7 +81,7 @@ impl Outside {
 
     /// Calls a function of the embedder's that returns at once; `None` if there is none of this name.
     pub(crate) fn call(&mut self, name: &str, arguments: &[Datum]) -> Option<Result<Datum, Failure>> {
-        match self.functions.get_mut(name)? {
+        match &mut self.functions.get_mut(name)?.function {
             HostFunction::AtOnce(function) => Some(self.host.call(name, arguments, function)),
             HostFunction::Operation(_) => None,
         }
@@ -73,7 +89,12 @@ impl Outside {
 
     /// Returns whether the embedder has an operation of this name.
     pub(crate) fn has_operation(&self, name: &str) -> bool {
-        matches!(self.functions.get(name), Some(HostFunction::Operation(_)))
+        self.functions.get(name).is_some_and(|given| matches!(given.function, HostFunction::Operation(_)))
+    }
+
+    /// Returns the rights that a function of the embedder's needs.
+    pub(crate) fn needs(&self, name: &str) -> Vec<Need> {
+        self.functions.get(name).map_or(Vec::new(), |given| given.needs.clone())
     }
 
     /// Begins an operation of the embedder's.
@@ -84,7 +105,8 @@ impl Outside {
         handle: Value,
         is_detached: bool,
     ) {
-        let Some(HostFunction::Operation(function)) = self.functions.get_mut(name) else { return };
+        let Some(given) = self.functions.get_mut(name) else { return };
+        let HostFunction::Operation(function) = &mut given.function else { return };
         let canceller = Canceller::default();
         self.operations.begin(handle, canceller.clone(), is_detached);
         let number = self.operations.begun;

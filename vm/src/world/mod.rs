@@ -90,6 +90,8 @@ pub(crate) struct World {
     pub(crate) nil: Value,
     /// The companion of `T`.
     pub(crate) t: Value,
+    /// Symbol that no program can name: bound to the rights that forms have narrowed, see `builtins::rights`.
+    pub(crate) rights: Value,
     /// Code of every symbol without a function.
     pub(crate) undefined: Value,
     /// Symbols with an object to which the images' definitions have not been applied.
@@ -123,6 +125,7 @@ impl World {
             streams: [Value::NIL; 3],
             nil: Value::NIL,
             t: Value::NIL,
+            rights: Value::NIL,
             undefined,
             undefined_yet: Vec::new(),
             is_defining: false,
@@ -133,6 +136,8 @@ impl World {
         world.t = world.make_constant(heap, &Symbol::cl("T"), Value::T)?;
         world.known = Known::intern(&mut world, heap)?;
         world.streams = stream::standard_streams(heap)?;
+        let name = heap.alloc_str("RIGHTS")?;
+        world.rights = world.make_symbol(heap, name, Value::NIL, 0)?;
         let [input, output, error] = world.streams;
         let package = world.package_object(heap, PackageId::USER)?;
         for (variable, value) in [
@@ -347,7 +352,7 @@ impl World {
     /// Calls `visit` with every object that the world keeps alive.
     pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
         self.known.visit(visit);
-        [self.nil, self.t, self.undefined, self.runner].into_iter().for_each(&mut *visit);
+        [self.nil, self.t, self.rights, self.undefined, self.runner].into_iter().for_each(&mut *visit);
         self.streams.into_iter().for_each(&mut *visit);
         self.symbols.values().copied().for_each(&mut *visit);
         self.package_objects.values().copied().for_each(&mut *visit);

@@ -27,8 +27,10 @@ pub(crate) mod slot {
     pub(crate) const FULL: usize = 7;
     /// Number of characters in the full strings.
     pub(crate) const BEFORE: usize = 8;
+    /// Path that is written to: the one that was permitted.
+    pub(crate) const PATH: usize = 9;
     /// Number of slots.
-    pub(crate) const LEN: usize = 9;
+    pub(crate) const LEN: usize = 10;
 }
 
 /// Source or destination of a stream.

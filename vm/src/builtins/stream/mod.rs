@@ -9,12 +9,13 @@ use smallvec::SmallVec;
 
 use crate::builtins::expect::optional;
 use crate::builtins::list::list_items;
+use crate::builtins::rights::demand;
 use crate::builtins::symbol::{text_between, text_of};
 use crate::builtins::{COPY_LIMIT, LIMIT};
 use crate::equality::characters_of;
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Kind};
-use crate::host::{Host, HostError, Output, Taken, WriteMode, column_after, encode};
+use crate::host::{Host, HostError, Output, Right, Taken, WriteMode, column_after, encode};
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::run;
 use crate::task::End;
@@ -215,12 +216,12 @@ fn write_out(vm: &mut Vm, stream: Value) -> Result<(), Exit> {
     let mut bytes = Vec::new();
     encode(vm.heap.string(buffer).map_or(&[], |all| &all[..position]), &mut bytes);
     let mode = write_mode(stream_index(&vm.heap, stream, slot::MODE));
-    let name = text_of(&vm.heap, stream_slot(&vm.heap, stream, slot::NAME)).unwrap_or_default();
+    let path = text_of(&vm.heap, stream_slot(&vm.heap, stream, slot::PATH)).unwrap_or_default();
     // What cannot be written is not tried again: the next block would fail too, and closing has to
     // succeed.
     set_stream_slot(&mut vm.heap, stream, slot::POSITION, Value::small(0));
     set_stream_slot(&mut vm.heap, stream, slot::MODE, Value::small(1));
-    match vm.outside.host.write_file(&name, &bytes, mode) {
+    match vm.outside.host.write_file(&path, &bytes, mode) {
         Ok(()) => Ok(()),
         Err(error) => vm.exchange.raise(Raised::Stream(stream, format!("it cannot be written: {error}"))),
     }
@@ -413,7 +414,7 @@ pub(super) fn open_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = text_of(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "STRING");
     };
-    let buffer = file_text(vm, arguments)?;
+    let buffer = file_text(vm, &arguments[..1])?;
     let length = vm.heap.string(buffer).map_or(0, <[u32]>::len);
     let stream = make_stream(&mut vm.heap, StreamKind::StringInput, buffer, 0, length)?;
     let name = vm.heap.alloc_str(&path)?;
@@ -429,8 +430,11 @@ pub(super) fn open_output(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let stream = make_stream(&mut vm.heap, StreamKind::FileOutput, buffer, 0, 0)?;
     let name = vm.heap.alloc_str(&path)?;
     set_stream_slot(&mut vm.heap, stream, slot::NAME, name);
+    let permitted = demand(vm, Right::Write, &path)?;
+    let target = vm.heap.alloc_str(&permitted)?;
+    set_stream_slot(&mut vm.heap, stream, slot::PATH, target);
     // Nothing is written at once, so that a file that cannot be made fails here.
-    match vm.outside.host.write_file(&path, &[], write_mode(mode)) {
+    match vm.outside.host.write_file(&permitted, &[], write_mode(mode)) {
         Ok(()) => {
             set_stream_slot(&mut vm.heap, stream, slot::MODE, Value::small(1));
             Ok(stream)
@@ -470,11 +474,22 @@ pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::T)
 }
 
+/// Returns the right that is needed for the file of the first argument: to read it, as a module if the second
+/// one is `T`, to write it if it is anything else.
+pub(super) fn right_to(arguments: &[Value]) -> Right {
+    match optional(arguments, 1) {
+        Value::NIL => Right::Read,
+        Value::T => Right::Module,
+        _ => Right::Write,
+    }
+}
+
 pub(super) fn file_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = text_of(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "STRING");
     };
-    match vm.outside.host.read_file(&path) {
+    let permitted = demand(vm, right_to(arguments), &path)?;
+    match vm.outside.host.read_file(&permitted) {
         Ok(bytes) => {
             vm.exchange.charge_elements(bytes.len());
             Ok(vm.heap.alloc_str(&String::from_utf8_lossy(&bytes))?)
@@ -487,14 +502,16 @@ pub(super) fn file_exists_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = text_of(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "STRING");
     };
-    Ok(Value::boolean(vm.outside.host.file_exists(&path)))
+    let permitted = demand(vm, right_to(arguments), &path)?;
+    Ok(Value::boolean(vm.outside.host.file_exists(&permitted)))
 }
 
 pub(super) fn delete_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = text_of(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "STRING");
     };
-    match vm.outside.host.delete_file(&path) {
+    let permitted = demand(vm, Right::Write, &path)?;
+    match vm.outside.host.delete_file(&permitted) {
         Ok(()) => Ok(Value::T),
         Err(error) => file_error(&mut vm.exchange, "deleted", &path, &error),
     }

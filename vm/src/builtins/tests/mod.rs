@@ -226,6 +226,9 @@ fn show_result(vm: &mut Vm, result: &Result<Vec<Value>, Exit>) -> String {
             Some(Raised::Stream(_, text)) => format!("stream-error: {text}"),
             Some(Raised::Program(text)) => format!("program-error: {text}"),
             Some(Raised::Parse(text)) => format!("parse-error: {text}"),
+            Some(Raised::Denied(right, object, flag)) => {
+                format!("denied {} {object} {}", right.name(), flag.unwrap_or_default())
+            }
             Some(Raised::File(name, text)) => format!("file-error {name}: {text}"),
             Some(Raised::Package(_, text)) => format!("package-error: {text}"),
             Some(Raised::Simple(text)) => format!("error: {text}"),

@@ -1,5 +1,5 @@
 use super::{check_all, evaluate};
-use crate::host::{HostError, VirtualHost};
+use crate::host::{Rights, VirtualHost};
 use crate::vm::{Config, Vm};
 
 #[test]
@@ -91,7 +91,18 @@ fn files_are_read_whole_and_written_in_blocks() {
 
 #[test]
 fn refused_files_are_failures() {
-    let mut vm = machine(VirtualHost::new().without_files());
-    let refused = format!("file-error in: it cannot be read: {}", HostError::Refused);
-    assert_eq!(evaluate(&mut vm, "(%file-text \"in\")"), refused);
+    let mut vm = machine(VirtualHost::new().with_rights(Rights::none().with_modules("lib")));
+    for (form, refused) in [
+        ("(%file-text \"in\")", "denied read in --allow-read=in"),
+        ("(%open-input \"../in\")", "denied read ../in --allow-read=../in"),
+        ("(%file-exists-p \"lib/a.esl\")", "denied read lib/a.esl --allow-read=lib/a.esl"),
+        ("(%compiled-file \"in\")", "denied read in --allow-read=in"),
+        ("(%open-output \"out\" 0)", "denied write out --allow-write=out"),
+        ("(%delete-file \"out\")", "denied write out --allow-write=out"),
+        ("(%file-exists-p \"lib/a.esl\" t)", "NIL"),
+        ("(%narrow-rights '(:read))", "type-error :READ LIST"),
+        ("(%narrow-rights nil)", "program-error: rights are narrowed in a scope only"),
+    ] {
+        assert_eq!(evaluate(&mut vm, form), refused);
+    }
 }

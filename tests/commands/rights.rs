@@ -1,0 +1,142 @@
+//! Rights of programs: the flags of `eslvm`, files of them, and what is refused without.
+
+use esl_conformance::process::{self, Finished};
+
+use crate::eslvm;
+use crate::folder::Folder;
+
+/// A program that reads and writes in and beside its folder, and reports each refusal.
+const PROGRAM: &str = "
+(defmacro try (form)
+  `(print (with-recovery-procedures (((:permission-denied right object flag) (abort (list right object flag))))
+            ,form)))
+(defun text (path) (with-open-file (stream path) (read-line stream)))
+(defun put (path) (with-open-file (stream path :direction :output) (write-string \"new\" stream)))
+(try (text \"own\"))
+(try (put \"made\"))
+(try (text \"../other/secret\"))
+(try (text \"link/secret\"))
+(try (put \"link/made\"))
+(try (put \"dangling\"))
+(try (probe-file \"../other/none\"))
+(try (load \"../other/secret\"))
+(try (delete-file \"../other/secret\"))
+";
+
+/// A folder with a program in `work`, and something beside it.
+fn folder(name: &str) -> Folder {
+    let folder =
+        Folder::with(name, &[("work/main.esl", PROGRAM), ("work/own", "mine"), ("other/secret", "5")]);
+    #[cfg(unix)]
+    for (link, target) in [("link", "../other"), ("dangling", "../other/new")] {
+        std::os::unix::fs::symlink(target, folder.path().join("work").join(link))
+            .expect("a link can be made");
+    }
+    folder
+}
+
+fn run(folder: &Folder, arguments: &[&str]) -> Finished {
+    let mut command = eslvm(&[&["run"], arguments, &["main.esl"]].concat());
+    process::run(command.current_dir(folder.path().join("work")), "")
+}
+
+/// Returns the lines that a run prints.
+#[track_caller]
+fn lines(folder: &Folder, arguments: &[&str]) -> Vec<String> {
+    let output = run(folder, arguments).quiet_output().expect("nothing is wrong");
+    output.lines().map(|line| line.trim().to_owned()).filter(|line| !line.is_empty()).collect()
+}
+
+#[cfg(unix)]
+#[test]
+fn only_the_current_folder_is_granted_unless_said() {
+    let folder = folder("rights-default");
+    let expected = [
+        "\"mine\"",
+        "\"new\"",
+        "(:READ \"../other/secret\" \"--allow-read=../other/secret\")",
+        "(:READ \"link/secret\" \"--allow-read=link/secret\")",
+        "(:WRITE \"link/made\" \"--allow-write=link/made\")",
+        "(:WRITE \"dangling\" \"--allow-write=dangling\")",
+        "(:READ \"../other/none\" \"--allow-read=../other/none\")",
+        "(:READ \"../other/secret\" \"--allow-read=../other/secret\")",
+        "(:WRITE \"../other/secret\" \"--allow-write=../other/secret\")",
+    ];
+    assert_eq!(lines(&folder, &[]), expected);
+    assert!(folder.path().join("other/secret").exists() && !folder.path().join("other/made").exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn flags_grant_more() {
+    let folder = folder("rights-flags");
+    let read = lines(&folder, &["--allow-read=../other"]);
+    assert_eq!(read[2..4], ["\"5\"", "\"5\""]);
+    assert_eq!(read[4], "(:WRITE \"link/made\" \"--allow-write=link/made\")");
+    assert_eq!(read[6], "NIL");
+    assert_eq!(read[7..], ["T", "(:WRITE \"../other/secret\" \"--allow-write=../other/secret\")"]);
+    // As the failure says it.
+    assert_eq!(lines(&folder, &["--allow-read=../other/secret"])[2..4], ["\"5\"", "\"5\""]);
+    assert_eq!(lines(&folder, &["--allow-read", "--allow-write=nowhere,../other"])[8], "T");
+    folder.file("other/secret", "6");
+    folder.file("work/grants", "# all of it\n--allow-read\n--allow-write=../other\n");
+    assert_eq!(lines(&folder, &["--rights", "grants"])[8], "T");
+    folder.file("other/secret", "6");
+    assert_eq!(lines(&folder, &["--allow-all"])[8], "T");
+}
+
+#[test]
+fn a_file_of_rights_that_does_not_parse_starts_nothing() {
+    let folder = folder("rights-file");
+    folder.file("work/grants", "--allow-read\nwrite everything\n");
+    let done = run(&folder, &["--rights", "grants"]);
+    assert_eq!((done.status, &*done.output), (Some(2), ""));
+    assert!(done.errors.contains("grants:2: `write everything`: expected a flag"), "{}", done.errors);
+    assert_eq!(run(&folder, &["--rights", "none"]).status, Some(2));
+    assert_eq!(run(&folder, &["--allow-run="]).status, Some(2));
+}
+
+#[test]
+fn the_repl_has_the_same_flags() {
+    let folder = folder("rights-repl");
+    let ask = |arguments: &[&str]| {
+        let mut command = eslvm(&[&["repl"], arguments].concat());
+        let input = "(with-open-file (stream \"../other/secret\") (read-line stream))\n";
+        process::run(command.current_dir(folder.path().join("work")), input).output
+    };
+    let refused = ask(&[]);
+    let report = "There is no right to read \"../other/secret\": --allow-read=../other/secret grants it.";
+    assert!(refused.contains(report), "{refused}");
+    assert!(ask(&["--allow-read=../other"]).contains("\"5\""));
+}
+
+#[test]
+fn modules_are_read_in_their_folders_and_macros_read_nothing_else() {
+    let files = [
+        ("work/main.esl", "(require :table)\n(print (table:size))\n(print (table:early))"),
+        (
+            "lib/table.esl",
+            "(defpackage :table (:use :esl) (:export :size :early))
+             (in-package :table)
+             (defun text () (with-open-file (stream \"../lib/data\") (read-line stream)))
+             (defun size ()
+               (with-recovery-procedures (((:permission-denied right object) (abort (list right object))))
+                 (length (text))))
+             (defmacro early ()
+               (with-recovery-procedures (((:permission-denied right object) (abort `'(,right ,object))))
+                 (with-open-file (stream \"../lib/data\") (read-line stream))))",
+        ),
+        ("lib/data", "12345"),
+    ];
+    let folder = Folder::with("rights-modules", &files);
+    let library = ["--library", "../lib"];
+    let read = lines(&folder, &[&library[..], &["--allow-read=../lib"]].concat());
+    assert_eq!(read, ["5", "(:READ \"../lib/data\")"]);
+    assert_eq!(lines(&folder, &library)[0], "(:READ \"../lib/data\")");
+    // Found when the program runs, as a source.
+    folder.file(
+        "work/main.esl",
+        "(let ((name \"table\")) (require name)) (print (funcall (find-symbol \"SIZE\" :table)))",
+    );
+    assert_eq!(lines(&folder, &library), ["(:READ \"../lib/data\")"]);
+}

@@ -1,0 +1,128 @@
+//! Rights: asking for them, and narrowing them.
+//!
+//! What forms have narrowed is a binding of a symbol that no program can name ([`World::rights`]), so that
+//! nothing can set it back, and tasks inherit it as they do all bindings. Its value is a list of strings, the
+//! innermost form's first, each of which writes [`Rights`] as a text that is made here and reaches no program.
+//!
+//! [`World::rights`]: crate::world::World
+
+use crate::builtins::LIMIT;
+use crate::builtins::expect::{exactly, optional};
+use crate::builtins::list::list_items;
+use crate::builtins::symbol::{designated_text, text_of};
+use crate::heap::Kind;
+use crate::heap::layout::Symbol;
+use crate::host::{Host, Permit, Right, Rights};
+use crate::raise::{Exit, Outcome, Raised};
+use crate::task::{Binding, EntryKind};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// Ends each part of a text that writes rights.
+const END: char = '\0';
+
+/// Makes sure that the program has a right to an object. Returns what to use in its place: for a path, the
+/// one to which its links lead. This is the only place at which rights are asked for.
+///
+/// # Errors
+/// A failure `:PERMISSION-DENIED` if it does not have it.
+pub(crate) fn demand(vm: &mut Vm, right: Right, object: &str) -> Result<String, Exit> {
+    let narrowed = narrowed(vm);
+    match vm.outside.host.permit(right, object, &narrowed) {
+        Permit::Granted(whole) => Ok(whole),
+        Permit::NotGranted => {
+            vm.exchange.raise(Raised::Denied(right, object.into(), Some(right.flag(object))))
+        }
+        Permit::Narrowed => vm.exchange.raise(Raised::Denied(right, object.into(), None)),
+    }
+}
+
+/// Returns the rights that forms around the present point have narrowed to, innermost first.
+fn narrowed(vm: &mut Vm) -> Vec<Rights> {
+    let mut found = Vec::new();
+    let mut list = in_force(vm);
+    while let Some(pair) = vm.heap.as_cons(list) {
+        let text = vm.heap.string_text(pair.car).unwrap_or_default();
+        vm.exchange.charge_elements(text.len());
+        found.push(decode(&text));
+        list = pair.cdr;
+    }
+    found
+}
+
+/// Returns the list of what is narrowed in the running task.
+fn in_force(vm: &Vm) -> Value {
+    let control = vm.scheduler.running.as_ref().and_then(|task| task.control.get());
+    control.and_then(|control| control.bindings.get(vm.world.rights)).unwrap_or(Value::NIL)
+}
+
+fn decode(text: &str) -> Rights {
+    let mut rights = Rights::none();
+    let mut parts = text.split(END);
+    while let (Some(name), Some(object)) = (parts.next(), parts.next()) {
+        let Some(right) = Right::of_name(name) else { continue };
+        rights = if object.is_empty() { rights.with_all(right) } else { rights.with(right, object) };
+    }
+    rights
+}
+
+/// Returns the right of which `v` is the name, a keyword.
+fn expect_right(vm: &mut Vm, v: Value) -> Result<Right, Exit> {
+    let is_keyword = vm.heap.flags(v, Kind::Symbol).is_some_and(|flags| flags & Symbol::KEYWORD != 0);
+    let right = if is_keyword { Right::of_name(&designated_text(vm, v)?) } else { None };
+    match right {
+        Some(right) => Ok(right),
+        None => vm.exchange.not_written(v, "(MEMBER :READ :WRITE :NET :RUN :ENV :SERIAL)"),
+    }
+}
+
+/// Returns the text of an object of a right.
+fn expect_object(vm: &mut Vm, v: Value) -> Result<String, Exit> {
+    match text_of(&vm.heap, v) {
+        Some(text) if !text.is_empty() && !text.contains(END) => Ok(text),
+        _ => vm.exchange.type_error(v, "STRING"),
+    }
+}
+
+/// `(%narrow-rights rights)`
+pub(super) fn narrow_rights(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let mut text = String::new();
+    for right in list_items(vm, optional(arguments, 0), LIMIT)? {
+        let parts = list_items(vm, right, LIMIT)?;
+        let Some((&name, objects)) = parts.split_first() else {
+            return vm.exchange.type_error(right, "CONS");
+        };
+        let right = expect_right(vm, name)?;
+        let mut add =
+            |object: &str| text.extend([right.name(), object].into_iter().flat_map(|part| [part, "\0"]));
+        if objects.is_empty() {
+            add("");
+        }
+        for &object in objects {
+            add(&expect_object(vm, object)?);
+        }
+    }
+    let control = vm.scheduler.running.as_ref().and_then(|task| task.control.get());
+    let scope = control.and_then(|control| control.entries.last());
+    let Some(base) = scope.filter(|entry| entry.kind == EntryKind::Scope).map(|entry| entry.base) else {
+        return vm.exchange.program_error("rights are narrowed in a scope only");
+    };
+    let text = vm.heap.alloc_str(&text)?;
+    let value = vm.heap.cons(text, in_force(vm))?;
+    let symbol = vm.world.rights;
+    let control = &mut vm.scheduler.task_mut().control;
+    if control.bindings.len() >= vm.config.stack {
+        return vm.exchange.raise(Raised::StackExhausted);
+    }
+    control.bindings.push(Binding { symbol, value, base });
+    Ok(Value::NIL)
+}
+
+/// `(%demand-right right object)`
+pub(super) fn demand_right(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [right, object] = exactly(arguments);
+    let right = expect_right(vm, right)?;
+    let object = expect_object(vm, object)?;
+    let whole = demand(vm, right, &object)?;
+    Ok(vm.heap.alloc_str(&whole)?)
+}
