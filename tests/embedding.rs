@@ -41,18 +41,25 @@ fn define_lag(engine: &mut Engine) {
 #[test]
 fn an_operation_parks_only_its_task() {
     let mut engine = engine();
-    define_lag(&mut engine);
-    let text = "(let ((n 0))
-                  (multiple-value-bind (a b)
-                      (task-net (one (lag 60 'done)) (two (loop until (wait-for-task-or n one) do (incf n)) n))
-                    (list a (> b 100))))";
-    check(
-        &mut engine,
-        "(defun wait-for-task-or (n task) (sleep 0) (or (> n 100000) (task-ended task)))",
-        "WAIT-FOR-TASK-OR",
-    );
-    check(&mut engine, "(defun task-ended (task) (not (member task (list-tasks))))", "TASK-ENDED");
-    check(&mut engine, text, "(DONE T)");
+    let (go, gone) = channel();
+    let gone = Mutex::new(Some(gone));
+    engine
+        .define_operation("JOURNEY", "()", "Ends once it was told to go.", move |operation| {
+            let gone = gone.lock().expect("no panic").take().expect("the test makes one journey");
+            std::thread::spawn(move || {
+                gone.recv().expect("the program says it");
+                operation.complete(Data::from("there"));
+            });
+        })
+        .expect("it compiles");
+    engine
+        .define("DEPART", "()", "Ends the journey.", move |_| {
+            go.send(()).expect("the journey goes on");
+            Ok(())
+        })
+        .expect("it compiles");
+    let text = "(task-net (one (journey)) (two (dotimes (i 100) (sleep 0)) (depart)))";
+    check(&mut engine, &format!("(multiple-value-list {text})"), "(\"there\" NIL)");
 }
 
 #[test]
