@@ -18,12 +18,12 @@ use crate::for_each_opcode;
 use crate::opcode::{Instr, Opcode};
 use crate::operand::*;
 
-/// What is wrong with a line.
+/// Fault in a line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AssembleError {
     /// The line, from 1.
     pub line: usize,
-    /// What was expected.
+    /// Expected text.
     pub message: String,
 }
 

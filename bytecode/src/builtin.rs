@@ -39,9 +39,9 @@ pub struct BuiltinInfo {
     pub builtin: Builtin,
     /// Package and visibility of its name.
     pub visibility: Visibility,
-    /// Its name.
+    /// Name of the function.
     pub name: &'static str,
-    /// Its lambda list as it is shown to people, without parentheses.
+    /// Lambda list as shown to people, without parentheses.
     pub lambda_list: &'static str,
     /// The arguments that it takes.
     pub arity: Arity,
@@ -50,7 +50,7 @@ pub struct BuiltinInfo {
     /// The ESL function, internal to the package `ESL`, that takes over when the work is above a builtin's
     /// limit.
     pub slowly: Option<&'static str>,
-    /// What it does.
+    /// Documentation: one sentence or more.
     pub doc: &'static [&'static str],
 }
 
@@ -198,11 +198,11 @@ macro_rules! for_each_builtin {
             Funcall = call::funcall, cl "FUNCALL" ("function &rest arguments");
             /// Calls `function` with `arguments`, the last of which is a list of further arguments.
             Apply = call::apply, cl "APPLY" ("function argument &rest arguments");
-            /// Its arguments, as multiple values.
+            /// The arguments, as multiple values.
             Values = call::values, cl "VALUES" ("&rest values");
             /// The items of `list`, as multiple values.
             ValuesList = call::values_list, cl "VALUES-LIST" ("list");
-            /// Its argument.
+            /// The argument.
             Identity = call::identity, cl "IDENTITY" ("object") -> one;
 
             // ---- identity and types
@@ -362,9 +362,9 @@ macro_rules! for_each_builtin {
             Acosh = float::acosh, cl "ACOSH" ("number");
             /// The number with this hyperbolic tangent.
             Atanh = float::atanh, cl "ATANH" ("number");
-            /// What is above the line in lowest terms.
+            /// The numerator, in lowest terms.
             Numerator = float::numerator, cl "NUMERATOR" ("rational");
-            /// What is below the line in lowest terms; 1 for an integer.
+            /// The denominator, in lowest terms; 1 for an integer.
             Denominator = float::denominator, cl "DENOMINATOR" ("rational");
             /// The ratio of two integers that have no divisor in common; the second is above 1.
             MakeRatio = float::make_ratio, internal "%MAKE-RATIO" ("numerator denominator");

@@ -23,7 +23,7 @@ pub struct Arity {
     pub max: Option<u32>,
 }
 
-/// What a symbol names as a function, globally.
+/// Global meaning of a symbol as a function.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum GlobalFunction {
     /// Nothing yet.
@@ -35,7 +35,7 @@ pub enum GlobalFunction {
     Macro,
 }
 
-/// What a symbol names as a variable, globally.
+/// Global meaning of a symbol as a variable.
 #[derive(Clone, Debug, Default)]
 pub enum GlobalVariable {
     /// Nothing yet.
@@ -85,7 +85,7 @@ pub enum InternError {
     },
 }
 
-/// What names mean while a form is read and compiled. No call of these runs the program.
+/// Meanings of names while a form is read and compiled. No call of these runs the program.
 pub trait Environment {
     /// What is known of `symbol`.
     fn global(&self, symbol: &Symbol) -> Global;
@@ -140,7 +140,7 @@ pub struct MacroCall {
     pub locals: Arc<[LocalDefinition]>,
 }
 
-/// What a compilation wants next.
+/// Next need of a compilation.
 #[derive(Debug)]
 pub enum Step {
     /// Run this macro and answer with [`Answer::Expansion`] or [`Answer::Failed`].
@@ -203,7 +203,7 @@ impl From<String> for CompileTimeFailure {
     }
 }
 
-/// What became of a step.
+/// Outcome of a step.
 #[derive(Debug)]
 pub enum Answer {
     /// First step: there is nothing to answer.

@@ -21,7 +21,7 @@ use crate::symbol::Symbol;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ObjectId(pub u32);
 
-/// What a datum is.
+/// Contents of a datum.
 #[derive(Clone, Debug)]
 pub enum DatumKind {
     /// `NIL`, the empty list. A datum is never the *symbol* `NIL`.
@@ -107,7 +107,7 @@ impl Datum {
         items.into_iter().rev().fold(tail, |rest, item| Datum::cons(item, rest, span))
     }
 
-    /// What this datum is.
+    /// Returns the contents.
     pub fn kind(&self) -> &DatumKind {
         &self.0.kind
     }
@@ -169,7 +169,7 @@ pub struct Elements<'a> {
 }
 
 impl<'a> Elements<'a> {
-    /// What has not been iterated over yet; at the end, the list's last `cdr`.
+    /// Rest of the list; at the end, the list's last `cdr`.
     pub fn tail(&self) -> &'a Datum {
         self.rest
     }

@@ -16,7 +16,7 @@ pub enum Severity {
 pub struct Label {
     /// The range.
     pub span: Span,
-    /// What is said of it; may be empty.
+    /// Note on the place; may be empty.
     pub text: String,
 }
 
@@ -33,7 +33,7 @@ pub struct Diagnostic {
     pub primary: Label,
     /// Further places that explain it.
     pub secondary: Vec<Label>,
-    /// What to do, when a repair is likely.
+    /// Advice, when a repair is likely.
     pub help: Option<String>,
 }
 

@@ -135,21 +135,21 @@ pub struct LineEntry {
 /// A function.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Function {
-    /// Its name: a symbol, or a list such as `(SETF X)` or `(FLET X)`. `None` for an anonymous function.
+    /// Name: a symbol, or a list such as `(SETF X)` or `(FLET X)`. `None` for an anonymous function.
     pub name: Option<PoolIdx>,
     /// The lambda list as written.
     pub lambda_list: Option<PoolIdx>,
     /// The documentation string.
     pub documentation: Option<PoolIdx>,
-    /// What it takes.
+    /// Parameters.
     pub parameters: Parameters,
     /// Number of registers of its frame: at least those of its parameters, at most 250.
     pub registers: u8,
-    /// Its captures, and where they come from.
+    /// Captures, and where they come from.
     pub captures: Vec<Capture>,
-    /// Its constants: `K[n]` is `constants[n]` of the module's pool.
+    /// Constants: `K[n]` is `constants[n]` of the module's pool.
     pub constants: Vec<PoolIdx>,
-    /// Its instructions.
+    /// Instructions.
     pub code: Vec<u32>,
     /// Source places, by ascending `pc`.
     pub lines: Vec<LineEntry>,

@@ -328,7 +328,7 @@ macro_rules! for_each_opcode {
     };
 }
 
-/// What becomes of a value that a recovery puts in place of a failed instruction.
+/// Use of a value that a recovery puts in place of a failed instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Substitute {
     /// The instruction never fails.
@@ -365,7 +365,7 @@ impl Substitute {
     }
 }
 
-/// What an instruction calls.
+/// Function that an instruction calls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CallTarget {
     /// The function in the first register of the window, or the one that the symbol there names.
@@ -390,7 +390,7 @@ impl CallTarget {
 /// The operands that all calls have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Call {
-    /// What is called.
+    /// Function called.
     pub callee: CallTarget,
     /// First register of the window.
     pub window: Window,
@@ -543,17 +543,17 @@ impl Instr {
 pub struct OpcodeInfo {
     /// The opcode.
     pub opcode: Opcode,
-    /// Its name in disassemblies.
+    /// Name in disassemblies.
     pub mnemonic: &'static str,
-    /// What becomes of a value put in place of the failed instruction.
+    /// Use of a value put in place of the failed instruction.
     pub substitute: Substitute,
-    /// What it calls, if it is a call.
+    /// Function called; `None` unless it is a call.
     pub callee: Option<CallTarget>,
     /// The builtin that it is, if it is one.
     pub builtin: Option<Builtin>,
     /// Name and type of each operand, in order.
     pub operands: &'static [(&'static str, &'static str)],
-    /// Its effect.
+    /// Effect of the instruction.
     pub doc: &'static [&'static str],
 }
 
@@ -597,7 +597,7 @@ macro_rules! define_opcodes {
                 }
             }
 
-            /// Its name in disassemblies.
+            /// Returns the name in disassemblies.
             pub fn mnemonic(self) -> &'static str {
                 match self {
                     $( Opcode::$name => $mnemonic, )*
@@ -612,7 +612,7 @@ macro_rules! define_opcodes {
                 }
             }
 
-            /// What becomes of a value put in place of the failed instruction.
+            /// Returns the use of a value put in place of the failed instruction.
             #[inline(always)]
             pub const fn substitute(self) -> Substitute {
                 match self {
@@ -634,7 +634,7 @@ macro_rules! define_opcodes {
                 }
             }
 
-            /// What it calls; `None` unless it is a call.
+            /// Returns the function called; `None` unless it is a call.
             #[inline(always)]
             pub const fn callee(self) -> Option<CallTarget> {
                 match self {

@@ -13,7 +13,7 @@ pub trait Operand: Copy + fmt::Display {
     fn to_bits(self) -> u32;
     /// Returns the operand with these bits; higher bits are ignored.
     fn from_bits(bits: u32) -> Self;
-    /// Its role, for the verifier.
+    /// Role of the operand, for the verifier.
     fn role(self) -> Role;
     /// Makes a jump or a landing lead this many words from the next instruction on. Leaves other operands as
     /// they are.

@@ -81,7 +81,7 @@ impl Stack {
         self.move_to(segment(words.max(self.capacity() + self.capacity() / 4)));
     }
 
-    /// Gives back the memory that the words below `top` do not need. The stack moves.
+    /// Returns the memory that the words below `top` do not need to the system. The stack moves.
     pub fn shrink(&mut self, top: usize) {
         self.move_to(segment(top));
     }
@@ -125,7 +125,7 @@ fn layout(words: usize) -> Layout {
     Layout::array::<Value>(words).expect("a stack is far smaller than the address space")
 }
 
-/// Gives back a segment, unless it has no words.
+/// Frees a segment, unless it has no words.
 fn free(start: NonNull<Value>, words: usize) {
     if words > 0 {
         // SAFETY: `allocate` made every segment with words, with this layout; its owner uses it no longer.

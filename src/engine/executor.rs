@@ -22,7 +22,7 @@ struct RunningFuture<F> {
     /// Dropped when it has ended, and when it is cancelled.
     future: Option<Pin<Box<F>>>,
     operation: Option<Operation>,
-    /// Whom to wake when the operation is cancelled.
+    /// Waker of the executor, for when the operation is cancelled.
     waker: Arc<Mutex<Option<Waker>>>,
 }
 

@@ -74,7 +74,7 @@ impl Typing {
         self.request(Request::Line(prompt));
     }
 
-    /// Gives up the requested line, for good, and restores the terminal. Returns whether that could be done.
+    /// Abandons the requested line, for good, and restores the terminal. Returns whether that could be done.
     pub(super) fn leave(&self) -> bool {
         if !self.is_interactive {
             return true;

@@ -20,7 +20,7 @@ new_key_type! {
     pub(crate) struct JobId;
 }
 
-/// What a handle names.
+/// Object that a handle names.
 pub(crate) enum CompilerJob {
     /// A compilation in progress.
     Compilation(Box<ActiveCompilation>),

@@ -103,7 +103,7 @@ pub(crate) struct Exchange {
     pub(crate) raised: Option<Raised>,
     /// Call requested by a builtin: the function, then its arguments.
     pub(crate) requested_call: Vec<Value>,
-    /// What was found last in a hash table.
+    /// Entry found last in a hash table.
     pub(crate) last_lookup: LastLookup,
     /// Charges of builtins, until the interpreter takes them.
     pub(crate) charges: Charges,

@@ -44,11 +44,11 @@ pub struct Vm {
     pub(crate) cpu: Cpu,
     /// The functions written in Rust, by number.
     pub(crate) natives: &'static Natives,
-    /// What passes between the interpreter and builtins.
+    /// Arguments and results that pass between the interpreter and builtins.
     pub(crate) exchange: Exchange,
-    /// Those who watch the run, and what is gathered for them.
+    /// Observers of the run, and the data gathered for them.
     pub(crate) watch: Watch,
-    /// What the embedder holds on to, and its requests.
+    /// Objects kept for the embedder, and the embedder's requests.
     pub(crate) embedder: Embedder,
     /// Limits and settings.
     pub(crate) config: Config,

@@ -202,7 +202,7 @@ impl Listing<'_> {
         text + &comment
     }
 
-    /// What an operand that is only a number stands for.
+    /// Returns the meaning of an operand that is only a number.
     fn meaning(&self, role: Role) -> Option<String> {
         match role {
             Role::Constant(index)

@@ -5,7 +5,7 @@ use super::{Problem, ReadError, Section};
 /// A place in a section, for reading.
 #[derive(Clone, Debug)]
 pub(super) struct Cursor<'a> {
-    /// What is left.
+    /// Bytes left.
     rest: &'a [u8],
     /// Offset of `rest` in the file, for messages.
     offset: usize,
@@ -23,7 +23,7 @@ impl<'a> Cursor<'a> {
         ReadError::Damaged { section: self.section, offset: self.offset, problem }
     }
 
-    /// What is left to be read.
+    /// Bytes left to be read.
     pub(super) fn rest(&self) -> &'a [u8] {
         self.rest
     }

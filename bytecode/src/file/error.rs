@@ -26,12 +26,12 @@ pub enum ReadError {
         section: Option<Section>,
         /// Offset in the file.
         offset: usize,
-        /// What is wrong there.
+        /// Fault at that place.
         problem: Problem,
     },
 }
 
-/// What is wrong at some place of a file.
+/// Fault at some place of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Problem {
     /// There are fewer bytes than were announced.
@@ -47,9 +47,9 @@ pub enum Problem {
     SectionTable,
     /// A byte or number that has no meaning there.
     Unknown {
-        /// What was expected.
+        /// Expected value.
         expected: &'static str,
-        /// What is there.
+        /// Value found.
         found: u32,
     },
     /// An index out of range.

@@ -64,7 +64,7 @@ pub enum SymbolHome {
 pub struct SymbolRecord<'a> {
     /// Where it is at home.
     pub home: SymbolHome,
-    /// Its name.
+    /// Name of the package.
     pub name: &'a str,
 }
 

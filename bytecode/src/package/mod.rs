@@ -59,7 +59,7 @@ pub enum Qualifier {
     Internal(Arc<str>),
 }
 
-/// What a package has under a name.
+/// Entry of a package for a name.
 #[derive(Clone, Debug)]
 struct NameEntry {
     home: PackageId,
@@ -70,7 +70,7 @@ struct NameEntry {
     symbol: Option<Symbol>,
 }
 
-/// What is known of one package.
+/// Record of one package.
 #[derive(Clone, Debug)]
 struct Package {
     name: Arc<str>,
@@ -161,7 +161,7 @@ impl Packages {
         &self.table[package].name
     }
 
-    /// Its other names.
+    /// Nicknames.
     pub fn nicknames(&self, package: PackageId) -> &[Arc<str>] {
         &self.table[package].nicknames
     }

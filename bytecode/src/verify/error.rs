@@ -10,7 +10,7 @@ use crate::module::{FunctionNumber, MAX_CAPTURES, MAX_CODE, MAX_CONTROL, MAX_REG
 pub struct VerifyError {
     /// Where in the module.
     pub place: FaultPlace,
-    /// What is wrong there.
+    /// Fault at that place.
     pub fault: Fault,
 }
 
@@ -107,9 +107,9 @@ pub enum Fault {
     PopCount(u8),
     /// V9: the innermost entry is another one.
     Entry {
-        /// What it should be.
+        /// Expected kind.
         expected: &'static str,
-        /// What it is.
+        /// Kind found.
         found: Option<EntryKind>,
     },
     /// V9: fewer bindings were made since the innermost entry.

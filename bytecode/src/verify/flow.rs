@@ -395,7 +395,7 @@ impl Flow<'_> {
     }
 }
 
-/// What is known of the registers of a frame that begins.
+/// Returns the known contents of the registers of a frame that begins.
 fn on_entry(parameters: &Parameters) -> Registers {
     let mut registers = Registers::default();
     let Parameters { required, optional, rest, .. } = parameters;
@@ -414,7 +414,7 @@ fn target(next: usize, distance: i32) -> usize {
     next.saturating_add_signed(distance as isize)
 }
 
-/// What `register` holds, if it may be read at all.
+/// Returns the contents of `register`, if it may be read at all.
 fn readable(state: &State, register: u8) -> Result<Class, Fault> {
     match state.registers.class(register) {
         Some(Class::MaybeUnsupplied) => Err(Fault::MaybeUnsupplied(register)),

@@ -42,7 +42,7 @@ impl RegisterSet {
     }
 }
 
-/// What a register that may be used is known to hold.
+/// Known contents of a register that may be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Class {
     /// An object of the program.
@@ -53,7 +53,7 @@ pub(super) enum Class {
     MaybeUnsupplied,
 }
 
-/// What is known of each register, and of the value list. Less is known after paths join.
+/// Known contents of each register, and of the value list. Less is known after paths join.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Registers {
     values: RegisterSet,
@@ -67,7 +67,7 @@ pub(super) struct Registers {
 }
 
 impl Registers {
-    /// What `register` holds; `None` when that is not known.
+    /// Returns the contents of `register`; `None` when they are not known.
     pub(super) fn class(&self, register: u8) -> Option<Class> {
         if self.values.contains(register) {
             Some(Class::Value)

@@ -213,7 +213,7 @@ impl Check<'_> {
         }
     }
 
-    /// What the roles of operands do not tell.
+    /// Checks the rules that the roles of operands do not tell.
     fn own_rules(self, instr: Instr) -> Result<(), Fault> {
         if let Some(call) = instr.call() {
             return self.call(instr, call);

@@ -51,7 +51,7 @@ pub(super) struct KnownEntry {
     pub(super) entered: Option<Box<Registers>>,
 }
 
-/// What is known at one place.
+/// Facts that hold at one place.
 #[derive(Clone, Debug)]
 pub(super) struct State {
     pub(super) registers: Registers,

@@ -18,7 +18,7 @@ use crate::diagnostic::code;
 /// Arguments that a call passes in registers. Further arguments are passed as a list.
 pub(super) const DIRECT_ARGUMENTS: usize = 60;
 
-/// What a call designates as its function.
+/// Function that a call designates.
 enum FunctionDesignator {
     /// A local function, kept in this variable.
     Local(VarId, Arity),

@@ -19,9 +19,9 @@ pub struct Purpose {
 /// A finished piece of the program.
 #[derive(Debug)]
 pub struct Chunk {
-    /// Its code.
+    /// Code of the chunk.
     pub core: Core,
-    /// Its purpose.
+    /// Purpose of the chunk.
     pub purpose: Purpose,
 }
 

@@ -139,7 +139,7 @@ impl SetfExpansion {
     }
 }
 
-/// What is to be done with places once they are found.
+/// Use of places once they are found.
 #[derive(Debug)]
 pub(super) enum PlaceUse {
     /// Makes the place `(values place…)` of the newest places.

@@ -22,7 +22,7 @@ pub(super) enum Meaning {
     Constant(Datum),
 }
 
-/// What is done to a variable by its name.
+/// Use of a variable by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Deed {
     /// It is bound.

@@ -184,7 +184,7 @@ pub(super) struct FunctionBuilder<'b, 'a> {
     pub(super) span: Span,
     pub(super) constants: Vec<PoolIdx>,
     constant_indexes: FxHashMap<PoolIdx, u16>,
-    /// What does not fit the format, if anything.
+    /// The first part that does not fit the format, if any.
     pub(super) excess: Option<Excess>,
 }
 

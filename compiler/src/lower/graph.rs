@@ -58,7 +58,7 @@ pub(crate) enum Cond {
     Count {
         /// The counter.
         counter: Reg,
-        /// Its limit.
+        /// Limit of the counter.
         limit: Reg,
         /// Step that is added first.
         step: Int8,

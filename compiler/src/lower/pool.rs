@@ -10,7 +10,7 @@ use esl_bytecode::module::{Constant, FunctionNumber, PoolIdx};
 use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashMap;
 
-/// What makes two constants one: for literals with an identity their node, otherwise their value.
+/// Identity of a constant: for literals with an identity their node, otherwise their value.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum LiteralKey {
     Nil,

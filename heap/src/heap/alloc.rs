@@ -133,7 +133,7 @@ impl Region {
         fill_metadata(self.next, self.hole_end, epoch);
     }
 
-    /// Gives up the current hole. While marking, all objects allocated black in it become one extent.
+    /// Abandons the current hole. While marking, all objects allocated black in it become one extent.
     fn retire(&mut self, marking: bool) {
         if marking && self.next < self.hole_end {
             fill_metadata(self.next, self.hole_end, 0);

@@ -356,7 +356,7 @@ impl Heap {
         self.begin_sweep();
     }
 
-    /// Gives up the marking under way. Its marks stay in the metadata; the sweep of the next cycle clears
+    /// Abandons the marking under way. Its marks stay in the metadata; the sweep of the next cycle clears
     /// them.
     fn abandon_marking(&mut self) {
         self.count_regions();

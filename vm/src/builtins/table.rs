@@ -71,7 +71,7 @@ fn search(vm: &mut Vm, table: Table, test: Test, key: Value, hash: u32) -> Resul
     })
 }
 
-/// What a search comes to.
+/// Outcome of a search.
 enum KeyPlace {
     /// The entry with the key, and its value.
     Entry(usize, Value),

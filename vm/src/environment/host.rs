@@ -31,7 +31,7 @@ const LOAD_TICKS: u64 = 1_000_000_000;
 const MAX_CULPRITS: usize = 50;
 
 impl Vm {
-    /// Gives the machine a compiler, for `eval`, `load` and `read`.
+    /// Sets the compiler of the machine, for `eval`, `load` and `read`.
     pub fn set_compiler(&mut self, compiler: Box<dyn Compile>) {
         self.compiler.compiler = Some(compiler);
     }

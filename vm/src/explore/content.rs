@@ -63,7 +63,7 @@ impl VisitScheduler for Walk<'_> {
         }
     }
 
-    /// What is to happen, in order: when, to whom, and what.
+    /// Mixes in the timers, in order: time, task and action.
     fn timers(&mut self, scheduler: &Scheduler) {
         for timer in scheduler.timers.in_order() {
             let Some(task) = scheduler.tasks.at(timer.index) else { continue };

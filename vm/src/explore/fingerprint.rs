@@ -97,7 +97,7 @@ impl Fingerprints {
     }
 }
 
-/// What sort of code a function has.
+/// Sort of the code of a function.
 pub(super) fn sort_of(heap: &Heap, function: Value) -> Option<Sort> {
     let code = heap.code(heap.function_code(function)?)?;
     Some(Shape::unpack(code.spare[0]).sort)
@@ -200,7 +200,7 @@ impl Walk<'_> {
         self.values(values);
     }
 
-    /// What an object holds.
+    /// Mixes in the contents of an object.
     fn object(&mut self, v: Value) {
         if let Some(pair) = self.heap().as_cons(v) {
             self.value(pair.car);

@@ -16,7 +16,7 @@ mod register {
 
     use crate::value::Value;
 
-    /// What an operand in memory has to be for instructions of the vector unit.
+    /// Operand in memory, in the form that instructions of the vector unit need.
     #[repr(align(16))]
     struct VectorOperand(#[expect(dead_code, reason = "read by instructions only")] [u64; 2]);
 

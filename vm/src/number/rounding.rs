@@ -18,7 +18,7 @@ pub(crate) enum Rounding {
     Floor,
     /// The least integer not below it.
     Ceiling,
-    /// Its integer part.
+    /// Integer part.
     Truncate,
     /// The nearest integer; halves go to the even one.
     Round,

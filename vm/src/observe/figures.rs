@@ -16,7 +16,7 @@ pub struct Pauses {
     pub longest: u64,
 }
 
-/// What a task has used.
+/// Resources that a task has used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TaskFigures {
     /// Ordinal of the task, counted from the machine's first.

@@ -10,7 +10,7 @@ use crate::host::Host;
 use crate::schedule::Scheduler;
 use crate::task::TaskNumber;
 
-/// What an observer is told.
+/// Event reported to an observer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen<'a> {
     /// The task was made, or was there when the observer came.
@@ -22,13 +22,13 @@ pub enum Seen<'a> {
     },
     /// Reports call the task by another name from now on.
     IsNamed(&'a str),
-    /// Its turn begins.
+    /// The task's turn begins.
     Runs,
     /// It could run, but another one does.
     IsReady,
     /// It waits, for what this says.
     Waits(&'a str),
-    /// Its end is asked for.
+    /// The task's end is asked for.
     IsToEnd,
     /// It has ended, as this says: `succeeded`, `failed` or `aborted`.
     Ends(&'a str),

@@ -8,7 +8,7 @@ use crate::task::TaskIndex;
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// What happens to a task.
+/// Event in the life of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Happening {
     /// It was made.

@@ -6,7 +6,7 @@
 
 use crate::task::{AccountId, LimitNumber, TaskIndex};
 
-/// What ends when an account is spent.
+/// Subject of an account: it ends when the account is spent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum AccountOwner {
     /// The form of the limit with this number, in the task with this index.
@@ -26,7 +26,7 @@ pub(crate) struct Account {
     parent: AccountId,
     /// Number of tasks and accounts that charge it, and of the open form.
     users: u32,
-    /// What ends when it is spent.
+    /// Subject, which ends when the account is spent.
     owner: AccountOwner,
 }
 

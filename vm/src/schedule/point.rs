@@ -12,7 +12,7 @@ use crate::value::Value;
 /// Kinds of operations before which a task stands at a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Grain {
-    /// Those that change what others can see, or begin to wait.
+    /// Builtins that change what others can see, or begin to wait.
     #[default]
     Changes,
     /// Also those that look at what others have changed.

@@ -9,7 +9,7 @@ use std::collections::BinaryHeap;
 
 use crate::task::{LimitNumber, Serial, TaskIndex};
 
-/// What happens when a timer fires.
+/// Action of a timer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Due {
     /// The wait of the task ends, if the task still has this serial number.
@@ -29,7 +29,7 @@ pub(crate) struct Timer {
     pub(crate) sequence: u64,
     /// Index of the task.
     pub(crate) index: TaskIndex,
-    /// What happens.
+    /// Action.
     pub(crate) due: Due,
 }
 

@@ -12,7 +12,7 @@ pub(crate) enum Parking {
     Wait(Option<u64>),
 }
 
-/// What follows on a slice after which the task could run on, in order of precedence.
+/// Consequence of a slice after which the task could run on, in order of precedence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum TurnEnd {
     /// The ticks are used up: the task goes to the end of its queue.
@@ -31,7 +31,7 @@ pub(crate) enum TurnEnd {
 pub(crate) struct Turn {
     /// Index of the task.
     pub(crate) index: TaskIndex,
-    /// What follows on the present slice.
+    /// Consequence of the present slice.
     pub(crate) end: TurnEnd,
     /// Ticks left of the task's critical section.
     pub(crate) critical_left: i64,

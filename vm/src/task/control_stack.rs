@@ -70,13 +70,13 @@ pub(crate) struct Entry {
 /// Way a task ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum End {
-    /// Its function returned.
+    /// The function returned.
     Succeeded,
     /// A failure left it; the value is the condition.
     Failed(Value),
     /// It was aborted.
     Aborted,
-    /// Its budget was spent.
+    /// The budget was spent.
     Spent,
 }
 

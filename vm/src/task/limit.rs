@@ -25,7 +25,7 @@ pub(crate) struct Limit {
     pub(crate) expired: Option<Value>,
 }
 
-/// What a running cleanup may still use.
+/// Means left to a running cleanup.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Allowance {
     /// Ticks of the task at which it ends.

@@ -119,9 +119,9 @@ define_flags! {
     daemon set_daemon = 2;
     /// It belongs to the library, not to the program.
     hidden set_hidden = 3;
-    /// Its record stays after its end, for the embedder.
+    /// The record stays after the task's end, for the embedder.
     kept set_kept = 4;
-    /// Its turns come before those of others: it is being ended, or waited for that.
+    /// The task's turns come before those of others: it is being ended, or its end is waited for.
     urgent set_urgent = 5;
     /// Something is pending that is delivered before it goes on: an expired limit, cleanups that have run
     /// out, an interrupt.
@@ -230,7 +230,7 @@ impl Task {
         *self = Task::with_stack(object, stack);
     }
 
-    /// What few tasks need, made if it is not there.
+    /// Returns the fields that few tasks need, made if they are not there.
     pub(crate) fn extra_mut(&mut self) -> &mut Extra {
         self.extra.get_or_insert_default()
     }

@@ -28,7 +28,7 @@ const LENGTH: usize = 11;
 /// `aux` of such an event.
 const AUX: u16 = 2;
 
-/// What happens to a signal for which an input has no room.
+/// Rule for a signal for which an input has no room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WhenFull {
     /// It takes the place of the oldest.
@@ -37,7 +37,7 @@ pub(crate) enum WhenFull {
     DropNewest,
     /// It takes the place of all others.
     Latest,
-    /// Who signals waits until there is room.
+    /// The sender waits until there is room.
     Wait,
 }
 
@@ -72,7 +72,7 @@ pub(crate) fn make(
     heap.alloc_record(Kind::Event, 0, AUX, &slots)
 }
 
-/// Gives an input another capacity and rule.
+/// Sets capacity and rule of an input.
 pub(crate) fn change(heap: &mut Heap, input: Value, capacity: usize, when_full: WhenFull) {
     heap.slot_set(input, CAPACITY, Value::index(capacity));
     heap.slot_set(input, RULE, Value::index(when_full as usize));

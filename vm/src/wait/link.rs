@@ -45,7 +45,7 @@ pub(crate) struct WaitOptions {
     pub child: bool,
     /// Time at which it ends by itself, in nanoseconds.
     pub deadline: Option<u64>,
-    /// What is waited for, for reports; `NIL` if the events say it.
+    /// Description of the wait, for reports; `NIL` if the events say it.
     pub what: Value,
 }
 
