@@ -143,7 +143,8 @@ impl Planner<'_> {
             Formula::And(parts) => self.arrange_and(parts, bound),
             Formula::Or(parts, rank, ranks_end) => {
                 let arranged = parts.iter().map(|part| self.arrange(part, &mut bound.clone())).collect();
-                self.bind(formula, bound);
+                // A negation further on may not run before all alternatives have bound its variables.
+                self.bind_surely(formula, bound);
                 Arranged::Or(arranged, *rank, *ranks_end)
             }
             Formula::Not(inside) => Arranged::Not(Box::new(self.arrange(inside, &mut bound.clone()))),

@@ -191,6 +191,12 @@ fn formulas_combine() {
         &["((?X . 3) (?Y . 3))", "((?X . 4) (?Y . 4))"],
     );
     check(facts, "(not (not (n 1)))", &["NIL"]);
+    // Only one alternative binds what the negation shares with the pattern behind it.
+    check(
+        facts,
+        "(and (or (none ?x) (big ?y)) (and (not (odd ?x)) (n ?x)))",
+        &["((?X . 2) (?Y . 3))", "((?X . 4) (?Y . 3))", "((?X . 2) (?Y . 4))", "((?X . 4) (?Y . 4))"],
+    );
     check(facts, "(and)", &["NIL"]);
     check(facts, "(or)", &[]);
 }
