@@ -56,6 +56,15 @@ pub enum Error {
     NoMemory(&'static str),
     /// The bytecode is damaged, was made by another version, or breaks a rule of the verifier.
     Refused(LoadError),
+    /// The value is not of the type that was asked for.
+    NotOfType {
+        /// The value, as the program prints it.
+        value: String,
+        /// Name of the type in `COMMON-LISP`.
+        expected: &'static str,
+    },
+    /// The engine that was asked is gone.
+    Ended,
     /// The value cannot become [`Data`](crate::Data).
     NotData(ExportError),
     /// The name cannot be that of a function.
@@ -85,6 +94,8 @@ impl fmt::Display for Error {
             Error::NoMemory(what) => {
                 write!(f, "the memory limit leaves no room for {what}: raise `Config::memory`")
             }
+            Error::NotOfType { value, expected } => write!(f, "the value {value} is not of type {expected}"),
+            Error::Ended => f.write_str("the engine is gone"),
             Error::Refused(error) => error.fmt(f),
             Error::NotData(error) => error.fmt(f),
             Error::InvalidName(name) => {

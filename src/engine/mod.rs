@@ -18,6 +18,7 @@
 
 mod call;
 mod executor;
+mod handle;
 mod operation;
 
 use std::future::Future;
@@ -38,6 +39,7 @@ use crate::program;
 
 pub use call::{Call, Failure};
 pub use executor::{Executor, Job};
+pub use handle::{Handle, Reply, TaskHandle};
 pub use operation::Operation;
 
 /// A machine with the library. Definitions last from one evaluation to the next.
@@ -230,6 +232,11 @@ impl Engine {
             return Error::DoesNotCompile(diagnostics);
         }
         error.into()
+    }
+
+    /// Returns a handle, through which other threads reach the run.
+    pub fn handle(&self) -> Handle {
+        Handle::new(&self.machine)
     }
 
     /// Ends what still runs: aborts all tasks, newest first, and runs their cleanups; cancels operations

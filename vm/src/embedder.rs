@@ -1,10 +1,12 @@
 //! Values that the embedder holds, and its requests.
 
+use std::collections::BTreeMap;
+
 use esl_bytecode::compile::SourcePlace;
 
 use crate::heap::Heap;
 use crate::host::ProcessSignal;
-use crate::task::TaskId;
+use crate::task::{TaskId, TaskIndex};
 use crate::value::Value;
 
 /// Values that the embedder holds, and its requests.
@@ -12,6 +14,8 @@ use crate::value::Value;
 pub(crate) struct Embedder {
     /// Values that are kept from being collected.
     pub(crate) pinned: Vec<Value>,
+    /// Numbers of the questions from outside for which tasks run, by the places of these.
+    pub(crate) calls: BTreeMap<TaskIndex, u64>,
     /// The task that an interrupt aborts.
     pub(crate) interruptible: Option<TaskId>,
     /// Signal that has come while no task was named, and is for the next one.

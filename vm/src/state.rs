@@ -77,7 +77,7 @@ state! {
     Scheduler by VisitScheduler :: scheduler_content {
         content { tasks, timers }
         course {
-            choices, readers, end_of_all, main, main_number, serial, spent, rounds, canary, open_turn, any_event,
+            choices, readers, end_of_all, main, main_number, serial, spent, rounds, is_paused, canary, open_turn, any_event,
             starter,
         }
         parts { queues, accounts, deliveries, counts, clock, points, turn }
@@ -174,6 +174,7 @@ list_state! { Exchange {
 } }
 list_state! { Embedder {
     pinned: Run,
+    calls: Run,
     interruptible: Run,
     signal_waits: Run,
     ended_by: Run,
@@ -182,7 +183,7 @@ list_state! { Embedder {
     last_words: Run,
     last_place: Run,
 } }
-list_state! { Watch { is_watched: Derived, observers: Process, figures: Process, traces_tasks: Process } }
+list_state! { Watch { is_watched: Derived, observers: Process, coming: Process, figures: Process, traces_tasks: Process } }
 list_state! { Observers {
     list: Process,
     start: Process,

@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use esl_bytecode::datum::Datum;
 
 use super::door::Doors;
+use super::question::{Asking, Question};
 use super::{News, ProcessSignal};
 
 /// Something that reaches a run from outside.
@@ -41,6 +42,21 @@ pub enum Incoming {
         /// Arguments of the signal.
         arguments: Vec<Datum>,
     },
+    /// A question, whose answer is for whoever waits for its number.
+    Question {
+        /// Number of the question.
+        number: u64,
+        /// What is asked.
+        question: Question,
+    },
+    /// The task with this number is to end.
+    Abort(u64),
+    /// The task of the call that the question with this number asked for is to end.
+    AbortCall(u64),
+    /// No task is to run, or tasks are to run again.
+    Pause(bool),
+    /// Observers have come, who are to watch the run.
+    Watch,
     /// There is one more who may send messages.
     SenderCame,
     /// One of those has gone.
@@ -55,6 +71,7 @@ struct InboxState {
     /// Notified, under the lock of `contents`, when `is_rung` is set.
     bell: Condvar,
     doors: Doors,
+    asking: Asking,
 }
 
 /// The inbox of one machine, shared by those who put things in and the host that takes them out.
@@ -74,6 +91,10 @@ impl Inbox {
 
     pub(super) fn doors(&self) -> &Doors {
         &self.0.doors
+    }
+
+    pub(super) fn asking(&self) -> &Asking {
+        &self.0.asking
     }
 
     /// Puts something in, from any thread, and ends the host's wait.

@@ -9,7 +9,7 @@ mod observer;
 pub(crate) use figures::Figures;
 pub use figures::{Pauses, TaskFigures};
 pub(crate) use observer::Observers;
-pub use observer::{Observer, Seen};
+pub use observer::{Coming, Observer, Seen};
 
 use crate::host::Host;
 use crate::schedule::Scheduler;
@@ -22,6 +22,8 @@ pub(crate) struct Watch {
     pub(crate) is_watched: bool,
     /// The observers.
     pub(crate) observers: Observers,
+    /// Observers on their way.
+    pub(crate) coming: Coming,
     /// The figures.
     pub(crate) figures: Figures,
     /// Whether what happens to tasks is written to the stream for reports.

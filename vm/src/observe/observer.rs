@@ -6,6 +6,9 @@
 //! Times are in nanoseconds since the first observer came. Where time is virtual, and stands still while
 //! tasks run, each tick counts as one nanosecond more, so that work has a length.
 
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
 use crate::host::Host;
 use crate::schedule::Scheduler;
 use crate::task::TaskNumber;
@@ -59,6 +62,33 @@ pub enum Seen<'a> {
 pub trait Observer: Send {
     /// Is told what happens to a task, and when, in nanoseconds.
     fn see(&mut self, time: u64, task: TaskNumber, seen: Seen<'_>);
+}
+
+/// Observers on their way to a machine, from other threads.
+#[derive(Clone, Default)]
+pub struct Coming(Arc<Mutex<Vec<Box<dyn Observer>>>>);
+
+impl fmt::Debug for Coming {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Coming")
+    }
+}
+
+impl Coming {
+    fn list(&self) -> MutexGuard<'_, Vec<Box<dyn Observer>>> {
+        // The list is whole at every moment, so a panic elsewhere does not corrupt it.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Adds an observer. The machine learns of it by [`Incoming::Watch`](crate::host::Incoming::Watch).
+    pub fn add(&self, observer: Box<dyn Observer>) {
+        self.list().push(observer);
+    }
+
+    /// Takes those that have come.
+    pub(crate) fn take(&self) -> Vec<Box<dyn Observer>> {
+        std::mem::take(&mut self.list())
+    }
 }
 
 /// The observers of a run, and what they have yet to be told.

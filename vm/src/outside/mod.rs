@@ -146,5 +146,6 @@ impl Outside {
 impl Drop for Outside {
     fn drop(&mut self) {
         self.inbox.close_doors();
+        self.inbox.end_answers();
     }
 }

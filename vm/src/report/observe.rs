@@ -1,7 +1,7 @@
 //! Telling observers what happens.
 
 use super::{cause_label, event_label, reason_of, task_label};
-use crate::observe::{Observer, Seen};
+use crate::observe::{Coming, Observer, Seen};
 use crate::task::{TaskIndex, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -29,6 +29,11 @@ impl Vm {
             observer.see(time, number, Seen::Begins { name: &name, is_hidden });
             observer.see(time, number, reason.as_deref().map_or(Seen::IsReady, Seen::Waits));
         }
+    }
+
+    /// Returns the place where other threads leave observers.
+    pub fn coming_observers(&self) -> Coming {
+        self.watch.coming.clone()
     }
 
     /// Lets go of all observers, after they were told what they do not know yet.

@@ -4,10 +4,11 @@ use esl_bytecode::datum::Datum;
 
 use super::finish::allocate_without_retry;
 use super::operation::{hear, import_list};
+use super::question::{abort_call, abort_task, take_question};
 use super::signal::signal;
 use super::wake::make_runnable;
 use crate::host::{Host, Incoming, ProcessSignal};
-use crate::task::TaskState;
+use crate::task::{TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -23,8 +24,21 @@ pub(crate) fn take_in(vm: &mut Vm) -> bool {
             Incoming::Input => wake_readers(vm),
             Incoming::Operation { number, news } => hear(vm, number, news),
             Incoming::Message { input, arguments } => receive(vm, &input, &arguments),
+            Incoming::Question { number, question } => take_question(vm, number, question),
+            Incoming::Abort(number) => abort_task(vm, TaskNumber(number)),
+            Incoming::AbortCall(number) => abort_call(vm, number),
+            Incoming::Pause(pauses) => vm.scheduler.is_paused = pauses && !vm.embedder.is_ending,
+            Incoming::Watch => {
+                for observer in vm.watch.coming.take() {
+                    vm.add_observer(observer);
+                }
+            }
             Incoming::SenderCame => vm.outside.senders += 1,
-            Incoming::SenderLeft => vm.outside.senders = vm.outside.senders.saturating_sub(1),
+            Incoming::SenderLeft => {
+                vm.outside.senders = vm.outside.senders.saturating_sub(1);
+                // Nobody is left who could end a pause.
+                vm.scheduler.is_paused &= vm.outside.senders > 0;
+            }
         }
     }
     stops

@@ -16,6 +16,7 @@ impl Vm {
     /// end an interrupt has cut short, and operations that have not stopped in time.
     pub fn end_run(&mut self) -> Vec<String> {
         self.embedder.is_ending = true;
+        self.scheduler.is_paused = false;
         if !self.embedder.is_cut_short {
             self.abort_all();
             run_cleanups(self, None);

@@ -2,6 +2,7 @@
 
 use super::abort::abort_others;
 use super::pending::interrupt_by;
+use super::question::answer_call;
 use super::signal::keep;
 use crate::heap::Kind;
 use crate::interp;
@@ -49,7 +50,11 @@ pub(super) fn finish_task(vm: &mut Vm) {
     if task.flags.kept() {
         let extra = task.extra_mut();
         extra.end = Some(end);
-        extra.values = std::mem::take(&mut values);
+        extra.values.clone_from(&values);
+        if answer_call(vm, end, &values) {
+            // Nobody asks for it any more.
+            vm.scheduler.task_mut().flags.set_kept(false);
+        }
     }
     values.clear();
     vm.exchange.values = values;

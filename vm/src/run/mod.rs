@@ -9,7 +9,8 @@
 //! call      calling a function from   arrival   taking in what has come
 //!           outside, and its result             into the inbox
 //! operation news of operations        cleanup   allowances of cleanups, and cutting off
-//! ending    the end of a run, wherever it stands
+//! question  calls from outside,       ending    the end of a run, wherever it stands
+//!           and what is asked of tasks
 //! ```
 //!
 //! A runnable task has a slice of ticks and goes to the end of its queue; `schedule` says whose turn it is.
@@ -26,6 +27,7 @@ mod finish;
 mod limit;
 mod operation;
 mod pending;
+mod question;
 mod signal;
 mod spawn;
 mod timers;
@@ -46,6 +48,7 @@ use abort::abort_more;
 use timers::look_at_clock;
 use turn::go_on_with_turn;
 
+use crate::host::{Awaited, Host};
 use crate::task::{TaskId, TaskIndex, TaskState};
 use crate::vm::Vm;
 
@@ -106,6 +109,14 @@ fn run_tasks(vm: &mut Vm, id: Option<TaskId>, ticks: u64, may_wait: bool) -> Run
         vm.scheduler.rounds += 1;
         if vm.outside.inbox.is_rung() && take_in(vm) {
             return RunOutcome::Stopped;
+        }
+        if vm.scheduler.is_paused {
+            if !may_wait {
+                return RunOutcome::Waiting;
+            }
+            vm.outside.flush();
+            vm.outside.host.wait(None, Awaited { input: false, news: true });
+            continue;
         }
         look_at_clock(vm);
         if !vm.scheduler.deliveries.is_empty() {

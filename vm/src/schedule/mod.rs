@@ -98,6 +98,8 @@ pub(crate) struct Scheduler {
     pub(crate) spent: u64,
     /// Number of rounds of the machine: times that it has looked whose turn it is. Never set back.
     pub(crate) rounds: u64,
+    /// Whether no task is to run until the outside says so.
+    pub(crate) is_paused: bool,
     /// Canary of the turns.
     pub(crate) canary: Canary,
     /// Turn that the end of the last portion has left open.
@@ -131,6 +133,7 @@ impl Scheduler {
             clock,
             spent: 0,
             rounds: 0,
+            is_paused: false,
             canary: Canary::default(),
             open_turn: None,
             running: None,

@@ -1,0 +1,239 @@
+//! Handles: what other threads say to a run and ask of it.
+
+use std::fmt;
+use std::future::Future;
+use std::pin::Pin;
+use std::task::{Context, Poll};
+
+use esl_bytecode::datum::Datum;
+use esl_bytecode::symbol::USER_PACKAGE;
+use esl_vm::embed::ExportError;
+use esl_vm::host::{Answer, Incoming, Pending, Question, SendError, Sender, TaskInfo};
+use esl_vm::observe::{Coming, Observer};
+use esl_vm::vm::Vm;
+
+use crate::data::{Data, FromData};
+use crate::error::Error;
+
+/// A way into a run for other threads, and for other parts of the program that owns the engine.
+///
+/// It may be cloned and sent, and holds no lock of the engine's. What it says and asks comes into the inbox of
+/// the machine in order, and is taken in between two turns while the engine runs. While there is a handle,
+/// something may come: a program that waits is not deadlocked. What a handle says after the engine is gone has
+/// no effect, and what it asks then ends with [`Error::Ended`].
+///
+/// ```
+/// use esl::Engine;
+///
+/// let mut engine = Engine::new()?;
+/// engine.eval("(progn (define-input commands :capacity 9) (defun double (n) (* 2 n)))")?;
+/// let handle = engine.handle();
+/// let operator = std::thread::spawn(move || {
+///     let four: i64 = handle.call("double", [2.into()]).wait()?;
+///     assert_eq!(four, 4);
+///     handle.signal("commands", ["drive".into(), four.into()]).expect("the program has the input");
+///     Ok::<(), esl::Error>(())
+/// });
+/// let command = engine.eval("(multiple-value-list (wait-for-event commands))")?;
+/// assert_eq!(command.to_string(), "(\"drive\" 4)");
+/// operator.join().expect("it does not panic")?;
+/// # Ok::<(), esl::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Handle {
+    sender: Sender,
+    coming: Coming,
+}
+
+impl Handle {
+    pub(super) fn new(machine: &Vm) -> Handle {
+        Handle { sender: Sender::new(&machine.inbox()), coming: machine.coming_observers() }
+    }
+
+    /// Signals an input of the program, by its name in any case. Waits while the input is full, if that is its
+    /// rule: so not on the thread that runs the engine.
+    ///
+    /// # Errors
+    /// [`SendError::NoSuchInput`], also before the program has defined the input; [`SendError::Ended`].
+    pub fn signal(&self, input: &str, arguments: impl IntoIterator<Item = Data>) -> Result<(), SendError> {
+        self.sender.signal(input, data(arguments))
+    }
+
+    /// Signals an input, as [`Handle::signal`], but does not wait.
+    ///
+    /// # Errors
+    /// [`SendError`].
+    pub fn try_signal(
+        &self,
+        input: &str,
+        arguments: impl IntoIterator<Item = Data>,
+    ) -> Result<(), SendError> {
+        self.sender.try_signal(input, data(arguments))
+    }
+
+    /// Adds a fact to the program's database. The answer is whether it is new.
+    pub fn assert(&self, fact: impl Into<Data>) -> Reply<bool> {
+        self.ask("ESL:ASSERT", [fact.into()], true)
+    }
+
+    /// Removes the facts that match a pattern. The answer is how many there were.
+    pub fn retract(&self, pattern: impl Into<Data>) -> Reply<i64> {
+        self.ask("ESL:RETRACT", [pattern.into()], true)
+    }
+
+    /// Sets a property of the program, in place of the value that it has for these arguments. The answer is
+    /// whether that has changed it.
+    pub fn set(
+        &self,
+        property: &str,
+        arguments: impl IntoIterator<Item = Data>,
+        value: impl Into<Data>,
+    ) -> Reply<bool> {
+        let name = Data::Symbol(property.to_uppercase());
+        self.ask("ESL::%SET-PROPERTY", [name, Data::list(arguments), value.into()], true)
+    }
+
+    /// Calls a function of the program in a task of its own. The answer is its first value, converted.
+    pub fn call<T: FromData>(&self, function: &str, arguments: impl IntoIterator<Item = Data>) -> Reply<T> {
+        self.ask(&function.to_uppercase(), arguments, false)
+    }
+
+    /// Starts a task that calls a function of the program.
+    pub fn spawn(&self, function: &str, arguments: impl IntoIterator<Item = Data>) -> TaskHandle {
+        TaskHandle { sender: self.sender.clone(), result: self.call(function, arguments) }
+    }
+
+    /// Aborts the task with this number, which [`Handle::tasks`] tells. Nothing happens if it has ended.
+    pub fn abort(&self, task: u64) {
+        self.sender.inbox().put(Incoming::Abort(task));
+    }
+
+    /// Has no task run, until [`Handle::resume`] or the end of the last handle. The clock goes on, if it is
+    /// not virtual.
+    pub fn pause(&self) {
+        self.sender.inbox().put(Incoming::Pause(true));
+    }
+
+    /// Has tasks run again.
+    pub fn resume(&self) {
+        self.sender.inbox().put(Incoming::Pause(false));
+    }
+
+    /// Returns the tasks of the program that have not ended, in the order in which they were made.
+    pub fn tasks(&self) -> Reply<Vec<TaskInfo>> {
+        Reply { pending: self.sender.ask(Question::Tasks), read: read_tasks }
+    }
+
+    /// Has an observer watch the run from the next turn on.
+    pub fn subscribe(&self, observer: impl Observer + 'static) {
+        self.coming.add(Box::new(observer));
+        self.sender.inbox().put(Incoming::Watch);
+    }
+
+    fn ask<T: FromData>(
+        &self,
+        function: &str,
+        arguments: impl IntoIterator<Item = Data>,
+        is_urgent: bool,
+    ) -> Reply<T> {
+        let question = Question::Call { function: function.into(), arguments: data(arguments), is_urgent };
+        Reply { pending: self.sender.ask(question), read: read_value }
+    }
+}
+
+fn data(arguments: impl IntoIterator<Item = Data>) -> Vec<Datum> {
+    arguments.into_iter().map(|argument| argument.to_datum(USER_PACKAGE)).collect()
+}
+
+/// An answer to come from a run: a future, which can also be waited for. Dropping it changes nothing in the
+/// run.
+pub struct Reply<T> {
+    pending: Pending,
+    read: fn(Answer) -> Result<T, Error>,
+}
+
+impl<T> fmt::Debug for Reply<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.pending.fmt(f)
+    }
+}
+
+impl<T> Reply<T> {
+    /// Waits for the answer: on another thread than the one that runs the engine.
+    ///
+    /// # Errors
+    /// [`Error::Failed`], [`Error::Aborted`], [`Error::NotData`], [`Error::NotOfType`] if the value is of another
+    /// type, and [`Error::Ended`] if the engine is gone.
+    pub fn wait(self) -> Result<T, Error> {
+        (self.read)(self.pending.wait())
+    }
+
+    /// Returns the answer, if it has come and was not taken before.
+    pub fn take(&self) -> Option<Result<T, Error>> {
+        self.pending.take().map(self.read)
+    }
+}
+
+impl<T> Future for Reply<T> {
+    type Output = Result<T, Error>;
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Result<T, Error>> {
+        let read = self.read;
+        Pin::new(&mut self.pending).poll(context).map(read)
+    }
+}
+
+/// Returns the error that an answer without a value stands for.
+fn error_of(answer: Answer) -> Error {
+    match answer {
+        Answer::Failed { cause, message, report } => Error::Failed { cause, message, report },
+        Answer::Circular => Error::NotData(ExportError::Circular),
+        Answer::TooLarge => Error::NotData(ExportError::TooLarge),
+        Answer::Aborted => Error::Aborted,
+        Answer::Values(_) | Answer::Tasks(_) | Answer::Ended => Error::Ended,
+    }
+}
+
+fn read_value<T: FromData>(answer: Answer) -> Result<T, Error> {
+    match answer {
+        Answer::Values(values) => {
+            let value = values.first().map_or(Data::Nil, Data::from_datum);
+            T::from_data(&value).ok_or(Error::NotOfType { value: value.to_string(), expected: T::TYPE })
+        }
+        answer => Err(error_of(answer)),
+    }
+}
+
+fn read_tasks(answer: Answer) -> Result<Vec<TaskInfo>, Error> {
+    match answer {
+        Answer::Tasks(tasks) => Ok(tasks),
+        answer => Err(error_of(answer)),
+    }
+}
+
+/// A task that was started from outside.
+#[derive(Debug)]
+pub struct TaskHandle {
+    sender: Sender,
+    result: Reply<Data>,
+}
+
+impl TaskHandle {
+    /// Aborts the task: it unwinds and runs its cleanups. Nothing happens if it has ended.
+    pub fn abort(&self) {
+        self.sender.inbox().put(Incoming::AbortCall(self.result.pending.number()));
+    }
+
+    /// Waits until the task has ended, and returns the first value of its function.
+    ///
+    /// # Errors
+    /// As [`Reply::wait`].
+    pub fn wait(self) -> Result<Data, Error> {
+        self.result.wait()
+    }
+
+    /// Returns the result as a future.
+    pub fn into_reply(self) -> Reply<Data> {
+        self.result
+    }
+}

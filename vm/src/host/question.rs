@@ -1,0 +1,227 @@
+//! Questions from outside to a run, and the answers.
+//!
+//! A question comes into the inbox as plain data with a number. Where the answer goes, the machine does not
+//! know: it is handed to whoever waits for that number, if anybody does. So a replay, in which nobody does, is
+//! the same run.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker};
+
+use esl_bytecode::datum::Datum;
+
+use super::{Inbox, Incoming, Sender};
+
+/// What is asked of a run.
+#[derive(Clone, Debug)]
+pub enum Question {
+    /// What a function returns, which is called in a task of its own.
+    Call {
+        /// Name of the function, in upper case; `PACKAGE:NAME` outside of the package of programs.
+        function: String,
+        /// The arguments.
+        arguments: Vec<Datum>,
+        /// Whether the task has its first turn before those that can run already.
+        is_urgent: bool,
+    },
+    /// Which tasks there are.
+    Tasks,
+}
+
+/// A task as the outside is told of it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TaskInfo {
+    /// Number of the task.
+    pub number: u64,
+    /// Number of the task that has made it; 0 if the embedder has.
+    pub maker: u64,
+    /// What reports call it.
+    pub name: String,
+    /// What it waits for, as reports say it; `None` if it can run.
+    pub waits_for: Option<String>,
+    /// Ticks that it has used.
+    pub ticks: u64,
+}
+
+/// What is answered.
+#[derive(Clone, Debug)]
+pub enum Answer {
+    /// The values of the call.
+    Values(Vec<Datum>),
+    /// A value contains itself, so it is no data.
+    Circular,
+    /// A value is too large.
+    TooLarge,
+    /// The call has failed.
+    Failed {
+        /// Cause of the failure, as the program prints it.
+        cause: String,
+        /// Text of the condition.
+        message: String,
+        /// What has happened where.
+        report: String,
+    },
+    /// The task of the call was aborted.
+    Aborted,
+    /// The tasks that have not ended, in the order in which they were made.
+    Tasks(Vec<TaskInfo>),
+    /// The machine is gone.
+    Ended,
+}
+
+/// The place where an answer is waited for.
+#[derive(Default)]
+struct Slot {
+    state: Mutex<(Option<Answer>, Option<Waker>)>,
+    ready: Condvar,
+}
+
+impl Slot {
+    fn state(&self) -> MutexGuard<'_, (Option<Answer>, Option<Waker>)> {
+        // The state is whole at every moment, so a panic elsewhere does not corrupt it.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn fill(&self, answer: Answer) {
+        let waker = {
+            let mut state = self.state();
+            state.0 = Some(answer);
+            self.ready.notify_all();
+            state.1.take()
+        };
+        if let Some(waker) = waker {
+            waker.wake();
+        }
+    }
+}
+
+/// Those who wait for answers, by the numbers of their questions.
+#[derive(Default)]
+pub(super) struct Asking(Mutex<Waiting>);
+
+#[derive(Default)]
+struct Waiting {
+    slots: BTreeMap<u64, Arc<Slot>>,
+    /// Number of questions so far.
+    asked: u64,
+    is_closed: bool,
+}
+
+impl Asking {
+    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Inbox {
+    /// Hands the answer to the question with this number to whoever waits for it.
+    pub(crate) fn answer(&self, number: u64, answer: Answer) {
+        let slot = self.asking().waiting().slots.remove(&number);
+        if let Some(slot) = slot {
+            slot.fill(answer);
+        }
+    }
+
+    /// Says that no question will be answered any more.
+    pub(crate) fn end_answers(&self) {
+        let slots = {
+            let mut waiting = self.asking().waiting();
+            waiting.is_closed = true;
+            std::mem::take(&mut waiting.slots)
+        };
+        slots.into_values().for_each(|slot| slot.fill(Answer::Ended));
+    }
+}
+
+/// An answer to come: a future, which can also be waited for.
+pub struct Pending {
+    number: u64,
+    slot: Arc<Slot>,
+}
+
+impl fmt::Debug for Pending {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Pending({})", self.number)
+    }
+}
+
+impl Pending {
+    /// Returns the number of the question.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Waits for the answer, on another thread than the one that runs the machine.
+    pub fn wait(self) -> Answer {
+        let mut state = self.slot.state();
+        loop {
+            match state.0.take() {
+                Some(answer) => return answer,
+                None => state = self.slot.ready.wait(state).unwrap_or_else(PoisonError::into_inner),
+            }
+        }
+    }
+
+    /// Returns the answer if it has come.
+    pub fn take(&self) -> Option<Answer> {
+        self.slot.state().0.take()
+    }
+}
+
+impl Future for Pending {
+    type Output = Answer;
+
+    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Answer> {
+        let mut state = self.slot.state();
+        match state.0.take() {
+            Some(answer) => Poll::Ready(answer),
+            None => {
+                state.1 = Some(context.waker().clone());
+                Poll::Pending
+            }
+        }
+    }
+}
+
+impl Sender {
+    /// Asks something of the run.
+    pub fn ask(&self, question: Question) -> Pending {
+        let slot = Arc::<Slot>::default();
+        let number = {
+            let mut waiting = self.inbox().asking().waiting();
+            waiting.asked += 1;
+            if waiting.is_closed {
+                slot.fill(Answer::Ended);
+            } else {
+                let number = waiting.asked;
+                waiting.slots.insert(number, slot.clone());
+            }
+            waiting.asked
+        };
+        self.inbox().put(Incoming::Question { number, question });
+        Pending { number, slot }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_goes_to_who_asked() {
+        let inbox = Inbox::new();
+        let sender = Sender::new(&inbox);
+        let (first, second) = (sender.ask(Question::Tasks), sender.ask(Question::Tasks));
+        assert!(first.take().is_none());
+        inbox.answer(second.number(), Answer::Aborted);
+        inbox.answer(77, Answer::Aborted);
+        assert!(matches!(second.wait(), Answer::Aborted));
+        let thread = std::thread::spawn(move || first.wait());
+        inbox.end_answers();
+        assert!(matches!(thread.join(), Ok(Answer::Ended)));
+        assert!(matches!(sender.ask(Question::Tasks).wait(), Answer::Ended));
+    }
+}

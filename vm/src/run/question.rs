@@ -1,0 +1,142 @@
+//! Questions from outside: calls in tasks of their own, and what there is to know of tasks.
+
+use esl_bytecode::datum::Datum;
+use esl_bytecode::symbol::{Symbol, USER_PACKAGE};
+
+use super::finish::allocate_without_retry;
+use crate::datum::{self, DatumError};
+use crate::host::{Answer, Question, TaskInfo};
+use crate::report;
+use crate::task::{End, Task, TaskId, TaskNumber, TaskState};
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::wait::event;
+
+/// Most tasks that an answer names.
+const SHOWN: usize = 10_000;
+
+/// Takes in a question, and answers it at once if it is not for a call.
+pub(super) fn take_question(vm: &mut Vm, number: u64, question: Question) {
+    match question {
+        Question::Tasks => {
+            let tasks = tasks(vm);
+            vm.outside.inbox.answer(number, Answer::Tasks(tasks));
+        }
+        // What ends begins nothing new.
+        Question::Call { .. } if vm.embedder.is_ending => vm.outside.inbox.answer(number, Answer::Ended),
+        Question::Call { function, arguments, is_urgent } => match begin_call(vm, &function, &arguments) {
+            Some(id) => {
+                if is_urgent {
+                    vm.scheduler.make_runnable(id.index, true);
+                }
+                vm.embedder.calls.insert(id.index, number);
+            }
+            None => vm.outside.inbox.answer(number, no_room()),
+        },
+    }
+}
+
+fn no_room() -> Answer {
+    Answer::Failed {
+        cause: ":HEAP-EXHAUSTED".into(),
+        message: "There is no memory left for a task.".into(),
+        report: String::new(),
+    }
+}
+
+/// Makes the task that calls a function for somebody outside; `None` if there is no room for it.
+fn begin_call(vm: &mut Vm, function: &str, arguments: &[Datum]) -> Option<TaskId> {
+    let (package, name) = match function.rsplit_once(':') {
+        Some((package, name)) => (package.trim_end_matches(':'), name),
+        None => (USER_PACKAGE, function),
+    };
+    let packages = vm.world.packages();
+    let found = packages.named(package).and_then(|package| packages.find(package, name));
+    let symbol = found.map_or_else(|| Symbol::new(&package.into(), name), |(symbol, _)| symbol);
+    let symbol = Datum::symbol(symbol, Default::default());
+    let mut values = Vec::new();
+    for argument in std::iter::once(&symbol).chain(arguments) {
+        // A cons around it tells `NIL` from a lack of room.
+        let cell = allocate_without_retry(vm, |vm| {
+            let (value, _) = datum::import(&mut vm.heap, &mut vm.world, argument)?;
+            Ok(vm.heap.cons(value, Value::NIL)?)
+        });
+        let value = vm.heap.as_cons(cell)?.car;
+        // A later argument may have what was made before collected.
+        vm.pin(value);
+        values.push(value);
+    }
+    let id = vm.spawn(values[0], &values[1..]);
+    values.into_iter().for_each(|value| vm.unpin(value));
+    id.ok()
+}
+
+/// Aborts the task of the call that was asked for with this number.
+pub(super) fn abort_call(vm: &mut Vm, number: u64) {
+    let call = vm.embedder.calls.iter().find(|&(_, &other)| other == number);
+    if let Some(id) = call.and_then(|(&index, _)| vm.scheduler.tasks.id_at(index)) {
+        vm.abort(id);
+    }
+}
+
+/// Aborts the task with this number.
+pub(super) fn abort_task(vm: &mut Vm, number: TaskNumber) {
+    let tasks = &vm.scheduler.tasks;
+    let is_it = |id: &TaskId| tasks.get(*id).is_some_and(|task| task.number == number);
+    if let Some(id) = tasks.ids().into_iter().find(is_it) {
+        vm.abort(id);
+    }
+}
+
+/// Answers whoever waits for the call of the running task, which has ended with these values. Returns whether
+/// it was for a call.
+pub(super) fn answer_call(vm: &mut Vm, end: End, values: &[Value]) -> bool {
+    let Some(number) = vm.embedder.calls.remove(&vm.scheduler.turn.index) else { return false };
+    let answer = match end {
+        End::Succeeded => answer_with(vm, values),
+        End::Failed(condition) => {
+            let extra = vm.scheduler.task_mut().extra.as_mut();
+            let report = extra.and_then(|extra| extra.report.take());
+            let message = vm.embedder.last_words.take().unwrap_or_else(|| vm.describe(condition));
+            let report =
+                report.map_or_else(|| report::report_in_short(&vm.heap, condition), |report| report.text());
+            Answer::Failed { cause: report::cause_label(&vm.heap, condition), message, report }
+        }
+        End::Aborted | End::Spent => Answer::Aborted,
+    };
+    vm.outside.inbox.answer(number, answer);
+    true
+}
+
+/// Returns values as an answer.
+fn answer_with(vm: &Vm, values: &[Value]) -> Answer {
+    let mut data = Vec::new();
+    for &value in values {
+        match datum::export(&vm.heap, &vm.world, value) {
+            Ok((datum, _)) => data.push(datum),
+            Err(DatumError::Circular) => return Answer::Circular,
+            Err(DatumError::TooLarge) => return Answer::TooLarge,
+        }
+    }
+    Answer::Values(data)
+}
+
+/// Returns what there is to know of the tasks of the program.
+fn tasks(vm: &Vm) -> Vec<TaskInfo> {
+    let mut tasks: Vec<&Task> = vm
+        .scheduler
+        .tasks
+        .iter()
+        .filter(|task| task.state != TaskState::Ended && !task.flags.hidden())
+        .collect();
+    tasks.sort_unstable_by_key(|task| task.number);
+    let maker = |task: &Task| vm.heap.slot_or_nil(task.object, event::RESULT).as_index().unwrap_or(0) as u64;
+    let info = |task: &Task| TaskInfo {
+        number: task.number.0,
+        maker: maker(task),
+        name: report::task_label(vm, task.object),
+        waits_for: (task.state != TaskState::Runnable).then(|| report::reason_of(vm, task)),
+        ticks: task.ticks,
+    };
+    tasks.into_iter().take(SHOWN).map(info).collect()
+}
