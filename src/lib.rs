@@ -35,6 +35,7 @@ pub mod module_path;
 pub mod program;
 #[cfg(feature = "cli")]
 pub mod repl;
+pub mod testing;
 pub mod timeline;
 
 pub use data::Data;

@@ -1325,6 +1325,8 @@ macro_rules! for_each_builtin {
             Deadline = event::deadline, internal "%DEADLINE" ("seconds");
             /// Waits until a time in nanoseconds.
             SleepUntil = event::sleep_until, internal "%SLEEP-UNTIL" ("deadline");
+            /// A number below `count`, picked by the seed of the run, or by the explorer of its schedules.
+            Choose = event::choose, internal "%CHOOSE" ("count");
             /// Lets other tasks have their turns.
             PassTurn = event::pass_turn, internal "%PASS-TURN" ("");
 

@@ -12,6 +12,7 @@ use esl::command::{self, NOT_COMPILED, ProgramFile, RightsOptions, USAGE, compla
 use esl::host::{ProcessSignal, RealHost};
 use esl::module_path::ModulePath;
 use esl::program::{self, Ended, Modules, Program, Summary};
+use esl::testing;
 use esl::timeline::Timeline;
 use esl_compiler::diagnostic::{Format, Renderer};
 use esl_vm::value::Value;
@@ -55,6 +56,36 @@ enum Action {
         /// Arguments of the program
         #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARG")]
         arguments: Vec<String>,
+    },
+    /// Run the tests of programs
+    ///
+    /// Each test (`deftest`) runs in a machine of its own, whose clock is virtual. Exit status: 0 all passed; 1 a
+    /// test failed; 2 wrong usage, or a file that cannot be read or written; 3 a file does not compile or is
+    /// refused.
+    Test {
+        /// Only tests whose names contain this word, in any case
+        #[arg(long, value_name = "WORD")]
+        filter: Option<String>,
+        /// Number of tests that run at the same time; as many as there are processors if it is missing
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+        jobs: Option<u16>,
+        /// Run each test with this seed only
+        #[arg(long, value_name = "N")]
+        seed: Option<u64>,
+        /// Write a report in the form of JUnit to a file
+        #[arg(long, value_name = "FILE")]
+        junit: Option<PathBuf>,
+        /// Most ticks of a run of a test
+        #[arg(long, value_name = "TICKS", default_value_t = 1_000_000_000)]
+        budget: u64,
+        /// Most memory for objects of a test, such as 64M or 2G
+        #[arg(long, value_name = "SIZE", default_value = "1G", value_parser = command::parse_size)]
+        memory: usize,
+        #[command(flatten)]
+        rights: RightsOptions,
+        /// Source or bytecode files
+        #[arg(required = true, value_name = "FILE")]
+        sources: Vec<PathBuf>,
     },
     /// Read forms, evaluate them and print their values
     Repl {
@@ -128,6 +159,18 @@ fn main() -> ExitCode {
         Action::Run { options, stats, timeline, trace, file, arguments } => {
             let path = ModulePath::new([file.as_path()], &library);
             run(&file, arguments, &options, stats, timeline.as_deref(), &trace, &path)
+        }
+        Action::Test { filter, jobs, seed, junit, budget, memory, rights, sources } => {
+            rights.rights().map(|rights| {
+                let processors = || std::thread::available_parallelism().map_or(1, usize::from);
+                let config = Config { budget: Some(budget), memory, ..Config::default() };
+                let jobs = jobs.map_or_else(processors, usize::from);
+                testing::run(
+                    &sources,
+                    &library,
+                    &testing::Options { filter, jobs, seed, junit, config, rights },
+                )
+            })
         }
         Action::Repl { options } => options.rights.rights().and_then(|rights| {
             let path = ModulePath::new([Path::new("-")], &library);

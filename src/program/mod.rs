@@ -30,9 +30,8 @@ use esl_vm::load::LoadError;
 
 pub use compile::{Compiled, Modules, compile, compile_with, expand};
 pub(crate) use run::end;
-#[cfg(feature = "cli")]
-pub(crate) use run::end_rest;
 pub use run::{Ended, Summary, begin, machine, run, run_in, set_module_path, set_traces};
+pub(crate) use run::{begin_with, end_rest, load};
 
 /// A source text and its name in diagnostics and backtraces.
 #[derive(Clone, Debug)]

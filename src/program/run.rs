@@ -8,6 +8,7 @@ use esl_vm::heap::HeapStats;
 use esl_vm::host::{Host, ProcessSignal};
 use esl_vm::run::RunOutcome;
 use esl_vm::task::{TaskId, TaskResult};
+use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
 
 use super::Program;
@@ -111,8 +112,33 @@ pub fn run(program: &Program, config: Config, host: Box<dyn Host + Send>) -> Res
 /// # Errors
 /// As [`run`].
 pub fn begin(machine: &mut Vm, program: &Program) -> Result<TaskId, Error> {
-    let functions = machine.load_module(&program.module)?;
-    let main = machine.spawn_library("%RUN-TOPLEVEL", &[functions])?;
+    begin_with(machine, program, "%RUN-TOPLEVEL", &[])
+}
+
+/// Loads a program into a machine that has the library, and returns the functions of its top-level forms.
+///
+/// # Errors
+/// As [`run`].
+pub(crate) fn load(machine: &mut Vm, program: &Program) -> Result<Value, Error> {
+    Ok(machine.load_module(&program.module)?)
+}
+
+/// Loads a program, and makes a main task that calls a function of the library with the functions of the
+/// program's top-level forms and further arguments.
+///
+/// # Errors
+/// As [`run`].
+pub(crate) fn begin_with(
+    machine: &mut Vm,
+    program: &Program,
+    function: &str,
+    further: &[Datum],
+) -> Result<TaskId, Error> {
+    let mut arguments = vec![load(machine, program)?];
+    for datum in further {
+        arguments.push(machine.import(datum).map_err(|_| Error::NoMemory("an argument"))?);
+    }
+    let main = machine.spawn_library(function, &arguments)?;
     machine.set_interruptible(Some(main));
     machine.set_main(main);
     Ok(main)

@@ -10,6 +10,7 @@ mod real_time;
 mod rights;
 #[cfg(unix)]
 mod terminal;
+mod testing;
 mod timeline;
 mod traces;
 #[cfg(unix)]

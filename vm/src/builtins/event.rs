@@ -357,6 +357,13 @@ pub(super) fn sleep_until(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
+pub(super) fn choose(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(count) = arguments[0].as_index().filter(|&count| count > 0) else {
+        return vm.exchange.not_written(arguments[0], "(INTEGER 1)");
+    };
+    Ok(Value::index(vm.scheduler.choose(count)?))
+}
+
 /// Done again when the others have had their turns.
 pub(super) fn pass_turn(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     vm.scheduler.turn.end_with(TurnEnd::Passed);

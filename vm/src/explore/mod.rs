@@ -14,6 +14,7 @@
 //! task, or queries the database. Nothing between two points is visible to other tasks by these means, so
 //! every schedule of the machine behaves like one of those explored. State shared in other ways (variables,
 //! tables, structures) is not considered: programs protect it by critical sections, which are one step each.
+//! Where a program itself chooses, by `choose`, each way is tried.
 //! A task that reaches no point is stopped after [`Settings::turn`] ticks.
 //!
 //! **Choices.** At each point any runnable task may continue, whatever its priority (every task has a turn at

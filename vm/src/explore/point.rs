@@ -6,10 +6,10 @@ use crate::schedule::Choices;
 use crate::task::{TaskIndex, TaskNumber, TaskState};
 use crate::vm::Vm;
 
-/// The tasks to choose from.
+/// The tasks to choose from, or the ways in which one of them may go on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Runnable {
-    /// Number of runnable tasks.
+    /// Number of runnable tasks, or of ways.
     pub(super) count: u32,
     /// Whether the first of them is the task that ran last.
     pub(super) has_last: bool,
@@ -69,6 +69,17 @@ pub(super) fn run_by_points(
             }
             continue;
         };
+        if let Some(ways) = vm.scheduler.points.asked.take() {
+            let way = choose(vm, Runnable { count: ways as u32, has_last: false })?;
+            vm.scheduler.points.chosen = Some(way as usize);
+            if let Some(&(_, _, index)) = runnable.first().filter(|_| !is_other) {
+                if let Some(task) = vm.scheduler.tasks.at_mut(index) {
+                    task.flags.set_at_point(false);
+                }
+                run::give_turn(vm, index, u64::MAX);
+            }
+            continue;
+        }
         let count = runnable.len() as u32;
         let choice = choose(vm, Runnable { count, has_last: !is_other })?;
         let (_, number, index) = runnable[(choice % count) as usize];

@@ -26,6 +26,10 @@ pub(crate) struct Points {
     pub(crate) grain: Option<Grain>,
     /// Whether the running task may pass the point at which it stands.
     pub(crate) is_open: bool,
+    /// Number of ways among which the task that ran last wants one to be chosen.
+    pub(crate) asked: Option<usize>,
+    /// The way that was chosen for it.
+    pub(crate) chosen: Option<usize>,
 }
 
 impl Scheduler {
@@ -57,6 +61,27 @@ impl Scheduler {
         self.task_mut().flags.set_at_point(true);
         self.turn.end_with(TurnEnd::Passed);
         true
+    }
+
+    /// Chooses a number below `count`: by the seed of the run, or by the explorer. In a critical section, which
+    /// is one step for the explorer, it is 0 then.
+    ///
+    /// # Errors
+    /// [`Exit::Again`] if the explorer is to choose; the builtin will be done again.
+    pub(crate) fn choose(&mut self, count: usize) -> Result<usize, Exit> {
+        if self.points.grain.is_none() {
+            return Ok(self.choices.choose(count));
+        }
+        if let Some(chosen) = self.points.chosen.take() {
+            return Ok(chosen % count);
+        }
+        if self.task().critical > 0 || count == 1 {
+            return Ok(0);
+        }
+        self.points.asked = Some(count);
+        self.task_mut().flags.set_at_point(true);
+        self.turn.end_with(TurnEnd::Passed);
+        Err(Exit::Again)
     }
 
     /// Stops the running task, which has come to its end with these values, before the last step of the

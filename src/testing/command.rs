@@ -1,0 +1,200 @@
+//! `eslvm test`: the tests of several files, in several threads, and what is said of them.
+#![allow(clippy::print_stdout, reason = "commands print")]
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use esl_compiler::diagnostic::{Format, Renderer};
+use esl_vm::host::Rights;
+use esl_vm::vm::Config;
+
+use super::{Setup, Test, Verdict, junit, list, run_test};
+use crate::command::{self, FAILED, NOT_COMPILED, ProgramFile, SUCCESS, USAGE, complain};
+use crate::module_path::ModulePath;
+use crate::program::{self, Modules, Program};
+
+/// Which tests to run, and how.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Only tests whose names contain this, in any case.
+    pub filter: Option<String>,
+    /// Number of tests that run at the same time.
+    pub jobs: usize,
+    /// The one seed to run tests with, in place of their own.
+    pub seed: Option<u64>,
+    /// File for a report in JUnit's form.
+    pub junit: Option<PathBuf>,
+    /// Limits of each test.
+    pub config: Config,
+    /// What of the outside a test may reach.
+    pub rights: Rights,
+}
+
+/// A file with tests.
+struct Suite<'a> {
+    file: &'a Path,
+    program: Program,
+    setup: Setup,
+}
+
+/// A test of a file, and what became of it.
+pub(super) struct Run<'a> {
+    suite: &'a Suite<'a>,
+    pub(super) test: Test,
+    pub(super) result: Mutex<Option<Finished>>,
+}
+
+impl Run<'_> {
+    /// Returns the name of the file.
+    pub(super) fn file(&self) -> String {
+        self.suite.file.display().to_string()
+    }
+}
+
+/// What became of a test.
+pub(super) struct Finished {
+    pub(super) verdict: Verdict,
+    /// Seed with which it has failed.
+    seed: Option<u64>,
+    pub(super) time: Duration,
+}
+
+/// Runs the tests of `files`, and prints what becomes of them. Returns the exit status.
+pub fn run(files: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
+    let suites = match files
+        .iter()
+        .map(|file| suite(file, library, options))
+        .collect::<Result<Vec<Suite<'_>>, u8>>()
+    {
+        Ok(suites) => suites,
+        Err(status) => return status,
+    };
+    let mut runs = Vec::new();
+    for suite in &suites {
+        match list(&suite.program, &suite.setup) {
+            Ok(tests) => {
+                let wanted = tests.into_iter().filter(|test| is_wanted(test, options.filter.as_deref()));
+                runs.extend(wanted.map(|test| Run { suite, test, result: Mutex::default() }));
+            }
+            Err(error) => {
+                complain(format_args!("{} has no tests to run: {error}", suite.file.display()));
+                return FAILED;
+            }
+        }
+    }
+    let next = AtomicUsize::new(0);
+    // Number of the first test that was not told of.
+    let told = Mutex::new(0);
+    std::thread::scope(|scope| {
+        for _ in 0..options.jobs.clamp(1, runs.len().max(1)) {
+            scope.spawn(|| {
+                while let Some(run) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let finished = finish(run, options);
+                    *run.result.lock().unwrap_or_else(PoisonError::into_inner) = Some(finished);
+                    tell(&runs, &mut told.lock().unwrap_or_else(PoisonError::into_inner), options);
+                }
+            });
+        }
+    });
+    let failed = runs.iter().filter(|run| has_failed(run)).count();
+    println!("{} passed, {failed} failed", runs.len() - failed);
+    if let Some(path) = &options.junit
+        && let Err(error) = std::fs::write(path, junit::report(&runs))
+    {
+        complain(format_args!("{} cannot be written: {error}", path.display()));
+        return USAGE;
+    }
+    if failed > 0 { FAILED } else { SUCCESS }
+}
+
+/// Reads and compiles a file.
+///
+/// # Errors
+/// The exit status, after a message.
+fn suite<'a>(file: &'a Path, library: &[PathBuf], options: &Options) -> Result<Suite<'a>, u8> {
+    let path = ModulePath::new([file], library);
+    let program = match command::read_program(file)? {
+        ProgramFile::Compiled(program) => program,
+        ProgramFile::Source(source) => {
+            let compiled = program::compile_with(&[source], &path, Modules::Inside);
+            let color = std::io::IsTerminal::is_terminal(&std::io::stderr());
+            command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
+            compiled.program.ok_or(NOT_COMPILED)?
+        }
+    };
+    let setup = Setup { config: options.config.clone(), path, rights: options.rights.clone() };
+    Ok(Suite { file, program, setup })
+}
+
+fn is_wanted(test: &Test, filter: Option<&str>) -> bool {
+    filter.is_none_or(|filter| test.name.to_lowercase().contains(&filter.to_lowercase()))
+}
+
+fn has_failed(run: &Run<'_>) -> bool {
+    let result = run.result.lock().unwrap_or_else(PoisonError::into_inner);
+    result.as_ref().is_none_or(|finished| finished.verdict != Verdict::Passed)
+}
+
+/// Runs a test with each of its seeds, until it fails.
+fn finish(run: &Run<'_>, options: &Options) -> Finished {
+    let start = Instant::now();
+    let seeds = match options.seed {
+        Some(seed) => seed..seed.saturating_add(1),
+        None => 0..if run.test.explores { 1 } else { run.test.seeds },
+    };
+    let mut finished = Finished { verdict: Verdict::Passed, seed: None, time: Duration::ZERO };
+    for seed in seeds {
+        let verdict = run_test(&run.suite.program, &run.test, seed, &run.suite.setup);
+        let verdict = verdict.unwrap_or_else(|error| Verdict::Failed {
+            why: "it cannot be begun".into(),
+            output: error.to_string(),
+        });
+        if verdict != Verdict::Passed {
+            finished = Finished { verdict, seed: (!run.test.explores).then_some(seed), ..finished };
+            break;
+        }
+    }
+    Finished { time: start.elapsed(), ..finished }
+}
+
+/// Prints what became of the tests from `told` on that have ended, in the order of the files.
+fn tell(runs: &[Run<'_>], told: &mut usize, options: &Options) {
+    while let Some(run) = runs.get(*told) {
+        let result = run.result.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(finished) = result.as_ref() else { return };
+        if *told == 0 || !std::ptr::eq(runs[*told - 1].suite, run.suite) {
+            println!("{}", run.file());
+        }
+        print!("{}", text(run, finished, options));
+        *told += 1;
+    }
+}
+
+/// Returns the lines that say what became of a test.
+fn text(run: &Run<'_>, finished: &Finished, options: &Options) -> String {
+    let Test { name, seeds, explores } = &run.test;
+    let Verdict::Failed { why, output } = &finished.verdict else {
+        let how = match options.seed {
+            None if *explores => ", all schedules".into(),
+            None if *seeds > 1 => format!(", {seeds} seeds"),
+            _ => String::new(),
+        };
+        return format!("  passed  {name}{how}\n");
+    };
+    let seed = finished.seed.map_or(String::new(), |seed| format!(", seed {seed}"));
+    let mut text = format!("  FAILED  {name}{seed}: {why}\n");
+    // Writing to a string does not fail.
+    output.lines().for_each(|line| _ = writeln!(text, "          {line}"));
+    let again = finished.seed.map_or(String::new(), |seed| format!(" --seed {seed}"));
+    _ = writeln!(text, "          again: eslvm test {} --filter {}{again}", run.file(), quoted(name));
+    text
+}
+
+/// Returns a word as a shell reads it.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_+.,/:@%".contains(c);
+    if word.chars().all(is_plain) { word.into() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+}

@@ -1,0 +1,207 @@
+//! Running the tests of a program, each in a machine of its own: what `eslvm test` does.
+//!
+//! The clock of a test is virtual, and what it prints is kept, and shown if it fails.
+//!
+//! ```
+//! use esl::program::{Source, compile};
+//! use esl::testing::{Setup, Verdict, list, run_test};
+//!
+//! let text = "(deftest adding (is (= (+ 1 1) 2)))
+//!             (deftest waiting :seeds 3 (sleep 100) (is (> (now) 200)))";
+//! let program = compile(&[Source::new("sums.esl", text)]).program.expect("it compiles");
+//! let setup = Setup::default();
+//! let tests = list(&program, &setup)?;
+//! let run = |at: usize| run_test(&program, &tests[at], 0, &setup);
+//! assert_eq!(run(0)?, Verdict::Passed);
+//! let Verdict::Failed { why, output } = run(1)? else { panic!() };
+//! assert_eq!(why, "a check did not hold");
+//! assert_eq!(output, "(> (NOW) 200) is false.\n  (NOW) is 100.0\n");
+//! # Ok::<(), esl::Error>(())
+//! ```
+
+#[cfg(feature = "cli")]
+mod command;
+#[cfg(feature = "cli")]
+mod junit;
+
+use std::cell::RefCell;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use esl_bytecode::datum::Datum;
+use esl_vm::explore::Settings;
+use esl_vm::host::{Host, RealHost, Rights, VirtualHost};
+use esl_vm::task::TaskId;
+use esl_vm::value::Value;
+use esl_vm::vm::{Config, Vm};
+
+#[cfg(feature = "cli")]
+pub use command::{Options, run};
+
+use crate::data::Data;
+use crate::error::Error;
+use crate::module_path::ModulePath;
+use crate::program::{self, Ended, Program};
+
+/// Statuses with which the library's `%run-test` ends a run.
+const ALL_HELD: u8 = 100;
+const ONE_DID_NOT_HOLD: u8 = 101;
+const NO_CHECK: u8 = 102;
+
+/// What tests are run with.
+#[derive(Clone, Debug, Default)]
+pub struct Setup {
+    /// Limits of each run.
+    pub config: Config,
+    /// Folders in which modules are found.
+    pub path: ModulePath,
+    /// What of the outside a test may reach.
+    pub rights: Rights,
+}
+
+/// A test of a program.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Test {
+    /// Name, as the program prints it.
+    pub name: String,
+    /// Number of seeds to run it with.
+    pub seeds: u64,
+    /// Whether to run it under all schedules.
+    pub explores: bool,
+}
+
+/// What became of a test.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// All its checks held.
+    Passed,
+    /// It failed.
+    Failed {
+        /// Why, in a few words.
+        why: String,
+        /// What it has written, reports of failures and checks included.
+        output: String,
+    },
+}
+
+/// What a machine has written.
+#[derive(Clone, Default)]
+struct Written(Arc<Mutex<Vec<u8>>>);
+
+impl Written {
+    fn text(&self) -> String {
+        String::from_utf8_lossy(&self.0.lock().unwrap_or_else(PoisonError::into_inner)).into_owned()
+    }
+
+    /// Returns a host with virtual time whose programs write here.
+    fn host(&self, setup: &Setup) -> RealHost {
+        let written = self.clone();
+        let screen = move |bytes: &[u8]| {
+            written.0.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(bytes);
+            Ok(())
+        };
+        let rights = setup.path.with_rights(setup.rights.clone());
+        RealHost::new(Vec::new()).with_rights(rights).with_virtual_time().with_screen(Box::new(screen))
+    }
+}
+
+/// Returns the tests of a program, in the order of their definitions.
+///
+/// # Errors
+/// Those of an evaluation, if the program does not come to its end.
+pub fn list(program: &Program, setup: &Setup) -> Result<Vec<Test>, Error> {
+    let host = Box::new(Written::default().host(setup));
+    let mut machine = program::machine(setup.config.clone(), host)?;
+    program::set_module_path(&mut machine, &setup.path)?;
+    let functions = program::load(&mut machine, program)?;
+    let function = machine.library_function("%LIST-TESTS")?;
+    let values = machine.call(function, &[functions], u64::MAX)?;
+    let tests = machine.export(values.first().copied().unwrap_or(Value::NIL))?;
+    let tests = Data::from_datum(&tests);
+    let read = |test: &Data| match test.as_list() {
+        Some([Data::String(name), Data::Integer(seeds), explores]) => Some(Test {
+            name: name.clone(),
+            seeds: u64::try_from(*seeds).ok()?,
+            explores: explores.is_true(),
+        }),
+        _ => None,
+    };
+    Ok(tests.as_list().unwrap_or_default().iter().filter_map(read).collect())
+}
+
+/// Returns a machine that is about to run a test, and its main task.
+fn begin(
+    program: &Program,
+    test: &Test,
+    seed: u64,
+    setup: &Setup,
+    host: Box<dyn Host + Send>,
+) -> Result<(Vm, TaskId), Error> {
+    let mut machine = program::machine(Config { seed, ..setup.config.clone() }, host)?;
+    program::set_module_path(&mut machine, &setup.path)?;
+    let name = Datum::string(&test.name, Default::default());
+    let main = program::begin_with(&mut machine, program, "%RUN-TEST", &[name])?;
+    Ok((machine, main))
+}
+
+/// Runs a test with a seed, or under all schedules if that is what it is for.
+///
+/// # Errors
+/// [`Error::NoMemory`] or [`Error::Refused`], if it cannot be begun.
+pub fn run_test(program: &Program, test: &Test, seed: u64, setup: &Setup) -> Result<Verdict, Error> {
+    if test.explores {
+        return explore(program, test, setup);
+    }
+    let written = Written::default();
+    let (mut machine, main) = begin(program, test, seed, setup, Box::new(written.host(setup)))?;
+    let outcome = machine.run(u64::MAX);
+    let ended = program::end(&mut machine, main, outcome);
+    program::end_rest(&mut machine);
+    Ok(verdict(ended, || written.text()))
+}
+
+/// Runs a test under all schedules.
+fn explore(program: &Program, test: &Test, setup: &Setup) -> Result<Verdict, Error> {
+    let present = RefCell::new(None);
+    let begin = || {
+        let host = VirtualHost::new();
+        let captured = host.captured();
+        let (machine, main) = begin(program, test, 0, setup, Box::new(host))?;
+        present.replace(Some((main, captured)));
+        Ok::<Vm, Error>(machine)
+    };
+    let found = esl_vm::explore::explore(&Settings::default(), begin, |machine, outcome| {
+        let (main, captured) = present.take().expect("a machine that has run was begun");
+        let ended = program::end(machine, main, outcome);
+        verdict(ended, || captured.output() + &captured.error())
+    })?;
+    let failed = found.endings.into_iter().find(|ending| ending.what != Verdict::Passed);
+    Ok(match failed.map(|ending| ending.what) {
+        Some(Verdict::Failed { why, output }) => {
+            Verdict::Failed { why: format!("under one of {} schedules, {why}", found.runs), output }
+        }
+        _ if found.endless.is_some() => {
+            Verdict::Failed { why: "a schedule leads to where it never ends".into(), output: String::new() }
+        }
+        _ if !found.is_complete => Verdict::Failed {
+            why: format!("after {} states there are schedules left that were not tried", found.states),
+            output: String::new(),
+        },
+        _ => Verdict::Passed,
+    })
+}
+
+/// Returns what became of a test whose run has ended so.
+fn verdict(ended: Ended, output: impl FnOnce() -> String) -> Verdict {
+    let why = match ended {
+        Ended::Normally(ALL_HELD) => return Verdict::Passed,
+        Ended::Normally(ONE_DID_NOT_HOLD) => "a check did not hold".into(),
+        Ended::Normally(NO_CHECK) => "it has no check: use IS, SIGNALS or FAILS".into(),
+        Ended::Normally(status) => format!("it has ended the run with the status {status}"),
+        Ended::Failed => "a failure has left it".into(),
+        Ended::HeapExhausted => "its memory is exhausted".into(),
+        Ended::BudgetSpent => "its budget of ticks is spent; `--budget` raises it".into(),
+        Ended::Deadlocked => "it waits for what cannot come".into(),
+        Ended::Signalled(signal) => format!("it was ended by the signal {}", signal.number()),
+    };
+    Verdict::Failed { why, output: output() }
+}
