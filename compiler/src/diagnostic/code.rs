@@ -395,6 +395,11 @@ UNREACHABLE_CLAUSE = "unreachable-clause" Warning
     repaired: "(with-recovery-procedures\n    ((:broken (abort))\n     \
               (:general-failure :retries :infinite (retry)))\n  (print 1))\n"
 
+NOTHING_TO_WAIT_FOR = "nothing-to-wait-for" Warning
+    /// A form to be waited for that reads nothing whose changes can be seen, such as a fluent or a fact.
+    fails: "(defvar *level* 0)\n(spawn (:daemon t)\n  (whenever (> *level* 5)\n    (print 'high)))\n"
+    repaired: "(define-fluent level 0)\n(spawn (:daemon t)\n  (whenever (> level 5)\n    (print 'high)))\n"
+
 UNDECLARED_CAUSE = "undeclared-cause" Warning
     /// A cause that is not declared, in a program that declares causes.
     fails: "(define-cause :broken ())\n(with-recovery-procedures\n    ((:brocken (abort)))\n  \

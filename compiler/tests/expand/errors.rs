@@ -259,6 +259,7 @@ fn the_programs_in_the_table_of_codes_have_them() {
         "literal-object",
         "clause-falls-off",
         "unreachable-clause",
+        "nothing-to-wait-for",
         "undeclared-cause",
         "outside-clause",
         "unknown-module",

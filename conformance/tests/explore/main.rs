@@ -1,6 +1,7 @@
 //! Explores all schedules of small programs: proves what never happens, and finds what does.
 
 mod defects;
+mod fluents;
 mod putting_back;
 mod resources;
 
