@@ -140,7 +140,7 @@ impl Data {
             DatumKind::Vector(items) | DatumKind::Array(_, items) => {
                 Data::Vector(items.iter().map(Data::from_datum).collect())
             }
-            DatumKind::Object(_) => Data::String(datum.to_string()),
+            DatumKind::Object(_) | DatumKind::Call(_) => Data::String(datum.to_string()),
             DatumKind::Cons(..) => {
                 let mut elements = datum.elements();
                 let items: Vec<Data> = elements.by_ref().map(Data::from_datum).collect();

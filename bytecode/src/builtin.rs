@@ -228,6 +228,8 @@ macro_rules! for_each_builtin {
             Numberp = types::numberp, cl "NUMBERP" ("object") -> one;
             /// Whether `object` is an integer, a ratio or a float.
             Realp = types::realp, cl "REALP" ("object") -> one;
+            /// Whether `object` is a complex number.
+            Complexp = number::complexp, cl "COMPLEXP" ("object");
             /// Whether `object` is an integer or a ratio.
             Rationalp = types::rationalp, cl "RATIONALP" ("object") -> one;
             /// Whether `object` is an integer.
@@ -270,9 +272,9 @@ macro_rules! for_each_builtin {
             /// ratios.
             Divide = number::divide, cl "/" ("number &rest numbers") -> one slowly "%SLOW-/";
             /// `number` plus one.
-            Increment = number::increment, cl "1+" ("number") -> one;
+            Increment = number::increment, cl "1+" ("number") -> one slowly "%SLOW-1+";
             /// `number` less one.
-            Decrement = number::decrement, cl "1-" ("number") -> one;
+            Decrement = number::decrement, cl "1-" ("number") -> one slowly "%SLOW-1-";
             /// Quotient rounded towards minus infinity, and remainder.
             Floor = number::floor, cl "FLOOR" ("number &optional divisor") slowly "%SLOW-FLOOR";
             /// Quotient rounded towards plus infinity, and remainder.
@@ -316,9 +318,15 @@ macro_rules! for_each_builtin {
             /// The least of the numbers.
             Min = number::min, cl "MIN" ("number &rest numbers");
             /// The number without its sign.
-            Abs = number::abs, cl "ABS" ("number");
+            Abs = number::abs, cl "ABS" ("number") slowly "%SLOW-ABS";
             /// -1, 0 or 1, as `number` is below, at or above zero, as a number of its type.
-            Signum = number::signum, cl "SIGNUM" ("number");
+            Signum = number::signum, cl "SIGNUM" ("number") slowly "%SLOW-SIGNUM";
+            /// The complex number with these parts, which are two rationals or two floats.
+            MakeComplex = number::make_complex, internal "%MAKE-COMPLEX" ("real-part imaginary-part");
+            /// The real part of a number.
+            Realpart = number::real_part, cl "REALPART" ("number");
+            /// The imaginary part of a number.
+            Imagpart = number::imaginary_part, cl "IMAGPART" ("number");
             /// As `floor`, with the quotient as a float.
             FFloor = number::ffloor, cl "FFLOOR" ("number &optional divisor") slowly "%SLOW-FFLOOR";
             /// As `ceiling`, with the quotient as a float.
@@ -330,38 +338,37 @@ macro_rules! for_each_builtin {
             FRound = number::fround, cl "FROUND" ("number &optional divisor") slowly "%SLOW-FROUND";
             /// `base` to the power of `power`: exact for rationals and integer powers.
             Expt = float::expt, cl "EXPT" ("base power") slowly "%SLOW-EXPT";
-            /// The square root, a float. That of a negative number is an `arithmetic-error`.
-            Sqrt = float::sqrt, cl "SQRT" ("number");
+            /// The square root, a float; that of a negative number is complex.
+            Sqrt = float::sqrt, cl "SQRT" ("number") slowly "%SLOW-SQRT";
             /// e to the power of `number`.
-            Exp = float::exp, cl "EXP" ("number");
-            /// The logarithm, natural unless a base is given. That of a negative number is an
-            /// `arithmetic-error`.
-            Log = float::log, cl "LOG" ("number &optional base");
+            Exp = float::exp, cl "EXP" ("number") slowly "%SLOW-EXP";
+            /// The logarithm, natural unless a base is given; that of a negative number is complex.
+            Log = float::log, cl "LOG" ("number &optional base") slowly "%SLOW-LOG";
             /// The sine.
-            Sin = float::sin, cl "SIN" ("radians");
+            Sin = float::sin, cl "SIN" ("radians") slowly "%SLOW-SIN";
             /// The cosine.
-            Cos = float::cos, cl "COS" ("radians");
+            Cos = float::cos, cl "COS" ("radians") slowly "%SLOW-COS";
             /// The tangent.
-            Tan = float::tan, cl "TAN" ("radians");
+            Tan = float::tan, cl "TAN" ("radians") slowly "%SLOW-TAN";
             /// The angle with this sine.
-            Asin = float::asin, cl "ASIN" ("number");
+            Asin = float::asin, cl "ASIN" ("number") slowly "%SLOW-ASIN";
             /// The angle with this cosine.
-            Acos = float::acos, cl "ACOS" ("number");
+            Acos = float::acos, cl "ACOS" ("number") slowly "%SLOW-ACOS";
             /// The angle with this tangent; of two arguments, the angle of the point with `number` above and
             /// `divisor` to the right.
-            Atan = float::atan, cl "ATAN" ("number &optional divisor");
+            Atan = float::atan, cl "ATAN" ("number &optional divisor") slowly "%SLOW-ATAN";
             /// The hyperbolic sine.
-            Sinh = float::sinh, cl "SINH" ("number");
+            Sinh = float::sinh, cl "SINH" ("number") slowly "%SLOW-SINH";
             /// The hyperbolic cosine.
-            Cosh = float::cosh, cl "COSH" ("number");
+            Cosh = float::cosh, cl "COSH" ("number") slowly "%SLOW-COSH";
             /// The hyperbolic tangent.
-            Tanh = float::tanh, cl "TANH" ("number");
+            Tanh = float::tanh, cl "TANH" ("number") slowly "%SLOW-TANH";
             /// The number with this hyperbolic sine.
-            Asinh = float::asinh, cl "ASINH" ("number");
+            Asinh = float::asinh, cl "ASINH" ("number") slowly "%SLOW-ASINH";
             /// The number with this hyperbolic cosine.
-            Acosh = float::acosh, cl "ACOSH" ("number");
+            Acosh = float::acosh, cl "ACOSH" ("number") slowly "%SLOW-ACOSH";
             /// The number with this hyperbolic tangent.
-            Atanh = float::atanh, cl "ATANH" ("number");
+            Atanh = float::atanh, cl "ATANH" ("number") slowly "%SLOW-ATANH";
             /// The numerator, in lowest terms.
             Numerator = float::numerator, cl "NUMERATOR" ("rational");
             /// The denominator, in lowest terms; 1 for an integer.
@@ -819,6 +826,17 @@ macro_rules! for_each_builtin {
             ArrayHasFillPointerp = array::array_has_fill_pointer_p, cl "ARRAY-HAS-FILL-POINTER-P" ("array");
             /// Whether the array was made to be adjustable.
             AdjustableArrayp = array::adjustable_array_p, cl "ADJUSTABLE-ARRAY-P" ("array");
+            /// The array to which `array` is displaced, and the index of its first element there; `NIL` and 0 if
+            /// there is none.
+            Displacement = array::displacement, cl "ARRAY-DISPLACEMENT" ("array");
+            /// What the elements may be: 0 any objects, 1 characters, 2 integers below 256, 3 bits.
+            ElementSort = array::element_sort, internal "%ELEMENT-SORT" ("array") -> one;
+            /// A vector of `size` times `byte`, of bits if `bits-p`.
+            MakeBytes = array::make_bytes, internal "%MAKE-BYTES" ("size byte bits-p") -> one;
+            /// Stores the bits of an operation on those of two arrays, from row-major index `start` on, in
+            /// `target`; the index up to which it has got. Bit 2a+b of `operation` is the result for bits a and b.
+            BitOperation = array::bit_operation, internal "%BIT-OPERATION"
+                ("operation left right target start") -> one;
             /// What keeps the elements: a simple vector or string, the array itself if it is one.
             ArrayData = array::array_data, internal "%ARRAY-DATA" ("array");
             /// The fill pointer of a vector.
@@ -842,12 +860,13 @@ macro_rules! for_each_builtin {
             /// Fills more elements of such a vector with `object`, or with 0 if that has an address; whether
             /// all are filled now.
             FillMore = array::fill_more, internal "%FILL-MORE" ("vector object");
-            /// An array that is not simple, over the simple vector or string `data`; `fill-pointer` is `NIL`,
-            /// `T` or an index.
-            MakeArray = array::make_array, internal "%MAKE-ARRAY" ("dimensions data fill-pointer adjustable");
+            /// An array that is not simple, over `data`, a simple vector or string, or bytes; with an offset,
+            /// displaced to the array `data`. `fill-pointer` is `NIL`, `T` or an index.
+            MakeArray = array::make_array, internal "%MAKE-ARRAY"
+                ("dimensions data fill-pointer adjustable &optional offset");
             /// Gives an array that is not simple other dimensions, data and fill pointer, and returns it.
-            AdjustArray = array::adjust_array, internal "%ADJUST-ARRAY" ("array dimensions data fill-pointer")
-               ;
+            AdjustArray = array::adjust_array, internal "%ADJUST-ARRAY"
+                ("array dimensions data fill-pointer &optional offset");
 
             // ---- hash tables
             /// A hash table: `test` is 0 for `eq`, 1 for `eql`, 2 for `equal`, 3 for `equalp`, 4 for the
@@ -1137,6 +1156,8 @@ macro_rules! for_each_builtin {
             /// A handle of a text that is compiled form by form. Functions of a text with a name know where
             /// they stand in it.
             OpenText = eval::open_text, internal "%OPEN-TEXT" ("text &optional name");
+            /// What is left of a text that is compiled form by form, which ends with this.
+            TextRest = eval::text_rest, internal "%TEXT-REST" ("handle");
             /// A handle of the compilation of the next form of a text, `NIL` at its end.
             NextForm = eval::next_form, internal "%NEXT-FORM" ("handle");
             /// Tells a compilation what became of its last step, and returns the next one: `:expand` function
@@ -1147,7 +1168,7 @@ macro_rules! for_each_builtin {
             /// Reads a datum: whether there was one, or `:unfinished`; the datum; and the index after it.
             ReadDatum = eval::read_from_string, internal "%READ-FROM-STRING" ("string &optional start end");
             /// Reads a datum from a stream: whether there was one, or `:unfinished`; and the datum.
-            ReadStream = eval::read, internal "%READ" ("&optional stream");
+            ReadStream = eval::read, internal "%READ" ("&optional stream") slowly "%SLOW-READ";
 
             // ---- streams
             /// Standard input, output or error: 0, 1 or 2.
@@ -1183,48 +1204,56 @@ macro_rules! for_each_builtin {
             FileExistsP = stream::file_exists_p, internal "%FILE-EXISTS-P" ("path &optional use");
             /// Removes a file.
             DeleteFile = stream::delete_file, internal "%DELETE-FILE" ("path");
+            /// The bytes of a file.
+            FileBytes = stream::file_bytes, internal "%FILE-BYTES" ("path");
+            /// Writes a vector of bytes to a file: 0 replaces it, 1 appends to it, 2 fails if there is one.
+            WriteBytes = stream::write_bytes, internal "%WRITE-BYTES" ("path vector mode");
+            /// A stream whose operations are written in ESL, over `data`.
+            MakeCustomStream = stream::make_custom_stream, internal "%MAKE-CUSTOM-STREAM" ("data");
+            /// The data of such a stream; `NIL` for any other object.
+            CustomStreamData = stream::custom_stream_data, internal "%CUSTOM-STREAM-DATA" ("stream");
             /// Whether `object` is a stream.
             Streamp = stream::streamp, cl "STREAMP" ("object");
             /// Whether a stream can be read from.
-            InputStreamP = stream::input_stream_p, cl "INPUT-STREAM-P" ("stream");
+            InputStreamP = stream::input_stream_p, cl "INPUT-STREAM-P" ("stream") slowly "%SLOW-INPUT-STREAM-P";
             /// Whether a stream can be written to.
-            OutputStreamP = stream::output_stream_p, cl "OUTPUT-STREAM-P" ("stream");
+            OutputStreamP = stream::output_stream_p, cl "OUTPUT-STREAM-P" ("stream") slowly "%SLOW-OUTPUT-STREAM-P";
             /// Whether a stream is open.
             OpenStreamP = stream::open_stream_p, cl "OPEN-STREAM-P" ("stream");
             /// `:standard`, `:string` or `:file`, and the name of the file.
             StreamSort = stream::stream_sort, internal "%STREAM-SORT" ("stream");
             /// Characters since the last line end that was written to a stream.
-            StreamColumn = stream::stream_column, internal "%STREAM-COLUMN" ("stream");
+            StreamColumn = stream::stream_column, internal "%STREAM-COLUMN" ("stream") slowly "%SLOW-STREAM-COLUMN";
             /// The next character of a stream. Waits for standard input.
             ReadChar = stream::read_char, cl "READ-CHAR"
-                ("&optional stream eof-error-p eof-value recursive-p");
+                ("&optional stream eof-error-p eof-value recursive-p") slowly "%SLOW-READ-CHAR";
             /// The next character of a stream, or `NIL` if it would have to wait.
             ReadCharNoHang = stream::read_char_no_hang, cl "READ-CHAR-NO-HANG"
-                ("&optional stream eof-error-p eof-value recursive-p");
+                ("&optional stream eof-error-p eof-value recursive-p") slowly "%SLOW-READ-CHAR-NO-HANG";
             /// Whether a character of a stream is there to be read.
-            Listen = stream::listen, cl "LISTEN" ("&optional stream");
+            Listen = stream::listen, cl "LISTEN" ("&optional stream") slowly "%SLOW-LISTEN";
             /// The next character of a stream, which stays there; with `T`, after white space; with a
             /// character, up to that.
             PeekChar = stream::peek_char, cl "PEEK-CHAR"
                 ("&optional peek-type stream eof-error-p eof-value recursive-p") slowly "%SLOW-PEEK-CHAR";
             /// Puts the character that was read last back into a stream.
-            UnreadChar = stream::unread_char, cl "UNREAD-CHAR" ("character &optional stream");
+            UnreadChar = stream::unread_char, cl "UNREAD-CHAR" ("character &optional stream") slowly "%SLOW-UNREAD-CHAR";
             /// The next line of a stream, and whether it has no line end. Waits for standard input.
             ReadLine = stream::read_line, cl "READ-LINE"
                 ("&optional stream eof-error-p eof-value recursive-p") slowly "%SLOW-READ-LINE";
             /// Writes a character to a stream, and returns it.
-            WriteChar = stream::write_char, cl "WRITE-CHAR" ("character &optional stream");
+            WriteChar = stream::write_char, cl "WRITE-CHAR" ("character &optional stream") slowly "%SLOW-WRITE-CHAR";
             /// Writes a part of a string to a stream, and returns the string.
             WriteStringPart = stream::write_string, internal "%WRITE-STRING" ("string stream start end")
                 slowly "%SLOW-WRITE-STRING";
             /// Ends the line that is being written to a stream.
-            Terpri = stream::terpri, cl "TERPRI" ("&optional stream");
+            Terpri = stream::terpri, cl "TERPRI" ("&optional stream") slowly "%SLOW-TERPRI";
             /// Ends the line that is being written to a stream, unless it is empty; whether it did.
-            FreshLine = stream::fresh_line, cl "FRESH-LINE" ("&optional stream");
+            FreshLine = stream::fresh_line, cl "FRESH-LINE" ("&optional stream") slowly "%SLOW-FRESH-LINE";
             /// Writes what a stream has gathered.
-            FinishOutput = stream::finish_output, cl "FINISH-OUTPUT" ("&optional stream");
+            FinishOutput = stream::finish_output, cl "FINISH-OUTPUT" ("&optional stream") slowly "%SLOW-FINISH-OUTPUT";
             /// Writes what a stream has gathered.
-            ForceOutput = stream::finish_output, cl "FORCE-OUTPUT" ("&optional stream");
+            ForceOutput = stream::finish_output, cl "FORCE-OUTPUT" ("&optional stream") slowly "%SLOW-FORCE-OUTPUT";
 
             // ---- the logical database
             /// Adds a fact to the database: `T` if it was new, or the fact that it replaces as the value of a

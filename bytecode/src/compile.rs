@@ -104,6 +104,14 @@ pub trait Environment {
     fn read_base(&self) -> u32 {
         10
     }
+    /// Returns whether `*features*` has the feature `name`, in upper case; `None` if the program does not say.
+    fn has_feature(&self, _name: &str) -> Option<bool> {
+        None
+    }
+    /// Returns whether an object that data refer to is a pair, which is no form.
+    fn is_pair(&self, _object: ObjectId) -> bool {
+        false
+    }
     /// Returns a number for a fresh uninterned symbol of this compilation unit.
     fn fresh(&mut self) -> u32;
     /// Names like `symbol` that are defined as a function or, if `variable`, as a variable; the likeliest

@@ -46,12 +46,34 @@ pub enum DatumKind {
     Array(Arc<[u32]>, Arc<[Datum]>),
     /// Some object of the running program.
     Object(ObjectId),
+    /// What a call gives that is made when the text has been read, such as `#.form`: a list of the name of a
+    /// macro of the library and its arguments. The macro returns `(quote datum)`.
+    Call(Datum),
 }
 
 #[derive(Debug)]
 struct DatumNode {
     kind: DatumKind,
     span: Span,
+    /// [`HAS_CALLS`], [`HAS_OBJECTS`]
+    contents: u8,
+}
+
+/// A node is or contains a [`DatumKind::Call`].
+const HAS_CALLS: u8 = 1;
+/// A node is or contains a [`DatumKind::Object`].
+const HAS_OBJECTS: u8 = 2;
+
+/// Returns what a node of this kind contains.
+fn contents(kind: &DatumKind) -> u8 {
+    let of_items = |items: &[Datum]| items.iter().fold(0, |all, item| all | item.0.contents);
+    match kind {
+        DatumKind::Cons(car, cdr) => car.0.contents | cdr.0.contents,
+        DatumKind::Vector(items) | DatumKind::Array(_, items) => of_items(items),
+        DatumKind::Call(call) => HAS_CALLS | call.0.contents,
+        DatumKind::Object(_) => HAS_OBJECTS,
+        _ => 0,
+    }
 }
 
 /// A datum: a reference to a shared, immutable node. Cloning is cheap.
@@ -61,7 +83,8 @@ pub struct Datum(Arc<DatumNode>);
 impl Datum {
     /// Returns a datum of the given kind.
     pub fn new(kind: DatumKind, span: Span) -> Datum {
-        Datum(Arc::new(DatumNode { kind, span }))
+        let contents = contents(&kind);
+        Datum(Arc::new(DatumNode { kind, span, contents }))
     }
 
     /// Returns the empty list.
@@ -125,6 +148,16 @@ impl Datum {
     /// Returns an address that tells nodes apart for as long as they are alive.
     pub fn identity(&self) -> usize {
         Arc::as_ptr(&self.0).addr()
+    }
+
+    /// Returns whether this is or contains a call that is still to be made.
+    pub fn has_calls(&self) -> bool {
+        self.0.contents & HAS_CALLS != 0
+    }
+
+    /// Returns whether this is or contains an object of the running program.
+    pub fn has_objects(&self) -> bool {
+        self.0.contents & HAS_OBJECTS != 0
     }
 
     /// Returns whether this is `NIL`.
@@ -200,11 +233,13 @@ impl Drop for DatumNode {
 
 /// Moves the children of a node that is about to go to `orphans`, leaving the node flat.
 fn release(kind: &mut DatumKind, orphans: &mut Vec<Datum>) {
-    if !matches!(kind, DatumKind::Cons(..) | DatumKind::Vector(..) | DatumKind::Array(..)) {
+    use DatumKind::{Array, Call, Cons, Vector};
+    if !matches!(kind, Cons(..) | Vector(..) | Array(..) | Call(_)) {
         return;
     }
     match std::mem::replace(kind, DatumKind::Nil) {
         DatumKind::Cons(car, cdr) => orphans.extend([cdr, car]),
+        DatumKind::Call(call) => orphans.push(call),
         DatumKind::Vector(mut items) | DatumKind::Array(_, mut items) => {
             // A shared slice is left to its last owner.
             if let Some(items) = Arc::get_mut(&mut items) {
@@ -247,6 +282,10 @@ fn display(datum: &Datum, f: &mut fmt::Formatter<'_>, depth: u32) -> fmt::Result
         DatumKind::Character(c) => write!(f, "#\\{c}"),
         DatumKind::String(value) => write!(f, "{value:?}"),
         DatumKind::Object(ObjectId(id)) => write!(f, "#<object {id}>"),
+        DatumKind::Call(call) => {
+            f.write_str("#.")?;
+            display(call, f, depth + 1)
+        }
         DatumKind::Cons(..) => {
             f.write_str("(")?;
             let mut elements = datum.elements();

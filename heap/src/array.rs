@@ -1,11 +1,12 @@
 //! Elements of arrays, wherever they are kept.
 //!
-//! A simple vector, a string and a row of bytes are arrays of rank 1 by themselves; every other array is a
-//! record over one of these, its *data*. The data decides what the elements may be: any value, characters, or
-//! integers below 256.
+//! A simple vector, a string and a row of bytes or bits are arrays of rank 1 by themselves; every other array
+//! is a record over one of these, its *data*, or over a part of another array, to which it is *displaced*. The
+//! data decides what the elements may be: any value, characters, integers below 256, or bits.
 //!
 //! Guarantees: if the dimensions or the fill pointer of an array ask for more elements than its data holds,
-//! the array has those that are there.
+//! the array has those that are there. An array that is displaced to itself, by way of others, or by way of
+//! too many others, has no elements.
 //!
 //! Not here: storing elements; creating and changing arrays.
 
@@ -23,7 +24,12 @@ pub enum ArrayElements<'a> {
     Characters(&'a [u32]),
     /// Integers below 256.
     Bytes(&'a [u8]),
+    /// 0 and 1.
+    Bits(&'a [u8]),
 }
+
+/// Arrays that stand between a displaced array and its data, at most.
+pub const MAX_DISPLACEMENTS: usize = 64;
 
 impl<'a> ArrayElements<'a> {
     /// Returns the elements in `data`, an array's data or a simple array itself.
@@ -31,6 +37,7 @@ impl<'a> ArrayElements<'a> {
         Some(match heap.kind(data)? {
             Kind::SimpleVector => ArrayElements::Values(heap.vector(data)?),
             Kind::String => ArrayElements::Characters(heap.string(data)?),
+            Kind::Bytes if heap.is_bits(data) => ArrayElements::Bits(heap.bytes(data)?),
             Kind::Bytes => ArrayElements::Bytes(heap.bytes(data)?),
             _ => return None,
         })
@@ -41,7 +48,7 @@ impl<'a> ArrayElements<'a> {
         match self {
             ArrayElements::Values(values) => values.len(),
             ArrayElements::Characters(characters) => characters.len(),
-            ArrayElements::Bytes(bytes) => bytes.len(),
+            ArrayElements::Bytes(bytes) | ArrayElements::Bits(bytes) => bytes.len(),
         }
     }
 
@@ -55,7 +62,9 @@ impl<'a> ArrayElements<'a> {
         match self {
             ArrayElements::Values(values) => values.get(index).copied(),
             ArrayElements::Characters(characters) => Value::character(*characters.get(index)?),
-            ArrayElements::Bytes(bytes) => bytes.get(index).map(|&byte| Value::small(i32::from(byte))),
+            ArrayElements::Bytes(bytes) | ArrayElements::Bits(bytes) => {
+                bytes.get(index).map(|&byte| Value::small(i32::from(byte)))
+            }
         }
     }
 
@@ -68,24 +77,36 @@ impl<'a> ArrayElements<'a> {
             ArrayElements::Values(values) => ArrayElements::Values(&values[start..end]),
             ArrayElements::Characters(characters) => ArrayElements::Characters(&characters[start..end]),
             ArrayElements::Bytes(bytes) => ArrayElements::Bytes(&bytes[start..end]),
+            ArrayElements::Bits(bits) => ArrayElements::Bits(&bits[start..end]),
         }
     }
 }
 
-/// Returns the data of an array: the array itself if it is simple.
-pub fn data_of(heap: &Heap, array: Value) -> Option<Value> {
-    match heap.kind(array)? {
-        Kind::SimpleVector | Kind::String | Kind::Bytes => Some(array),
-        Kind::Array => heap.array(array).map(|array| array.data),
-        _ => None,
+/// Returns the data of an array, and the index of the array's first element in it. The data of a simple array
+/// is the array itself.
+pub fn storage(heap: &Heap, array: Value) -> Option<(Value, usize)> {
+    let (mut at, mut offset) = (array, 0usize);
+    for _ in 0..=MAX_DISPLACEMENTS {
+        match heap.kind(at)? {
+            Kind::SimpleVector | Kind::String | Kind::Bytes => return Some((at, offset)),
+            Kind::Array => {
+                let array = heap.array(at)?;
+                offset = offset.checked_add(array.offset.as_index().unwrap_or(0))?;
+                at = array.data;
+            }
+            _ => return None,
+        }
     }
+    None
 }
 
 /// Returns all elements of an array, even those behind a fill pointer.
 pub fn all_elements(heap: &Heap, array: Value) -> Option<ArrayElements<'_>> {
-    let elements = ArrayElements::of_data(heap, data_of(heap, array)?)?;
-    let size = total_size(heap, array)?.min(elements.len());
-    Some(elements.part(0, size))
+    let size = total_size(heap, array)?;
+    let Some((data, offset)) = storage(heap, array) else { return Some(ArrayElements::Values(&[])) };
+    let elements = ArrayElements::of_data(heap, data)?;
+    let start = offset.min(elements.len());
+    Some(elements.part(start, start + size.min(elements.len() - start)))
 }
 
 /// Returns the elements of a vector, up to its fill pointer.

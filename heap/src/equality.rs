@@ -56,11 +56,8 @@ fn walk(heap: &Heap, loosely: bool, a: Value, b: Value, work: &mut usize) -> Opt
             open.push((left.car, right.car));
             continue;
         }
-        let is_same = if loosely {
-            loosely_same(heap, a, b, &mut open, work)?
-        } else {
-            same_strings(heap, a, b, work)?
-        };
+        let is_same =
+            if loosely { loosely_same(heap, a, b, &mut open, work)? } else { same_rows(heap, a, b, work)? };
         if !is_same {
             return Some(false);
         }
@@ -79,13 +76,29 @@ pub fn characters_of(heap: &Heap, v: Value) -> Option<&[u32]> {
     }
 }
 
-fn same_strings(heap: &Heap, a: Value, b: Value, work: &mut usize) -> Option<bool> {
-    let (Some(a), Some(b)) = (characters_of(heap, a), characters_of(heap, b)) else { return Some(false) };
+/// Compares two strings, or two bit vectors; other objects differ.
+fn same_rows(heap: &Heap, a: Value, b: Value, work: &mut usize) -> Option<bool> {
+    if let (Some(a), Some(b)) = (characters_of(heap, a), characters_of(heap, b)) {
+        if a.len() != b.len() {
+            return Some(false);
+        }
+        *work = work.checked_sub(a.len() / 64)?;
+        return Some(a == b);
+    }
+    let (Some(a), Some(b)) = (bits_of(heap, a), bits_of(heap, b)) else { return Some(false) };
     if a.len() != b.len() {
         return Some(false);
     }
-    *work = work.checked_sub(a.len() / 64)?;
+    *work = work.checked_sub(a.len() / 256)?;
     Some(a == b)
+}
+
+/// Returns the bits of a bit vector, up to its fill pointer.
+fn bits_of(heap: &Heap, v: Value) -> Option<&[u8]> {
+    match vector_elements(heap, v)? {
+        ArrayElements::Bits(bits) => Some(bits),
+        _ => None,
+    }
 }
 
 /// Compares one pair of objects by `equalp`; the pairs of their parts go to `open`.
@@ -217,6 +230,10 @@ fn number_hash(heap: &Heap, v: Value) -> Option<u64> {
     match heap.kind(v)? {
         Kind::Bignum => Some(limbs(v, 1)),
         Kind::Float => heap.as_double(v).map(f64::to_bits),
+        Kind::Complex => heap.complex(v).map(|(real, imaginary)| {
+            let part = |v: Value| number_hash(heap, v).unwrap_or(v.bits());
+            mix(part(real), part(imaginary))
+        }),
         Kind::Ratio => heap.ratio(v).map(|(numerator, denominator)| limbs(denominator, limbs(numerator, 2))),
         _ => None,
     }
@@ -224,6 +241,10 @@ fn number_hash(heap: &Heap, v: Value) -> Option<u64> {
 
 /// Returns a hash word that numbers of equal value share, whatever their type.
 fn value_hash(heap: &Heap, v: Value) -> u64 {
+    if let Some((real, imaginary)) = heap.complex(v) {
+        let hash = value_hash(heap, real);
+        return if number::is_zero(heap, imaginary) { hash } else { mix(hash, value_hash(heap, imaginary)) };
+    }
     match number::exact_double(heap, v) {
         // Minus zero is zero.
         Some(x) => (x + 0.0).to_bits(),
@@ -267,6 +288,9 @@ fn parts_hash(heap: &Heap, v: Value, loosely: bool) -> u64 {
             hash = loose_hash(heap, v, hash, &mut open);
         } else if let Some(characters) = characters_of(heap, v) {
             hash = mix(hash, characters_hash(characters, false));
+        } else if let Some(bits) = bits_of(heap, v) {
+            let shown = bits.iter().take(HASHED_CHARACTERS);
+            hash = shown.fold(mix(hash, bits.len() as u64), |hash, &bit| mix(hash, u64::from(bit)));
         } else {
             hash = mix(hash, number_hash(heap, v).unwrap_or_else(|| heap.identity(v)));
         }

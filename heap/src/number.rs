@@ -26,8 +26,13 @@ pub fn is_float(heap: &Heap, v: Value) -> bool {
     v.as_double().is_some() || heap.is(v, Kind::Float)
 }
 
-/// Returns whether `v` is a number; all numbers are real.
+/// Returns whether `v` is a number.
 pub fn is_number(heap: &Heap, v: Value) -> bool {
+    is_real(heap, v) || heap.is(v, Kind::Complex)
+}
+
+/// Returns whether `v` is a number other than a complex one.
+pub fn is_real(heap: &Heap, v: Value) -> bool {
     v.is_fixnum()
         || v.as_double().is_some()
         || matches!(heap.kind(v), Some(Kind::Bignum | Kind::Ratio | Kind::Float))
@@ -54,18 +59,42 @@ fn boxed_eql(heap: &Heap, a: Value, b: Value) -> bool {
             (Some((a, b)), Some((c, d))) => eql(heap, a, c) && eql(heap, b, d),
             _ => false,
         },
+        Some(Kind::Complex) => match (heap.complex(a), heap.complex(b)) {
+            (Some((a, b)), Some((c, d))) => eql(heap, a, c) && eql(heap, b, d),
+            _ => false,
+        },
         _ => false,
     }
 }
 
 /// Returns whether `a` and `b` are numbers of one value, whatever their types.
 pub fn same_value(heap: &Heap, a: Value, b: Value) -> bool {
+    match (heap.complex(a), heap.complex(b)) {
+        (None, None) => {}
+        (Some((a, b)), Some((c, d))) => return same_value(heap, a, c) && same_value(heap, b, d),
+        (Some((real, imaginary)), None) => return is_like(heap, real, imaginary, b),
+        (None, Some((real, imaginary))) => return is_like(heap, real, imaginary, a),
+    }
     match (heap.as_double(a), heap.as_double(b)) {
         (Some(x), Some(y)) => x == y,
         (Some(x), None) => exact_double(heap, b) == Some(x),
         (None, Some(y)) => exact_double(heap, a) == Some(y),
         // Rationals of equal value are `eql`.
         (None, None) => is_number(heap, a) && eql(heap, a, b),
+    }
+}
+
+/// Returns whether a complex number with these parts has the value of `v`, which is no complex number.
+fn is_like(heap: &Heap, real: Value, imaginary: Value, v: Value) -> bool {
+    is_zero(heap, imaginary) && same_value(heap, real, v)
+}
+
+/// Returns whether a number is zero.
+pub fn is_zero(heap: &Heap, v: Value) -> bool {
+    match heap.complex(v) {
+        // The parts are real, so the recursion is one level deep.
+        Some((real, imaginary)) => is_zero(heap, real) && is_zero(heap, imaginary),
+        None => same_value(heap, v, Value::small(0)),
     }
 }
 

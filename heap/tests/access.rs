@@ -50,6 +50,7 @@ fn one_of_each(heap: &mut Heap) -> Vec<(Option<Kind>, Value)> {
             Kind::Box => heap.alloc_box(n(1)).unwrap(),
             Kind::Array => heap.alloc_array(Array::ADJUSTABLE, vector, n(1), &[n(2)]).unwrap(),
             Kind::Ratio => heap.alloc_ratio(n(1), n(2)).unwrap(),
+            Kind::Complex => heap.alloc_complex(n(1), n(2)).unwrap(),
             Kind::Structure => heap.alloc_structure(class, &[n(5), n(6)]).unwrap(),
             Kind::Tag => heap.alloc_tag(n(1)).unwrap(),
             Kind::Code => code(heap, &[n(1)], &[1, 2, 3]),

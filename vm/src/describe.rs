@@ -110,6 +110,15 @@ fn describe_object(heap: &Heap, value: Value, depth: usize, text: &mut String) {
                 describe_into(heap, denominator, depth, text);
             }
         }
+        Some(Kind::Complex) => {
+            if let Some((real, imaginary)) = heap.complex(value) {
+                text.push_str("#C(");
+                describe_into(heap, real, depth, text);
+                text.push(' ');
+                describe_into(heap, imaginary, depth, text);
+                text.push(')');
+            }
+        }
         Some(Kind::SimpleVector) => {
             if depth == 0 {
                 text.push('#');

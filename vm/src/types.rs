@@ -2,6 +2,8 @@
 
 use esl_bytecode::opcode::TypeCode;
 
+use esl_heap::array::storage;
+
 use crate::heap::layout::Symbol;
 use crate::heap::{Heap, Kind};
 use crate::number;
@@ -16,7 +18,8 @@ pub(crate) fn has_type_code(heap: &Heap, value: Value, code: TypeCode) -> bool {
         TypeCode::Null => value.is_nil(),
         TypeCode::Symbol => is_symbol(heap, value),
         TypeCode::Keyword => heap.symbol(value).is_some_and(|cell| cell.header.flags & Symbol::KEYWORD != 0),
-        TypeCode::Number | TypeCode::Real => number::is_number(heap, value),
+        TypeCode::Number => number::is_number(heap, value),
+        TypeCode::Real => number::is_real(heap, value),
         TypeCode::Integer => number::is_integer(heap, value),
         TypeCode::Rational => number::is_rational(heap, value),
         TypeCode::Float => number::is_float(heap, value),
@@ -52,7 +55,8 @@ pub(crate) fn is_string(heap: &Heap, value: Value) -> bool {
     match heap.kind(value) {
         Some(Kind::String) => true,
         Some(Kind::Array) => {
-            is_vector(heap, value) && heap.array(value).is_some_and(|array| heap.is(array.data, Kind::String))
+            is_vector(heap, value)
+                && storage(heap, value).is_some_and(|(data, _)| heap.is(data, Kind::String))
         }
         _ => false,
     }

@@ -199,9 +199,9 @@ UNKNOWN_LABEL = "unknown-label" Error
     repaired: "(print '(#1=a #1#))\n"
 
 CIRCULAR_LITERAL = "circular-literal" Error
-    /// `#n#` within the object that `#n=` labels.
-    fails: "(print '#1=(a . #1#))\n"
-    repaired: "(print '(a a a))\n"
+    /// A label whose datum is a reference to it.
+    fails: "(print '#1=#1#)\n"
+    repaired: "(print '#1=(a . #1#))\n"
 
 LITERAL_TOO_LARGE = "literal-too-large" Error
     /// A literal whose `#n#` or `#n(` stand for millions of elements.
@@ -217,11 +217,6 @@ NOT_EXTERNAL = "not-external" Error
     /// `package:name` with a name that the package does not export.
     fails: "(print (cl:lst 1 2))\n"
     repaired: "(print (cl:list 1 2))\n"
-
-NOT_IN_SUBSET = "not-in-subset" Error
-    /// Syntax of Common Lisp that ESL leaves out.
-    fails: "(print #c(1 2))\n"
-    repaired: "(print '(1 2))\n"
 
 }
 Expander {
@@ -335,7 +330,7 @@ UNDEFINED_FUNCTION = "undefined-function" Warning
 
 NAME_NOT_IN_SUBSET = "name-not-in-subset" Warning
     /// A function, macro or variable of Common Lisp that ESL leaves out.
-    fails: "(defun point (x y)\n  (complex x y))\n(print (point 3 4))\n"
+    fails: "(defun point (x y)\n  (find-method x y))\n(print (point 3 4))\n"
     repaired: "(defun point (x y)\n  (list x y))\n(print (point 3 4))\n"
 
 UNDEFINED_VARIABLE = "undefined-variable" Warning
@@ -372,6 +367,11 @@ COMPILE_TIME_FAILURE = "compile-time-failure" Error
     /// A form that is evaluated while the file is compiled failed then.
     fails: "(eval-when (:compile-toplevel :load-toplevel :execute)\n  (car 'table))\n"
     repaired: "(eval-when (:compile-toplevel :load-toplevel :execute)\n  (car '(table)))\n"
+
+READ_TIME_FAILURE = "read-time-failure" Error
+    /// A `#.form` or another literal that is made by a call, which failed when the form was read.
+    fails: "(print '#.(car 'table))\n"
+    repaired: "(print '#.(car '(table)))\n"
 
 LITERAL_OBJECT = "literal-object" Error
     /// An expansion that contains an object which cannot be written to a file, such as a table.

@@ -18,6 +18,13 @@ use crate::diagnostic::code;
 /// `(quote datum)`
 pub(super) fn quote(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     form.takes(1..=1, "takes one datum")?;
+    expander.literal(form.args[0].clone(), to);
+    Ok(())
+}
+
+/// `(%quote-object datum)`: the datum as it is, even if it cannot be written to a file.
+pub(super) fn quote_object(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
+    form.takes(1..=1, "takes one datum")?;
     expander.fill(to, NodeKind::Constant(form.args[0].clone()));
     Ok(())
 }

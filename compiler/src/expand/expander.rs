@@ -15,7 +15,7 @@ use rustc_hash::FxHashSet;
 
 use super::chunk::{Chunk, OpenChunk, Purpose};
 use super::failure::{Failure, FailurePlace};
-use super::form::{Checked, Form, is_known, name, span_of};
+use super::form::{Checked, Form, Make, is_known, name, span_of};
 use super::global::GlobalUses;
 use super::job::{Job, To, Top, Waiting};
 use super::origin::{OriginId, Origins};
@@ -71,6 +71,8 @@ pub struct Expander {
     reported: FxHashSet<(&'static str, Span, String)>,
     /// Number of errors so far.
     pub(super) errors: usize,
+    /// Whether the forms are those of a file, to which objects cannot be written.
+    is_file: bool,
     /// Whether the limit on depth has been reported for the current top-level form.
     is_too_deep: bool,
     /// Uses and definitions of global names.
@@ -94,6 +96,7 @@ impl Expander {
             diagnostics: Vec::new(),
             reported: FxHashSet::default(),
             errors: 0,
+            is_file: false,
             is_too_deep: false,
             globals: GlobalUses::default(),
         }
@@ -101,11 +104,13 @@ impl Expander {
 
     /// Begins a form of a file. The form before it must be finished ([`Stop::Done`]).
     pub fn begin_file_form(&mut self, form: Datum) {
+        self.is_file = true;
         self.begin(form, Top::file());
     }
 
     /// Begins a form for `eval`. The value of the last chunk that is to be emitted is that of the form.
     pub fn begin_evaluation(&mut self, form: Datum) {
+        self.is_file = false;
         self.begin(form, Top::evaluate());
     }
 
@@ -243,10 +248,23 @@ impl Expander {
                     _ => self.expand_lambda_call(environment, form, to),
                 }
             }
+            DatumKind::Object(object) if environment.is_pair(*object) => Err(Box::new(
+                code::MALFORMED_FORM.at(to.span, "expected a form, found one that contains itself"),
+            )),
             _ => {
-                self.fill(to, NodeKind::Constant(datum));
+                self.literal(datum, to);
                 Ok(())
             }
+        }
+    }
+
+    /// Expands to a literal. In a file, a macro of the library makes a form that makes one with objects.
+    pub(super) fn literal(&mut self, datum: Datum, to: To) {
+        if self.is_file && datum.has_objects() {
+            let form = Make(to.span).esl("%LITERAL", [datum]);
+            self.schedule([Job::Expand(form, to)]);
+        } else {
+            self.fill(to, NodeKind::Constant(datum));
         }
     }
 

@@ -84,6 +84,7 @@ const OWN: &[(&str, Operator)] = &[
     ("%MODIFY", modify::modify),
     ("%NAMED-LAMBDA", lambda::named_lambda),
     ("%PLACE-PARTS", modify::place_parts),
+    ("%QUOTE-OBJECT", control::quote_object),
     ("%UNQUOTE", backquote::misplaced_unquote),
     ("%UNQUOTE-SPLICING", backquote::misplaced_unquote),
     ("%WITH-FAILURE-CLEANUP", recovery::with_failure_cleanup),

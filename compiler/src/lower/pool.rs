@@ -123,6 +123,8 @@ impl Pool {
             DatumKind::Character(c) => Constant::Character(*c),
             DatumKind::String(text) => Constant::String(text.clone()),
             DatumKind::Object(id) => Constant::Object(*id),
+            // Calls have been made before a form is compiled.
+            DatumKind::Call(_) => Constant::Nil,
             DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) => {
                 unreachable!("compound data are handled by the caller")
             }
@@ -155,9 +157,11 @@ fn key(datum: &Datum) -> LiteralKey {
         DatumKind::Float(value) => LiteralKey::Float(value.to_bits()),
         DatumKind::Character(c) => LiteralKey::Character(*c),
         DatumKind::Object(id) => LiteralKey::Object(id.0),
-        DatumKind::String(_) | DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) => {
-            LiteralKey::Node(datum.identity())
-        }
+        DatumKind::String(_)
+        | DatumKind::Cons(..)
+        | DatumKind::Vector(_)
+        | DatumKind::Array(..)
+        | DatumKind::Call(_) => LiteralKey::Node(datum.identity()),
     }
 }
 

@@ -33,6 +33,15 @@ pub(crate) enum Abbreviation {
     Function,
 }
 
+/// Syntax that stands for what a macro of the library gives for the datum after it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum ReadCall {
+    Eval,
+    Structure,
+    Pathname,
+    Complex,
+}
+
 /// Symbols that the reader itself puts into data.
 struct KnownNames {
     quote: Symbol,
@@ -41,6 +50,12 @@ struct KnownNames {
     unquote: Symbol,
     splice: Symbol,
     logical_value: Symbol,
+    read_eval: Symbol,
+    read_structure: Symbol,
+    read_pathname: Symbol,
+    read_complex: Symbol,
+    read_bits: Symbol,
+    read_circular: Symbol,
     keyword: Arc<str>,
 }
 
@@ -51,6 +66,12 @@ static NAMES: LazyLock<KnownNames> = LazyLock::new(|| KnownNames {
     unquote: Symbol::esl("%UNQUOTE"),
     splice: Symbol::esl("%UNQUOTE-SPLICING"),
     logical_value: Symbol::esl("LOGICAL-VALUE"),
+    read_eval: Symbol::esl("%READ-EVAL"),
+    read_structure: Symbol::esl("%READ-STRUCTURE"),
+    read_pathname: Symbol::esl("%READ-PATHNAME"),
+    read_complex: Symbol::esl("%READ-COMPLEX"),
+    read_bits: Symbol::esl("%READ-BITS"),
+    read_circular: Symbol::esl("%READ-CIRCULAR"),
     keyword: KEYWORD_PACKAGE.into(),
 });
 
@@ -60,6 +81,8 @@ pub(crate) struct DatumBuilder<'a> {
     text: &'a str,
     source: SourceId,
     labels: FxHashMap<u32, Datum>,
+    /// Symbols that stand for data within themselves, by the number of the label.
+    inside: FxHashMap<u32, Datum>,
     /// Radix of integers and ratios without a prefix.
     base: u32,
     /// Elements that `#n(…)` may still fill in.
@@ -76,9 +99,9 @@ impl<'a> DatumBuilder<'a> {
         source: SourceId,
         room: &'a mut usize,
     ) -> DatumBuilder<'a> {
-        let (labels, errors) = (FxHashMap::default(), Vec::new());
+        let (labels, inside, errors) = (FxHashMap::default(), FxHashMap::default(), Vec::new());
         let base = environment.read_base();
-        DatumBuilder { environment, text, source, labels, base, room, buffer: String::new(), errors }
+        DatumBuilder { environment, text, source, labels, inside, base, room, buffer: String::new(), errors }
     }
 
     fn span(&self, start: u32, end: u32) -> Span {
@@ -350,22 +373,7 @@ impl<'a> DatumBuilder<'a> {
         };
         match vector {
             Ok(items) => Datum::new(DatumKind::Vector(items), span),
-            Err(VectorError::TooLong { length, count }) => {
-                let message = format!("expected a length of at least {count}, found {length}");
-                self.fail(code::MALFORMED_LITERAL.at(span, message))
-            }
-            Err(VectorError::NothingToFill { length }) => {
-                let message = format!("expected an element to fill {length} places, found none");
-                self.fail(code::MALFORMED_LITERAL.at(span, message))
-            }
-            Err(VectorError::NoRoom) => {
-                let message = "expected a vector of moderate length, found too many elements to fill in";
-                self.fail(
-                    code::LITERAL_TOO_LARGE
-                        .at(span, message)
-                        .help("use `make-array` with `:initial-element`"),
-                )
-            }
+            Err(error) => self.vector_fault(error, span),
         }
     }
 
@@ -395,16 +403,88 @@ impl<'a> DatumBuilder<'a> {
     /// `#n=` before its datum; it ends before `middle`.
     pub(super) fn label(&mut self, start: u32, middle: u32, datum: Datum) -> Datum {
         // The scanner has checked the number.
-        if let Some(number) = label_number(self.text, start, middle) {
-            self.labels.insert(number, datum.clone());
-        }
+        let Some(number) = label_number(self.text, start, middle) else { return datum };
+        let span = self.span(start, middle).to(datum.span());
+        let datum = match self.inside.remove(&number) {
+            None => datum,
+            Some(placeholder) if placeholder.is_same(&datum) => {
+                let message = "expected a datum after the label, found only a reference to it";
+                return self.fail(code::CIRCULAR_LITERAL.at(span, message));
+            }
+            Some(placeholder) => self.made_by(&NAMES.read_circular, [placeholder, datum], span),
+        };
+        self.labels.insert(number, datum.clone());
         datum
     }
 
     /// `#n#`
     pub(super) fn reference(&mut self, start: u32, end: u32) -> Datum {
-        let found = label_number(self.text, start, end).and_then(|number| self.labels.get(&number));
-        // The scanner has checked that the label exists.
-        found.cloned().unwrap_or_else(|| Datum::nil(self.span(start, end)))
+        let span = self.span(start, end);
+        let Some(number) = label_number(self.text, start, end) else { return Datum::nil(span) };
+        if let Some(found) = self.labels.get(&number) {
+            return found.clone();
+        }
+        // The scanner has checked that the label exists, so this is within its datum.
+        let environment = &mut *self.environment;
+        let placeholder = self.inside.entry(number).or_insert_with(|| {
+            Datum::symbol(Symbol::uninterned(environment.fresh(), &format!("#{number}#")), span)
+        });
+        placeholder.clone()
+    }
+
+    /// Returns what the call of a macro of the library gives.
+    fn made_by(&self, operator: &Symbol, arguments: impl IntoIterator<Item = Datum>, span: Span) -> Datum {
+        let operator = Datum::symbol(operator.clone(), span);
+        let call: Vec<Datum> = std::iter::once(operator).chain(arguments).collect();
+        Datum::new(DatumKind::Call(Datum::list(call, span)), span)
+    }
+
+    /// `#.form`, `#S(…)`, `#P"…"`, `#C(…)`
+    pub(super) fn call(&mut self, call: ReadCall, start: u32, datum: Datum) -> Datum {
+        let operator = match call {
+            ReadCall::Eval => &NAMES.read_eval,
+            ReadCall::Structure => &NAMES.read_structure,
+            ReadCall::Pathname => &NAMES.read_pathname,
+            ReadCall::Complex => &NAMES.read_complex,
+        };
+        let span = self.span(start, start).to(datum.span());
+        self.made_by(operator, [datum], span)
+    }
+
+    /// `#*0101`, `#n*0101`
+    pub(super) fn bits(&mut self, start: u32, end: u32) -> Datum {
+        let span = self.span(start, end);
+        let (length, bits) = self.slice(start + 1, end).split_once('*').unwrap_or_default();
+        if let Some(wrong) = bits.chars().find(|c| !matches!(c, '0' | '1')) {
+            let message = format!("expected only 0 and 1 after `*`, found `{wrong}`");
+            return self.fail(code::INVALID_TOKEN.at(span, message));
+        }
+        let items: Vec<Datum> = bits.bytes().map(|bit| Datum::integer(bit - b'0', span)).collect();
+        let wanted = if length.is_empty() { Some(items.len() as u32) } else { name::digits(length) };
+        match wanted.ok_or(VectorError::NoRoom).and_then(|n| literal::vector(Some(n), items, self.room)) {
+            Ok(items) => {
+                let text: String = items.iter().map(Datum::to_string).collect();
+                self.made_by(&NAMES.read_bits, [Datum::string(&text, span)], span)
+            }
+            Err(error) => self.vector_fault(error, span),
+        }
+    }
+
+    /// Reports why the elements of a vector do not suit its length.
+    fn vector_fault(&mut self, error: VectorError, span: Span) -> Datum {
+        self.fail(match error {
+            VectorError::TooLong { length, count } => {
+                let message = format!("expected a length of at least {count}, found {length}");
+                code::MALFORMED_LITERAL.at(span, message)
+            }
+            VectorError::NothingToFill { length } => {
+                let message = format!("expected an element to fill {length} places, found none");
+                code::MALFORMED_LITERAL.at(span, message)
+            }
+            VectorError::NoRoom => {
+                let message = "expected a vector of moderate length, found too many elements to fill in";
+                code::LITERAL_TOO_LARGE.at(span, message).help("use `make-array` with `:initial-element`")
+            }
+        })
     }
 }

@@ -6,7 +6,7 @@
 use super::lexer::{Lexeme, Token};
 use super::name;
 
-/// The features of this implementation.
+/// The features of this implementation, as `*features*` has them at first.
 pub const FEATURES: [&str; 2] = ["ESL", "COMMON-LISP"];
 
 /// A fault of a feature expression, and its place.
@@ -31,11 +31,18 @@ enum FeatureOperator {
     Not,
 }
 
+/// Says whether a feature of this name, in upper case, is present.
+pub(super) type HasFeature<'a> = &'a dyn Fn(&str) -> bool;
+
 /// Whether the feature expression with these tokens holds. The tokens are balanced.
 ///
 /// # Errors
 /// The first fault.
-pub(super) fn holds(text: &str, lexemes: &[Lexeme]) -> Result<bool, FeatureError> {
+pub(super) fn holds(
+    text: &str,
+    lexemes: &[Lexeme],
+    has_feature: HasFeature<'_>,
+) -> Result<bool, FeatureError> {
     let mut operations: Vec<FeatureOperation> = Vec::new();
     let mut lexemes = lexemes.iter();
     while let Some(lexeme) = lexemes.next() {
@@ -60,7 +67,7 @@ pub(super) fn holds(text: &str, lexemes: &[Lexeme]) -> Result<bool, FeatureError
             },
             Token::Atom | Token::Escaped => {
                 let name = feature(text, lexeme).ok_or_else(|| fault(lexeme, "expected a feature", text))?;
-                FEATURES.contains(&name.as_str())
+                has_feature(&name)
             }
             _ => return Err(fault(lexeme, "expected a feature", text)),
         };

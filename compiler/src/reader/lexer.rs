@@ -86,19 +86,19 @@ pub enum Token {
     /// `#-`
     #[token("#-", priority = 100)]
     FeatureAbsent,
-    /// `#.`, evaluation while reading: not in the subset.
+    /// `#.`, before a form that is evaluated when it has been read.
     #[token("#.", priority = 100)]
     ReadEval,
-    /// `#S`, a literal structure: not in the subset.
+    /// `#S`, before the list of a structure.
     #[regex(r"#[sS]", priority = 100)]
     Structure,
-    /// `#P`, a literal path: not in the subset.
+    /// `#P`, before the string of a pathname.
     #[regex(r"#[pP]", priority = 100)]
     Pathname,
-    /// `#C`, a complex number: not in the subset.
+    /// `#C`, before the list of the two parts of a complex number.
     #[regex(r"#[cC]", priority = 100)]
     Complex,
-    /// `#*0101`, a bit vector: not in the subset.
+    /// `#*0101` or `#n*0101`, a bit vector.
     #[regex(r"#[0-9]*\*(?&constituent)*", priority = 100)]
     BitVector,
     /// `#<…>`, as objects are printed that cannot be read.

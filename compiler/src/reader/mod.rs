@@ -6,8 +6,9 @@
 //!
 //! Guarantees: reading any text ends, in time in proportion to its length, without native recursion, and with
 //! a datum or a diagnostic for every part of it. After an error, reading continues behind the faulty datum
-//! or, if that has no end, at the next form that begins in column 0. Not here: reader macros, which ESL does
-//! not have; `read` on streams (the library, over [`read_datum`]).
+//! or, if that has no end, at the next form that begins in column 0. Not here: reader macros and `read` on
+//! streams (the library, over [`read_datum`]); the calls that stand for data such as `#.form`, which are made
+//! before the datum is compiled ([`DatumKind::Call`](esl_bytecode::datum::DatumKind::Call)).
 
 mod bare;
 mod builder;
@@ -141,7 +142,7 @@ pub fn read_datum(
 
 /// Returns the end of the datum of `text` that begins at byte `start`; `None` if it is faulty.
 pub(crate) fn datum_end(text: &str, start: usize) -> Option<usize> {
-    match Scanner::new(SourceId::default()).scan(text, start) {
+    match Scanner::new(SourceId::default()).scan(text, start, &|name| FEATURES.contains(&name)) {
         Scan::Datum(end) => Some(end),
         Scan::Errors(_) | Scan::End => None,
     }
@@ -193,7 +194,8 @@ fn read(
     from: usize,
     room: &mut usize,
 ) -> ReadStep {
-    let end = match scanner.scan(text, from) {
+    let has_feature = |name: &str| environment.has_feature(name).unwrap_or(FEATURES.contains(&name));
+    let end = match scanner.scan(text, from, &has_feature) {
         Scan::Datum(end) => end,
         Scan::Errors(resume) => return ReadStep::Errors(std::mem::take(&mut scanner.errors), resume),
         Scan::End => return ReadStep::End,
@@ -253,8 +255,9 @@ fn explain<E>(
 }
 
 fn is_mark(token: Token) -> bool {
-    use Token::{Array, Backquote, Comma, CommaAt, Function, Label, Quote};
-    matches!(token, Quote | Backquote | Comma | CommaAt | Function | Array | Label)
+    use Token::*;
+    let is_call = matches!(token, ReadEval | Structure | Pathname | Complex);
+    is_call || matches!(token, Quote | Backquote | Comma | CommaAt | Function | Array | Label)
 }
 
 /// Returns the number of bytes to be skipped at the beginning of a text.

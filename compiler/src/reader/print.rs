@@ -86,6 +86,11 @@ fn print_one<'a>(
         DatumKind::Float(value) if value.is_finite() => write!(out, "{value:?}"),
         DatumKind::Float(value) => write!(out, "#<float {value}>"),
         DatumKind::Object(ObjectId(id)) => write!(out, "#<object {id}>"),
+        DatumKind::Call(call) => {
+            out.push_str("#.");
+            work.push(Work::Datum(call, level, true));
+            Ok(())
+        }
         DatumKind::Character(c) => print_character(*c, out),
         DatumKind::String(value) => write!(out, "\"{}\"", value.replace('\\', "\\\\").replace('"', "\\\"")),
         DatumKind::Cons(car, cdr) => {

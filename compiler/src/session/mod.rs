@@ -11,6 +11,7 @@
 //! Not here: running code, finding modules. The driver of the compilation does that, see
 //! [`esl_bytecode::compile`].
 
+mod calls;
 mod queue;
 
 use std::sync::Arc;
@@ -28,6 +29,7 @@ use crate::expand::{Chunk, Expander, Failure, FailurePlace, Stop};
 use crate::lower::{SourceLines, lower};
 use crate::reader::{datum_end, read_datum};
 
+use calls::FormCalls;
 use queue::{FormQueue, Next, renumber_uninterned};
 
 /// The compiler.
@@ -88,6 +90,7 @@ impl Compiler {
             apart: self.apart,
             asked: None,
             loading: None,
+            calls: None,
             lines,
             expander: Expander::new(),
             chunks: Vec::new(),
@@ -150,6 +153,8 @@ struct CompilationState {
     asked: Option<(String, Span)>,
     /// Place of the form that requires the compiled module that is being loaded.
     loading: Option<Span>,
+    /// Form that has been read and whose calls are being made.
+    calls: Option<FormCalls>,
     lines: SourceLines,
     expander: Expander,
     /// Chunks of the program.
@@ -203,6 +208,10 @@ impl Compilation for CompilationState {
                 let message = format!("the module failed at compile time: {}", failure.report);
                 self.diagnostics.push(code::COMPILE_TIME_FAILURE.at(span, message));
             }
+        } else if let Some(calls) = self.calls.take() {
+            if let Some(step) = self.take_call(calls, answer) {
+                return step;
+            }
         } else if let Answer::Failed(failure) = answer {
             let here = failure.place.as_ref().and_then(|place| self.span_of(place));
             let mut failure = Failure::from(failure);
@@ -228,6 +237,11 @@ impl Compilation for CompilationState {
                     }
                     match self.next_form(environment) {
                         Next::Form => {}
+                        Next::Calls(form) => {
+                            if let Some(step) = self.make_calls(FormCalls::new(form)) {
+                                return step;
+                            }
+                        }
                         Next::Require(name, span) => {
                             self.asked = Some((name.clone(), span));
                             return Step::Require(name);
@@ -258,6 +272,7 @@ impl CompilationState {
     fn next_form(&mut self, environment: &mut dyn Environment) -> Next {
         match &mut self.input {
             Input::Form(form) => match form.take() {
+                Some(form) if form.has_calls() => Next::Calls(form),
                 Some(form) => {
                     self.expander.begin_evaluation(form);
                     Next::Form
@@ -265,6 +280,36 @@ impl CompilationState {
                 None => Next::End,
             },
             Input::Texts(queue) => queue.next(environment, &mut self.expander, &mut self.diagnostics),
+        }
+    }
+
+    /// Asks for the next call in a form to be made, or puts the form back if all have been made.
+    fn make_calls(&mut self, calls: FormCalls) -> Option<Step> {
+        if let Some(call) = calls.next() {
+            self.calls = Some(calls);
+            return Some(Step::Expand(call));
+        }
+        let form = calls.finish();
+        match &mut self.input {
+            Input::Form(place) => *place = Some(form),
+            Input::Texts(queue) => queue.put_back(form),
+        }
+        None
+    }
+
+    /// Takes what a call in a form has given. A form with a call that fails is left out.
+    fn take_call(&mut self, mut calls: FormCalls, answer: Answer) -> Option<Step> {
+        match answer {
+            Answer::Expansion(expansion) => {
+                calls.take(&expansion);
+                self.make_calls(calls)
+            }
+            Answer::Failed(failure) => {
+                let message = format!("this failed when it was read: {}", failure.report);
+                self.diagnostics.push(code::READ_TIME_FAILURE.at(calls.span(), message));
+                None
+            }
+            _ => None,
         }
     }
 

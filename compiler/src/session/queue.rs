@@ -31,6 +31,8 @@ use crate::reader::Reader;
 pub(super) enum Next {
     /// A form, which the expander has received.
     Form,
+    /// A form with calls that are to be made first.
+    Calls(Datum),
     /// A module that the form at this place requires.
     Require(String, Span),
     /// A compiled module, which the form at this place requires.
@@ -46,6 +48,8 @@ enum QueueItem {
     Text(Box<Reader>),
     /// A form that no text contains.
     Form(Datum),
+    /// A form of the text after it, whose calls have been made.
+    Read(Datum),
     /// A module that a compiled one requires; the form at this place requires that one.
     Require(String, Span),
     /// A compiled module, and the place of the form that requires it.
@@ -109,6 +113,11 @@ impl FormQueue {
         self.row.push_front(QueueItem::Form(call(Symbol::cl("REQUIRE"), name, span)));
     }
 
+    /// Puts a form whose calls have been made at the front.
+    pub(super) fn put_back(&mut self, form: Datum) {
+        self.row.push_front(QueueItem::Read(form));
+    }
+
     /// Takes the modules that the texts themselves require.
     pub(super) fn take_apart(&mut self) -> Vec<String> {
         std::mem::take(&mut self.apart)
@@ -160,36 +169,54 @@ impl FormQueue {
                     self.row.pop_front();
                     return next;
                 }
+                QueueItem::Read(form) => {
+                    let form = std::mem::replace(form, Datum::nil(Span::default()));
+                    self.row.pop_front();
+                    if let Some(next) = self.begin(form, expander, diagnostics) {
+                        return next;
+                    }
+                }
                 QueueItem::Text(reader) => match reader.next(environment) {
                     None => {
                         self.row.pop_front();
                     }
                     Some(Err(diagnostic)) => diagnostics.push(*diagnostic),
+                    Some(Ok(form)) if form.has_calls() => return Next::Calls(form),
                     Some(Ok(form)) => {
-                        let Some(name) = required(&form) else {
-                            let is_about_package = is_about_package(&form);
-                            self.errors_before_package = is_about_package.then(|| expander.errors());
-                            expander.begin_file_form(form);
-                            return Next::Form;
-                        };
-                        let key = name.to_lowercase();
-                        if self.inside.is_empty() && !self.apart.contains(&key) {
-                            self.apart.push(key.clone());
+                        if let Some(next) = self.begin(form, expander, diagnostics) {
+                            return next;
                         }
-                        if let Some(at) = self.inside.iter().position(|inside| *inside == key) {
-                            diagnostics.push(*circular(&self.inside[at..], form.span()));
-                            continue;
-                        }
-                        if self.required.insert(key) {
-                            return Next::Require(name, form.span());
-                        }
-                        expander.begin_file_form(form);
-                        return Next::Form;
                     }
                 },
             }
         }
         Next::End
+    }
+
+    /// Begins a form of a text. Returns what comes next, unless the form is faulty.
+    fn begin(
+        &mut self,
+        form: Datum,
+        expander: &mut Expander,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<Next> {
+        if let Some(name) = required(&form) {
+            let key = name.to_lowercase();
+            if self.inside.is_empty() && !self.apart.contains(&key) {
+                self.apart.push(key.clone());
+            }
+            if let Some(at) = self.inside.iter().position(|inside| *inside == key) {
+                diagnostics.push(*circular(&self.inside[at..], form.span()));
+                return None;
+            }
+            if self.required.insert(key) {
+                return Some(Next::Require(name, form.span()));
+            }
+        } else {
+            self.errors_before_package = is_about_package(&form).then(|| expander.errors());
+        }
+        expander.begin_file_form(form);
+        Some(Next::Form)
     }
 }
 

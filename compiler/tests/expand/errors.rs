@@ -256,6 +256,7 @@ fn the_programs_in_the_table_of_codes_have_them() {
         "assignment-to-constant",
         "macro-failed",
         "compile-time-failure",
+        "read-time-failure",
         "literal-object",
         "clause-falls-off",
         "unreachable-clause",

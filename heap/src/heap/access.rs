@@ -10,7 +10,7 @@
 //! the data of an array, the class of a structure. These have setters of their own, or none.
 
 use super::Heap;
-use super::layout::{Array, Bignum, Code, Cons, Float, Function, Header, Kind, Structure, Symbol};
+use super::layout::{Array, Bignum, Bytes, Code, Cons, Float, Function, Header, Kind, Structure, Symbol};
 use super::object::is_vouched_for;
 use crate::value::Value;
 use std::slice;
@@ -362,9 +362,9 @@ impl Heap {
 
     // Arrays.
 
-    /// Returns whether `v` may be the data of an array.
+    /// Returns whether `v` may be the data of an array, or the array to which another is displaced.
     pub fn is_array_data(&self, v: Value) -> bool {
-        matches!(self.kind(v), Some(Kind::SimpleVector | Kind::String | Kind::Bytes))
+        matches!(self.kind(v), Some(Kind::SimpleVector | Kind::String | Kind::Bytes | Kind::Array))
     }
 
     /// Returns the fixed part of an array that is not simple.
@@ -376,7 +376,7 @@ impl Heap {
 
     /// Returns the dimensions of an array that is not simple.
     pub fn array_dimensions(&self, v: Value) -> Option<&[Value]> {
-        self.record(v, Kind::Array).map(|slots| &slots[2..])
+        self.record(v, Kind::Array).map(|slots| &slots[3..])
     }
 
     /// Sets the fill pointer of an array that is not simple; `None` if `v` is not one.
@@ -385,17 +385,24 @@ impl Heap {
     }
 
     /// Replaces the data of an array that is not simple; `None` if `v` is not one, or `data` is none of
-    /// SimpleVector, String, Bytes.
+    /// SimpleVector, String, Bytes, Array.
     pub fn array_set_data(&mut self, v: Value, data: Value) -> Option<()> {
+        self.array_displace(v, data, Value::NIL)
+    }
+
+    /// As [`Heap::array_set_data`], with the index of the first element in the array `data`; `nil` if `v` is
+    /// not displaced.
+    pub fn array_displace(&mut self, v: Value, data: Value, offset: Value) -> Option<()> {
         if !self.is_array_data(data) {
             return None;
         }
-        self.set_slot(v, Kind::Array, 0, data)
+        self.set_slot(v, Kind::Array, 0, data)?;
+        self.set_slot(v, Kind::Array, 2, offset)
     }
 
     /// Sets a dimension of an array that is not simple; `None` if `v` is not one or has no such dimension.
     pub fn array_set_dimension(&mut self, v: Value, axis: usize, size: Value) -> Option<()> {
-        self.set_slot(v, Kind::Array, axis.checked_add(2)?, size)
+        self.set_slot(v, Kind::Array, axis.checked_add(3)?, size)
     }
 
     // Numbers.
@@ -419,6 +426,11 @@ impl Heap {
     /// Returns numerator and denominator of a ratio.
     pub fn ratio(&self, v: Value) -> Option<(Value, Value)> {
         self.record(v, Kind::Ratio).map(|slots| (slots[0], slots[1]))
+    }
+
+    /// Returns real and imaginary part of a complex number.
+    pub fn complex(&self, v: Value) -> Option<(Value, Value)> {
+        self.record(v, Kind::Complex).map(|slots| (slots[0], slots[1]))
     }
 
     // Raw data.
@@ -458,7 +470,12 @@ impl Heap {
         self.raw(v, Kind::Bytes)
     }
 
-    /// Returns the elements of a Bytes object, to be changed in place.
+    /// Returns whether `v` is a Bytes object of bits.
+    pub fn is_bits(&self, v: Value) -> bool {
+        self.flags(v, Kind::Bytes).is_some_and(|flags| flags & Bytes::BITS != 0)
+    }
+
+    /// Returns the elements of a Bytes object, to be changed in place. The caller keeps bits bits.
     pub fn bytes_mut(&mut self, v: Value) -> Option<&mut [u8]> {
         self.raw_mut(v, Kind::Bytes)
     }

@@ -38,10 +38,12 @@ pub enum Kind {
     Box = 0x03,
     /// A one-dimensional array of any values without a fill pointer: [`Vector`].
     SimpleVector = 0x04,
-    /// Any other array, over a simple vector or string: [`Array`].
+    /// Any other array, over a simple vector, a string or bytes, or over a part of another array: [`Array`].
     Array = 0x05,
     /// A ratio in lowest terms: numerator, denominator.
     Ratio = 0x06,
+    /// A complex number: real part, imaginary part; two rationals or two floats.
+    Complex = 0x07,
     /// An instance of a structure or condition type: class, then the slots. [`Structure`].
     Structure = 0x08,
     /// The description of a structure or condition type.
@@ -81,18 +83,19 @@ pub enum Kind {
     Words32 = 0x51,
     /// A large string under construction, like [`Kind::UnfinishedVector`].
     UnfinishedString = 0x52,
-    /// Bytes.
+    /// Bytes, or bits with one byte for each: [`Bytes`].
     Bytes = 0x60,
 }
 
 /// All kinds, for tests and tables.
-pub const KINDS: [Kind; 26] = [
+pub const KINDS: [Kind; 27] = [
     Kind::Symbol,
     Kind::Function,
     Kind::Box,
     Kind::SimpleVector,
     Kind::Array,
     Kind::Ratio,
+    Kind::Complex,
     Kind::HashTable,
     Kind::Structure,
     Kind::Class,
@@ -321,16 +324,18 @@ pub struct Str {
 
 /// An array that has a fill pointer, or is adjustable, or is not of one dimension. `aux` is its rank.
 ///
-/// The heap guarantees that `data` is a SimpleVector, a String or Bytes.
+/// The heap guarantees that `data` is a SimpleVector, a String, Bytes or an Array.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
 pub struct Array {
-    /// Kind, flags below, rank; length 2 + rank.
+    /// Kind, flags below, rank; length 3 + rank.
     pub header: Header,
-    /// Object with the elements, in row-major order.
+    /// Object with the elements, in row-major order; for a displaced array, another array.
     pub data: Value,
     /// Fill pointer, a fixnum, or `nil`.
     pub fill: Value,
+    /// For a displaced array, the index of its first element in the other array, a fixnum; otherwise `nil`.
+    pub offset: Value,
     /// Dimensions, fixnums, `header.aux` of them.
     pub dimensions: [Value; 0],
 }
@@ -342,7 +347,16 @@ impl Array {
     pub const ADJUSTABLE: u8 = 2;
 }
 
-const _: () = assert!(size_of::<Array>() == 24);
+const _: () = assert!(size_of::<Array>() == 32);
+
+/// A row of bytes, or of bits.
+#[derive(Copy, Clone, Debug)]
+pub struct Bytes;
+
+impl Bytes {
+    /// Flag: every byte is 0 or 1.
+    pub const BITS: u8 = 1;
+}
 
 /// A boxed double.
 #[repr(C)]

@@ -6,7 +6,9 @@
 //!
 //! The functions assert the contents that the interpreter relies on (H4 in [`super`]).
 
-use super::layout::{Bignum, Boxed, Code, Cons, Float, Function, Header, Kind, MAX_LENGTH, Symbol, Vector};
+use super::layout::{
+    Bignum, Boxed, Bytes, Code, Cons, Float, Function, Header, Kind, MAX_LENGTH, Symbol, Vector,
+};
 use super::{AllocError, Heap};
 use crate::value::Value;
 
@@ -230,6 +232,11 @@ impl Heap {
         self.record_from(Kind::Ratio, 0, 0, &[], &[numerator, denominator])
     }
 
+    /// Creates a complex number. Both parts are rationals, the second not 0, or both are floats.
+    pub fn alloc_complex(&mut self, real: Value, imaginary: Value) -> Result<Value, AllocError> {
+        self.record_from(Kind::Complex, 0, 0, &[], &[real, imaginary])
+    }
+
     /// Creates an identity that carries `value`.
     pub fn alloc_tag(&mut self, value: Value) -> Result<Value, AllocError> {
         self.record_from(Kind::Tag, 0, 0, &[], &[value])
@@ -255,9 +262,25 @@ impl Heap {
         fill: Value,
         dimensions: &[Value],
     ) -> Result<Value, AllocError> {
+        self.alloc_displaced_array(flags, data, fill, Value::NIL, dimensions)
+    }
+
+    /// As [`Heap::alloc_array`]. With an `offset` other than `nil`, the array is displaced to `data`, which may
+    /// be any array.
+    ///
+    /// # Panics
+    /// As [`Heap::alloc_array`].
+    pub fn alloc_displaced_array(
+        &mut self,
+        flags: u8,
+        data: Value,
+        fill: Value,
+        offset: Value,
+        dimensions: &[Value],
+    ) -> Result<Value, AllocError> {
         assert!(self.is_array_data(data), "the data of an array is a vector or string");
         let rank = u16::try_from(dimensions.len()).expect("an array has less than 65536 dimensions");
-        self.record_from(Kind::Array, flags, rank, &[data, fill], dimensions)
+        self.record_from(Kind::Array, flags, rank, &[data, fill, offset], dimensions)
     }
 
     /// Creates a symbol without value, macro function and properties.
@@ -430,6 +453,17 @@ impl Heap {
         self.raw_filled(Kind::Bytes, len, fill)
     }
 
+    /// Creates a Bytes object of bits. Bytes above 1 become 1.
+    pub fn alloc_bits(&mut self, bits: &[u8]) -> Result<Value, AllocError> {
+        let bits: Vec<u8> = bits.iter().map(|&bit| bit.min(1)).collect();
+        self.raw_from(Kind::Bytes, Bytes::BITS, &bits)
+    }
+
+    /// Creates a Bytes object of `len` bits.
+    pub fn alloc_bits_filled(&mut self, len: usize, fill: bool) -> Result<Value, AllocError> {
+        self.raw_filled_with(Kind::Bytes, Bytes::BITS, len, u8::from(fill))
+    }
+
     /// Allocates an object. Its header is written, its `len` elements are not.
     #[inline]
     fn begin_object(
@@ -491,8 +525,18 @@ impl Heap {
     }
 
     fn raw_filled<T: Copy>(&mut self, kind: Kind, len: usize, fill: T) -> Result<Value, AllocError> {
+        self.raw_filled_with(kind, 0, len, fill)
+    }
+
+    fn raw_filled_with<T: Copy>(
+        &mut self,
+        kind: Kind,
+        flags: u8,
+        len: usize,
+        fill: T,
+    ) -> Result<Value, AllocError> {
         debug_assert!(kind.is_raw() && 1 << kind.element_shift() == size_of::<T>());
-        let object = self.begin_object(kind, 0, 0, len)?;
+        let object = self.begin_object(kind, flags, 0, len)?;
         // SAFETY: `begin_object` gave room for `len` elements of this size; they are written before the value
         // is made.
         unsafe {

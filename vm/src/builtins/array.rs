@@ -1,10 +1,10 @@
 //! Arrays: their elements, dimensions and fill pointers.
 //!
-//! What keeps the elements decides what they may be: any value, characters, or integers below 256.
+//! What keeps the elements decides what they may be: any value, characters, integers below 256, or bits.
 //! [`esl_heap::array`] reads them.
 
-pub(crate) use esl_heap::array::{ArrayElements, all_elements, data_of, vector_elements, vector_length};
-use esl_heap::array::{dimensions, total_size};
+pub(crate) use esl_heap::array::{ArrayElements, all_elements, storage, vector_elements, vector_length};
+use esl_heap::array::{MAX_DISPLACEMENTS, dimensions, total_size};
 
 use crate::builtins::list::list_items;
 use crate::builtins::sequence::copy_elements;
@@ -15,7 +15,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 use super::COPY_LIMIT;
-use super::expect::exactly;
+use super::expect::{exactly, optional};
 
 /// Elements of a long vector that is being made that are filled at once.
 const FILLED_AT_ONCE: usize = 1 << 13;
@@ -26,6 +26,10 @@ const MAX_RANK: usize = 64;
 pub(crate) fn check_element(vm: &mut Vm, data: Value, value: Value) -> Result<(), Exit> {
     match vm.heap.kind(data) {
         Some(Kind::String) if !value.is_character() => vm.exchange.type_error(value, "CHARACTER"),
+        Some(Kind::Bytes) if vm.heap.is_bits(data) => match value.as_index() {
+            Some(0 | 1) => Ok(()),
+            _ => vm.exchange.type_error(value, "BIT"),
+        },
         Some(Kind::Bytes) if value.as_index().is_none_or(|byte| byte > 255) => {
             vm.exchange.not_written(value, "(UNSIGNED-BYTE 8)")
         }
@@ -76,10 +80,17 @@ fn element(vm: &mut Vm, array: Value, index: usize) -> Outcome {
     }
 }
 
-fn set_element(vm: &mut Vm, array: Value, index: usize, value: Value) -> Outcome {
-    let Some(data) = data_of(&vm.heap, array) else { return vm.exchange.type_error(array, "ARRAY") };
+/// Makes `value` element `index` of an array.
+pub(crate) fn set_element(vm: &mut Vm, array: Value, index: usize, value: Value) -> Outcome {
+    let Some(elements) = all_elements(&vm.heap, array) else {
+        return vm.exchange.type_error(array, "ARRAY");
+    };
+    let size = elements.len();
+    // A displaced array may have lost elements that its dimensions promise.
+    let index = vm.exchange.index_below(Value::index(index), size)?;
+    let (data, offset) = storage(&vm.heap, array).unwrap_or((array, 0));
     check_element(vm, data, value)?;
-    store_element(&mut vm.heap, data, index, value);
+    store_element(&mut vm.heap, data, offset + index, value);
     Ok(value)
 }
 
@@ -224,9 +235,74 @@ pub(super) fn adjustable_array_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn array_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    match data_of(&vm.heap, arguments[0]) {
-        Some(data) => Ok(data),
+    match storage(&vm.heap, arguments[0]) {
+        Some((data, _)) => Ok(data),
         None => vm.exchange.type_error(arguments[0], "ARRAY"),
+    }
+}
+
+pub(super) fn displacement(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    array_size(vm, arguments[0])?;
+    match vm.heap.array(arguments[0]).copied() {
+        Some(array) if array.offset.is_fixnum() => vm.give_values(&[array.data, array.offset]),
+        _ => vm.give_values(&[Value::NIL, Value::small(0)]),
+    }
+}
+
+pub(super) fn element_sort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    array_size(vm, arguments[0])?;
+    Ok(Value::small(match all_elements(&vm.heap, arguments[0]) {
+        Some(ArrayElements::Characters(_)) => 1,
+        Some(ArrayElements::Bytes(_)) => 2,
+        Some(ArrayElements::Bits(_)) => 3,
+        _ => 0,
+    }))
+}
+
+pub(super) fn make_bytes(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [size, byte, bits] = exactly(arguments);
+    let size = vm.exchange.count(size)?;
+    let limit = if bits.is_true() { 1 } else { 255 };
+    let byte = match byte.as_index() {
+        Some(value) if value <= limit => value as u8,
+        _ if bits.is_true() => return vm.exchange.type_error(byte, "BIT"),
+        _ => return vm.exchange.not_written(byte, "(UNSIGNED-BYTE 8)"),
+    };
+    vm.exchange.charge_elements(size / 8);
+    Ok(match bits.is_true() {
+        true => vm.heap.alloc_bits_filled(size, byte == 1)?,
+        false => vm.heap.alloc_bytes_filled(size, byte)?,
+    })
+}
+
+pub(super) fn bit_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [operation, left, right, target, start] = exactly(arguments);
+    let operation = vm.exchange.index_below(operation, 16)?;
+    let start = vm.exchange.count(start)?;
+    let [Some(a), Some(b)] = [left, right].map(|array| bits_of(&vm.heap, array)) else {
+        return vm.exchange.not_written(left, "(ARRAY BIT)");
+    };
+    let end = a.len().min(b.len()).min(start.saturating_add(COPY_LIMIT));
+    let start = start.min(end);
+    // Bit 2a + b of the operation is its result for the bits a and b.
+    let result = a[start..end].iter().zip(&b[start..end]);
+    let result: Vec<u8> = result.map(|(a, b)| (operation >> (2 * a + b)) as u8 & 1).collect();
+    if bits_of(&vm.heap, target).is_none_or(|bits| bits.len() < end) {
+        return vm.exchange.not_written(target, "(ARRAY BIT)");
+    }
+    vm.exchange.charge_elements(result.len());
+    let (data, offset) = storage(&vm.heap, target).unwrap_or((target, 0));
+    if let Some(bits) = vm.heap.bytes_mut(data) {
+        bits[offset + start..offset + end].copy_from_slice(&result);
+    }
+    Ok(Value::index(end))
+}
+
+/// Returns the bits of an array of bits.
+fn bits_of(heap: &Heap, array: Value) -> Option<&[u8]> {
+    match all_elements(heap, array)? {
+        ArrayElements::Bits(bits) => Some(bits),
+        _ => None,
     }
 }
 
@@ -245,24 +321,24 @@ pub(super) fn set_fill_pointer(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn vector_push(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [value, vector] = exactly(arguments);
-    let (array, fill) = with_fill_pointer(vm, vector)?;
+    let (_, fill) = with_fill_pointer(vm, vector)?;
     if fill >= array_size(vm, vector)? {
         return Ok(Value::NIL);
     }
-    check_element(vm, array.data, value)?;
-    store_element(&mut vm.heap, array.data, fill, value);
+    set_element(vm, vector, fill, value)?;
     vm.heap.array_set_fill(vector, Value::index(fill + 1));
     Ok(Value::index(fill))
 }
 
 pub(super) fn vector_push_extend(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (value, vector) = (arguments[0], arguments[1]);
-    let (array, fill) = with_fill_pointer(vm, vector)?;
+    let (_, fill) = with_fill_pointer(vm, vector)?;
     let size = array_size(vm, vector)?;
     if fill < size {
         return vector_push(vm, &arguments[..2]);
     }
-    check_element(vm, array.data, value)?;
+    let (old, _) = storage(&vm.heap, vector).unwrap_or((vector, 0));
+    check_element(vm, old, value)?;
     // As SBCL: twice the size, unless the caller says by how much at least.
     let extension = match arguments.get(2) {
         Some(&extension) => match extension.as_index() {
@@ -271,7 +347,7 @@ pub(super) fn vector_push_extend(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         },
         None => size.max(1),
     };
-    let data = extended(vm, array.data, size.saturating_add(extension))?;
+    let data = extended(vm, vector, size.saturating_add(extension))?;
     vm.heap.array_set_data(vector, data);
     vm.heap.array_set_dimension(vector, 0, Value::index(size + extension));
     store_element(&mut vm.heap, data, fill, value);
@@ -279,19 +355,22 @@ pub(super) fn vector_push_extend(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::index(fill))
 }
 
-/// Returns a copy of `data` with room for `size` elements, the new ones zero, `NUL` or `0`.
-fn extended(vm: &mut Vm, data: Value, size: usize) -> Outcome {
-    let length = ArrayElements::of_data(&vm.heap, data).map_or(0, ArrayElements::len);
+/// Returns new data with the elements of `array` and room for `size` elements, the new ones zero, `NUL` or
+/// `0`.
+fn extended(vm: &mut Vm, array: Value, size: usize) -> Outcome {
+    let length = all_elements(&vm.heap, array).map_or(0, ArrayElements::len);
+    let (old, offset) = storage(&vm.heap, array).unwrap_or((array, 0));
     if size > COPY_LIMIT {
         return Err(Exit::Slowly);
     }
-    let new = match vm.heap.kind(data) {
+    let new = match vm.heap.kind(old) {
         Some(Kind::String) => vm.heap.alloc_string_filled(size, 0)?,
+        Some(Kind::Bytes) if vm.heap.is_bits(old) => vm.heap.alloc_bits_filled(size, false)?,
         Some(Kind::Bytes) => vm.heap.alloc_bytes_filled(size, 0)?,
         _ => vm.heap.alloc_vector_filled(size, Value::small(0))?,
     };
     vm.exchange.charge_elements(size);
-    copy_elements(vm, data, 0, new, 0, length)?;
+    copy_elements(vm, old, offset, new, 0, length)?;
     Ok(new)
 }
 
@@ -331,30 +410,39 @@ pub(super) fn fill_more(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
-/// `%make-array`: an array over data that is there.
+/// `%make-array`: an array over data that is there, or over a part of another array.
 pub(super) fn make_array(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [dimensions, data, fill, adjustable] = exactly(arguments);
-    let (sizes, fill) = shape(vm, dimensions, data, fill)?;
+    let [dimensions, data, fill, adjustable] = exactly(&arguments[..4]);
+    let offset = optional(arguments, 4);
+    let (sizes, fill) = shape(vm, dimensions, data, fill, offset)?;
     let mut flags = if fill.is_nil() { 0 } else { Array::HAS_FILL_POINTER };
     if adjustable.is_true() {
         flags |= Array::ADJUSTABLE;
     }
-    Ok(vm.heap.alloc_array(flags, data, fill, &sizes)?)
+    Ok(vm.heap.alloc_displaced_array(flags, data, fill, offset, &sizes)?)
 }
 
-/// `%adjust-array`: other dimensions, data and fill pointer for an array that has as many dimensions.
+/// `%adjust-array`: other dimensions, data, fill pointer and offset for an array that has as many dimensions.
 pub(super) fn adjust_array(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [array, dimensions, data, fill] = exactly(arguments);
+    let [array, dimensions, data, fill] = exactly(&arguments[..4]);
+    let offset = optional(arguments, 4);
     let Some(rank) = vm.heap.array_dimensions(array).map(<[Value]>::len) else {
         return vm.exchange.type_error(array, "ARRAY");
     };
-    let (sizes, fill) = shape(vm, dimensions, data, fill)?;
+    let (sizes, fill) = shape(vm, dimensions, data, fill, offset)?;
     if sizes.len() != rank {
         return vm
             .exchange
             .raise(Raised::Simple(format!("the array has {rank} dimensions, not {}", sizes.len())));
     }
-    vm.heap.array_set_data(array, data);
+    let mut at = data;
+    while let Some(inner) = vm.heap.array(at) {
+        if at == array {
+            return vm.exchange.raise(Raised::Simple("an array cannot be displaced to itself".into()));
+        }
+        at = inner.data;
+    }
+    vm.heap.array_displace(array, data, offset);
     for (axis, &size) in sizes.iter().enumerate() {
         vm.heap.array_set_dimension(array, axis, size);
     }
@@ -362,11 +450,28 @@ pub(super) fn adjust_array(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(array)
 }
 
-/// Dimensions and fill pointer that suit the data.
-fn shape(vm: &mut Vm, dimensions: Value, data: Value, fill: Value) -> Result<(Vec<Value>, Value), Exit> {
-    let Some(room) = ArrayElements::of_data(&vm.heap, data).map(ArrayElements::len) else {
-        return vm.exchange.type_error(data, "VECTOR");
+/// Dimensions and fill pointer that suit the data, from the offset on if that is not `NIL`.
+fn shape(
+    vm: &mut Vm,
+    dimensions: Value,
+    data: Value,
+    fill: Value,
+    offset: Value,
+) -> Result<(Vec<Value>, Value), Exit> {
+    let room = match (offset.is_nil(), storage(&vm.heap, data)) {
+        (true, _) => ArrayElements::of_data(&vm.heap, data).map(ArrayElements::len),
+        (false, Some(_)) => all_elements(&vm.heap, data).map(ArrayElements::len),
+        (false, None) if vm.heap.array(data).is_some() => {
+            let text = format!("an array is displaced by way of at most {MAX_DISPLACEMENTS} others");
+            return vm.exchange.raise(Raised::Simple(text));
+        }
+        (false, None) => None,
     };
+    let Some(room) = room else {
+        return vm.exchange.type_error(data, if offset.is_nil() { "VECTOR" } else { "ARRAY" });
+    };
+    let start = if offset.is_nil() { 0 } else { vm.exchange.index_below(offset, room + 1)? };
+    let room = room - start;
     let sizes = match list_items(vm, dimensions, MAX_RANK) {
         Err(Exit::Slowly) => {
             return vm.exchange.raise(Raised::Simple(format!("an array has at most {MAX_RANK} dimensions")));

@@ -163,31 +163,35 @@ fn read_datum(vm: &mut Vm, text: &str, start: usize, name: Option<&str>) -> Resu
     }
 }
 
-/// Reads the first datum of `text`. Returns whether there was one, the object, and the number of characters
-/// up to its end; `None` if what comes after the text may belong to the datum.
-fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<(Value, Value, usize)>, Exit> {
+/// Reads the first datum of `text`. Returns whether there was one, the object, the list of the calls in it
+/// that are to be made, and the number of characters up to its end; `None` if what comes after the text may belong to the datum.
+fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<([Value; 3], usize)>, Exit> {
     let count = |end: usize| text[..end].chars().count();
     Ok(Some(match read_datum(vm, text, 0, None)? {
         Read::Datum(_, end) if then != Then::End && end == text.len() && !text.ends_with([')', '"']) => {
             return Ok(None);
         }
-        Read::Datum(datum, end) => (Value::T, read_object(vm, &datum)?, count(end)),
+        Read::Datum(datum, end) => {
+            let (object, calls) = read_object(vm, &datum)?;
+            ([Value::T, object, calls], count(end))
+        }
         // What is faulty where the text is cut may be part of something else.
         Read::Fault(fault) if then != Then::Rest && !fault.is_unfinished() => {
             return vm.exchange.raise(Raised::Reader(fault.text));
         }
         Read::End | Read::Fault(_) if then != Then::End => return Ok(None),
-        Read::End => (Value::NIL, Value::NIL, count(text.len())),
-        Read::Fault(_) => (vm.world.known.unfinished, Value::NIL, count(text.len())),
+        Read::End => ([Value::NIL; 3], count(text.len())),
+        Read::Fault(_) => ([vm.world.known.unfinished, Value::NIL, Value::NIL], count(text.len())),
     }))
 }
 
-/// Returns a datum that was read, as an object.
-fn read_object(vm: &mut Vm, datum: &Datum) -> Outcome {
+/// Returns a datum that was read as an object, and the list of the calls in it.
+fn read_object(vm: &mut Vm, datum: &Datum) -> Result<(Value, Value), Exit> {
     let mut unit = Unit::default();
     let value = unit.value_of(&mut vm.heap, &mut vm.world, datum);
     vm.exchange.charge(unit.take_work() as usize);
-    Ok(value?)
+    let calls = vm.heap.list(&unit.take_calls())?;
+    Ok((value?, calls))
 }
 
 /// Result of reading.
@@ -274,6 +278,23 @@ pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     next
 }
 
+pub(super) fn text_rest(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let (id, mut job) = take_job(vm, arguments[0])?;
+    let rest = match &mut job {
+        CompilerJob::Text(text) => {
+            vm.exchange.charge(text.text.len() - text.position);
+            let rest = vm.heap.alloc_str(&text.text[text.position..]);
+            if rest.is_ok() {
+                text.position = text.text.len();
+            }
+            rest.map_err(Exit::from)
+        }
+        _ => vm.exchange.program_error("there are no forms in a compilation"),
+    };
+    vm.compiler.put_back(id, job);
+    rest
+}
+
 fn begin_form(vm: &mut Vm, text: &mut FormText) -> Outcome {
     match read_datum(vm, &text.text, text.position, text.name.as_deref())? {
         Read::End => Ok(Value::NIL),
@@ -352,8 +373,8 @@ pub(super) fn read_from_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         let limit = end.min(start.saturating_add(part));
         let text = text_between(&vm.heap, string, start, limit);
         let then = if limit < end { Then::Rest } else { Then::End };
-        if let Some((status, object, length)) = read_first(vm, &text, then)? {
-            return vm.give_values(&[status, object, Value::index(start + length)]);
+        if let Some(([status, object, calls], length)) = read_first(vm, &text, then)? {
+            return vm.give_values(&[status, object, Value::index(start + length), calls]);
         }
         part = part.saturating_mul(2);
     }
@@ -365,9 +386,9 @@ pub(super) fn read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut part = FIRST_PART;
     loop {
         let source = source(vm, stream, part)?;
-        if let Some((status, object, length)) = read_first(vm, &source.text, source.then)? {
+        if let Some((read, length)) = read_first(vm, &source.text, source.then)? {
             skip_source(vm, stream, &source, length);
-            return vm.give_values(&[status, object]);
+            return vm.give_values(&read);
         }
         match source.then {
             Then::Input => more_input(vm)?,

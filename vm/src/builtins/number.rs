@@ -33,7 +33,8 @@ fn fold(
 pub(super) fn add(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     match *numbers {
         [] => Ok(Value::small(0)),
-        [only] => vm.number(only, "NUMBER").map(|_| only),
+        [only] if number::is_number(&vm.heap, only) => Ok(only),
+        [only] => vm.exchange.type_error(only, "NUMBER"),
         [first, ref rest @ ..] => fold(vm, first, rest, number::add),
     }
 }
@@ -41,7 +42,8 @@ pub(super) fn add(vm: &mut Vm, numbers: &[Value]) -> Outcome {
 pub(super) fn multiply(vm: &mut Vm, numbers: &[Value]) -> Outcome {
     match *numbers {
         [] => Ok(ONE),
-        [only] => vm.number(only, "NUMBER").map(|_| only),
+        [only] if number::is_number(&vm.heap, only) => Ok(only),
+        [only] => vm.exchange.type_error(only, "NUMBER"),
         [first, ref rest @ ..] => fold(vm, first, rest, number::multiply),
     }
 }
@@ -133,7 +135,10 @@ pub(super) fn min(vm: &mut Vm, numbers: &[Value]) -> Outcome {
 }
 
 pub(super) fn zerop(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    Ok((number::sign(vm, arguments[0], "NUMBER")? == 0).into())
+    if !number::is_number(&vm.heap, arguments[0]) {
+        return vm.exchange.type_error(arguments[0], "NUMBER");
+    }
+    Ok(number::is_zero(&vm.heap, arguments[0]).into())
 }
 
 pub(super) fn plusp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -148,6 +153,7 @@ pub(super) fn abs(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if let Some(x) = vm.heap.as_double(arguments[0]) {
         return Ok(vm.heap.float(x.abs())?);
     }
+    vm.number(arguments[0], "NUMBER")?;
     let sign = number::sign(vm, arguments[0], "NUMBER")?;
     if sign < 0 { number::negate(vm, arguments[0]) } else { Ok(arguments[0]) }
 }
@@ -155,7 +161,10 @@ pub(super) fn abs(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn signum(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match vm.heap.as_double(arguments[0]) {
         Some(x) => Ok(vm.heap.float(if x == 0.0 { x } else { x.signum() })?),
-        None => Ok(Value::small(number::sign(vm, arguments[0], "NUMBER")?)),
+        None => {
+            vm.number(arguments[0], "NUMBER")?;
+            Ok(Value::small(number::sign(vm, arguments[0], "NUMBER")?))
+        }
     }
 }
 
@@ -178,6 +187,32 @@ roundings! {
     fceiling = both_with_float Ceiling;
     ftruncate = both_with_float Truncate;
     fround = both_with_float Round;
+}
+
+pub(super) fn complexp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(vm.heap.complex(arguments[0]).is_some().into())
+}
+
+pub(super) fn make_complex(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [real, imaginary] = exactly(arguments);
+    for part in [real, imaginary] {
+        vm.number(part, "REAL")?;
+    }
+    Ok(vm.heap.alloc_complex(real, imaginary)?)
+}
+
+pub(super) fn real_part(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match vm.heap.complex(arguments[0]) {
+        Some((real, _)) => Ok(real),
+        None => vm.number(arguments[0], "NUMBER").map(|_| arguments[0]),
+    }
+}
+
+pub(super) fn imaginary_part(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    match vm.heap.complex(arguments[0]) {
+        Some((_, imaginary)) => Ok(imaginary),
+        None => number::multiply(vm, Value::small(0), arguments[0]),
+    }
 }
 
 pub(super) fn modulo(vm: &mut Vm, arguments: &[Value]) -> Outcome {

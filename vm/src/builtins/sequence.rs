@@ -10,7 +10,7 @@ use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
 
-use super::array::{ArrayElements, all_elements, data_of, vector_elements, vector_length};
+use super::array::{ArrayElements, all_elements, set_element, storage, vector_elements, vector_length};
 use super::expect::{exactly, optional};
 use super::list::reverse_in_place;
 use super::{COPY_LIMIT, LIMIT};
@@ -67,6 +67,7 @@ fn new_vector(vm: &mut Vm, elements: &Owned) -> Outcome {
         Owned::Values(values) => vm.heap.alloc_vector(values)?,
         Owned::Characters(characters) => vm.heap.alloc_string(characters)?,
         Owned::Bytes(bytes) => vm.heap.alloc_bytes(bytes)?,
+        Owned::Bits(bits) => vm.heap.alloc_bits(bits)?,
     })
 }
 
@@ -75,6 +76,7 @@ enum Owned {
     Values(Vec<Value>),
     Characters(Vec<u32>),
     Bytes(Vec<u8>),
+    Bits(Vec<u8>),
 }
 
 impl Owned {
@@ -83,6 +85,7 @@ impl Owned {
             ArrayElements::Values(values) => Owned::Values(values.to_vec()),
             ArrayElements::Characters(characters) => Owned::Characters(characters.to_vec()),
             ArrayElements::Bytes(bytes) => Owned::Bytes(bytes.to_vec()),
+            ArrayElements::Bits(bits) => Owned::Bits(bits.to_vec()),
         }
     }
 
@@ -90,7 +93,9 @@ impl Owned {
         match self {
             Owned::Values(values) => values,
             Owned::Characters(characters) => characters.into_iter().filter_map(Value::character).collect(),
-            Owned::Bytes(bytes) => bytes.into_iter().map(|byte| Value::small(i32::from(byte))).collect(),
+            Owned::Bytes(bytes) | Owned::Bits(bytes) => {
+                bytes.into_iter().map(|byte| Value::small(i32::from(byte))).collect()
+            }
         }
     }
 
@@ -98,7 +103,7 @@ impl Owned {
         match self {
             Owned::Values(values) => values.reverse(),
             Owned::Characters(characters) => characters.reverse(),
-            Owned::Bytes(bytes) => bytes.reverse(),
+            Owned::Bytes(bytes) | Owned::Bits(bytes) => bytes.reverse(),
         }
     }
 }
@@ -131,10 +136,7 @@ pub(super) fn set_elt(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [sequence, index, value] = exactly(arguments);
     if let Some(length) = vector_length(&vm.heap, sequence) {
         let index = vm.exchange.index_below(index, length)?;
-        let data = data_of(&vm.heap, sequence).unwrap_or(sequence);
-        check_element(vm, data, value)?;
-        store_element(&mut vm.heap, data, index, value);
-        return Ok(value);
+        return set_element(vm, sequence, index, value);
     }
     let pair = list_element(vm, sequence, index)?;
     vm.heap.set_car(pair, value);
@@ -238,16 +240,16 @@ pub(super) fn reverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn nreverse(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let sequence = arguments[0];
     if let Some(length) = vector_length(&vm.heap, sequence) {
-        let data = data_of(&vm.heap, sequence).unwrap_or(sequence);
+        let (data, start) = storage(&vm.heap, sequence).unwrap_or((sequence, 0));
         if length > COPY_LIMIT {
             return Err(Exit::Slowly);
         }
         vm.exchange.charge_elements(length);
         if let Some(characters) = vm.heap.string_mut(data) {
-            characters[..length].reverse();
+            characters[start..start + length].reverse();
             return Ok(sequence);
         }
-        for (low, high) in (0..length / 2).map(|low| (low, length - 1 - low)) {
+        for (low, high) in (0..length / 2).map(|low| (start + low, start + length - 1 - low)) {
             let elements = all_elements(&vm.heap, data);
             if let Some((a, b)) = elements.and_then(|elements| elements.get(low).zip(elements.get(high))) {
                 store_element(&mut vm.heap, data, low, b);
@@ -271,9 +273,10 @@ pub(super) fn fill(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if end - start > COPY_LIMIT {
         return Err(Exit::Slowly);
     }
-    let data = data_of(&vm.heap, vector).unwrap_or(vector);
+    let (data, offset) = storage(&vm.heap, vector).unwrap_or((vector, 0));
     check_element(vm, data, item)?;
     vm.exchange.charge_elements(end - start);
+    let (start, end) = (offset + start, offset + end);
     if let Some(code) = item.as_character()
         && let Some(characters) = vm.heap.string_mut(data)
     {
@@ -299,9 +302,9 @@ pub(super) fn replace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if count > COPY_LIMIT {
         return Err(Exit::Slowly);
     }
-    let to_data = data_of(&vm.heap, target).unwrap_or(target);
-    let from_data = data_of(&vm.heap, source).unwrap_or(source);
-    copy_elements(vm, from_data, from, to_data, to, count)?;
+    let (to_data, to_offset) = storage(&vm.heap, target).unwrap_or((target, 0));
+    let (from_data, from_offset) = storage(&vm.heap, source).unwrap_or((source, 0));
+    copy_elements(vm, from_data, from_offset + from, to_data, to_offset + to, count)?;
     Ok(target)
 }
 

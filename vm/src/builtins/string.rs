@@ -5,7 +5,7 @@
 
 use std::cmp::Ordering;
 
-use crate::builtins::array::{all_elements, check_element, data_of, store_element};
+use crate::builtins::array::{all_elements, set_element, storage};
 use crate::builtins::list::list_items;
 use crate::character;
 use crate::equality::characters_of;
@@ -79,10 +79,7 @@ pub(super) fn char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn set_char(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [string, index, character] = exactly(arguments);
     let index = string_and_index(vm, string, index)?;
-    let data = data_of(&vm.heap, string).unwrap_or(string);
-    check_element(vm, data, character)?;
-    store_element(&mut vm.heap, data, index, character);
-    Ok(character)
+    set_element(vm, string, index, character)
 }
 
 pub(super) fn make_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -177,9 +174,9 @@ fn converted_in_place(vm: &mut Vm, arguments: &[Value], case: Case) -> Outcome {
         return vm.exchange.type_error(arguments[0], "STRING");
     }
     let (string, start, end) = designated_part(vm, arguments[0], arguments[1], arguments[2])?;
-    let data = data_of(&vm.heap, string).unwrap_or(string);
+    let (data, offset) = storage(&vm.heap, string).unwrap_or((string, 0));
     if let Some(characters) = vm.heap.string_mut(data) {
-        case.convert(&mut characters[start..end]);
+        case.convert(&mut characters[offset + start..offset + end]);
     }
     Ok(string)
 }

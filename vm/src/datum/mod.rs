@@ -52,6 +52,16 @@ impl fmt::Display for DatumError {
 
 impl std::error::Error for DatumError {}
 
+/// Circular literals in one form, at most.
+const MAX_CIRCULAR: usize = 64;
+
+/// Why a walk from object to datum has ended.
+enum WalkError {
+    /// This quoted object contains itself.
+    Quoted(Value),
+    Datum(DatumError),
+}
+
 /// Objects and data of one compilation.
 #[derive(Default)]
 pub(crate) struct Unit {
@@ -68,6 +78,8 @@ pub(crate) struct Unit {
     /// Addresses of objects whose data were made from them, not the other way round: their place is that of
     /// the macro call that they came from last.
     made: GivenSet<u64>,
+    /// Objects of the calls ([`DatumKind::Call`]) in the data that became objects, the innermost first.
+    calls: Vec<Value>,
     /// Nodes visited since the last call of [`Unit::take_work`].
     work: u64,
 }
@@ -106,6 +118,12 @@ impl Unit {
         self.uninterned.values().copied().for_each(&mut *visit);
         self.data.values().for_each(|&(value, _)| visit(value));
         self.values.values().for_each(|&(_, value)| visit(value));
+        self.calls.iter().copied().for_each(visit);
+    }
+
+    /// Takes the lists that are calls in the data that became objects.
+    pub(crate) fn take_calls(&mut self) -> Vec<Value> {
+        std::mem::take(&mut self.calls)
     }
 
     /// Returns the number of nodes visited since the last call.
@@ -167,18 +185,26 @@ impl Unit {
                             steps.push(ToValue::Build(datum));
                             steps.extend(items.iter().rev().map(ToValue::Visit));
                         }
+                        DatumKind::Call(call) => {
+                            steps.extend([ToValue::Build(datum), ToValue::Visit(call)]);
+                        }
                         _ => made.push(self.atom_value(heap, world, datum)?),
                     }
                 }
                 ToValue::Build(datum) => {
                     let parts = match datum.kind() {
                         DatumKind::Vector(items) | DatumKind::Array(_, items) => items.len(),
+                        DatumKind::Call(_) => 1,
                         _ => 2,
                     };
                     let parts = made.split_off(made.len() - parts);
                     let value = match datum.kind() {
                         DatumKind::Vector(_) => heap.alloc_vector(&parts)?,
                         DatumKind::Array(dimensions, _) => array(heap, dimensions, &parts)?,
+                        DatumKind::Call(_) => {
+                            self.calls.push(parts[0]);
+                            parts[0]
+                        }
                         _ => heap.cons(parts[0], parts[1])?,
                     };
                     self.remember(datum, value);
@@ -202,7 +228,11 @@ impl Unit {
                 value
             }
             DatumKind::Object(id) => self.pinned(*id).unwrap_or(Value::NIL),
-            DatumKind::Nil | DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) => Value::NIL,
+            DatumKind::Nil
+            | DatumKind::Cons(..)
+            | DatumKind::Vector(_)
+            | DatumKind::Array(..)
+            | DatumKind::Call(_) => Value::NIL,
         })
     }
 
@@ -236,6 +266,27 @@ impl Unit {
         object: Value,
         span: Span,
     ) -> Result<Datum, DatumError> {
+        // Quoted objects that contain themselves, and so are represented as wholes.
+        let mut circular: Vec<Value> = Vec::new();
+        loop {
+            match self.walk(heap, world, object, span, &circular) {
+                Ok(datum) => return Ok(datum),
+                Err(WalkError::Quoted(part)) if circular.len() < MAX_CIRCULAR => circular.push(part),
+                Err(WalkError::Quoted(_)) => return Err(DatumError::Circular),
+                Err(WalkError::Datum(error)) => return Err(error),
+            }
+        }
+    }
+
+    /// As [`Unit::datum_of`], with the objects `wholes` represented as such.
+    fn walk(
+        &mut self,
+        heap: &Heap,
+        world: &World,
+        object: Value,
+        span: Span,
+        wholes: &[Value],
+    ) -> Result<Datum, WalkError> {
         let mut steps = vec![ToDatum::Visit(object)];
         let mut made: Vec<Datum> = Vec::new();
         // Compound objects met by this walk: `None` while it is inside.
@@ -246,7 +297,11 @@ impl Unit {
                 ToDatum::Visit(object) => {
                     nodes += 1;
                     if nodes > MAX_NODES {
-                        return Err(DatumError::TooLarge);
+                        return Err(WalkError::Datum(DatumError::TooLarge));
+                    }
+                    if wholes.contains(&object) {
+                        made.push(Datum::new(DatumKind::Object(self.pin(object)), span));
+                        continue;
                     }
                     let parts = parts_of(heap, object);
                     if parts.is_none() {
@@ -255,7 +310,7 @@ impl Unit {
                     }
                     match met.get(&object.bits()) {
                         Some(Some(datum)) => made.push(datum.clone()),
-                        Some(None) => return Err(DatumError::Circular),
+                        Some(None) => return Err(circle(heap, world, &steps)),
                         None => {
                             met.insert(object.bits(), None);
                             steps.push(ToDatum::Build(object));
@@ -398,6 +453,19 @@ impl Unit {
     }
 }
 
+/// Returns the error for an object that the steps of a walk have met within itself.
+fn circle(heap: &Heap, world: &World, steps: &[ToDatum]) -> WalkError {
+    let quoted = steps.iter().rev().find_map(|step| match step {
+        ToDatum::Build(form) => {
+            let pair = heap.as_cons(*form).filter(|pair| pair.car == world.known.quote)?;
+            let rest = heap.as_cons(pair.cdr).filter(|rest| rest.cdr.is_nil())?;
+            Some(rest.car)
+        }
+        ToDatum::Visit(_) => None,
+    });
+    quoted.map_or(WalkError::Datum(DatumError::Circular), WalkError::Quoted)
+}
+
 /// The parts of an object other than an atom.
 enum ObjectParts<'a> {
     Pair(Value, Value),
@@ -414,8 +482,10 @@ fn parts_of(heap: &Heap, object: Value) -> Option<ObjectParts<'_>> {
         Kind::Array => {
             let dimensions = heap.array_dimensions(object)?;
             let array = heap.array(object)?;
-            // Data cannot express fill pointers, adjustability, and elements that are not values.
-            let is_plain = array.header.flags & (Array::HAS_FILL_POINTER | Array::ADJUSTABLE) == 0;
+            // Data cannot express fill pointers, adjustability, displacement, and elements that are not
+            // values.
+            let is_plain = array.header.flags & (Array::HAS_FILL_POINTER | Array::ADJUSTABLE) == 0
+                && array.offset.is_nil();
             let items = heap.vector(array.data).filter(|_| is_plain && dimensions.len() != 1)?;
             Some(ObjectParts::Items(Some(dimensions), items))
         }

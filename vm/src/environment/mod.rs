@@ -10,7 +10,7 @@ use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::compile::{
     Accessor, Arity, Environment, Global, GlobalFunction, GlobalVariable, InternError,
 };
-use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
 use esl_bytecode::module::Parameters;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol, setf_cell};
@@ -27,6 +27,9 @@ use crate::world::{World, find_builtin};
 mod host;
 mod package;
 mod similar;
+
+/// Items of `*features*` that are looked at: the list may be circular.
+const MAX_FEATURES: usize = 1000;
 
 impl Environment for Vm {
     fn global(&self, symbol: &Symbol) -> Global {
@@ -78,6 +81,23 @@ impl Environment for Vm {
     fn read_base(&self) -> u32 {
         let base = self.symbol_value(self.world.known.read_base).and_then(Value::as_fixnum);
         base.and_then(|base| u32::try_from(base).ok()).filter(|base| (2..=36).contains(base)).unwrap_or(10)
+    }
+
+    fn has_feature(&self, name: &str) -> Option<bool> {
+        let mut rest = self.symbol_value(self.world.known.features)?;
+        for _ in 0..MAX_FEATURES {
+            let Some(pair) = self.heap.as_cons(rest) else { return Some(false) };
+            let feature = self.heap.symbol(self.world.object_of(&self.heap, pair.car).unwrap_or(pair.car));
+            if feature.is_some_and(|symbol| self.heap.string_text(symbol.name).as_deref() == Some(name)) {
+                return Some(true);
+            }
+            rest = pair.cdr;
+        }
+        Some(false)
+    }
+
+    fn is_pair(&self, object: ObjectId) -> bool {
+        self.compiler.unit.borrow().pinned(object).is_some_and(Value::is_cons)
     }
 
     fn fresh(&mut self) -> u32 {

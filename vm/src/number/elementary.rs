@@ -3,7 +3,7 @@
 //! Here are names, domains and failures; the computation is in `transcendental`.
 
 use super::transcendental;
-use crate::raise::{Outcome, Raised};
+use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -55,9 +55,8 @@ impl Elementary {
     pub(crate) fn apply(&self, vm: &mut Vm, a: Value) -> Outcome {
         let x = vm.double_of(self.name, a, "NUMBER")?;
         if !(self.domain)(x) {
-            return vm
-                .exchange
-                .raise(Raised::Arithmetic(self.name, "the result would be a complex number".into()));
+            // The result is complex.
+            return Err(Exit::Slowly);
         }
         let y = (self.function)(x);
         if y.is_infinite() && x.abs() == 1.0 {

@@ -1,4 +1,5 @@
-//! The numeric tower: integers of any size, ratios and doubles, with the contagion of Common Lisp.
+//! The numeric tower: integers of any size, ratios and doubles, with the contagion of Common Lisp. Arithmetic
+//! of complex numbers is in ESL (`stdlib/complex.esl`).
 //!
 //! Functions on values, for the builtins, and for the interpreter when the operands of an instruction are
 //! neither two fixnums nor two doubles.
@@ -26,7 +27,9 @@ use crate::vm::Vm;
 
 pub(crate) use arithmetic::{add, check_gcd, divide, multiply, negate, subtract, unboxed_doubles};
 pub(crate) use compare::{less, less_or_equal, num_equal, sign, sign_of};
-pub(crate) use esl_heap::number::{eql, is_float, is_integer, is_number, is_rational, same_value};
+pub(crate) use esl_heap::number::{
+    eql, is_float, is_integer, is_number, is_rational, is_real, is_zero, same_value,
+};
 pub(crate) use integer::Int;
 pub(crate) use ratio::Ratio;
 pub(crate) use rounding::{Rounding, modulo, remainder};
@@ -77,7 +80,8 @@ impl Number {
 }
 
 impl Vm {
-    /// Returns the number that `v` is. Any other value is a type error that names `expected`.
+    /// Returns the real number that `v` is. Any other value is a type error that names `expected`; where that
+    /// is a number, a complex one is left to the builtin's twin.
     pub(crate) fn number(&mut self, v: Value, expected: &'static str) -> Result<Number, Exit> {
         match Number::of(&self.heap, v) {
             Some(number) => {
@@ -88,6 +92,8 @@ impl Vm {
                 });
                 Ok(number)
             }
+            // The ESL twins know complex numbers.
+            None if expected == "NUMBER" && self.heap.is(v, Kind::Complex) => Err(Exit::Slowly),
             None => self.exchange.type_error(v, expected),
         }
     }

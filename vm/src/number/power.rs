@@ -1,7 +1,7 @@
 //! Powers, roots, exponentials and logarithms.
 //!
-//! Powers of exact numbers with an integer exponent are exact; all other results are doubles. Where Common
-//! Lisp would return a complex number, these functions fail with an arithmetic error.
+//! Powers of exact numbers with an integer exponent are exact; all other results are doubles. Where the
+//! result is a complex number, these functions leave the work to their ESL twins.
 
 use num_traits::Pow;
 
@@ -90,7 +90,7 @@ fn real_power(vm: &mut Vm, operands: [Value; 2], is_float: bool, x: f64, y: f64)
         return vm.exchange.raise(Raised::DivisionByZero("EXPT", operands));
     }
     if x < 0.0 && y.fract() != 0.0 {
-        return vm.exchange.raise(Raised::Arithmetic("EXPT", "the result would be a complex number".into()));
+        return Err(Exit::Slowly);
     }
     vm.float_value("EXPT", transcendental::pow(x, y))
 }
@@ -99,9 +99,7 @@ fn real_power(vm: &mut Vm, operands: [Value; 2], is_float: bool, x: f64, y: f64)
 pub(crate) fn sqrt(vm: &mut Vm, a: Value) -> Outcome {
     let x = vm.double_of("SQRT", a, "NUMBER")?;
     if x < 0.0 {
-        return vm
-            .exchange
-            .raise(Raised::Arithmetic("SQRT", "the square root of a negative number is complex".into()));
+        return Err(Exit::Slowly);
     }
     vm.float_value("SQRT", x.sqrt())
 }
@@ -149,6 +147,7 @@ fn natural_log(bits: f64, x: f64) -> f64 {
 /// Implements `(log a base)`.
 pub(crate) fn log_in_base(vm: &mut Vm, a: Value, base: Value) -> Outcome {
     vm.number(a, "NUMBER")?;
+    vm.number(base, "NUMBER")?;
     if super::sign(vm, base, "NUMBER")? == 0 {
         return Ok(Value::POSITIVE_ZERO);
     }
@@ -177,9 +176,7 @@ fn log_parts(vm: &mut Vm, a: Value) -> Result<(f64, f64), Exit> {
         return vm.exchange.raise(Raised::DivisionByZero("LOG", [a, Value::small(0)]));
     }
     if is_negative {
-        return vm
-            .exchange
-            .raise(Raised::Arithmetic("LOG", "the logarithm of a negative number is complex".into()));
+        return Err(Exit::Slowly);
     }
     Ok(match number {
         Number::Float(x) => (0.0, x),

@@ -48,6 +48,8 @@ define_known! {
     package = cl "*PACKAGE*";
     gensym_counter = cl "*GENSYM-COUNTER*";
     read_base = cl "*READ-BASE*";
+    features = cl "*FEATURES*";
+    quote = cl "QUOTE";
     standard_input = cl "*STANDARD-INPUT*";
     standard_output = cl "*STANDARD-OUTPUT*";
     error_output = cl "*ERROR-OUTPUT*";

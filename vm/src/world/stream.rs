@@ -44,6 +44,8 @@ pub(crate) enum StreamKind {
     StringInput = 3,
     StringOutput = 4,
     FileOutput = 5,
+    /// Anything else: the operations are in ESL, over the object in the buffer's slot.
+    Custom = 6,
 }
 
 impl StreamKind {
@@ -61,7 +63,8 @@ impl StreamKind {
             2 => StreamKind::StandardError,
             3 => StreamKind::StringInput,
             4 => StreamKind::StringOutput,
-            _ => StreamKind::FileOutput,
+            5 => StreamKind::FileOutput,
+            _ => StreamKind::Custom,
         })
     }
 }

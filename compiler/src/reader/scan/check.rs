@@ -1,5 +1,4 @@
-//! Checks that depend on more of a datum than the grammar sees: commas, labels, and syntax that the subset
-//! leaves out.
+//! Checks that depend on more of a datum than the grammar sees: commas and labels.
 
 use crate::diagnostic::code;
 use crate::reader::lexer::Token;
@@ -84,11 +83,8 @@ impl Scanner {
                     );
                 }
             }
-            Some(LabelState::Open) => self.error(
-                code::CIRCULAR_LITERAL
-                    .at(span, "expected a finished label, found one whose literal contains this")
-                    .help("build circular structure at run time, with `setf` or `nconc`"),
-            ),
+            // The builder closes the circle.
+            Some(LabelState::Open) => {}
             None => {
                 let label = &text[start as usize..end as usize];
                 self.error(
@@ -97,24 +93,6 @@ impl Scanner {
                 );
             }
         }
-    }
-
-    pub(super) fn refuse(&mut self, token: Token, text: &str, start: u32, end: u32) {
-        if self.excluded > 0 {
-            return;
-        }
-        let (what, help) = match token {
-            Token::ReadEval => ("evaluation while reading", "use a macro, `load-time-value` or a variable"),
-            Token::Structure => ("a literal structure", "call its constructor"),
-            Token::BitVector => ("a bit vector", "use an integer with `logbitp`, or a vector of 0 and 1"),
-            Token::Pathname => ("a path", "use a string"),
-            _ => ("a complex number", "keep real and imaginary part in a list or a structure"),
-        };
-        let mark = text[start as usize..end as usize].chars().take(2).collect::<String>();
-        let span = self.span(start, end);
-        self.error(
-            code::NOT_IN_SUBSET.at(span, format!("`{mark}`, {what}, is not in the subset")).help(help),
-        );
     }
 }
 

@@ -20,7 +20,7 @@ use rustc_hash::FxHashMap;
 use crate::diagnostic::code;
 
 use super::MAX_ERRORS;
-use super::feature;
+use super::feature::{self, HasFeature};
 use super::lexer::{Lexeme, Token};
 
 pub(super) use check::label_number;
@@ -133,7 +133,8 @@ impl Scanner {
     }
 
     /// Collects the tokens of the next datum of `text` from byte `from` on.
-    pub(super) fn scan(&mut self, text: &str, from: usize) -> Scan {
+    /// `has_feature` says what holds for `#+`.
+    pub(super) fn scan(&mut self, text: &str, from: usize, has_feature: HasFeature<'_>) -> Scan {
         self.reset();
         let mut lexer = Token::lexer(&text[from..]);
         while let Some(token) = lexer.next() {
@@ -161,13 +162,13 @@ impl Scanner {
                     if self.levels.is_empty() && self.excess == 0 {
                         return Scan::Errors(self.unexpected_close(text, start));
                     }
-                    self.close(text, start, end)
+                    self.close(text, start, end, has_feature)
                 }
                 Token::Stray => {
                     self.stray(text, start, end);
                     false
                 }
-                token => self.token(token, text, start, end),
+                token => self.token(token, text, start, end, has_feature),
             };
             if is_done {
                 return if self.errors.is_empty() {
@@ -195,7 +196,7 @@ impl Scanner {
     }
 
     /// Takes a token other than a parenthesis. Returns whether it completes the top-level datum.
-    fn token(&mut self, token: Token, text: &str, start: u32, end: u32) -> bool {
+    fn token(&mut self, token: Token, text: &str, start: u32, end: u32, has_feature: HasFeature<'_>) -> bool {
         match token {
             Token::Quote | Token::Function => self.push(OpenKind::Prefix, token, start, end),
             Token::Backquote => {
@@ -220,7 +221,6 @@ impl Scanner {
                 self.excluded += 1;
             }
             Token::ReadEval | Token::Structure | Token::Pathname | Token::Complex => {
-                self.refuse(token, text, start, end);
                 self.push(OpenKind::Prefix, token, start, end);
             }
             Token::Dot => {
@@ -228,13 +228,11 @@ impl Scanner {
                 return self.lists == 0 && self.excess == 0;
             }
             _ => {
-                match token {
-                    Token::Reference => self.check_reference(text, start, end),
-                    Token::BitVector => self.refuse(token, text, start, end),
-                    _ => {}
+                if token == Token::Reference {
+                    self.check_reference(text, start, end);
                 }
                 self.add(token, start, end);
-                return self.complete(text);
+                return self.complete(text, has_feature);
             }
         }
         false
@@ -270,15 +268,15 @@ impl Scanner {
     }
 
     /// Takes a `)`. Returns whether it completes the top-level datum.
-    fn close(&mut self, text: &str, start: u32, end: u32) -> bool {
+    fn close(&mut self, text: &str, start: u32, end: u32, has_feature: HasFeature<'_>) -> bool {
         if self.excess > 0 {
             self.excess -= 1;
-            return self.complete(text);
+            return self.complete(text, has_feature);
         }
         self.add(Token::Close, start, end);
         while let Some(level) = self.pop() {
             match level.open {
-                OpenKind::List => return self.complete(text),
+                OpenKind::List => return self.complete(text, has_feature),
                 // Excluded data never reach the grammar, so their marks are checked here.
                 OpenKind::Feature { .. } | OpenKind::Conditional { .. } => {
                     let mark = &text[level.start as usize..level.end as usize];
@@ -297,7 +295,7 @@ impl Scanner {
     }
 
     /// Completes a datum and the marks before it. Returns whether nothing is left open.
-    fn complete(&mut self, text: &str) -> bool {
+    fn complete(&mut self, text: &str, has_feature: HasFeature<'_>) -> bool {
         if self.excess > 0 {
             return false;
         }
@@ -307,7 +305,7 @@ impl Scanner {
                 OpenKind::Feature { wanted } => {
                     self.pop();
                     let test = &self.lexemes[level.lexeme + 1..];
-                    let kept = match feature::holds(text, test) {
+                    let kept = match feature::holds(text, test, has_feature) {
                         Ok(holds) => holds == wanted,
                         Err(fault) => {
                             let span = self.span(fault.start, fault.end);

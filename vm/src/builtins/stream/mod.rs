@@ -1,12 +1,14 @@
 //! Streams: the standard ones, and those that read from or write to a string or a text file.
 //!
-//! A Stream is a record ([`crate::world::stream`]). A file is read as a whole when it is opened; output to a
+//! A Stream is a record ([`crate::world::stream`]). The operations of a custom stream are in ESL: its builtins
+//! leave it to their twins. A file is read as a whole when it is opened; output to a
 //! file is gathered, and written in blocks and when the stream is closed. Output to a string is gathered in
 //! strings that never grow, so that the millionth character takes as long as the first. Every output stream
 //! knows its column.
 
 use smallvec::SmallVec;
 
+use crate::builtins::array::{ArrayElements, vector_elements};
 use crate::builtins::expect::optional;
 use crate::builtins::list::list_items;
 use crate::builtins::rights::demand;
@@ -92,12 +94,15 @@ fn designated_stream(vm: &mut Vm, v: Value, is_input: bool) -> Result<(Value, St
             _ => Raised::Type(stream, expected),
         });
     };
-    if kind.is_input() != is_input {
+    if kind != StreamKind::Custom && kind.is_input() != is_input {
         let text = if is_input { "it is not open for reading" } else { "it is not open for writing" };
         return vm.exchange.raise(Raised::Stream(stream, text.into()));
     }
     if stream_slot(&vm.heap, stream, slot::OPEN).is_nil() {
         return vm.exchange.raise(Raised::Stream(stream, "it is closed".into()));
+    }
+    if kind == StreamKind::Custom {
+        return Err(Exit::Slowly);
     }
     Ok((stream, kind))
 }
@@ -498,6 +503,48 @@ pub(super) fn file_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
+pub(super) fn file_bytes(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(path) = text_of(&vm.heap, arguments[0]) else {
+        return vm.exchange.type_error(arguments[0], "STRING");
+    };
+    let permitted = demand(vm, Right::Read, &path)?;
+    match vm.outside.host.read_file(&permitted) {
+        Ok(bytes) => {
+            vm.exchange.charge_elements(bytes.len());
+            Ok(vm.heap.alloc_bytes(&bytes)?)
+        }
+        Err(error) => file_error(&mut vm.exchange, "read", &path, &error),
+    }
+}
+
+pub(super) fn write_bytes(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [path, vector, mode] = exactly(arguments);
+    let Some(path) = text_of(&vm.heap, path) else { return vm.exchange.type_error(path, "STRING") };
+    let mode = vm.exchange.index_below(mode, 3)?;
+    let permitted = demand(vm, Right::Write, &path)?;
+    let Some(ArrayElements::Bytes(bytes)) = vector_elements(&vm.heap, vector) else {
+        return vm.exchange.not_written(vector, "(VECTOR (UNSIGNED-BYTE 8))");
+    };
+    let length = bytes.len();
+    let written = vm.outside.host.write_file(&permitted, bytes, write_mode(mode));
+    vm.exchange.charge_elements(length);
+    match written {
+        Ok(()) => Ok(Value::NIL),
+        Err(error) => file_error(&mut vm.exchange, "written", &path, &error),
+    }
+}
+
+pub(super) fn make_custom_stream(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(make_stream(&mut vm.heap, StreamKind::Custom, arguments[0], 0, 0)?)
+}
+
+pub(super) fn custom_stream_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    Ok(match StreamKind::of(&vm.heap, arguments[0]) {
+        Some(StreamKind::Custom) => stream_slot(&vm.heap, arguments[0], slot::BUFFER),
+        _ => Value::NIL,
+    })
+}
+
 pub(super) fn file_exists_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = text_of(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "STRING");
@@ -525,6 +572,7 @@ pub(super) fn streamp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn input_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match StreamKind::of(&vm.heap, arguments[0]) {
+        Some(StreamKind::Custom) => Err(Exit::Slowly),
         Some(kind) => Ok(Value::boolean(kind.is_input())),
         None => vm.exchange.type_error(arguments[0], "STREAM"),
     }
@@ -532,6 +580,7 @@ pub(super) fn input_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn output_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match StreamKind::of(&vm.heap, arguments[0]) {
+        Some(StreamKind::Custom) => Err(Exit::Slowly),
         Some(kind) => Ok(Value::boolean(!kind.is_input())),
         None => vm.exchange.type_error(arguments[0], "STREAM"),
     }
@@ -551,6 +600,7 @@ pub(super) fn stream_sort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let name = stream_slot(&vm.heap, arguments[0], slot::NAME);
     let kind = match kind {
         StreamKind::StandardInput | StreamKind::StandardOutput | StreamKind::StandardError => "STANDARD",
+        StreamKind::Custom => "CUSTOM",
         StreamKind::StringInput | StreamKind::StringOutput if name.is_nil() => "STRING",
         _ => "FILE",
     };
