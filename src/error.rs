@@ -8,6 +8,8 @@ use esl_vm::embed::{ExportError, LibraryError};
 use esl_vm::load::LoadError;
 use esl_vm::run::CallError;
 
+use crate::data::Data;
+
 /// Reason why an evaluation returned no value, or a program could not be begun.
 ///
 /// ```
@@ -26,7 +28,7 @@ use esl_vm::run::CallError;
 /// assert_eq!(outcome(&mut engine, "(wait-for-event (make-event))"), Error::Deadlocked);
 /// # Ok::<(), Error>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
     /// A form of the text cannot be read or compiled. The forms before it have been evaluated.
@@ -41,6 +43,9 @@ pub enum Error {
         message: String,
         /// Message, frames of the failure and what they were recovering from, as the commands print them.
         report: String,
+        /// Arguments of the failure: of `(fail :valve-stuck 'left)` the symbol. None if the cause is an error of the
+        /// language.
+        arguments: Vec<Data>,
     },
     /// The evaluation was aborted: by the program, or by a [`ProcessSignal`](crate::host::ProcessSignal).
     Aborted,
@@ -121,7 +126,10 @@ impl std::error::Error for Error {
 impl From<CallError> for Error {
     fn from(error: CallError) -> Error {
         match error {
-            CallError::Failed { cause, message, report, .. } => Error::Failed { cause, message, report },
+            CallError::Failed { cause, message, report, arguments } => {
+                let arguments = arguments.0.iter().map(Data::from_datum).collect();
+                Error::Failed { cause, message, report, arguments }
+            }
             CallError::Aborted => Error::Aborted,
             CallError::Deadlocked => Error::Deadlocked,
             CallError::BudgetSpent => Error::BudgetSpent,

@@ -1,12 +1,13 @@
 //! Functions of the embedder's: operations, which park only the task that calls them, however the host
 //! behaves.
 
+use std::future::Future;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use esl::engine::{Failure, Operation};
+use esl::engine::{Ending, Failure, Operation, Poll};
 use esl::host::{RealHost, RecordingHost, ReplayHost, SendError, Sender, VirtualHost};
 use esl::{Config, Data, Engine, Error};
 use esl_bytecode::datum::Datum;
@@ -497,4 +498,85 @@ fn a_run_with_questions_is_replayed() {
     let recording = host.recording();
     let canary = run(Box::new(host), true);
     assert_eq!(run(Box::new(ReplayHost::new(recording.to_records())), false), canary);
+}
+
+#[test]
+fn a_failure_has_its_arguments() {
+    let mut engine = engine();
+    let Err(Error::Failed { cause, arguments, .. }) = engine.eval("(fail :valve-stuck 'left 3)") else {
+        panic!()
+    };
+    assert_eq!((&*cause, Data::list(arguments).to_string()), (":VALVE-STUCK", "(LEFT 3)".into()));
+    let Err(Error::Failed { arguments, .. }) = engine.eval("(car 5)") else { panic!() };
+    assert_eq!(arguments, []);
+}
+
+/// Runs an engine by `poll` alone, and returns how it ends and how often it was idle.
+fn poll_to_the_end(engine: &mut Engine, ticks: u64) -> (Ending, usize) {
+    let mut idle = 0;
+    loop {
+        match engine.poll(Instant::now(), ticks) {
+            Poll::Busy => {}
+            Poll::Idle { .. } => {
+                idle += 1;
+                std::thread::yield_now();
+            }
+            Poll::Ended(ending) => return (ending, idle),
+        }
+    }
+}
+
+#[test]
+fn a_loop_of_the_embedders_runs_timers_operations_and_questions() {
+    let mut engine = engine();
+    define_lag(&mut engine);
+    let handle = engine.handle();
+    let sum = engine.begin("(progn (sleep 0.01) (+ (lag 5 1) (lag 5 2)))");
+    let called = handle.call::<i64>("+", [1_i64.into(), 5_i64.into()]);
+    let failed = engine.begin("(car 5)");
+    drop(handle);
+    let (ending, idle) = poll_to_the_end(&mut engine, 100);
+    assert!(ending == Ending::Done && idle > 0, "{ending:?}, {idle}");
+    assert_eq!((sum.wait(), called.wait()), (Ok(Data::Integer(3)), Ok(6)));
+    assert!(matches!(failed.wait(), Err(Error::Failed { cause, .. }) if cause == ":TYPE-ERROR"));
+    let left = engine.begin("(unwind-protect (wait-for-event (make-event)) (princ 'off))");
+    assert_eq!(poll_to_the_end(&mut engine, 100).0, Ending::Deadlocked);
+    engine.end();
+    assert_eq!(left.wait(), Err(Error::Aborted));
+    engine.begin("(exit 7)");
+    assert_eq!(engine.run(), Ending::Exited(7));
+}
+
+#[test]
+fn virtual_time_goes_on_in_a_loop_of_the_embedders() {
+    let host = VirtualHost::new();
+    let mut engine = Engine::with(Config::default(), Box::new(host)).expect("there is room for the library");
+    let now = engine.begin("(progn (sleep 3600) (now))");
+    assert_eq!(poll_to_the_end(&mut engine, u64::MAX), (Ending::Done, 0));
+    assert_eq!(now.wait(), Ok(Data::Float(3600.0)));
+}
+
+#[test]
+fn a_future_of_a_run_waits_for_time_and_for_what_comes() {
+    struct Unpark(std::thread::Thread);
+    impl std::task::Wake for Unpark {
+        fn wake(self: Arc<Self>) {
+            self.0.unpark();
+        }
+    }
+    let mut engine = engine();
+    define_lag(&mut engine);
+    let sum = engine.begin("(progn (sleep 0.02) (dotimes (i 300000)) (+ (lag 20 1) (lag 1 2)))");
+    let waker = Arc::new(Unpark(std::thread::current())).into();
+    let mut context = std::task::Context::from_waker(&waker);
+    let mut polls = 0;
+    {
+        let mut run = std::pin::pin!(engine.run_async());
+        while run.as_mut().poll(&mut context).is_pending() {
+            polls += 1;
+            std::thread::park();
+        }
+    }
+    assert_eq!(sum.wait(), Ok(Data::Integer(3)));
+    assert!(polls > 3, "{polls}");
 }

@@ -1354,6 +1354,8 @@ macro_rules! for_each_builtin {
             Deadline = event::deadline, internal "%DEADLINE" ("seconds");
             /// Waits until a time in nanoseconds.
             SleepUntil = event::sleep_until, internal "%SLEEP-UNTIL" ("deadline");
+            /// Has a function called, in a task of its own, for each signal of the process of this number.
+            OnSignal = event::on_signal, internal "%ON-SIGNAL" ("number function");
             /// A number below `count`, picked by the seed of the run, or by the explorer of its schedules.
             Choose = event::choose, internal "%CHOOSE" ("count");
             /// Lets other tasks have their turns.

@@ -20,11 +20,21 @@ impl Interrupts {
     }
 }
 
-/// Has Ctrl-C interrupt the machine. A second one during the same evaluation ends the process.
-pub fn interrupt_on_signal(inbox: Inbox) -> Interrupts {
+/// Has Ctrl-C interrupt the machine. A second one during the same evaluation ends the process. Other signals end
+/// the evaluation, and are passed to `end`.
+pub fn interrupt_on_signal(inbox: Inbox, end: impl Fn(ProcessSignal) + Send + 'static) -> Interrupts {
     let was_asked = Arc::new(AtomicBool::new(false));
     let interrupts = Interrupts { was_asked: was_asked.clone() };
-    on_signal(&[ProcessSignal::Interrupt], move |signal| {
+    let all = [ProcessSignal::HangUp, ProcessSignal::Interrupt, ProcessSignal::Terminate];
+    on_signal(&all, move |signal| {
+        if inbox.is_handled(signal) {
+            return inbox.put(Incoming::Signal(signal));
+        }
+        if signal != ProcessSignal::Interrupt {
+            end(signal);
+            inbox.put(Incoming::Signal(signal));
+            return inbox.put(Incoming::Stop);
+        }
         if was_asked.swap(true, Ordering::Relaxed) {
             std::process::exit((SIGNALLED + signal.number()).into());
         }
@@ -39,7 +49,10 @@ pub fn end_on_signal(inbox: Inbox) {
     let interrupts = AtomicUsize::new(0);
     let all = [ProcessSignal::HangUp, ProcessSignal::Interrupt, ProcessSignal::Terminate];
     on_signal(&all, move |signal| {
-        if signal == ProcessSignal::Interrupt && interrupts.fetch_add(1, Ordering::Relaxed) > 1 {
+        if !inbox.is_handled(signal)
+            && signal == ProcessSignal::Interrupt
+            && interrupts.fetch_add(1, Ordering::Relaxed) > 1
+        {
             complain("interrupted");
             std::process::exit((SIGNALLED + signal.number()).into());
         }

@@ -137,7 +137,7 @@ impl Handle {
         is_urgent: bool,
     ) -> Reply<T> {
         let question = Question::Call { function: function.into(), arguments: data(arguments), is_urgent };
-        Reply { pending: self.sender.ask(question), read: read_value }
+        Reply::of_value(self.sender.ask(question))
     }
 }
 
@@ -155,6 +155,13 @@ pub struct Reply<T> {
 impl<T> fmt::Debug for Reply<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.pending.fmt(f)
+    }
+}
+
+impl<T: FromData> Reply<T> {
+    /// Returns the reply that a pending answer will be, by its first value.
+    pub(super) fn of_value(pending: Pending) -> Reply<T> {
+        Reply { pending, read: read_value }
     }
 }
 
@@ -186,7 +193,12 @@ impl<T> Future for Reply<T> {
 /// Returns the error that an answer without a value stands for.
 fn error_of(answer: Answer) -> Error {
     match answer {
-        Answer::Failed { cause, message, report } => Error::Failed { cause, message, report },
+        Answer::Failed { cause, message, report, arguments } => Error::Failed {
+            cause,
+            message,
+            report,
+            arguments: arguments.iter().map(Data::from_datum).collect(),
+        },
         Answer::Circular => Error::NotData(ExportError::Circular),
         Answer::TooLarge => Error::NotData(ExportError::TooLarge),
         Answer::Aborted => Error::Aborted,

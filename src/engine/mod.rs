@@ -19,6 +19,7 @@
 mod call;
 mod executor;
 mod handle;
+mod looping;
 mod operation;
 
 use std::future::Future;
@@ -40,6 +41,7 @@ use crate::program;
 pub use call::{Call, Failure};
 pub use executor::{Executor, Job};
 pub use handle::{Handle, Reply, TaskHandle};
+pub use looping::{Ending, Poll, Running};
 pub use operation::Operation;
 
 /// A machine with the library. Definitions last from one evaluation to the next.

@@ -2,6 +2,8 @@
 
 use std::io::BufRead;
 
+use esl_vm::host::ProcessSignal;
+
 /// Result of reading a line.
 pub(super) enum Line {
     /// Text of a line, without its newline.
@@ -10,6 +12,8 @@ pub(super) enum Line {
     Dropped,
     /// There are no more lines.
     End,
+    /// A signal of the process ends the session.
+    Signalled(ProcessSignal),
     /// Reading failed, for this reason.
     Failed(String),
 }

@@ -34,7 +34,7 @@ use esl_vm::task::{TaskId, TaskResult};
 use esl_vm::value::Value;
 use esl_vm::vm::{Config, Vm};
 
-use crate::command::{Interrupts, NOT_COMPILED, SUCCESS, USAGE, complain, interrupt_on_signal};
+use crate::command::{Interrupts, NOT_COMPILED, SIGNALLED, SUCCESS, USAGE, complain, interrupt_on_signal};
 use crate::module_path::ModulePath;
 use crate::program;
 use lines::Line;
@@ -73,7 +73,12 @@ pub fn run(config: Config, rights: Rights, virtual_time: bool, path: &ModulePath
         complain(format_args!("no thread can be made to read standard input: {error}"));
         USAGE
     })?;
-    let interrupts = interrupt_on_signal(machine.inbox());
+    let lines = typing.other_lines();
+    let end = move |signal| {
+        // When nobody listens, the session is at its end.
+        drop(lines.send(Line::Signalled(signal)));
+    };
+    let interrupts = interrupt_on_signal(machine.inbox(), end);
     let mut repl = Repl { machine, typing, interrupts, virtual_time, failure: None };
     repl.call("%REPL-BEGIN", "");
     let status = repl.talk();
@@ -153,6 +158,10 @@ impl Repl {
                     }
                 }
                 Line::Dropped => text.clear(),
+                Line::Signalled(signal) => {
+                    self.typing.leave();
+                    return Ok(SIGNALLED + signal.number());
+                }
                 Line::End => {
                     if !text.trim().is_empty() {
                         // The rest is not a whole form: reading it again reports what is missing.

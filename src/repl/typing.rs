@@ -26,6 +26,8 @@ enum Request {
 pub(super) struct Typing {
     requests: Sender<Request>,
     lines: Receiver<Line>,
+    /// For lines that are not typed.
+    other_lines: Sender<Line>,
     /// Whether a person types at a terminal.
     pub(super) is_interactive: bool,
     /// Settings of the terminal when the session began.
@@ -42,6 +44,7 @@ impl Typing {
     pub(super) fn begin(is_interactive: bool, screen: PromptScreen, inbox: Inbox) -> std::io::Result<Typing> {
         let (requests, asked) = channel();
         let (answer, lines) = channel();
+        let other_lines = answer.clone();
         let terminal = if is_interactive { Terminal::now() } else { None };
         let above = screen.clone();
         std::thread::Builder::new().name("typing".into()).spawn(move || {
@@ -61,12 +64,17 @@ impl Typing {
                 }
             }
         })?;
-        Ok(Typing { requests, lines, is_interactive, terminal, screen })
+        Ok(Typing { requests, lines, other_lines, is_interactive, terminal, screen })
     }
 
     fn request(&self, request: Request) {
         // Without the thread there is nobody to ask; `wait` reports that.
         _ = self.requests.send(request);
+    }
+
+    /// Returns what sends lines that are not typed.
+    pub(super) fn other_lines(&self) -> Sender<Line> {
+        self.other_lines.clone()
     }
 
     /// Requests the next line.

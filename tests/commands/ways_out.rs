@@ -1,6 +1,6 @@
 //! The ends of a run that the outside wants: cleanups run, and the status says which signal it was.
 
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};
 
 use esl_conformance::process;
@@ -114,4 +114,48 @@ fn the_end_of_a_run_has_the_time_that_is_given() {
     let run = process::run(&mut eslvm(&arguments), "");
     assert_eq!((run.status, &*run.output), (Some(5), ""), "{}", run.errors);
     assert!(run.errors.contains("A cleanup of task ARM takes too long and is left."), "{}", run.errors);
+}
+
+#[test]
+fn a_signal_that_the_program_handles_does_not_end_it() {
+    let program = "(define-input seen :capacity 9)
+(on-signal :hup (signal seen 'hup))
+(on-signal :term (signal seen 'term))
+(on-signal :int (signal seen 'int))
+(format t \"begun~%\")
+(finish-output)
+(loop repeat 5 do (format t \"~a~%\" (wait-for-event seen)) (finish-output))";
+    let mut running = Running::start("handled", program);
+    for (signal, name) in
+        [("-HUP", "HUP"), ("-INT", "INT"), ("-INT", "INT"), ("-INT", "INT"), ("-TERM", "TERM")]
+    {
+        running.send(signal);
+        assert_eq!(running.line(), name);
+    }
+    let ended = running.end();
+    assert_eq!((ended.status, &*ended.errors), (Some(0), ""));
+}
+
+#[test]
+fn a_signal_ends_a_session_of_the_repl_with_its_cleanups() {
+    for (signal, status) in [("-TERM", 143), ("-HUP", 129)] {
+        let mut command = eslvm(&["repl"]);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().expect("the command is there");
+        let mut input = child.stdin.take().expect("the input is a pipe");
+        let forms = "(progn (spawn (unwind-protect (loop (sleep 0.01)) (format t \"off~%\"))) (princ \"begun\") (terpri) 1)\n";
+        input.write_all(forms.as_bytes()).expect("it reads");
+        let mut output = BufReader::new(child.stdout.take().expect("the output is a pipe"));
+        let mut line = String::new();
+        while !line.contains("begun") {
+            line.clear();
+            output.read_line(&mut line).expect("output is text");
+        }
+        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
+        assert!(sent.expect("there is a kill").success());
+        let mut rest = String::new();
+        output.read_to_string(&mut rest).expect("output is text");
+        assert_eq!(child.wait().expect("it ends").code(), Some(status), "{rest}");
+        assert!(rest.contains("off"), "{rest}");
+    }
 }

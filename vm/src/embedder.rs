@@ -18,6 +18,8 @@ pub(crate) struct Embedder {
     pub(crate) calls: BTreeMap<TaskIndex, u64>,
     /// The task that an interrupt aborts.
     pub(crate) interruptible: Option<TaskId>,
+    /// Functions that are called for signals of the process, by the numbers of these. They are pinned.
+    pub(crate) handlers: BTreeMap<u8, Value>,
     /// Signal that has come while no task was named, and is for the next one.
     pub(crate) signal_waits: Option<ProcessSignal>,
     /// Signal that has ended the run, or a task that was named.

@@ -175,6 +175,7 @@ list_state! { Exchange {
 list_state! { Embedder {
     pinned: Run,
     calls: Run,
+    handlers: Run,
     interruptible: Run,
     signal_waits: Run,
     ended_by: Run,

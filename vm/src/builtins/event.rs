@@ -5,6 +5,7 @@
 
 use crate::builtins::list::list_items;
 use crate::heap::Kind;
+use crate::host::ProcessSignal;
 use crate::raise::{Exit, Outcome};
 use crate::run;
 use crate::schedule::TurnEnd;
@@ -355,6 +356,22 @@ pub(super) fn sleep_until(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     } else {
         vm.scheduler.park_at(Value::NIL, Some(deadline as u64))
     }
+}
+
+pub(super) fn on_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [number, function] = exactly(arguments);
+    let Some(signal) = number.as_index().and_then(ProcessSignal::from_number) else {
+        return vm.exchange.not_written(number, "(MEMBER 1 2 15)");
+    };
+    let function = vm.callable(function)?;
+    vm.embedder.pin(&mut vm.heap, function);
+    match vm.embedder.handlers.insert(signal.number(), function) {
+        Some(before) => vm.embedder.unpin(before),
+        // Whoever sends the signal may still do so.
+        None => vm.outside.senders += 1,
+    }
+    vm.outside.inbox.note_handled(signal);
+    Ok(Value::NIL)
 }
 
 pub(super) fn choose(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -34,7 +34,7 @@ pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(String, Vec<Datu
     let name = name.unwrap_or_default();
     for need in vm.outside.needs(&name) {
         if let Some(DatumKind::String(object)) = data.get(need.argument).map(Datum::kind) {
-            let permitted = demand(vm, need.right, &object.to_string())?;
+            let permitted = demand(vm, need.right, object.as_ref())?;
             data[need.argument] = Datum::string(&permitted, Span::default());
         }
     }

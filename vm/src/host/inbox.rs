@@ -7,8 +7,9 @@
 //! Guarantees: nothing is lost, and nothing is taken twice. An inbox may outlive its machine; what is put in
 //! then has no effect.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::task::Waker;
 use std::time::{Duration, Instant};
 
 use esl_bytecode::datum::Datum;
@@ -72,6 +73,10 @@ struct InboxState {
     bell: Condvar,
     doors: Doors,
     asking: Asking,
+    /// A bit for each signal of the process that the program handles, by number.
+    handled: AtomicU32,
+    /// Whom to wake when the inbox is rung.
+    waker: Mutex<Option<Waker>>,
 }
 
 /// The inbox of one machine, shared by those who put things in and the host that takes them out.
@@ -108,6 +113,31 @@ impl Inbox {
         let _contents = self.contents();
         self.0.is_rung.store(true, Ordering::Relaxed);
         self.0.bell.notify_all();
+        if let Some(waker) = self.waker().take() {
+            waker.wake();
+        }
+    }
+
+    fn waker(&self) -> MutexGuard<'_, Option<Waker>> {
+        self.0.waker.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Has `waker` woken when the machine should look, at once if it should already.
+    pub fn wake_when_rung(&self, waker: &Waker) {
+        *self.waker() = Some(waker.clone());
+        if self.is_rung() {
+            waker.wake_by_ref();
+        }
+    }
+
+    /// Notes that the program handles a signal of the process.
+    pub(crate) fn note_handled(&self, signal: ProcessSignal) {
+        self.0.handled.fetch_or(1 << signal.number(), Ordering::Relaxed);
+    }
+
+    /// Returns whether the program handles a signal of the process, so that it does not end the run.
+    pub fn is_handled(&self, signal: ProcessSignal) -> bool {
+        self.0.handled.load(Ordering::Relaxed) >> signal.number() & 1 != 0
     }
 
     /// Returns whether the machine should look.

@@ -63,6 +63,8 @@ pub enum Answer {
         message: String,
         /// What has happened where.
         report: String,
+        /// Arguments of the failure, if its cause is one of the program's.
+        arguments: Vec<Datum>,
     },
     /// The task of the call was aborted.
     Aborted,

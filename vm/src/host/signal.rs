@@ -12,6 +12,12 @@ pub enum ProcessSignal {
 }
 
 impl ProcessSignal {
+    /// Returns the signal of this number.
+    pub fn from_number(number: usize) -> Option<ProcessSignal> {
+        let all = [ProcessSignal::HangUp, ProcessSignal::Interrupt, ProcessSignal::Terminate];
+        all.into_iter().find(|signal| usize::from(signal.number()) == number)
+    }
+
     /// Returns the number of the signal.
     pub const fn number(self) -> u8 {
         self as u8

@@ -1,5 +1,8 @@
 //! The words by which reports call tasks, events and causes of failures.
 
+use esl_bytecode::datum::Datum;
+
+use crate::datum;
 use crate::describe::describe;
 use crate::heap::{Heap, Kind};
 use crate::task::{Task, TaskNumber, TaskState};
@@ -163,6 +166,18 @@ pub(crate) fn cause_label(heap: &Heap, condition: Value) -> String {
     } else {
         format!(":{name}")
     }
+}
+
+/// Returns the arguments of a failure of a cause of the program's, those that are data.
+pub(crate) fn failure_arguments(vm: &Vm, condition: Value) -> Vec<Datum> {
+    let heap = &vm.heap;
+    let Some(class) = heap.structure_class(condition) else { return Vec::new() };
+    if describe(heap, class::name_of(heap, class)) != "FAILURE" {
+        return Vec::new();
+    }
+    let list = heap.structure_slots(condition).and_then(|slots| slots.get(1).copied()).unwrap_or(Value::NIL);
+    let export = |value| datum::export(heap, &vm.world, value).ok();
+    items(vm, list).filter_map(export).map(|(datum, _)| datum).collect()
 }
 
 /// Returns the report of a failure that has ended a task when there was no room for more.

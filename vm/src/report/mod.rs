@@ -8,7 +8,8 @@ mod trace;
 
 pub(crate) use figures::note_end_in_figures;
 pub(crate) use label::{
-    cause_label, end_label, event_label, label_of, lack_of, reason_of, report_in_short, task_label,
+    cause_label, end_label, event_label, failure_arguments, label_of, lack_of, reason_of, report_in_short,
+    task_label,
 };
 pub(crate) use observe::{show, tell_of_failure, tell_of_signal, tell_of_waking};
 pub(crate) use tasks::{operations_left, place_in_program, tasks_left};

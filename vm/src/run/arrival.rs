@@ -6,6 +6,7 @@ use super::finish::allocate_without_retry;
 use super::operation::{hear, import_list};
 use super::question::{abort_call, abort_task, take_question};
 use super::signal::signal;
+use super::spawn::{SpawnOptions, make_task};
 use super::wake::make_runnable;
 use crate::host::{Host, Incoming, ProcessSignal};
 use crate::task::{TaskNumber, TaskState};
@@ -48,6 +49,12 @@ pub(crate) fn take_in(vm: &mut Vm) -> bool {
 /// the next one. Returns whether the signal cuts the end of the run short.
 fn end_by_signal(vm: &mut Vm, signal: ProcessSignal) -> bool {
     let embedder = &mut vm.embedder;
+    if !embedder.is_ending
+        && let Some(&function) = embedder.handlers.get(&signal.number())
+    {
+        handle_signal(vm, function);
+        return false;
+    }
     if embedder.is_ending {
         let cuts = signal == ProcessSignal::Interrupt;
         embedder.is_cut_short |= cuts;
@@ -62,6 +69,15 @@ fn end_by_signal(vm: &mut Vm, signal: ProcessSignal) -> bool {
         }
     }
     false
+}
+
+/// Starts a task of the program for a signal of the process that it handles.
+fn handle_signal(vm: &mut Vm, function: Value) {
+    let options = SpawnOptions { name: vm.world.known.on_signal, ..SpawnOptions::default() };
+    let start = |vm: &mut Vm| make_task(vm, function, Value::NIL, options).map(|_| Value::T);
+    if allocate_without_retry(vm, start).is_nil() {
+        vm.outside.complain("There is no memory left for the task that handles a signal.\n");
+    }
 }
 
 /// Signals an input of the program, which knows it by this name.

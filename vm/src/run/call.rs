@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use esl_bytecode::datum::Datum;
+
 use super::RunOutcome;
 use super::ending::end_task;
 use crate::observe::Seen;
@@ -9,6 +11,18 @@ use crate::report;
 use crate::task::{End, Task, TaskId, TaskResult};
 use crate::value::Value;
 use crate::vm::Vm;
+
+/// Arguments of a failure, compared by what they print as.
+#[derive(Clone, Debug, Default)]
+pub struct FailureArguments(pub Vec<Datum>);
+
+impl PartialEq for FailureArguments {
+    fn eq(&self, other: &FailureArguments) -> bool {
+        self.0.iter().map(Datum::to_string).eq(other.0.iter().map(Datum::to_string))
+    }
+}
+
+impl Eq for FailureArguments {}
 
 /// Reason why a call from outside returned no values.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,6 +35,8 @@ pub enum CallError {
         message: String,
         /// Message, frames of the failure and what they were recovering from.
         report: String,
+        /// Arguments of the failure, if its cause is one of the program's.
+        arguments: FailureArguments,
     },
     /// The task was aborted.
     Aborted,
@@ -101,7 +117,9 @@ impl Vm {
             (TaskResult::Failed(condition), _) => {
                 let cause = report::cause_label(&self.heap, condition);
                 let message = self.embedder.last_words.take().unwrap_or_else(|| self.describe(condition));
-                let failed = CallError::Failed { cause, message, report: report.unwrap_or_default() };
+                let arguments = FailureArguments(report::failure_arguments(self, condition));
+                let report = report.unwrap_or_default();
+                let failed = CallError::Failed { cause, message, report, arguments };
                 return Err((failed, condition));
             }
             (TaskResult::Aborted, _) => CallError::Aborted,

@@ -36,7 +36,7 @@ mod wake;
 
 pub(crate) use abort::abort_others;
 pub(crate) use arrival::take_in;
-pub use call::CallError;
+pub use call::{CallError, FailureArguments};
 pub(crate) use limit::{expire_limit, open_limit};
 pub(crate) use pending::interrupt_by;
 pub(crate) use signal::{deliver_some, show_kept};
@@ -45,8 +45,10 @@ pub(crate) use timers::idle;
 pub(crate) use turn::give_turn;
 
 use abort::abort_more;
-use timers::look_at_clock;
+use timers::{go_on_in_time, look_at_clock};
 use turn::go_on_with_turn;
+
+use std::time::Duration;
 
 use crate::host::{Awaited, Host};
 use crate::task::{TaskId, TaskIndex, TaskState};
@@ -83,6 +85,31 @@ impl Vm {
     /// Runs tasks in turn, as [`Vm::run`] does, but comes back instead of waiting when all of them wait.
     pub fn run_ready(&mut self, ticks: u64) -> RunOutcome {
         run_tasks(self, None, ticks, false)
+    }
+
+    /// Runs tasks in turn, as [`Vm::run_ready`] does, those included whose time has come. Virtual time goes on
+    /// when all tasks wait.
+    pub fn run_due(&mut self, ticks: u64) -> RunOutcome {
+        let end = self.scheduler.spent.saturating_add(ticks);
+        loop {
+            let outcome = run_tasks(self, None, end.saturating_sub(self.scheduler.spent), false);
+            if outcome != RunOutcome::Waiting || !go_on_in_time(self) {
+                return outcome;
+            }
+        }
+    }
+
+    /// Returns whether something can still come for tasks that all wait: a time, input, or news from outside.
+    pub fn expects_something(&mut self) -> bool {
+        let scheduler = &mut self.scheduler;
+        scheduler.first_timer().is_some() || !scheduler.readers.is_empty() || self.outside.expects_news()
+    }
+
+    /// Returns the time that is left to the first timer.
+    pub fn time_to_next_timer(&mut self) -> Option<Duration> {
+        let first = self.scheduler.first_timer()?;
+        let now = self.scheduler.clock.read(&mut self.outside.host);
+        Some(Duration::from_nanos(first.saturating_sub(now)))
     }
 }
 

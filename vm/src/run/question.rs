@@ -41,6 +41,7 @@ fn no_room() -> Answer {
         cause: ":HEAP-EXHAUSTED".into(),
         message: "There is no memory left for a task.".into(),
         report: String::new(),
+        arguments: Vec::new(),
     }
 }
 
@@ -100,7 +101,9 @@ pub(super) fn answer_call(vm: &mut Vm, end: End, values: &[Value]) -> bool {
             let message = vm.embedder.last_words.take().unwrap_or_else(|| vm.describe(condition));
             let report =
                 report.map_or_else(|| report::report_in_short(&vm.heap, condition), |report| report.text());
-            Answer::Failed { cause: report::cause_label(&vm.heap, condition), message, report }
+            let (cause, arguments) =
+                (report::cause_label(&vm.heap, condition), report::failure_arguments(vm, condition));
+            Answer::Failed { cause, message, report, arguments }
         }
         End::Aborted | End::Spent => Answer::Aborted,
     };

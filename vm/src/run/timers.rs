@@ -78,6 +78,32 @@ fn fire_timers(vm: &mut Vm) {
     }
 }
 
+/// Fires timers that are due while all tasks wait, and looks whether input has come, without waiting. Where time
+/// is virtual, it goes on to the first timer. Returns whether any task can go on.
+pub(super) fn go_on_in_time(vm: &mut Vm) -> bool {
+    if vm.scheduler.is_paused {
+        return false;
+    }
+    let input = !vm.scheduler.readers.is_empty();
+    let first = vm.scheduler.first_timer();
+    let is_virtual = vm.scheduler.clock.is_virtual;
+    if vm.outside.inbox.is_rung() {
+        return true;
+    }
+    let now = vm.scheduler.clock.read(&mut vm.outside.host);
+    if input || is_virtual && first.is_some() {
+        let deadline = first.filter(|_| is_virtual).unwrap_or(now);
+        vm.outside.host.wait(Some(deadline), Awaited { input, news: false });
+        if input && is_virtual {
+            wake_readers(vm);
+        }
+    }
+    vm.scheduler.clock.looked_at = vm.scheduler.spent;
+    fire_timers(vm);
+    let has_fired = vm.scheduler.first_timer() != first || vm.scheduler.clock.more_is_due;
+    has_fired || vm.outside.inbox.is_rung() || input && is_virtual
+}
+
 /// Sleeps until a timer is due or something comes from outside. Returns false if nothing ever will.
 pub(crate) fn idle(vm: &mut Vm) -> bool {
     vm.outside.flush();

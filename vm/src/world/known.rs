@@ -70,6 +70,7 @@ define_known! {
     fail_as_host = esl "%FAIL-AS-HOST";
     input = esl "INPUT";
     room = keyword "ROOM";
+    on_signal = esl "ON-SIGNAL";
     task = esl "TASK";
     restarts = esl "*RESTARTS*";
     recoveries = esl "*RECOVERIES*";
