@@ -42,6 +42,7 @@ pub(crate) fn abort_others(vm: &mut Vm) {
     let mut alive: Vec<(TaskNumber, TaskId)> = alive.collect();
     alive.sort_unstable_by_key(|&(number, _)| number);
     vm.scheduler.end_of_all = Some(EndOfAll { left: alive.into_iter().map(|(_, id)| id).collect() });
+    vm.scheduler.counts.made_at_end = vm.scheduler.counts.made;
     abort_more(vm);
     if vm.scheduler.end_of_all.is_some()
         && let Some(task) = &mut vm.scheduler.running

@@ -112,7 +112,9 @@ fn end_run_if_over(vm: &mut Vm, end: End) {
     }
     let Some(main) = scheduler.main else { return };
     let main_has_failed = main.index == scheduler.turn.index && end != End::Succeeded;
-    if main_has_failed || scheduler.counts.foreground == 0 {
+    // All others may have been asked before; each of them comes by here.
+    let has_newer = scheduler.counts.made > scheduler.counts.made_at_end;
+    if has_newer && (main_has_failed || scheduler.counts.foreground == 0) {
         abort_others(vm);
     }
 }

@@ -56,6 +56,8 @@ pub(crate) struct Counts {
     pub(crate) foreground: usize,
     /// Tasks made so far.
     pub(crate) made: u64,
+    /// Tasks made when all were last asked to end.
+    pub(crate) made_at_end: u64,
     /// Turns so far.
     pub(crate) turns: u64,
     /// Turns that came after one of another task.
