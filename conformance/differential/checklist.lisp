@@ -894,3 +894,107 @@ e") (read-from-string "#:g") (read-from-string ":Key")))
        (:method ((x symbol)) (list :symbol (call-next-method)))))
   (define-shape223 shape223)
   (answer 223 (list (shape223 1) (shape223 'a))))
+
+;; operations of bits
+;;; 224
+(answer 224 (list (bit-and #*0011 #*0101) (bit-ior #*0011 #*0101) (bit-xor #*0011 #*0101) (bit-eqv #*0011 #*0101)
+                  (bit-nand #*0011 #*0101) (bit-nor #*0011 #*0101) (bit-andc1 #*0011 #*0101)
+                  (bit-andc2 #*0011 #*0101) (bit-orc1 #*0011 #*0101) (bit-orc2 #*0011 #*0101) (bit-not #*0011)
+                  (bit-vector-p #*1) (simple-bit-vector-p #*1) (bit-vector-p #(1))))
+
+;; arrays of bits and bytes are told apart from others
+;;; 225
+(answer 225 (let ((bits (make-array 3 :element-type 'bit :initial-element 1))
+                  (bytes (make-array 2 :element-type '(unsigned-byte 8) :initial-element 200)))
+              (list bits bytes (array-element-type bits) (array-element-type bytes) (equal bits #*111)
+                    (equalp bytes #(200 200)) (typep bytes '(vector (unsigned-byte 8))) (typep bits 'simple-vector)
+                    (handler-case (setf (aref bits 0) (car (list 2))) (type-error () :refused))
+                    (handler-case (setf (aref bytes 0) (car (list 256))) (type-error () :refused))
+                    (concatenate 'bit-vector bits #*0) (coerce '(0 1) 'bit-vector)
+                    (multiple-value-list (subtypep 'bit-vector '(array bit (*)))))))
+
+;; displaced arrays share, until they grow
+;;; 226
+(answer 226 (let* ((all (vector 1 2 3 4 5 6))
+                   (part (make-array 3 :displaced-to all :displaced-index-offset 2 :adjustable t :fill-pointer 2))
+                   (square (make-array '(2 2) :displaced-to all :displaced-index-offset 1)))
+              (setf (aref part 0) 'a (aref square 1 1) 'b)
+              (list part square all (multiple-value-list (array-displacement square))
+                    (progn (vector-push-extend 'c part) (vector-push-extend 'd part) (setf (aref part 1) 'e) part)
+                    all
+                    (adjust-array (make-array '(2 2) :adjustable t) '(1 3) :displaced-to all) (position 'b all))))
+
+;; arithmetic of complex numbers
+;;; 227
+(answer 227 (list #C(1 2) (complex 1 0) (complex 1.5 0) (realpart #C(1 2)) (imagpart #C(1 2)) (conjugate #C(1 2))
+                  (+ #C(1 2) #C(3 -2)) (- #C(1 2) 1/2) (* #C(1 2) #C(1 2)) (/ #C(1 2) #C(3 4)) (expt #C(1 1) 10)
+                  (= #C(1 2) #C(1.0 2.0)) (eql #C(1 2) #C(1 2)) (zerop #C(0.0 0.0)) (abs #C(3.0 4.0))
+                  (sqrt -4.0) (phase #C(0.0 1.0)) (cis 0.0) (upgraded-complex-part-type 'rational)
+                  (handler-case (< #C(1 2) (car (list 1))) (type-error () :refused))))
+
+;; broadcast, concatenated, two-way, echo and synonym streams
+;;; 228
+(defvar *out228*)
+(answer 228 (let* ((a (make-string-output-stream)) (b (make-string-output-stream)) (c (make-string-output-stream))
+                   (in (make-concatenated-stream (make-string-input-stream "12 (a") (make-string-input-stream " b) rest")))
+                   (both (make-broadcast-stream a b))
+                   (two (make-two-way-stream in both))
+                   (echo (make-echo-stream two c))
+                   (*out228* b)
+                   (synonym (make-synonym-stream '*out228*)))
+              (write-string "x" two)
+              (let ((first (read echo)) (second (read two)))
+                (write-string "y" synonym)
+                (list first second (read-line in) (get-output-stream-string a) (get-output-stream-string b)
+                      (get-output-stream-string c) (synonym-stream-symbol synonym)
+                      (length (broadcast-stream-streams both)) (length (concatenated-stream-streams in))
+                      (eq (two-way-stream-input-stream two) in) (eq (two-way-stream-output-stream two) both)
+                      (eq (echo-stream-input-stream echo) two) (eq (echo-stream-output-stream echo) c)
+                      (input-stream-p two) (output-stream-p in) (interactive-stream-p a)))))
+
+;; sequences of characters
+;;; 229
+(answer 229 (let ((in (make-string-input-stream "abcdef")) (text (make-string 4 :initial-element #\-)) (list (list 1 2 3))
+                  (out (make-string-output-stream)))
+              (list (read-sequence text in :start 1 :end 3) text (read-sequence list in) list (read-sequence text in) text
+                    (write-sequence "hello" out :start 1) (write-sequence '(#\a #\b) out) (get-output-stream-string out)
+                    (stream-element-type in))))
+
+;; names of files
+;;; 230
+(answer 230 (flet ((parts (name) (list (pathname-directory name) (pathname-name name) (pathname-type name))))
+              (list (parts "/a/b/c.d.txt") (parts "x") (parts "a/b/") (parts ".hidden") (parts "/")
+                    (namestring (make-pathname :directory '(:relative "a") :name "b" :type "c"))
+                    (namestring (make-pathname :name "n" :defaults "/d/e.f"))
+                    (namestring (merge-pathnames "b" "/c/d.e")) (namestring (merge-pathnames "x/y.z" "/c/d.e"))
+                    (file-namestring "/a/b.c") (directory-namestring "/a/b.c") (namestring (pathname "q.r"))
+                    (pathnamep #P"a") (pathnamep "a") (namestring (parse-namestring "p/q"))
+                    (if (wild-pathname-p "*.c") t nil) (wild-pathname-p "a.c") (prin1-to-string #P"a/b"))))
+
+;; literals made when they are read
+;;; 231
+(defstruct point231 (x 1) y)
+(answer 231 (list '(#.(+ 1 2) #.(list 'a)) (let ((*print-circle* t)) (prin1-to-string '#1=(a . #1#)))
+                  (point231-y (read-from-string "#S(point231 :y 5)")) (read-from-string "#*0101")
+                  (handler-case (let ((*read-eval* nil)) (read-from-string "#.1")) (reader-error () :refused))
+                  (let ((*read-suppress* t)) (read-from-string "(a b)"))
+                  (read-from-string "#C(1 2)") (namestring (read-from-string "#P\"x\""))
+                  (let ((*features* (cons :feature231 *features*))) (read-from-string "(#+feature231 a #-feature231 b)"))))
+
+;; readtables
+;;; 232
+(answer 232 (let ((*readtable* (copy-readtable nil)))
+              (set-macro-character #\[ (lambda (stream character) (declare (ignore character)) (cons :list (read-delimited-list #\] stream t))))
+              (set-macro-character #\] (get-macro-character #\)))
+              (set-macro-character #\! (lambda (stream character) (declare (ignore stream character)) (values)) t)
+              (set-dispatch-macro-character #\# #\z (lambda (stream sub number) (declare (ignore sub)) (list number (read stream t nil t))))
+              (make-dispatch-macro-character #\$)
+              (set-dispatch-macro-character #\$ #\v (lambda (stream sub number) (declare (ignore stream number)) sub))
+              (set-syntax-from-char #\% #\;)
+              (list (read-from-string "(a [b [c] \"s\"] !d e!f #7z(g) $v % h
+                                        i)")
+                    (readtablep *readtable*) (readtable-case *readtable*) (nth-value 1 (get-macro-character #\!))
+                    (if (get-dispatch-macro-character #\# #\z) t nil)
+                    (mapcar (lambda (case) (setf (readtable-case *readtable*) case)
+                              (symbol-name (read-from-string "aBc|d|")))
+                            '(:upcase :downcase :preserve :invert)))))

@@ -24,7 +24,21 @@ const EXCEPTIONS: &[(&str, &str)] = &[
         "programs share a package",
     ),
     ("package-nicknames package-use-list package-error-package", "packages of the two differ"),
-    ("file-error-pathname load open probe-file delete-file with-open-file", "programs have no files"),
+    (
+        "file-error-pathname load open probe-file delete-file with-open-file truename file-length file-position \
+         read-byte write-byte",
+        "programs have no files",
+    ),
+    (
+        "*compile-file-pathname* *compile-file-truename* *load-pathname* *load-truename* make-load-form \
+         make-load-form-saving-slots",
+        "programs are compiled in different ways",
+    ),
+    (
+        "*default-pathname-defaults* enough-namestring host-namestring pathname-device pathname-host \
+         pathname-version stream-external-format",
+        "hosts, versions, encodings and the current folder are specific to the implementation",
+    ),
     ("require provide *modules*", "modules are files"),
     ("print-not-readable-object unbound-slot-instance", "nothing signals these errors"),
     ("trace untrace", "the formats of the two differ"),
