@@ -23,7 +23,8 @@ const TICKS: u64 = 100_000;
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn machine() -> Vm {
-    let config = Config { memory: 24 << 20, stack: 1 << 13, budget: Some(3 * TICKS), ..Config::default() };
+    let config =
+        Config { memory: 24 << 20, stack: Some(1 << 13), budget: Some(3 * TICKS), ..Config::default() };
     let host = VirtualHost::new().with_output_limit(1 << 20).with_rights(Rights::none());
     program::machine(config, Box::new(host)).expect("there is room for the library")
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use esl::Config;
-use esl::command::{exit_status, parse_size};
+use esl::command::{exit_status, parse_size, parse_stack};
 use esl::host::VirtualHost;
 use esl::program::{self, Compiled, Program, Source};
 use esl_bytecode::diagnostic::Severity;
@@ -101,7 +101,7 @@ fn config(options: &[String], setting: Setting) -> Result<Config, Failed> {
         let [option, value] = pair else { return Err(format!("`{}` needs a value", pair[0]).into()) };
         match option.as_str() {
             "--memory" => config.memory = parse_size(value)?,
-            "--stack" => config.stack = parse_size(value)? / size_of::<u64>(),
+            "--stack" => config.stack = Some(parse_stack(value)? / size_of::<u64>()),
             "--budget" => config.budget = Some(value.parse()?),
             "--slice" => config.slice = value.parse()?,
             "--seed" => config.seed = value.parse()?,

@@ -16,7 +16,7 @@
 
 #![allow(unsafe_code)]
 
-use std::alloc::{Layout, alloc, dealloc, handle_alloc_error};
+use std::alloc::{Layout, alloc, dealloc, handle_alloc_error, realloc};
 use std::ptr::NonNull;
 
 use crate::list_state;
@@ -38,9 +38,18 @@ unsafe impl Send for Stack {}
 /// bytes; the other sizes fill blocks likewise.
 const SMALLEST: usize = 15;
 
+/// Words from which on a segment fills whole pages, with the two words that an allocator takes for itself.
+const LARGE: usize = 1 << 14;
+
+/// Words of two pages.
+const PAGES: usize = 1024;
+
 /// Returns the size of the smallest segment with at least `words` words: 15, 23, 31, 47, 63, 95, …
 fn segment(words: usize) -> usize {
     assert!(words < 1 << 31, "a stack has less than 2^31 words");
+    if words >= LARGE {
+        return (words + 2).next_multiple_of(PAGES) - 2;
+    }
     let power = (words + 1).max(SMALLEST + 1).next_power_of_two();
     let between = power / 4 * 3 - 1;
     if between >= words.max(SMALLEST) { between } else { power - 1 }
@@ -73,12 +82,19 @@ impl Stack {
         self.capacity as usize
     }
 
+    /// Returns the number of words to grow to if there are to be at least `words`: so many that the copies of
+    /// a stack that keeps growing are a bounded part of the work that fills it.
+    pub fn larger(&self, words: usize) -> usize {
+        let capacity = self.capacity();
+        words.max(capacity + if capacity < 1 << 20 { capacity / 4 } else { capacity / 8 })
+    }
+
     /// Makes room for at least `words` words and keeps the contents. The stack moves.
     ///
     /// # Panics
     /// If `words` is not below 2^31.
     pub fn grow(&mut self, words: usize) {
-        self.move_to(segment(words.max(self.capacity() + self.capacity() / 4)));
+        self.move_to(segment(words.max(self.capacity())));
     }
 
     /// Returns the memory that the words below `top` do not need to the system. The stack moves.
@@ -87,24 +103,25 @@ impl Stack {
     }
 
     fn move_to(&mut self, capacity: usize) {
-        let start = allocate(capacity);
-        // SAFETY: both segments are ours, distinct, and hold at least so many words.
-        unsafe {
-            let words = self.capacity().min(capacity);
-            std::ptr::copy_nonoverlapping(self.start.as_ptr(), start.as_ptr(), words);
-        };
-        let old = std::mem::replace(&mut self.start, start);
-        free(old, self.capacity());
+        let old = self.capacity();
+        if old == 0 {
+            self.start = allocate(capacity);
+        } else {
+            let (before, after) = (layout(old), layout(capacity));
+            // SAFETY: `allocate` made the segment with the layout `before`, and neither size is zero.
+            // For large segments the system moves pages instead of copying words.
+            let start = unsafe { realloc(self.start.as_ptr().cast(), before, after.size()) };
+            let Some(start) = NonNull::new(start.cast::<Value>()) else { handle_alloc_error(after) };
+            self.start = start;
+            fill(start, old, capacity);
+        }
         self.capacity = capacity as u32;
     }
 
     /// Sets all words from `top` on to `nil`, so that a scan sees only those below.
     pub fn wipe(&mut self, top: usize) {
         // The interpreter does not note how high it has written, since that would cost each call a store.
-        for index in top..self.capacity() {
-            // SAFETY: the index is below the capacity, so the word lies in the segment.
-            unsafe { self.start.as_ptr().add(index).write(Value::NIL) };
-        }
+        fill(self.start, top, self.capacity());
     }
 
     /// Returns the words below `top`.
@@ -139,11 +156,16 @@ fn allocate(words: usize) -> NonNull<Value> {
     let Some(start) = NonNull::new(unsafe { alloc(layout) }.cast::<Value>()) else {
         handle_alloc_error(layout)
     };
-    for index in 0..words {
-        // SAFETY: the index is below the size of the fresh segment.
+    fill(start, 0, words);
+    start
+}
+
+/// Sets the words of a segment from `from` to before `to` to `nil`. The segment has that many words.
+fn fill(start: NonNull<Value>, from: usize, to: usize) {
+    for index in from..to {
+        // SAFETY: every caller passes a segment and at most its capacity, so the word lies in it.
         unsafe { start.as_ptr().add(index).write(Value::NIL) };
     }
-    start
 }
 
 #[cfg(test)]
@@ -163,9 +185,23 @@ mod tests {
     }
 
     #[test]
+    fn a_stack_that_grows_keeps_its_words_and_fills_the_rest() {
+        let mut stack = Stack::new(3);
+        // SAFETY: the first word lies in the segment.
+        unsafe { stack.start().write(Value::T) };
+        for words in [40, 20_000, 50] {
+            let larger = stack.larger(words);
+            assert!(larger >= words && larger <= words.max(stack.capacity() + stack.capacity() / 4));
+            stack.grow(larger);
+            assert_eq!(stack.words(2), [Value::T, Value::NIL]);
+            assert_eq!(stack.words(stack.capacity()).last(), Some(&Value::NIL));
+        }
+    }
+
+    #[test]
     fn segments_are_as_large_as_asked_for_and_not_much_larger() {
         assert_eq!([1, 15, 16, 23, 24, 31, 32, 47, 48].map(segment), [15, 15, 23, 23, 31, 31, 47, 47, 63]);
-        for words in 1..5000 {
+        for words in (1..5000).chain(16_000..20_000) {
             let segment = segment(words);
             assert!(segment >= words && (segment <= 15 || segment * 2 <= words * 3), "{words} {segment}");
         }

@@ -71,7 +71,7 @@ fn the_reserve_opens_above_the_limit() {
     assert_eq!(fill(&mut heap).0, 0);
     assert!(heap.open_reserve());
     assert!(!heap.open_reserve());
-    assert_eq!(fill(&mut heap).0 * 16, RESERVE / 16 * 15);
+    assert_eq!(fill(&mut heap).0 * 16, RESERVE / 3 * 2 / 16 * 15, "an arena is two thirds of it");
     heap.close_reserve();
     collect(&mut heap, &[list]);
     assert_eq!(heap.stats().committed as usize, scaled(4 << 20), "what the reserve held went back");

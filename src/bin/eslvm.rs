@@ -132,9 +132,9 @@ struct MachineOptions {
     /// Most seconds that the cleanups of an aborted task may take, also at the end of the run
     #[arg(long, value_name = "SECONDS", default_value_t = 60)]
     cleanup_time: u32,
-    /// Most memory for the stack of a task, such as 16M
-    #[arg(long, value_name = "SIZE", default_value = "512K", value_parser = command::parse_stack)]
-    stack: usize,
+    /// Most memory for the stack of a task, such as 16M; half of --memory without it
+    #[arg(long, value_name = "SIZE", value_parser = command::parse_stack)]
+    stack: Option<usize>,
     #[command(flatten)]
     rights: RightsOptions,
 }
@@ -143,7 +143,7 @@ impl MachineOptions {
     fn config(&self) -> Config {
         Config {
             memory: self.memory,
-            stack: self.stack / size_of::<Value>(),
+            stack: self.stack.map(|bytes| bytes / size_of::<Value>()),
             slice: self.slice,
             budget: self.budget,
             seed: self.seed,

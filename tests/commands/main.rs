@@ -5,6 +5,8 @@ mod bad_input;
 mod deadlock;
 mod examples;
 mod folder;
+#[cfg(target_os = "linux")]
+mod memory;
 mod modules;
 mod real_time;
 mod rights;

@@ -5,13 +5,17 @@ const CLEANUP_TICKS: u64 = 1_000_000;
 /// Nanoseconds that it may take then.
 const CLEANUP_TIME: u64 = 60_000_000_000;
 
+/// Most words of a stack: the offsets of frames have 32 bits.
+const MAX_STACK: usize = 1 << 30;
+
 /// Limits and settings of a virtual machine.
 #[derive(Clone, Debug)]
 pub struct Config {
     /// Limit of the heap in bytes.
     pub memory: usize,
-    /// Limit of a task's stack in words; also of its bindings and of the entries of its control stack.
-    pub stack: usize,
+    /// Limit of a task's stack in words; also of its bindings and of the entries of its control stack. `None`
+    /// for as much as half of the memory has room for.
+    pub stack: Option<usize>,
     /// Ticks that a task runs before the next one has its turn.
     pub slice: u32,
     /// Ticks that the whole run may take; `None` without a limit.
@@ -32,7 +36,7 @@ impl Config {
     /// Default limits and settings.
     pub const DEFAULT: Config = Config {
         memory: 1 << 30,
-        stack: 1 << 16,
+        stack: None,
         slice: 2000,
         budget: None,
         seed: 0,
@@ -41,6 +45,11 @@ impl Config {
         cleanup_ticks: CLEANUP_TICKS,
         cleanup_time: CLEANUP_TIME,
     };
+
+    /// Returns the limit of a task's stack in words.
+    pub fn stack_words(&self) -> usize {
+        self.stack.unwrap_or(self.memory / 2 / size_of::<u64>()).min(MAX_STACK)
+    }
 }
 
 impl Default for Config {

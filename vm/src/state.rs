@@ -90,7 +90,7 @@ state! {
     Task by VisitTask :: task_content {
         content { flags, priority, critical, state, wait, notify, stack, control, account, extra }
         course { object, ticks, serial, number, turns, pc, base }
-        derived { scanned }
+        derived { scanned, counted }
     }
 }
 

@@ -87,7 +87,15 @@ struct Package {
 pub struct Packages {
     table: PackageTable,
     by_name: FxHashMap<Arc<str>, PackageId>,
+    /// Bytes that packages and their entries take, about.
+    bytes: usize,
 }
+
+/// Bytes of a package without entries, and of one of its names.
+const PACKAGE_BYTES: usize = 2 * size_of::<Package>() + 64;
+
+/// Bytes of an entry beside twice its name: the entry in a table that is half full, its name and its symbol.
+const ENTRY_BYTES: usize = 2 * size_of::<(Cow<'static, str>, NameEntry)>() + 144;
 
 /// Why packages are not changed as asked.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -127,11 +135,12 @@ impl IndexMut<PackageId> for PackageTable {
 
 impl Packages {
     fn empty() -> Packages {
-        Packages { table: PackageTable::default(), by_name: FxHashMap::default() }
+        Packages { table: PackageTable::default(), by_name: FxHashMap::default(), bytes: 0 }
     }
 
     fn add(&mut self, name: Arc<str>, nicknames: Vec<Arc<str>>) -> PackageId {
         let id = PackageId(self.table.0.len() as u32);
+        self.bytes += PACKAGE_BYTES * (1 + nicknames.len()) + name.len();
         for name in nicknames.iter().chain([&name]) {
             self.by_name.insert(name.clone(), id);
         }
@@ -197,6 +206,7 @@ impl Packages {
         for used in uses {
             if !self.table[id].uses.contains(&used) {
                 self.table[id].uses.push(used);
+                self.bytes += size_of::<PackageId>() * 2;
             }
         }
         Ok(id)
@@ -213,6 +223,7 @@ impl Packages {
         }
         for &name in nicknames {
             if self.by_name.insert(name.into(), package).is_none() {
+                self.bytes += PACKAGE_BYTES + name.len();
                 self.table[package].nicknames.push(name.into());
             }
         }
@@ -223,7 +234,21 @@ impl Packages {
     /// checked.
     pub fn register(&mut self, package: PackageId, name: impl Into<Cow<'static, str>>, external: bool) {
         let entry = NameEntry { home: package, external, shadowing: false, symbol: None };
-        self.table[package].symbols.insert(name.into(), entry);
+        self.enter(package, name.into(), entry);
+    }
+
+    /// Enters a symbol into a package, in place of an entry of that name. Returns the old entry.
+    fn enter(&mut self, package: PackageId, name: Cow<'static, str>, entry: NameEntry) -> Option<NameEntry> {
+        let bytes = ENTRY_BYTES + 2 * name.len();
+        let old = self.table[package].symbols.insert(name, entry);
+        self.bytes += if old.is_none() { bytes } else { 0 };
+        old
+    }
+
+    /// Returns the bytes that packages and their entries take, about. Entries that are the same in every
+    /// program take none until they are read.
+    pub fn bytes(&self) -> usize {
+        self.bytes
     }
 
     /// Makes room for as many symbols more.
@@ -292,7 +317,7 @@ impl Packages {
             None => {
                 let entry =
                     NameEntry { home, external: true, shadowing: false, symbol: Some(symbol.clone()) };
-                self.table[entry_of].symbols.insert(name.to_owned().into(), entry);
+                self.enter(entry_of, name.to_owned().into(), entry);
             }
         }
         symbol
@@ -368,11 +393,13 @@ impl Packages {
                 return Err(self.conflict(user, name));
             }
         }
-        let symbol = symbol.clone();
+        if let Some(entry) = self.table[package].symbols.get_mut(name) {
+            entry.external = true;
+            return Ok(());
+        }
         let entry =
             NameEntry { home: found.home, external: true, shadowing: false, symbol: Some(symbol.clone()) };
-        let entry = self.table[package].symbols.entry(Cow::Owned(name_of(&symbol))).or_insert(entry);
-        entry.external = true;
+        self.enter(package, Cow::Owned(name_of(symbol)), entry);
         Ok(())
     }
 
@@ -390,7 +417,9 @@ impl Packages {
         }
         self.check_open(package)?;
         let entry = NameEntry { home, external: false, shadowing: false, symbol: Some(symbol.clone()) };
-        self.table[package].symbols.entry(Cow::Owned(name_of(symbol))).or_insert(entry);
+        if !self.table[package].symbols.contains_key(name) {
+            self.enter(package, Cow::Owned(name_of(symbol)), entry);
+        }
         Ok(())
     }
 
@@ -404,7 +433,7 @@ impl Packages {
         let home = symbol.package().and_then(|home| self.named(home));
         let home = home.ok_or_else(|| PackageError::NotAccessible(symbol.clone()))?;
         let entry = NameEntry { home, external: false, shadowing: true, symbol: Some(symbol.clone()) };
-        let old = self.table[package].symbols.insert(Cow::Owned(name_of(symbol)), entry);
+        let old = self.enter(package, Cow::Owned(name_of(symbol)), entry);
         if let Some(old) = old.filter(|old| old.home == home)
             && let Some(entry) = self.table[package].symbols.get_mut(symbol.name())
         {

@@ -253,7 +253,7 @@ impl Heap {
             }
         }
         // 2. Blocks in order of address, unless that takes too long.
-        let may_grow = self.committed.saturating_add(self.external).saturating_add(ARENA) <= self.limit_now();
+        let may_grow = self.taken().saturating_add(ARENA) <= self.limit_now();
         let mut swept_in_vain = 0;
         while self.region(which).cursor.0 < self.arenas.len() {
             let (arena, block) = self.region(which).cursor;
@@ -331,12 +331,7 @@ impl Heap {
     }
 
     fn allocate_large(&mut self, bytes: usize) -> Result<NonNull<u8>, AllocError> {
-        if footprint(bytes) > self.limit {
-            return Err(AllocError::TooLarge { requested: bytes });
-        }
-        if self.committed.saturating_add(self.external).saturating_add(footprint(bytes)) > self.limit_now() {
-            return Err(AllocError::NeedCollection);
-        }
+        self.check_room(footprint(bytes))?;
         // The current epoch: marked while marking and not yet swept while sweeping; stale by the next cycle.
         let large = LargeObject::new(bytes, self.large_number, self.large.len(), self.epoch)
             .ok_or(AllocError::NeedCollection)?;

@@ -5,7 +5,7 @@
 //! layout    their form, to the byte                      alloc     bump allocation into holes
 //! mark      incremental marking                          sweep     lazy sweeping
 //! arena     1 MiB pieces of memory, in blocks            large     big objects, one by one
-//! metadata  one byte per granule
+//! metadata  one byte per granule                     external  memory outside that counts against the limit
 //! ```
 //!
 //! Objects never move. A cycle of the collector marks what is reachable, in slices between which the program
@@ -53,6 +53,7 @@ pub mod layout;
 mod access;
 mod alloc;
 mod arena;
+mod external;
 mod large;
 mod mark;
 mod metadata;
@@ -61,6 +62,7 @@ mod sweep;
 
 pub use access::BignumRef;
 pub use alloc::AllocError;
+pub use external::Holder;
 pub use layout::Kind;
 pub use object::CodeParts;
 
@@ -68,12 +70,13 @@ use crate::list_state;
 use crate::value::{TAG_MASK, Value};
 use alloc::Region;
 use arena::{ARENA, Arena};
+use external::External;
 use large::LargeObject;
 use mark::Marker;
 use sweep::Sweep;
 
-/// Bytes added to the limit by [`Heap::open_reserve`].
-pub const RESERVE: usize = 1 << 20;
+/// Bytes added to the limit by [`Heap::open_reserve`]: an arena, and something for what is outside of the heap.
+pub const RESERVE: usize = ARENA + ARENA / 2;
 
 /// Number of visits of an ordinary slice.
 ///
@@ -180,8 +183,7 @@ pub struct Heap {
     large: Vec<LargeObject>,
     large_number: u64,
     committed: usize,
-    /// Bytes outside of the heap that count against its limit.
-    external: usize,
+    external: External,
     limit: usize,
 
     stats: HeapStats,
@@ -218,7 +220,7 @@ list_state! {
         large: Parts,
         large_number: Run,
         committed: Derived,
-        external: Derived,
+        external: Parts,
         limit: Run,
         stats: Parts,
     }
@@ -251,7 +253,7 @@ impl Heap {
             large: Vec::new(),
             large_number: 0,
             committed: 0,
-            external: 0,
+            external: External::default(),
             limit: config.limit.max(ARENA),
             stats: HeapStats::default(),
         }
@@ -297,23 +299,15 @@ impl Heap {
         self.cycle_id
     }
 
-    /// Sets the number of bytes outside of the heap that count against its limit, even if they are too many.
-    ///
-    /// # Errors
-    /// [`AllocError::NeedCollection`] if the limit is passed.
-    pub fn set_external(&mut self, bytes: usize) -> Result<(), AllocError> {
-        self.external = bytes;
-        if self.committed.saturating_add(bytes) > self.limit_now() {
-            Err(AllocError::NeedCollection)
-        } else {
-            Ok(())
-        }
-    }
-
     /// Opens the reserve above the limit, for the clause that handles `:heap-exhausted`. Returns false if it
     /// is open already.
     pub fn open_reserve(&mut self) -> bool {
         !std::mem::replace(&mut self.reserve_open, true)
+    }
+
+    /// Returns whether the reserve is open.
+    pub fn is_reserve_open(&self) -> bool {
+        self.reserve_open
     }
 
     /// Closes the reserve. Objects in it stay; the next allocation beyond the limit fails again.

@@ -50,8 +50,10 @@ impl Heap {
         self.sweep = Sweep { at: (0, 1), large: self.large.len(), spares: 0, live: 0 };
         // Most objects allocated during the cycle are garbage: they count as live here, but do not put off
         // the next cycle.
-        let room = (self.limit as u64).saturating_sub(self.stats.live) / 2;
-        self.pacing.threshold = self.marker.bytes.max(self.pacing.floor).min(room.max(LEAST_THRESHOLD));
+        let room = (self.limit as u64).saturating_sub(self.stats.live + self.external.total as u64) / 2;
+        // A cycle goes over the stacks of all tasks, too.
+        let live = self.marker.bytes + self.external.of_tasks() as u64;
+        self.pacing.threshold = live.max(self.pacing.floor).min(room.max(LEAST_THRESHOLD));
         self.pacing.since_cycle = 0;
         self.pacing.owed = 0;
         self.due = false;
@@ -86,6 +88,7 @@ impl Heap {
             } else {
                 debug_assert_eq!(self.sweep.live, self.stats.live, "marking and sweeping count alike");
                 self.phase = Phase::Idle;
+                self.external.wanted = 0;
                 self.pacing.owed = 0;
                 self.due = self.pacing.since_cycle >= self.pacing.threshold;
                 return SliceOutcome::Finished;
@@ -107,7 +110,7 @@ impl Heap {
         if self.arenas[arena].as_ref().is_none_or(|arena| !arena.is_empty()) {
             return false;
         }
-        if (self.sweep.spares * ARENA) as u64 <= self.pacing.threshold && self.committed <= self.limit {
+        if (self.sweep.spares * ARENA) as u64 <= self.pacing.threshold && !self.is_crowded() {
             self.sweep.spares += 1;
             return false;
         }

@@ -150,6 +150,7 @@ fn read_datum(vm: &mut Vm, text: &str, start: usize, name: Option<&str>) -> Resu
     if let Some(base) = vm.symbol_value(vm.world.known.read_base) {
         radix(vm, base)?;
     }
+    vm.world.check_room(&mut vm.heap)?;
     let read = environment::with_compiler(vm, |vm, compiler| {
         let read = compiler.read(vm, text, start);
         read.map_err(|diagnostic| ReadFault { text: compiler.render(&diagnostic, name, text), diagnostic })

@@ -151,6 +151,7 @@ pub(super) fn list_all_packages(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn make_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.world.check_room(&mut vm.heap)?;
     let [name, nicknames, uses] = exactly(arguments);
     let name = designated_text(vm, name)?;
     let nicknames = designated_names(vm, nicknames)?;
@@ -176,6 +177,7 @@ pub(super) fn make_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn use_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.world.check_room(&mut vm.heap)?;
     let uses = designated_packages(vm, arguments[0])?;
     let package = package_or_current(vm, optional(arguments, 1))?;
     for used in uses {
@@ -186,6 +188,7 @@ pub(super) fn use_package(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn export(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.world.check_room(&mut vm.heap)?;
     let symbols = named_symbols(vm, arguments[0])?;
     let package = package_or_current(vm, optional(arguments, 1))?;
     vm.exchange.charge(symbols.len() * 16);
@@ -210,6 +213,7 @@ fn import_each(
     arguments: &[Value],
     import: fn(&mut Packages, PackageId, &Symbol) -> Result<(), PackageError>,
 ) -> Outcome {
+    vm.world.check_room(&mut vm.heap)?;
     let symbols = named_symbols(vm, arguments[0])?;
     let package = package_or_current(vm, optional(arguments, 1))?;
     vm.exchange.charge(symbols.len() * 16);
@@ -221,6 +225,7 @@ fn import_each(
 }
 
 pub(super) fn shadow(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.world.check_room(&mut vm.heap)?;
     let names = designated_names(vm, arguments[0])?;
     let package = package_or_current(vm, optional(arguments, 1))?;
     vm.exchange.charge(names.len() * 16);

@@ -110,11 +110,10 @@ pub(super) fn narrow_rights(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let text = vm.heap.alloc_str(&text)?;
     let value = vm.heap.cons(text, in_force(vm))?;
     let symbol = vm.world.rights;
-    let control = &mut vm.scheduler.task_mut().control;
-    if control.bindings.len() >= vm.config.stack {
-        return vm.exchange.raise(Raised::StackExhausted);
+    if vm.scheduler.task().control.bindings.is_full() {
+        vm.reserve_bindings()?;
     }
-    control.bindings.push(Binding { symbol, value, base });
+    vm.scheduler.task_mut().control.bindings.push(Binding { symbol, value, base });
     Ok(Value::NIL)
 }
 

@@ -3,7 +3,7 @@
 use crate::builtins::LIMIT;
 use crate::builtins::event::{nanoseconds, take_or_park};
 use crate::heap::{Heap, Kind};
-use crate::raise::{Exit, Outcome};
+use crate::raise::{Exit, Outcome, Raised};
 use crate::run::{self, SpawnOptions};
 use crate::schedule::Scheduler;
 use crate::task::{DEFAULT_PRIORITY, End, PRIORITIES, TaskIndex, TaskNumber, TaskState, guard};
@@ -12,6 +12,9 @@ use crate::vm::Vm;
 use crate::wait::{WaitOptions, event};
 
 use super::expect::exactly;
+
+/// Most limits that may be open in a task at once: each turn, and each timer, goes over them.
+const MAX_LIMITS: usize = 10_000;
 
 /// Returns the task that `v` is.
 ///
@@ -282,6 +285,10 @@ pub(super) fn open_limit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [tag, seconds, ticks] = exactly(arguments);
     let time = if seconds.is_nil() { None } else { Some(nanoseconds(vm, seconds)?) };
     let ticks = if ticks.is_nil() { None } else { Some(ticks_argument(vm, ticks)?) };
+    let open = vm.scheduler.task().extra.as_ref().map_or(0, |extra| extra.limits.len());
+    if open >= MAX_LIMITS {
+        return vm.exchange.raise(Raised::StackExhausted);
+    }
     Ok(Value::boolean(run::open_limit(vm, tag, time, ticks)))
 }
 

@@ -39,7 +39,7 @@ use std::sync::Arc;
 
 use esl_heap::list_state;
 
-use crate::heap::{AllocError, Heap};
+use crate::heap::{AllocError, Heap, Holder};
 use crate::value::Value;
 use bucket::{Buckets, finish, mix};
 pub(crate) use formula::FormulaError;
@@ -146,7 +146,7 @@ impl Database {
         work: &mut usize,
     ) -> Result<Value, FormulaError> {
         self.tidy(heap);
-        heap.set_external(self.footprint())?;
+        heap.set_external(Holder::Facts, self.footprint())?;
         let mut cells = std::mem::take(&mut self.cells);
         cells.clear();
         let made = formula::fact(&mut self.terms, heap, fact, &mut cells, work);
@@ -356,7 +356,7 @@ impl Database {
         work: &mut usize,
     ) -> Result<u64, FormulaError> {
         self.tidy(heap);
-        heap.set_external(self.footprint())?;
+        heap.set_external(Holder::Facts, self.footprint())?;
         let query = Query::begin(self, heap, query, inherited, wants_facts, work)?;
         let number = self.serial;
         self.serial += 1;
@@ -485,7 +485,7 @@ impl Database {
     /// # Errors
     /// As for every allocation.
     pub(crate) fn check_room(&self, heap: &mut Heap) -> Result<(), AllocError> {
-        heap.set_external(self.footprint())
+        heap.set_external(Holder::Facts, self.footprint())
     }
 
     // ---- telling states apart

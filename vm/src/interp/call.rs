@@ -244,13 +244,13 @@ impl Vm {
     /// Returns the library's function that takes over from a builtin with too much to do at once.
     ///
     /// # Errors
-    /// `program-error` if there is none.
+    /// `program-error` if there is none, [`Exit::Collect`] without room for its name.
     pub(super) fn twin_of(&mut self, builtin: &BuiltinInfo) -> Result<Value, Exit> {
-        if let Some(name) = builtin.slowly
-            && let Ok(symbol) = self.world.intern_esl(&mut self.heap, name)
-            && self.world.is_defined(&self.heap, symbol)
-        {
-            return Ok(symbol);
+        if let Some(name) = builtin.slowly {
+            let symbol = self.world.intern_esl(&mut self.heap, name)?;
+            if self.world.is_defined(&self.heap, symbol) {
+                return Ok(symbol);
+            }
         }
         self.exchange.program_error(format!("{} has too much to do at once", builtin.name))
     }

@@ -59,6 +59,7 @@ unsafe fn scan(heap: &mut Heap, task: &mut Task) -> usize {
         extra.visit(&mut |value| heap.mark(value));
     }
     task.scanned = heap.cycle_id();
+    task.recount(heap);
     let Some(control) = task.control.get() else { return top };
     control.visit(&mut |value| heap.mark(value));
     top + control.entries.len() + 2 * control.bindings.len()

@@ -12,6 +12,9 @@ use crate::saved_pc::SavedPc;
 use crate::task::End;
 use crate::vm::Vm;
 
+/// Live bytes over which a collection goes in the time of a tick, about.
+const BYTES_PER_TICK: u64 = 256;
+
 /// Deals with a builtin or an instruction that gave no value.
 ///
 /// # Safety
@@ -103,6 +106,8 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
             vm.leave_reserve(vm.world.known.heap_exhausted);
             return Signal::Unwind;
         }
+        // A task that goes on failing for want of memory does not get its collections for nothing.
+        vm.exchange.charges.add(vm.heap.stats().live / BYTES_PER_TICK);
         return failure(vm, Raised::HeapExhausted);
     }
     vm.exchange.collected_at = Some(place);

@@ -1,12 +1,21 @@
 //! Room on the running task's stack, and the reserves that are for handling the exhaustion of stack and heap.
 
 use crate::raise::{Exit, Raised};
-use crate::task::{End, Target, Unwinding};
+use crate::task::{Bindings, End, Entry, Target, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 
 /// Words beyond the limit of the stack for the handling of its exhaustion.
 const RESERVE: usize = 8192;
+
+/// Words by which a stack grows at a time while memory is exhausted.
+const MODEST: usize = 1024;
+
+/// Entries or bindings by which the control stack grows at first.
+const FEW: usize = 4;
+
+/// Entries or bindings from which on it grows by a quarter instead of doubling.
+const MANY: usize = 1 << 14;
 
 impl Vm {
     /// Offset of an address in the running task's stack.
@@ -16,7 +25,7 @@ impl Vm {
 
     /// Words that the running task's stack may have now.
     fn stack_limit(&self) -> usize {
-        self.config.stack + if self.scheduler.task().flags.uses_reserve() { RESERVE } else { 0 }
+        self.config.stack_words() + if self.scheduler.task().flags.uses_reserve() { RESERVE } else { 0 }
     }
 
     /// Address up to which the running task's stack may be used: its end, or its limit if that comes first.
@@ -36,7 +45,8 @@ impl Vm {
     /// Makes room in the running task's stack for `words` words in all.
     ///
     /// # Errors
-    /// `:stack-exhausted` at the limit. Handling that has a reserve; see [`Vm::leave_reserve`].
+    /// `:stack-exhausted` at the limit, and [`Exit::Collect`] if there is no memory for it. Handling either has
+    /// a reserve; see [`Vm::leave_reserve`].
     pub(super) fn reserve_stack(&mut self, words: usize) -> Result<(), Exit> {
         if words > self.stack_limit() {
             if self.scheduler.task().flags.uses_reserve() {
@@ -51,7 +61,19 @@ impl Vm {
             return Ok(());
         }
         let offset = self.offset_of(self.cpu.base());
-        self.scheduler.task_mut().stack.grow(words);
+        let task = self.scheduler.task_mut();
+        let more = |capacity: usize| (capacity - task.stack.capacity()) * size_of::<Value>();
+        let mut capacity = task.stack.larger(words);
+        if let Err(error) = self.heap.check_room(more(capacity)) {
+            if !self.heap.is_reserve_open() {
+                return Err(error.into());
+            }
+            // A failure for want of memory is being handled, with what little there is.
+            capacity = words + MODEST;
+            self.heap.check_room(more(capacity))?;
+        }
+        task.stack.grow(capacity);
+        task.recount(&mut self.heap);
         // SAFETY: the offset was inside of the stack, which has grown.
         unsafe {
             let base = self.scheduler.task().stack.start().add(offset);
@@ -61,12 +83,60 @@ impl Vm {
         Ok(())
     }
 
+    /// Makes room for more entries of the running task's control stack, which is full.
+    ///
+    /// # Errors
+    /// `:stack-exhausted` at the limit, and [`Exit::Collect`] if there is no memory for it.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn reserve_entries(&mut self) -> Result<(), Exit> {
+        let count = self.scheduler.task().control.entries.len();
+        let more = self.room_on_control_stack(count, size_of::<Entry>())?;
+        let task = self.scheduler.task_mut();
+        task.control.entries.reserve_exact(more);
+        task.recount(&mut self.heap);
+        Ok(())
+    }
+
+    /// Makes room for more bindings of the running task, which has no room left for them.
+    ///
+    /// # Errors
+    /// As [`Vm::reserve_entries`].
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn reserve_bindings(&mut self) -> Result<(), Exit> {
+        let count = self.scheduler.task().control.bindings.len();
+        let more = self.room_on_control_stack(count, Bindings::BYTES)?;
+        let task = self.scheduler.task_mut();
+        task.control.bindings.reserve(more);
+        task.recount(&mut self.heap);
+        Ok(())
+    }
+
+    /// Returns for how many more items of so many bytes there is room, where `count` are.
+    fn room_on_control_stack(&mut self, count: usize, bytes: usize) -> Result<usize, Exit> {
+        let left = self.config.stack_words().saturating_sub(count);
+        if left == 0 {
+            return self.exchange.raise(Raised::StackExhausted);
+        }
+        let more = if count < MANY { count.max(FEW) } else { count / 4 }.min(left);
+        if let Err(error) = self.heap.check_room(more * bytes) {
+            if !self.heap.is_reserve_open() {
+                return Err(error.into());
+            }
+            let modest = left.min(MODEST / 8);
+            self.heap.check_room(modest * bytes)?;
+            return Ok(modest);
+        }
+        Ok(more)
+    }
+
     /// Closes the reserves of stack and heap once the handling of their exhaustion is over: an unwinding has
     /// landed.
     pub(super) fn close_reserves(&mut self) {
         self.heap.close_reserve();
         if self.scheduler.task().flags.uses_reserve()
-            && self.offset_of(self.cpu.base()) < self.config.stack / 2
+            && self.offset_of(self.cpu.base()) < self.config.stack_words() / 2
         {
             self.scheduler.task_mut().flags.set_uses_reserve(false);
             self.update_stack_end();

@@ -74,6 +74,7 @@ pub(super) fn begin_again(vm: &mut Vm, function: Value, arguments: Value) {
     let task = vm.scheduler.task_mut();
     if task.stack.capacity() < words {
         task.stack.grow(words);
+        task.recount(&mut vm.heap);
     }
     first_frame(&vm.heap, task, starter, function, arguments);
     let (pc, stack_end) = (task.pc.get(), vm.stack_end());

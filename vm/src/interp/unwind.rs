@@ -45,11 +45,13 @@ unsafe fn landing(pc: *const u32) -> SavedPc {
 
 /// Pushes an entry of the frame at `base`.
 fn push(vm: &mut Vm, base: *mut Value, entry: Entry) -> Signal {
-    let limit = vm.config.stack;
     let base = vm.offset_of(base) as u32;
-    let control = &mut vm.scheduler.task_mut().control;
-    if control.entries.len() >= limit {
-        return failure(vm, Raised::StackExhausted);
+    let mut control = &mut *vm.scheduler.task_mut().control;
+    if control.entries.len() == control.entries.capacity() {
+        if let Err(exit) = vm.reserve_entries() {
+            return Signal::Exit(exit);
+        }
+        control = &mut *vm.scheduler.task_mut().control;
     }
     let bindings = control.bindings.len() as u32;
     control.entries.push(Entry { base, bindings, ..entry });

@@ -137,10 +137,10 @@ impl Vm {
         if flags & Symbol::EVER_BOUND == 0 {
             self.heap.set_flags(symbol, Kind::Symbol, flags | Symbol::EVER_BOUND);
         }
-        let limit = self.config.stack;
-        let bindings = &mut self.scheduler.task_mut().control.bindings;
-        if bindings.len() >= limit {
-            return self.exchange.raise(Raised::StackExhausted);
+        let mut bindings = &mut self.scheduler.task_mut().control.bindings;
+        if bindings.is_full() {
+            self.reserve_bindings()?;
+            bindings = &mut self.scheduler.task_mut().control.bindings;
         }
         bindings.push(Binding { symbol, value, base });
         Ok(())

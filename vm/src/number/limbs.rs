@@ -17,6 +17,9 @@ use crate::vm::Vm;
 /// Limbs of a result; up to 24 stay on the native stack.
 pub(crate) type Limbs = SmallVec<[u64; 24]>;
 
+/// Number of limbs of which the room for a long result is a multiple.
+const ROUNDED: usize = 1024;
+
 /// Greatest length, in limbs, of the shorter factor of a product; longer ones are for `num-bigint`.
 const SCHOOL_LIMBS: usize = 32;
 
@@ -106,9 +109,16 @@ fn is_less(a: &[u64], b: &[u64]) -> bool {
     a.len() < b.len() || a.len() == b.len() && a.iter().rev().lt(b.iter().rev())
 }
 
+/// Returns no limbs, with room for so many.
+fn with_room(limbs: usize) -> Limbs {
+    // The result is copied into the heap while these are there. If the next one is a little longer, it is to
+    // fit where these have been; otherwise a hole remains beside each number.
+    Limbs::with_capacity(if limbs < ROUNDED { limbs } else { limbs.next_multiple_of(ROUNDED) })
+}
+
 fn sum(a: &[u64], b: &[u64]) -> Limbs {
     let (long, short) = if a.len() < b.len() { (b, a) } else { (a, b) };
-    let mut result = Limbs::with_capacity(long.len() + 1);
+    let mut result = with_room(long.len() + 1);
     let mut carry = false;
     for (i, &limb) in long.iter().enumerate() {
         let (partial, over) = limb.overflowing_add(short.get(i).copied().unwrap_or(0));
@@ -124,7 +134,7 @@ fn sum(a: &[u64], b: &[u64]) -> Limbs {
 
 /// Returns `a - b`, where `a` is not less.
 fn difference(a: &[u64], b: &[u64]) -> Limbs {
-    let mut result = Limbs::with_capacity(a.len());
+    let mut result = with_room(a.len());
     let mut borrow = false;
     for (i, &limb) in a.iter().enumerate() {
         let (partial, under) = limb.overflowing_sub(b.get(i).copied().unwrap_or(0));
@@ -139,7 +149,7 @@ fn difference(a: &[u64], b: &[u64]) -> Limbs {
 /// Returns `a · 2^shift`. The number of limbs of the result must fit in memory.
 fn shifted_left(a: &[u64], shift: u64) -> Limbs {
     let (zeros, offset) = ((shift / 64) as usize, shift % 64);
-    let mut result = Limbs::with_capacity(zeros + a.len() + 1);
+    let mut result = with_room(zeros + a.len() + 1);
     result.resize(zeros, 0);
     if offset == 0 {
         result.extend_from_slice(a);

@@ -8,7 +8,7 @@ use crate::interp;
 use crate::raise::{Exit, Raised};
 use crate::report::{self, Happening};
 use crate::schedule::AccountOwner;
-use crate::task::{DEFAULT_PRIORITY, Fund, TaskId, TaskNumber, TaskState};
+use crate::task::{Bindings, DEFAULT_PRIORITY, Fund, Task, TaskId, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
@@ -81,7 +81,9 @@ impl Vm {
             scheduler.accounts.leave(account);
             self.heap.slot_set(object, event::STATE, self.world.known.aborted);
         }
-        self.scheduler.tasks.remove(id);
+        if let Some(mut task) = self.scheduler.tasks.remove(id) {
+            task.uncount(&mut self.heap);
+        }
     }
 }
 
@@ -104,13 +106,15 @@ pub(crate) fn make_task(
 ) -> Result<TaskId, Exit> {
     let fund = if options.notify.is_true() { fund_of_child(vm)? } else { None };
     let Vm { heap, world, scheduler, exchange, .. } = vm;
+    let words = interp::start::first_words(heap, function, arguments);
     let maker = scheduler.running.as_ref();
+    let bindings = maker.and_then(|maker| maker.control.get()).map_or(0, |control| control.bindings.len());
+    heap.check_room(Task::bytes_with(words) + bindings * Bindings::BYTES)?;
     let mut slots = [Value::NIL; event::TASK_LENGTH];
     slots[event::NAME] = options.name;
     slots[event::COUNT] = Value::small(0);
     slots[event::RESULT] = maker.map_or(Value::NIL, |task| Value::index(task.number.0 as usize));
     let object = heap.alloc_record(Kind::Task, 0, 0, &slots)?;
-    let words = interp::start::first_words(heap, function, arguments);
     let mut task = scheduler.tasks.make(object, words);
     interp::start::first_frame(heap, &mut task, scheduler.starter, function, arguments);
     // A new task holds nothing that was not found in a cycle under way: what it is made of is in hands of a
@@ -141,6 +145,7 @@ pub(crate) fn make_task(
             task.control.bindings = control.bindings.copy(&without);
         }
     }
+    task.recount(heap);
     if let Some(ticks) = options.budget {
         let above = task.account;
         task.account = scheduler.accounts.open(above, ticks, AccountOwner::Tasks);

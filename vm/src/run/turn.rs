@@ -8,6 +8,7 @@ use super::limit::charge_account;
 use super::pending::deliver_pending;
 use super::signal::deliver_some;
 use super::wake::make_runnable;
+use crate::heap::Heap;
 use crate::interp::{self, Leave};
 use crate::observe::Seen;
 use crate::report::{self, Happening};
@@ -186,11 +187,12 @@ fn begin_running(vm: &mut Vm, account: AccountId) -> Result<(), Leave> {
 /// Puts the record of the running task back into the table, or retires it after the task's end.
 fn put_back(vm: &mut Vm, leave: Leave) {
     let scheduler = &mut vm.scheduler;
-    let Some(task) = scheduler.running.take() else { return };
+    let Some(mut task) = scheduler.running.take() else { return };
     let index = scheduler.turn.index;
     if leave == Leave::Ended && !task.flags.kept() {
         scheduler.turn.index = TaskIndex::NONE;
         if let Some(id) = scheduler.tasks.id_at(index) {
+            task.uncount(&mut vm.heap);
             scheduler.tasks.retire(id, task);
         }
     } else {
@@ -221,7 +223,7 @@ fn park_task(vm: &mut Vm, index: TaskIndex) {
     let Some(id) = scheduler.tasks.id_at(index) else { return };
     let Some(task) = scheduler.tasks.at_mut(index) else { return };
     task.serial = serial;
-    trim(task);
+    trim(&mut vm.heap, task);
     match parking {
         Parking::Input => {
             task.state = TaskState::Reading;
@@ -243,11 +245,12 @@ fn park_task(vm: &mut Vm, index: TaskIndex) {
 }
 
 /// Gives back most of a stack that is much too large for what is on it, if it was the last time too.
-fn trim(task: &mut Task) {
+fn trim(heap: &mut Heap, task: &mut Task) {
     let (top, capacity) = (interp::top_of_task(task), task.stack.capacity());
     let is_oversized = capacity > 64 && top < capacity / 4;
     if is_oversized && task.flags.oversized() {
         task.stack.shrink(top + 16);
+        task.recount(heap);
     }
     task.flags.set_oversized(is_oversized && !task.flags.oversized());
 }

@@ -14,6 +14,9 @@ use crate::world::GivenMap;
 /// Number of bindings searched one by one; at most twice as many.
 const NEAR: usize = 32;
 
+/// Bytes of an entry of the table's map.
+const TABLE_ENTRY: usize = size_of::<(u64, u32)>() + 1;
+
 /// A dynamic binding.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Binding {
@@ -44,6 +47,28 @@ impl Bindings {
     #[inline]
     pub(crate) fn len(&self) -> usize {
         self.all.len()
+    }
+
+    /// Bytes that a binding takes, with its part of the table.
+    pub(crate) const BYTES: usize = size_of::<Binding>() + 2 * TABLE_ENTRY;
+
+    /// Returns whether there is no room for another binding.
+    #[inline]
+    pub(crate) fn is_full(&self) -> bool {
+        self.all.len() == self.all.capacity()
+    }
+
+    /// Makes room for so many more bindings.
+    pub(crate) fn reserve(&mut self, more: usize) {
+        self.all.reserve_exact(more);
+    }
+
+    /// Returns the bytes that they take.
+    pub(crate) fn bytes(&self) -> usize {
+        let table = self.table.as_ref().map_or(0, |table| {
+            table.newest.capacity() * TABLE_ENTRY + table.previous.capacity() * size_of::<u32>()
+        });
+        self.all.capacity() * size_of::<Binding>() + table
     }
 
     /// Returns all bindings, oldest first.

@@ -285,6 +285,14 @@ impl Control {
         None
     }
 
+    /// Returns the bytes that the control stack takes.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of::<Control>()
+            + self.entries.capacity() * size_of::<Entry>()
+            + self.running.capacity() * size_of::<Running>()
+            + self.bindings.bytes()
+    }
+
     /// Calls `visit` with every value that the control stack holds.
     pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
         for entry in &self.entries {

@@ -46,15 +46,20 @@ impl Allowance {
 
 /// Ticks that a cleanup may use when the fund that it belongs to is spent.
 const LAST_TICKS: u64 = 1000;
-/// Nanoseconds that it may use then.
-const LAST_TIME: u64 = 1_000_000;
+/// Ticks that many cleanups may use then together, about.
+const LAST_TICKS_OF_ALL: u64 = 1_000_000;
+/// Fewest ticks that one of many may use then.
+const FEWEST_LAST_TICKS: u64 = 20;
+/// Nanoseconds that go with a tick of a last allowance.
+const LAST_TIME_PER_TICK: u64 = 1000;
 
 /// What the cleanups that run for one abort, or for one expired limit, may use together.
 ///
 /// A fund is twice the allowance of a single cleanup, and each cleanup may use half of what is left. So the
 /// first one that hangs leaves something for those further out, and cleanups that are begun in others that
 /// are cut off use up one fund, however deep. When it is spent, each cleanup that was established before has
-/// a last small allowance, since it may release what others need; those established later are not run.
+/// a last small allowance, since it may release what others need: the smaller, the more of them there are.
+/// Those established later are not run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Fund {
     /// Number of entries of the control stack that are left when the abort, or the limit, has had its way.
@@ -85,7 +90,7 @@ impl Fund {
     /// Returns whether so little is left that cleanups have their last allowance.
     pub(crate) fn is_spent(&self, now: Allowance) -> bool {
         now.ticks.saturating_add(LAST_TICKS) > self.ends.ticks
-            || now.time.saturating_add(LAST_TIME) > self.ends.time
+            || now.time.saturating_add(LAST_TICKS * LAST_TIME_PER_TICK) > self.ends.time
     }
 
     /// Returns the allowance of the cleanup at the control entry `index`; `None` if it is not to be run.
@@ -99,7 +104,9 @@ impl Fund {
             return None;
         }
         self.floor = Some(index);
-        Some(Allowance::after(now, LAST_TICKS, LAST_TIME))
+        // There are at most `index` cleanups further out.
+        let ticks = (LAST_TICKS_OF_ALL / (index as u64 + 1)).clamp(FEWEST_LAST_TICKS, LAST_TICKS);
+        Some(Allowance::after(now, ticks, ticks * LAST_TIME_PER_TICK))
     }
 }
 

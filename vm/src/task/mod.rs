@@ -23,6 +23,7 @@ pub(crate) use limit::{AccountId, Allowance, Fund, Limit};
 pub use tasks::TaskId;
 pub(crate) use tasks::Tasks;
 
+use crate::heap::{Heap, Holder};
 use crate::saved_pc::SavedPc;
 use crate::stack::Stack;
 use crate::value::Value;
@@ -71,6 +72,8 @@ pub(crate) struct Task {
     pub turns: u32,
     /// Account that its ticks are charged to.
     pub account: AccountId,
+    /// Bytes that the heap counts for it, in units of [`UNIT`].
+    pub counted: u32,
     /// Whether it can run.
     pub state: TaskState,
     /// Priority from 0 to 7, most urgent last.
@@ -172,6 +175,11 @@ pub(crate) struct Extra {
 }
 
 impl Extra {
+    /// Returns the bytes that it takes, with the timers of its limits.
+    fn bytes(&self) -> usize {
+        size_of::<Extra>() + self.limits.capacity() * 2 * size_of::<Limit>()
+    }
+
     /// Calls `visit` with every value that it holds.
     pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
         self.limits.iter().filter_map(|limit| limit.expired).for_each(&mut *visit);
@@ -217,6 +225,7 @@ impl Task {
             base: 0,
             turns: 0,
             account: AccountId::NONE,
+            counted: 0,
             state: TaskState::Runnable,
             priority: DEFAULT_PRIORITY,
             critical: 0,
@@ -228,6 +237,33 @@ impl Task {
     fn renew(&mut self, object: Value) {
         let stack = std::mem::replace(&mut self.stack, Stack::none());
         *self = Task::with_stack(object, stack);
+    }
+
+    /// Returns the bytes that a new task with so many words of stack takes.
+    pub(crate) fn bytes_with(words: usize) -> usize {
+        RECORD_BYTES + words * size_of::<Value>()
+    }
+
+    /// Returns the bytes that it takes outside of the heap.
+    fn bytes(&self) -> usize {
+        let extra = self.extra.as_ref().map_or(0, |extra| extra.bytes());
+        let control = self.control.get().map_or(0, Control::bytes);
+        Task::bytes_with(self.stack.capacity()) + extra + control
+    }
+
+    /// Has the heap count what it takes now.
+    pub(crate) fn recount(&mut self, heap: &mut Heap) {
+        let counted = (self.bytes() / UNIT) as u32;
+        let before = std::mem::replace(&mut self.counted, counted);
+        if before != counted {
+            heap.recount_external(Holder::Tasks, before as usize * UNIT, counted as usize * UNIT);
+        }
+    }
+
+    /// Has the heap count it no more: it is gone.
+    pub(crate) fn uncount(&mut self, heap: &mut Heap) {
+        let before = std::mem::take(&mut self.counted);
+        heap.recount_external(Holder::Tasks, before as usize * UNIT, 0);
     }
 
     /// Returns the fields that few tasks need, made if they are not there.
@@ -296,6 +332,13 @@ impl Task {
         }
     }
 }
+
+/// Bytes of a task beside its stack: its record, its place in the table, in a queue and among the timers, and
+/// what the allocator takes for itself.
+const RECORD_BYTES: usize = size_of::<Task>() + 160;
+
+/// Bytes in which the heap counts what a task takes.
+const UNIT: usize = 16;
 
 /// Priority of a task that is given none.
 pub(crate) const DEFAULT_PRIORITY: u8 = 4;

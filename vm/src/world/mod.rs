@@ -22,7 +22,7 @@ use esl_bytecode::package::{PackageId, Packages};
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
 use crate::heap::layout::Symbol as SymbolObject;
-use crate::heap::{AllocError, Heap, Kind};
+use crate::heap::{AllocError, Heap, Holder, Kind};
 use crate::shape::{Shape, Sort};
 use crate::trust;
 use crate::value::Value;
@@ -63,6 +63,15 @@ pub(crate) type GivenMap<K, V> = HashMap<K, V, BuildHasherDefault<GivenHash>>;
 
 /// A set of keys that hash themselves well.
 pub(crate) type GivenSet<K> = std::collections::HashSet<K, BuildHasherDefault<GivenHash>>;
+
+/// Bytes of an entry of a table of symbols.
+const SYMBOL_BYTES: usize = size_of::<(Symbol, Value)>() + 1;
+
+/// Bytes of an entry of a table of packages, with its share of the nodes.
+const OBJECT_BYTES: usize = 2 * size_of::<(Arc<str>, PackageId, Value)>();
+
+/// Bytes of an entry of the table of classes.
+const CLASS_BYTES: usize = size_of::<(u64, Value)>() + 1;
 
 /// Names, and the objects that they stand for.
 pub(crate) struct World {
@@ -219,8 +228,20 @@ impl World {
         self.symbols.iter().for_each(|(symbol, &value)| visit(symbol, value));
     }
 
+    /// Checks that there is room for the names that there are.
+    ///
+    /// # Errors
+    /// As for every allocation.
+    pub(crate) fn check_room(&self, heap: &mut Heap) -> Result<(), AllocError> {
+        let symbols = self.symbols.capacity() + self.names.borrow().capacity();
+        let objects = self.package_objects.len() + self.homes.len();
+        let tables = symbols * SYMBOL_BYTES + objects * OBJECT_BYTES + self.classes.capacity() * CLASS_BYTES;
+        heap.set_external(Holder::Names, self.packages.bytes() + tables)
+    }
+
     /// Makes an object for `symbol`, with its builtin function if it names one.
     fn make_object(&mut self, heap: &mut Heap, symbol: &Symbol) -> Result<Value, AllocError> {
+        self.check_room(heap)?;
         let name = heap.alloc_str(symbol.name())?;
         let (package, flags) = match symbol.package() {
             None => (Value::NIL, 0),
