@@ -72,7 +72,7 @@ pub struct Expander {
     /// Number of errors so far.
     pub(super) errors: usize,
     /// Whether the forms are those of a file, to which objects cannot be written.
-    is_file: bool,
+    pub(super) is_file: bool,
     /// Whether the limit on depth has been reported for the current top-level form.
     is_too_deep: bool,
     /// Uses and definitions of global names.

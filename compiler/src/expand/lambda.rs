@@ -108,6 +108,7 @@ impl Expander {
         jobs.push(Job::Leave(count));
         self.schedule(jobs);
 
+        let shown = if self.is_file && shown.has_objects() { without_objects(&shown) } else { shown };
         let filled = &mut self.core().lambdas[lambda.index()];
         *filled = Lambda {
             name,
@@ -313,4 +314,17 @@ pub(super) fn named_lambda(
     let text = expander.lambda_text(environment, parts, &form, to.origin)?;
     expander.closure(text, to);
     Ok(())
+}
+
+/// Returns a lambda list, which is kept for people to read, without the initial forms that contain objects: a
+/// file cannot hold these.
+fn without_objects(list: &Datum) -> Datum {
+    let mut elements = list.elements();
+    let items = elements.by_ref().map(|item| match item.as_cons() {
+        _ if !item.has_objects() => item.clone(),
+        Some((name, _)) if !name.has_objects() => Datum::list([name.clone()], item.span()),
+        _ => Datum::nil(item.span()),
+    });
+    let items: Vec<Datum> = items.collect();
+    Datum::list_with_tail(items, elements.tail().clone(), list.span())
 }
