@@ -12,10 +12,10 @@ use super::operation::Operation;
 use crate::data::Data;
 
 /// A future that an executor is to run to its end.
-pub type Job = Pin<Box<dyn Future<Output = ()> + Send>>;
+pub type HostFuture = Pin<Box<dyn Future<Output = ()> + Send>>;
 
 /// Runs futures to their ends, somewhere: on tokio, for one, by `move |job| drop(handle.spawn(job))`.
-pub type Executor = Arc<dyn Fn(Job) + Send + Sync>;
+pub type Executor = Arc<dyn Fn(HostFuture) + Send + Sync>;
 
 /// The future of an operation: ends with the future of its values, or when the operation is cancelled.
 struct RunningFuture<F> {
@@ -61,7 +61,7 @@ where
 
 /// Returns the job that ends `operation` as `future` does, and drops the future when the operation is
 /// cancelled.
-pub(super) fn job<F, V>(operation: Operation, future: F) -> Job
+pub(super) fn job<F, V>(operation: Operation, future: F) -> HostFuture
 where
     F: Future<Output = Result<V, Failure>> + Send + 'static,
     V: Into<Data>,
@@ -78,7 +78,7 @@ where
 
 /// A job on the engine's own thread; waking it puts it into the queue of the thread again.
 struct QueuedJob {
-    job: Mutex<Option<Job>>,
+    job: Mutex<Option<HostFuture>>,
     queue: Sender<Arc<QueuedJob>>,
 }
 

@@ -39,7 +39,7 @@ use crate::error::{Error, NAME_MARKS};
 use crate::program;
 
 pub use call::{Call, Failure};
-pub use executor::{Executor, Job};
+pub use executor::{Executor, HostFuture};
 pub use handle::{Handle, Reply, TaskHandle};
 pub use looping::{Ending, Poll, Running};
 pub use operation::Operation;
@@ -81,7 +81,7 @@ impl Engine {
     /// Has the futures of operations run by an executor of the embedder's, such as a tokio runtime. Without
     /// this, one thread of the engine's runs them all.
     #[must_use]
-    pub fn with_executor(mut self, executor: impl Fn(Job) + Send + Sync + 'static) -> Engine {
+    pub fn with_executor(mut self, executor: impl Fn(HostFuture) + Send + Sync + 'static) -> Engine {
         self.executor = Arc::new(executor);
         self
     }

@@ -79,7 +79,7 @@ pub(crate) struct ActiveCompilation {
 
 /// The compiler of a machine, and the jobs of its programs.
 #[derive(Default)]
-pub(crate) struct Compiler {
+pub(crate) struct Compilations {
     /// The compiler, unless a builtin works with it.
     pub(crate) compiler: Option<Box<dyn Compile>>,
     /// Jobs of programs.
@@ -90,7 +90,7 @@ pub(crate) struct Compiler {
     pub(crate) refused: Vec<Diagnostic>,
 }
 
-impl Compiler {
+impl Compilations {
     /// Calls `visit` with every object that compilations keep alive.
     pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
         self.unit.borrow().roots(visit);
@@ -114,7 +114,7 @@ impl Compiler {
         self.jobs.contains_key(id).then_some(id)
     }
 
-    /// Takes the job that `handle` names out of the table, until [`Compiler::put_back`]. `None` if it has
+    /// Takes the job that `handle` names out of the table, until [`Compilations::put_back`]. `None` if it has
     /// ended.
     pub(crate) fn take(&mut self, handle: Value) -> Option<(JobId, CompilerJob)> {
         let id = self.find(handle)?;

@@ -6,7 +6,7 @@ use std::fmt;
 use esl_bytecode::datum::Datum;
 
 use crate::builtins::NATIVES;
-use crate::compiler::Compiler;
+use crate::compiler::Compilations;
 use crate::config::Config;
 use crate::cpu::Cpu;
 use crate::database::Database;
@@ -64,7 +64,7 @@ impl Vm {
         Ok(Vm {
             heap,
             world,
-            compiler: Compiler::default(),
+            compiler: Compilations::default(),
             database: Database::default(),
             scheduler: Scheduler::new(config.seed, Clock::of(&*host), starter, any_event),
             outside: Outside::new(host),

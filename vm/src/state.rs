@@ -16,7 +16,7 @@
 
 use esl_heap::list_state;
 
-use crate::compiler::Compiler;
+use crate::compiler::Compilations;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;
 use crate::observe::{Figures, Observers, Watch};
@@ -129,7 +129,7 @@ state! {
 
 state! {
     /// Visits the content of a compiler.
-    Compiler by VisitCompiler :: compiler_content {
+    Compilations by VisitCompiler :: compiler_content {
         content { jobs }
         transient { unit, refused }
         process { compiler }

@@ -2,7 +2,7 @@
 
 use esl_bytecode::builtin::BUILTINS;
 
-use crate::compiler::Compiler;
+use crate::compiler::Compilations;
 pub use crate::config::Config;
 use crate::cpu::Cpu;
 use crate::database::Database;
@@ -33,7 +33,7 @@ pub struct Vm {
     /// Symbols, packages, classes and loaded modules.
     pub(crate) world: World,
     /// The compiler, and the compilations that programs run.
-    pub(crate) compiler: Compiler,
+    pub(crate) compiler: Compilations,
     /// Facts and rules.
     pub(crate) database: Database,
     /// Tasks, their turns, and what is to happen at which time.

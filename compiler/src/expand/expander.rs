@@ -14,7 +14,7 @@ use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashSet;
 
 use super::chunk::{Chunk, OpenChunk, Purpose};
-use super::failure::{Failure, FailurePlace};
+use super::failure::{FailurePlace, MacroFailure};
 use super::form::{Checked, Form, Make, is_known, name, span_of};
 use super::global::GlobalUses;
 use super::job::{Job, To, Top, Waiting};
@@ -338,7 +338,7 @@ impl Expander {
     }
 
     /// Takes the failure of the last stop.
-    pub fn fail(&mut self, failure: &Failure) {
+    pub fn fail(&mut self, failure: &MacroFailure) {
         match std::mem::replace(&mut self.waiting, Waiting::Nothing) {
             Waiting::Nothing => {}
             Waiting::Form(to) => {
@@ -373,7 +373,7 @@ impl Expander {
     // ---- findings
 
     /// Reports the failure of the macro whose call at `span` the expander stopped for.
-    fn macro_failed(&mut self, failure: &Failure, origin: Option<OriginId>, span: Span) {
+    fn macro_failed(&mut self, failure: &MacroFailure, origin: Option<OriginId>, span: Span) {
         let origin = origin.map(|origin| self.origins.get(origin));
         let failed = origin.map_or_else(|| "a macro".to_string(), |origin| name(&origin.name));
         let is_standard = origin.is_some_and(|origin| origin.is_standard);

@@ -21,7 +21,7 @@ pub enum FailurePlace {
 
 /// A failure at compile time.
 #[derive(Clone, Debug, Default)]
-pub struct Failure {
+pub struct MacroFailure {
     /// Report of the failure.
     pub report: String,
     /// Place at which it occurred.
@@ -30,14 +30,14 @@ pub struct Failure {
     pub culprits: Vec<Datum>,
 }
 
-impl From<CompileTimeFailure> for Failure {
-    fn from(failure: CompileTimeFailure) -> Failure {
+impl From<CompileTimeFailure> for MacroFailure {
+    fn from(failure: CompileTimeFailure) -> MacroFailure {
         let place = failure.place.map_or(FailurePlace::Unknown, FailurePlace::Elsewhere);
-        Failure { report: failure.report, place, culprits: failure.culprits }
+        MacroFailure { report: failure.report, place, culprits: failure.culprits }
     }
 }
 
-impl Failure {
+impl MacroFailure {
     /// Returns the place of the part of `form` that the failure is about, if it is about one.
     pub(super) fn faulty_part(&self, form: &Datum) -> Option<Span> {
         self.culprits.iter().rev().find_map(|culprit| match culprit.kind() {

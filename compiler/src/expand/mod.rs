@@ -106,4 +106,4 @@ mod variable;
 
 pub use chunk::{Chunk, Purpose};
 pub use expander::{Expander, Stop};
-pub use failure::{Failure, FailurePlace};
+pub use failure::{FailurePlace, MacroFailure};

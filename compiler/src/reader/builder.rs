@@ -20,7 +20,7 @@ use super::MAX_ERRORS;
 use super::character;
 use super::literal::{self, ArrayError, VectorError};
 use super::name::{self, MAX_NAME, NameParts, Prefix, shorten};
-use super::number::{self, Number, NumberError};
+use super::number::{self, NumberError, NumberToken};
 use super::scan::label_number;
 
 /// A mark that abbreviates a list of two elements.
@@ -202,14 +202,14 @@ impl<'a> DatumBuilder<'a> {
         }
     }
 
-    fn number(&mut self, number: Result<Number, NumberError>, start: u32, end: u32) -> Datum {
+    fn number(&mut self, number: Result<NumberToken, NumberError>, start: u32, end: u32) -> Datum {
         let span = self.span(start, end);
         match number {
-            Ok(Number::Integer(value)) => Datum::new(DatumKind::Integer(value), span),
-            Ok(Number::Ratio(numerator, denominator)) => {
+            Ok(NumberToken::Integer(value)) => Datum::new(DatumKind::Integer(value), span),
+            Ok(NumberToken::Ratio(numerator, denominator)) => {
                 Datum::new(DatumKind::Ratio(numerator, denominator), span)
             }
-            Ok(Number::Float(value)) => Datum::new(DatumKind::Float(value), span),
+            Ok(NumberToken::Float(value)) => Datum::new(DatumKind::Float(value), span),
             Err(NumberError::ZeroDenominator) => {
                 self.fail(code::INVALID_TOKEN.at(span, "expected a denominator other than zero, found zero"))
             }

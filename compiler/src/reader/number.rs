@@ -14,7 +14,7 @@ pub const MAX_RATIO_DIGITS: usize = 10_000;
 
 /// A number.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Number {
+pub(super) enum NumberToken {
     Integer(BigInt),
     /// In lowest terms, the denominator above 1.
     Ratio(BigInt, BigInt),
@@ -35,12 +35,12 @@ pub(super) enum NumberError {
 /// Returns the number that `token` denotes, an integer or a ratio in base `base`, from 2 to 36, if that is
 /// possible; `None` if it does not have the syntax of a number. Floats, and integers before a point, are
 /// decimal.
-pub(super) fn parse(token: &str, base: u32) -> Option<Result<Number, NumberError>> {
+pub(super) fn parse(token: &str, base: u32) -> Option<Result<NumberToken, NumberError>> {
     if base == 10 { decimal(token) } else { parse_radix(token, base).or_else(|| pointed(token)) }
 }
 
 /// Returns the number that `token` denotes in base ten.
-fn decimal(token: &str) -> Option<Result<Number, NumberError>> {
+fn decimal(token: &str) -> Option<Result<NumberToken, NumberError>> {
     let unsigned = token.strip_prefix(['+', '-']).unwrap_or(token);
     // Most tokens are names, which the first character rules out.
     if !unsigned.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
@@ -63,14 +63,14 @@ fn decimal(token: &str) -> Option<Result<Number, NumberError>> {
 
 /// Returns the number that `token` denotes if it is decimal in every base: a float, or an integer before a
 /// point.
-fn pointed(token: &str) -> Option<Result<Number, NumberError>> {
+fn pointed(token: &str) -> Option<Result<NumberToken, NumberError>> {
     let is_rational = token.bytes().all(|byte| byte.is_ascii_digit() || matches!(byte, b'+' | b'-' | b'/'));
     if is_rational { None } else { decimal(token) }
 }
 
 /// Returns the rational number that `token` denotes in base `radix`; `None` if it does not have the syntax of
 /// one.
-pub(super) fn parse_radix(token: &str, radix: u32) -> Option<Result<Number, NumberError>> {
+pub(super) fn parse_radix(token: &str, radix: u32) -> Option<Result<NumberToken, NumberError>> {
     let unsigned = token.strip_prefix(['+', '-']).unwrap_or(token);
     match unsigned.split_once('/') {
         None => is_digits(unsigned, radix).then(|| integer(token, radix)),
@@ -85,11 +85,11 @@ fn is_digits(text: &str, radix: u32) -> bool {
     !text.is_empty() && text.chars().all(|c| c.is_digit(radix))
 }
 
-fn integer(digits: &str, radix: u32) -> Result<Number, NumberError> {
-    big(digits, radix, MAX_DIGITS).map(Number::Integer)
+fn integer(digits: &str, radix: u32) -> Result<NumberToken, NumberError> {
+    big(digits, radix, MAX_DIGITS).map(NumberToken::Integer)
 }
 
-fn ratio(numerator: &str, denominator: &str, radix: u32) -> Result<Number, NumberError> {
+fn ratio(numerator: &str, denominator: &str, radix: u32) -> Result<NumberToken, NumberError> {
     let numerator = big(numerator, radix, MAX_RATIO_DIGITS)?;
     let denominator = big(denominator, radix, MAX_RATIO_DIGITS)?;
     if denominator == BigInt::ZERO {
@@ -98,9 +98,9 @@ fn ratio(numerator: &str, denominator: &str, radix: u32) -> Result<Number, Numbe
     let divisor = numerator.gcd(&denominator);
     let (numerator, denominator) = (numerator / &divisor, denominator / divisor);
     Ok(if denominator == BigInt::from(1) {
-        Number::Integer(numerator)
+        NumberToken::Integer(numerator)
     } else {
-        Number::Ratio(numerator, denominator)
+        NumberToken::Ratio(numerator, denominator)
     })
 }
 
@@ -117,7 +117,7 @@ fn big(digits: &str, radix: u32, limit: usize) -> Result<BigInt, NumberError> {
 }
 
 /// Parses `[+-] digits* [. digits*] [marker [+-] digits+]`, with digits after the point or a marker.
-fn float(token: &str, unsigned: &str, whole: usize) -> Option<Result<Number, NumberError>> {
+fn float(token: &str, unsigned: &str, whole: usize) -> Option<Result<NumberToken, NumberError>> {
     let bytes = unsigned.as_bytes();
     let digits_from = |at: usize| bytes[at..].iter().take_while(|byte| byte.is_ascii_digit()).count();
     let mut at = whole;
@@ -144,22 +144,22 @@ fn float(token: &str, unsigned: &str, whole: usize) -> Option<Result<Number, Num
 }
 
 /// Converts a text in the float syntax of Rust. Numbers too small for a double become zero.
-fn double(text: String) -> Result<Number, NumberError> {
+fn double(text: String) -> Result<NumberToken, NumberError> {
     let value: f64 = text.parse().expect("the syntax of a float");
-    if value.is_finite() { Ok(Number::Float(value)) } else { Err(NumberError::OutOfRange) }
+    if value.is_finite() { Ok(NumberToken::Float(value)) } else { Err(NumberError::OutOfRange) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn show(number: Option<Result<Number, NumberError>>) -> String {
+    fn show(number: Option<Result<NumberToken, NumberError>>) -> String {
         match number {
             None => "name".into(),
             Some(Err(fault)) => format!("{fault:?}"),
-            Some(Ok(Number::Integer(value))) => value.to_string(),
-            Some(Ok(Number::Ratio(numerator, denominator))) => format!("{numerator}/{denominator}"),
-            Some(Ok(Number::Float(value))) => format!("{value:?}"),
+            Some(Ok(NumberToken::Integer(value))) => value.to_string(),
+            Some(Ok(NumberToken::Ratio(numerator, denominator))) => format!("{numerator}/{denominator}"),
+            Some(Ok(NumberToken::Float(value))) => format!("{value:?}"),
         }
     }
 

@@ -25,7 +25,7 @@ use esl_bytecode::span::{SourceId, Span};
 
 use crate::diagnostic::{Renderer, Sources, code};
 use crate::expand::print::print;
-use crate::expand::{Chunk, Expander, Failure, FailurePlace, Stop};
+use crate::expand::{Chunk, Expander, FailurePlace, MacroFailure, Stop};
 use crate::lower::{SourceLines, lower};
 use crate::reader::{datum_end, read_datum};
 
@@ -79,10 +79,10 @@ impl Compiler {
             sources.add(name, Some(text.clone()));
             queue.add(name, lines.add(name, text.clone()), text);
         }
-        self.session(Input::Texts(queue), lines, sources)
+        self.session(FormSource::Texts(queue), lines, sources)
     }
 
-    fn session(&self, input: Input, lines: SourceLines, sources: Sources) -> CompilationState {
+    fn session(&self, input: FormSource, lines: SourceLines, sources: Sources) -> CompilationState {
         CompilationState {
             input,
             source: self.source,
@@ -108,7 +108,7 @@ impl Compile for Compiler {
             sources.add_part(&part);
             lines.add_part(&part);
         }
-        Box::new(self.session(Input::Form(Some(form)), lines, sources))
+        Box::new(self.session(FormSource::Form(Some(form)), lines, sources))
     }
 
     fn compile_text(&self, name: &str, text: &str) -> Box<dyn Compilation> {
@@ -135,7 +135,7 @@ impl Compile for Compiler {
 
 /// Source of forms.
 #[derive(Debug)]
-enum Input {
+enum FormSource {
     /// Texts, all forms of which are compiled.
     Texts(FormQueue),
     /// A form to be evaluated.
@@ -144,7 +144,7 @@ enum Input {
 
 /// A compilation under way.
 struct CompilationState {
-    input: Input,
+    input: FormSource,
     source: SourceId,
     /// Texts, for drawing diagnostics.
     sources: Sources,
@@ -214,7 +214,7 @@ impl Compilation for CompilationState {
             }
         } else if let Answer::Failed(failure) = answer {
             let here = failure.place.as_ref().and_then(|place| self.span_of(place));
-            let mut failure = Failure::from(failure);
+            let mut failure = MacroFailure::from(failure);
             if let Some(span) = here {
                 failure.place = FailurePlace::Here(span);
             }
@@ -271,7 +271,7 @@ impl CompilationState {
     /// Begins the next form, if there is one.
     fn next_form(&mut self, environment: &mut dyn Environment) -> Next {
         match &mut self.input {
-            Input::Form(form) => match form.take() {
+            FormSource::Form(form) => match form.take() {
                 Some(form) if form.has_calls() => Next::Calls(form),
                 Some(form) => {
                     self.expander.begin_evaluation(form);
@@ -279,7 +279,7 @@ impl CompilationState {
                 }
                 None => Next::End,
             },
-            Input::Texts(queue) => queue.next(environment, &mut self.expander, &mut self.diagnostics),
+            FormSource::Texts(queue) => queue.next(environment, &mut self.expander, &mut self.diagnostics),
         }
     }
 
@@ -291,8 +291,8 @@ impl CompilationState {
         }
         let form = calls.finish();
         match &mut self.input {
-            Input::Form(place) => *place = Some(form),
-            Input::Texts(queue) => queue.put_back(form),
+            FormSource::Form(place) => *place = Some(form),
+            FormSource::Texts(queue) => queue.put_back(form),
         }
         None
     }
@@ -325,7 +325,7 @@ impl CompilationState {
 
     /// Puts the module that was asked for in the place of the form that requires it.
     fn take_module(&mut self, name: &str, span: Span, answer: Answer) {
-        let Input::Texts(queue) = &mut self.input else { return };
+        let FormSource::Texts(queue) = &mut self.input else { return };
         match answer {
             Answer::Module(Required::Source { name: path, text }) => {
                 self.sources.add(path.clone(), Some(text.clone()));
@@ -356,7 +356,7 @@ impl CompilationState {
 
     /// Whether the current form stays outside of the program.
     fn is_outside(&self) -> bool {
-        self.apart && matches!(&self.input, Input::Texts(queue) if queue.is_inside_module())
+        self.apart && matches!(&self.input, FormSource::Texts(queue) if queue.is_inside_module())
     }
 
     /// Lowers a chunk; keeps it for the program, asks for it to be loaded, or both.
@@ -379,7 +379,7 @@ impl CompilationState {
                 return None;
             }
         };
-        let is_file = matches!(self.input, Input::Texts(_));
+        let is_file = matches!(self.input, FormSource::Texts(_));
         if is_file
             && purpose.emit
             && module.constants.iter().any(|constant| matches!(constant, Constant::Object(_)))
@@ -404,7 +404,7 @@ impl CompilationState {
 
     /// Whether the last form was to make or enter a package, and has errors.
     fn is_package_in_doubt(&self) -> bool {
-        matches!(&self.input, Input::Texts(queue) if queue.is_package_in_doubt(&self.expander))
+        matches!(&self.input, FormSource::Texts(queue) if queue.is_package_in_doubt(&self.expander))
     }
 
     /// Ends the compilation before the end of its texts: all names there would be in doubt.
@@ -433,7 +433,7 @@ impl CompilationState {
         }
         let has_failed = diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error);
         let mut module = (!has_failed).then(|| join(std::mem::take(&mut self.chunks)));
-        if let (Some(module), Input::Texts(queue)) = (&mut module, &mut self.input) {
+        if let (Some(module), FormSource::Texts(queue)) = (&mut module, &mut self.input) {
             module.requires = if self.apart { queue.take_apart() } else { Vec::new() };
         }
         Step::Done(module, diagnostics)

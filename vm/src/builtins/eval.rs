@@ -28,7 +28,7 @@ use crate::builtins::expect::optional;
 use crate::builtins::rights::demand;
 use crate::builtins::stream::{Then, file_error, more_input, right_to, skip_source, source};
 use crate::builtins::symbol::{designated_text, text_between, text_of};
-use crate::compiler::{ActiveCompilation, Compiler, CompilerJob, FormText, JobId};
+use crate::compiler::{ActiveCompilation, Compilations, CompilerJob, FormText, JobId};
 use crate::datum::Unit;
 use crate::environment;
 use crate::equality::characters_of;
@@ -52,12 +52,17 @@ fn is_unfinished(code: &str) -> bool {
 
 /// Begins a compilation and returns its handle. `is_nameless` says whether its form comes from a text
 /// without a name.
-fn begin(compiler: &mut Compiler, compilation: Box<dyn Compilation>, unit: Unit, is_nameless: bool) -> Value {
+fn begin(
+    compiler: &mut Compilations,
+    compilation: Box<dyn Compilation>,
+    unit: Unit,
+    is_nameless: bool,
+) -> Value {
     let running = ActiveCompilation { compilation, unit, step: None, keeps: false, is_nameless };
     compiler.add(CompilerJob::Compilation(Box::new(running)))
 }
 
-/// Takes the job that `handle` names out of the table, until `Compiler::put_back`.
+/// Takes the job that `handle` names out of the table, until `Compilations::put_back`.
 fn take_job(vm: &mut Vm, handle: Value) -> Result<(JobId, CompilerJob), Exit> {
     match vm.compiler.take(handle) {
         Some(taken) => Ok(taken),
@@ -146,7 +151,7 @@ fn list_of_diagnostics(vm: &mut Vm, compilation: &dyn Compilation, diagnostics: 
 }
 
 /// Reads a datum of `text`, which may have a name, from byte `start` on.
-fn read_datum(vm: &mut Vm, text: &str, start: usize, name: Option<&str>) -> Result<Read, Exit> {
+fn read_datum(vm: &mut Vm, text: &str, start: usize, name: Option<&str>) -> Result<ReadOutcome, Exit> {
     if let Some(base) = vm.symbol_value(vm.world.known.read_base) {
         radix(vm, base)?;
     }
@@ -158,9 +163,9 @@ fn read_datum(vm: &mut Vm, text: &str, start: usize, name: Option<&str>) -> Resu
     let end = read.as_ref().map_or(text.len(), |&(_, end)| end);
     vm.exchange.charge(end.saturating_sub(start));
     match read {
-        Ok((Some(datum), end)) => Ok(Read::Datum(datum, end)),
-        Ok((None, _)) => Ok(Read::End),
-        Err(fault) => Ok(Read::Fault(fault)),
+        Ok((Some(datum), end)) => Ok(ReadOutcome::Datum(datum, end)),
+        Ok((None, _)) => Ok(ReadOutcome::End),
+        Err(fault) => Ok(ReadOutcome::Fault(fault)),
     }
 }
 
@@ -169,20 +174,22 @@ fn read_datum(vm: &mut Vm, text: &str, start: usize, name: Option<&str>) -> Resu
 fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<([Value; 3], usize)>, Exit> {
     let count = |end: usize| text[..end].chars().count();
     Ok(Some(match read_datum(vm, text, 0, None)? {
-        Read::Datum(_, end) if then != Then::End && end == text.len() && !text.ends_with([')', '"']) => {
+        ReadOutcome::Datum(_, end)
+            if then != Then::End && end == text.len() && !text.ends_with([')', '"']) =>
+        {
             return Ok(None);
         }
-        Read::Datum(datum, end) => {
+        ReadOutcome::Datum(datum, end) => {
             let (object, calls) = read_object(vm, &datum)?;
             ([Value::T, object, calls], count(end))
         }
         // What is faulty where the text is cut may be part of something else.
-        Read::Fault(fault) if then != Then::Rest && !fault.is_unfinished() => {
+        ReadOutcome::Fault(fault) if then != Then::Rest && !fault.is_unfinished() => {
             return vm.exchange.raise(Raised::Reader(fault.text));
         }
-        Read::End | Read::Fault(_) if then != Then::End => return Ok(None),
-        Read::End => ([Value::NIL; 3], count(text.len())),
-        Read::Fault(_) => ([vm.world.known.unfinished, Value::NIL, Value::NIL], count(text.len())),
+        ReadOutcome::End | ReadOutcome::Fault(_) if then != Then::End => return Ok(None),
+        ReadOutcome::End => ([Value::NIL; 3], count(text.len())),
+        ReadOutcome::Fault(_) => ([vm.world.known.unfinished, Value::NIL, Value::NIL], count(text.len())),
     }))
 }
 
@@ -196,7 +203,7 @@ fn read_object(vm: &mut Vm, datum: &Datum) -> Result<(Value, Value), Exit> {
 }
 
 /// Result of reading.
-enum Read {
+enum ReadOutcome {
     /// A datum, and the offset of the byte after it.
     Datum(Datum, usize),
     /// Nothing but white space.
@@ -298,14 +305,14 @@ pub(super) fn text_rest(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 fn begin_form(vm: &mut Vm, text: &mut FormText) -> Outcome {
     match read_datum(vm, &text.text, text.position, text.name.as_deref())? {
-        Read::End => Ok(Value::NIL),
-        Read::Fault(fault) => {
+        ReadOutcome::End => Ok(Value::NIL),
+        ReadOutcome::Fault(fault) => {
             if text.name.is_none() {
                 vm.compiler.refused = vec![*fault.diagnostic];
             }
             vm.exchange.raise(Raised::Reader(fault.text))
         }
-        Read::Datum(datum, end) => {
+        ReadOutcome::Datum(datum, end) => {
             let part = text.part(end);
             let is_nameless = part.is_none();
             let compilation =

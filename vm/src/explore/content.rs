@@ -2,7 +2,7 @@
 //! calls content.
 
 use super::fingerprint::{Walk, sort_of};
-use crate::compiler::Compiler;
+use crate::compiler::Compilations;
 use crate::heap::layout::Symbol as SymbolObject;
 use crate::interp::frames::entry_word;
 use crate::outside::Outside;
@@ -238,7 +238,7 @@ impl VisitWorld for Walk<'_> {
 }
 
 impl VisitCompiler for Walk<'_> {
-    fn jobs(&mut self, compiler: &Compiler) {
+    fn jobs(&mut self, compiler: &Compilations) {
         if !compiler.jobs.is_empty() {
             // How far a compilation is, is not looked into.
             self.unlike_any_other();

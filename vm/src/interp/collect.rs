@@ -5,7 +5,7 @@
 //! begins, every other one when the marker gets to it or just before the task runs, whichever is first.
 
 use super::{Leave, code_of};
-use crate::compiler::Compiler;
+use crate::compiler::Compilations;
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Phase, SLICE_VISITS, SliceOutcome};
 use crate::outside::Outside;
@@ -69,7 +69,7 @@ unsafe fn scan(heap: &mut Heap, task: &mut Task) -> usize {
 fn mark_roots(
     heap: &mut Heap,
     world: &World,
-    compiler: &Compiler,
+    compiler: &Compilations,
     exchange: &Exchange,
     pinned: &[Value],
     deliveries: &Deliveries,

@@ -43,7 +43,7 @@ const SKIP_LIMIT: usize = 1 << 14;
 const FIRST_BUFFER: usize = 24;
 
 /// The beginning of what a stream has to read.
-pub(crate) struct Source {
+pub(crate) struct StreamSource {
     /// The text.
     pub(crate) text: String,
     /// What comes after it.
@@ -287,7 +287,7 @@ pub(crate) fn characters(vm: &mut Vm, v: Value, start: Value, end: Value) -> Res
 ///
 /// # Errors
 /// A failure if it is not an open input stream.
-pub(crate) fn source(vm: &mut Vm, stream: Value, limit: usize) -> Result<Source, Exit> {
+pub(crate) fn source(vm: &mut Vm, stream: Value, limit: usize) -> Result<StreamSource, Exit> {
     let (stream, kind) = designated_stream(vm, stream, true)?;
     if kind == StreamKind::StandardInput {
         let console = &vm.outside.console;
@@ -296,17 +296,17 @@ pub(crate) fn source(vm: &mut Vm, stream: Value, limit: usize) -> Result<Source,
             true => Then::End,
             false => Then::Input,
         };
-        return Ok(Source { text: console.first_pending(limit), then, is_console: true });
+        return Ok(StreamSource { text: console.first_pending(limit), then, is_console: true });
     }
     let (start, end) =
         (stream_index(&vm.heap, stream, slot::POSITION), stream_index(&vm.heap, stream, slot::END));
     let limit = end.min(start.saturating_add(limit));
     let text = text_between(&vm.heap, stream_slot(&vm.heap, stream, slot::BUFFER), start, limit);
-    Ok(Source { text, then: if limit < end { Then::Rest } else { Then::End }, is_console: false })
+    Ok(StreamSource { text, then: if limit < end { Then::Rest } else { Then::End }, is_console: false })
 }
 
 /// Takes so many characters from a stream of which `source` was the beginning.
-pub(crate) fn skip_source(vm: &mut Vm, stream: Value, source: &Source, characters: usize) {
+pub(crate) fn skip_source(vm: &mut Vm, stream: Value, source: &StreamSource, characters: usize) {
     if source.is_console {
         vm.outside.console.skip(characters);
     } else if let Ok((stream, _)) = designated_stream(vm, stream, true) {
