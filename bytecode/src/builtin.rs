@@ -1170,6 +1170,18 @@ macro_rules! for_each_builtin {
             /// Reads a datum from a stream: whether there was one, or `:unfinished`; and the datum.
             ReadStream = eval::read, internal "%READ" ("&optional stream") slowly "%SLOW-READ";
 
+            // ---- JSON
+            /// Reads the JSON value of a string that begins at `start`: the value, the index after it, and
+            /// `NIL`. If there is none, `NIL`, the index of the fault, and a text; if the value is long or
+            /// deep, `NIL`, the index at which it begins, and `T`. Objects are association lists, or hash
+            /// tables.
+            JsonValue = json::value, internal "%JSON-VALUE" ("string start are-tables");
+            /// Reads a part of a JSON string that has begun: its characters, the index after them, and `NIL`,
+            /// `T` if the string has ended, or a text that says what is wrong at the index.
+            JsonStringPart = json::string_part, internal "%JSON-STRING-PART" ("string start");
+            /// Writes a part of a string to a string stream as JSON does, without the quotes.
+            JsonWritePart = json::write_part, internal "%JSON-WRITE-PART" ("string stream start end");
+
             // ---- streams
             /// Standard input, output or error: 0, 1 or 2.
             StandardStream = stream::standard_stream, internal "%STANDARD-STREAM" ("number");
@@ -1212,6 +1224,17 @@ macro_rules! for_each_builtin {
             MakeCustomStream = stream::make_custom_stream, internal "%MAKE-CUSTOM-STREAM" ("data");
             /// The data of such a stream; `NIL` for any other object.
             CustomStreamData = stream::custom_stream_data, internal "%CUSTOM-STREAM-DATA" ("stream");
+            /// A stream whose characters come from and go to what `handler` says.
+            MakeChannel = stream::make_channel, internal "%MAKE-CHANNEL" ("handler");
+            /// The handler of a channel; `NIL` for any other object.
+            ChannelHandler = stream::channel_handler, internal "%CHANNEL-HANDLER" ("object");
+            /// The string stream that gathers what is written to a channel.
+            ChannelOutput = stream::channel_output, internal "%CHANNEL-OUTPUT" ("channel");
+            /// How many characters a channel has to be read, whether there is a whole line among the first of
+            /// them, and whether no more will come.
+            ChannelState = stream::channel_state, internal "%CHANNEL-STATE" ("channel");
+            /// Adds characters to those that a channel has to be read; with `NIL`, no more will come.
+            SupplyChannel = stream::supply_channel, internal "%SUPPLY-CHANNEL" ("channel text");
             /// Whether `object` is a stream.
             Streamp = stream::streamp, cl "STREAMP" ("object");
             /// Whether a stream can be read from.

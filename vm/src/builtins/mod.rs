@@ -68,6 +68,7 @@ mod float;
 mod input;
 mod instance;
 mod integer;
+mod json;
 mod list;
 mod lookup;
 mod net;

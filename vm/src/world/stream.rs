@@ -17,17 +17,19 @@ pub(crate) mod slot {
     pub(crate) const END: usize = 2;
     /// Characters written since the last line end.
     pub(crate) const COLUMN: usize = 3;
-    /// Name of the file.
+    /// Name of the file. For a channel what reads and writes for it.
     pub(crate) const NAME: usize = 4;
     /// Whether the stream is open.
     pub(crate) const OPEN: usize = 5;
-    /// Mode in which the next block is written to the file: number of a `WriteMode`.
+    /// Mode in which the next block is written to the file: number of a `WriteMode`. For a channel 1 if nothing
+    /// comes after what it has to read; for its output 1, since that is bounded.
     pub(crate) const MODE: usize = 6;
     /// List of the full strings gathered before the buffer, the last first.
     pub(crate) const FULL: usize = 7;
     /// Number of characters in the full strings.
     pub(crate) const BEFORE: usize = 8;
-    /// Path that is written to: the one that was permitted.
+    /// Path that is written to: the one that was permitted. For a channel the string stream that gathers its
+    /// output.
     pub(crate) const PATH: usize = 9;
     /// Number of slots.
     pub(crate) const LEN: usize = 10;
@@ -46,12 +48,19 @@ pub(crate) enum StreamKind {
     FileOutput = 5,
     /// Anything else: the operations are in ESL, over the object in the buffer's slot.
     Custom = 6,
+    /// What functions of the library read from and write to, such as a socket: for both.
+    Channel = 7,
 }
 
 impl StreamKind {
     /// Returns whether the stream is for reading.
     pub(crate) fn is_input(self) -> bool {
-        matches!(self, StreamKind::StandardInput | StreamKind::StringInput)
+        matches!(self, StreamKind::StandardInput | StreamKind::StringInput | StreamKind::Channel)
+    }
+
+    /// Returns whether the stream is for writing.
+    pub(crate) fn is_output(self) -> bool {
+        self == StreamKind::Channel || !self.is_input()
     }
 
     /// Returns the kind of a stream; `None` for any other value.
@@ -64,7 +73,8 @@ impl StreamKind {
             3 => StreamKind::StringInput,
             4 => StreamKind::StringOutput,
             5 => StreamKind::FileOutput,
-            _ => StreamKind::Custom,
+            6 => StreamKind::Custom,
+            _ => StreamKind::Channel,
         })
     }
 }

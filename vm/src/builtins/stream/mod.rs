@@ -27,9 +27,11 @@ use crate::world::stream::{StreamKind, make_stream, slot};
 
 use super::expect::exactly;
 
+mod channel;
 mod read;
 mod write;
 
+pub(super) use channel::{channel_handler, channel_output, channel_state, make_channel, supply_channel};
 pub(super) use read::{listen, peek_char, read_char, read_char_no_hang, read_line, unread_char};
 pub(super) use write::{finish_output, fresh_line, terpri, write_char, write_string};
 
@@ -94,7 +96,8 @@ fn designated_stream(vm: &mut Vm, v: Value, is_input: bool) -> Result<(Value, St
             _ => Raised::Type(stream, expected),
         });
     };
-    if kind != StreamKind::Custom && kind.is_input() != is_input {
+    let is_right = if is_input { kind.is_input() } else { kind.is_output() };
+    if kind != StreamKind::Custom && !is_right {
         let text = if is_input { "it is not open for reading" } else { "it is not open for writing" };
         return vm.exchange.raise(Raised::Stream(stream, text.into()));
     }
@@ -103,6 +106,9 @@ fn designated_stream(vm: &mut Vm, v: Value, is_input: bool) -> Result<(Value, St
     }
     if kind == StreamKind::Custom {
         return Err(Exit::Slowly);
+    }
+    if kind == StreamKind::Channel && !is_input {
+        return channel::output_to_write(vm, stream);
     }
     Ok((stream, kind))
 }
@@ -128,7 +134,7 @@ fn next_character(vm: &mut Vm, stream: Value, kind: StreamKind) -> Result<Option
     }
     let position = stream_index(&vm.heap, stream, slot::POSITION);
     if position >= stream_index(&vm.heap, stream, slot::END) {
-        return Ok(None);
+        return if channel::may_go_on(&vm.heap, stream, kind) { Err(Exit::Slowly) } else { Ok(None) };
     }
     let buffer = stream_slot(&vm.heap, stream, slot::BUFFER);
     let character = vm.heap.string(buffer).and_then(|characters| characters.get(position)).copied();
@@ -149,6 +155,12 @@ fn give_back(vm: &mut Vm, stream: Value, kind: StreamKind, character: u32) {
 fn at_end(exchange: &mut Exchange, stream: Value, arguments: &[Value], first: usize) -> Outcome {
     let is_error = arguments.get(first).is_none_or(|v| v.is_true());
     if is_error { exchange.raise(Raised::EndOfFile(stream)) } else { Ok(optional(arguments, first + 1)) }
+}
+
+/// Writes characters to the stream that `stream` designates.
+pub(super) fn write_part(vm: &mut Vm, stream: Value, characters: &[u32]) -> Result<(), Exit> {
+    let (stream, kind) = designated_stream(vm, stream, false)?;
+    write_characters(vm, stream, kind, characters)
 }
 
 /// Writes characters to an open output stream.
@@ -263,7 +275,7 @@ fn column_of(vm: &Vm, stream: Value, kind: StreamKind) -> usize {
 }
 
 /// As [`Vm::characters`], unless they are too many for one step.
-fn few_characters(vm: &mut Vm, v: Value, start: Value, end: Value) -> Result<Vec<u32>, Exit> {
+pub(super) fn few_characters(vm: &mut Vm, v: Value, start: Value, end: Value) -> Result<Vec<u32>, Exit> {
     let length = characters_of(&vm.heap, v).map_or(0, <[u32]>::len);
     if length > COPY_LIMIT {
         let (start, end) = vm.exchange.bounds(start, end, length)?;
@@ -289,6 +301,10 @@ pub(crate) fn characters(vm: &mut Vm, v: Value, start: Value, end: Value) -> Res
 /// A failure if it is not an open input stream.
 pub(crate) fn source(vm: &mut Vm, stream: Value, limit: usize) -> Result<StreamSource, Exit> {
     let (stream, kind) = designated_stream(vm, stream, true)?;
+    if kind == StreamKind::Channel {
+        // What it will have to read decides where the datum ends.
+        return Err(Exit::Slowly);
+    }
     if kind == StreamKind::StandardInput {
         let console = &vm.outside.console;
         let then = match console.is_at_end() {
@@ -581,7 +597,7 @@ pub(super) fn input_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn output_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match StreamKind::of(&vm.heap, arguments[0]) {
         Some(StreamKind::Custom) => Err(Exit::Slowly),
-        Some(kind) => Ok(Value::boolean(!kind.is_input())),
+        Some(kind) => Ok(Value::boolean(kind.is_output())),
         None => vm.exchange.type_error(arguments[0], "STREAM"),
     }
 }
@@ -597,11 +613,15 @@ pub(super) fn stream_sort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(kind) = StreamKind::of(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "STREAM");
     };
-    let name = stream_slot(&vm.heap, arguments[0], slot::NAME);
+    let name = match kind {
+        StreamKind::Channel => Value::NIL,
+        _ => stream_slot(&vm.heap, arguments[0], slot::NAME),
+    };
     let kind = match kind {
         StreamKind::StandardInput | StreamKind::StandardOutput | StreamKind::StandardError => "STANDARD",
         StreamKind::Custom => "CUSTOM",
         StreamKind::StringInput | StreamKind::StringOutput if name.is_nil() => "STRING",
+        StreamKind::Channel => "CHANNEL",
         _ => "FILE",
     };
     let kind = vm.world.keyword(&mut vm.heap, kind)?;

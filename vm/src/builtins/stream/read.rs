@@ -7,8 +7,8 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 use super::{
-    SKIP_LIMIT, StreamKind, at_end, designated_stream, give_back, input_of, next_character, set_stream_slot,
-    slot, stream_index, stream_slot,
+    SKIP_LIMIT, StreamKind, at_end, channel, designated_stream, give_back, input_of, next_character,
+    set_stream_slot, slot, stream_index, stream_slot,
 };
 
 /// `(read-char &optional stream (eof-error-p t) eof-value recursive-p)`
@@ -91,13 +91,14 @@ pub(in crate::builtins) fn read_line(vm: &mut Vm, arguments: &[Value]) -> Outcom
     } else {
         let (start, end) =
             (stream_index(&vm.heap, stream, slot::POSITION), stream_index(&vm.heap, stream, slot::END));
-        if start >= end {
+        let is_open = channel::may_go_on(&vm.heap, stream, kind);
+        if start >= end && !is_open {
             return end_of_line(vm, stream, arguments);
         }
         let buffer = stream_slot(&vm.heap, stream, slot::BUFFER);
         let rest = vm.heap.string(buffer).map_or(&[][..], |all| &all[start..end]);
         let length = rest.iter().take(COPY_LIMIT).position(|&c| c == u32::from('\n'));
-        if length.is_none() && rest.len() > COPY_LIMIT {
+        if length.is_none() && (is_open || rest.len() > COPY_LIMIT) {
             return Err(Exit::Slowly);
         }
         let line = rest[..length.unwrap_or(rest.len())].to_vec();

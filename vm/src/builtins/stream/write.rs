@@ -1,12 +1,13 @@
 //! Writing characters, strings and line ends.
 
 use crate::builtins::expect::optional;
-use crate::raise::Outcome;
+use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
 
 use super::{
-    StreamKind, check_output, column_of, designated_stream, few_characters, write_characters, write_out,
+    StreamKind, channel, check_output, column_of, designated_stream, few_characters, write_characters,
+    write_out,
 };
 
 /// `(write-char character &optional stream)`
@@ -54,6 +55,7 @@ pub(in crate::builtins) fn finish_output(vm: &mut Vm, arguments: &[Value]) -> Ou
             check_output(vm)?;
         }
         StreamKind::FileOutput => write_out(vm, stream)?,
+        StreamKind::StringOutput if channel::is_bounded(&vm.heap, stream) => return Err(Exit::Slowly),
         _ => {}
     }
     Ok(Value::NIL)

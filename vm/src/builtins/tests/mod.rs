@@ -16,6 +16,7 @@ use crate::vm::Vm;
 mod anything;
 mod arrays;
 mod characters;
+mod json;
 mod lists;
 mod numbers;
 mod streams;
