@@ -123,7 +123,7 @@ impl ModulePath {
     }
 
     /// Reads the module of this name for a compilation: its source, or else the compiled file, from the first
-    /// folder that has either.
+    /// folder that has either; otherwise one that comes with the machine.
     ///
     /// # Errors
     /// [`ModuleError`].
@@ -140,6 +140,10 @@ impl ModulePath {
             if compiled.is_file() {
                 return read_compiled(&compiled);
             }
+        }
+        #[cfg(feature = "world")]
+        if let Some(text) = esl_world::module(name) {
+            return Ok(Required::Source { name: format!("{}.esl", name.to_lowercase()), text: text.into() });
         }
         Err(ModuleError::NotFound { name: name.into(), folders: self.folders.clone() })
     }

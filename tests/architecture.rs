@@ -6,11 +6,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Sections of the code map, and the folders whose modules their tables list.
-const SECTIONS: [(&str, &str); 6] = [
+const SECTIONS: [(&str, &str); 7] = [
     ("### `bytecode/`", "bytecode/src"),
     ("### `compiler/`", "compiler/src"),
     ("### `heap/`", "heap/src"),
     ("### `vm/`", "vm/src"),
+    ("### `world/`", "world/src"),
     ("### `src/`", "src"),
     ("### The other folders", "conformance/src"),
 ];

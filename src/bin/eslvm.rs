@@ -218,6 +218,9 @@ fn run(
         host = host.with_virtual_time();
     }
     let mut machine = program::machine(options.config(), Box::new(host)).map_err(setup)?;
+    if options.clock == ClockChoice::Real {
+        esl_world::install_operations(&mut machine);
+    }
     command::end_on_signal(machine.inbox());
     program::set_module_path(&mut machine, path).map_err(setup)?;
     program::set_traces(&mut machine, trace).map_err(setup)?;

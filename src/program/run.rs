@@ -60,6 +60,8 @@ pub fn machine(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, Error> 
     let mut machine = Vm::new(unhurried, host).map_err(|_| Error::NoMemory("the library"))?;
     machine.set_compiler(Box::new(Compiler::default()));
     esl_stdlib::load(&mut machine).map_err(|_| Error::NoMemory("the library"))?;
+    #[cfg(feature = "world")]
+    esl_world::install_modules(&mut machine);
     machine.begin_program(config);
     Ok(machine)
 }

@@ -67,6 +67,9 @@ pub fn run(config: Config, rights: Rights, virtual_time: bool, path: &ModulePath
         USAGE
     };
     let mut machine = program::machine(config, Box::new(host)).map_err(setup)?;
+    if !virtual_time {
+        esl_world::install_operations(&mut machine);
+    }
     program::set_module_path(&mut machine, path).map_err(setup)?;
     machine.complain_to(Output::Standard);
     let typing = Typing::begin(is_interactive, screen, machine.inbox()).map_err(|error| {

@@ -7,6 +7,7 @@ mod examples;
 mod folder;
 #[cfg(target_os = "linux")]
 mod memory;
+mod http;
 mod modules;
 mod real_time;
 mod rights;
@@ -17,6 +18,7 @@ mod timeline;
 mod traces;
 #[cfg(unix)]
 mod ways_out;
+mod world;
 
 use std::process::Command;
 

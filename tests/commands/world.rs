@@ -1,0 +1,245 @@
+//! The modules over the operating system, in the real world.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream, UdpSocket};
+
+use esl_conformance::process::{self, Finished};
+
+use crate::eslvm;
+use crate::folder::Folder;
+
+fn run(test: &str, text: &str, arguments: &[&str]) -> Finished {
+    let folder = Folder::with(test, &[("main.esl", text)]);
+    let mut command = eslvm(&[&["run"], arguments, &["main.esl"]].concat());
+    process::run(command.current_dir(folder.path()), "")
+}
+
+/// Checks the lines that a program prints.
+#[track_caller]
+fn check(test: &str, text: &str, arguments: &[&str], expected: &[&str]) {
+    let output = run(test, text, arguments).quiet_output().expect("nothing is wrong");
+    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    assert_eq!(lines, expected);
+}
+
+#[cfg(unix)]
+#[test]
+fn programs_are_run_and_their_output_taken() {
+    let text = "(require :process)
+(defun run (command &rest options) (print (multiple-value-list (apply #'process:run-program command options))))
+(defmacro cause (form) `(print (handler-case ,form (failure (f) (list (failure-cause f) (car (failure-arguments f)))))))
+(run '(\"sh\" \"-c\" \"echo out; echo err >&2; exit 3\") :output :string :error-output :lines)
+(run '(\"cat\") :input (format nil \"ä~%b~%\") :output :lines)
+(run '(\"cat\") :input (make-string-input-stream \"from a stream\") :output :string)
+(run '(\"sh\" \"-c\" \"echo $A; pwd -P | sed 's,.*/,,'\") :output :lines :environment '((\"A\" . \"5\")) :directory \"..\")
+(run '(\"sh\" \"-c\" \"kill -9 $$\"))
+(run '(\"true\"))
+(cause (process:run-program '(\"no-such-program\")))
+(cause (process:run-program '(\"ls\")))
+(with-open-stream (s (process:run-program '(\"echo\" \"x y\") :output :stream)) (print (read-line s)))
+(print (handler-case (process:run-program \"ls\") (error () 'no-list)))";
+    check(
+        "process-run",
+        text,
+        &["--allow-run=sh,cat,true,echo,no-such-program"],
+        &[
+            "(\"out",
+            "\" (\"err\") 3)",
+            "((\"ä\" \"b\") NIL 0)",
+            "(\"from a stream\" NIL 0)",
+            "((\"5\" \"commands\") NIL 0)",
+            "(NIL NIL 137)",
+            "(NIL NIL 0)",
+            "(:PROCESS-ERROR \"there is no program `no-such-program`\")",
+            "(:PERMISSION-DENIED :RUN)",
+            "\"x y\"",
+            "NO-LIST",
+        ],
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_program_whose_call_is_left_is_ended_and_others_go_on() {
+    // The first program ends when it is told to, the second one only when it is forced.
+    let text = "(require :process)
+(defun run (script) (process:run-program (list \"sh\" \"-c\" script)))
+(spawn (:name 'other :daemon t) (loop (sleep 0.001)))
+(dolist (script '(\"trap 'echo stopped > ended; exit' TERM; echo > begun; while :; do sleep 0.01; done\"
+                  \"trap '' TERM; echo > begun; while :; do sleep 0.01; done\"))
+  (let ((task (spawn (run script))))
+    (loop until (probe-file \"begun\") do (sleep 0.01))
+    (delete-file \"begun\")
+    (abort-task task)
+    (print (wait-for-task task))))
+(print (or-parallel (a (run \"exec sleep 1000\")) (b 'first)))
+(with-open-file (s \"ended\") (print (read-line s)))
+(let ((p (process:launch-program '(\"sh\" \"-c\" \"exit 7\"))))
+  (print (list (process:wait-process p) (process:process-alive-p p))))
+(let ((p (process:launch-program '(\"sleep\" \"1000\"))))
+  (print (list (process:process-alive-p p) (process:end-process p) (process:process-alive-p p))))";
+    let expected = [":ABORTED", ":ABORTED", "FIRST", "\"stopped\"", "(7 NIL)", "(T 143 NIL)"];
+    check("process-left", text, &["--allow-run=sh,sleep"], &expected);
+}
+
+#[test]
+fn the_environment_needs_a_right() {
+    let text = "(require :os)
+(defmacro cause (form) `(print (handler-case ,form (failure (f) (failure-arguments f)))))
+(cause (stringp (os:getenv \"PATH\")))
+(cause (os:getenv \"ESL_NO_SUCH_VARIABLE\"))
+(cause (os:getenv \"HOME\"))
+(print (and (plusp (length (os:hostname))) (plusp (os:process-id))))";
+    let expected = ["T", "NIL", "(:ENV \"HOME\" \"--allow-env=HOME\")", "T"];
+    check("os-environment", text, &["--allow-env=PATH,ESL_NO_SUCH_VARIABLE"], &expected);
+}
+
+#[test]
+fn two_tasks_talk_over_a_connection() {
+    let text = "(require :sockets)
+(sockets:with-socket (listener (sockets:listen \"127.0.0.1\" 0))
+  (spawn (:name 'echo)
+    (sockets:with-socket (c (sockets:accept listener))
+      (loop for line = (read-line c nil nil)
+            while line do (format c \"~a!~%\" line))))
+  (sockets:with-socket (c (sockets:connect \"127.0.0.1\" (sockets:local-port listener)))
+    (format c \"one~%twö~%\")
+    (print (list (read-line c) (read-char c) (peek-char nil c) (read-line c)))
+    (write-string (make-string 100000 :initial-element #\\x) c)
+    (terpri c)
+    (print (length (read-line c)))
+    (print (list (input-stream-p c) (output-stream-p c) (open-stream-p c)))
+    (close c)
+    (print (open-stream-p c))))
+(defmacro cause (form) `(print (handler-case ,form (failure (f) (failure-cause f)))))
+(let ((port (sockets:with-socket (l (sockets:listen \"127.0.0.1\" 0)) (sockets:local-port l))))
+  (cause (sockets:connect \"127.0.0.1\" port)))
+(sockets:with-socket (l (sockets:listen \"127.0.0.1\" 0))
+  (cause (sockets:listen \"127.0.0.1\" (sockets:local-port l)))
+  (cause (with-timeout 0.05 (sockets:accept l)))
+  (let ((waiting (spawn (cause (sockets:accept l)))))
+    (sleep 0.01)
+    (close l)
+    (wait-for-task waiting)))
+(cause (sockets:connect \"localhost\" 1))";
+    let expected = [
+        "(\"one!\" #\\t #\\w \"wö!\")",
+        "100001",
+        "(T T T)",
+        "NIL",
+        ":CONNECTION-REFUSED",
+        ":ADDRESS-IN-USE",
+        ":TIMEOUT",
+        ":SOCKET-CLOSED",
+        ":PERMISSION-DENIED",
+    ];
+    check("sockets-talk", text, &["--allow-net=127.0.0.1"], &expected);
+}
+
+#[test]
+fn a_server_serves_many_at_once_and_peers_may_do_what_they_like() {
+    let folder = Folder::new("sockets-server");
+    let path = folder.file(
+        "main.esl",
+        "(require :sockets)
+(let ((listener (sockets:listen \"127.0.0.1\" 0)))
+  (format t \"~a~%\" (sockets:local-port listener))
+  (finish-output)
+  (let ((count 0))
+    (sockets::serve listener nil
+      (lambda (c)
+        (loop for line = (read-line c nil nil)
+              while line do (format c \"~a ~a~%\" (incf count) (length line)) (finish-output c))))))",
+    );
+    let mut command = eslvm(&["run", "--allow-net", &path]);
+    let mut child = process::start(&mut command);
+    let mut output = BufReader::new(child.stdout.take().expect("it is a pipe"));
+    let mut line = String::new();
+    output.read_line(&mut line).expect("the port is printed");
+    let port: u16 = line.trim().parse().expect("the port is printed");
+    let connect = || TcpStream::connect(("127.0.0.1", port)).expect("it listens");
+    // One sends half a line and goes, one sends no text, one nothing.
+    drop(connect().write_all(b"half"));
+    let mut garbage = connect();
+    garbage.write_all(b"\xff\xfe\n").expect("it can be sent");
+    let silent = connect();
+    let clients: Vec<TcpStream> = (0..100).map(|_| connect()).collect();
+    for client in &clients {
+        let mut client = client;
+        client.write_all(b"hello\n").expect("it can be sent");
+    }
+    for client in clients {
+        let mut answer = String::new();
+        BufReader::new(client).read_line(&mut answer).expect("it answers");
+        assert!(answer.ends_with(" 5\n"), "{answer}");
+    }
+    let mut answer = String::new();
+    BufReader::new(garbage).read_line(&mut answer).expect("it answers");
+    assert!(answer.ends_with(" 2\n"), "{answer}");
+    drop(silent);
+    child.kill().expect("it runs");
+    child.wait().expect("it ends");
+}
+
+#[test]
+fn a_peer_elsewhere_is_read_until_it_closes() {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("there is a port");
+    let port = listener.local_addr().expect("it has an address").port();
+    let peer = std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().expect("somebody connects");
+        // A character comes in two parts.
+        stream.write_all(b"a\xc3").expect("it can be sent");
+        let mut request = [0; 3];
+        stream.write_all(b"\xa4\nrest without an end").expect("it can be sent");
+        stream.read_exact(&mut request).expect("it is sent");
+        request
+    });
+    let text = format!(
+        "(require :sockets)
+(sockets:with-socket (c (sockets:connect \"127.0.0.1\" {port} :timeout 60))
+  (print (read-line c))
+  (princ \"yes\" c)
+  (print (multiple-value-list (read-line c)))
+  (print (list (read-line c nil 'end) (read-char c nil 'end) (listen c))))"
+    );
+    let address = format!("--allow-net=127.0.0.1:{port}");
+    check("sockets-peer", &text, &[&address], &["\"aä\"", "(\"rest without an end\" T)", "(END END NIL)"]);
+    assert_eq!(&peer.join().expect("the peer does not fail"), b"yes");
+}
+
+#[cfg(unix)]
+#[test]
+fn unix_sockets_are_paths() {
+    let text = "(require :sockets)
+(sockets:with-socket (l (sockets:listen-unix \"talk\"))
+  (spawn (sockets:with-socket (c (sockets:accept l)) (format c \"hello ~a~%\" (read-line c))))
+  (sockets:with-socket (c (sockets:connect-unix \"talk\"))
+    (write-line \"you\" c)
+    (print (read-line c))))
+(print (probe-file \"talk\"))
+(print (handler-case (sockets:listen-unix \"../talk\") (failure (f) (failure-arguments f))))";
+    let expected = ["\"hello you\"", "NIL", "(:READ \"../talk\" \"--allow-read=../talk\")"];
+    check("sockets-unix", text, &[], &expected);
+}
+
+#[test]
+fn datagrams_come_whole() {
+    let peer = UdpSocket::bind("127.0.0.1:0").expect("there is a port");
+    let port = peer.local_addr().expect("it has an address").port();
+    let answer = std::thread::spawn(move || {
+        let mut bytes = [0; 100];
+        let (count, address) = peer.recv_from(&mut bytes).expect("something comes");
+        peer.send_to(&[0, 255, count as u8], address).expect("it can be sent");
+    });
+    let text = format!(
+        "(require :sockets)
+(sockets:with-socket (s (sockets:udp-open \"127.0.0.1\"))
+  (sockets:udp-send s \"127.0.0.1\" {port} \"häl\")
+  (print (equalp (multiple-value-list (sockets:udp-receive s)) '(#(0 255 4) \"127.0.0.1\" {port})))
+  (sockets:udp-send s \"127.0.0.1\" (sockets:local-port s) #(1 2))
+  (print (sockets:udp-receive s))
+  (print (handler-case (with-timeout 0.05 (sockets:udp-receive s)) (failure (f) (failure-cause f)))))"
+    );
+    check("sockets-udp", &text, &["--allow-net"], &["T", "#(1 2)", ":TIMEOUT"]);
+    answer.join().expect("the peer does not fail");
+}

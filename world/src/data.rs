@@ -1,0 +1,115 @@
+//! Arguments and values of operations, as data of the machine.
+//!
+//! Bytes pass as strings of the characters 0 to 255, since data have no vectors of bytes.
+
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
+use esl_vm::host::Failure;
+
+/// Returns the text of a string.
+pub(crate) fn text_of(datum: &Datum) -> Option<&str> {
+    match datum.kind() {
+        DatumKind::String(text) => Some(text),
+        _ => None,
+    }
+}
+
+/// Returns the string of a text.
+pub(crate) fn text(text: &str) -> Datum {
+    Datum::string(text, Span::default())
+}
+
+/// Returns bytes as a string of the characters 0 to 255.
+pub(crate) fn text_of_bytes(bytes: &[u8]) -> Datum {
+    text(&bytes.iter().map(|&byte| char::from(byte)).collect::<String>())
+}
+
+/// Returns the bytes of such a string; other characters count as question marks.
+pub(crate) fn bytes_of(text: &str) -> Vec<u8> {
+    text.chars().map(|character| u8::try_from(u32::from(character)).unwrap_or(b'?')).collect()
+}
+
+/// Returns an integer as data.
+pub(crate) fn integer(value: impl Into<i64>) -> Datum {
+    Datum::integer(value.into(), Span::default())
+}
+
+/// Returns `T` or `NIL`.
+pub(crate) fn boolean(value: bool) -> Datum {
+    if value { Datum::symbol(Symbol::cl("T"), Span::default()) } else { nil() }
+}
+
+/// Returns `NIL`.
+pub(crate) fn nil() -> Datum {
+    Datum::nil(Span::default())
+}
+
+/// Returns the failure of a cause, a keyword's name, with a text.
+pub(crate) fn failure(cause: &str, reason: impl ToString) -> Failure {
+    Failure { cause: cause.into(), arguments: vec![text(&reason.to_string())] }
+}
+
+/// The arguments of a call, in the order of the lambda list.
+pub(crate) struct Arguments(pub(crate) Vec<Datum>);
+
+impl Arguments {
+    fn get(&self, index: usize, expected: &str) -> Result<&Datum, Failure> {
+        self.0.get(index).ok_or_else(|| wrong(&nil(), expected))
+    }
+
+    /// Returns an argument that is a string.
+    pub(crate) fn text(&self, index: usize) -> Result<String, Failure> {
+        let datum = self.get(index, "STRING")?;
+        text_of(datum).map(str::to_owned).ok_or_else(|| wrong(datum, "STRING"))
+    }
+
+    /// Returns an argument that is a string or `NIL`.
+    pub(crate) fn text_if_any(&self, index: usize) -> Result<Option<String>, Failure> {
+        if self.is_true(index) { self.text(index).map(Some) } else { Ok(None) }
+    }
+
+    /// Returns an argument that is an integer.
+    pub(crate) fn integer(&self, index: usize) -> Result<i64, Failure> {
+        let datum = self.get(index, "INTEGER")?;
+        match datum.kind() {
+            DatumKind::Integer(value) => i64::try_from(value).map_err(|_| wrong(datum, "FIXNUM")),
+            _ => Err(wrong(datum, "INTEGER")),
+        }
+    }
+
+    /// Returns an argument that is a list of strings.
+    pub(crate) fn texts(&self, index: usize) -> Result<Vec<String>, Failure> {
+        let datum = self.get(index, "LIST")?;
+        let items = datum.as_list().ok_or_else(|| wrong(datum, "LIST"))?;
+        items
+            .into_iter()
+            .map(|item| text_of(item).map(str::to_owned).ok_or_else(|| wrong(item, "STRING")))
+            .collect()
+    }
+
+    /// Returns an argument that is an association list of strings.
+    pub(crate) fn pairs(&self, index: usize) -> Result<Vec<(String, String)>, Failure> {
+        let datum = self.get(index, "LIST")?;
+        let items = datum.as_list().ok_or_else(|| wrong(datum, "LIST"))?;
+        items
+            .into_iter()
+            .map(|item| {
+                let (name, value) = item.as_cons().ok_or_else(|| wrong(item, "CONS"))?;
+                match (text_of(name), text_of(value)) {
+                    (Some(name), Some(value)) => Ok((name.to_owned(), value.to_owned())),
+                    _ => Err(wrong(item, "CONS")),
+                }
+            })
+            .collect()
+    }
+
+    /// Returns whether an argument is anything but `NIL`.
+    pub(crate) fn is_true(&self, index: usize) -> bool {
+        self.0.get(index).is_some_and(|datum| !datum.is_nil())
+    }
+}
+
+fn wrong(datum: &Datum, expected: &str) -> Failure {
+    Failure { cause: "TYPE-ERROR".into(), arguments: vec![datum.clone(), text(expected)] }
+}

@@ -1,0 +1,46 @@
+//! What ESL programs can do without Rust: modules over the operating system.
+//!
+//! Whatever the system may delay is an operation, done on one event loop in a thread of its own:
+//! it makes only the task wait that has asked for it. The operations are the small part of a
+//! module that is in Rust; the rest of it is in ESL, in `modules/`.
+//!
+//! Guarantees: each operation names the right that it needs, which is asked for before it begins. What a
+//! peer, a child or the system does wrong is a failure at the call.
+//!
+//! ```
+//! use esl_vm::host::RealHost;
+//! use esl_vm::vm::{Config, Vm};
+//!
+//! let mut machine = Vm::new(Config::default(), Box::new(RealHost::new(Vec::new())))?;
+//! esl_world::install_modules(&mut machine);
+//! esl_world::install_operations(&mut machine);
+//! assert!(esl_world::module("json").is_some_and(|text| text.contains("(defpackage :json")));
+//! # Ok::<(), esl_vm::heap::AllocError>(())
+//! ```
+#![forbid(unsafe_code)]
+
+mod data;
+mod event_loop;
+mod modules;
+mod operation;
+mod os;
+mod process;
+mod socket;
+
+use esl_vm::vm::Vm;
+
+pub use modules::module;
+
+/// Gives a machine the modules, for `require`, and what they need of the process itself.
+pub fn install_modules(machine: &mut Vm) {
+    modules::install(machine);
+    os::install(machine);
+}
+
+/// Gives a machine the operations of the modules, which reach the real world. Without them calls fail with
+/// `:NOT-IN-THIS-WORLD`.
+pub fn install_operations(machine: &mut Vm) {
+    os::install_clock(machine);
+    process::install(machine);
+    socket::install(machine);
+}

@@ -1,0 +1,473 @@
+//! Sockets: connections over TCP and Unix sockets, listeners, and UDP.
+//!
+//! What has arrived is kept here until the program takes it, which it does at once, without waiting: an
+//! operation only waits until something is there. So nothing is lost when a call is left at the moment at
+//! which its data come.
+//!
+//! A connection reads ahead at most [`CHUNK`] bytes; a peer that sends more waits.
+
+use std::collections::{HashMap, VecDeque};
+use std::io::{Error, ErrorKind};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use esl_bytecode::datum::Datum;
+use esl_bytecode::span::Span;
+use esl_vm::embed::{HostFunction, Need};
+use esl_vm::host::{Failure, Right};
+use esl_vm::vm::Vm;
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream, UdpSocket};
+use tokio::sync::watch;
+
+use crate::data::{Arguments, bytes_of, failure, integer, nil, text, text_of_bytes};
+use crate::operation::{Answer, define};
+
+/// Most bytes that are read at a time.
+const CHUNK: usize = 1 << 16;
+
+type Reader = Box<dyn AsyncRead + Send + Unpin>;
+type Writer = Box<dyn AsyncWrite + Send + Unpin>;
+
+/// What a connection has read and the program has not taken.
+#[derive(Default)]
+struct Arrived {
+    bytes: Vec<u8>,
+    is_ended: bool,
+}
+
+/// A connection.
+struct Connection {
+    reader: tokio::sync::Mutex<Reader>,
+    writer: tokio::sync::Mutex<Writer>,
+    arrived: Mutex<Arrived>,
+}
+
+/// A socket that waits for connections.
+enum Listener {
+    Tcp(TcpListener),
+    #[cfg(unix)]
+    Unix(tokio::net::UnixListener, std::path::PathBuf),
+}
+
+#[cfg(unix)]
+impl Drop for Listener {
+    fn drop(&mut self) {
+        if let Listener::Unix(_, path) = self {
+            // The file may be gone.
+            drop(std::fs::remove_file(path));
+        }
+    }
+}
+
+/// A datagram, and the address of its sender.
+type Datagram = (Vec<u8>, String);
+
+#[derive(Clone)]
+enum Kind {
+    /// Not connected yet.
+    New,
+    Connection(Arc<Connection>),
+    /// With the numbers of connections that the program has not taken.
+    Listener(Arc<Listener>, Arc<Mutex<VecDeque<i64>>>),
+    /// With the datagrams that the program has not taken.
+    Udp(Arc<UdpSocket>, Arc<Mutex<VecDeque<Datagram>>>),
+}
+
+#[derive(Clone)]
+struct Socket {
+    kind: Kind,
+    port: i64,
+    peer: String,
+    /// Changes when the socket is closed.
+    closing: watch::Receiver<bool>,
+    closer: Arc<watch::Sender<bool>>,
+}
+
+/// The sockets of a machine, by number.
+#[derive(Clone, Default)]
+struct Sockets(Arc<Mutex<(i64, HashMap<i64, Socket>)>>);
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // What it guards is whole at every moment, so a panic elsewhere does not corrupt it.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn closed() -> Failure {
+    failure("SOCKET-CLOSED", "the socket is closed")
+}
+
+/// Returns the failure for an error of the system.
+fn socket_failure(error: &Error) -> Failure {
+    let cause = match error.kind() {
+        ErrorKind::ConnectionRefused => "CONNECTION-REFUSED",
+        ErrorKind::ConnectionReset | ErrorKind::ConnectionAborted | ErrorKind::BrokenPipe => {
+            "CONNECTION-LOST"
+        }
+        ErrorKind::AddrInUse => "ADDRESS-IN-USE",
+        ErrorKind::TimedOut => "TIMEOUT",
+        _ => "SOCKET-ERROR",
+    };
+    failure(cause, error)
+}
+
+impl Sockets {
+    fn add(&self, kind: Kind, port: i64, peer: String) -> i64 {
+        let (closer, closing) = watch::channel(false);
+        let mut sockets = lock(&self.0);
+        sockets.0 += 1;
+        let number = sockets.0;
+        sockets.1.insert(number, Socket { kind, port, peer, closing, closer: Arc::new(closer) });
+        number
+    }
+
+    fn get(&self, number: i64) -> Result<Socket, Failure> {
+        lock(&self.0).1.get(&number).cloned().ok_or_else(closed)
+    }
+
+    /// Says what a new socket is. It may have been closed meanwhile.
+    fn set(&self, number: i64, kind: Kind, port: i64, peer: String) -> Answer {
+        let mut sockets = lock(&self.0);
+        let socket = sockets.1.get_mut(&number).ok_or_else(closed)?;
+        (socket.kind, socket.port, socket.peer) = (kind, port, peer);
+        Ok(vec![integer(number)])
+    }
+
+    fn close(&self, number: i64) {
+        let socket = lock(&self.0).1.remove(&number);
+        if let Some(socket) = socket {
+            // Nobody may wait for it.
+            _ = socket.closer.send(true);
+        }
+    }
+}
+
+impl Socket {
+    fn connection(&self) -> Result<Arc<Connection>, Failure> {
+        match &self.kind {
+            Kind::Connection(connection) => Ok(connection.clone()),
+            _ => Err(failure("SOCKET-ERROR", "it is not connected")),
+        }
+    }
+
+    fn datagrams(&self) -> Result<(Arc<UdpSocket>, Arc<Mutex<VecDeque<Datagram>>>), Failure> {
+        match &self.kind {
+            Kind::Udp(socket, datagrams) => Ok((socket.clone(), datagrams.clone())),
+            _ => Err(failure("SOCKET-ERROR", "it is not a UDP socket")),
+        }
+    }
+
+    /// Returns what a future comes to, unless the socket is closed before.
+    async fn unless_closed<T>(&self, future: impl Future<Output = Result<T, Failure>>) -> Result<T, Failure> {
+        let mut closing = self.closing.clone();
+        tokio::select! {
+            biased;
+            _ = closing.wait_for(|&is_closed| is_closed) => Err(closed()),
+            result = future => result,
+        }
+    }
+}
+
+impl Connection {
+    fn new(
+        reader: impl AsyncRead + Send + Unpin + 'static,
+        writer: impl AsyncWrite + Send + Unpin + 'static,
+    ) -> Kind {
+        Kind::Connection(Arc::new(Connection {
+            reader: tokio::sync::Mutex::new(Box::new(reader)),
+            writer: tokio::sync::Mutex::new(Box::new(writer)),
+            arrived: Mutex::default(),
+        }))
+    }
+
+    fn of_tcp(stream: TcpStream) -> (Kind, i64, String) {
+        // Requests and answers are small, and are not to wait for more; without it they only take longer.
+        drop(stream.set_nodelay(true));
+        let port = stream.local_addr().map_or(0, |address| address.port().into());
+        let peer = stream.peer_addr().map_or(String::new(), |address| address.to_string());
+        let (reader, writer) = stream.into_split();
+        (Connection::new(reader, writer), port, peer)
+    }
+
+    /// Waits until something has arrived, or the connection has ended.
+    async fn wait(&self) -> Result<(), Failure> {
+        let mut reader = self.reader.lock().await;
+        let is_there = {
+            let arrived = lock(&self.arrived);
+            arrived.is_ended || !arrived.bytes.is_empty()
+        };
+        if is_there {
+            return Ok(());
+        }
+        let mut bytes = Vec::with_capacity(CHUNK);
+        let count = reader.read_buf(&mut bytes).await.map_err(|error| socket_failure(&error))?;
+        let mut arrived = lock(&self.arrived);
+        arrived.is_ended = count == 0;
+        arrived.bytes.append(&mut bytes);
+        Ok(())
+    }
+
+    /// Takes what has arrived: whole characters, or bytes. `NIL` at the end.
+    fn take(&self, as_text: bool) -> Datum {
+        let mut arrived = lock(&self.arrived);
+        if arrived.bytes.is_empty() {
+            return if arrived.is_ended { nil() } else { text("") };
+        }
+        let is_ended = arrived.is_ended;
+        let bytes = std::mem::take(&mut arrived.bytes);
+        if !as_text {
+            return text_of_bytes(&bytes);
+        }
+        let whole = if is_ended { bytes.len() } else { whole_characters(&bytes) };
+        arrived.bytes = bytes[whole..].to_vec();
+        text(&String::from_utf8_lossy(&bytes[..whole]))
+    }
+}
+
+/// Returns the length of a text without the character at its end of which a part is missing.
+fn whole_characters(bytes: &[u8]) -> usize {
+    for back in 1..=bytes.len().min(3) {
+        let byte = bytes[bytes.len() - back];
+        if byte & 0xC0 != 0x80 {
+            let length = match byte {
+                0xC0..=0xDF => 2,
+                0xE0..=0xEF => 3,
+                0xF0..=0xF7 => 4,
+                _ => 1,
+            };
+            return if length > back { bytes.len() - back } else { bytes.len() };
+        }
+    }
+    bytes.len()
+}
+
+/// Gives a machine the operations of `:sockets`.
+pub(crate) fn install(machine: &mut Vm) {
+    let sockets = Sockets::default();
+    define_immediate(machine, &sockets);
+    let net = [Need { right: Right::Net, argument: 1 }];
+    let path = [Need { right: Right::Read, argument: 1 }, Need { right: Right::Write, argument: 1 }];
+    let mut operation = {
+        let sockets = sockets.clone();
+        move |name: &str, needs: &[Need], function: Function| {
+            let sockets = sockets.clone();
+            define(machine, name, needs, move |arguments| function(arguments, sockets.clone()));
+        }
+    };
+    operation("%SOCKET-CONNECT", &net, |arguments, sockets| Box::pin(connect(arguments, sockets)));
+    operation("%SOCKET-LISTEN", &net, |arguments, sockets| Box::pin(listen(arguments, sockets)));
+    #[cfg(unix)]
+    {
+        operation("%SOCKET-CONNECT-UNIX", &path, |arguments, sockets| {
+            Box::pin(connect_unix(arguments, sockets))
+        });
+        operation("%SOCKET-LISTEN-UNIX", &path, |arguments, sockets| {
+            Box::pin(listen_unix(arguments, sockets))
+        });
+    }
+    operation("%SOCKET-ACCEPT", &[], |arguments, sockets| Box::pin(accept(arguments, sockets)));
+    operation("%SOCKET-AWAIT", &[], |arguments, sockets| Box::pin(wait(arguments, sockets)));
+    operation("%SOCKET-WRITE", &[], |arguments, sockets| Box::pin(write(arguments, sockets)));
+    operation("%UDP-OPEN", &net, |arguments, sockets| Box::pin(open_udp(arguments, sockets)));
+    operation("%UDP-SEND", &net, |arguments, sockets| Box::pin(send(arguments, sockets)));
+    operation("%UDP-AWAIT", &[], |arguments, sockets| Box::pin(wait_for_datagram(arguments, sockets)));
+}
+
+type Function = fn(Arguments, Sockets) -> std::pin::Pin<Box<dyn Future<Output = Answer> + Send>>;
+
+/// Gives a machine the functions that do not wait.
+fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
+    let mut define = |name: &str, function: fn(Arguments, &Sockets) -> Result<Datum, Failure>| {
+        let sockets = sockets.clone();
+        let function = move |arguments: &[Datum]| function(Arguments(arguments.to_vec()), &sockets);
+        machine.add_host_function(name, HostFunction::AtOnce(Box::new(function)));
+    };
+    define("%SOCKET-NEW", |_, sockets| Ok(integer(sockets.add(Kind::New, 0, String::new()))));
+    define("%SOCKET-CLOSE", |arguments, sockets| {
+        sockets.close(arguments.integer(0)?);
+        Ok(nil())
+    });
+    define("%SOCKET-PORT", |arguments, sockets| Ok(integer(sockets.get(arguments.integer(0)?)?.port)));
+    define("%SOCKET-PEER", |arguments, sockets| Ok(text(&sockets.get(arguments.integer(0)?)?.peer)));
+    define("%SOCKET-TAKE", |arguments, sockets| {
+        let connection = sockets.get(arguments.integer(0)?)?.connection()?;
+        Ok(connection.take(arguments.is_true(1)))
+    });
+    define("%SOCKET-ACCEPTED", |arguments, sockets| match sockets.get(arguments.integer(0)?)?.kind {
+        Kind::Listener(_, accepted) => Ok(lock(&accepted).pop_front().map_or_else(nil, integer)),
+        _ => Err(failure("SOCKET-ERROR", "it is no listener")),
+    });
+    define("%BYTES-OF-TEXT", |arguments, _| Ok(text_of_bytes(arguments.text(0)?.as_bytes())));
+    define("%TEXT-OF-BYTES", |arguments, _| {
+        let bytes = bytes_of(&arguments.text(0)?);
+        let used = if arguments.is_true(1) { bytes.len() } else { whole_characters(&bytes) };
+        let decoded = text(&String::from_utf8_lossy(&bytes[..used]));
+        Ok(Datum::list([decoded, integer(used as i64)], Span::default()))
+    });
+    define("%UDP-TAKE", |arguments, sockets| {
+        let (_, datagrams) = sockets.get(arguments.integer(0)?)?.datagrams()?;
+        let next = lock(&datagrams).pop_front();
+        Ok(next.map_or_else(nil, |(bytes, address)| {
+            Datum::list([text_of_bytes(&bytes), text(&address)], Span::default())
+        }))
+    });
+}
+
+/// `%SOCKET-CONNECT`: number, address, milliseconds.
+async fn connect(arguments: Arguments, sockets: Sockets) -> Answer {
+    let (number, address) = (arguments.integer(0)?, arguments.text(1)?);
+    let connect = async {
+        let addresses =
+            tokio::net::lookup_host(&address).await.map_err(|error| failure("HOST-NOT-FOUND", error))?;
+        let mut last = failure("HOST-NOT-FOUND", format!("`{address}` has no address"));
+        for address in addresses {
+            match TcpStream::connect(address).await {
+                Ok(stream) => return Ok(stream),
+                Err(error) => last = socket_failure(&error),
+            }
+        }
+        Err(last)
+    };
+    let stream = if arguments.is_true(2) {
+        let time = Duration::from_millis(u64::try_from(arguments.integer(2)?).unwrap_or(0));
+        let late = |_| Err(failure("TIMEOUT", format!("`{address}` does not answer")));
+        tokio::time::timeout(time, connect).await.unwrap_or_else(late)?
+    } else {
+        connect.await?
+    };
+    let (kind, port, peer) = Connection::of_tcp(stream);
+    sockets.set(number, kind, port, peer)
+}
+
+/// `%SOCKET-LISTEN`: number, address.
+async fn listen(arguments: Arguments, sockets: Sockets) -> Answer {
+    let listener = TcpListener::bind(arguments.text(1)?).await.map_err(|error| bind_failure(&error))?;
+    let port = listener.local_addr().map_or(0, |address| address.port().into());
+    let kind = Kind::Listener(Arc::new(Listener::Tcp(listener)), Arc::default());
+    sockets.set(arguments.integer(0)?, kind, port, String::new())
+}
+
+/// Returns the failure for an address that cannot be used here.
+fn bind_failure(error: &Error) -> Failure {
+    match error.kind() {
+        // What the resolver says has no kind of its own.
+        ErrorKind::Other | ErrorKind::InvalidInput => failure("HOST-NOT-FOUND", error),
+        _ => socket_failure(error),
+    }
+}
+
+#[cfg(unix)]
+async fn connect_unix(arguments: Arguments, sockets: Sockets) -> Answer {
+    let (number, path) = (arguments.integer(0)?, arguments.text(1)?);
+    let stream = tokio::net::UnixStream::connect(&path).await.map_err(|error| socket_failure(&error))?;
+    let (reader, writer) = stream.into_split();
+    sockets.set(number, Connection::new(reader, writer), 0, path)
+}
+
+#[cfg(unix)]
+async fn listen_unix(arguments: Arguments, sockets: Sockets) -> Answer {
+    let (number, path) = (arguments.integer(0)?, arguments.text(1)?);
+    let listener = tokio::net::UnixListener::bind(&path).map_err(|error| socket_failure(&error))?;
+    let kind = Kind::Listener(Arc::new(Listener::Unix(listener, path.into())), Arc::default());
+    sockets.set(number, kind, 0, String::new())
+}
+
+/// `%SOCKET-ACCEPT`: waits until a connection is there to be taken.
+async fn accept(arguments: Arguments, sockets: Sockets) -> Answer {
+    let socket = sockets.get(arguments.integer(0)?)?;
+    let Kind::Listener(listener, accepted) = &socket.kind else {
+        return Err(failure("SOCKET-ERROR", "it is no listener"));
+    };
+    if !lock(accepted).is_empty() {
+        return Ok(Vec::new());
+    }
+    let next = async {
+        match &**listener {
+            Listener::Tcp(listener) => {
+                let (stream, _) = listener.accept().await.map_err(|error| socket_failure(&error))?;
+                Ok(Connection::of_tcp(stream))
+            }
+            #[cfg(unix)]
+            Listener::Unix(listener, _) => {
+                let (stream, _) = listener.accept().await.map_err(|error| socket_failure(&error))?;
+                let (reader, writer) = stream.into_split();
+                Ok((Connection::new(reader, writer), 0, String::new()))
+            }
+        }
+    };
+    let (kind, port, peer) = socket.unless_closed(next).await?;
+    let number = sockets.add(kind, port, peer);
+    lock(accepted).push_back(number);
+    Ok(Vec::new())
+}
+
+/// `%SOCKET-AWAIT`: waits until there is something to be taken.
+async fn wait(arguments: Arguments, sockets: Sockets) -> Answer {
+    let socket = sockets.get(arguments.integer(0)?)?;
+    let connection = socket.connection()?;
+    socket.unless_closed(connection.wait()).await?;
+    Ok(Vec::new())
+}
+
+/// `%SOCKET-WRITE`: number, text, whether its characters are bytes.
+async fn write(arguments: Arguments, sockets: Sockets) -> Answer {
+    let socket = sockets.get(arguments.integer(0)?)?;
+    let connection = socket.connection()?;
+    let text = arguments.text(1)?;
+    let bytes = if arguments.is_true(2) { bytes_of(&text) } else { text.into_bytes() };
+    let write = async {
+        let mut writer = connection.writer.lock().await;
+        let written = async {
+            writer.write_all(&bytes).await?;
+            writer.flush().await
+        };
+        written.await.map_err(|error| socket_failure(&error))
+    };
+    socket.unless_closed(write).await?;
+    Ok(Vec::new())
+}
+
+/// `%UDP-OPEN`: number, address.
+async fn open_udp(arguments: Arguments, sockets: Sockets) -> Answer {
+    let socket = UdpSocket::bind(arguments.text(1)?).await.map_err(|error| bind_failure(&error))?;
+    let port = socket.local_addr().map_or(0, |address| address.port().into());
+    sockets.set(arguments.integer(0)?, Kind::Udp(Arc::new(socket), Arc::default()), port, String::new())
+}
+
+/// `%UDP-SEND`: number, address, text, whether its characters are bytes.
+async fn send(arguments: Arguments, sockets: Sockets) -> Answer {
+    let (socket, _) = sockets.get(arguments.integer(0)?)?.datagrams()?;
+    let (address, text) = (arguments.text(1)?, arguments.text(2)?);
+    let bytes = if arguments.is_true(3) { bytes_of(&text) } else { text.into_bytes() };
+    socket.send_to(&bytes, address).await.map_err(|error| bind_failure(&error))?;
+    Ok(Vec::new())
+}
+
+/// `%UDP-AWAIT`: waits until there is a datagram to be taken.
+async fn wait_for_datagram(arguments: Arguments, sockets: Sockets) -> Answer {
+    let socket = sockets.get(arguments.integer(0)?)?;
+    let (udp, datagrams) = socket.datagrams()?;
+    if !lock(&datagrams).is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut bytes = vec![0; CHUNK];
+    let receive = async { udp.recv_from(&mut bytes).await.map_err(|error| socket_failure(&error)) };
+    let (count, address) = socket.unless_closed(receive).await?;
+    bytes.truncate(count);
+    lock(&datagrams).push_back((bytes, address.to_string()));
+    Ok(Vec::new())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_character_that_is_cut_waits_for_its_rest() {
+        let bytes = "aä€😀".as_bytes();
+        let expected = [0, 1, 1, 3, 3, 3, 6, 6, 6, 6, 10];
+        let found: Vec<usize> = (0..=bytes.len()).map(|end| whole_characters(&bytes[..end])).collect();
+        assert_eq!(found, expected);
+        assert_eq!(whole_characters(&[0x80; 5]), 5, "what is no text does not wait");
+    }
+}
