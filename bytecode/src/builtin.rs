@@ -1214,6 +1214,14 @@ macro_rules! for_each_builtin {
             /// Whether there is a file of this name, which is to be read; with `T`, as a module, with anything
             /// else, to be written.
             FileExistsP = stream::file_exists_p, internal "%FILE-EXISTS-P" ("path &optional use");
+            /// The names of what is in a folder; those of folders end in `/`.
+            FolderNames = file::folder_names, internal "%FOLDER-NAMES" ("path");
+            /// Gives a file another name.
+            RenameFile = file::rename_file, internal "%RENAME-FILE" ("path new-path");
+            /// The universal time at which a file was written last.
+            FileWriteDate = file::file_write_date, internal "%FILE-WRITE-DATE" ("path");
+            /// Makes a folder, and those around it; whether it was not there.
+            MakeFolders = file::make_folders, internal "%MAKE-FOLDERS" ("path");
             /// Removes a file.
             DeleteFile = stream::delete_file, internal "%DELETE-FILE" ("path");
             /// The bytes of a file.

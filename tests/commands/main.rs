@@ -5,9 +5,9 @@ mod bad_input;
 mod deadlock;
 mod examples;
 mod folder;
+mod http;
 #[cfg(target_os = "linux")]
 mod memory;
-mod http;
 mod modules;
 mod real_time;
 mod rights;

@@ -63,6 +63,9 @@ impl Drop for Listener {
 /// A datagram, and the address of its sender.
 type Datagram = (Vec<u8>, String);
 
+/// The datagrams that the program has not taken.
+type Datagrams = Arc<Mutex<VecDeque<Datagram>>>;
+
 #[derive(Clone)]
 enum Kind {
     /// Not connected yet.
@@ -70,8 +73,7 @@ enum Kind {
     Connection(Arc<Connection>),
     /// With the numbers of connections that the program has not taken.
     Listener(Arc<Listener>, Arc<Mutex<VecDeque<i64>>>),
-    /// With the datagrams that the program has not taken.
-    Udp(Arc<UdpSocket>, Arc<Mutex<VecDeque<Datagram>>>),
+    Udp(Arc<UdpSocket>, Datagrams),
 }
 
 #[derive(Clone)]
@@ -150,7 +152,7 @@ impl Socket {
         }
     }
 
-    fn datagrams(&self) -> Result<(Arc<UdpSocket>, Arc<Mutex<VecDeque<Datagram>>>), Failure> {
+    fn datagrams(&self) -> Result<(Arc<UdpSocket>, Datagrams), Failure> {
         match &self.kind {
             Kind::Udp(socket, datagrams) => Ok((socket.clone(), datagrams.clone())),
             _ => Err(failure("SOCKET-ERROR", "it is not a UDP socket")),
@@ -169,7 +171,7 @@ impl Socket {
 }
 
 impl Connection {
-    fn new(
+    fn over(
         reader: impl AsyncRead + Send + Unpin + 'static,
         writer: impl AsyncWrite + Send + Unpin + 'static,
     ) -> Kind {
@@ -186,7 +188,7 @@ impl Connection {
         let port = stream.local_addr().map_or(0, |address| address.port().into());
         let peer = stream.peer_addr().map_or(String::new(), |address| address.to_string());
         let (reader, writer) = stream.into_split();
-        (Connection::new(reader, writer), port, peer)
+        (Connection::over(reader, writer), port, peer)
     }
 
     /// Waits until something has arrived, or the connection has ended.
@@ -361,7 +363,7 @@ async fn connect_unix(arguments: Arguments, sockets: Sockets) -> Answer {
     let (number, path) = (arguments.integer(0)?, arguments.text(1)?);
     let stream = tokio::net::UnixStream::connect(&path).await.map_err(|error| socket_failure(&error))?;
     let (reader, writer) = stream.into_split();
-    sockets.set(number, Connection::new(reader, writer), 0, path)
+    sockets.set(number, Connection::over(reader, writer), 0, path)
 }
 
 #[cfg(unix)]
@@ -391,7 +393,7 @@ async fn accept(arguments: Arguments, sockets: Sockets) -> Answer {
             Listener::Unix(listener, _) => {
                 let (stream, _) = listener.accept().await.map_err(|error| socket_failure(&error))?;
                 let (reader, writer) = stream.into_split();
-                Ok((Connection::new(reader, writer), 0, String::new()))
+                Ok((Connection::over(reader, writer), 0, String::new()))
             }
         }
     };

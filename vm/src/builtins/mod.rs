@@ -64,6 +64,7 @@ pub(crate) mod eval;
 pub(crate) mod event;
 mod expect;
 mod failure;
+mod file;
 mod float;
 mod input;
 mod instance;

@@ -10,7 +10,7 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 
 /// Seconds from the beginning of 1900 to that of 1970.
-const UNIX_EPOCH: i64 = 2_208_988_800;
+pub(super) const UNIX_EPOCH: i64 = 2_208_988_800;
 
 pub(super) fn command_line_arguments(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     let mut strings = Vec::new();

@@ -4,7 +4,8 @@
 use esl_bytecode::datum::Datum;
 
 use super::{
-    Awaited, Failure, Host, HostError, Inbox, Incoming, Input, Output, Permit, Right, Rights, Wake, WriteMode,
+    Awaited, Failure, FileAnswer, FileRequest, Host, HostError, Inbox, Incoming, Input, Output, Permit,
+    Right, Rights, Wake, WriteMode,
 };
 use crate::canary::Canary;
 
@@ -28,6 +29,7 @@ enum Question {
     Call,
     Begin,
     Permit,
+    RequestOfFiles,
 }
 
 /// A machine's host, and the canary of the questions that it was asked.
@@ -128,6 +130,11 @@ impl Host for Asked {
     fn is_interactive(&mut self) -> bool {
         self.note(Question::IsInteractive);
         self.host.is_interactive()
+    }
+
+    fn request_of_files(&mut self, request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
+        self.note_bytes(Question::RequestOfFiles, format!("{request:?}").as_bytes());
+        self.host.request_of_files(request)
     }
 
     fn permit(&mut self, right: Right, object: &str, narrowed: &[Rights]) -> Permit {

@@ -74,6 +74,30 @@ pub enum WriteMode {
     Create,
 }
 
+/// Something that is done with files beside reading and writing them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FileRequest<'a> {
+    /// The names of what is in a folder; those of folders end in `/`.
+    List(&'a str),
+    /// Gives a file another name, in place of what has it.
+    Rename(&'a str, &'a str),
+    /// The time at which a file was written last.
+    Date(&'a str),
+    /// Makes a folder, and those around it.
+    MakeFolders(&'a str),
+}
+
+/// What comes of a [`FileRequest`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FileAnswer {
+    /// Names, in order.
+    Names(Vec<String>),
+    /// Seconds since 1970.
+    Date(i64),
+    /// It is done; whether it changed anything.
+    Done(bool),
+}
+
 /// Time of day at which virtual time begins: the beginning of the year 2000, in nanoseconds since 1970, UTC.
 pub const VIRTUAL_BEGINNING: i64 = 946_684_800_000_000_000;
 
@@ -205,6 +229,12 @@ pub trait Host {
     /// # Errors
     /// [`HostError`].
     fn delete_file(&mut self, path: &str) -> Result<(), HostError>;
+
+    /// Does something with files.
+    ///
+    /// # Errors
+    /// [`HostError`].
+    fn request_of_files(&mut self, request: FileRequest<'_>) -> Result<FileAnswer, HostError>;
 
     /// Has a function of the embedder's called, and returns its result.
     ///

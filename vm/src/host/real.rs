@@ -11,8 +11,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::rights::{permit, resolve};
 use super::{
-    Awaited, Host, HostError, Inbox, Incoming, Input, Output, Permit, Right, Rights, VIRTUAL_BEGINNING, Wake,
-    WriteMode,
+    Awaited, FileAnswer, FileRequest, Host, HostError, Inbox, Incoming, Input, Output, Permit, Right, Rights,
+    VIRTUAL_BEGINNING, Wake, WriteMode,
 };
 
 /// Receives the bytes written by a program.
@@ -133,6 +133,22 @@ fn error_of(error: &std::io::Error) -> HostError {
         ErrorKind::AlreadyExists => HostError::Exists,
         _ => HostError::Other(error.to_string()),
     }
+}
+
+/// Returns the names of what is in a folder, in order; those of folders end in `/`.
+fn names_in(folder: &str) -> std::io::Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        let mut name = entry.file_name().to_string_lossy().into_owned();
+        // A link counts as what it leads to.
+        if entry.path().is_dir() {
+            name.push('/');
+        }
+        names.push(name);
+    }
+    names.sort();
+    Ok(names)
 }
 
 fn nanoseconds(duration: Duration) -> u64 {
@@ -262,6 +278,25 @@ impl Host for RealHost {
 
     fn delete_file(&mut self, path: &str) -> Result<(), HostError> {
         std::fs::remove_file(path).map_err(|error| error_of(&error))
+    }
+
+    fn request_of_files(&mut self, request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
+        let answer = match request {
+            FileRequest::List(folder) => names_in(folder).map(FileAnswer::Names),
+            FileRequest::Rename(from, to) => std::fs::rename(from, to).map(|()| FileAnswer::Done(true)),
+            FileRequest::Date(path) => {
+                std::fs::metadata(path).and_then(|metadata| metadata.modified()).map(|time| {
+                    let seconds = |duration: Duration| i64::try_from(duration.as_secs()).unwrap_or(i64::MAX);
+                    let since = time.duration_since(UNIX_EPOCH);
+                    FileAnswer::Date(since.map_or_else(|before| -seconds(before.duration()), seconds))
+                })
+            }
+            FileRequest::MakeFolders(path) => {
+                let is_there = std::path::Path::new(path).is_dir();
+                std::fs::create_dir_all(path).map(|()| FileAnswer::Done(!is_there))
+            }
+        };
+        answer.map_err(|error| error_of(&error))
     }
 
     fn inbox(&self) -> Inbox {

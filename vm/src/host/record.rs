@@ -15,8 +15,8 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 
 use super::{
-    Awaited, Captured, Failure, Host, HostError, Inbox, Incoming, Input, Output, Permit, Right, Rights, Wake,
-    WriteMode,
+    Awaited, Captured, Failure, FileAnswer, FileRequest, Host, HostError, Inbox, Incoming, Input, Output,
+    Permit, Right, Rights, Wake, WriteMode,
 };
 
 /// Defines [`Record`] and, for each kind of answer, how it is recorded and replayed.
@@ -74,6 +74,8 @@ define_records! {
     Read(Input);
     /// Whether a person watches standard output.
     Interactive(bool);
+    /// What came of a request of files.
+    Filed(Result<FileAnswer, HostError>);
     /// Whether a right is granted.
     Permitted(Permit);
     /// Contents of a file.
@@ -182,6 +184,11 @@ impl<H: Host> Host for RecordingHost<H> {
 
     fn is_interactive(&mut self) -> bool {
         let answer = Interactive(self.host.is_interactive());
+        self.note(answer).0
+    }
+
+    fn request_of_files(&mut self, request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
+        let answer = Filed(self.host.request_of_files(request));
         self.note(answer).0
     }
 
@@ -349,6 +356,10 @@ impl Host for ReplayHost {
 
     fn is_interactive(&mut self) -> bool {
         self.next::<Interactive>().is_some_and(|answer| answer.0)
+    }
+
+    fn request_of_files(&mut self, _request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
+        self.next::<Filed>().map_or(Err(HostError::Refused), |answer| answer.0)
     }
 
     fn permit(&mut self, _right: Right, _object: &str, _narrowed: &[Rights]) -> Permit {

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::rights::{permit, resolve_as_text};
 use super::{
-    Awaited, Host, HostError, Inbox, Incoming, Input, Output, Permit, Right, Rights, VIRTUAL_BEGINNING, Wake,
-    WriteMode,
+    Awaited, FileAnswer, FileRequest, Host, HostError, Inbox, Incoming, Input, Output, Permit, Right, Rights,
+    VIRTUAL_BEGINNING, Wake, WriteMode,
 };
 
 /// The output of a program and its files, shared between a [`VirtualHost`] and its observers.
@@ -257,6 +257,37 @@ impl Host for VirtualHost {
 
     fn delete_file(&mut self, path: &str) -> Result<(), HostError> {
         self.captured.contents().files.remove(path).map(|_| ()).ok_or(HostError::NotFound)
+    }
+
+    /// Folders are there as far as files are in them. Files have been written now.
+    fn request_of_files(&mut self, request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
+        let now = self.wall_clock();
+        let mut contents = self.captured.contents();
+        match request {
+            FileRequest::List(folder) => {
+                let prefix = if folder.is_empty() { String::new() } else { format!("{folder}/") };
+                let below = contents.files.keys().filter_map(|path| path.strip_prefix(&prefix));
+                let mut names: Vec<String> = below
+                    .map(|rest| match rest.split_once('/') {
+                        Some((folder, _)) => format!("{folder}/"),
+                        None => rest.to_owned(),
+                    })
+                    .collect();
+                names.sort();
+                names.dedup();
+                Ok(FileAnswer::Names(names))
+            }
+            FileRequest::Rename(from, to) => {
+                let file = contents.files.remove(from).ok_or(HostError::NotFound)?;
+                contents.files.insert(to.to_owned(), file);
+                Ok(FileAnswer::Done(true))
+            }
+            FileRequest::Date(path) if contents.files.contains_key(path) => {
+                Ok(FileAnswer::Date(now.div_euclid(1_000_000_000)))
+            }
+            FileRequest::Date(_) => Err(HostError::NotFound),
+            FileRequest::MakeFolders(_) => Ok(FileAnswer::Done(false)),
+        }
     }
 
     fn inbox(&self) -> Inbox {
