@@ -296,17 +296,17 @@ macro_rules! for_each_builtin {
             /// `integer` shifted left by `count` bits, right if that is negative.
             Ash = integer::ash, cl "ASH" ("integer count") -> one;
             /// Whether all numbers are equal.
-            NumEqual = number::num_equal, cl "=" ("number &rest numbers") -> one;
+            NumEqual = number::num_equal, cl "=" ("number &rest numbers") -> one slowly "%SLOW-=";
             /// Whether no two numbers are equal.
             NumNotEqual = number::num_not_equal, cl "/=" ("number &rest numbers") -> one slowly "%SLOW-/=";
             /// Whether the numbers increase.
-            Less = number::less, cl "<" ("number &rest numbers") -> one;
+            Less = number::less, cl "<" ("number &rest numbers") -> one slowly "%SLOW-<";
             /// Whether the numbers never decrease.
-            LessEqual = number::less_equal, cl "<=" ("number &rest numbers") -> one;
+            LessEqual = number::less_equal, cl "<=" ("number &rest numbers") -> one slowly "%SLOW-<=";
             /// Whether the numbers decrease.
-            Greater = number::greater, cl ">" ("number &rest numbers") -> one;
+            Greater = number::greater, cl ">" ("number &rest numbers") -> one slowly "%SLOW->";
             /// Whether the numbers never increase.
-            GreaterEqual = number::greater_equal, cl ">=" ("number &rest numbers") -> one;
+            GreaterEqual = number::greater_equal, cl ">=" ("number &rest numbers") -> one slowly "%SLOW->=";
             /// Whether `number` is zero.
             Zerop = number::zerop, cl "ZEROP" ("number") -> one;
             /// Whether `number` is above zero.
@@ -314,9 +314,9 @@ macro_rules! for_each_builtin {
             /// Whether `number` is below zero.
             Minusp = number::minusp, cl "MINUSP" ("number") -> one;
             /// The greatest of the numbers.
-            Max = number::max, cl "MAX" ("number &rest numbers");
+            Max = number::max, cl "MAX" ("number &rest numbers") slowly "%SLOW-MAX";
             /// The least of the numbers.
-            Min = number::min, cl "MIN" ("number &rest numbers");
+            Min = number::min, cl "MIN" ("number &rest numbers") slowly "%SLOW-MIN";
             /// The number without its sign.
             Abs = number::abs, cl "ABS" ("number") slowly "%SLOW-ABS";
             /// -1, 0 or 1, as `number` is below, at or above zero, as a number of its type.

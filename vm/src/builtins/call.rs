@@ -5,6 +5,9 @@ use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
 
+/// The largest number of values of a form.
+const MAX_VALUES: usize = 4096;
+
 pub(super) fn funcall(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.exchange.request_call(arguments[0], &arguments[1..]);
     Err(Exit::Call)
@@ -39,8 +42,8 @@ pub(super) fn values_list(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut rest = arguments[0];
     vm.exchange.values.clear();
     while let Some(pair) = vm.heap.as_cons(rest) {
-        if vm.exchange.values.len() == MAX_SPREAD {
-            return vm.exchange.program_error(format!("more than {MAX_SPREAD} values"));
+        if vm.exchange.values.len() == MAX_VALUES {
+            return vm.exchange.program_error(format!("more than {MAX_VALUES} values"));
         }
         vm.exchange.values.push(pair.car);
         rest = pair.cdr;

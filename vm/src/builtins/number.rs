@@ -78,6 +78,9 @@ fn chain(
     expected: &'static str,
     holds: impl Fn(&mut Vm, Value, Value) -> Result<bool, Exit>,
 ) -> Outcome {
+    if numbers.len() > LIMIT {
+        return Err(Exit::Slowly);
+    }
     if let Some(&wrong) = numbers.iter().find(|&&v| !number::is_number(&vm.heap, v)) {
         return vm.exchange.type_error(wrong, expected);
     }

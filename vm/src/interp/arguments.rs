@@ -10,8 +10,8 @@ use crate::shape::Shape;
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// The largest number of arguments that `apply` spreads.
-pub(crate) const MAX_SPREAD: usize = 4096;
+/// The largest number of arguments that `apply` spreads: they are copied in one piece.
+pub(crate) const MAX_SPREAD: usize = 1 << 20;
 
 /// Replaces the last argument, a list, by its items.
 pub(super) fn spread(vm: &mut Vm, arguments: &mut Arguments) -> Result<(), Exit> {
