@@ -1442,6 +1442,11 @@ macro_rules! for_each_builtin {
             SetHeld = task::set_held, internal "%SET-HELD" ("list");
             /// What lets the end of another task interrupt this one with a call of `function`.
             MakeGuard = task::make_guard, internal "%MAKE-GUARD" ("function");
+            /// Interrupts a task, as soon as none of its cleanups runs, with a call of `function`.
+            InterruptTask = task::interrupt_task, internal "%INTERRUPT-TASK" ("task function");
+            /// From now on only the end of this task is delivered, of what becomes pending, and its clock is
+            /// stopped if it is to; or, without `stands`, no longer.
+            StandStill = task::stand_still, internal "%STAND-STILL" ("stands stops-clock");
             /// Has a guard interrupt its task, again if it has done so before.
             InterruptBy = task::interrupt_by, internal "%INTERRUPT-BY" ("guard");
             /// Lets a guard interrupt no more.

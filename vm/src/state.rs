@@ -98,7 +98,7 @@ state! {
     /// Visits the content of the rarely used parts of a task.
     Extra by VisitExtra :: extra_content {
         content { limits, interrupts, fund }
-        course { report, end, values }
+        course { report, end, values, clock_behind, clock_stopped }
     }
 }
 

@@ -4,6 +4,7 @@ mod defects;
 mod fluents;
 mod putting_back;
 mod resources;
+mod suspension;
 
 use esl::explore::{Behaviour, Exploration, Grain, Settings, explore, follow};
 use esl::program::{self, Ended, Program, Source};

@@ -31,6 +31,12 @@ pub(crate) fn nanoseconds(vm: &mut Vm, seconds: Value) -> Result<u64, Exit> {
     Ok(((seconds * 1e9).round() as u64).min(LATEST))
 }
 
+/// Returns the time of the running task's clock.
+fn time_of_task(vm: &mut Vm) -> u64 {
+    let now = vm.scheduler.clock.read(&mut vm.outside.host);
+    vm.scheduler.task().time_at(now)
+}
+
 /// Returns the sum of the counts of an event or of a list of events.
 fn count_of_events(vm: &mut Vm, events: Value) -> Result<i64, Exit> {
     if !events.is_list() {
@@ -303,7 +309,7 @@ pub(super) fn open_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         None
     } else {
         let nanoseconds = nanoseconds(vm, seconds)?;
-        Some(vm.scheduler.clock.read(&mut vm.outside.host).saturating_add(nanoseconds).min(LATEST))
+        Some(time_of_task(vm).saturating_add(nanoseconds).min(LATEST))
     };
     let is_kept = what.is_nil() && is_one_kept(vm, events);
     if !is_kept && was_signalled_since(vm, events, count)? {
@@ -328,10 +334,11 @@ pub(super) fn take_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     // A signal that is on its way comes before a timeout.
     vm.scheduler.wait_for_deliveries()?;
     match link::deadline(&vm.heap, wait) {
-        Some(deadline) if vm.scheduler.clock.read(&mut vm.outside.host) >= deadline => {
-            Ok(vm.world.known.timeout)
+        Some(deadline) if time_of_task(vm) >= deadline => Ok(vm.world.known.timeout),
+        deadline => {
+            let deadline = deadline.map(|time| vm.scheduler.task().when(time));
+            vm.scheduler.park_at(wait, deadline)
         }
-        deadline => vm.scheduler.park_at(wait, deadline),
     }
 }
 
@@ -342,7 +349,7 @@ pub(super) fn close_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn deadline(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let nanoseconds = nanoseconds(vm, arguments[0])?;
-    let time = vm.scheduler.clock.read(&mut vm.outside.host).saturating_add(nanoseconds).min(LATEST);
+    let time = time_of_task(vm).saturating_add(nanoseconds).min(LATEST);
     Ok(Value::fixnum(time as i64).unwrap_or(Value::NIL))
 }
 
@@ -350,11 +357,11 @@ pub(super) fn sleep_until(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(deadline) = arguments[0].as_index() else {
         return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
     };
-    let now = vm.scheduler.clock.read(&mut vm.outside.host);
-    if now >= deadline as u64 {
+    if time_of_task(vm) >= deadline as u64 {
         Ok(Value::NIL)
     } else {
-        vm.scheduler.park_at(Value::NIL, Some(deadline as u64))
+        let time = vm.scheduler.task().when(deadline as u64);
+        vm.scheduler.park_at(Value::NIL, Some(time))
     }
 }
 

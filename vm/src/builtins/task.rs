@@ -99,7 +99,9 @@ pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let state = vm.heap.slot_or_nil(task, event::STATE);
     let Some(index) = event::task_index(&vm.heap, task) else { return Ok(state) };
     let known = &vm.world.known;
-    Ok(match vm.scheduler.tasks.at(index).map(|task| task.state) {
+    let task = vm.scheduler.tasks.at(index);
+    Ok(match task.map(|task| task.state) {
+        Some(TaskState::Waiting) if task.is_some_and(|task| task.flags.suspended()) => known.suspended,
         Some(TaskState::Waiting | TaskState::Reading) => known.waiting,
         _ => known.running,
     })
@@ -262,6 +264,31 @@ pub(super) fn make_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     slots[guard::IS_OPEN] = Value::T;
     slots[guard::HEIGHT] = Value::index(height);
     Ok(vm.heap.alloc_record(Kind::Record, 0, guard::AUX, &slots)?)
+}
+
+pub(super) fn interrupt_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.scheduler.point()?;
+    let [task, function] = exactly(arguments);
+    let task = expect_task(vm, task)?;
+    let mut slots = [Value::NIL; 4];
+    slots[guard::TASK] = task;
+    slots[guard::FUNCTION] = vm.callable(function)?;
+    slots[guard::IS_OPEN] = Value::T;
+    // It does not act within a cleanup.
+    slots[guard::HEIGHT] = Value::small(0);
+    let guard = vm.heap.alloc_record(Kind::Record, 0, guard::AUX, &slots)?;
+    run::interrupt_by(vm, guard);
+    Ok(Value::NIL)
+}
+
+pub(super) fn stand_still(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [stands, stops_clock] = exactly(arguments);
+    if stands.is_true() {
+        run::stand_still(vm, stops_clock.is_true());
+    } else {
+        run::go_on(vm);
+    }
+    Ok(Value::NIL)
 }
 
 pub(super) fn interrupt_by(vm: &mut Vm, arguments: &[Value]) -> Outcome {

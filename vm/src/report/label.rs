@@ -66,6 +66,7 @@ pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
         return match describe(&vm.heap, pair.car).as_str() {
             ":CHECKPOINT" => format!("checkpoint {datum} of {}", event_label(vm, first)),
             ":UNTIL" => format!("{datum} to be true"),
+            ":SUSPENDED" => format!("RESUME-TASK, suspended by {}", event_label(vm, pair.cdr)),
             ":RESOURCE" => resources_label(vm, pair.cdr),
             _ => vm.heap.string_text(pair.cdr).unwrap_or(datum),
         };

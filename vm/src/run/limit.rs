@@ -23,7 +23,8 @@ pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, ticks: Opti
     entry.kind = EntryKind::Limit;
     let entry = task.control.entries.len() as u32 - 1;
     let parent = task.account;
-    let mut limit = Limit { entry, number, account: AccountId::NONE, expired: None };
+    let ends = time.map(|time| task.time_at(now).saturating_add(time));
+    let mut limit = Limit { entry, number, account: AccountId::NONE, ends, expired: None };
     if let Some(ticks) = ticks {
         limit.account = scheduler.accounts.open(parent, ticks, AccountOwner::Form(index, number));
         scheduler.task_mut().account = limit.account;
@@ -39,6 +40,52 @@ pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, ticks: Opti
         expire(vm, index, number, vm.world.known.budget_exhausted);
     }
     true
+}
+
+/// Notes that a limit of time has expired, unless the clock of its task was stopped meanwhile.
+pub(super) fn expire_in_time(vm: &mut Vm, index: TaskIndex, number: LimitNumber, now: u64) {
+    let Some(task) = vm.scheduler.find(index) else { return };
+    let limits = task.extra.as_ref().map_or(&[][..], |extra| &extra.limits[..]);
+    let ends = limits.iter().find(|limit| limit.number == number).and_then(|limit| limit.ends);
+    match ends {
+        Some(ends) if task.time_at(now) < ends => {
+            // The timer of one whose clock is stopped is set when it goes on.
+            if task.extra.as_ref().is_some_and(|extra| extra.clock_stopped.is_none()) {
+                let time = task.when(ends);
+                vm.scheduler.timers.push(time, index, Due::Limit(number));
+            }
+        }
+        _ => expire(vm, index, number, vm.world.known.timeout),
+    }
+}
+
+/// Has the running task stand still, with its clock stopped or not.
+pub(crate) fn stand_still(vm: &mut Vm, stops_clock: bool) {
+    let now = vm.scheduler.clock.read(&mut vm.outside.host);
+    let task = vm.scheduler.task_mut();
+    task.flags.set_suspended(true);
+    if stops_clock {
+        task.extra_mut().clock_stopped.get_or_insert(now);
+    }
+}
+
+/// Has the running task go on after it has stood still. What has become pending meanwhile is delivered.
+pub(crate) fn go_on(vm: &mut Vm) {
+    let now = vm.scheduler.clock.read(&mut vm.outside.host);
+    let index = vm.scheduler.turn.index;
+    let task = vm.scheduler.task_mut();
+    task.flags.set_suspended(false);
+    task.flags.set_attention(true);
+    vm.exchange.charges.end_slice();
+    let Some(extra) = task.extra.as_mut() else { return };
+    let Some(stopped) = extra.clock_stopped.take() else { return };
+    extra.clock_behind = extra.clock_behind.saturating_add(now.saturating_sub(stopped));
+    let behind = extra.clock_behind;
+    let open = extra.limits.iter().filter_map(|limit| Some((limit.number, limit.ends?)));
+    let timers: Vec<(LimitNumber, u64)> = open.collect();
+    for (number, ends) in timers {
+        vm.scheduler.timers.push(ends.saturating_add(behind), index, Due::Limit(number));
+    }
 }
 
 /// Charges ticks to an account and those above it; limits whose accounts are spent by it expire.

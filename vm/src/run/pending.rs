@@ -65,6 +65,11 @@ fn take_pending(vm: &mut Vm) -> Option<Value> {
         end_running_task(vm);
         return None;
     }
+    if scheduler.task().flags.suspended() {
+        // What else is pending is delivered when it goes on.
+        scheduler.task_mut().flags.set_attention(false);
+        return None;
+    }
     let mut waits = ends;
     let expired = scheduler.task().expired_limit();
     if let Some((entry, cause)) = expired {

@@ -4,7 +4,7 @@
 //! does, and when so many ticks have run that something else must be meant to happen.
 
 use super::arrival::wake_readers;
-use super::limit::expire;
+use super::limit::expire_in_time;
 use super::wake::{call_attention, make_runnable};
 use crate::host::{Awaited, Host};
 use crate::schedule::Due;
@@ -62,7 +62,7 @@ fn fire_timers(vm: &mut Vm) {
                     make_runnable(vm, timer.index, false);
                 }
             }
-            Due::Limit(number) => expire(vm, timer.index, number, vm.world.known.timeout),
+            Due::Limit(number) => expire_in_time(vm, timer.index, number, now),
             Due::Cleanup => {
                 if task.is_some_and(Task::runs_cleanup) {
                     call_attention(vm, timer.index);

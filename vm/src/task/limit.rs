@@ -21,6 +21,8 @@ pub(crate) struct Limit {
     pub(crate) number: LimitNumber,
     /// Account, if it limits ticks.
     pub(crate) account: AccountId,
+    /// Time of the task's clock at which it expires, if it limits time.
+    pub(crate) ends: Option<u64>,
     /// Cause of its expiry, a keyword.
     pub(crate) expired: Option<Value>,
 }

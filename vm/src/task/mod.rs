@@ -133,6 +133,8 @@ define_flags! {
     oversized set_oversized = 7;
     /// It stands at a point, before it does what others can see: see `explore`.
     at_point set_at_point = 8;
+    /// It stands still: of what is pending only its end is delivered.
+    suspended set_suspended = 9;
 }
 
 /// Report of a failure.
@@ -172,6 +174,10 @@ pub(crate) struct Extra {
     pub fund: Option<Fund>,
     /// Guards that interrupt it as soon as may be.
     pub interrupts: Vec<Value>,
+    /// Nanoseconds by which its clock is behind the machine's.
+    pub clock_behind: u64,
+    /// Time of the machine at which its clock was stopped, if it is.
+    pub clock_stopped: Option<u64>,
 }
 
 impl Extra {
@@ -269,6 +275,17 @@ impl Task {
     /// Returns the fields that few tasks need, made if they are not there.
     pub(crate) fn extra_mut(&mut self) -> &mut Extra {
         self.extra.get_or_insert_default()
+    }
+
+    /// Returns the time of its clock, which stands still while it is suspended, at the time `now`.
+    pub(crate) fn time_at(&self, now: u64) -> u64 {
+        let Some(extra) = &self.extra else { return now };
+        extra.clock_stopped.unwrap_or(now).saturating_sub(extra.clock_behind)
+    }
+
+    /// Returns when its clock will show `time`, unless it is stopped before.
+    pub(crate) fn when(&self, time: u64) -> u64 {
+        time.saturating_add(self.extra.as_ref().map_or(0, |extra| extra.clock_behind))
     }
 
     /// Returns whether it waits since it got this serial number.

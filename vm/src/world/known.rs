@@ -83,6 +83,7 @@ define_known! {
     aborted = keyword "ABORTED";
     running = keyword "RUNNING";
     waiting = keyword "WAITING";
+    suspended = keyword "SUSPENDED";
     // Properties under which the machine keeps data on a symbol.
     accessor = esl "%ACCESSOR";
     // Results and options that are keywords.

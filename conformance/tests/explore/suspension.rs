@@ -1,0 +1,68 @@
+//! Suspension under all schedules: a task that is suspended and resumed ends as without, an abort reaches it
+//! wherever it is, and nothing is left.
+
+use esl::explore::Grain;
+
+use crate::check;
+
+/// What is left of suspensions, and a step that others can see.
+const LEFT: &str = "
+  (defvar *step* (make-event))
+  (defun go-on () (signal *step*))
+  (defun left ()
+    (if esl::*%suspensions* (hash-table-count esl::*%suspensions*) 0))";
+
+fn check_suspension(text: &str, expected: &[&str]) {
+    check(&format!("{LEFT} {text}"), Grain::Changes, expected);
+}
+
+#[test]
+fn a_task_that_is_suspended_and_resumed_ends_as_without() {
+    check_suspension(
+        "(let ((task (spawn (go-on) (wait-for-task (spawn (go-on))) :value)))
+           (suspend-task task)
+           (resume-task task)
+           (princ (list (multiple-value-list (wait-for-task task)) (left))))",
+        &["((SUCCEEDED VALUE) 0)"],
+    );
+}
+
+#[test]
+fn nobody_goes_on_who_is_suspended() {
+    check_suspension(
+        "(let* ((count 0) (task (spawn (dotimes (i 2) (go-on) (incf count)))))
+           (suspend-task task)
+           (let ((before count))
+             (go-on)
+             (go-on)
+             (unless (= before count) (princ 'moved)))
+           (resume-task task)
+           (wait-for-task task)
+           (princ (list count (left))))",
+        &["(2 0)"],
+    );
+}
+
+#[test]
+fn an_abort_reaches_a_task_wherever_its_suspension_is() {
+    check_suspension(
+        "(define-resource arm)
+         (let ((task (spawn (with-resource (arm) (go-on)))))
+           (spawn (suspend-task task))
+           (abort-task task)
+           (princ (list (resource-holders 'arm) (resource-waiters 'arm))))",
+        &["(NIL NIL)"],
+    );
+}
+
+#[test]
+fn suspensions_of_two_tasks_nest_by_count() {
+    check_suspension(
+        "(let ((task (spawn (go-on) (go-on))))
+           (task-net (a (suspend-task task) (resume-task task))
+                     (b (suspend-task task) (resume-task task)))
+           (wait-for-task task)
+           (princ (list (task-status task) (left))))",
+        &["(SUCCEEDED 0)"],
+    );
+}
