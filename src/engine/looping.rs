@@ -93,7 +93,7 @@ impl Engine {
             return Poll::Busy;
         }
         if outcome == RunOutcome::Waiting && self.machine.expects_something() {
-            let until = self.machine.time_to_next_timer();
+            let until = self.machine.time_to_next_timer().map(Duration::from_nanos);
             return Poll::Idle { until: until.and_then(|time| now.checked_add(time)) };
         }
         Poll::Ended(self.ending_of(outcome))

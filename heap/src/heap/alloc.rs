@@ -331,7 +331,10 @@ impl Heap {
     }
 
     fn allocate_large(&mut self, bytes: usize) -> Result<NonNull<u8>, AllocError> {
-        self.check_room(footprint(bytes))?;
+        self.check_room(footprint(bytes)).map_err(|error| match error {
+            AllocError::TooLarge { .. } => AllocError::TooLarge { requested: bytes },
+            error => error,
+        })?;
         // The current epoch: marked while marking and not yet swept while sweeping; stale by the next cycle.
         let large = LargeObject::new(bytes, self.large_number, self.large.len(), self.epoch)
             .ok_or(AllocError::NeedCollection)?;

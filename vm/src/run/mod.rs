@@ -48,8 +48,6 @@ use abort::abort_more;
 use timers::{go_on_in_time, look_at_clock};
 use turn::go_on_with_turn;
 
-use std::time::Duration;
-
 use crate::host::{Awaited, Host};
 use crate::task::{TaskId, TaskIndex, TaskState};
 use crate::vm::Vm;
@@ -105,11 +103,11 @@ impl Vm {
         scheduler.first_timer().is_some() || !scheduler.readers.is_empty() || self.outside.expects_news()
     }
 
-    /// Returns the time that is left to the first timer.
-    pub fn time_to_next_timer(&mut self) -> Option<Duration> {
+    /// Returns the time that is left to the first timer, in nanoseconds.
+    pub fn time_to_next_timer(&mut self) -> Option<u64> {
         let first = self.scheduler.first_timer()?;
         let now = self.scheduler.clock.read(&mut self.outside.host);
-        Some(Duration::from_nanos(first.saturating_sub(now)))
+        Some(first.saturating_sub(now))
     }
 }
 

@@ -64,11 +64,11 @@ fn begin_call(vm: &mut Vm, function: &str, arguments: &[Datum]) -> Option<TaskId
         });
         let value = vm.heap.as_cons(cell)?.car;
         // A later argument may have what was made before collected.
-        vm.pin(value);
+        vm.embedder.pin(&mut vm.heap, value);
         values.push(value);
     }
     let id = vm.spawn(values[0], &values[1..]);
-    values.into_iter().for_each(|value| vm.unpin(value));
+    values.into_iter().for_each(|value| vm.embedder.unpin(value));
     id.ok()
 }
 
