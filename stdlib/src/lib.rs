@@ -54,6 +54,7 @@ pub fn load(machine: &mut Vm) -> Result<(), StdlibError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use esl_bytecode::builtin::BUILTINS;
 
     #[test]
     fn few_forms_run_when_a_machine_is_made() {
@@ -82,7 +83,11 @@ mod tests {
             let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             names.for_each(|name| places.entry(name.to_owned()).or_default().push(file.clone()));
         }
+        let defined: std::collections::BTreeSet<String> = places.keys().cloned().collect();
         let twice: Vec<_> = places.into_iter().filter(|(_, files)| files.len() > 1).collect();
         assert!(twice.is_empty(), "the later definition replaces the earlier one: {twice:?}");
+        let builtins = BUILTINS.iter().map(|builtin| builtin.name.to_lowercase());
+        let hidden: Vec<_> = builtins.filter(|name| defined.contains(name)).collect();
+        assert!(hidden.is_empty(), "a builtin takes the place of the definition: {hidden:?}");
     }
 }
