@@ -1215,7 +1215,7 @@ macro_rules! for_each_builtin {
             /// else, to be written.
             FileExistsP = stream::file_exists_p, internal "%FILE-EXISTS-P" ("path &optional use");
             /// The names of what is in a folder; those of folders end in `/`.
-            FolderNames = file::folder_names, internal "%FOLDER-NAMES" ("path");
+            ListFolder = file::list_folder, internal "%LIST-FOLDER" ("path");
             /// Gives a file another name.
             RenameFile = file::rename_file, internal "%RENAME-FILE" ("path new-path");
             /// The universal time at which a file was written last.

@@ -25,8 +25,8 @@ fn ask(vm: &mut Vm, what: &str, path: &str, request: FileRequest<'_>) -> Result<
     }
 }
 
-/// `(%folder-names path)`
-pub(super) fn folder_names(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+/// `(%list-folder path)`
+pub(super) fn list_folder(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (path, permitted) = permitted(vm, arguments[0], Right::Read)?;
     let FileAnswer::Names(names) = ask(vm, "listed", &path, FileRequest::List(&permitted))? else {
         return Ok(Value::NIL);
