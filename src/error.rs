@@ -70,7 +70,7 @@ pub enum Error {
     },
     /// The engine that was asked is gone.
     Ended,
-    /// The value cannot become [`Data`](crate::Data).
+    /// The value cannot become [`Data`].
     NotData(ExportError),
     /// The name cannot be that of a function.
     InvalidName(String),

@@ -143,7 +143,11 @@ fn a_signal_ends_a_session_of_the_repl_with_its_cleanups() {
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().expect("the command is there");
         let mut input = child.stdin.take().expect("the input is a pipe");
-        let forms = "(progn (spawn (unwind-protect (loop (sleep 0.01)) (format t \"off~%\"))) (princ \"begun\") (terpri) 1)\n";
+        let forms = "(progn (spawn (unwind-protect (loop (sleep 0.01)) (format t \"off~%\")))
+                            (sleep 0.01)
+                            (princ \"begun\")
+                            (terpri)
+                            1)\n";
         input.write_all(forms.as_bytes()).expect("it reads");
         let mut output = BufReader::new(child.stdout.take().expect("the output is a pipe"));
         let mut line = String::new();
