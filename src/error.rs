@@ -43,8 +43,8 @@ pub enum Error {
         message: String,
         /// Message, frames of the failure and what they were recovering from, as the commands print them.
         report: String,
-        /// Arguments of the failure: of `(fail :valve-stuck 'left)` the symbol. None if the cause is an error of the
-        /// language.
+        /// Arguments of the failure: of `(fail :valve-stuck 'left)` the symbol. None if the cause is an error
+        /// of the language.
         arguments: Vec<Data>,
     },
     /// The evaluation was aborted: by the program, or by a [`ProcessSignal`](crate::host::ProcessSignal).

@@ -826,8 +826,8 @@ macro_rules! for_each_builtin {
             ArrayHasFillPointerp = array::array_has_fill_pointer_p, cl "ARRAY-HAS-FILL-POINTER-P" ("array");
             /// Whether the array was made to be adjustable.
             AdjustableArrayp = array::adjustable_array_p, cl "ADJUSTABLE-ARRAY-P" ("array");
-            /// The array to which `array` is displaced, and the index of its first element there; `NIL` and 0 if
-            /// there is none.
+            /// The array to which `array` is displaced, and the index of its first element there; `NIL` and 0
+            /// if there is none.
             Displacement = array::displacement, cl "ARRAY-DISPLACEMENT" ("array");
             /// What the elements may be: 0 any objects, 1 characters, 2 integers below 256, 3 bits.
             ElementSort = array::element_sort, internal "%ELEMENT-SORT" ("array") -> one;
@@ -1211,8 +1211,8 @@ macro_rules! for_each_builtin {
             CloseStream = stream::close, internal "%CLOSE" ("stream abort");
             /// The text of a file.
             FileText = stream::file_text, internal "%FILE-TEXT" ("path &optional is-module");
-            /// Whether there is a file of this name, which is to be read; with `T`, as a module, with anything
-            /// else, to be written.
+            /// Whether there is a file of this name, which is to be read; with `T`, as a module, with
+            /// anything else, to be written.
             FileExistsP = stream::file_exists_p, internal "%FILE-EXISTS-P" ("path &optional use");
             /// The names of what is in a folder; those of folders end in `/`.
             ListFolder = file::list_folder, internal "%LIST-FOLDER" ("path");
@@ -1372,8 +1372,8 @@ macro_rules! for_each_builtin {
             TakeSignal = event::take_signal, internal "%TAKE-SIGNAL" ("wait");
             /// Ends a wait.
             CloseWait = event::close_wait, internal "%CLOSE-WAIT" ("wait");
-            /// The input that the outside knows by a name, a symbol or string: a new one, or one that is there
-            /// already, with this capacity and the rule of this number.
+            /// The input that the outside knows by a name, a symbol or string: a new one, or one that is
+            /// there already, with this capacity and the rule of this number.
             AddInput = input::add_input, internal "%ADD-INPUT" ("name capacity rule");
             /// Has the outside know no input of this name any more.
             RemoveInput = input::remove_input, internal "%REMOVE-INPUT" ("name");

@@ -104,7 +104,8 @@ pub trait Environment {
     fn read_base(&self) -> u32 {
         10
     }
-    /// Returns whether `*features*` has the feature `name`, in upper case; `None` if the program does not say.
+    /// Returns whether `*features*` has the feature `name`, in upper case; `None` if the program does not
+    /// say.
     fn has_feature(&self, _name: &str) -> Option<bool> {
         None
     }

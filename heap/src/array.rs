@@ -1,8 +1,8 @@
 //! Elements of arrays, wherever they are kept.
 //!
 //! A simple vector, a string and a row of bytes or bits are arrays of rank 1 by themselves; every other array
-//! is a record over one of these, its *data*, or over a part of another array, to which it is *displaced*. The
-//! data decides what the elements may be: any value, characters, integers below 256, or bits.
+//! is a record over one of these, its *data*, or over a part of another array, to which it is *displaced*.
+//! The data decides what the elements may be: any value, characters, integers below 256, or bits.
 //!
 //! Guarantees: if the dimensions or the fill pointer of an array ask for more elements than its data holds,
 //! the array has those that are there. An array that is displaced to itself, by way of others, or by way of

@@ -59,9 +59,9 @@ enum Action {
     },
     /// Run the tests of programs
     ///
-    /// Each test (`deftest`) runs in a machine of its own, whose clock is virtual. Exit status: 0 all passed; 1 a
-    /// test failed; 2 wrong usage, or a file that cannot be read or written; 3 a file does not compile or is
-    /// refused.
+    /// Each test (`deftest`) runs in a machine of its own, whose clock is virtual. Exit status: 0 all passed;
+    /// 1 a test failed; 2 wrong usage, or a file that cannot be read or written; 3 a file does not compile or
+    /// is refused.
     Test {
         /// Only tests whose names contain this word, in any case
         #[arg(long, value_name = "WORD")]

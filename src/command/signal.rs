@@ -20,8 +20,8 @@ impl Interrupts {
     }
 }
 
-/// Has Ctrl-C interrupt the machine. A second one during the same evaluation ends the process. Other signals end
-/// the evaluation, and are passed to `end`.
+/// Has Ctrl-C interrupt the machine. A second one during the same evaluation ends the process. Other signals
+/// end the evaluation, and are passed to `end`.
 pub fn interrupt_on_signal(inbox: Inbox, end: impl Fn(ProcessSignal) + Send + 'static) -> Interrupts {
     let was_asked = Arc::new(AtomicBool::new(false));
     let interrupts = Interrupts { was_asked: was_asked.clone() };

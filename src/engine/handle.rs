@@ -17,10 +17,10 @@ use crate::error::Error;
 
 /// A way into a run for other threads, and for other parts of the program that owns the engine.
 ///
-/// It may be cloned and sent, and holds no lock of the engine's. What it says and asks comes into the inbox of
-/// the machine in order, and is taken in between two turns while the engine runs. While there is a handle,
-/// something may come: a program that waits is not deadlocked. What a handle says after the engine is gone has
-/// no effect, and what it asks then ends with [`Error::Ended`].
+/// It may be cloned and sent, and holds no lock of the engine's. What it says and asks comes into the inbox
+/// of the machine in order, and is taken in between two turns while the engine runs. While there is a handle,
+/// something may come: a program that waits is not deadlocked. What a handle says after the engine is gone
+/// has no effect, and what it asks then ends with [`Error::Ended`].
 ///
 /// ```
 /// use esl::Engine;
@@ -50,8 +50,8 @@ impl Handle {
         Handle { sender: Sender::new(&machine.inbox()), coming: machine.coming_observers() }
     }
 
-    /// Signals an input of the program, by its name in any case. Waits while the input is full, if that is its
-    /// rule: so not on the thread that runs the engine.
+    /// Signals an input of the program, by its name in any case. Waits while the input is full, if that is
+    /// its rule: so not on the thread that runs the engine.
     ///
     /// # Errors
     /// [`SendError::NoSuchInput`], also before the program has defined the input; [`SendError::Ended`].
@@ -169,8 +169,8 @@ impl<T> Reply<T> {
     /// Waits for the answer: on another thread than the one that runs the engine.
     ///
     /// # Errors
-    /// [`Error::Failed`], [`Error::Aborted`], [`Error::NotData`], [`Error::NotOfType`] if the value is of another
-    /// type, and [`Error::Ended`] if the engine is gone.
+    /// [`Error::Failed`], [`Error::Aborted`], [`Error::NotData`], [`Error::NotOfType`] if the value is of
+    /// another type, and [`Error::Ended`] if the engine is gone.
     pub fn wait(self) -> Result<T, Error> {
         (self.read)(self.pending.wait())
     }

@@ -62,9 +62,9 @@ impl Engine {
         self.ending_of(outcome)
     }
 
-    /// Runs tasks for a portion of ticks, for a loop of the embedder's, which says what time it is. Comes back
-    /// when all tasks wait; never waits itself. Timers that are due fire. Into which portions a run is divided
-    /// changes nothing in it.
+    /// Runs tasks for a portion of ticks, for a loop of the embedder's, which says what time it is. Comes
+    /// back when all tasks wait; never waits itself. Timers that are due fire. Into which portions a run is
+    /// divided changes nothing in it.
     ///
     /// ```
     /// use std::time::{Duration, Instant};
@@ -110,8 +110,8 @@ impl Engine {
         }
     }
 
-    /// Runs tasks as [`Engine::run`] does, as a future for any executor: it waits without a thread of its own,
-    /// but for one that keeps the time, and lets others of its executor go on in between.
+    /// Runs tasks as [`Engine::run`] does, as a future for any executor: it waits without a thread of its
+    /// own, but for one that keeps the time, and lets others of its executor go on in between.
     ///
     /// ```
     /// use esl::Engine;

@@ -99,8 +99,8 @@ fn no_program_takes_much_more_memory_than_it_may() {
         if peak > LIMIT + SLACK {
             return Some("too much memory".into());
         }
-        // 1 is a failure for want of stack, 5 one for want of memory, or the end of the budget. A program that
-        // takes its time has not been shown to stay within the limit for ever, but for long.
+        // 1 is a failure for want of stack, 5 one for want of memory, or the end of the budget. A program
+        // that takes its time has not been shown to stay within the limit for ever, but for long.
         (!matches!(status, Some(1 | 5) | None)).then(|| "it did not end by a limit".into())
     });
     assert!(faults.is_empty(), "{}", faults.join("\n"));

@@ -112,8 +112,8 @@ fn is_executable(path: &Path) -> bool {
     path.is_file()
 }
 
-/// Returns the command of a call whose arguments begin with the program and its arguments, and have the folder
-/// and the environment from `index` on.
+/// Returns the command of a call whose arguments begin with the program and its arguments, and have the
+/// folder and the environment from `index` on.
 fn command(arguments: &Arguments, index: usize) -> Result<Command, Failure> {
     let name = arguments.text(0)?;
     let unknown = || failure("PROCESS-ERROR", format!("there is no program `{name}`"));

@@ -1,5 +1,5 @@
-//! Resources under all schedules: nothing is held by a task that has ended, and no grant is lost, with an abort
-//! or a preemption at every point.
+//! Resources under all schedules: nothing is held by a task that has ended, and no grant is lost, with an
+//! abort or a preemption at every point.
 
 use esl::explore::Grain;
 

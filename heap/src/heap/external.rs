@@ -1,8 +1,8 @@
 //! Memory outside of the heap that counts against its limit: what a machine keeps beside its objects, such as
 //! the stacks of its tasks.
 //!
-//! Each [`Holder`] says how many bytes it has. Its bytes leave less room for arenas and large objects. Those of
-//! tasks put off the next cycle as live objects do, since the collector goes over them.
+//! Each [`Holder`] says how many bytes it has. Its bytes leave less room for arenas and large objects. Those
+//! of tasks put off the next cycle as live objects do, since the collector goes over them.
 //!
 //! Guarantees: what a holder has is counted even if it is too much, so the sum is always that of the last
 //! reports.

@@ -75,7 +75,8 @@ use large::LargeObject;
 use mark::Marker;
 use sweep::Sweep;
 
-/// Bytes added to the limit by [`Heap::open_reserve`]: an arena, and something for what is outside of the heap.
+/// Bytes added to the limit by [`Heap::open_reserve`]: an arena, and something for what is outside of the
+/// heap.
 pub const RESERVE: usize = ARENA + ARENA / 2;
 
 /// Number of visits of an ordinary slice.

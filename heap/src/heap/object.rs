@@ -265,8 +265,8 @@ impl Heap {
         self.alloc_displaced_array(flags, data, fill, Value::NIL, dimensions)
     }
 
-    /// As [`Heap::alloc_array`]. With an `offset` other than `nil`, the array is displaced to `data`, which may
-    /// be any array.
+    /// As [`Heap::alloc_array`]. With an `offset` other than `nil`, the array is displaced to `data`, which
+    /// may be any array.
     ///
     /// # Panics
     /// As [`Heap::alloc_array`].

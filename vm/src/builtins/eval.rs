@@ -170,7 +170,8 @@ fn read_datum(vm: &mut Vm, text: &str, start: usize, name: Option<&str>) -> Resu
 }
 
 /// Reads the first datum of `text`. Returns whether there was one, the object, the list of the calls in it
-/// that are to be made, and the number of characters up to its end; `None` if what comes after the text may belong to the datum.
+/// that are to be made, and the number of characters up to its end; `None` if what comes after the text may
+/// belong to the datum.
 fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<([Value; 3], usize)>, Exit> {
     let count = |end: usize| text[..end].chars().count();
     Ok(Some(match read_datum(vm, text, 0, None)? {

@@ -78,7 +78,8 @@ fn was_signalled_since(vm: &mut Vm, events: Value, count: Value) -> Result<bool,
     }
 }
 
-/// Takes the oldest signal that one of `events` keeps, an event or a list of events: the list of its arguments.
+/// Takes the oldest signal that one of `events` keeps, an event or a list of events: the list of its
+/// arguments.
 ///
 /// # Errors
 /// As [`take_kept_by`].

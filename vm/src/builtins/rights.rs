@@ -2,7 +2,8 @@
 //!
 //! What forms have narrowed is a binding of a symbol that no program can name ([`World::rights`]), so that
 //! nothing can set it back, and tasks inherit it as they do all bindings. Its value is a list of strings, the
-//! innermost form's first, each of which writes [`Rights`] as a text that is made here and reaches no program.
+//! innermost form's first, each of which writes [`Rights`] as a text that is made here and reaches no
+//! program.
 //!
 //! [`World::rights`]: crate::world::World
 

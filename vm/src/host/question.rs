@@ -1,8 +1,8 @@
 //! Questions from outside to a run, and the answers.
 //!
 //! A question comes into the inbox as plain data with a number. Where the answer goes, the machine does not
-//! know: it is handed to whoever waits for that number, if anybody does. So a replay, in which nobody does, is
-//! the same run.
+//! know: it is handed to whoever waits for that number, if anybody does. So a replay, in which nobody does,
+//! is the same run.
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -167,8 +167,8 @@ fn is_address_in(address: &str, grant: &str) -> bool {
 /// Answer of a host that was asked for a right.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Permit {
-    /// It is granted. To be used in place of the object: for a path the one that was compared, so that no link
-    /// that is put there now leads elsewhere.
+    /// It is granted. To be used in place of the object: for a path the one that was compared, so that no
+    /// link that is put there now leads elsewhere.
     Granted(String),
     /// The run does not have it.
     NotGranted,

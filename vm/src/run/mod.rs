@@ -85,8 +85,8 @@ impl Vm {
         run_tasks(self, None, ticks, false)
     }
 
-    /// Runs tasks in turn, as [`Vm::run_ready`] does, those included whose time has come. Virtual time goes on
-    /// when all tasks wait.
+    /// Runs tasks in turn, as [`Vm::run_ready`] does, those included whose time has come. Virtual time goes
+    /// on when all tasks wait.
     pub fn run_due(&mut self, ticks: u64) -> RunOutcome {
         let end = self.scheduler.spent.saturating_add(ticks);
         loop {

@@ -78,8 +78,8 @@ fn fire_timers(vm: &mut Vm) {
     }
 }
 
-/// Fires timers that are due while all tasks wait, and looks whether input has come, without waiting. Where time
-/// is virtual, it goes on to the first timer. Returns whether any task can go on.
+/// Fires timers that are due while all tasks wait, and looks whether input has come, without waiting. Where
+/// time is virtual, it goes on to the first timer. Returns whether any task can go on.
 pub(super) fn go_on_in_time(vm: &mut Vm) -> bool {
     if vm.scheduler.is_paused {
         return false;

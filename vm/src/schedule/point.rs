@@ -63,8 +63,8 @@ impl Scheduler {
         true
     }
 
-    /// Chooses a number below `count`: by the seed of the run, or by the explorer. In a critical section, which
-    /// is one step for the explorer, it is 0 then.
+    /// Chooses a number below `count`: by the seed of the run, or by the explorer. In a critical section,
+    /// which is one step for the explorer, it is 0 then.
     ///
     /// # Errors
     /// [`Exit::Again`] if the explorer is to choose; the builtin will be done again.

@@ -21,8 +21,8 @@ pub(crate) mod slot {
     pub(crate) const NAME: usize = 4;
     /// Whether the stream is open.
     pub(crate) const OPEN: usize = 5;
-    /// Mode in which the next block is written to the file: number of a `WriteMode`. For a channel 1 if nothing
-    /// comes after what it has to read; for its output 1, since that is bounded.
+    /// Mode in which the next block is written to the file: number of a `WriteMode`. For a channel 1 if
+    /// nothing comes after what it has to read; for its output 1, since that is bounded.
     pub(crate) const MODE: usize = 6;
     /// List of the full strings gathered before the buffer, the last first.
     pub(crate) const FULL: usize = 7;

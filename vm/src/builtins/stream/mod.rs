@@ -1,10 +1,10 @@
 //! Streams: the standard ones, and those that read from or write to a string or a text file.
 //!
-//! A Stream is a record ([`crate::world::stream`]). The operations of a custom stream are in ESL: its builtins
-//! leave it to their twins. A file is read as a whole when it is opened; output to a
-//! file is gathered, and written in blocks and when the stream is closed. Output to a string is gathered in
-//! strings that never grow, so that the millionth character takes as long as the first. Every output stream
-//! knows its column.
+//! A Stream is a record ([`crate::world::stream`]). The operations of a custom stream are in ESL: its
+//! builtins leave it to their twins. A file is read as a whole when it is opened; output to a file is
+//! gathered, and written in blocks and when the stream is closed. Output to a string is gathered in strings
+//! that never grow, so that the millionth character takes as long as the first. Every output stream knows its
+//! column.
 
 use smallvec::SmallVec;
 
