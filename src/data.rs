@@ -9,12 +9,18 @@
 //! assert_eq!(items[1].as_float(), Some(21.5));
 //! ```
 
+#[cfg(feature = "serde")]
+mod structure;
+
 use std::fmt;
 
 use esl_bytecode::BigInt;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
+
+#[cfg(feature = "serde")]
+pub use structure::{Structure, StructureError};
 
 /// A value from a program, or for one.
 #[derive(Clone, Debug, PartialEq)]

@@ -586,3 +586,26 @@ fn a_future_of_a_run_waits_for_time_and_for_what_comes() {
     assert_eq!(sum.wait(), Ok(Data::Integer(3)));
     assert!(polls > 3, "{polls}");
 }
+
+#[test]
+fn functions_are_held_and_called_from_anywhere() {
+    let (mut engine, mut other) = (engine(), engine());
+    let count = engine.function("(let ((n 0)) (lambda (&optional (by 1)) (incf n by)))").expect("it is one");
+    // What is held survives collections.
+    check(&mut engine, "(dotimes (i 200000) (list i i i))", "NIL");
+    assert_eq!(engine.call::<i64>(&count, [5_i64.into()]), Ok(5));
+    let handle = engine.handle();
+    let shared = count.clone();
+    let called = handle.call::<i64>(&shared, []);
+    let started = handle.spawn(&count, [10_i64.into()]);
+    drop((handle, count));
+    assert_eq!(engine.run(), Ending::Done);
+    assert_eq!((called.wait(), started.wait()), (Ok(6), Ok(Data::Integer(16))));
+    assert!(matches!(other.call::<i64>(&shared, []), Err(Error::NotOfType { .. })));
+    let elsewhere = other.handle().call::<i64>(&shared, []);
+    assert_eq!(other.run(), Ending::Done);
+    assert!(matches!(elsewhere.wait(), Err(Error::Failed { cause, .. }) if cause == ":PROGRAM-ERROR"));
+    drop(shared);
+    assert_eq!(engine.call::<i64>("+", [1_i64.into(), 2_i64.into()]), Ok(3));
+    assert!(matches!(engine.function("5"), Err(Error::NotOfType { .. })));
+}

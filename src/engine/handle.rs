@@ -8,10 +8,11 @@ use std::task::{Context, Poll};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::USER_PACKAGE;
 use esl_vm::embed::ExportError;
-use esl_vm::host::{Answer, Incoming, Pending, Question, SendError, Sender, TaskInfo};
+use esl_vm::host::{Answer, Callee, Incoming, Pending, Question, SendError, Sender, TaskInfo};
 use esl_vm::observe::{Coming, Observer};
 use esl_vm::vm::Vm;
 
+use super::function::Callable;
 use crate::data::{Data, FromData};
 use crate::error::Error;
 
@@ -73,12 +74,12 @@ impl Handle {
 
     /// Adds a fact to the program's database. The answer is whether it is new.
     pub fn assert(&self, fact: impl Into<Data>) -> Reply<bool> {
-        self.ask("ESL:ASSERT", [fact.into()], true)
+        self.ask(Callee::Named("ESL:ASSERT".into()), [fact.into()], true)
     }
 
     /// Removes the facts that match a pattern. The answer is how many there were.
     pub fn retract(&self, pattern: impl Into<Data>) -> Reply<i64> {
-        self.ask("ESL:RETRACT", [pattern.into()], true)
+        self.ask(Callee::Named("ESL:RETRACT".into()), [pattern.into()], true)
     }
 
     /// Sets a property of the program, in place of the value that it has for these arguments. The answer is
@@ -90,16 +91,24 @@ impl Handle {
         value: impl Into<Data>,
     ) -> Reply<bool> {
         let name = Data::Symbol(property.to_uppercase());
-        self.ask("ESL::%SET-PROPERTY", [name, Data::list(arguments), value.into()], true)
+        self.ask(
+            Callee::Named("ESL::%SET-PROPERTY".into()),
+            [name, Data::list(arguments), value.into()],
+            true,
+        )
     }
 
-    /// Calls a function of the program in a task of its own. The answer is its first value, converted.
-    pub fn call<T: FromData>(&self, function: &str, arguments: impl IntoIterator<Item = Data>) -> Reply<T> {
-        self.ask(&function.to_uppercase(), arguments, false)
+    /// Calls a function of the program, by its name or as a [`Function`](super::Function), in a task of its own. The answer is its first value, converted.
+    pub fn call<T: FromData>(
+        &self,
+        function: impl Callable,
+        arguments: impl IntoIterator<Item = Data>,
+    ) -> Reply<T> {
+        self.ask(function.callee(self.sender.inbox()), arguments, false)
     }
 
     /// Starts a task that calls a function of the program.
-    pub fn spawn(&self, function: &str, arguments: impl IntoIterator<Item = Data>) -> TaskHandle {
+    pub fn spawn(&self, function: impl Callable, arguments: impl IntoIterator<Item = Data>) -> TaskHandle {
         TaskHandle { sender: self.sender.clone(), result: self.call(function, arguments) }
     }
 
@@ -132,16 +141,16 @@ impl Handle {
 
     fn ask<T: FromData>(
         &self,
-        function: &str,
+        function: Callee,
         arguments: impl IntoIterator<Item = Data>,
         is_urgent: bool,
     ) -> Reply<T> {
-        let question = Question::Call { function: function.into(), arguments: data(arguments), is_urgent };
+        let question = Question::Call { function, arguments: data(arguments), is_urgent };
         Reply::of_value(self.sender.ask(question))
     }
 }
 
-fn data(arguments: impl IntoIterator<Item = Data>) -> Vec<Datum> {
+pub(super) fn data(arguments: impl IntoIterator<Item = Data>) -> Vec<Datum> {
     arguments.into_iter().map(|argument| argument.to_datum(USER_PACKAGE)).collect()
 }
 

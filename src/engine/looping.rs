@@ -7,7 +7,7 @@ use std::task::{Context, Waker};
 use std::time::{Duration, Instant};
 
 use esl_bytecode::datum::Datum;
-use esl_vm::host::{Question, Sender};
+use esl_vm::host::{Callee, Question, Sender};
 use esl_vm::run::RunOutcome;
 
 use super::{Engine, Reply};
@@ -51,7 +51,7 @@ impl Engine {
     /// [`Engine::eval`], does not run anything.
     pub fn begin(&mut self, text: &str) -> Reply<Data> {
         let text = Datum::string(text, Default::default());
-        let function = "ESL::%EVAL-TEXT".into();
+        let function = Callee::Named("ESL::%EVAL-TEXT".into());
         let question = Question::Call { function, arguments: vec![text], is_urgent: false };
         Reply::of_value(Sender::new(&self.machine.inbox()).ask(question))
     }

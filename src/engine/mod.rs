@@ -18,6 +18,7 @@
 
 mod call;
 mod executor;
+mod function;
 mod handle;
 mod looping;
 mod operation;
@@ -40,6 +41,7 @@ use crate::program;
 
 pub use call::{Call, Failure};
 pub use executor::{Executor, HostFuture};
+pub use function::{Callable, Function};
 pub use handle::{Handle, Reply, TaskHandle};
 pub use looping::{Ending, Poll, Running};
 pub use operation::Operation;
@@ -212,16 +214,24 @@ impl Engine {
     /// # Errors
     /// All of [`Error`] but [`Error::Refused`] and [`Error::InvalidName`].
     pub fn eval(&mut self, text: &str) -> Result<Data, Error> {
+        let value = self.value_of(text)?;
+        Ok(Data::from_datum(&self.machine.export(value)?))
+    }
+
+    /// Evaluates the forms of a text, and returns the first value of the last form.
+    fn value_of(&mut self, text: &str) -> Result<Value, Error> {
         let datum = Datum::string(text, Default::default());
         let text = self.machine.import(&datum).map_err(|_| Error::NoMemory("the text"))?;
         let function = self.machine.library_function("%EVAL-TEXT")?;
         let result = self.machine.call(function, &[text], self.ticks);
+        self.first_value(result)
+    }
+
+    /// Returns the first of the values of a call.
+    fn first_value(&mut self, result: Result<Vec<Value>, CallError>) -> Result<Value, Error> {
         self.machine.flush();
         match result {
-            Ok(values) => {
-                let datum = self.machine.export(values.first().copied().unwrap_or(Value::NIL))?;
-                Ok(Data::from_datum(&datum))
-            }
+            Ok(values) => Ok(values.first().copied().unwrap_or(Value::NIL)),
             Err(error) => Err(self.error(error)),
         }
     }

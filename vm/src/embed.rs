@@ -13,7 +13,7 @@ use crate::database::Database;
 use crate::datum;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;
-use crate::heap::{AllocError, HeapConfig, HeapStats};
+use crate::heap::{AllocError, HeapConfig, HeapStats, Kind};
 use crate::host::{Host, Inbox, Incoming, Output, ProcessSignal};
 use crate::interp::start::make_starter;
 use crate::observe::Watch;
@@ -137,6 +137,11 @@ impl Vm {
     /// Keeps a value from being collected, until [`Vm::unpin`].
     pub fn pin(&mut self, value: Value) {
         self.embedder.pin(&mut self.heap, value);
+    }
+
+    /// Returns whether a value is a function.
+    pub fn is_function(&self, value: Value) -> bool {
+        self.heap.is(value, Kind::Function)
     }
 
     /// Lets go of a pinned value.

@@ -16,6 +16,10 @@ pub(crate) struct Embedder {
     pub(crate) pinned: Vec<Value>,
     /// Numbers of the questions from outside for which tasks run, by the places of these.
     pub(crate) calls: BTreeMap<TaskIndex, u64>,
+    /// Values that the outside holds, by number. They are pinned.
+    pub(crate) kept: BTreeMap<u64, Value>,
+    /// Number of values kept so far.
+    pub(crate) kept_so_far: u64,
     /// The task that an interrupt aborts.
     pub(crate) interruptible: Option<TaskId>,
     /// Functions that are called for signals of the process, by the numbers of these. They are pinned.

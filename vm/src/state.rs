@@ -176,6 +176,8 @@ list_state! { Embedder {
     pinned: Run,
     calls: Run,
     handlers: Run,
+    kept: Run,
+    kept_so_far: Run,
     interruptible: Run,
     signal_waits: Run,
     ended_by: Run,

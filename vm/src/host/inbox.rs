@@ -56,6 +56,8 @@ pub enum Incoming {
     AbortCall(u64),
     /// No task is to run, or tasks are to run again.
     Pause(bool),
+    /// The outside has let go of the value that is kept for it under this number.
+    Release(u64),
     /// Observers have come, who are to watch the run.
     Watch,
     /// There is one more who may send messages.
@@ -133,6 +135,11 @@ impl Inbox {
     /// Notes that the program handles a signal of the process.
     pub(crate) fn note_handled(&self, signal: ProcessSignal) {
         self.0.handled.fetch_or(1 << signal.number(), Ordering::Relaxed);
+    }
+
+    /// Returns whether both are the inbox of one machine.
+    pub fn is_same(&self, other: &Inbox) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
     }
 
     /// Returns whether the program handles a signal of the process, so that it does not end the run.

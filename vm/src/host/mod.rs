@@ -34,7 +34,7 @@ pub use door::{SendError, Sender};
 pub use inbox::{Inbox, Incoming};
 pub(crate) use operation::Canceller;
 pub use operation::{Failure, News, Operation};
-pub use question::{Answer, Pending, Question, TaskInfo};
+pub use question::{Answer, Callee, Kept, Pending, Question, TaskInfo};
 pub use real::{RealHost, Screen};
 pub use record::{Record, Recording, RecordingHost, ReplayHost};
 pub use rights::{Permit, Right, Rights};

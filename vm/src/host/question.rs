@@ -15,13 +15,54 @@ use esl_bytecode::datum::Datum;
 
 use super::{Inbox, Incoming, Sender};
 
+/// A function of the program, as the outside knows it.
+#[derive(Clone, Debug)]
+pub enum Callee {
+    /// Its name, in upper case; `PACKAGE:NAME` outside of the package of programs.
+    Named(String),
+    /// One that the machine keeps under this number.
+    Kept(u64),
+}
+
+/// A value of a program that its machine keeps for the outside, until the last clone is dropped.
+#[derive(Clone)]
+pub struct Kept(Arc<KeptNumber>);
+
+struct KeptNumber {
+    number: u64,
+    inbox: Inbox,
+}
+
+impl Drop for KeptNumber {
+    fn drop(&mut self) {
+        self.inbox.put(Incoming::Release(self.number));
+    }
+}
+
+impl fmt::Debug for Kept {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Kept({})", self.0.number)
+    }
+}
+
+impl Kept {
+    pub(crate) fn new(number: u64, inbox: Inbox) -> Kept {
+        Kept(Arc::new(KeptNumber { number, inbox }))
+    }
+
+    /// Returns what a question to the machine with this inbox calls the value: nothing, if another one keeps it.
+    pub fn callee(&self, inbox: &Inbox) -> Callee {
+        Callee::Kept(if self.0.inbox.is_same(inbox) { self.0.number } else { u64::MAX })
+    }
+}
+
 /// What is asked of a run.
 #[derive(Clone, Debug)]
 pub enum Question {
     /// What a function returns, which is called in a task of its own.
     Call {
-        /// Name of the function, in upper case; `PACKAGE:NAME` outside of the package of programs.
-        function: String,
+        /// The function.
+        function: Callee,
         /// The arguments.
         arguments: Vec<Datum>,
         /// Whether the task has its first turn before those that can run already.

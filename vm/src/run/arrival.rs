@@ -4,7 +4,7 @@ use esl_bytecode::datum::Datum;
 
 use super::finish::allocate_without_retry;
 use super::operation::{hear, import_list};
-use super::question::{abort_call, abort_task, take_question};
+use super::question::{abort_call, abort_task, release, take_question};
 use super::signal::signal;
 use super::spawn::{SpawnOptions, make_task};
 use super::wake::make_runnable;
@@ -29,6 +29,7 @@ pub(crate) fn take_in(vm: &mut Vm) -> bool {
             Incoming::Abort(number) => abort_task(vm, TaskNumber(number)),
             Incoming::AbortCall(number) => abort_call(vm, number),
             Incoming::Pause(pauses) => vm.scheduler.is_paused = pauses && !vm.embedder.is_ending,
+            Incoming::Release(number) => release(vm, number),
             Incoming::Watch => {
                 for observer in vm.watch.coming.take() {
                     vm.add_observer(observer);

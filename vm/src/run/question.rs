@@ -5,7 +5,7 @@ use esl_bytecode::symbol::{Symbol, USER_PACKAGE};
 
 use super::finish::allocate_without_retry;
 use crate::datum::{self, DatumError};
-use crate::host::{Answer, Question, TaskInfo};
+use crate::host::{Answer, Callee, Kept, Question, TaskInfo};
 use crate::report;
 use crate::task::{End, Task, TaskId, TaskNumber, TaskState};
 use crate::value::Value;
@@ -31,45 +31,84 @@ pub(super) fn take_question(vm: &mut Vm, number: u64, question: Question) {
                 }
                 vm.embedder.calls.insert(id.index, number);
             }
-            None => vm.outside.inbox.answer(number, no_room()),
+            None => vm.outside.inbox.answer(number, no_call(&function)),
         },
     }
 }
 
-fn no_room() -> Answer {
+fn no_call(function: &Callee) -> Answer {
+    let (cause, message) = match function {
+        Callee::Kept(u64::MAX) => (":PROGRAM-ERROR", "The function belongs to another engine."),
+        _ => (":HEAP-EXHAUSTED", "There is no memory left for a task."),
+    };
     Answer::Failed {
-        cause: ":HEAP-EXHAUSTED".into(),
-        message: "There is no memory left for a task.".into(),
+        cause: cause.into(),
+        message: message.into(),
         report: String::new(),
         arguments: Vec::new(),
     }
 }
 
+impl Vm {
+    /// Keeps a value for the outside, until that lets go of it.
+    pub fn keep(&mut self, value: Value) -> Kept {
+        self.embedder.pin(&mut self.heap, value);
+        self.embedder.kept_so_far += 1;
+        let number = self.embedder.kept_so_far;
+        self.embedder.kept.insert(number, value);
+        Kept::new(number, self.inbox())
+    }
+
+    /// Returns the function that the outside calls so: a symbol, or a value that is kept. `None` if there is no
+    /// room for the symbol, or no such value.
+    pub fn callee(&mut self, callee: &Callee) -> Option<Value> {
+        let name = match callee {
+            Callee::Named(name) => name,
+            Callee::Kept(number) => return self.embedder.kept.get(number).copied(),
+        };
+        let (package, name) = match name.rsplit_once(':') {
+            Some((package, name)) => (package.trim_end_matches(':'), name),
+            None => (USER_PACKAGE, &**name),
+        };
+        let packages = self.world.packages();
+        let found = packages.named(package).and_then(|package| packages.find(package, name));
+        let symbol = found.map_or_else(|| Symbol::new(&package.into(), name), |(symbol, _)| symbol);
+        let symbol = Datum::symbol(symbol, Default::default());
+        import_datum(self, &symbol)
+    }
+}
+
+/// Lets go of a value that was kept for the outside.
+pub(super) fn release(vm: &mut Vm, number: u64) {
+    if let Some(value) = vm.embedder.kept.remove(&number) {
+        vm.embedder.unpin(value);
+    }
+}
+
+/// Returns data as a value; `None` if there is no room.
+fn import_datum(vm: &mut Vm, datum: &Datum) -> Option<Value> {
+    // A cons around it tells `NIL` from a lack of room.
+    let cell = allocate_without_retry(vm, |vm| {
+        let (value, _) = datum::import(&mut vm.heap, &mut vm.world, datum)?;
+        Ok(vm.heap.cons(value, Value::NIL)?)
+    });
+    vm.heap.as_cons(cell).map(|cell| cell.car)
+}
+
 /// Makes the task that calls a function for somebody outside; `None` if there is no room for it.
-fn begin_call(vm: &mut Vm, function: &str, arguments: &[Datum]) -> Option<TaskId> {
-    let (package, name) = match function.rsplit_once(':') {
-        Some((package, name)) => (package.trim_end_matches(':'), name),
-        None => (USER_PACKAGE, function),
-    };
-    let packages = vm.world.packages();
-    let found = packages.named(package).and_then(|package| packages.find(package, name));
-    let symbol = found.map_or_else(|| Symbol::new(&package.into(), name), |(symbol, _)| symbol);
-    let symbol = Datum::symbol(symbol, Default::default());
-    let mut values = Vec::new();
-    for argument in std::iter::once(&symbol).chain(arguments) {
-        // A cons around it tells `NIL` from a lack of room.
-        let cell = allocate_without_retry(vm, |vm| {
-            let (value, _) = datum::import(&mut vm.heap, &mut vm.world, argument)?;
-            Ok(vm.heap.cons(value, Value::NIL)?)
-        });
-        let value = vm.heap.as_cons(cell)?.car;
+fn begin_call(vm: &mut Vm, function: &Callee, arguments: &[Datum]) -> Option<TaskId> {
+    let function = vm.callee(function)?;
+    vm.embedder.pin(&mut vm.heap, function);
+    let mut values = vec![function];
+    for argument in arguments {
         // A later argument may have what was made before collected.
+        let Some(value) = import_datum(vm, argument) else { break };
         vm.embedder.pin(&mut vm.heap, value);
         values.push(value);
     }
-    let id = vm.spawn(values[0], &values[1..]);
+    let id = if values.len() > arguments.len() { vm.spawn(values[0], &values[1..]).ok() } else { None };
     values.into_iter().for_each(|value| vm.embedder.unpin(value));
-    id.ok()
+    id
 }
 
 /// Aborts the task of the call that was asked for with this number.
