@@ -8,9 +8,8 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use esl::engine::{Ending, Failure, Operation, Poll};
-use esl::host::{RealHost, RecordingHost, ReplayHost, SendError, Sender, VirtualHost};
+use esl::host::{RealHost, RecordingHost, ReplayHost, SendError, VirtualHost};
 use esl::{Config, Data, Engine, Error};
-use esl_bytecode::datum::Datum;
 use esl_vm::observe::{Observer, Seen};
 use esl_vm::task::TaskNumber;
 
@@ -289,7 +288,7 @@ fn a_pending_operation_is_no_deadlock_and_reports_name_it() {
     define_lag(&mut engine);
     check(&mut engine, "(lag 20 'late)", "LATE");
     check(&mut engine, "(progn (spawn (:name 'slow) (lag 20)) (sleep 0))", "NIL");
-    let report = engine.machine().task_report();
+    let report = engine.task_report();
     assert!(report.contains("task SLOW waits for operation LAG 2"), "{report}");
 }
 
@@ -307,7 +306,7 @@ fn a_recorded_run_is_replayed_without_the_host() {
             .define("COUNT-CALLS", "()", "", move |_| Ok(calls.fetch_add(1, Ordering::Relaxed) as i64))
             .expect("it compiles");
         let value = engine.eval(text).expect("it returns");
-        (value.to_string(), engine.machine().canary(), engine.machine().ticks())
+        (value.to_string(), engine.canary(), engine.ticks())
     };
     let host = RecordingHost::new(RealHost::new(Vec::new()));
     let (recording, calls) = (host.recording(), Arc::new(AtomicUsize::new(0)));
@@ -329,12 +328,11 @@ fn senders_outside_signal_inputs_by_name() {
     check(&mut engine, "(define-input commands :capacity 3)", "COMMANDS");
     let waiting = "(list (wait-for-event commands) (multiple-value-list (wait-for-event commands)))";
     assert_eq!(engine.eval(waiting), Err(Error::Deadlocked));
-    let sender = Sender::new(&engine.machine().inbox());
-    let number = |n: i64| Datum::integer(n, Default::default());
+    let handle = engine.handle();
     let thread = std::thread::spawn(move || {
-        sender.signal("commands", vec![number(1)])?;
-        sender.signal("Commands", vec![number(2), number(3)])?;
-        sender.signal("orders", Vec::new())
+        handle.signal("commands", [1_i64.into()])?;
+        handle.signal("Commands", [2_i64.into(), 3_i64.into()])?;
+        handle.signal("orders", [])
     });
     check(&mut engine, waiting, "(1 (2 3))");
     assert_eq!(thread.join().ok(), Some(Err(SendError::NoSuchInput("ORDERS".into()))));
@@ -345,17 +343,16 @@ fn senders_outside_signal_inputs_by_name() {
 fn senders_wait_while_an_input_is_full() {
     let mut engine = engine();
     check(&mut engine, "(define-input commands :capacity 2 :when-full :wait)", "COMMANDS");
-    let sender = Sender::new(&engine.machine().inbox());
-    let other = sender.clone();
-    let thread = std::thread::spawn(move || {
-        (0..1000).all(|n| other.signal("commands", vec![Datum::integer(n, Default::default())]).is_ok())
-    });
+    let handle = engine.handle();
+    let other = handle.clone();
+    let thread =
+        std::thread::spawn(move || (0..1000_i64).all(|n| other.signal("commands", [n.into()]).is_ok()));
     check(&mut engine, "(loop for i below 1000 always (eql (wait-for-event commands) i))", "T");
     assert_eq!(thread.join().ok(), Some(true));
-    let full = (0..3).map(|_| sender.try_signal("commands", Vec::new())).find(Result::is_err);
+    let full = (0..3).map(|_| handle.try_signal("commands", [])).find(Result::is_err);
     assert_eq!(full, Some(Err(SendError::Full("COMMANDS".into()))));
     drop(engine);
-    assert_eq!(sender.signal("commands", Vec::new()), Err(SendError::Ended));
+    assert_eq!(handle.signal("commands", []), Err(SendError::Ended));
 }
 
 #[test]
@@ -493,7 +490,7 @@ fn a_run_with_questions_is_replayed() {
         });
         // Without the thread nobody asks; the recording has it all.
         check(&mut engine, "(loop until (eql (wait-for-event done) 49))", "NIL");
-        let canary = engine.machine().canary();
+        let canary = engine.canary();
         if let Some(thread) = thread {
             assert_eq!(engine.eval("(sleep 0.01)"), Ok(Data::Nil));
             assert_eq!(thread.join().ok(), Some(true));

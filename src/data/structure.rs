@@ -389,7 +389,7 @@ fn entries(items: &[Data]) -> Option<Vec<(Data, Data)>> {
     if items.iter().all(is_pair) {
         return items.iter().map(entry).collect();
     }
-    if items.len() % 2 != 0 {
+    if !items.len().is_multiple_of(2) {
         return None;
     }
     Some(items.chunks(2).map(|two| (two[0].clone(), two[1].clone())).collect())

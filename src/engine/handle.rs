@@ -8,7 +8,7 @@ use std::task::{Context, Poll};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::USER_PACKAGE;
 use esl_vm::embed::ExportError;
-use esl_vm::host::{Answer, Callee, Incoming, Pending, Question, SendError, Sender, TaskInfo};
+use esl_vm::host::{Answer, Callee, Incoming, Pending, ProcessSignal, Question, SendError, Sender, TaskInfo};
 use esl_vm::observe::{Coming, Observer};
 use esl_vm::vm::Vm;
 
@@ -98,7 +98,8 @@ impl Handle {
         )
     }
 
-    /// Calls a function of the program, by its name or as a [`Function`](super::Function), in a task of its own. The answer is its first value, converted.
+    /// Calls a function of the program, by its name or as a [`Function`](super::Function), in a task of its
+    /// own. The answer is its first value, converted.
     pub fn call<T: FromData>(
         &self,
         function: impl Callable,
@@ -126,6 +127,19 @@ impl Handle {
     /// Has tasks run again.
     pub fn resume(&self) {
         self.sender.inbox().put(Incoming::Pause(false));
+    }
+
+    /// Has [`Engine::eval`](super::Engine::eval) return with [`Error::Stopped`], and
+    /// [`Engine::run`](super::Engine::run) with [`Ending::Stopped`](super::Ending::Stopped). Tasks stay as
+    /// they are, and go on in the next run.
+    pub fn stop(&self) {
+        self.sender.inbox().put(Incoming::Stop);
+    }
+
+    /// Has the program deal with a signal as if the process had got it: it calls the function of `on-signal`,
+    /// or ends.
+    pub fn send_signal(&self, signal: ProcessSignal) {
+        self.sender.inbox().put(Incoming::Signal(signal));
     }
 
     /// Returns the tasks of the program that have not ended, in the order in which they were made.

@@ -260,9 +260,21 @@ impl Engine {
         left
     }
 
-    /// Returns the machine, for what this API does not offer.
-    pub fn machine(&mut self) -> &mut Vm {
-        &mut self.machine
+    /// Returns the canary of the run so far: a hash of the turns of its tasks and of the questions to its
+    /// host. Runs are compared by it: a recorded one and its replay have the same.
+    pub fn canary(&self) -> u64 {
+        self.machine.canary()
+    }
+
+    /// Returns the ticks that all tasks have used.
+    pub fn ticks(&self) -> u64 {
+        self.machine.ticks()
+    }
+
+    /// Returns a text that shows the tasks of the program: each below its maker, with what it does and where,
+    /// and the ticks that it has used.
+    pub fn task_report(&self) -> String {
+        self.machine.task_report()
     }
 }
 

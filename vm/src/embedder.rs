@@ -16,7 +16,7 @@ pub(crate) struct Embedder {
     pub(crate) pinned: Vec<Value>,
     /// Numbers of the questions from outside for which tasks run, by the places of these.
     pub(crate) calls: BTreeMap<TaskIndex, u64>,
-    /// Values that the outside holds, by number. They are pinned.
+    /// Values that the outside holds, by number.
     pub(crate) kept: BTreeMap<u64, Value>,
     /// Number of values kept so far.
     pub(crate) kept_so_far: u64,
@@ -43,6 +43,19 @@ impl Embedder {
     pub(crate) fn pin(&mut self, heap: &mut Heap, value: Value) {
         heap.log_if_marking(value);
         self.pinned.push(value);
+    }
+
+    /// Keeps a value for the outside, and returns the number under which it is kept.
+    pub(crate) fn keep(&mut self, heap: &mut Heap, value: Value) -> u64 {
+        heap.log_if_marking(value);
+        self.kept_so_far += 1;
+        self.kept.insert(self.kept_so_far, value);
+        self.kept_so_far
+    }
+
+    /// Calls `visit` with each value that the embedder or the outside holds.
+    pub(crate) fn visit(&self, visit: &mut impl FnMut(Value)) {
+        self.pinned.iter().chain(self.kept.values()).for_each(|&value| visit(value));
     }
 
     /// Lets go of a pinned value.

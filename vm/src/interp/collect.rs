@@ -6,13 +6,13 @@
 
 use super::{Leave, code_of};
 use crate::compiler::Compilations;
+use crate::embedder::Embedder;
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Phase, SLICE_VISITS, SliceOutcome};
 use crate::outside::Outside;
 use crate::saved_pc::SavedPc;
 use crate::schedule::{Scheduler, TurnEnd};
 use crate::task::{Task, Tasks};
-use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::Deliveries;
 use crate::world::World;
@@ -71,7 +71,7 @@ fn mark_roots(
     world: &World,
     compiler: &Compilations,
     exchange: &Exchange,
-    pinned: &[Value],
+    embedder: &Embedder,
     deliveries: &Deliveries,
     outside: &Outside,
 ) {
@@ -79,10 +79,10 @@ fn mark_roots(
     compiler.roots(&mut |value| heap.mark(value));
     heap.mark_slice(&exchange.values);
     heap.mark_slice(&exchange.requested_call);
-    heap.mark_slice(pinned);
     if let Some(raised) = &exchange.raised {
         raised.visit(&mut |value| heap.mark(value));
     }
+    embedder.visit(&mut |value| heap.mark(value));
     deliveries.visit(&mut |value| heap.mark(value));
     outside.visit(&mut |value| heap.mark(value));
 }
@@ -204,7 +204,7 @@ impl Vm {
         // running task, those of the others were noted at the switch.
         unsafe {
             heap.collect_fully(|heap| {
-                mark_roots(heap, world, compiler, exchange, &embedder.pinned, deliveries, outside);
+                mark_roots(heap, world, compiler, exchange, embedder, deliveries, outside);
                 for task in running.as_deref_mut().into_iter().chain(tasks.iter_mut()) {
                     _ = scan(heap, task);
                 }
@@ -224,7 +224,7 @@ impl Vm {
             Phase::Idle => {
                 heap.begin_cycle();
                 tasks.begin_cycle();
-                mark_roots(heap, world, compiler, exchange, &embedder.pinned, deliveries, outside);
+                mark_roots(heap, world, compiler, exchange, embedder, deliveries, outside);
                 if let Some(task) = running {
                     // SAFETY: `begin_pause` has noted the base of its running frame.
                     _ = unsafe { scan(heap, task) };

@@ -52,11 +52,8 @@ fn no_call(function: &Callee) -> Answer {
 impl Vm {
     /// Keeps a value for the outside, until that lets go of it.
     pub fn keep(&mut self, value: Value) -> Kept {
-        self.embedder.pin(&mut self.heap, value);
-        self.embedder.kept_so_far += 1;
-        let number = self.embedder.kept_so_far;
-        self.embedder.kept.insert(number, value);
-        Kept::new(number, self.inbox())
+        let number = self.embedder.keep(&mut self.heap, value);
+        Kept::new(number, self.outside.inbox.clone())
     }
 
     /// Returns the function that the outside calls so: a symbol, or a value that is kept. `None` if there is no
@@ -80,9 +77,7 @@ impl Vm {
 
 /// Lets go of a value that was kept for the outside.
 pub(super) fn release(vm: &mut Vm, number: u64) {
-    if let Some(value) = vm.embedder.kept.remove(&number) {
-        vm.embedder.unpin(value);
-    }
+    vm.embedder.kept.remove(&number);
 }
 
 /// Returns data as a value; `None` if there is no room.
