@@ -1451,9 +1451,11 @@ macro_rules! for_each_builtin {
             InterruptBy = task::interrupt_by, internal "%INTERRUPT-BY" ("guard");
             /// Lets a guard interrupt no more.
             CloseGuard = task::close_guard, internal "%CLOSE-GUARD" ("guard");
-            /// Makes the innermost catch, for `tag`, a limit: when it expires, its form is ended and gives
-            /// the cause.
-            OpenLimit = task::open_limit, internal "%OPEN-LIMIT" ("tag seconds ticks");
+            /// Makes the innermost catch, for `tag`, a limit of time, of ticks, or of a quota's units of the
+            /// measure with this number: when it expires, its form is ended and gives the cause.
+            OpenLimit = task::open_limit, internal "%OPEN-LIMIT" ("tag seconds units &optional measure");
+            /// Returns true if a task has to end because it charges a quota that is spent.
+            IsOverQuota = task::is_over_quota, internal "%IS-OVER-QUOTA" ("task");
             /// Makes the limit for `tag` of `task` expire with `cause`, a keyword, unless it is closed.
             ExpireLimit = task::expire_limit, internal "%EXPIRE-LIMIT" ("task tag cause");
             /// Begins a critical section: no other task runs.

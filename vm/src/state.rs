@@ -149,7 +149,7 @@ state! {
 list_state! { Operations { open: Run, begun: Run } }
 list_state! { RunQueues { queues: Run, occupied: Derived, urgent: Run, turns: Run } }
 list_state! { Timers { heap: Run, sequence: Run, sweep_at: Run } }
-list_state! { Accounts { accounts: Run, free: Run } }
+list_state! { Accounts { accounts: Run, free: Run, bytes_counted: Derived } }
 list_state! { Deliveries { signals: Run, held: Run } }
 list_state! { EndOfAll { left: Run } }
 list_state! { Counts { alive: Run, foreground: Run, made: Run, made_at_end: Run, turns: Run, switches: Run } }

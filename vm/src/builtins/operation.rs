@@ -4,6 +4,8 @@ use crate::builtins::rights::demand;
 use crate::builtins::task::expect_task;
 use crate::datum;
 use crate::raise::{Exit, Outcome, Raised};
+use crate::run;
+use crate::schedule::Measure;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::operation;
@@ -56,8 +58,10 @@ pub(super) fn begin_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if !vm.outside.has_operation(&name) {
         return vm.exchange.raise(Raised::Cause("NOT-IN-THIS-WORLD", arguments[0]));
     }
+    run::admit(vm, Measure::Operations)?;
     let number = vm.outside.operations.next_number();
     let handle = operation::make(&mut vm.heap, arguments[0], number, vm.world.known.pending)?;
+    vm.scheduler.accounts.take(vm.scheduler.running_account(), Measure::Operations);
     vm.outside.begin_operation(&name, &data, handle, detached.is_true());
     Ok(handle)
 }
@@ -93,8 +97,10 @@ pub(super) fn operationp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn make_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    run::admit(vm, Measure::Operations)?;
     let number = vm.outside.operations.next_number();
     let handle = operation::make(&mut vm.heap, arguments[0], number, vm.world.known.pending)?;
+    vm.scheduler.accounts.take(vm.scheduler.running_account(), Measure::Operations);
     vm.outside.operations.count();
     Ok(handle)
 }

@@ -5,7 +5,7 @@ use crate::builtins::event::{nanoseconds, take_or_park};
 use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::run::{self, SpawnOptions};
-use crate::schedule::Scheduler;
+use crate::schedule::{Amount, Measure, Scheduler};
 use crate::task::{DEFAULT_PRIORITY, End, PRIORITIES, TaskIndex, TaskNumber, TaskState, guard};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -308,15 +308,41 @@ pub(super) fn close_guard(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::NIL)
 }
 
+/// Returns what quotas count under this number, which the library knows.
+fn measure_argument(vm: &mut Vm, v: Value) -> Result<Measure, Exit> {
+    match v.as_index() {
+        Some(0) => Ok(Measure::Ticks),
+        Some(1) => Ok(Measure::Bytes),
+        Some(2) => Ok(Measure::Tasks),
+        Some(3) => Ok(Measure::Operations),
+        _ => vm.exchange.not_written(v, "(INTEGER 0 3)"),
+    }
+}
+
 pub(super) fn open_limit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [tag, seconds, ticks] = exactly(arguments);
+    let argument = |index: usize| arguments.get(index).copied().unwrap_or(Value::NIL);
+    let (tag, seconds, units, measure) = (argument(0), argument(1), argument(2), argument(3));
     let time = if seconds.is_nil() { None } else { Some(nanoseconds(vm, seconds)?) };
-    let ticks = if ticks.is_nil() { None } else { Some(ticks_argument(vm, ticks)?) };
+    let amount = if units.is_nil() {
+        None
+    } else {
+        let units = ticks_argument(vm, units)?;
+        let is_quota = measure.is_true();
+        let measure = if is_quota { measure_argument(vm, measure)? } else { Measure::Ticks };
+        Some(Amount { measure, units, is_quota })
+    };
     let open = vm.scheduler.task().extra.as_ref().map_or(0, |extra| extra.limits.len());
     if open >= MAX_LIMITS {
         return vm.exchange.raise(Raised::StackExhausted);
     }
-    Ok(Value::boolean(run::open_limit(vm, tag, time, ticks)))
+    Ok(Value::boolean(run::open_limit(vm, tag, time, amount)))
+}
+
+pub(super) fn is_over_quota(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let task = expect_task(vm, arguments[0])?;
+    let Some(index) = event::task_index(&vm.heap, task) else { return Ok(Value::NIL) };
+    let Some(account) = vm.scheduler.find(index).map(|task| task.account) else { return Ok(Value::NIL) };
+    Ok(Value::boolean(vm.scheduler.accounts.is_quota_spent_for(account, index)))
 }
 
 pub(super) fn expire_limit(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -8,6 +8,7 @@ use crate::heap::Kind;
 use crate::interp;
 use crate::raise::Exit;
 use crate::report;
+use crate::schedule::Measure;
 use crate::task::{AccountId, End, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -41,7 +42,11 @@ pub(super) fn finish_task(vm: &mut Vm) {
     let task = vm.scheduler.task_mut();
     let notify = std::mem::replace(&mut task.notify, Value::NIL);
     let account = std::mem::replace(&mut task.account, AccountId::NONE);
+    let is_hidden = task.flags.hidden();
     interp::start::drop_frames(vm);
+    if !is_hidden {
+        vm.scheduler.accounts.give_back(account, Measure::Tasks);
+    }
     vm.scheduler.accounts.leave(account);
     report::trace_end(vm, vm.heap.slot_or_nil(object, event::NAME), status);
     report_end(vm, end, is_awaited || notify.is_true());

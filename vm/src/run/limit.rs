@@ -1,16 +1,17 @@
-//! Limits of time and of ticks: opening them, and their expiry.
+//! Limits of time, of ticks and of other measures: opening them, and their expiry.
 //!
 //! A limit that expires is noted in its task and seen to before the task next runs: see `pending`.
 
 use super::wake::call_attention;
-use crate::schedule::{AccountOwner, Due};
+use crate::raise::Exit;
+use crate::schedule::{AccountOwner, Amount, Due, Measure};
 use crate::task::{AccountId, EntryKind, Limit, LimitNumber, TaskIndex};
 use crate::value::Value;
 use crate::vm::Vm;
 
 /// Makes the innermost catch of the running task, whose tag is `tag`, a limit of time, in nanoseconds from
-/// now, and of ticks. Returns whether there is such a catch.
-pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, ticks: Option<u64>) -> bool {
+/// now, or of an amount that may be used. Returns whether there is such a catch.
+pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, amount: Option<Amount>) -> bool {
     let scheduler = &mut vm.scheduler;
     let number = scheduler.next_limit();
     let now = scheduler.clock.read(&mut vm.outside.host);
@@ -25,8 +26,8 @@ pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, ticks: Opti
     let parent = task.account;
     let ends = time.map(|time| task.time_at(now).saturating_add(time));
     let mut limit = Limit { entry, number, account: AccountId::NONE, ends, expired: None };
-    if let Some(ticks) = ticks {
-        limit.account = scheduler.accounts.open(parent, ticks, AccountOwner::Form(index, number));
+    if let Some(amount) = amount {
+        limit.account = scheduler.accounts.open(parent, amount, AccountOwner::Form(index, number));
         scheduler.task_mut().account = limit.account;
         // What the slice has used so far is not charged to it, and the next one is to be no longer than it
         // allows.
@@ -36,7 +37,7 @@ pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, ticks: Opti
     if let Some(time) = time {
         scheduler.timers.push(now.saturating_add(time), index, Due::Limit(number));
     }
-    if ticks == Some(0) {
+    if amount.is_some_and(|amount| amount.measure == Measure::Ticks && amount.units == 0) {
         expire(vm, index, number, vm.world.known.budget_exhausted);
     }
     true
@@ -88,11 +89,25 @@ pub(crate) fn go_on(vm: &mut Vm) {
     }
 }
 
-/// Charges ticks to an account and those above it; limits whose accounts are spent by it expire.
-pub(super) fn charge_account(vm: &mut Vm, id: AccountId, ticks: u64) {
-    for (index, number) in vm.scheduler.accounts.charge(id, ticks) {
+/// Charges ticks or bytes to an account and those above it; limits whose accounts are spent by it expire.
+pub(super) fn charge_account(vm: &mut Vm, id: AccountId, measure: Measure, units: u64) {
+    for (index, number) in vm.scheduler.accounts.charge(id, measure, units) {
         expire(vm, index, number, vm.world.known.budget_exhausted);
     }
+}
+
+/// Sees to it that the running task may take a unit more of a measure.
+///
+/// # Errors
+/// [`Exit::Again`] if that is more than a quota allows: before the task does it again, the form with the quota
+/// ends. Where it cannot, as in a cleanup, the unit may be taken then.
+pub(crate) fn admit(vm: &mut Vm, measure: Measure) -> Result<(), Exit> {
+    let account = vm.scheduler.running_account();
+    let Err(expired) = vm.scheduler.accounts.admit(account, measure) else { return Ok(()) };
+    for (index, number) in expired {
+        expire(vm, index, number, vm.world.known.budget_exhausted);
+    }
+    Err(Exit::Again)
 }
 
 /// Notes that the limit of a task that was opened for `tag` has expired, if it is still open.

@@ -37,7 +37,7 @@ mod wake;
 pub(crate) use abort::abort_others;
 pub(crate) use arrival::take_in;
 pub use call::{CallError, FailureArguments};
-pub(crate) use limit::{expire_limit, go_on, open_limit, stand_still};
+pub(crate) use limit::{admit, expire_limit, go_on, open_limit, stand_still};
 pub(crate) use pending::interrupt_by;
 pub(crate) use signal::{deliver_some, show_kept};
 pub(crate) use spawn::{SpawnOptions, make_task};

@@ -94,8 +94,9 @@ fn take_pending(vm: &mut Vm) -> Option<Value> {
 /// Begins to end the running task.
 fn end_running_task(vm: &mut Vm) {
     vm.scheduler.cancel_wait(&mut vm.heap);
+    let is_over_quota = vm.scheduler.is_task_over_quota();
     let task = vm.scheduler.task_mut();
-    let end = if task.flags.abort_pending() { End::Aborted } else { End::Spent };
+    let end = if task.flags.abort_pending() || is_over_quota { End::Aborted } else { End::Spent };
     task.flags.set_abort_pending(false);
     task.flags.set_attention(false);
     task.flags.set_urgent(true);

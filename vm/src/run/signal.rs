@@ -13,8 +13,8 @@ use super::wake::make_runnable;
 use crate::heap::{Heap, Kind};
 use crate::raise::Exit;
 use crate::report;
-use crate::schedule::TurnEnd;
-use crate::task::{AccountId, TaskNumber};
+use crate::schedule::{Measure, TurnEnd};
+use crate::task::TaskNumber;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::input::{self, WhenFull};
@@ -195,7 +195,7 @@ fn begin_delivery(vm: &mut Vm, event: Value, arguments: Value) {
     let next = link::first(&vm.heap, event);
     if next.is_true() {
         let scheduler = &mut vm.scheduler;
-        let account = scheduler.running.as_ref().map_or(AccountId::NONE, |task| task.account);
+        let account = scheduler.running_account();
         let by = scheduler.running_number();
         scheduler.accounts.enter(account);
         scheduler.deliveries.signals.push_back(Delivery { event, arguments, next, account, by });
@@ -218,7 +218,7 @@ pub(crate) fn deliver_some(vm: &mut Vm) {
         hand_over(vm, link, (event, by), arguments, &mut cells);
     }
     vm.scheduler.spent += links.len() as u64;
-    charge_account(vm, account, links.len() as u64);
+    charge_account(vm, account, Measure::Ticks, links.len() as u64);
     let deliveries = &mut vm.scheduler.deliveries;
     match deliveries.signals.front_mut() {
         Some(delivery) if link.is_true() => delivery.next = link,

@@ -3,11 +3,12 @@
 //! A task is made of a function and its arguments. It begins with copies of its maker's bindings of special
 //! variables, and charges the same account.
 
+use super::limit::admit;
 use crate::heap::Kind;
 use crate::interp;
 use crate::raise::{Exit, Raised};
 use crate::report::{self, Happening};
-use crate::schedule::AccountOwner;
+use crate::schedule::{AccountOwner, Amount, Measure};
 use crate::task::{Bindings, DEFAULT_PRIORITY, Fund, Task, TaskId, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -77,7 +78,11 @@ impl Vm {
             scheduler.counts.alive -= 1;
             scheduler.counts.foreground -= usize::from(!task.flags.daemon());
             let (object, wait, account) = (task.object, task.wait, task.account);
+            let hidden = task.flags.hidden();
             scheduler.close_wait(&mut self.heap, wait);
+            if !hidden {
+                scheduler.accounts.give_back(account, Measure::Tasks);
+            }
             scheduler.accounts.leave(account);
             self.heap.slot_set(object, event::STATE, self.world.known.aborted);
         }
@@ -96,8 +101,8 @@ fn try_spawn(vm: &mut Vm, function: Value, arguments: &[Value]) -> Result<TaskId
 /// running task.
 ///
 /// # Errors
-/// [`Exit::Collect`] if there is no room for it, and a failure if it would belong to a form of a cleanup that
-/// is being cut off; then nothing has happened.
+/// [`Exit::Collect`] if there is no room for it, [`Exit::Again`] if it would be more than a quota allows, and a
+/// failure if it would belong to a form of a cleanup that is being cut off; then nothing has happened.
 pub(crate) fn make_task(
     vm: &mut Vm,
     function: Value,
@@ -105,6 +110,9 @@ pub(crate) fn make_task(
     options: SpawnOptions,
 ) -> Result<TaskId, Exit> {
     let fund = if options.notify.is_true() { fund_of_child(vm)? } else { None };
+    if !options.hidden {
+        admit(vm, Measure::Tasks)?;
+    }
     let Vm { heap, world, scheduler, exchange, .. } = vm;
     let words = interp::start::first_words(heap, function, arguments);
     let maker = scheduler.running.as_ref();
@@ -134,8 +142,14 @@ pub(crate) fn make_task(
         task.extra_mut().fund = Some(fund);
     }
     if let Some(maker) = scheduler.running.as_ref().filter(|_| !options.is_service) {
-        scheduler.accounts.enter(maker.account);
-        task.account = maker.account;
+        // What a cleanup makes in a form that has used up its account is not to end at once.
+        let is_free = maker.runs_cleanup();
+        let account = scheduler.accounts.for_child(maker.account, is_free);
+        scheduler.accounts.enter(account);
+        task.account = account;
+        if !options.hidden {
+            scheduler.accounts.take(account, Measure::Tasks);
+        }
         if let Some(control) = maker.control.get()
             && control.bindings.len() > 0
         {
@@ -148,7 +162,7 @@ pub(crate) fn make_task(
     task.recount(heap);
     if let Some(ticks) = options.budget {
         let above = task.account;
-        task.account = scheduler.accounts.open(above, ticks, AccountOwner::Tasks);
+        task.account = scheduler.accounts.open(above, Amount::budget(ticks), AccountOwner::Tasks);
         // The account has taken the place of the task with the one above.
         scheduler.accounts.leave(above);
     }

@@ -12,7 +12,7 @@ use crate::heap::Heap;
 use crate::interp::{self, Leave};
 use crate::observe::Seen;
 use crate::report::{self, Happening};
-use crate::schedule::{Due, OpenSlice, OpenTurn, Parking, TurnEnd};
+use crate::schedule::{Due, Measure, OpenSlice, OpenTurn, Parking, TurnEnd};
 use crate::task::{AccountId, Task, TaskIndex, TaskState};
 use crate::vm::Vm;
 
@@ -64,6 +64,7 @@ fn run_slice(vm: &mut Vm, index: TaskIndex, rest: Option<OpenSlice>, end: u64) -
     }
     let Some(task) = vm.scheduler.tasks.take(index) else { return Some(Leave::Ended) };
     let portion = end.saturating_sub(vm.scheduler.spent);
+    let allocated = vm.bytes_for_accounts();
     let (mut slice, leave) = match rest {
         None => begin_slice(vm, index, task, portion),
         Some(slice) => (slice, go_on_with_slice(vm, task, slice, portion)),
@@ -78,6 +79,7 @@ fn run_slice(vm: &mut Vm, index: TaskIndex, rest: Option<OpenSlice>, end: u64) -
     };
     let used = vm.cpu.take_used();
     slice.used += used;
+    slice.bytes += vm.bytes_for_accounts().saturating_sub(allocated);
     if leave == Leave::Slice && used >= portion && used < slice.left && vm.slice_may_go_on() {
         vm.scheduler.spent += used;
         slice.left -= used;
@@ -87,8 +89,16 @@ fn run_slice(vm: &mut Vm, index: TaskIndex, rest: Option<OpenSlice>, end: u64) -
     }
     let charges = vm.exchange.charges.take().ticks();
     vm.scheduler.spent += used + charges;
-    end_slice(vm, slice.used + charges, slice.account, leave);
+    slice.used += charges;
+    end_slice(vm, slice, leave);
     Some(leave)
+}
+
+impl Vm {
+    /// Returns the number of bytes allocated so far, if an account counts them.
+    fn bytes_for_accounts(&self) -> u64 {
+        if self.scheduler.accounts.count_bytes() { self.heap.stats().allocated } else { 0 }
+    }
 }
 
 /// Makes a task the running one, and runs it for a slice, or for a portion of it.
@@ -109,7 +119,7 @@ fn begin_slice(vm: &mut Vm, index: TaskIndex, mut task: Box<Task>, portion: u64)
         Ok(()) => interp::run(vm),
         Err(leave) => leave,
     };
-    (OpenSlice { left, used: 0, account, collections: 0 }, leave)
+    (OpenSlice { left, used: 0, bytes: 0, account, collections: 0 }, leave)
 }
 
 /// Makes a task the running one, and runs it for a further portion of its slice.
@@ -143,7 +153,8 @@ fn leave_slice_open(vm: &mut Vm, slice: OpenSlice) {
 }
 
 /// Charges the running task what it has used in its slice, and takes it off the processor.
-fn end_slice(vm: &mut Vm, used: u64, account: AccountId, leave: Leave) {
+fn end_slice(vm: &mut Vm, slice: OpenSlice, leave: Leave) {
+    let OpenSlice { used, bytes, account, .. } = slice;
     let word = if leave == Leave::Ended {
         0
     } else {
@@ -158,7 +169,8 @@ fn end_slice(vm: &mut Vm, used: u64, account: AccountId, leave: Leave) {
     }
     vm.scheduler.canary.mix(course);
     if account != AccountId::NONE {
-        charge_account(vm, account, used);
+        charge_account(vm, account, Measure::Ticks, used);
+        charge_account(vm, account, Measure::Bytes, bytes);
     }
     if vm.watch.is_watched {
         tell_how_turn_ended(vm, leave);

@@ -22,7 +22,7 @@ mod queues;
 mod timer;
 mod turn;
 
-pub(crate) use account::{AccountOwner, Accounts};
+pub(crate) use account::{AccountOwner, Accounts, Amount, Measure};
 pub use choices::Choices;
 pub(crate) use clock::Clock;
 pub use point::Grain;
@@ -74,7 +74,7 @@ pub(crate) struct Scheduler {
     pub(crate) choices: Choices,
     /// Times at which waits end, limits expire and cleanups are looked at.
     pub(crate) timers: Timers,
-    /// Budgets of forms and tasks.
+    /// Budgets and quotas of forms and tasks.
     pub(crate) accounts: Accounts,
     /// Signals under delivery, and the tasks held back by them.
     pub(crate) deliveries: Deliveries,
@@ -289,9 +289,19 @@ impl Scheduler {
         }
     }
 
+    /// Returns the account that the running task charges, if there is a task and an account.
+    pub(crate) fn running_account(&self) -> AccountId {
+        self.running.as_ref().map_or(AccountId::NONE, |task| task.account)
+    }
+
     /// Returns whether the running task has to end because an account that it charges is spent.
     pub(crate) fn is_task_spent(&self) -> bool {
         self.accounts.is_spent_for(self.task().account, self.turn.index)
+    }
+
+    /// Returns whether the running task has to end because it charges a quota that is spent.
+    pub(crate) fn is_task_over_quota(&self) -> bool {
+        self.accounts.is_quota_spent_for(self.task().account, self.turn.index)
     }
 
     /// Returns whether the budget of the run is spent.

@@ -12,7 +12,9 @@ pub(crate) struct OpenSlice {
     pub(crate) left: u64,
     /// Ticks used of it, which its task was not charged yet.
     pub(crate) used: u64,
-    /// Account that its ticks will be charged to.
+    /// Bytes allocated in it, if an account counts them, which its task was not charged either.
+    pub(crate) bytes: u64,
+    /// Account that they will be charged to.
     pub(crate) account: AccountId,
     /// Number of the collector's turns in it.
     pub(crate) collections: u32,
