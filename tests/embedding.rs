@@ -106,6 +106,50 @@ fn a_failure_is_one_of_the_program_at_the_call() {
 }
 
 #[test]
+fn operations_are_told_when_their_task_is_suspended_and_goes_on() {
+    let log = Arc::new(Mutex::new(Vec::new()));
+    let mut engine = engine();
+    let noted = log.clone();
+    let drives = "Drives until it is told to stop.";
+    let defined = engine.define_operation("DRIVE", "()", drives, move |operation| {
+        let note = |what| {
+            let noted = noted.clone();
+            move || noted.lock().expect("no panic").push(what)
+        };
+        note("begins")();
+        let (pauses, goes_on, stops) = (note("pauses"), note("goes on"), note("stops"));
+        operation.on_suspension(move |is_suspended| if is_suspended { pauses() } else { goes_on() });
+        let kept = Arc::new(Mutex::new(None));
+        let dropped = kept.clone();
+        operation.on_cancel(move || {
+            stops();
+            drop(dropped.lock().expect("no panic").take());
+        });
+        *kept.lock().expect("no panic") = Some(operation);
+    });
+    defined.expect("it compiles");
+    let noted = log.clone();
+    let counts = engine.define("NOTED", "()", "Returns how much has happened.", move |_| {
+        Ok(noted.lock().expect("no panic").len() as i64)
+    });
+    counts.expect("it compiles");
+    let text = "(let ((task (spawn (drive))) (other (spawn (drive))))
+                  (loop (when (= (noted) 2) (return)) (sleep 0))
+                  (suspend-task task)
+                  (suspend-task task)
+                  (resume-task task)
+                  (resume-task task)
+                  (loop (when (= (noted) 4) (return)) (sleep 0))
+                  (suspend-task task)
+                  (abort-task task)
+                  (abort-task other)
+                  (list (task-status task) (task-status other)))";
+    check(&mut engine, text, "(:ABORTED :ABORTED)");
+    let expected = ["begins", "begins", "pauses", "goes on", "pauses", "stops", "stops"];
+    assert_eq!(*log.lock().expect("no panic"), expected);
+}
+
+#[test]
 fn leaving_a_call_cancels_and_waits_until_the_outside_has_stopped() {
     let log = Arc::new(Mutex::new(Vec::new()));
     let mut engine = engine();

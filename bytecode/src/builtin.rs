@@ -965,6 +965,9 @@ macro_rules! for_each_builtin {
             /// Begins the embedder's operation of this name, a symbol, with a list of arguments; its handle.
             /// Nobody waits until a detached one has stopped.
             BeginOperation = operation::begin_operation, internal "%BEGIN-OPERATION" ("name arguments detached");
+            /// Tells the outside that this task, whose operations are under way there, stands still, or goes
+            /// on.
+            TellOfSuspension = operation::tell_of_suspension, internal "%TELL-OF-SUSPENSION" ("stands");
             /// Tells the outside to stop an operation, once.
             CancelOperation = operation::cancel_operation, internal "%CANCEL-OPERATION" ("handle");
             /// What has become of an operation: a keyword, and the list of its values or of the cause and the

@@ -146,7 +146,7 @@ state! {
     }
 }
 
-list_state! { Operations { open: Run, begun: Run } }
+list_state! { Operations { open: Run, begun: Run, by_task: Derived } }
 list_state! { RunQueues { queues: Run, occupied: Derived, urgent: Run, turns: Run } }
 list_state! { Timers { heap: Run, sequence: Run, sweep_at: Run } }
 list_state! { Accounts { accounts: Run, free: Run, bytes_counted: Derived } }

@@ -62,8 +62,16 @@ pub(super) fn begin_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let number = vm.outside.operations.next_number();
     let handle = operation::make(&mut vm.heap, arguments[0], number, vm.world.known.pending)?;
     vm.scheduler.accounts.take(vm.scheduler.running_account(), Measure::Operations);
-    vm.outside.begin_operation(&name, &data, handle, detached.is_true());
+    let task = vm.scheduler.running_number();
+    vm.outside.begin_operation(&name, &data, handle, detached.is_true(), task);
     Ok(handle)
+}
+
+pub(super) fn tell_of_suspension(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let task = vm.scheduler.running_number();
+    let told = vm.outside.operations.suspend(task, arguments[0].is_true());
+    vm.exchange.charge(told);
+    Ok(Value::NIL)
 }
 
 pub(super) fn cancel_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -43,9 +43,26 @@ enum OnCancel {
     Done,
 }
 
-/// The part of an operation that the machine keeps: it can cancel the operation.
+/// What the outside is told of suspensions of the task that has begun an operation.
+#[derive(Default)]
+struct Suspension {
+    /// Whether the task stands still.
+    is_suspended: bool,
+    /// Function that is called with this whenever it changes.
+    on_change: Option<Box<dyn FnMut(bool) + Send>>,
+}
+
+/// What the two parts of an operation share.
+#[derive(Default)]
+struct Shared {
+    on_cancel: Mutex<OnCancel>,
+    suspension: Mutex<Suspension>,
+}
+
+/// The part of an operation that the machine keeps: it can cancel the operation, and say that its task stands
+/// still.
 #[derive(Clone, Default)]
-pub(crate) struct Canceller(Arc<Mutex<OnCancel>>);
+pub(crate) struct Canceller(Arc<Shared>);
 
 impl fmt::Debug for Canceller {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -56,7 +73,12 @@ impl fmt::Debug for Canceller {
 impl Canceller {
     fn lock(&self) -> MutexGuard<'_, OnCancel> {
         // The state is whole at every moment, so a panic elsewhere does not corrupt it.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.on_cancel.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn lock_suspension(&self) -> MutexGuard<'_, Suspension> {
+        // As above.
+        self.0.suspension.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Tells the outside to stop the operation.
@@ -64,6 +86,17 @@ impl Canceller {
         let before = std::mem::replace(&mut *self.lock(), OnCancel::Done);
         if let OnCancel::Call(function) = before {
             function();
+        }
+    }
+
+    /// Tells the outside that the task which has begun the operation stands still, or goes on.
+    pub(crate) fn suspend(&self, is_suspended: bool) {
+        let mut suspension = self.lock_suspension();
+        if std::mem::replace(&mut suspension.is_suspended, is_suspended) != is_suspended
+            && let Some(function) = &mut suspension.on_change
+        {
+            // Under the lock, so that the last thing said is what is so.
+            function(is_suspended);
         }
     }
 }
@@ -129,6 +162,22 @@ impl Operation {
         *state = OnCancel::Call(Box::new(function));
     }
 
+    /// Has `function` called with true when the task that has begun the operation is suspended, and with false
+    /// when it goes on; at once if it is suspended already. The machine waits for the function, so it should
+    /// only pass the message on; it may not ask this operation whether it is suspended.
+    pub fn on_suspension(&self, mut function: impl FnMut(bool) + Send + 'static) {
+        let mut suspension = self.canceller.lock_suspension();
+        if suspension.is_suspended {
+            function(true);
+        }
+        suspension.on_change = Some(Box::new(function));
+    }
+
+    /// Returns whether the task that has begun the operation is suspended.
+    pub fn is_suspended(&self) -> bool {
+        self.canceller.lock_suspension().is_suspended
+    }
+
     /// Returns whether the program has cancelled the operation.
     pub fn is_cancelled(&self) -> bool {
         matches!(*self.canceller.lock(), OnCancel::Done)
@@ -179,6 +228,27 @@ mod tests {
         });
         assert!(thread.join().is_err());
         assert!(heard(&inbox).contains("HOST-PANIC"));
+    }
+
+    #[test]
+    fn suspensions_are_told_in_order_and_once() {
+        let (operation, _, canceller) = begun();
+        let told = Arc::new(Mutex::new(Vec::new()));
+        let listen = |told: &Arc<Mutex<Vec<bool>>>| {
+            let told = told.clone();
+            move |is_suspended| told.lock().expect("nobody panics").push(is_suspended)
+        };
+        operation.on_suspension(listen(&told));
+        for is_suspended in [false, true, true, false, true] {
+            canceller.suspend(is_suspended);
+        }
+        assert_eq!(*told.lock().expect("nobody panics"), [true, false, true]);
+        // One who comes later learns of it at once.
+        let later = Arc::new(Mutex::new(Vec::new()));
+        operation.on_suspension(listen(&later));
+        canceller.suspend(false);
+        assert_eq!(*later.lock().expect("nobody panics"), [true, false]);
+        assert!(!operation.is_suspended());
     }
 
     #[test]

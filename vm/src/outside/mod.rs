@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use esl_bytecode::datum::Datum;
 
 use crate::host::{Asked, Canceller, Console, Failure, Host, Inbox, Operation, Output, Right};
+use crate::task::TaskNumber;
 use crate::value::Value;
 pub(crate) use operations::Operations;
 
@@ -104,11 +105,12 @@ impl Outside {
         arguments: &[Datum],
         handle: Value,
         is_detached: bool,
+        begun_by: TaskNumber,
     ) {
         let Some(given) = self.functions.get_mut(name) else { return };
         let HostFunction::Operation(function) = &mut given.function else { return };
         let canceller = Canceller::default();
-        self.operations.begin(handle, canceller.clone(), is_detached);
+        self.operations.begin(handle, canceller.clone(), is_detached, begun_by);
         let number = self.operations.begun;
         self.host.begin(name, arguments, &mut |arguments| {
             function(Operation::new(number, arguments.to_vec(), self.inbox.clone(), canceller.clone()));

@@ -1,8 +1,9 @@
 //! The operations under way, as the machine knows them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::host::Canceller;
+use crate::task::TaskNumber;
 use crate::value::Value;
 
 /// An operation under way.
@@ -16,6 +17,8 @@ pub(crate) struct OpenOperation {
     pub(crate) is_cancelled: bool,
     /// Whether nobody waits until it has stopped.
     pub(crate) is_detached: bool,
+    /// The task that has begun it.
+    pub(crate) begun_by: TaskNumber,
 }
 
 /// The operations under way, by number.
@@ -24,6 +27,8 @@ pub(crate) struct Operations {
     pub(crate) open: BTreeMap<u64, OpenOperation>,
     /// Number of operations begun so far.
     pub(crate) begun: u64,
+    /// Those under way, each behind the task that has begun it.
+    pub(crate) by_task: BTreeSet<(TaskNumber, u64)>,
 }
 
 impl Operations {
@@ -44,9 +49,32 @@ impl Operations {
     }
 
     /// Adds the next operation.
-    pub(crate) fn begin(&mut self, handle: Value, canceller: Canceller, is_detached: bool) {
+    pub(crate) fn begin(
+        &mut self,
+        handle: Value,
+        canceller: Canceller,
+        is_detached: bool,
+        begun_by: TaskNumber,
+    ) {
         self.begun += 1;
-        self.open.insert(self.begun, OpenOperation { handle, canceller, is_cancelled: false, is_detached });
+        self.by_task.insert((begun_by, self.begun));
+        let open = OpenOperation { handle, canceller, is_cancelled: false, is_detached, begun_by };
+        self.open.insert(self.begun, open);
+    }
+
+    /// Removes one that is over.
+    pub(crate) fn remove(&mut self, number: u64) {
+        if let Some(open) = self.open.remove(&number) {
+            self.by_task.remove(&(open.begun_by, number));
+        }
+    }
+
+    /// Tells the outside that a task, whose operations these are, stands still or goes on. Returns how many
+    /// there are.
+    pub(crate) fn suspend(&self, task: TaskNumber, is_suspended: bool) -> usize {
+        let of_task = self.by_task.range((task, 0)..=(task, u64::MAX));
+        let open = of_task.filter_map(|(_, number)| self.open.get(number));
+        open.inspect(|open| open.canceller.suspend(is_suspended)).count()
     }
 
     /// Cancels an operation, once. The outside says when it has stopped.

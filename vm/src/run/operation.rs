@@ -39,7 +39,7 @@ pub(super) fn hear(vm: &mut Vm, number: u64, news: News) {
     vm.heap.slot_set(handle, operation::RESULT, result);
     vm.heap.slot_set(handle, operation::STATE, state);
     signal(vm, handle);
-    vm.outside.operations.open.remove(&number);
+    vm.outside.operations.remove(number);
 }
 
 /// Returns data as a list of the heap; `None` if there is no room for it.
