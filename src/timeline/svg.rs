@@ -33,6 +33,7 @@ enum Activity {
     Runs,
     Ready,
     Waits(String),
+    IsSuspended(String),
 }
 
 struct Bar {
@@ -139,6 +140,7 @@ impl Observer for Drawing {
             Seen::Runs => self.change(time, task, Some(Activity::Runs)),
             Seen::IsReady => self.change(time, task, Some(Activity::Ready)),
             Seen::Waits(reason) => self.change(time, task, Some(Activity::Waits(reason.into()))),
+            Seen::IsSuspended(reason) => self.change(time, task, Some(Activity::IsSuspended(reason.into()))),
             Seen::IsToEnd => self.mark(time, task, Sign::IsToEnd, "is to be aborted".into()),
             Seen::Ends(how) => {
                 self.change(time, task, None);
@@ -219,7 +221,7 @@ fn fit(text: &str, width: f64) -> String {
 }
 
 const STYLE: &str = "text{font:11px sans-serif;fill:#333}.s{font-size:10px;fill:#555}.n{text-anchor:end;font-weight:bold}\
-.g{stroke:#e4e7eb}.r{fill:#2f7d5b}.y{fill:#e7b04b}.w{fill:#dde3ea}.c{fill:#f3e3f5}.a{stroke:#3b6fb5;stroke-width:1.2}\
+.g{stroke:#e4e7eb}.r{fill:#2f7d5b}.y{fill:#e7b04b}.w{fill:#dde3ea}.u{fill:#b9a3d4}.c{fill:#f3e3f5}.a{stroke:#3b6fb5;stroke-width:1.2}\
 .h{fill:#3b6fb5}.f{fill:#c33}.v{fill:#2f7d5b;stroke:#fff}.x{stroke:#c33;stroke-width:2}.o{stroke:#d9822b;stroke-width:2}\
 .e{stroke:#2f7d5b;stroke-width:2}.t{fill:#c33}";
 
@@ -290,10 +292,11 @@ impl Drawing {
 
 fn legend(svg: &mut String) {
     let mut x = LEFT;
-    for (class, text) in [("r", "runs"), ("y", "is ready"), ("w", "waits"), ("c", "collection")] {
+    let bars = [("r", "runs"), ("y", "is ready"), ("w", "waits"), ("u", "is suspended"), ("c", "collection")];
+    for (class, text) in bars {
         _ = write!(svg, "<rect class=\"{class}\" x=\"{x}\" y=\"14\" width=\"14\" height=\"12\"/>");
         _ = writeln!(svg, "<text x=\"{}\" y=\"24\">{text}</text>", x + 19.0);
-        x += 85.0;
+        x += 38.0 + 6.5 * text.len() as f64;
     }
     let signs = [
         (Sign::Fails, "fails"),
@@ -348,6 +351,7 @@ fn draw_bars(svg: &mut String, scale: &Scale, index: usize, row: &TaskRow) {
                 Activity::Runs => ("r", "runs".to_string()),
                 Activity::Ready => ("y", "is ready".to_string()),
                 Activity::Waits(reason) => ("w", format!("waits for {reason}")),
+                Activity::IsSuspended(reason) => ("u", format!("waits for {reason}")),
             };
             let (begin, end) = (bar.begin as f64 / 1e6, bar.end as f64 / 1e6);
             _ = writeln!(
@@ -355,7 +359,7 @@ fn draw_bars(svg: &mut String, scale: &Scale, index: usize, row: &TaskRow) {
                 "<rect class=\"{class}\" x=\"{x:.1}\" y=\"{y}\" width=\"{width:.1}\" height=\"{BAR_HEIGHT}\"><title>{}, {begin:.3} to {end:.3} ms</title></rect>",
                 escape(&title)
             );
-            if let Activity::Waits(reason) = &bar.state {
+            if let Activity::Waits(reason) | Activity::IsSuspended(reason) = &bar.state {
                 let text = fit(reason, width);
                 if !text.is_empty() {
                     _ = writeln!(

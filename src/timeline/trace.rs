@@ -151,7 +151,9 @@ impl<W: Write + Send> Observer for Trace<W> {
             Seen::IsNamed(name) => self.name_track(TASKS, task, "thread_name", name),
             Seen::Runs => self.change(task, Some("runs".into())),
             Seen::IsReady => self.change(task, Some("ready".into())),
-            Seen::Waits(reason) => self.change(task, Some(format!("waits for {reason}"))),
+            Seen::Waits(reason) | Seen::IsSuspended(reason) => {
+                self.change(task, Some(format!("waits for {reason}")));
+            }
             Seen::IsToEnd => self.mark(task, "is to be aborted", "task"),
             Seen::Ends(how) => {
                 self.change(task, None);

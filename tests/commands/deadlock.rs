@@ -52,3 +52,42 @@ fn every_task_that_waits_is_named_with_its_place() {
         ]
     );
 }
+
+/// What the forms of coordination wait for has names of its own: fluents, children and who has suspended it.
+#[test]
+fn what_coordination_waits_for_is_named() {
+    let program = r#"(define-fluent level 0)
+(define-resource arm)
+(defvar *never* (make-event 'never))
+(spawn (:name 'holder)
+  (with-resource (arm) (wait-until (> level 5))))
+(spawn (:name 'waiter)
+  (sleep 1)
+  (with-resource (arm) t))
+(spawn (:name 'watcher)
+  (whenever (> level 7) (princ 'never)))
+(spawn (:name 'supervisor)
+  (supervise () (motor (wait-for-event *never*)) (lamp (wait-for-event *never*))))
+(defvar *stopped* (spawn (:name 'stopped) (wait-for-event *never*)))
+(sleep 2)
+(suspend-task *stopped*)
+"#;
+    let source = Folder::new("coordination").file("coordination.esl", program);
+    let run = process::run(&mut eslvm(&["run", "--clock", "virtual", &source]), "");
+    assert_eq!(run.status, Some(4), "{}", run.errors);
+    let lines = lines("coordination.esl", &run.errors);
+    let reasons: Vec<&str> =
+        lines.iter().filter_map(|line| line.rsplit_once(", ")).map(|(said, _)| said).collect();
+    assert_eq!(
+        reasons,
+        [
+            "task HOLDER waits for (> LEVEL 5) to be true by changes of LEVEL",
+            "task WAITER waits for resource ARM, held by task HOLDER",
+            "task WATCHER waits for (> LEVEL 7) to be true by changes of LEVEL",
+            "task SUPERVISOR waits for the end of MOTOR or LAMP",
+            "task STOPPED waits for RESUME-TASK, suspended by a task that has ended",
+            "task MOTOR waits for event NEVER",
+            "task LAMP waits for event NEVER",
+        ]
+    );
+}

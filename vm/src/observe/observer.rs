@@ -31,6 +31,8 @@ pub enum Seen<'a> {
     IsReady,
     /// It waits, for what this says.
     Waits(&'a str),
+    /// It stands still, as it was suspended: it waits to be resumed, and this says who has suspended it.
+    IsSuspended(&'a str),
     /// The task's end is asked for.
     IsToEnd,
     /// It has ended, as this says: `succeeded`, `failed` or `aborted`.

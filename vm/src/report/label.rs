@@ -65,7 +65,8 @@ pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
         let datum = describe(&vm.heap, pair.cdr);
         return match describe(&vm.heap, pair.car).as_str() {
             ":CHECKPOINT" => format!("checkpoint {datum} of {}", event_label(vm, first)),
-            ":UNTIL" => format!("{datum} to be true"),
+            ":UNTIL" => format!("{datum} to be true{}", changes_label(vm, &events)),
+            ":CHILDREN" => children_label(vm, pair.cdr),
             ":SUSPENDED" => format!("RESUME-TASK, suspended by {}", event_label(vm, pair.cdr)),
             ":RESOURCE" => resources_label(vm, pair.cdr),
             _ => vm.heap.string_text(pair.cdr).unwrap_or(datum),
@@ -79,6 +80,49 @@ pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
             format!("room in input {}", describe(&vm.heap, vm.heap.slot_or_nil(first, event::NAME)))
         }
         labels => labels.join(" or "),
+    }
+}
+
+/// Returns what is added to a condition that is waited for: the fluents whose changes are. Sources of facts
+/// have no names; the condition shows them.
+fn changes_label(vm: &Vm, events: &[Value]) -> String {
+    let named = events.iter().filter(|&&event| event != vm.scheduler.any_event);
+    let names: Vec<String> = named
+        .map(|&event| vm.heap.slot_or_nil(event, event::NAME))
+        .filter(|name| name.is_true())
+        .take(SHOWN)
+        .map(|name| describe(&vm.heap, name))
+        .collect();
+    if names.is_empty() { String::new() } else { format!(" by changes of {}", in_words(&names, "or")) }
+}
+
+/// Returns what reports call that for which a supervisor waits: the ends of children that run, and the
+/// restarts of those that are due. `supervision.esl` says what these are.
+fn children_label(vm: &Vm, children: Value) -> String {
+    let (mut running, mut due) = (Vec::new(), Vec::new());
+    for child in items(vm, children) {
+        let name = describe(&vm.heap, field_of(vm, child, 0));
+        if field_of(vm, child, CHILD_TASK).is_true() {
+            running.push(name);
+        } else if field_of(vm, child, CHILD_DUE).is_true() {
+            due.push(name);
+        }
+    }
+    let mut parts = Vec::new();
+    if !running.is_empty() {
+        parts.push(format!("the end of {}", in_words(&running, "or")));
+    }
+    if !due.is_empty() {
+        parts.push(format!("the time to restart {}", in_words(&due, "and")));
+    }
+    if parts.is_empty() { "its children".into() } else { parts.join(" or ") }
+}
+
+/// Returns a list in words.
+fn in_words(names: &[String], conjunction: &str) -> String {
+    match names {
+        [first @ .., last] if !first.is_empty() => format!("{} {conjunction} {last}", first.join(", ")),
+        names => names.concat(),
     }
 }
 
@@ -114,6 +158,10 @@ fn resource_label(vm: &Vm, resource: Value) -> String {
 
 /// Field of a claim with its request.
 const REQUEST: usize = 4;
+
+/// Fields of a supervisor's child with its task, and with the time of its restart.
+const CHILD_TASK: usize = 6;
+const CHILD_DUE: usize = 8;
 
 /// Returns a field of a record of the library; `NIL` if there is none.
 fn field_of(vm: &Vm, record: Value, index: usize) -> Value {

@@ -2,7 +2,7 @@
 
 use super::{cause_label, event_label, reason_of, task_label};
 use crate::observe::{Coming, Observer, Seen};
-use crate::task::{TaskIndex, TaskNumber, TaskState};
+use crate::task::{Flags, TaskIndex, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -14,20 +14,26 @@ impl Vm {
         watch.observers.list.push(observer);
         watch.update_is_watched();
         let time = watch.observers.time(&mut outside.host, scheduler);
-        let tasks: Vec<(TaskNumber, String, bool, Option<String>)> = self
+        let tasks: Vec<(TaskNumber, String, Flags, Option<String>)> = self
             .scheduler
             .tasks
             .iter()
             .filter(|task| task.state != TaskState::Ended)
             .map(|task| {
                 let reason = (task.state != TaskState::Runnable).then(|| reason_of(self, task));
-                (task.number, task_label(self, task.object), task.flags.hidden(), reason)
+                (task.number, task_label(self, task.object), task.flags, reason)
             })
             .collect();
         let Some(observer) = self.watch.observers.list.last_mut() else { return };
-        for (number, name, is_hidden, reason) in tasks {
+        for (number, name, flags, reason) in tasks {
+            let is_hidden = flags.hidden();
             observer.see(time, number, Seen::Begins { name: &name, is_hidden });
-            observer.see(time, number, reason.as_deref().map_or(Seen::IsReady, Seen::Waits));
+            let seen = match &reason {
+                None => Seen::IsReady,
+                Some(reason) if flags.suspended() => Seen::IsSuspended(reason),
+                Some(reason) => Seen::Waits(reason),
+            };
+            observer.see(time, number, seen);
         }
     }
 

@@ -51,8 +51,8 @@ fn note_for_watchers(vm: &mut Vm, index: TaskIndex, happening: Happening) {
             show(vm, number, Seen::IsReady);
         }
         Happening::Waits => {
-            let reason = reason_of(vm, task);
-            show(vm, number, Seen::Waits(&reason));
+            let (is_suspended, reason) = (task.flags.suspended(), reason_of(vm, task));
+            show(vm, number, if is_suspended { Seen::IsSuspended(&reason) } else { Seen::Waits(&reason) });
         }
         Happening::GoesOn => show(vm, number, Seen::IsReady),
         Happening::IsToEnd => show(vm, number, Seen::IsToEnd),
