@@ -1,7 +1,9 @@
 //! Explores all schedules of small programs: proves what never happens, and finds what does.
 
+mod composition;
 mod defects;
 mod fluents;
+mod keeping;
 mod putting_back;
 mod resources;
 mod suspension;
