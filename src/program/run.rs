@@ -204,6 +204,22 @@ mod tests {
     use crate::program::{Source, compile};
 
     #[test]
+    fn an_end_ends_though_cleanups_make_tasks_that_have_cleanups() {
+        for pause in ["(sleep 1)", "(dotimes (i 3) (sleep 0))"] {
+            let text = format!(
+                "(defun work () (unwind-protect (sleep 100) (spawn (work)) (spawn (work)) {pause}))
+                 (spawn (work))
+                 (sleep 1)
+                 (error \"over\")"
+            );
+            let program = compile(&[Source::new("chain.esl", &*text)]).program.expect("it compiles");
+            let config = Config { cleanup_ticks: 10_000, ..Config::DEFAULT };
+            let summary = run(&program, config, Box::new(VirtualHost::new())).expect("it runs");
+            assert_eq!(summary.ended, Ended::Failed, "{pause}");
+        }
+    }
+
+    #[test]
     fn what_cleanups_may_take_can_be_set() {
         let text =
             "(let ((task (spawn (unwind-protect (loop) (dotimes (i 5000)) (princ 'a) (sleep 5) (princ 'b)))))

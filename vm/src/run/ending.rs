@@ -22,6 +22,7 @@ impl Vm {
             run_cleanups(self, None);
             stop_operations(self);
             self.embedder.is_ending = self.embedder.is_cut_short;
+            self.scheduler.counts.made_at_end = 0;
         }
         let mut left = report::tasks_left(self);
         left.extend(report::operations_left(self));

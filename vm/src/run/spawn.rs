@@ -109,7 +109,9 @@ pub(crate) fn make_task(
     arguments: Value,
     options: SpawnOptions,
 ) -> Result<TaskId, Exit> {
-    let fund = if options.notify.is_true() { fund_of_child(vm)? } else { None };
+    let belongs = options.notify.is_true();
+    let fund =
+        if belongs || vm.scheduler.counts.made_at_end > 0 { fund_of_child(vm, belongs)? } else { None };
     if !options.hidden {
         admit(vm, Measure::Tasks)?;
     }
@@ -176,18 +178,25 @@ pub(crate) fn make_task(
     Ok(id)
 }
 
-/// Returns what the cleanups of a task may use that belongs to a form of the running task: what is left to
-/// the cleanups of that one, or `None` without bounds.
+/// Returns what the cleanups of a new task may use that the running task makes: what is left to the cleanups
+/// of that one, if it belongs to a form there, or a part of that. `None` without bounds.
 ///
 /// # Errors
-/// `:budget-exhausted` if nothing is left: the form would not be there to end the new task.
-fn fund_of_child(vm: &mut Vm) -> Result<Option<Fund>, Exit> {
+/// `:budget-exhausted` if nothing is left: nobody would be there to end the new task.
+fn fund_of_child(vm: &mut Vm, belongs: bool) -> Result<Option<Fund>, Exit> {
     let Vm { scheduler, outside, cpu, exchange, .. } = vm;
-    let Some(task) = &scheduler.running else { return Ok(None) };
-    let Some(fund) = task.extra.as_ref().and_then(|extra| extra.fund) else { return Ok(None) };
-    let ticks = task.ticks;
+    if scheduler
+        .running
+        .as_ref()
+        .is_none_or(|task| task.extra.as_ref().is_none_or(|extra| extra.fund.is_none()))
+    {
+        return Ok(None);
+    }
     if scheduler.is_fund_spent(cpu.used(), &mut outside.host) {
         return exchange.raise(Raised::Failure("BUDGET-EXHAUSTED"));
     }
-    Ok(Some(fund.for_child(ticks)))
+    let task = scheduler.task_mut();
+    let ticks = task.ticks;
+    let fund = task.extra_mut().fund.as_mut();
+    Ok(fund.map(|fund| if belongs { fund.for_child(ticks) } else { fund.split(ticks) }))
 }

@@ -89,6 +89,15 @@ impl Fund {
         Fund { depth: 0, ends, floor: None, is_reported: false }
     }
 
+    /// Gives half of the ticks that are left to a new task that is not waited for, and returns its fund. So
+    /// tasks that are made by cleanups and make others in theirs use up one fund together.
+    pub(crate) fn split(&mut self, ticks: u64) -> Fund {
+        let half = self.ends.ticks.saturating_sub(ticks) / 2;
+        self.ends.ticks -= half;
+        let ends = Allowance { ticks: half, time: self.ends.time };
+        Fund { depth: 0, ends, floor: None, is_reported: false }
+    }
+
     /// Returns whether so little is left that cleanups have their last allowance.
     pub(crate) fn is_spent(&self, now: Allowance) -> bool {
         now.ticks.saturating_add(LAST_TICKS) > self.ends.ticks
@@ -139,8 +148,11 @@ mod tests {
 
     #[test]
     fn a_child_has_what_is_left() {
-        let fund = Fund::new(3, NOW, 1000, 50);
+        let mut fund = Fund::new(3, NOW, 1000, 50);
         let child = fund.for_child(NOW.ticks);
         assert_eq!((child.depth, child.ends), (0, Allowance { ticks: 2000, time: 107 }));
+        let other = fund.split(NOW.ticks);
+        assert_eq!((other.depth, other.ends), (0, Allowance { ticks: 1000, time: 107 }));
+        assert_eq!(fund.ends, Allowance { ticks: 1500, time: 107 });
     }
 }
