@@ -40,6 +40,9 @@ enum Action {
     Run {
         #[command(flatten)]
         options: MachineOptions,
+        /// Seconds of the program's clock in a second of real time: for a program whose outside is a simulator
+        #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = parse_speed)]
+        speed: f64,
         /// Print figures of the run to standard error at its end; with `=tasks`, also of the tasks with most
         /// ticks
         #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "run")]
@@ -156,9 +159,13 @@ impl MachineOptions {
 fn main() -> ExitCode {
     let Command { action, library } = Command::parse();
     let status = match action {
-        Action::Run { options, stats, timeline, trace, file, arguments } => {
+        Action::Run { options, speed, stats, timeline, trace, file, arguments } => {
             let path = ModulePath::new([file.as_path()], &library);
-            run(&file, arguments, &options, stats, timeline.as_deref(), &trace, &path)
+            let rights = options.rights.rights();
+            rights.and_then(|rights| {
+                let host = RealHost::new(arguments).with_rights(path.with_rights(rights)).with_speed(speed);
+                run(&file, host, &options, stats, timeline.as_deref(), &trace, &path)
+            })
         }
         Action::Test { filter, jobs, seed, junit, budget, memory, rights, sources } => {
             rights.rights().map(|rights| {
@@ -180,6 +187,14 @@ fn main() -> ExitCode {
     ExitCode::from(status.unwrap_or_else(|status| status))
 }
 
+/// Parses the speed of the program's clock.
+fn parse_speed(text: &str) -> Result<f64, &'static str> {
+    match text.parse() {
+        Ok(speed) if (1e-6..=1e6).contains(&speed) => Ok(speed),
+        _ => Err("expected a number from 0.000001 to 1000000"),
+    }
+}
+
 /// Reads the program in a file, and compiles it if it is a source.
 ///
 /// # Errors
@@ -197,7 +212,7 @@ fn program(file: &Path, path: &ModulePath) -> Result<Program, u8> {
 
 fn run(
     file: &Path,
-    arguments: Vec<String>,
+    mut host: RealHost,
     options: &MachineOptions,
     stats: Option<Stats>,
     timeline: Option<&Path>,
@@ -207,13 +222,11 @@ fn run(
     if let Some(timeline) = timeline {
         command::refuse_overwriting(timeline, [file])?;
     }
-    let rights = options.rights.rights()?;
     let program = program(file, path)?;
     let setup = |error| {
         complain(error);
         USAGE
     };
-    let mut host = RealHost::new(arguments).with_rights(path.with_rights(rights));
     if options.clock == ClockChoice::Virtual {
         host = host.with_virtual_time();
     }

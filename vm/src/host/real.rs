@@ -43,6 +43,8 @@ pub struct RealHost {
     screen: Option<Screen>,
     /// Nanoseconds of virtual time, if time is virtual.
     virtual_time: Option<u64>,
+    /// Seconds of the program's clock in a second.
+    speed: f64,
 }
 
 impl RealHost {
@@ -58,6 +60,7 @@ impl RealHost {
             is_reading: false,
             screen: None,
             virtual_time: None,
+            speed: 1.0,
         }
     }
 
@@ -80,6 +83,14 @@ impl RealHost {
     #[must_use]
     pub fn with_virtual_time(mut self) -> RealHost {
         self.virtual_time = Some(0);
+        self
+    }
+
+    /// Has so many seconds of the program's clock pass in a second of real time: for a program whose outside is
+    /// a simulator that is as fast. The wall clock is not affected.
+    #[must_use]
+    pub fn with_speed(mut self, speed: f64) -> RealHost {
+        self.speed = speed;
         self
     }
 
@@ -155,9 +166,18 @@ fn nanoseconds(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }
 
+/// Returns a duration times a factor, the longest there is if that is out of range.
+fn scaled(duration: Duration, factor: f64) -> Duration {
+    if factor == 1.0 {
+        return duration;
+    }
+    Duration::try_from_secs_f64(duration.as_secs_f64() * factor).unwrap_or(Duration::MAX)
+}
+
 impl Host for RealHost {
     fn monotonic(&mut self) -> u64 {
-        self.virtual_time.unwrap_or_else(|| nanoseconds(self.start.elapsed()))
+        let elapsed = self.start.elapsed();
+        self.virtual_time.unwrap_or_else(|| nanoseconds(scaled(elapsed, self.speed)))
     }
 
     fn stopwatch(&mut self) -> u64 {
@@ -203,7 +223,10 @@ impl Host for RealHost {
         let time = match deadline {
             None if awaited == Awaited::default() => return Wake::Never,
             None => None,
-            Some(deadline) => Some(Duration::from_nanos(deadline.saturating_sub(self.monotonic()))),
+            Some(deadline) => {
+                let left = Duration::from_nanos(deadline.saturating_sub(self.monotonic()));
+                Some(scaled(left, self.speed.recip()))
+            }
         };
         if self.inbox.wait(time) { Wake::Arrival } else { Wake::Time }
     }
@@ -325,6 +348,18 @@ mod tests {
         let deadline = host.monotonic() + 1;
         assert_eq!(host.wait(Some(deadline), Awaited::default()), Wake::Time);
         assert!(host.monotonic() >= deadline);
+    }
+
+    #[test]
+    fn a_clock_that_is_faster_reaches_its_deadlines_sooner() {
+        let mut host = RealHost::new(Vec::new()).with_speed(1e6);
+        let deadline = host.monotonic() + 1_000_000_000_000;
+        let begun = Instant::now();
+        while host.monotonic() < deadline {
+            assert_eq!(host.wait(Some(deadline), Awaited::default()), Wake::Time);
+        }
+        assert!(begun.elapsed() < Duration::from_secs(600), "a thousand seconds take a thousandth");
+        assert_eq!(scaled(Duration::MAX, 2.0), Duration::MAX);
     }
 
     #[test]
