@@ -1246,6 +1246,8 @@ macro_rules! for_each_builtin {
             ChannelState = stream::channel_state, internal "%CHANNEL-STATE" ("channel");
             /// Adds characters to those that a channel has to be read; with `NIL`, no more will come.
             SupplyChannel = stream::supply_channel, internal "%SUPPLY-CHANNEL" ("channel text");
+            /// Reads many of the characters that a channel has to be read, a string.
+            ChannelPiece = stream::channel_piece, internal "%CHANNEL-PIECE" ("channel");
             /// Whether `object` is a stream.
             Streamp = stream::streamp, cl "STREAMP" ("object");
             /// Whether a stream can be read from.

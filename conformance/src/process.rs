@@ -53,10 +53,19 @@ pub fn start(command: &mut Command) -> Child {
 ///
 /// # Panics
 /// If the command takes longer than [`PATIENCE`], or writes something other than UTF-8.
-pub fn finish(mut child: Child) -> Finished {
+pub fn finish(child: Child) -> Finished {
+    finish_within(child, PATIENCE)
+}
+
+/// Waits until a command has ended, which takes some time by itself, and reads its outputs as far as they are
+/// pipes.
+///
+/// # Panics
+/// If the command takes longer than `patience`, or writes something other than UTF-8.
+pub fn finish_within(mut child: Child, patience: Duration) -> Finished {
     let output = read_to_end(child.stdout.take());
     let errors = read_to_end(child.stderr.take());
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + patience;
     let status = loop {
         if let Some(status) = child.try_wait().expect("a child can be waited for") {
             break status.code();

@@ -243,3 +243,115 @@ fn datagrams_come_whole() {
     check("sockets-udp", &text, &["--allow-net"], &["T", "#(1 2)", ":TIMEOUT"]);
     answer.join().expect("the peer does not fail");
 }
+
+#[test]
+fn a_thousand_connections_are_served_by_one_program() {
+    // All are open before the first is answered.
+    let server = "(require :sockets)
+(let ((listener (sockets:listen \"127.0.0.1\" 0)) (served 0) (all (make-event 'all)))
+  (format t \"~a~%\" (sockets:local-port listener))
+  (finish-output)
+  (sockets::serve listener nil
+    (lambda (c)
+      (let ((line (read-line c)))
+        (incf served)
+        (signal all)
+        (wait-until (>= served 1000) :on all)
+        (format c \"~a~%\" line)))))";
+    let folder = Folder::with("sockets-thousand", &[("server.esl", server)]);
+    let mut server = process::start(eslvm(&["run", "--allow-net", "server.esl"]).current_dir(folder.path()));
+    let mut port = String::new();
+    let output = server.stdout.take().expect("it is a pipe");
+    BufReader::new(output).read_line(&mut port).expect("the port is printed");
+    let client = format!(
+        "(require :sockets)
+(defun ask (number)
+  (sockets:with-socket (c (sockets:connect \"127.0.0.1\" {}))
+    (format c \"~a~%\" number)
+    (if (equal (read-line c) (format nil \"~a\" number)) 1 0)))
+(print (let ((tasks (loop for i below 1000 collect (let ((i i)) (spawn (ask i))))))
+         (loop for task in tasks sum (nth-value 1 (wait-for-task task)))))",
+        port.trim()
+    );
+    let path = folder.file("client.esl", client);
+    let mut client = process::start(&mut eslvm(&["run", "--allow-net", &path]));
+    drop(client.stdin.take());
+    let done = process::finish_within(client, std::time::Duration::from_secs(600));
+    server.kill().expect("it runs");
+    server.wait().expect("it ends");
+    assert_eq!((done.output.trim(), &*done.errors), ("1000", ""));
+}
+
+/// Has a peer do something with a connection, and returns its port.
+fn peer(what: impl FnOnce(TcpStream) + Send + 'static) -> (u16, std::thread::JoinHandle<()>) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("there is a port");
+    let port = listener.local_addr().expect("it has an address").port();
+    (port, std::thread::spawn(move || what(listener.accept().expect("somebody connects").0)))
+}
+
+#[test]
+fn a_peer_that_closes_half_way_can_be_answered() {
+    let (port, peer) = peer(|mut stream| {
+        stream.write_all(b"question\nhal").expect("it can be sent");
+        stream.shutdown(std::net::Shutdown::Write).expect("the end can be sent");
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).expect("it answers");
+        assert_eq!(answer, "answer\n");
+    });
+    let text = format!(
+        "(require :sockets)
+(sockets:with-socket (c (sockets:connect \"127.0.0.1\" {port}))
+  (print (list (read-line c) (multiple-value-list (read-line c)) (read-line c nil 'end)))
+  (format c \"answer~%\"))"
+    );
+    check("sockets-half", &text, &["--allow-net"], &["(\"question\" (\"hal\" T) END)"]);
+    peer.join().expect("the peer has its answer");
+}
+
+#[test]
+fn a_line_without_an_end_fails() {
+    // Also where the line ends in time, much as it is.
+    let (port, peer) = peer(|mut stream| {
+        let piece = [b'x'; 1 << 16];
+        for _ in 0..3 {
+            stream.write_all(&piece).expect("it can be sent");
+        }
+        stream.write_all(b"\n").expect("it can be sent");
+        while stream.write_all(&piece).is_ok() {}
+    });
+    let text = format!(
+        "(require :sockets)
+(sockets:with-socket (c (sockets:connect \"127.0.0.1\" {port}))
+  (print (length (read-line c)))
+  (print (handler-case (read-line c) (failure (f) (failure-cause f)))))"
+    );
+    check("sockets-endless", &text, &["--allow-net", "--memory", "400M"], &["196608", ":LINE-TOO-LONG"]);
+    peer.join().expect("the connection is closed");
+}
+
+#[test]
+fn faults_of_the_outside_have_causes() {
+    let text = "(require :sockets) (require :process) (require :json)
+(defmacro cause (form)
+  `(print (handler-case ,form (failure (f) (failure-cause f)) (error (e) (type-of e)))))
+(cause (sockets:connect \"no-such-host.invalid\" 80))
+(cause (sockets:listen \"no-such-host.invalid\" 80))
+(cause (sockets:listen \"192.0.2.1\" 0))
+(cause (sockets:connect-unix \"no-such-socket\"))
+(cause (process:run-program '(\"no-such-program\")))
+(cause (with-open-file (s \"/dev/full\" :direction :output :if-exists :append)
+         (loop repeat 10000 do (write-line \"more\" s))))
+(cause (json:parse (make-string 1000000 :initial-element #\\[)))
+(cause (json:parse (map 'string #'code-char '(34 65533 1 34))))";
+    let expected = [
+        ":HOST-NOT-FOUND",
+        ":HOST-NOT-FOUND",
+        ":SOCKET-ERROR",
+        ":SOCKET-ERROR",
+        ":PROCESS-ERROR",
+        "STREAM-ERROR",
+        "JSON:JSON-ERROR",
+        "JSON:JSON-ERROR",
+    ];
+    check("outside-faults", text, &["--allow-all"], &expected);
+}

@@ -351,11 +351,8 @@ async fn listen(arguments: Arguments, sockets: Sockets) -> Answer {
 
 /// Returns the failure for an address that cannot be used here.
 fn bind_failure(error: &Error) -> Failure {
-    match error.kind() {
-        // What the resolver says has no kind of its own.
-        ErrorKind::Other | ErrorKind::InvalidInput => failure("HOST-NOT-FOUND", error),
-        _ => socket_failure(error),
-    }
+    // What the resolver says is no error of the system.
+    if error.raw_os_error().is_none() { failure("HOST-NOT-FOUND", error) } else { socket_failure(error) }
 }
 
 #[cfg(unix)]

@@ -31,7 +31,9 @@ mod channel;
 mod read;
 mod write;
 
-pub(super) use channel::{channel_handler, channel_output, channel_state, make_channel, supply_channel};
+pub(super) use channel::{
+    channel_handler, channel_output, channel_piece, channel_state, make_channel, supply_channel,
+};
 pub(super) use read::{listen, peek_char, read_char, read_char_no_hang, read_line, unread_char};
 pub(super) use write::{finish_output, fresh_line, terpri, write_char, write_string};
 
