@@ -11,13 +11,18 @@ lines. The executive sends a command a line, and gets an answer with the same nu
     < {"id": 1, "ok": true}
     < {"id": 2, "fault": "wheel-stuck", "about": [2]}
 
-"stop" with the number of a command ends it; its answer is the fault "stopped". Each second of simulated time a
-line of telemetry comes without being asked for:
+"stop" with the number of a command ends it; the command's answer is the fault "cancelled". Each second of
+simulated time a line of telemetry comes without being asked for, before the answers of that second:
 
     < {"time": 12.0, "attitude": "turning", "battery": 68.5, "error": 0.31}
 
 SPEED is how many seconds are simulated in one. Faults come by SEED: a wheel sticks, the star tracker is
-blinded, the camera hangs, the link drops, the spacecraft is pushed, the battery drains.
+blinded, the camera hangs, a transmission is lost, the spacecraft is pushed, the battery drains. Now and then
+the connection drops and cannot be made for a while; what was under way is stopped then, without an answer.
+
+The simulator ends when its executive has been away for 200 seconds of simulated time. Its exit status is 0 if the
+spacecraft points at the sun then, and the executive has broken no rule: two commands to the wheels at
+once, an empty battery.
 """
 
 import argparse
@@ -34,7 +39,7 @@ from Basilisk.fswAlgorithms import attTrackingError, inertial3D, mrpFeedback, rw
 from Basilisk.simulation import extForceTorque, reactionWheelStateEffector, simpleNav, spacecraft
 from Basilisk.utilities import SimulationBaseClass, macros, orbitalMotion, simIncludeGravBody, simIncludeRW
 
-STEP = 0.1
+STEP = 0.25
 """Seconds between two steps of the integrator."""
 
 ATTITUDES = {
@@ -48,6 +53,9 @@ ATTITUDES = {
     "pole": [0.3, 0.1, 0.0],
 }
 """Attitudes by name, as modified Rodrigues parameters."""
+
+DURATIONS = {"slew": 5, "reset-wheel": 5, "switch-tracker": 2, "expose": 4, "cycle-camera": 8, "transmit": 6}
+"""Seconds that each command takes; a slew also takes as long as the turn does."""
 
 
 class Body:
@@ -78,7 +86,7 @@ class Body:
         factory = simIncludeRW.rwFactory()
         axes = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]]) / np.array([[1], [1], [1], [3**0.5]])
         for axis in axes:
-            factory.create("Honeywell_HR16", list(axis), maxMomentum=100.0, Omega=0.0)
+            factory.create("Honeywell_HR16", list(axis), maxMomentum=100.0, Omega=0.0, u_max=4.0)
         wheels = reactionWheelStateEffector.ReactionWheelStateEffector()
         wheels.ModelTag = "wheels"
         factory.addToSpacecraft(hub.ModelTag, wheels, hub)
@@ -89,7 +97,7 @@ class Body:
         self.reference = inertial3D.inertial3D()
         self.error = attTrackingError.attTrackingError()
         control = mrpFeedback.mrpFeedback()
-        control.K, control.Ki, control.P, control.integralLimit = 20.0, -1.0, 150.0, 0.0
+        control.K, control.Ki, control.P, control.integralLimit = 200.0, -1.0, 500.0, 0.0
         torque = rwMotorTorque.rwMotorTorque()
         torque.controlAxes_B = [1, 0, 0, 0, 1, 0, 0, 0, 1]
 
@@ -150,6 +158,9 @@ class Spacecraft:
         self.battery = 70.0
         self.draining = 0.05
         self.next_push = 60.0
+        self.next_drop = random.uniform(60, 180)
+        self.back_at = 0.0
+        self.broken = []
         self.under_way = {}
         self.answers = []
 
@@ -167,16 +178,17 @@ class Spacecraft:
         except (ValueError, KeyError, TypeError):
             return self.answers.append({"fault": "not-understood", "about": [str(line)[:80]]})
         if do == "stop":
-            if self.under_way.pop(command.get("command"), None):
-                self.answers.append({"id": command["command"], "fault": "stopped", "about": []})
+            if self.under_way.pop(number, None):
+                self.fail(number, "cancelled")
             return
         if do == "slew" and command.get("target") not in ATTITUDES:
             return self.fail(number, "no-such-target", command.get("target"))
-        durations = {"slew": 5, "reset-wheel": 5, "switch-tracker": 2, "expose": 4, "cycle-camera": 8, "transmit": 6}
-        if do not in durations:
+        if do not in DURATIONS:
             return self.fail(number, "not-understood", do)
-        command["until"] = self.body.now + durations[do]
+        command["until"] = self.body.now + DURATIONS[do]
         if do == "slew":
+            if any(other["do"] == "slew" for other in self.under_way.values()):
+                self.broken.append("two commands to the wheels")
             self.target = command["target"]
             self.body.point(self.target)
             if self.chance(8):
@@ -205,64 +217,112 @@ class Spacecraft:
             return self.fail(number, "link-lost")
         self.answers.append({"id": number, "ok": True})
 
+    def drops_link(self):
+        """Returns whether the connection drops now, for a while."""
+        if not self.has_faults or self.body.now < self.next_drop:
+            return False
+        self.back_at = self.body.now + random.uniform(5, 20)
+        self.next_drop = self.back_at + random.uniform(60, 180)
+        return True
+
     def step(self):
         """Simulates a second."""
         self.body.step(1.0)
         self.battery += (0.4 if self.attitude() == "sun" else 0.0) - self.draining
         self.battery = max(0.0, min(100.0, self.battery))
+        if self.battery == 0.0:
+            self.broken.append("the battery is empty")
         if self.has_faults and self.body.now > self.next_push:
             self.next_push = self.body.now + random.uniform(60, 240)
             self.draining = random.choice([0.05, 0.05, 0.2])
             self.body.push.extTorquePntB_B = [[random.uniform(-20, 20)] for _ in range(3)]
         else:
             self.body.push.extTorquePntB_B = [[0.0], [0.0], [0.0]]
-        for number, command in list(self.under_way.items()):
-            is_over = self.body.now >= command["until"]
-            if is_over and (command["do"] != "slew" or "fault" in command or self.attitude() == self.target):
-                del self.under_way[number]
-                self.finish(command)
         self.answers.append({
             "time": round(self.body.now, 1),
             "attitude": self.attitude(),
             "battery": round(self.battery, 1),
             "error": round(self.body.deviation()[0], 4),
         })
+        for number, command in list(self.under_way.items()):
+            is_over = self.body.now >= command["until"]
+            if is_over and (command["do"] != "slew" or "fault" in command or self.attitude() == self.target):
+                del self.under_way[number]
+                self.finish(command)
 
 
-def serve(port, speed, has_faults):
-    """Serves one executive until it closes the connection."""
-    listener = socket.create_server(("127.0.0.1", port))
-    print(f"listening on port {listener.getsockname()[1]}", flush=True)
-    connection, _ = listener.accept()
-    listener.close()
-    connection.setblocking(False)
-    selector = selectors.DefaultSelector()
-    selector.register(connection, selectors.EVENT_READ)
-    craft = Spacecraft(has_faults)
-    received, unsent = b"", b""
-    due = time.monotonic()
-    while True:
-        due += 1.0 / speed
-        while (wait := due - time.monotonic()) > 0:
-            if selector.select(wait):
+class Link:
+    """The connection to the executive; there may be none."""
+
+    def __init__(self, port):
+        self.listener = socket.create_server(("127.0.0.1", port))
+        self.selector = selectors.DefaultSelector()
+        self.selector.register(self.listener, selectors.EVENT_READ)
+        self.connection = None
+        self.received, self.unsent = b"", b""
+
+    def drop(self):
+        if self.connection:
+            self.selector.unregister(self.connection)
+            self.connection.close()
+        self.connection = None
+
+    def wait(self, seconds, craft):
+        """Waits, at most so long, for something to come, and has CRAFT take it."""
+        for key, _ in self.selector.select(seconds):
+            if key.fileobj is self.listener:
+                connection, _ = self.listener.accept()
+                if self.connection or craft.body.now < craft.back_at:
+                    connection.close()
+                else:
+                    connection.setblocking(False)
+                    self.selector.register(connection, selectors.EVENT_READ)
+                    self.connection, self.received, self.unsent = connection, b"", b""
+            elif key.fileobj is self.connection:
                 try:
-                    data = connection.recv(65536)
+                    data = self.connection.recv(65536)
                 except ConnectionError:
                     data = b""
-                if not data:
-                    return craft
-                *lines, received = (received + data).split(b"\n")
-                for line in lines:
-                    craft.command(line)
-        craft.step()
-        unsent += b"".join(json.dumps(answer).encode() + b"\n" for answer in craft.answers)
-        craft.answers.clear()
+                if data:
+                    *lines, self.received = (self.received + data).split(b"\n")
+                    for line in lines:
+                        craft.command(line)
+                else:
+                    self.drop()
+
+    def send(self, objects):
+        self.unsent += b"".join(json.dumps(each).encode() + b"\n" for each in objects)
         try:
-            unsent = unsent[connection.send(unsent):]
+            self.unsent = self.unsent[self.connection.send(self.unsent):]
         except BlockingIOError:
             pass
         except ConnectionError:
-            return craft
+            self.drop()
+
+
+def serve(port, speed, has_faults):
+    """Serves an executive until it has been away for 200 seconds of simulated time."""
+    link = Link(port)
+    print(f"listening on port {link.listener.getsockname()[1]}", flush=True)
+    craft = Spacecraft(has_faults)
+    while not link.connection:
+        link.wait(None, craft)
+    seen = 0.0
+    due = time.monotonic()
+    while craft.body.now < seen + 200.0:
+        due += 1.0 / speed
+        while (wait := due - time.monotonic()) > 0:
+            link.wait(wait, craft)
+        craft.step()
+        if craft.drops_link():
+            link.drop()
+        if link.connection:
+            link.send(craft.answers)
+            seen = craft.body.now
+        else:
+            craft.under_way.clear()
+        craft.answers.clear()
+    return craft
 
 
 def main():
@@ -274,8 +334,9 @@ def main():
     arguments = parser.parse_args()
     random.seed(arguments.seed)
     craft = serve(arguments.port, arguments.speed, arguments.faults == "some")
-    print(f"the executive has gone; attitude {craft.attitude()}, battery {craft.battery:.0f} %")
-    return 0
+    rules = ", ".join(sorted(set(craft.broken))) or "no rule"
+    print(f"the executive has gone; attitude {craft.attitude()}, battery {craft.battery:.0f} %, {rules} broken")
+    return 0 if craft.attitude() == "sun" and not craft.broken else 1
 
 
 if __name__ == "__main__":

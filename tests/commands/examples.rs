@@ -1,11 +1,22 @@
 //! The examples come to their end, in virtual time and under several schedules.
 
-use std::path::Path;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command};
+use std::time::Duration;
 
 use esl_conformance::process;
 
 use crate::folder::Folder;
 use crate::{eslc, eslvm};
+
+/// Longest time that a flight may take on a machine that is busy with others.
+const PATIENCE: Duration = Duration::from_secs(600);
+
+fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name)
+}
 
 #[test]
 fn examples_come_to_their_end() {
@@ -46,4 +57,100 @@ fn the_spacecraft_survives_its_faults() {
         violations += usize::from(run.errors.contains(":MAINTAINED-PROPERTY-VIOLATION"));
     }
     assert!(safe_modes > 5 && violations > 5, "{safe_modes} safe modes, {violations} violations");
+}
+
+/// Starts a simulator, which prints its port, and returns it with its output and the port.
+fn start_simulator(command: &mut Command) -> (Child, BufReader<std::process::ChildStdout>, String) {
+    let mut child = process::start(command);
+    let mut output = BufReader::new(child.stdout.take().expect("it is a pipe"));
+    let mut line = String::new();
+    output.read_line(&mut line).expect("the port is printed");
+    let port = line.trim().rsplit(' ').next().expect("the port is printed").to_owned();
+    (child, output, port)
+}
+
+/// Flies a spacecraft that is simulated elsewhere.
+fn fly(port: &str, speed: &str, targets: &[&str]) -> process::Finished {
+    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "--speed", speed]);
+    command.arg(example("spacecraft/simulated.esl")).arg(port).args(targets);
+    process::finish_within(process::start(&mut command), PATIENCE)
+}
+
+/// The executive that flies in the world of scripts flies behind a connection, which drops on the way.
+#[test]
+fn the_executive_flies_by_lines_of_json() {
+    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "--speed", "20"]);
+    command.arg(example("spacecraft/stand-in.esl")).arg("0");
+    let (mut simulator, mut output, port) = start_simulator(&mut command);
+    let flight = fly(&port, "20", &["crater", "ridge"]);
+    simulator.kill().expect("it runs");
+    simulator.wait().expect("it ends");
+    let mut said = String::new();
+    output.read_to_string(&mut said).expect("output is text");
+    assert_eq!(flight.status, Some(0), "{}{}", flight.output, flight.errors);
+    assert!(flight.output.ends_with("pointing at SUN\n"), "{}", flight.output);
+    assert!(flight.output.contains("the link is down\n"), "{}", flight.output);
+    assert_eq!(said, "", "no rule is broken");
+}
+
+#[test]
+fn the_executive_flies_what_basilisk_simulates() {
+    let has_basilisk = Command::new("python3").args(["-c", "import Basilisk"]).output();
+    if !has_basilisk.is_ok_and(|done| done.status.success()) {
+        eprintln!("left out: it needs python3 with Basilisk, by `pip install bsk`");
+        return;
+    }
+    let mut command = Command::new("python3");
+    command.arg("-B").arg(example("spacecraft/simulator.py")).args(["--port", "0", "--speed", "10"]);
+    let (simulator, mut output, port) = start_simulator(&mut command);
+    let flight = fly(&port, "10", &["crater"]);
+    let done = process::finish_within(simulator, PATIENCE);
+    let mut said = String::new();
+    output.read_to_string(&mut said).expect("output is text");
+    assert_eq!(flight.status, Some(0), "{}{}{}", flight.output, flight.errors, done.errors);
+    assert!(flight.output.ends_with("pointing at SUN\n"), "{}", flight.output);
+    assert!(said.contains("no rule broken"), "{said}");
+}
+
+/// Returns a port that is free, from those that the system gives to nobody who asks for any.
+fn free_port() -> u16 {
+    let first = 20_000 + u16::try_from(std::process::id() % 10_000).expect("it is small");
+    (first..32_000).find(|&port| TcpListener::bind(("127.0.0.1", port)).is_ok()).expect("one is free")
+}
+
+/// The watchdog starts a service again that has died, and ends it when it ends itself.
+#[cfg(unix)]
+#[test]
+fn the_watchdog_restarts_a_service_that_dies() {
+    let port = free_port();
+    let mut command = eslvm(&["run", "--allow-net", "--allow-run"]);
+    command.arg(example("watchdog/watchdog.esl")).arg(format!("http://127.0.0.1:{port}/health"));
+    command.args([crate::ESLVM, "run", "--allow-net"]).arg(example("watchdog/service.esl"));
+    let mut watchdog = process::start(command.arg(port.to_string()));
+    let mut log = BufReader::new(watchdog.stderr.take().expect("it is a pipe"));
+    let mut next = |message: &str| {
+        let mut seen = String::new();
+        loop {
+            let mut line = String::new();
+            assert_ne!(log.read_line(&mut line).expect("it is text"), 0, "expected {message} after {seen}");
+            assert!(line.starts_with("{\"time\":\"20"), "{line}");
+            if line.contains(&format!("\"message\":\"{message}\"")) {
+                return line;
+            }
+            seen += &line;
+        }
+    };
+    next("started");
+    next("healthy");
+    let mut connection = TcpStream::connect(("127.0.0.1", port)).expect("the service listens");
+    connection.write_all(b"POST /die HTTP/1.1\r\nContent-Length: 0\r\n\r\n").expect("it can be sent");
+    next("unhealthy");
+    assert!(next("ended").contains("\"by\":\"itself\",\"status\":1}"));
+    next("started");
+    next("healthy");
+    let ended = Command::new("kill").arg(watchdog.id().to_string()).status();
+    assert!(ended.expect("there is a kill").success());
+    assert!(next("ended").contains("\"by\":\"watchdog\",\"status\":143}"));
+    assert_eq!(process::finish(watchdog).status, Some(143));
+    assert!(TcpStream::connect(("127.0.0.1", port)).is_err(), "the service has ended");
 }
