@@ -10,9 +10,9 @@ main() ->
     Main = self(),
     [spawn_link(fun() ->
         {ok, Socket} = gen_tcp:connect({127, 0, 0, 1}, Port, Options),
-        Main ! ask(Socket, 0)
+        Main ! {answers, ask(Socket, 0)}
     end) || _ <- lists:seq(1, 1000)],
-    io:format("~b~n", [lists:sum([receive N -> N end || _ <- lists:seq(1, 1000)])]).
+    io:format("~b~n", [lists:sum([receive {answers, N} -> N end || _ <- lists:seq(1, 1000)])]).
 
 ask(Socket, 20) -> gen_tcp:close(Socket), 20;
 ask(Socket, N) ->

@@ -86,8 +86,8 @@ impl RealHost {
         self
     }
 
-    /// Has so many seconds of the program's clock pass in a second of real time: for a program whose outside is
-    /// a simulator that is as fast. The wall clock is not affected.
+    /// Has so many seconds of the program's clock pass in a second of real time: for a program whose outside
+    /// is a simulator that is as fast. The wall clock is not affected.
     #[must_use]
     pub fn with_speed(mut self, speed: f64) -> RealHost {
         self.speed = speed;
