@@ -8,6 +8,7 @@ mod folder;
 mod http;
 #[cfg(target_os = "linux")]
 mod memory;
+mod missions;
 mod modules;
 mod real_time;
 mod rights;
