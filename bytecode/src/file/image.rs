@@ -206,6 +206,22 @@ impl ModuleImage {
         Ok(self.sources_and_required()?.0)
     }
 
+    /// Name of the source with this number; `None` if there is no such source.
+    ///
+    /// # Errors
+    /// [`ReadError::Damaged`].
+    pub fn source(&self, number: u32) -> Result<Option<&str>, ReadError> {
+        let mut from = self.section(Section::Sources);
+        let count = from.count(4)?;
+        if number as usize >= count {
+            return Ok(None);
+        }
+        for _ in 0..number {
+            from.text()?;
+        }
+        from.text().map(Some)
+    }
+
     /// Names of the modules that it requires.
     ///
     /// # Errors

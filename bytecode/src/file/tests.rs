@@ -107,6 +107,10 @@ fn an_image_is_read_in_parts() {
     let file = write(&module).unwrap();
     let image = ModuleImage::open_trusted(ImageBytes::Shared(file.into())).unwrap();
     assert_eq!(image.sources(), Ok(module.sources.clone()));
+    for (number, name) in module.sources.iter().enumerate() {
+        assert_eq!(image.source(number as u32), Ok(Some(name.as_str())));
+    }
+    assert_eq!(image.source(module.sources.len() as u32), Ok(None));
     assert_eq!(image.requires(), Ok(module.requires.clone()));
     assert_eq!(image.packages().unwrap(), ["COMMON-LISP", "ESL", "KEYWORD"]);
     let symbols: Vec<_> = image.symbols().map(Result::unwrap).collect();

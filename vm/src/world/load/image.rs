@@ -93,7 +93,7 @@ impl Images {
 
     /// Returns the name of a source of an image.
     fn source(&self, image: usize, source: u32) -> Option<String> {
-        self.0.get(image)?.module.sources().ok()?.into_iter().nth(source as usize)
+        self.0.get(image)?.module.source(source).ok()?.map(str::to_owned)
     }
 }
 
