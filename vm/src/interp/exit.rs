@@ -106,8 +106,13 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
             vm.leave_reserve(vm.world.known.heap_exhausted);
             return Signal::Unwind;
         }
-        // A task that goes on failing for want of memory does not get its collections for nothing.
-        vm.exchange.charges.add(vm.heap.stats().live / BYTES_PER_TICK);
+        // A task that goes on failing for want of memory does not get its collections for nothing. But its
+        // critical section is not to be over because of them: the failure has yet to be handled there.
+        let ticks = vm.heap.stats().live / BYTES_PER_TICK;
+        vm.exchange.charges.add(ticks);
+        if vm.scheduler.task().critical > 0 {
+            vm.scheduler.turn.extend_critical(ticks);
+        }
         return failure(vm, Raised::HeapExhausted);
     }
     vm.exchange.collected_at = Some(place);

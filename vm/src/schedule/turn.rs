@@ -51,6 +51,13 @@ impl Turn {
     pub(crate) fn end_with(&mut self, end: TurnEnd) {
         self.end = self.end.max(end);
     }
+
+    /// Makes up for ticks of this slice that do not count for the critical section.
+    pub(crate) fn extend_critical(&mut self, ticks: u64) {
+        if !self.critical_is_new {
+            self.critical_left = self.critical_left.saturating_add_unsigned(ticks);
+        }
+    }
 }
 
 impl Default for Turn {
