@@ -113,7 +113,7 @@ state! {
     /// Visits the content of a running cleanup.
     Running by VisitRunning :: running_content {
         content { pending, values, allowance }
-        derived { entry }
+        derived { entry, bound }
     }
 }
 

@@ -290,7 +290,14 @@ unsafe fn settle(vm: &mut Vm, mut signal: Signal) -> Result<(), Leave> {
                 Signal::Exit(exit) => exit::exit(vm, exit),
                 Signal::Call => call::slow_call(vm),
                 Signal::ReturnAll => substitute::return_all(vm),
-                Signal::Unwind => unwind::unwind(vm),
+                Signal::Unwind => {
+                    let signal = unwind::unwind(vm);
+                    // A cleanup that begins may have less to use than the slice.
+                    if vm.wants_safepoint() {
+                        vm.cpu.ticks = vm.prepare_safepoint(vm.cpu.ticks);
+                    }
+                    signal
+                }
                 Signal::TaskExit => return end::end_task(vm),
             };
         }

@@ -285,7 +285,9 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
                 task.control.unwinding = Some(unwinding);
             }
             EntryKind::Cleanup | EntryKind::FailureCleanup => {
-                let is_forced = unwinding.target.is_forced();
+                // A task that ends by a failure, and is to be aborted besides, is waited for too.
+                let is_forced = unwinding.target.is_forced()
+                    || unwinding.target.is_final() && vm.scheduler.task().flags.abort_pending();
                 let allowance = if is_forced { vm.allow_cleanup(unwinding.target, height - 1) } else { None };
                 if is_forced && allowance.is_none() {
                     // What these cleanups may use together is spent.

@@ -2,7 +2,7 @@
 
 use crate::report;
 use crate::schedule::Due;
-use crate::task::{Allowance, Control, Target, Unwinding};
+use crate::task::{Allowance, Running, Target, Unwinding};
 use crate::vm::Vm;
 use crate::wait::link;
 
@@ -14,14 +14,11 @@ const CHILD_INTERVAL: u64 = 1_000_000_000;
 pub(super) fn allow_cleanups(vm: &mut Vm, depth: usize) {
     let Vm { scheduler, outside, config, cpu, .. } = vm;
     let running = scheduler.task().control.get().map_or(&[][..], |control| &control.running[..]);
-    let Some(position) = running.iter().position(|running| running.entry >= depth) else { return };
-    if running[position].allowance.is_some() {
-        return;
-    }
-    let entry = running[position].entry;
+    let position = running.partition_point(|running| running.entry < depth);
+    let Some(&Running { entry, allowance: None, .. }) = running.get(position) else { return };
     let allowance = scheduler.allow_cleanup(Some(depth), entry, cpu.used(), &mut outside.host, config);
-    scheduler.task_mut().control.running[position].allowance =
-        Some(allowance.unwrap_or(Allowance { ticks: 0, time: 0 }));
+    let allowance = allowance.unwrap_or(Allowance { ticks: 0, time: 0 });
+    scheduler.task_mut().control.set_allowance(position, allowance);
 }
 
 /// Begins to leave the outermost cleanup of the running task that has outrun its allowance. Returns whether
@@ -33,9 +30,8 @@ pub(super) fn cut_off_cleanup(vm: &mut Vm) -> bool {
     let awaits_child = task.wait.is_true() && link::is_for_child(&vm.heap, task.wait);
     let ticks = task.ticks;
     let is_spent = |allowance: Allowance| ticks >= allowance.ticks || now >= allowance.time && !awaits_child;
-    let running = &task.control.running;
-    let position = running.iter().position(|running| running.allowance.is_some_and(is_spent));
-    if awaits_child && task.control.get().and_then(Control::allowance).is_some() {
+    let position = task.control.outermost_spent(is_spent);
+    if awaits_child && task.control.bound() != Allowance::OVER {
         // Children are bounded in their turn; their end is what this cleanup is for.
         let index = scheduler.turn.index;
         scheduler.timers.push(now.saturating_add(CHILD_INTERVAL), index, Due::Cleanup);
@@ -45,7 +41,7 @@ pub(super) fn cut_off_cleanup(vm: &mut Vm) -> bool {
     let control = &mut scheduler.task_mut().control;
     let entry = control.running[position].entry;
     // It is left once; what runs on the way out has allowances of its own.
-    control.running[position].allowance = Some(Allowance::OVER);
+    control.set_allowance(position, Allowance::OVER);
     let is_under_way = control
         .unwinding
         .as_ref()

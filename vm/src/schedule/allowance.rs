@@ -25,9 +25,14 @@ impl Scheduler {
         host: &mut dyn Host,
         config: &Config,
     ) -> Option<Allowance> {
+        let fund = self.task().extra.as_ref().and_then(|extra| extra.fund);
+        let is_new = fund.is_none_or(|fund| depth.is_some_and(|depth| depth < fund.depth));
+        if !is_new && fund.is_some_and(|fund| fund.refuses(index)) {
+            // There may be very many of these, and to look at the clock takes longer than to leave one.
+            return None;
+        }
         let now = self.reading(used, host);
         let fund = &mut self.task_mut().extra_mut().fund;
-        let is_new = fund.is_none_or(|fund| depth.is_some_and(|depth| depth < fund.depth));
         if is_new {
             *fund = Some(Fund::new(depth.unwrap_or(0), now, config.cleanup_ticks, config.cleanup_time));
         }

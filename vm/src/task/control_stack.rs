@@ -160,6 +160,8 @@ pub(crate) struct Running {
     pub values: Vec<Value>,
     /// Ticks and time that it may still use, once something waits for its end.
     pub allowance: Option<Allowance>,
+    /// The least ticks and time of its allowance and of those of the cleanups around it.
+    pub bound: Allowance,
 }
 
 /// Control stack of a task, with its bindings.
@@ -228,7 +230,8 @@ impl Control {
     pub(crate) fn run_cleanup(&mut self, entry: Entry, running: Running) {
         let data = Value::index(self.running.len());
         self.bindings.truncate(entry.bindings as usize);
-        self.running.push(Running { entry: self.entries.len(), ..running });
+        let bound = self.bound().around(running.allowance);
+        self.running.push(Running { entry: self.entries.len(), bound, ..running });
         self.entries.push(Entry { kind: EntryKind::Running, data, ..entry });
     }
 
@@ -237,9 +240,30 @@ impl Control {
         Some(self.running.last()?.entry)
     }
 
-    /// Returns the first allowance of a running cleanup that it has not outrun yet.
-    pub(crate) fn allowance(&self) -> Option<Allowance> {
-        self.running.iter().filter_map(|running| running.allowance).find(|&it| it != Allowance::OVER)
+    /// Returns the least ticks and time that a running cleanup may use.
+    pub(crate) fn bound(&self) -> Allowance {
+        self.running.last().map_or(Allowance::OVER, |running| running.bound)
+    }
+
+    /// Gives the running cleanup at `position` an allowance.
+    pub(crate) fn set_allowance(&mut self, position: usize, allowance: Allowance) {
+        let (outer, inner) = self.running.split_at_mut(position);
+        let mut bound = outer.last().map_or(Allowance::OVER, |running| running.bound);
+        let Some(first) = inner.first_mut() else { return };
+        first.allowance = Some(allowance);
+        for running in inner {
+            bound = bound.around(running.allowance);
+            if std::mem::replace(&mut running.bound, bound) == bound {
+                break;
+            }
+        }
+    }
+
+    /// Returns the position of the outermost running cleanup that `is_spent` holds for, of what it may use:
+    /// if it holds for something, then for all that is less.
+    pub(crate) fn outermost_spent(&self, is_spent: impl Fn(Allowance) -> bool) -> Option<usize> {
+        let position = self.running.partition_point(|running| !is_spent(running.bound));
+        (position < self.running.len()).then_some(position)
     }
 
     /// Returns the target of an interrupted unwinding that the running cleanup cannot cancel.

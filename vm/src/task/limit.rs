@@ -36,9 +36,25 @@ pub(crate) struct Allowance {
     pub time: u64,
 }
 
+impl Default for Allowance {
+    fn default() -> Allowance {
+        Allowance::OVER
+    }
+}
+
 impl Allowance {
     /// The allowance of a cleanup that was cut off: it has none to outrun any more.
     pub(crate) const OVER: Allowance = Allowance { ticks: u64::MAX, time: u64::MAX };
+
+    /// Returns the smaller number of ticks and the earlier time of two.
+    fn least(self, other: Allowance) -> Allowance {
+        Allowance { ticks: self.ticks.min(other.ticks), time: self.time.min(other.time) }
+    }
+
+    /// Returns what is left to a cleanup with the allowance `own`, inside of those that may use this.
+    pub(crate) fn around(self, own: Option<Allowance>) -> Allowance {
+        own.map_or(self, |own| self.least(own))
+    }
 
     /// Returns the allowance of a cleanup that may use `ticks` and `nanoseconds` from `now` on.
     pub(crate) fn after(now: Allowance, ticks: u64, nanoseconds: u64) -> Allowance {
@@ -104,6 +120,11 @@ impl Fund {
             || now.time.saturating_add(LAST_TICKS * LAST_TIME_PER_TICK) > self.ends.time
     }
 
+    /// Returns whether the cleanup at the control entry `index` is not to be run, whatever the time.
+    pub(crate) fn refuses(&self, index: usize) -> bool {
+        self.floor.is_some_and(|floor| index >= floor)
+    }
+
     /// Returns the allowance of the cleanup at the control entry `index`; `None` if it is not to be run.
     pub(crate) fn allow(&mut self, index: usize, now: Allowance) -> Option<Allowance> {
         if !self.is_spent(now) {
@@ -111,7 +132,7 @@ impl Fund {
             let nanoseconds = (self.ends.time - now.time) / 2;
             return Some(Allowance::after(now, ticks, nanoseconds));
         }
-        if self.floor.is_some_and(|floor| index >= floor) {
+        if self.refuses(index) {
             return None;
         }
         self.floor = Some(index);

@@ -300,8 +300,8 @@ impl Task {
 
     /// Returns the ticks that its cleanups may still use; `None` if they have no allowance, or none runs.
     pub(crate) fn cleanup_ticks_left(&self) -> Option<u64> {
-        let allowances = self.control.get()?.running.iter().filter_map(|running| running.allowance);
-        allowances.map(|allowance| allowance.ticks.saturating_sub(self.ticks)).min()
+        let bound = self.control.get()?.bound();
+        (bound.ticks != u64::MAX).then(|| bound.ticks.saturating_sub(self.ticks))
     }
 
     /// Returns the entry of its outermost limit that has expired, and the cause.
