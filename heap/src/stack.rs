@@ -26,10 +26,12 @@ use crate::value::Value;
 pub struct Stack {
     start: NonNull<Value>,
     capacity: u32,
+    /// How far the scan under way has come, in units of its own.
+    pub scan: u32,
 }
 
 // The words behind `start` are the run's, their address is the process's.
-list_state! { Stack { start: Run, capacity: Run } }
+list_state! { Stack { start: Run, capacity: Run, scan: Derived } }
 
 // SAFETY: a stack owns its segment; the values in it belong to the heap of the machine that owns the stack.
 unsafe impl Send for Stack {}
@@ -40,6 +42,10 @@ const SMALLEST: usize = 15;
 
 /// Words from which on a segment fills whole pages, with the two words that an allocator takes for itself.
 const LARGE: usize = 1 << 14;
+
+/// Most words by which a stack grows or shrinks at once, if that is not a small part of it: in about a
+/// millisecond.
+const MOST: usize = 1 << 18;
 
 /// Words of two pages.
 const PAGES: usize = 1024;
@@ -62,12 +68,12 @@ impl Stack {
     /// If `words` is not below 2^31.
     pub fn new(words: usize) -> Stack {
         let capacity = segment(words);
-        Stack { start: allocate(capacity), capacity: capacity as u32 }
+        Stack { start: allocate(capacity), capacity: capacity as u32, scan: 0 }
     }
 
     /// Creates a stack without words, to stand in for one that was taken away.
     pub const fn none() -> Stack {
-        Stack { start: NonNull::dangling(), capacity: 0 }
+        Stack { start: NonNull::dangling(), capacity: 0, scan: 0 }
     }
 
     /// Returns the address of the first word.
@@ -83,10 +89,11 @@ impl Stack {
     }
 
     /// Returns the number of words to grow to if there are to be at least `words`: so many that the copies of
-    /// a stack that keeps growing are a bounded part of the work that fills it.
+    /// a stack that keeps growing are a bounded part of the work that fills it, and not so many that filling
+    /// the new ones takes long.
     pub fn larger(&self, words: usize) -> usize {
         let capacity = self.capacity();
-        words.max(capacity + if capacity < 1 << 20 { capacity / 4 } else { capacity / 8 })
+        words.max(capacity + (capacity / 4).min((capacity / 32).max(MOST)))
     }
 
     /// Makes room for at least `words` words and keeps the contents. The stack moves.
@@ -97,9 +104,10 @@ impl Stack {
         self.move_to(segment(words.max(self.capacity())));
     }
 
-    /// Returns the memory that the words below `top` do not need to the system. The stack moves.
+    /// Returns the memory that the words below `top` do not need to the system, so much of it as does not
+    /// take long. The stack moves.
     pub fn shrink(&mut self, top: usize) {
-        self.move_to(segment(top));
+        self.move_to(segment(top.max(self.capacity().saturating_sub(MOST))));
     }
 
     fn move_to(&mut self, capacity: usize) {
@@ -122,6 +130,11 @@ impl Stack {
     pub fn wipe(&mut self, top: usize) {
         // The interpreter does not note how high it has written, since that would cost each call a store.
         fill(self.start, top, self.capacity());
+    }
+
+    /// Sets the words of a range to `nil`, as far as they are there.
+    pub fn wipe_range(&mut self, from: usize, to: usize) {
+        fill(self.start, from, to.min(self.capacity()));
     }
 
     /// Returns the words below `top`.
@@ -170,7 +183,7 @@ fn fill(start: NonNull<Value>, from: usize, to: usize) {
 
 #[cfg(test)]
 mod tests {
-    use super::{Stack, segment};
+    use super::{MOST, PAGES, Stack, segment};
     use crate::value::Value;
 
     #[test]
@@ -196,6 +209,34 @@ mod tests {
             assert_eq!(stack.words(2), [Value::T, Value::NIL]);
             assert_eq!(stack.words(stack.capacity()).last(), Some(&Value::NIL));
         }
+    }
+
+    #[test]
+    fn a_range_of_words_is_wiped_as_far_as_they_are_there() {
+        let mut stack = Stack::new(15);
+        for index in 0..15 {
+            // SAFETY: the word lies in the segment.
+            unsafe { stack.start().add(index).write(Value::T) };
+        }
+        stack.wipe_range(2, 5);
+        stack.wipe_range(14, 100);
+        stack.wipe_range(20, 30);
+        let wiped = |index: usize| (2..5).contains(&index) || index == 14;
+        let words = stack.words(15);
+        assert!((0..15).all(|index| words[index] == if wiped(index) { Value::NIL } else { Value::T }));
+    }
+
+    #[test]
+    #[cfg(not(miri))]
+    fn a_large_stack_grows_and_shrinks_by_steps() {
+        let mut stack = Stack::new(4 * MOST);
+        assert!(stack.larger(0) < 5 * MOST + 2 * PAGES);
+        stack.shrink(3);
+        assert!(stack.capacity() >= 3 * MOST);
+        for _ in 0..4 {
+            stack.shrink(3);
+        }
+        assert_eq!(stack.capacity(), segment(3));
     }
 
     #[test]

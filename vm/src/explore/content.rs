@@ -183,7 +183,7 @@ impl VisitControl for Walk<'_> {
     }
 
     fn bindings(&mut self, control: &Control) {
-        for binding in control.bindings.iter() {
+        for binding in control.bindings.all() {
             self.value(binding.symbol);
             self.value(binding.value);
         }

@@ -4,11 +4,13 @@ use esl_bytecode::module::Parameters;
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::{Count, Pad, Window};
 
+use super::collect::LARGE_STACK;
 use super::{code_of, stubs};
 use crate::heap::layout::Code;
 use crate::heap::{AllocError, CodeParts, Heap};
 use crate::saved_pc::SavedPc;
 use crate::shape::{Shape, Sort};
+use crate::stack::Stack;
 use crate::task::LazyControl;
 use crate::task::Task;
 use crate::value::Value;
@@ -16,6 +18,9 @@ use crate::vm::Vm;
 
 /// Offset in a task's stack of the base of the frame in which the stub at the end of the task runs.
 const EXIT_BASE: u32 = 2;
+
+/// Words of a stack with nothing but that frame: its link and the registers of the starter.
+const EXIT_WORDS: usize = 5;
 
 /// Offset in a task's stack of the base of its first frame.
 pub(super) const FIRST_BASE: u32 = 4;
@@ -105,10 +110,23 @@ pub(crate) fn drop_frames(vm: &mut Vm) {
     let task = vm.scheduler.task_mut();
     task.control = LazyControl::default();
     task.base = EXIT_BASE;
-    task.stack.wipe(EXIT_BASE as usize);
+    if task.stack.capacity() > LARGE_STACK {
+        let stack = Stack::new(EXIT_WORDS);
+        // SAFETY: both stacks have more words than this link.
+        unsafe { task.stack.start().copy_to_nonoverlapping(stack.start(), EXIT_BASE as usize) };
+        let large = std::mem::replace(&mut task.stack, stack);
+        vm.scheduler.tasks.discard(large);
+    } else {
+        task.stack.wipe(EXIT_BASE as usize);
+    }
+    let stack_end = vm.stack_end();
+    let start = vm.scheduler.task().stack.start();
     // A collection may still come in this turn, and takes the running frame from the registers.
     // SAFETY: F1: every stack begins with the link of the frame whose base this is.
-    unsafe { vm.cpu.set_base(task.stack.start().add(EXIT_BASE as usize)) };
+    unsafe {
+        vm.cpu.set_base(start.add(EXIT_BASE as usize));
+        vm.cpu.set_stack_end(stack_end);
+    }
 }
 
 /// Makes the function with which every task begins: `(apply R0 R2)` as a tail call.

@@ -148,6 +148,7 @@ fn run_tasks(vm: &mut Vm, id: Option<TaskId>, ticks: u64, may_wait: bool) -> Run
             deliver_some(vm);
         }
         let scheduler = &mut vm.scheduler;
+        let frees = scheduler.tasks.free_some();
         let next = match scheduler.end_of_all {
             None => scheduler.queues.next(&scheduler.tasks, &mut scheduler.choices),
             Some(_) => next_while_all_end(vm),
@@ -156,7 +157,7 @@ fn run_tasks(vm: &mut Vm, id: Option<TaskId>, ticks: u64, may_wait: bool) -> Run
         match next {
             Some(index) => give_turn(vm, index, end),
             None => {
-                if !scheduler.deliveries.is_empty() || scheduler.end_of_all.is_some() {
+                if frees || !scheduler.deliveries.is_empty() || scheduler.end_of_all.is_some() {
                     continue;
                 }
                 if scheduler.counts.alive == 0 {

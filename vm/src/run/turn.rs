@@ -62,7 +62,12 @@ fn run_slice(vm: &mut Vm, index: TaskIndex, rest: Option<OpenSlice>, end: u64) -
     if rest.is_none() && !vm.scheduler.deliveries.is_empty() {
         deliver_some(vm);
     }
-    let Some(task) = vm.scheduler.tasks.take(index) else { return Some(Leave::Ended) };
+    let Some(mut task) = vm.scheduler.tasks.take(index) else { return Some(Leave::Ended) };
+    if rest.is_none() && !vm.scan_in_turn(&mut task) {
+        vm.scheduler.tasks.put_back(index, task);
+        vm.scheduler.turn.end = TurnEnd::Spent;
+        return Some(Leave::Slice);
+    }
     let portion = end.saturating_sub(vm.scheduler.spent);
     let allocated = vm.bytes_for_accounts();
     let (mut slice, leave) = match rest {

@@ -72,8 +72,8 @@ impl Bindings {
     }
 
     /// Returns all bindings, oldest first.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = &Binding> {
-        self.all.iter()
+    pub(crate) fn all(&self) -> &[Binding] {
+        &self.all
     }
 
     /// Returns a copy for another task: the newest binding of each symbol but those of `without`.

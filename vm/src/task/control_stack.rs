@@ -9,7 +9,7 @@
 //! `base` is that of a live frame.
 
 use std::cell::OnceCell;
-use std::ops::{Deref, DerefMut};
+use std::ops::{Deref, DerefMut, Range};
 
 use crate::saved_pc::SavedPc;
 use crate::task::Allowance;
@@ -133,6 +133,14 @@ pub(crate) struct Unwinding {
 }
 
 impl Unwinding {
+    /// Calls `visit` with every value that it holds.
+    fn visit(&self, visit: &mut dyn FnMut(Value)) {
+        self.values.iter().copied().for_each(&mut *visit);
+        if let Target::Root(End::Failed(condition)) = self.target {
+            visit(condition);
+        }
+    }
+
     /// Returns the unwinding that goes on when a cleanup is left: this one, by which it is left, or the one
     /// that the cleanup interrupted. An exit of the program replaces another, but not the end of the task,
     /// nor an expired limit. A failure that was about to end the task does not get in the way of a cut-off:
@@ -317,26 +325,45 @@ impl Control {
             + self.bindings.bytes()
     }
 
-    /// Calls `visit` with every value that the control stack holds.
-    pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
-        for entry in &self.entries {
+    /// Returns the number of its parts: entries, bindings and running cleanups.
+    pub(crate) fn parts(&self) -> usize {
+        self.entries.len() + self.bindings.len() + self.running.len()
+    }
+
+    /// Calls `visit` with every value that a range of its parts holds.
+    pub(crate) fn visit_parts(&self, parts: Range<usize>, visit: &mut dyn FnMut(Value)) {
+        let Range { mut start, mut end } = parts;
+        for entry in part_of(&self.entries, &mut start, &mut end) {
             visit(entry.data);
         }
-        for binding in self.bindings.iter() {
+        for binding in part_of(self.bindings.all(), &mut start, &mut end) {
             visit(binding.symbol);
             visit(binding.value);
         }
-        let pending = self.running.iter().filter_map(|running| running.pending.as_ref());
-        for unwinding in pending.chain(&self.unwinding) {
-            unwinding.values.iter().copied().for_each(&mut *visit);
-            if let Target::Root(End::Failed(condition)) = unwinding.target {
-                visit(condition);
+        for running in part_of(&self.running, &mut start, &mut end) {
+            running.values.iter().copied().for_each(&mut *visit);
+            if let Some(unwinding) = &running.pending {
+                unwinding.visit(visit);
             }
         }
-        for running in &self.running {
-            running.values.iter().copied().for_each(&mut *visit);
+    }
+
+    /// Calls `visit` with every value that the unwinding under way holds.
+    pub(crate) fn visit_unwinding(&self, visit: &mut dyn FnMut(Value)) {
+        if let Some(unwinding) = &self.unwinding {
+            unwinding.visit(visit);
         }
     }
+}
+
+/// Returns the items from `start` to before `end`, as far as they are there, and counts both on from behind
+/// the last one that is.
+fn part_of<'a, T>(items: &'a [T], start: &mut usize, end: &mut usize) -> &'a [T] {
+    let count = items.len();
+    let part = &items[(*start).min(count)..(*end).min(count)];
+    *start = start.saturating_sub(count);
+    *end = end.saturating_sub(count);
+    part
 }
 
 #[cfg(test)]

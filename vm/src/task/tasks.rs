@@ -3,6 +3,7 @@
 use esl_heap::list_state;
 
 use super::{Task, TaskIndex};
+use crate::stack::Stack;
 use crate::value::Value;
 
 /// Name of a task, good for as long as the machine lives.
@@ -39,9 +40,11 @@ pub(crate) struct Tasks {
     spare: Vec<Box<Task>>,
     /// Number of places, from the first on, that the collector has yet to look at.
     unmet: usize,
+    /// Large stacks of tasks that have ended, to be freed.
+    discarded: Vec<Stack>,
 }
 
-list_state! { Tasks { places: Run, free: Run, spare: Derived, unmet: Derived } }
+list_state! { Tasks { places: Run, free: Run, spare: Derived, unmet: Derived, discarded: Derived } }
 
 impl Tasks {
     /// Creates a task that has yet to be given a frame, with at least so many words of stack.
@@ -61,6 +64,23 @@ impl Tasks {
         if self.spare.len() < SPARE && task.stack.capacity() <= SPARE_WORDS {
             self.spare.push(task);
         }
+    }
+
+    /// Takes the large stack of a task that has ended, to free it piece by piece.
+    pub(crate) fn discard(&mut self, stack: Stack) {
+        self.discarded.push(stack);
+    }
+
+    /// Frees a piece of a stack that was discarded. Returns whether there was one.
+    #[inline]
+    pub(crate) fn free_some(&mut self) -> bool {
+        let Some(stack) = self.discarded.last_mut() else { return false };
+        let before = stack.capacity();
+        stack.shrink(0);
+        if stack.capacity() == before {
+            self.discarded.pop();
+        }
+        true
     }
 
     /// Adds a task, and returns its name.
@@ -170,6 +190,11 @@ impl Tasks {
     pub(crate) fn next_unmet(&mut self) -> Option<Option<&mut Task>> {
         self.unmet = self.unmet.checked_sub(1)?;
         Some(self.places[self.unmet].task.as_deref_mut())
+    }
+
+    /// Has the collector look again at the place that it has looked at last.
+    pub(crate) fn meet_again(&mut self) {
+        self.unmet += 1;
     }
 }
 
