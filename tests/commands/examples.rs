@@ -14,7 +14,7 @@ use crate::{eslc, eslvm};
 /// Longest time that a flight may take on a machine that is busy with others.
 const PATIENCE: Duration = Duration::from_secs(600);
 
-fn example(name: &str) -> PathBuf {
+pub(crate) fn example(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name)
 }
 
@@ -60,7 +60,9 @@ fn the_spacecraft_survives_its_faults() {
 }
 
 /// Starts a simulator, which prints its port, and returns it with its output and the port.
-fn start_simulator(command: &mut Command) -> (Child, BufReader<std::process::ChildStdout>, String) {
+pub(crate) fn start_simulator(
+    command: &mut Command,
+) -> (Child, BufReader<std::process::ChildStdout>, String) {
     let mut child = process::start(command);
     let mut output = BufReader::new(child.stdout.take().expect("it is a pipe"));
     let mut line = String::new();
@@ -94,6 +96,7 @@ fn the_executive_flies_by_lines_of_json() {
 }
 
 #[test]
+#[allow(clippy::print_stderr, reason = "whoever runs the tests sees what is left out")]
 fn the_executive_flies_what_basilisk_simulates() {
     let has_basilisk = Command::new("python3").args(["-c", "import Basilisk"]).output();
     if !has_basilisk.is_ok_and(|done| done.status.success()) {
