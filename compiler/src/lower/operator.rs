@@ -42,12 +42,11 @@ enum OperatorShape {
     Not,
     Eq,
     Eql,
-    /// An instruction for effect on two arguments; the call returns the second.
-    Store(fn(Reg, Reg) -> Instr),
-    /// An instruction for effect on two arguments, if the value of the call is unused.
+    /// An instruction for effect on two arguments, if the value of the call is unused. Where it is used, a
+    /// value that a recovery procedure gives takes its place, as for any call.
     Change(fn(Reg, Reg) -> Instr),
-    /// As `Store`, with three arguments, of which the call returns the last.
-    StoreAt(fn(Reg, Reg, Reg) -> Instr),
+    /// As `Change`, with three arguments.
+    ChangeAt(fn(Reg, Reg, Reg) -> Instr),
     List,
     ListStar,
     Identity,
@@ -117,10 +116,10 @@ fn shape(builtin: Builtin, count: usize) -> Option<OperatorShape> {
         (B::Aref, 2) => Binary(|dst, array, index| Instr::ArrayRef { dst, array, index }),
         (B::Rplaca, 2) => Change(|pair, value| Instr::SetCar { pair, value }),
         (B::Rplacd, 2) => Change(|pair, value| Instr::SetCdr { pair, value }),
-        (B::SetCar, 2) => Store(|pair, value| Instr::SetCar { pair, value }),
-        (B::SetCdr, 2) => Store(|pair, value| Instr::SetCdr { pair, value }),
-        (B::SetSvref, 3) => StoreAt(|vector, index, value| Instr::VectorSet { vector, index, value }),
-        (B::SetAref, 3) => StoreAt(|array, index, value| Instr::ArraySet { array, index, value }),
+        (B::SetCar, 2) => Change(|pair, value| Instr::SetCar { pair, value }),
+        (B::SetCdr, 2) => Change(|pair, value| Instr::SetCdr { pair, value }),
+        (B::SetSvref, 3) => ChangeAt(|vector, index, value| Instr::VectorSet { vector, index, value }),
+        (B::SetAref, 3) => ChangeAt(|array, index, value| Instr::ArraySet { array, index, value }),
         (B::List, _) => List,
         (B::ListStar, 1..=MAX_DIRECT) => ListStar,
         (B::Identity, 1) => Identity,
@@ -142,9 +141,8 @@ pub(super) fn takes_literals(core: &Core, builtin: Builtin, arguments: &[NodeId]
         Some(
             OperatorShape::Binary(_)
             | OperatorShape::Quotient(_)
-            | OperatorShape::Store(_)
             | OperatorShape::Change(_)
-            | OperatorShape::StoreAt(_),
+            | OperatorShape::ChangeAt(_),
         ) => true,
         _ => false,
     }
@@ -198,23 +196,16 @@ impl<'a> FunctionBuilder<'_, 'a> {
             (OperatorShape::Not, [object]) => self.not(*object, dest),
             (OperatorShape::Eq, [left, right]) => self.identical(false, *left, *right, dest),
             (OperatorShape::Eql, [left, right]) => self.identical(true, *left, *right, dest),
-            (OperatorShape::Store(instr), [object, value]) => {
-                let (object, value) = self.operands(*object, *value);
-                self.emit(instr(object, value));
-                self.registers.release(top);
-                self.deliver(value, dest);
-            }
             (OperatorShape::Change(instr), [object, value]) if matches!(dest, Dest::Effect) => {
                 let (object, value) = self.operands(*object, *value);
                 self.emit(instr(object, value));
                 self.registers.release(top);
             }
-            (OperatorShape::StoreAt(instr), [object, index, value]) => {
+            (OperatorShape::ChangeAt(instr), [object, index, value]) if matches!(dest, Dest::Effect) => {
                 let object = self.operand(*object, &[*index, *value]);
                 let (index, value) = self.operands(*index, *value);
                 self.emit(instr(object, index, value));
                 self.registers.release(top);
-                self.deliver(value, dest);
             }
             (OperatorShape::List, _) => self.list(arguments, dest),
             (OperatorShape::ListStar, _) => self.list_star(arguments, dest),

@@ -39,7 +39,9 @@ impl FunctionBuilder<'_, '_> {
         dest: Dest,
     ) {
         let top = self.registers.top();
-        let Ok(narrow) = u8::try_from(slot) else {
+        // Where the value of the form is used, what a recovery procedure gives takes its place, as for any
+        // call; the instruction has no result that it could replace.
+        let (Ok(narrow), Dest::Effect) = (u8::try_from(slot), dest) else {
             return self.distant_slot(Builtin::SetSlotOf, class, slot, &[instance, value], dest);
         };
         let instance = self.operand(instance, &[value]);
@@ -47,10 +49,9 @@ impl FunctionBuilder<'_, '_> {
         let class = WideClassIdx(u32::from(self.class_index(class)));
         self.emit(Instr::SetSlot { instance, slot: Index(narrow), value, class });
         self.registers.release(top);
-        self.deliver(value, dest);
     }
 
-    /// Lowers access to a slot whose number does not fit the instruction.
+    /// Lowers access to a slot by a builtin: its number does not fit the instruction, or the value is used.
     fn distant_slot(&mut self, builtin: Builtin, class: &Symbol, slot: u16, forms: &[NodeId], dest: Dest) {
         let window = self.registers.top();
         self.registers.take(2);
