@@ -149,6 +149,48 @@ enum EndQuestion {
     Leaves(VarId),
 }
 
+/// Returns whether the global function of this name never returns.
+fn is_leaving(function: &Symbol) -> bool {
+    LEAVING.iter().any(|name| is_esl(function, name))
+        || LEAVING_STANDARD.iter().any(|name| function.is_cl(name))
+}
+
+/// Returns whether a form itself leaves, and what is around it too. `inside` are blocks around it that would
+/// not be left.
+fn exits(core: &Core, node: NodeId, inside: &FxHashSet<BlockId>) -> bool {
+    match &core.nodes[node.index()].kind {
+        NodeKind::Throw(..) | NodeKind::Go(..) => true,
+        NodeKind::ReturnFrom(block, _) => !inside.contains(block),
+        NodeKind::Call(Callee::Global(function), _) => is_leaving(function),
+        NodeKind::Call(Callee::Local(function), _) => core.variables[function.index()].never_returns,
+        _ => false,
+    }
+}
+
+/// Returns whether the value of a form is true, if that is written there.
+fn truth(core: &Core, node: NodeId) -> Option<bool> {
+    match &core.nodes[node.index()].kind {
+        NodeKind::Constant(constant) => Some(!constant.is_nil()),
+        _ => None,
+    }
+}
+
+/// Returns parts of a form that are evaluated whenever the form is, before it ends.
+fn evaluated_first(kind: &NodeKind) -> impl Iterator<Item = NodeId> {
+    let (one, list): (Option<NodeId>, &[NodeId]) = match kind {
+        NodeKind::SetLocal(_, value) | NodeKind::SetSpecial(_, value) => (Some(*value), &[]),
+        NodeKind::If(test, ..) => (Some(*test), &[]),
+        NodeKind::And(forms) | NodeKind::Or(forms) => (forms.first().copied(), &[]),
+        NodeKind::Progn(forms) | NodeKind::Values(forms) => (None, forms),
+        NodeKind::UnwindProtect(_, cleanup) => (Some(*cleanup), &[]),
+        NodeKind::BindValues(_, form, _) | NodeKind::FirstValues(form, _) => (Some(*form), &[]),
+        NodeKind::Call(_, arguments) | NodeKind::Apply(_, arguments) => (None, arguments),
+        NodeKind::CallValues(_, forms) => (None, forms),
+        _ => (None, &[]),
+    };
+    one.into_iter().chain(list.iter().copied())
+}
+
 /// Answers a question about the end of a form. A `NIL` that a macro has put at the end of its expansion, as
 /// `dolist` does, does not say that it is meant. A function that calls itself at its end does not return
 /// there.
@@ -159,7 +201,11 @@ fn ends(core: &Core, node: NodeId, end: EndQuestion) -> bool {
     while let Some((node, around)) = pending.pop() {
         let span = core.nodes[node.index()].span;
         let inside_it = |node: NodeId| (node, Some(span));
-        match &core.nodes[node.index()].kind {
+        let kind = &core.nodes[node.index()].kind;
+        if evaluated_first(kind).any(|part| exits(core, part, &inside)) {
+            continue;
+        }
+        match kind {
             NodeKind::Constant(constant) if constant.is_nil() && around == Some(span) => return false,
             NodeKind::Constant(_) | NodeKind::Values(_) if leaves => return false,
             NodeKind::Constant(_) | NodeKind::Values(_) | NodeKind::Throw(..) | NodeKind::Go(..) => {}
@@ -173,6 +219,18 @@ fn ends(core: &Core, node: NodeId, end: EndQuestion) -> bool {
             NodeKind::Block(block, body) => {
                 inside.insert(*block);
                 pending.push(inside_it(*body));
+            }
+            NodeKind::If(test, consequent, alternative) if truth(core, *test).is_some() => {
+                let holds = truth(core, *test) == Some(true);
+                pending.push(inside_it(if holds { *consequent } else { *alternative }));
+            }
+            NodeKind::And(forms) | NodeKind::Or(forms) => {
+                let goes_on = matches!(kind, NodeKind::And(_));
+                let Some((last, before)) = forms.split_last() else { return false };
+                if !before.iter().all(|&form| truth(core, form) == Some(goes_on)) {
+                    return false;
+                }
+                pending.push(inside_it(*last));
             }
             NodeKind::If(_, consequent, alternative) => {
                 // A branch that `when` or `cond` leaves out does not say that its value is meant.
@@ -205,16 +263,14 @@ fn ends(core: &Core, node: NodeId, end: EndQuestion) -> bool {
             }
             NodeKind::Tagbody(_, items) => match items.last() {
                 Some(TagbodyItem::Form(last)) => {
-                    if !matches!(core.nodes[last.index()].kind, NodeKind::Go(..)) {
+                    if !exits(core, *last, &inside) {
                         return false;
                     }
                 }
                 _ => return false,
             },
             NodeKind::Call(Callee::Global(function), _) => {
-                let is_known = LEAVING.iter().any(|name| is_esl(function, name))
-                    || LEAVING_STANDARD.iter().any(|name| function.is_cl(name));
-                if !is_known {
+                if !is_leaving(function) {
                     return false;
                 }
             }
