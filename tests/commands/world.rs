@@ -246,13 +246,15 @@ fn datagrams_come_whole() {
 
 #[test]
 fn a_thousand_connections_are_served_by_one_program() {
-    // All are open before the first is answered.
+    // All are open before the first is answered. They come in at most fifty at a time, since the system drops some
+    // where more wait than it has room for.
     let server = "(require :sockets)
 (let ((listener (sockets:listen \"127.0.0.1\" 0)) (served 0) (all (make-event 'all)))
   (format t \"~a~%\" (sockets:local-port listener))
   (finish-output)
   (sockets::serve listener nil
     (lambda (c)
+      (format c \"hello~%\")
       (let ((line (read-line c)))
         (incf served)
         (signal all)
@@ -265,8 +267,14 @@ fn a_thousand_connections_are_served_by_one_program() {
     BufReader::new(output).read_line(&mut port).expect("the port is printed");
     let client = format!(
         "(require :sockets)
+(define-resource door :capacity 50)
+(defun enter ()
+  (with-resource (door)
+    (let ((c (sockets:connect \"127.0.0.1\" {})))
+      (read-line c)
+      c)))
 (defun ask (number)
-  (sockets:with-socket (c (sockets:connect \"127.0.0.1\" {}))
+  (sockets:with-socket (c (enter))
     (format c \"~a~%\" number)
     (if (equal (read-line c) (format nil \"~a\" number)) 1 0)))
 (print (let ((tasks (loop for i below 1000 collect (let ((i i)) (spawn (ask i))))))
