@@ -177,6 +177,10 @@ fn truth(core: &Core, node: NodeId) -> Option<bool> {
 
 /// Returns parts of a form that are evaluated whenever the form is, before it ends.
 fn evaluated_first(kind: &NodeKind) -> impl Iterator<Item = NodeId> {
+    let bindings = match kind {
+        NodeKind::Let { bindings, .. } => &bindings[..],
+        _ => &[],
+    };
     let (one, list): (Option<NodeId>, &[NodeId]) = match kind {
         NodeKind::SetLocal(_, value) | NodeKind::SetSpecial(_, value) => (Some(*value), &[]),
         NodeKind::If(test, ..) => (Some(*test), &[]),
@@ -188,7 +192,7 @@ fn evaluated_first(kind: &NodeKind) -> impl Iterator<Item = NodeId> {
         NodeKind::CallValues(_, forms) => (None, forms),
         _ => (None, &[]),
     };
-    one.into_iter().chain(list.iter().copied())
+    one.into_iter().chain(list.iter().copied()).chain(bindings.iter().map(|(_, value)| *value))
 }
 
 /// Answers a question about the end of a form. A `NIL` that a macro has put at the end of its expansion, as
