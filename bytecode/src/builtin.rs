@@ -968,6 +968,8 @@ macro_rules! for_each_builtin {
             /// Tells the outside that this task, whose operations are under way there, stands still, or goes
             /// on.
             TellOfSuspension = operation::tell_of_suspension, internal "%TELL-OF-SUSPENSION" ("stands");
+            /// Whether the embedder has an operation of this name, a symbol, and the task may wait for it.
+            MayAwait = operation::may_await, internal "%MAY-AWAIT" ("name");
             /// Tells the outside to stop an operation, once.
             CancelOperation = operation::cancel_operation, internal "%CANCEL-OPERATION" ("handle");
             /// What has become of an operation: a keyword, and the list of its values or of the cause and the
@@ -1235,8 +1237,9 @@ macro_rules! for_each_builtin {
             MakeCustomStream = stream::make_custom_stream, internal "%MAKE-CUSTOM-STREAM" ("data");
             /// The data of such a stream; `NIL` for any other object.
             CustomStreamData = stream::custom_stream_data, internal "%CUSTOM-STREAM-DATA" ("stream");
-            /// A stream whose characters come from and go to what `handler` says.
-            MakeChannel = stream::make_channel, internal "%MAKE-CHANNEL" ("handler");
+            /// A stream whose characters come from and go to what `handler` says: to be read if `direction` is
+            /// 1, to be written if it is 2, otherwise both. `file` is the name of the file, or `NIL`.
+            MakeChannel = stream::make_channel, internal "%MAKE-CHANNEL" ("handler file direction");
             /// The handler of a channel; `NIL` for any other object.
             ChannelHandler = stream::channel_handler, internal "%CHANNEL-HANDLER" ("object");
             /// The string stream that gathers what is written to a channel.
@@ -1248,6 +1251,10 @@ macro_rules! for_each_builtin {
             SupplyChannel = stream::supply_channel, internal "%SUPPLY-CHANNEL" ("channel text");
             /// Reads many of the characters that a channel has to be read, a string.
             ChannelPiece = stream::channel_piece, internal "%CHANNEL-PIECE" ("channel");
+            /// The bytes that the characters 0 to 255 of a string stand for.
+            BytesOfString = stream::bytes_of_string, internal "%BYTES-OF-STRING" ("string");
+            /// The string of the characters that stand for the bytes of a vector.
+            StringOfBytes = stream::string_of_bytes, internal "%STRING-OF-BYTES" ("vector");
             /// Whether `object` is a stream.
             Streamp = stream::streamp, cl "STREAMP" ("object");
             /// Whether a stream can be read from.

@@ -13,6 +13,7 @@ mod modules;
 mod real_time;
 mod rights;
 #[cfg(unix)]
+mod streams;
 mod terminal;
 mod testing;
 mod timeline;

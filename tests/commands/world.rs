@@ -363,3 +363,62 @@ fn faults_of_the_outside_have_causes() {
     ];
     check("outside-faults", text, &["--allow-all"], &expected);
 }
+
+#[test]
+fn bytes_and_text_take_turns_on_a_connection() {
+    let text = "(require :sockets)
+(defun bytes (&rest list) (make-array (length list) :element-type '(unsigned-byte 8) :initial-contents list))
+(sockets:with-socket (listener (sockets:listen \"127.0.0.1\" 0))
+  (spawn (:name 'other)
+    (sockets:with-socket (c (sockets:accept listener))
+      (format c \"sïze 300~%\")
+      (write-sequence (apply #'bytes (loop for i below 300 collect (mod i 256))) c)
+      (write-byte 254 c)
+      (format c \"ënd~%\")
+      (finish-output c)
+      (write-sequence (vector 1 195 2) c)
+      (read-line c nil nil)))
+  (sockets:with-socket (c (sockets:connect \"127.0.0.1\" (sockets:local-port listener)))
+    (let ((data (make-array 300 :element-type '(unsigned-byte 8))))
+      (print (list (read-line c) (read-sequence data c)))
+      (print (loop for i below 300 always (= (aref data i) (mod i 256))))
+      (print (list (read-byte c) (read-line c) (read-byte c) (read-byte c) (read-byte c)))
+      (terpri c)
+      (finish-output c)
+      (print (list (read-byte c nil :end) (read-sequence data c :start 2))))
+    (print (handler-case (write-byte 256 c) (type-error () 'refused)))))";
+    let expected = ["(\"sïze 300\" 300)", "T", "(254 \"ënd\" 1 195 2)", "(:END 2)", "REFUSED"];
+    check("sockets-bytes", text, &["--allow-net=127.0.0.1"], &expected);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_launched_program_is_talked_to_through_streams() {
+    let text = "(require :process)
+(let* ((p (process:launch-program '(\"sh\" \"-c\" \"while read x; do echo got $x; echo bad $x >&2; done; exit 3\")
+                                  :input :stream :output :stream :error-output :stream))
+       (in (process:process-input p)) (out (process:process-output p)) (errors (process:process-error-output p)))
+  (print (list (input-stream-p in) (output-stream-p in) (input-stream-p out) (output-stream-p out)))
+  (dolist (x '(1 2))
+    (format in \"~d~%\" x)
+    (finish-output in)
+    (print (list (read-line out) (read-line errors))))
+  (print (handler-case (with-timeout 0.01 (read-line out)) (failure (f) (failure-cause f))))
+  (close in)
+  (print (list (read-line out nil :end) (read-line errors nil :end) (process:wait-process p)))
+  (close out)
+  (close errors))
+(let ((p (process:launch-program '(\"sh\" \"-c\" \"exit 4\"))))
+  (print (list (process:process-input p) (process:process-output p) (process:wait-process p))))
+(print (handler-case (process:launch-program '(\"no-such-program\") :output :stream) (failure (f) (failure-cause f))))";
+    let expected = [
+        "(NIL T T NIL)",
+        "(\"got 1\" \"bad 1\")",
+        "(\"got 2\" \"bad 2\")",
+        ":TIMEOUT",
+        "(:END :END 3)",
+        "(NIL NIL 4)",
+        ":PROCESS-ERROR",
+    ];
+    check("process-streams", text, &["--allow-run=sh,no-such-program"], &expected);
+}

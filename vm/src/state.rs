@@ -77,7 +77,7 @@ state! {
     Scheduler by VisitScheduler :: scheduler_content {
         content { tasks, timers }
         course {
-            choices, readers, end_of_all, main, main_number, serial, spent, rounds, is_paused, canary, open_turn, any_event,
+            choices, readers, writers, end_of_all, main, main_number, serial, spent, rounds, is_paused, canary, open_turn, any_event,
             starter,
         }
         parts { queues, accounts, deliveries, counts, clock, points, turn }

@@ -19,8 +19,10 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod arrived;
 mod data;
 mod event_loop;
+mod file;
 mod modules;
 mod operation;
 mod os;
@@ -41,6 +43,8 @@ pub fn install_modules(machine: &mut Vm) {
 /// `:NOT-IN-THIS-WORLD`.
 pub fn install_operations(machine: &mut Vm) {
     os::install_clock(machine);
-    process::install(machine);
-    socket::install(machine);
+    file::install(machine);
+    let sockets = socket::Sockets::default();
+    process::install(machine, &sockets);
+    socket::install(machine, &sockets);
 }

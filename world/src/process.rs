@@ -20,6 +20,7 @@ use tokio::sync::{mpsc, watch};
 use crate::data::{Arguments, boolean, failure, integer, nil, text};
 use crate::event_loop;
 use crate::operation::{Answer, Cancelled, define, define_with_end};
+use crate::socket::{Connection, Sockets};
 
 /// Time that a program has between SIGTERM and SIGKILL.
 const GRACE: Duration = Duration::from_secs(2);
@@ -64,12 +65,14 @@ impl Programs {
 }
 
 /// Gives a machine the operations of `:process`.
-pub(crate) fn install(machine: &mut Vm) {
+pub(crate) fn install(machine: &mut Vm, sockets: &Sockets) {
     let needs = [Need { right: Right::Run, argument: 0 }];
     define_with_end(machine, "%PROCESS-RUN", &needs, run);
     let programs = Programs::default();
-    let known = programs.clone();
-    define(machine, "%PROCESS-LAUNCH", &needs, move |arguments| launch(arguments, known.clone()));
+    let (known, sockets) = (programs.clone(), sockets.clone());
+    define(machine, "%PROCESS-LAUNCH", &needs, move |arguments| {
+        launch(arguments, known.clone(), sockets.clone())
+    });
     let known = programs.clone();
     define(machine, "%PROCESS-WAIT", &[], move |arguments| {
         let launched = arguments.integer(0).and_then(|number| known.get(number));
@@ -215,15 +218,37 @@ fn terminate(child: &mut Child) {
     drop(child.start_kill());
 }
 
-/// `%PROCESS-LAUNCH`: program, arguments, whether it has the output of this process, folder, environment.
-async fn launch(arguments: Arguments, programs: Programs) -> Answer {
-    let name = arguments.text(0)?;
-    let mut command = command(&arguments, 3)?;
-    command.stdin(Stdio::null());
-    if !arguments.is_true(2) {
-        command.stdout(Stdio::null()).stderr(Stdio::null());
+/// Where the output of a launched program goes: to the connection of a number, nowhere for `NIL`, and for anything
+/// else to where that of this process goes.
+fn output_of(arguments: &Arguments, index: usize) -> (Stdio, Option<i64>) {
+    match arguments.integer(index) {
+        Ok(number) => (Stdio::piped(), Some(number)),
+        Err(_) if arguments.is_true(index) => (Stdio::inherit(), None),
+        Err(_) => (Stdio::null(), None),
     }
+}
+
+/// `%PROCESS-LAUNCH`: program, arguments, the number of a connection for its input or `NIL`, where output and error
+/// output go, folder, environment.
+async fn launch(arguments: Arguments, programs: Programs, sockets: Sockets) -> Answer {
+    let name = arguments.text(0)?;
+    let mut command = command(&arguments, 5)?;
+    let input = if arguments.is_true(2) { Some(arguments.integer(2)?) } else { None };
+    let ((output, output_number), (errors, errors_number)) =
+        (output_of(&arguments, 3), output_of(&arguments, 4));
+    command.stdin(pipe_if(input.is_some())).stdout(output).stderr(errors);
     let mut child = start(command, &name)?;
+    let none = tokio::io::empty;
+    // A number may have been closed meanwhile; then the pipe is closed too.
+    if let (Some(number), Some(pipe)) = (input, child.stdin.take()) {
+        _ = sockets.set(number, Connection::over(none(), pipe), 0, String::new());
+    }
+    if let (Some(number), Some(pipe)) = (output_number, child.stdout.take()) {
+        _ = sockets.set(number, Connection::over(pipe, none()), 0, String::new());
+    }
+    if let (Some(number), Some(pipe)) = (errors_number, child.stderr.take()) {
+        _ = sockets.set(number, Connection::over(pipe, none()), 0, String::new());
+    }
     let number = integer(child.id().unwrap_or(0));
     let (status_sender, status) = watch::channel(None);
     let (end, mut ends) = mpsc::unbounded_channel();

@@ -20,6 +20,7 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream, UdpSocket};
 use tokio::sync::watch;
 
+use crate::arrived::{Arrived, whole_characters};
 use crate::data::{Arguments, bytes_of, failure, integer, nil, text, text_of_bytes};
 use crate::operation::{Answer, define};
 
@@ -29,22 +30,15 @@ const CHUNK: usize = 1 << 16;
 type Reader = Box<dyn AsyncRead + Send + Unpin>;
 type Writer = Box<dyn AsyncWrite + Send + Unpin>;
 
-/// What a connection has read and the program has not taken.
-#[derive(Default)]
-struct Arrived {
-    bytes: Vec<u8>,
-    is_ended: bool,
-}
-
 /// A connection.
-struct Connection {
+pub(crate) struct Connection {
     reader: tokio::sync::Mutex<Reader>,
     writer: tokio::sync::Mutex<Writer>,
     arrived: Mutex<Arrived>,
 }
 
 /// A socket that waits for connections.
-enum Listener {
+pub(crate) enum Listener {
     Tcp(TcpListener),
     #[cfg(unix)]
     Unix(tokio::net::UnixListener, std::path::PathBuf),
@@ -61,13 +55,14 @@ impl Drop for Listener {
 }
 
 /// A datagram, and the address of its sender.
-type Datagram = (Vec<u8>, String);
+pub(crate) type Datagram = (Vec<u8>, String);
 
 /// The datagrams that the program has not taken.
-type Datagrams = Arc<Mutex<VecDeque<Datagram>>>;
+pub(crate) type Datagrams = Arc<Mutex<VecDeque<Datagram>>>;
 
+/// What a socket is.
 #[derive(Clone)]
-enum Kind {
+pub(crate) enum Kind {
     /// Not connected yet.
     New,
     Connection(Arc<Connection>),
@@ -88,7 +83,7 @@ struct Socket {
 
 /// The sockets of a machine, by number.
 #[derive(Clone, Default)]
-struct Sockets(Arc<Mutex<(i64, HashMap<i64, Socket>)>>);
+pub(crate) struct Sockets(Arc<Mutex<(i64, HashMap<i64, Socket>)>>);
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // What it guards is whole at every moment, so a panic elsewhere does not corrupt it.
@@ -128,7 +123,7 @@ impl Sockets {
     }
 
     /// Says what a new socket is. It may have been closed meanwhile.
-    fn set(&self, number: i64, kind: Kind, port: i64, peer: String) -> Answer {
+    pub(crate) fn set(&self, number: i64, kind: Kind, port: i64, peer: String) -> Answer {
         let mut sockets = lock(&self.0);
         let socket = sockets.1.get_mut(&number).ok_or_else(closed)?;
         (socket.kind, socket.port, socket.peer) = (kind, port, peer);
@@ -171,7 +166,8 @@ impl Socket {
 }
 
 impl Connection {
-    fn over(
+    /// Returns a connection that is read from one side and written to the other.
+    pub(crate) fn over(
         reader: impl AsyncRead + Send + Unpin + 'static,
         writer: impl AsyncWrite + Send + Unpin + 'static,
     ) -> Kind {
@@ -183,70 +179,40 @@ impl Connection {
     }
 
     fn of_tcp(stream: TcpStream) -> (Kind, i64, String) {
+        let (port, peer) = Connection::ends_of(&stream);
+        let (reader, writer) = stream.into_split();
+        (Connection::over(reader, writer), port, peer)
+    }
+
+    /// Returns the port of a connection here, and the address there.
+    fn ends_of(stream: &TcpStream) -> (i64, String) {
         // Requests and answers are small, and are not to wait for more; without it they only take longer.
         drop(stream.set_nodelay(true));
         let port = stream.local_addr().map_or(0, |address| address.port().into());
-        let peer = stream.peer_addr().map_or(String::new(), |address| address.to_string());
-        let (reader, writer) = stream.into_split();
-        (Connection::over(reader, writer), port, peer)
+        (port, stream.peer_addr().map_or(String::new(), |address| address.to_string()))
     }
 
     /// Waits until something has arrived, or the connection has ended.
     async fn wait(&self) -> Result<(), Failure> {
         let mut reader = self.reader.lock().await;
-        let is_there = {
-            let arrived = lock(&self.arrived);
-            arrived.is_ended || !arrived.bytes.is_empty()
-        };
-        if is_there {
+        if lock(&self.arrived).is_something() {
             return Ok(());
         }
         let mut bytes = Vec::with_capacity(CHUNK);
-        let count = reader.read_buf(&mut bytes).await.map_err(|error| socket_failure(&error))?;
-        let mut arrived = lock(&self.arrived);
-        arrived.is_ended = count == 0;
-        arrived.bytes.append(&mut bytes);
+        reader.read_buf(&mut bytes).await.map_err(|error| socket_failure(&error))?;
+        lock(&self.arrived).add(&bytes);
         Ok(())
     }
 
-    /// Takes what has arrived: whole characters, or bytes. `NIL` at the end.
-    fn take(&self, as_text: bool) -> Datum {
-        let mut arrived = lock(&self.arrived);
-        if arrived.bytes.is_empty() {
-            return if arrived.is_ended { nil() } else { text("") };
-        }
-        let is_ended = arrived.is_ended;
-        let bytes = std::mem::take(&mut arrived.bytes);
-        if !as_text {
-            return text_of_bytes(&bytes);
-        }
-        let whole = if is_ended { bytes.len() } else { whole_characters(&bytes) };
-        arrived.bytes = bytes[whole..].to_vec();
-        text(&String::from_utf8_lossy(&bytes[..whole]))
+    /// Takes what has arrived. `NIL` at the end.
+    fn take<T>(&self, take: impl FnOnce(&mut Arrived) -> T) -> T {
+        take(&mut lock(&self.arrived))
     }
-}
-
-/// Returns the length of a text without the character at its end of which a part is missing.
-fn whole_characters(bytes: &[u8]) -> usize {
-    for back in 1..=bytes.len().min(3) {
-        let byte = bytes[bytes.len() - back];
-        if byte & 0xC0 != 0x80 {
-            let length = match byte {
-                0xC0..=0xDF => 2,
-                0xE0..=0xEF => 3,
-                0xF0..=0xF7 => 4,
-                _ => 1,
-            };
-            return if length > back { bytes.len() - back } else { bytes.len() };
-        }
-    }
-    bytes.len()
 }
 
 /// Gives a machine the operations of `:sockets`.
-pub(crate) fn install(machine: &mut Vm) {
-    let sockets = Sockets::default();
-    define_immediate(machine, &sockets);
+pub(crate) fn install(machine: &mut Vm, sockets: &Sockets) {
+    define_immediate(machine, sockets);
     let net = [Need { right: Right::Net, argument: 1 }];
     let path = [Need { right: Right::Read, argument: 1 }, Need { right: Right::Write, argument: 1 }];
     let mut operation = {
@@ -293,7 +259,15 @@ fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
     define("%SOCKET-PEER", |arguments, sockets| Ok(text(&sockets.get(arguments.integer(0)?)?.peer)));
     define("%SOCKET-TAKE", |arguments, sockets| {
         let connection = sockets.get(arguments.integer(0)?)?.connection()?;
-        Ok(connection.take(arguments.is_true(1)))
+        // Lines are taken one by one, so that bytes may follow a line of text.
+        Ok(connection.take(|arrived| {
+            if arguments.is_true(1) { arrived.take_text(true) } else { arrived.take_bytes(CHUNK) }
+        }))
+    });
+    define("%SOCKET-TAKE-BYTES", |arguments, sockets| {
+        let connection = sockets.get(arguments.integer(0)?)?.connection()?;
+        let limit = usize::try_from(arguments.integer(1)?).unwrap_or(0);
+        Ok(connection.take(|arrived| arrived.take_bytes(limit)))
     });
     define("%SOCKET-ACCEPTED", |arguments, sockets| match sockets.get(arguments.integer(0)?)?.kind {
         Kind::Listener(_, accepted) => Ok(lock(&accepted).pop_front().map_or_else(nil, integer)),
@@ -324,20 +298,19 @@ async fn connect(arguments: Arguments, sockets: Sockets) -> Answer {
         let mut last = failure("HOST-NOT-FOUND", format!("`{address}` has no address"));
         for address in addresses {
             match TcpStream::connect(address).await {
-                Ok(stream) => return Ok(stream),
+                Ok(stream) => return Ok(Connection::of_tcp(stream)),
                 Err(error) => last = socket_failure(&error),
             }
         }
         Err(last)
     };
-    let stream = if arguments.is_true(2) {
+    let (kind, port, peer) = if arguments.is_true(2) {
         let time = Duration::from_millis(u64::try_from(arguments.integer(2)?).unwrap_or(0));
         let late = |_| Err(failure("TIMEOUT", format!("`{address}` does not answer")));
         tokio::time::timeout(time, connect).await.unwrap_or_else(late)?
     } else {
         connect.await?
     };
-    let (kind, port, peer) = Connection::of_tcp(stream);
     sockets.set(number, kind, port, peer)
 }
 
@@ -455,18 +428,4 @@ async fn wait_for_datagram(arguments: Arguments, sockets: Sockets) -> Answer {
     bytes.truncate(count);
     lock(&datagrams).push_back((bytes, address.to_string()));
     Ok(Vec::new())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_character_that_is_cut_waits_for_its_rest() {
-        let bytes = "aä€😀".as_bytes();
-        let expected = [0, 1, 1, 3, 3, 3, 6, 6, 6, 6, 10];
-        let found: Vec<usize> = (0..=bytes.len()).map(|end| whole_characters(&bytes[..end])).collect();
-        assert_eq!(found, expected);
-        assert_eq!(whole_characters(&[0x80; 5]), 5, "what is no text does not wait");
-    }
 }

@@ -74,6 +74,12 @@ pub(super) fn tell_of_suspension(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::NIL)
 }
 
+pub(super) fn may_await(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let name = vm.heap.symbol(arguments[0]).and_then(|symbol| vm.heap.string_text(symbol.name));
+    let is_there = name.is_some_and(|name| vm.outside.has_operation(&name));
+    Ok(Value::boolean(is_there && vm.scheduler.task().critical == 0))
+}
+
 pub(super) fn cancel_operation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
     let handle = expect_handle(vm, arguments[0])?;

@@ -102,7 +102,7 @@ pub(super) fn task_status(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = vm.scheduler.tasks.at(index);
     Ok(match task.map(|task| task.state) {
         Some(TaskState::Waiting) if task.is_some_and(|task| task.flags.suspended()) => known.suspended,
-        Some(TaskState::Waiting | TaskState::Reading) => known.waiting,
+        Some(TaskState::Waiting | TaskState::Reading | TaskState::Writing) => known.waiting,
         _ => known.running,
     })
 }

@@ -122,6 +122,12 @@ impl Host for Asked {
         self.host.write(output, bytes)
     }
 
+    fn write_ready(&mut self, output: Output, bytes: &[u8]) -> Result<usize, HostError> {
+        self.note_word(Question::Write, output as u64);
+        self.canary.mix_bytes(bytes);
+        self.host.write_ready(output, bytes)
+    }
+
     fn read_input(&mut self) -> Input {
         self.note(Question::ReadInput);
         self.host.read_input()

@@ -4,6 +4,9 @@
 //! input, and at its end. Standard error is written at once, after the contents of standard output's buffer,
 //! so that both appear in the order of the program. Input is decoded as UTF-8; invalid bytes become U+FFFD.
 //!
+//! What a program prints is written as far as there is room. The rest stays in the buffer, and tasks that print
+//! more wait meanwhile; only the end of a run, and its reports, wait for the reader.
+//!
 //! Guarantees: once nobody reads standard output any more, everything written to it is dropped, and
 //! [`Console::is_broken`] holds: the run ends quietly.
 
@@ -18,6 +21,9 @@ const BLOCK: usize = 1 << 14;
 #[derive(Default)]
 pub(crate) struct Console {
     output: Vec<u8>,
+    /// What there was no room for on standard error. While there is anything, no more is written to standard
+    /// output, whose buffer was empty then.
+    errors: Vec<u8>,
     /// Characters since the last line end, by stream.
     columns: [usize; 2],
     /// A hash of everything written to standard output, if requested.
@@ -59,17 +65,61 @@ impl Console {
                 }
                 encode(characters, &mut self.output);
                 if self.output.len() >= BLOCK {
-                    self.flush(host);
+                    self.pass_on(host);
                 }
             }
             Output::Error => {
-                self.flush(host);
-                let mut bytes = Vec::new();
-                encode(characters, &mut bytes);
-                // Standard error is gone, and there is no other stream for the error.
-                let _ = host.write(Output::Error, &bytes);
+                self.pass_on(host);
+                if !self.output.is_empty() {
+                    self.flush(host);
+                }
+                encode(characters, &mut self.errors);
+                self.pass_on(host);
             }
         }
+    }
+
+    /// Returns whether a task may write to a stream now, and need not wait.
+    pub(crate) fn has_room(&mut self, host: &mut dyn Host, output: Output) -> bool {
+        let limit = if output == Output::Standard { BLOCK } else { 1 };
+        if self.errors.is_empty() && self.output.len() < limit {
+            return true;
+        }
+        self.pass_on(host);
+        self.errors.is_empty() && self.output.len() < limit
+    }
+
+    /// Returns whether something waits until there is room for it.
+    pub(crate) fn is_behind(&self) -> bool {
+        !self.errors.is_empty() || !self.output.is_empty()
+    }
+
+    /// Writes the buffers, as far as there is room.
+    pub(crate) fn pass_on(&mut self, host: &mut dyn Host) {
+        if !self.errors.is_empty() {
+            // If standard error is gone, there is no other stream for the error.
+            let count = host.write_ready(Output::Error, &self.errors).unwrap_or(self.errors.len());
+            self.errors.drain(..count.min(self.errors.len()));
+        }
+        if !self.errors.is_empty() || self.output.is_empty() {
+            return;
+        }
+        let count = match self.broken {
+            true => Ok(self.output.len()),
+            false => host.write_ready(Output::Standard, &self.output),
+        };
+        let count = self.count_written(count);
+        self.output.drain(..count.min(self.output.len()));
+    }
+
+    /// Notes what has come of a write to standard output, and returns how much of the buffer is done with.
+    fn count_written(&mut self, written: Result<usize, HostError>) -> usize {
+        match written {
+            Ok(count) => return count,
+            Err(HostError::BrokenPipe) => self.broken = true,
+            Err(error) => self.failure = Some(error),
+        }
+        self.output.len()
     }
 
     /// Turns the hash of everything written to standard output on, from zero, or off.
@@ -82,17 +132,19 @@ impl Console {
         self.noted.unwrap_or(0)
     }
 
-    /// Writes the buffer of standard output.
+    /// Writes the buffers, and waits until there is room for that.
     pub(crate) fn flush(&mut self, host: &mut dyn Host) {
+        if !self.errors.is_empty() {
+            // As above.
+            let _ = host.write(Output::Error, &self.errors);
+            self.errors.clear();
+        }
         if self.output.is_empty() {
             return;
         }
         if !self.broken {
-            match host.write(Output::Standard, &self.output) {
-                Ok(()) => {}
-                Err(HostError::BrokenPipe) => self.broken = true,
-                Err(error) => self.failure = Some(error),
-            }
+            let written = host.write(Output::Standard, &self.output).map(|()| self.output.len());
+            self.count_written(written);
         }
         self.output.clear();
     }
@@ -187,7 +239,7 @@ impl Console {
         if self.at_end {
             return Taken::End;
         }
-        self.flush(host);
+        self.pass_on(host);
         match host.read_input() {
             Input::Data(bytes) => {
                 self.take_in(&bytes);

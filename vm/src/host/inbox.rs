@@ -29,6 +29,8 @@ pub enum Incoming {
     Stop,
     /// Standard input has data, or has ended: tasks that wait for it try again.
     Input,
+    /// A standard stream has room for output again: tasks that wait for that try again.
+    Output,
     /// News of an operation.
     Operation {
         /// Number of the operation.

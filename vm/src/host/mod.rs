@@ -130,11 +130,26 @@ impl fmt::Display for HostError {
 
 impl std::error::Error for HostError {}
 
+impl From<&std::io::Error> for HostError {
+    fn from(error: &std::io::Error) -> HostError {
+        use std::io::ErrorKind;
+        match error.kind() {
+            ErrorKind::BrokenPipe => HostError::BrokenPipe,
+            ErrorKind::NotFound => HostError::NotFound,
+            ErrorKind::PermissionDenied => HostError::Refused,
+            ErrorKind::AlreadyExists => HostError::Exists,
+            _ => HostError::Other(error.to_string()),
+        }
+    }
+}
+
 /// What a host waits for beside a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Awaited {
     /// Whether tasks wait for standard input.
     pub input: bool,
+    /// Whether output waits until there is room for it.
+    pub output: bool,
     /// Whether something is expected in the inbox, because an operation is under way, or because there is a
     /// sender.
     pub news: bool,
@@ -196,6 +211,15 @@ pub trait Host {
     /// # Errors
     /// [`HostError::BrokenPipe`] if nobody reads them, another error if they could not be written.
     fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError>;
+
+    /// Writes as many of the bytes to a standard stream as there is room for, without waiting, and returns
+    /// their number. If that is not all, [`Incoming::Output`] comes into the inbox when there is room.
+    ///
+    /// # Errors
+    /// As [`Host::write`].
+    fn write_ready(&mut self, output: Output, bytes: &[u8]) -> Result<usize, HostError> {
+        self.write(output, bytes).map(|()| bytes.len())
+    }
 
     /// Reads the available part of standard input, without waiting.
     fn read_input(&mut self) -> Input;

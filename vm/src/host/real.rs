@@ -3,8 +3,13 @@
 //! A thread reads standard input, one chunk per request of the program, and then puts a note into the inbox.
 //! So waiting for either, up to a deadline, is one operation, and input that was not requested stays with the
 //! system.
+//!
+//! Output to a pipe, a terminal or a socket is written as far as there is room; a thread waits for more room,
+//! and then puts a note into the inbox. Everything else takes output without delay, or at its own pace.
 
 use std::io::{Read, Write};
+#[cfg(unix)]
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -39,6 +44,9 @@ pub struct RealHost {
     /// Requests a chunk from the reading thread, which is started at the first request.
     reader: Option<Sender<()>>,
     is_reading: bool,
+    /// What is known of standard output and standard error.
+    #[cfg(unix)]
+    outputs: [OutputState; 2],
     /// Destination of both output streams, in place of the process's own.
     screen: Option<Screen>,
     /// Nanoseconds of virtual time, if time is virtual.
@@ -58,6 +66,8 @@ impl RealHost {
             input: Arrived::default(),
             reader: None,
             is_reading: false,
+            #[cfg(unix)]
+            outputs: Default::default(),
             screen: None,
             virtual_time: None,
             speed: 1.0,
@@ -122,6 +132,85 @@ impl RealHost {
     }
 }
 
+/// Bytes that a pipe has room for when it has any.
+#[cfg(unix)]
+const PIECE: usize = 4096;
+
+/// What is known of an output stream.
+#[cfg(unix)]
+#[derive(Default)]
+struct OutputState {
+    /// Whether a reader can delay it; unknown before the first write.
+    is_delayed: Option<bool>,
+    /// Asks the thread that waits for room, which is started when there is none for the first time.
+    watcher: Option<Sender<()>>,
+    /// Whether it was asked, and has not put its note into the inbox yet.
+    is_watched: Arc<AtomicBool>,
+}
+
+/// Calls `function` with the descriptor of an output stream.
+#[cfg(unix)]
+fn with_descriptor<T>(output: Output, function: impl FnOnce(rustix::fd::BorrowedFd<'_>) -> T) -> T {
+    use rustix::fd::AsFd;
+    match output {
+        Output::Standard => function(std::io::stdout().as_fd()),
+        Output::Error => function(std::io::stderr().as_fd()),
+    }
+}
+
+/// Waits until a write to an output stream would not wait, or for no time at all. Returns whether it would not.
+#[cfg(unix)]
+fn await_room(output: Output, waits: bool) -> bool {
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+    let none = Timespec { tv_sec: 0, tv_nsec: 0 };
+    with_descriptor(output, |descriptor| {
+        let mut asked = [PollFd::from_borrowed_fd(descriptor, PollFlags::OUT)];
+        // An error of the stream shows in the write.
+        !matches!(
+            poll(&mut asked, if waits { None } else { Some(&none) }),
+            Ok(0) | Err(rustix::io::Errno::INTR)
+        )
+    })
+}
+
+#[cfg(unix)]
+impl OutputState {
+    /// Returns whether a reader of the stream can delay it.
+    fn is_delayed(&mut self, output: Output) -> bool {
+        use rustix::fs::FileType;
+        *self.is_delayed.get_or_insert_with(|| {
+            let file_type = with_descriptor(output, |descriptor| rustix::fs::fstat(descriptor))
+                .map_or(FileType::Unknown, |stat| FileType::from_raw_mode(stat.st_mode));
+            matches!(file_type, FileType::Fifo | FileType::Socket | FileType::CharacterDevice)
+        })
+    }
+
+    /// Has `inbox` told when the stream has room. Returns false if nobody can do that.
+    fn watch(&mut self, output: Output, inbox: &Inbox) -> bool {
+        if self.is_watched.swap(true, Ordering::Relaxed) {
+            return true;
+        }
+        if self.watcher.is_none() {
+            let (ask, asked) = channel();
+            let (is_watched, inbox) = (self.is_watched.clone(), inbox.clone());
+            let run = move || {
+                while asked.recv().is_ok() {
+                    while !await_room(output, true) {}
+                    is_watched.store(false, Ordering::Relaxed);
+                    inbox.put(Incoming::Output);
+                }
+            };
+            let spawned = std::thread::Builder::new().name("standard-output".into()).spawn(run);
+            self.watcher = spawned.is_ok().then_some(ask);
+        }
+        let is_asked = self.watcher.as_ref().is_some_and(|watcher| watcher.send(()).is_ok());
+        if !is_asked {
+            self.is_watched.store(false, Ordering::Relaxed);
+        }
+        is_asked
+    }
+}
+
 /// Waits for a chunk of standard input.
 fn read_chunk() -> Input {
     let mut buffer = [0; 4096];
@@ -136,14 +225,7 @@ fn read_chunk() -> Input {
 }
 
 fn error_of(error: &std::io::Error) -> HostError {
-    use std::io::ErrorKind;
-    match error.kind() {
-        ErrorKind::BrokenPipe => HostError::BrokenPipe,
-        ErrorKind::NotFound => HostError::NotFound,
-        ErrorKind::PermissionDenied => HostError::Refused,
-        ErrorKind::AlreadyExists => HostError::Exists,
-        _ => HostError::Other(error.to_string()),
-    }
+    HostError::from(error)
 }
 
 /// Returns the names of what is in a folder, in order; those of folders end in `/`.
@@ -251,6 +333,37 @@ impl Host for RealHost {
             Output::Error => std::io::stderr().lock().write_all(bytes),
         };
         written.map_err(|error| error_of(&error))
+    }
+
+    #[cfg(unix)]
+    fn write_ready(&mut self, output: Output, bytes: &[u8]) -> Result<usize, HostError> {
+        // Where time is virtual, a reader takes none of it.
+        let is_at_once = self.screen.is_some() || self.virtual_time.is_some();
+        if is_at_once || !self.outputs[output as usize].is_delayed(output) {
+            return self.write(output, bytes).map(|()| bytes.len());
+        }
+        let mut done = 0;
+        while done < bytes.len() {
+            let piece = &bytes[done..bytes.len().min(done + PIECE)];
+            let written = match await_room(output, false) {
+                true => with_descriptor(output, |descriptor| rustix::io::write(descriptor, piece)),
+                false => Err(rustix::io::Errno::AGAIN),
+            };
+            match written {
+                Ok(count) => done += count,
+                Err(rustix::io::Errno::INTR) => {}
+                Err(rustix::io::Errno::AGAIN) if self.outputs[output as usize].watch(output, &self.inbox) => {
+                    return Ok(done);
+                }
+                Err(rustix::io::Errno::AGAIN) => {
+                    return self.write(output, &bytes[done..]).map(|()| bytes.len());
+                }
+                // As the standard library has it: nobody has the stream, and nobody misses what is written.
+                Err(rustix::io::Errno::BADF) => return Ok(bytes.len()),
+                Err(error) => return Err(error_of(&error.into())),
+            }
+        }
+        Ok(done)
     }
 
     fn read_input(&mut self) -> Input {

@@ -70,6 +70,8 @@ define_records! {
     Arguments(Vec<String>);
     /// Outcome of a write to a standard stream or a file, or of a removal.
     Written(Result<(), HostError>);
+    /// Outcome of a write of what there was room for.
+    PassedOn(Result<usize, HostError>);
     /// Standard input.
     Read(Input);
     /// Whether a person watches standard output.
@@ -174,6 +176,11 @@ impl<H: Host> Host for RecordingHost<H> {
 
     fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError> {
         let answer = Written(self.host.write(output, bytes));
+        self.note(answer).0
+    }
+
+    fn write_ready(&mut self, output: Output, bytes: &[u8]) -> Result<usize, HostError> {
+        let answer = PassedOn(self.host.write_ready(output, bytes));
         self.note(answer).0
     }
 
@@ -348,6 +355,13 @@ impl Host for ReplayHost {
         // Output is captured even if the recorded write failed, as it is what the program wanted to write.
         self.captured.append(output, bytes);
         self.next::<Written>().map_or(Err(HostError::BrokenPipe), |answer| answer.0)
+    }
+
+    fn write_ready(&mut self, output: Output, bytes: &[u8]) -> Result<usize, HostError> {
+        let passed_on = self.next::<PassedOn>().map_or(Err(HostError::BrokenPipe), |answer| answer.0);
+        let count = passed_on.as_ref().map_or(bytes.len(), |&count| count.min(bytes.len()));
+        self.captured.append(output, &bytes[..count]);
+        passed_on
     }
 
     fn read_input(&mut self) -> Input {

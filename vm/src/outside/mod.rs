@@ -128,6 +128,11 @@ impl Outside {
         !self.operations.is_empty() || self.senders > 0
     }
 
+    /// Writes what programs have printed and is still in a buffer, as far as there is room.
+    pub(crate) fn pass_on(&mut self) {
+        self.console.pass_on(&mut self.host);
+    }
+
     /// Writes what programs have printed and is still in a buffer.
     pub(crate) fn flush(&mut self) {
         self.console.flush(&mut self.host);

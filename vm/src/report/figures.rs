@@ -34,7 +34,7 @@ impl Vm {
 fn figures_of(vm: &Vm, task: &Task) -> TaskFigures {
     let status = match task.state {
         TaskState::Ended => end_label(vm, task),
-        TaskState::Waiting | TaskState::Reading => "waiting",
+        TaskState::Waiting | TaskState::Reading | TaskState::Writing => "waiting",
         TaskState::Runnable => "running",
     };
     TaskFigures {

@@ -56,6 +56,9 @@ pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
     if task.state == TaskState::Reading {
         return "input".into();
     }
+    if task.state == TaskState::Writing {
+        return "room for output".into();
+    }
     if task.wait.is_nil() {
         return "a time".into();
     }

@@ -73,7 +73,8 @@ impl Vm {
             .tasks
             .iter()
             .filter(|task| {
-                matches!(task.state, TaskState::Waiting | TaskState::Reading) && !task.flags.hidden()
+                matches!(task.state, TaskState::Waiting | TaskState::Reading | TaskState::Writing)
+                    && !task.flags.hidden()
             })
             .collect();
         tasks.sort_unstable_by_key(|task| task.number);

@@ -23,6 +23,7 @@ pub(crate) fn take_in(vm: &mut Vm) -> bool {
             Incoming::Signal(signal) => stops |= end_by_signal(vm, signal),
             Incoming::Stop => stops = true,
             Incoming::Input => wake_readers(vm),
+            Incoming::Output => wake_writers(vm),
             Incoming::Operation { number, news } => hear(vm, number, news),
             Incoming::Message { input, arguments } => receive(vm, &input, &arguments),
             Incoming::Question { number, question } => take_question(vm, number, question),
@@ -87,6 +88,16 @@ fn receive(vm: &mut Vm, name: &str, arguments: &[Datum]) {
     let Some(&input) = vm.outside.inputs.get(name) else { return };
     let arguments = import_list(vm, arguments).unwrap_or(Value::NIL);
     allocate_without_retry(vm, |vm| signal(vm, input, arguments).map(|()| Value::NIL));
+}
+
+/// Writes what has room now, and has the tasks that wait for that try again.
+fn wake_writers(vm: &mut Vm) {
+    vm.outside.pass_on();
+    for id in std::mem::take(&mut vm.scheduler.writers) {
+        if vm.scheduler.tasks.get(id).is_some_and(|task| task.state == TaskState::Writing) {
+            make_runnable(vm, id.index, false);
+        }
+    }
 }
 
 /// Has the tasks that wait for standard input try again.

@@ -55,7 +55,7 @@ fn stop_operations(vm: &mut Vm) {
         if vm.scheduler.clock.is_due(&mut vm.outside.host, deadline) {
             return;
         }
-        vm.outside.host.wait(Some(deadline), Awaited { input: false, news: true });
+        vm.outside.host.wait(Some(deadline), Awaited { news: true, ..Awaited::default() });
         if vm.outside.inbox.is_rung() {
             vm.scheduler.rounds += 1;
             take_in(vm);

@@ -100,7 +100,10 @@ impl Vm {
     /// Returns whether something can still come for tasks that all wait: a time, input, or news from outside.
     pub fn expects_something(&mut self) -> bool {
         let scheduler = &mut self.scheduler;
-        scheduler.first_timer().is_some() || !scheduler.readers.is_empty() || self.outside.expects_news()
+        scheduler.first_timer().is_some()
+            || !scheduler.readers.is_empty()
+            || !scheduler.writers.is_empty()
+            || self.outside.expects_news()
     }
 
     /// Returns the time that is left to the first timer, in nanoseconds.
@@ -139,8 +142,8 @@ fn run_tasks(vm: &mut Vm, id: Option<TaskId>, ticks: u64, may_wait: bool) -> Run
             if !may_wait {
                 return RunOutcome::Waiting;
             }
-            vm.outside.flush();
-            vm.outside.host.wait(None, Awaited { input: false, news: true });
+            vm.outside.pass_on();
+            vm.outside.host.wait(None, Awaited { news: true, ..Awaited::default() });
             continue;
         }
         look_at_clock(vm);

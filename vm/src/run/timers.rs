@@ -93,7 +93,7 @@ pub(super) fn go_on_in_time(vm: &mut Vm) -> bool {
     let now = vm.scheduler.clock.read(&mut vm.outside.host);
     if input || is_virtual && first.is_some() {
         let deadline = first.filter(|_| is_virtual).unwrap_or(now);
-        vm.outside.host.wait(Some(deadline), Awaited { input, news: false });
+        vm.outside.host.wait(Some(deadline), Awaited { input, ..Awaited::default() });
         if input && is_virtual {
             wake_readers(vm);
         }
@@ -106,9 +106,14 @@ pub(super) fn go_on_in_time(vm: &mut Vm) -> bool {
 
 /// Sleeps until a timer is due or something comes from outside. Returns false if nothing ever will.
 pub(crate) fn idle(vm: &mut Vm) -> bool {
-    vm.outside.flush();
+    vm.outside.pass_on();
     let deadline = vm.scheduler.first_timer();
-    let awaited = Awaited { input: !vm.scheduler.readers.is_empty(), news: vm.outside.expects_news() };
+    let awaited = Awaited {
+        input: !vm.scheduler.readers.is_empty(),
+        // Room may have come since a task has parked; the note that says so has not.
+        output: vm.outside.console.is_behind() || !vm.scheduler.writers.is_empty(),
+        news: vm.outside.expects_news(),
+    };
     if deadline.is_none() && awaited == Awaited::default() {
         return false;
     }

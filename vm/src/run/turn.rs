@@ -246,6 +246,10 @@ fn park_task(vm: &mut Vm, index: TaskIndex) {
             task.state = TaskState::Reading;
             scheduler.readers.push(id);
         }
+        Parking::Output => {
+            task.state = TaskState::Writing;
+            scheduler.writers.push(id);
+        }
         Parking::Wait(deadline) => {
             task.state = TaskState::Waiting;
             if let Some(deadline) = deadline {

@@ -80,6 +80,8 @@ pub(crate) struct Scheduler {
     pub(crate) deliveries: Deliveries,
     /// Tasks that wait for input.
     pub(crate) readers: Vec<TaskId>,
+    /// Tasks that wait until output has room.
+    pub(crate) writers: Vec<TaskId>,
     /// Progress of ending all tasks, while that is under way.
     pub(crate) end_of_all: Option<EndOfAll>,
     /// The event that every signal signals too.
@@ -125,6 +127,7 @@ impl Scheduler {
             accounts: Accounts::default(),
             deliveries: Deliveries::default(),
             readers: Vec::new(),
+            writers: Vec::new(),
             end_of_all: None,
             any_event,
             starter,

@@ -8,6 +8,8 @@ pub(crate) enum Parking {
     /// For input from outside.
     #[default]
     Input,
+    /// For room for output.
+    Output,
     /// For a signal, or until a time in nanoseconds.
     Wait(Option<u64>),
 }

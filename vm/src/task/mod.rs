@@ -37,6 +37,8 @@ pub(crate) enum TaskState {
     Waiting,
     /// It waits for input from outside.
     Reading,
+    /// It waits until output has room.
+    Writing,
     /// It has ended, and its record is kept for the embedder.
     Ended,
 }

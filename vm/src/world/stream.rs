@@ -24,15 +24,19 @@ pub(crate) mod slot {
     /// Mode in which the next block is written to the file: number of a `WriteMode`. For a channel 1 if
     /// nothing comes after what it has to read; for its output 1, since that is bounded.
     pub(crate) const MODE: usize = 6;
-    /// List of the full strings gathered before the buffer, the last first.
+    /// List of the full strings gathered before the buffer, the last first. For a channel what it is for: 1 for
+    /// reading, 2 for writing, otherwise both.
     pub(crate) const FULL: usize = 7;
-    /// Number of characters in the full strings.
+    /// Number of characters in the full strings. For a channel of those that were read and are not in the
+    /// buffer any more.
     pub(crate) const BEFORE: usize = 8;
     /// Path that is written to: the one that was permitted. For a channel the string stream that gathers its
     /// output.
     pub(crate) const PATH: usize = 9;
+    /// For a channel the name of the file that is behind it.
+    pub(crate) const FILE: usize = 10;
     /// Number of slots.
-    pub(crate) const LEN: usize = 10;
+    pub(crate) const LEN: usize = 11;
 }
 
 /// Source or destination of a stream.
@@ -42,13 +46,13 @@ pub(crate) enum StreamKind {
     StandardInput = 0,
     StandardOutput = 1,
     StandardError = 2,
-    /// A string or the text of a file, which is read as a whole.
+    /// A string, or the text of a file that is read as a whole.
     StringInput = 3,
     StringOutput = 4,
     FileOutput = 5,
     /// Anything else: the operations are in ESL, over the object in the buffer's slot.
     Custom = 6,
-    /// What functions of the library read from and write to, such as a socket: for both.
+    /// What functions of the library read from and write to, such as a socket or a file.
     Channel = 7,
 }
 

@@ -12,11 +12,20 @@ use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::stream::{StreamKind, make_stream, slot};
 
-use super::{BLOCK, FIRST_BUFFER, set_stream_slot, stream_index, stream_slot};
+use super::{BLOCK, FIRST_BUFFER, StreamUse, set_stream_slot, stream_index, stream_slot};
 
 /// Returns whether more may be supplied to a stream.
 pub(super) fn may_go_on(heap: &Heap, stream: Value, kind: StreamKind) -> bool {
     kind == StreamKind::Channel && stream_index(heap, stream, slot::MODE) == 0
+}
+
+/// Returns whether a channel is for a use.
+pub(super) fn is_for(heap: &Heap, channel: Value, purpose: StreamUse) -> bool {
+    match stream_index(heap, channel, slot::FULL) {
+        1 => purpose == StreamUse::Reading,
+        2 => purpose == StreamUse::Writing,
+        _ => true,
+    }
 }
 
 /// Returns whether a string stream gathers the output of a channel.
@@ -42,9 +51,9 @@ fn expect_channel(vm: &mut Vm, v: Value) -> Result<Value, Exit> {
     }
 }
 
-/// `(%make-channel handler)`
+/// `(%make-channel handler file direction)`
 pub(in crate::builtins) fn make_channel(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [handler] = exactly(arguments);
+    let [handler, file, direction] = exactly(arguments);
     let buffer = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
     let output = make_stream(&mut vm.heap, StreamKind::StringOutput, buffer, 0, 0)?;
     set_stream_slot(&mut vm.heap, output, slot::MODE, Value::small(1));
@@ -52,6 +61,8 @@ pub(in crate::builtins) fn make_channel(vm: &mut Vm, arguments: &[Value]) -> Out
     let channel = make_stream(&mut vm.heap, StreamKind::Channel, empty, 0, 0)?;
     set_stream_slot(&mut vm.heap, channel, slot::NAME, handler);
     set_stream_slot(&mut vm.heap, channel, slot::PATH, output);
+    set_stream_slot(&mut vm.heap, channel, slot::FILE, file);
+    set_stream_slot(&mut vm.heap, channel, slot::FULL, direction);
     Ok(channel)
 }
 
@@ -115,9 +126,11 @@ pub(in crate::builtins) fn supply_channel(vm: &mut Vm, arguments: &[Value]) -> O
     all.extend_from_slice(more);
     vm.exchange.charge_elements(all.len());
     let (position, length) = (start - kept, all.len());
+    let before = stream_index(&vm.heap, channel, slot::BEFORE) + kept;
     let buffer = vm.heap.alloc_string(&all)?;
     set_stream_slot(&mut vm.heap, channel, slot::BUFFER, buffer);
     set_stream_slot(&mut vm.heap, channel, slot::POSITION, Value::index(position));
     set_stream_slot(&mut vm.heap, channel, slot::END, Value::index(length));
+    set_stream_slot(&mut vm.heap, channel, slot::BEFORE, Value::index(before));
     Ok(Value::T)
 }

@@ -20,6 +20,7 @@ use crate::heap::{Heap, Kind};
 use crate::host::{Host, HostError, Output, Right, Taken, WriteMode, column_after, encode};
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::run;
+use crate::schedule::Parking;
 use crate::task::End;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -67,6 +68,22 @@ pub(crate) enum Then {
     Input,
 }
 
+/// What a stream is used for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum StreamUse {
+    Reading,
+    Writing,
+}
+
+/// Returns whether a stream is for a use.
+fn is_for(heap: &Heap, stream: Value, kind: StreamKind, purpose: StreamUse) -> bool {
+    match purpose {
+        _ if kind == StreamKind::Channel => channel::is_for(heap, stream, purpose),
+        StreamUse::Reading => kind.is_input(),
+        StreamUse::Writing => kind.is_output(),
+    }
+}
+
 fn stream_slot(heap: &Heap, stream: Value, index: usize) -> Value {
     heap.record(stream, Kind::Stream).map_or(Value::NIL, |slots| slots[index])
 }
@@ -98,8 +115,8 @@ fn designated_stream(vm: &mut Vm, v: Value, is_input: bool) -> Result<(Value, St
             _ => Raised::Type(stream, expected),
         });
     };
-    let is_right = if is_input { kind.is_input() } else { kind.is_output() };
-    if kind != StreamKind::Custom && !is_right {
+    let purpose = if is_input { StreamUse::Reading } else { StreamUse::Writing };
+    if kind != StreamKind::Custom && !is_for(&vm.heap, stream, kind, purpose) {
         let text = if is_input { "it is not open for reading" } else { "it is not open for writing" };
         return vm.exchange.raise(Raised::Stream(stream, text.into()));
     }
@@ -170,10 +187,12 @@ fn write_characters(vm: &mut Vm, stream: Value, kind: StreamKind, characters: &[
     vm.exchange.charge_elements(characters.len());
     match kind {
         StreamKind::StandardOutput => {
+            await_room(vm, Output::Standard)?;
             vm.outside.console.write(&mut vm.outside.host, Output::Standard, characters);
             check_output(vm)
         }
         StreamKind::StandardError => {
+            await_room(vm, Output::Error)?;
             vm.outside.console.write(&mut vm.outside.host, Output::Error, characters);
             Ok(())
         }
@@ -244,6 +263,44 @@ fn write_out(vm: &mut Vm, stream: Value) -> Result<(), Exit> {
         Ok(()) => Ok(()),
         Err(error) => vm.exchange.raise(Raised::Stream(stream, format!("it cannot be written: {error}"))),
     }
+}
+
+/// Has the running task wait until a standard stream has room. A task that must not wait writes what there is
+/// before, however long that takes.
+///
+/// # Errors
+/// [`Exit::Park`] while there is no room.
+fn await_room(vm: &mut Vm, output: Output) -> Result<(), Exit> {
+    if vm.outside.console.has_room(&mut vm.outside.host, output) {
+        return Ok(());
+    }
+    if vm.scheduler.task().critical > 0 {
+        vm.outside.flush();
+        return Ok(());
+    }
+    park_for_output(vm)
+}
+
+/// Parks the running task until there is room for output; the instruction is done again then.
+fn park_for_output<T>(vm: &mut Vm) -> Result<T, Exit> {
+    vm.scheduler.turn.parking = Parking::Output;
+    Err(Exit::Park)
+}
+
+/// Writes what standard output and standard error have gathered, and waits until that is done.
+///
+/// # Errors
+/// [`Exit::Park`] while there is no room.
+fn finish_standard(vm: &mut Vm) -> Result<(), Exit> {
+    if vm.scheduler.task().critical > 0 {
+        vm.outside.flush();
+    } else {
+        vm.outside.pass_on();
+        if vm.outside.console.is_behind() {
+            return park_for_output(vm);
+        }
+    }
+    Ok(())
 }
 
 /// What becomes of a program whose standard output could not be written: it fails, or if nobody reads it
@@ -374,8 +431,13 @@ pub(super) fn read_from_copy(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn string_input_position(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (stream, _) = designated_stream(vm, arguments[0], true)?;
-    Ok(stream_slot(&vm.heap, stream, slot::POSITION))
+    let (stream, kind) = designated_stream(vm, arguments[0], true)?;
+    let position = stream_index(&vm.heap, stream, slot::POSITION);
+    let before = match kind {
+        StreamKind::Channel => stream_index(&vm.heap, stream, slot::BEFORE),
+        _ => 0,
+    };
+    Ok(Value::index(before + position))
 }
 
 pub(super) fn make_string_output(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
@@ -485,7 +547,7 @@ pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
     match kind {
         StreamKind::StandardInput | StreamKind::StandardOutput | StreamKind::StandardError => {
-            vm.outside.flush();
+            finish_standard(vm)?;
             return Ok(Value::T);
         }
         StreamKind::FileOutput if abort.is_nil() => {
@@ -552,6 +614,24 @@ pub(super) fn write_bytes(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
+pub(super) fn bytes_of_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(characters) = characters_of(&vm.heap, arguments[0]) else {
+        return vm.exchange.type_error(arguments[0], "STRING");
+    };
+    let bytes: Vec<u8> = characters.iter().map(|&code| u8::try_from(code).unwrap_or(b'?')).collect();
+    vm.exchange.charge_elements(bytes.len());
+    Ok(vm.heap.alloc_bytes(&bytes)?)
+}
+
+pub(super) fn string_of_bytes(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(ArrayElements::Bytes(bytes)) = vector_elements(&vm.heap, arguments[0]) else {
+        return vm.exchange.not_written(arguments[0], "(VECTOR (UNSIGNED-BYTE 8))");
+    };
+    let characters: Vec<u32> = bytes.iter().map(|&byte| u32::from(byte)).collect();
+    vm.exchange.charge_elements(characters.len());
+    Ok(vm.heap.alloc_string(&characters)?)
+}
+
 pub(super) fn make_custom_stream(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(make_stream(&mut vm.heap, StreamKind::Custom, arguments[0], 0, 0)?)
 }
@@ -591,7 +671,7 @@ pub(super) fn streamp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn input_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match StreamKind::of(&vm.heap, arguments[0]) {
         Some(StreamKind::Custom) => Err(Exit::Slowly),
-        Some(kind) => Ok(Value::boolean(kind.is_input())),
+        Some(kind) => Ok(Value::boolean(is_for(&vm.heap, arguments[0], kind, StreamUse::Reading))),
         None => vm.exchange.type_error(arguments[0], "STREAM"),
     }
 }
@@ -599,7 +679,7 @@ pub(super) fn input_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn output_stream_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match StreamKind::of(&vm.heap, arguments[0]) {
         Some(StreamKind::Custom) => Err(Exit::Slowly),
-        Some(kind) => Ok(Value::boolean(kind.is_output())),
+        Some(kind) => Ok(Value::boolean(is_for(&vm.heap, arguments[0], kind, StreamUse::Writing))),
         None => vm.exchange.type_error(arguments[0], "STREAM"),
     }
 }
@@ -616,14 +696,14 @@ pub(super) fn stream_sort(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return vm.exchange.type_error(arguments[0], "STREAM");
     };
     let name = match kind {
-        StreamKind::Channel => Value::NIL,
+        StreamKind::Channel => stream_slot(&vm.heap, arguments[0], slot::FILE),
         _ => stream_slot(&vm.heap, arguments[0], slot::NAME),
     };
     let kind = match kind {
         StreamKind::StandardInput | StreamKind::StandardOutput | StreamKind::StandardError => "STANDARD",
         StreamKind::Custom => "CUSTOM",
         StreamKind::StringInput | StreamKind::StringOutput if name.is_nil() => "STRING",
-        StreamKind::Channel => "CHANNEL",
+        StreamKind::Channel if name.is_nil() => "CHANNEL",
         _ => "FILE",
     };
     let kind = vm.world.keyword(&mut vm.heap, kind)?;

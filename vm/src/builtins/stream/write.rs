@@ -6,8 +6,8 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 use super::{
-    StreamKind, channel, check_output, column_of, designated_stream, few_characters, write_characters,
-    write_out,
+    StreamKind, channel, check_output, column_of, designated_stream, few_characters, finish_standard,
+    write_characters, write_out,
 };
 
 /// `(write-char character &optional stream)`
@@ -51,9 +51,10 @@ pub(in crate::builtins) fn finish_output(vm: &mut Vm, arguments: &[Value]) -> Ou
     let (stream, kind) = designated_stream(vm, optional(arguments, 0), false)?;
     match kind {
         StreamKind::StandardOutput => {
-            vm.outside.flush();
+            finish_standard(vm)?;
             check_output(vm)?;
         }
+        StreamKind::StandardError => finish_standard(vm)?,
         StreamKind::FileOutput => write_out(vm, stream)?,
         StreamKind::StringOutput if channel::is_bounded(&vm.heap, stream) => return Err(Exit::Slowly),
         _ => {}
