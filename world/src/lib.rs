@@ -28,6 +28,8 @@ mod operation;
 mod os;
 mod process;
 mod socket;
+#[cfg(feature = "tls")]
+mod tls;
 
 use esl_vm::vm::Vm;
 

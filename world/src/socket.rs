@@ -22,10 +22,13 @@ use tokio::sync::watch;
 
 use crate::arrived::{Arrived, whole_characters};
 use crate::data::{Arguments, bytes_of, failure, integer, nil, text, text_of_bytes};
+use crate::event_loop;
 use crate::operation::{Answer, define};
 
 /// Most bytes that are read at a time.
 const CHUNK: usize = 1 << 16;
+/// Time that a peer has to take the end of a connection.
+const GOODBYE: Duration = Duration::from_secs(1);
 
 type Reader = Box<dyn AsyncRead + Send + Unpin>;
 type Writer = Box<dyn AsyncWrite + Send + Unpin>;
@@ -35,6 +38,8 @@ pub(crate) struct Connection {
     reader: tokio::sync::Mutex<Reader>,
     writer: tokio::sync::Mutex<Writer>,
     arrived: Mutex<Arrived>,
+    /// Whether the peer is to be told that nothing more comes, beside by the end of the connection.
+    says_goodbye: bool,
 }
 
 /// A socket that waits for connections.
@@ -135,6 +140,14 @@ impl Sockets {
         if let Some(socket) = socket {
             // Nobody may wait for it.
             _ = socket.closer.send(true);
+            if let Kind::Connection(connection) = socket.kind
+                && connection.says_goodbye
+            {
+                // Without the event loop there is nobody to be told.
+                _ = event_loop::spawn(
+                    async move { drop(tokio::time::timeout(GOODBYE, connection.end()).await) },
+                );
+            }
         }
     }
 }
@@ -175,6 +188,19 @@ impl Connection {
             reader: tokio::sync::Mutex::new(Box::new(reader)),
             writer: tokio::sync::Mutex::new(Box::new(writer)),
             arrived: Mutex::default(),
+            says_goodbye: false,
+        }))
+    }
+
+    /// Returns a connection whose protocol has an end of its own.
+    #[cfg(feature = "tls")]
+    fn secured(stream: impl AsyncRead + AsyncWrite + Send + 'static) -> Kind {
+        let (reader, writer) = tokio::io::split(stream);
+        Kind::Connection(Arc::new(Connection {
+            reader: tokio::sync::Mutex::new(Box::new(reader)),
+            writer: tokio::sync::Mutex::new(Box::new(writer)),
+            arrived: Mutex::default(),
+            says_goodbye: true,
         }))
     }
 
@@ -204,6 +230,12 @@ impl Connection {
         Ok(())
     }
 
+    /// Tells the peer that nothing more comes.
+    async fn end(&self) {
+        // It may be gone.
+        drop(self.writer.lock().await.shutdown().await);
+    }
+
     /// Takes what has arrived. `NIL` at the end.
     fn take<T>(&self, take: impl FnOnce(&mut Arrived) -> T) -> T {
         take(&mut lock(&self.arrived))
@@ -222,7 +254,8 @@ pub(crate) fn install(machine: &mut Vm, sockets: &Sockets) {
             define(machine, name, needs, move |arguments| function(arguments, sockets.clone()));
         }
     };
-    operation("%SOCKET-CONNECT", &net, |arguments, sockets| Box::pin(connect(arguments, sockets)));
+    let connect_needs = [net[0], Need { right: Right::Read, argument: 4 }];
+    operation("%SOCKET-CONNECT", &connect_needs, |arguments, sockets| Box::pin(connect(arguments, sockets)));
     operation("%SOCKET-LISTEN", &net, |arguments, sockets| Box::pin(listen(arguments, sockets)));
     #[cfg(unix)]
     {
@@ -289,16 +322,19 @@ fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
     });
 }
 
-/// `%SOCKET-CONNECT`: number, address, milliseconds.
+/// `%SOCKET-CONNECT`: number, address, milliseconds, and for TLS the name of the server and a file of
+/// certificates.
 async fn connect(arguments: Arguments, sockets: Sockets) -> Answer {
     let (number, address) = (arguments.integer(0)?, arguments.text(1)?);
+    let server_name = arguments.text_if_any(3)?;
+    let ca_file = arguments.text_if_any(4)?;
     let connect = async {
         let addresses =
             tokio::net::lookup_host(&address).await.map_err(|error| failure("HOST-NOT-FOUND", error))?;
         let mut last = failure("HOST-NOT-FOUND", format!("`{address}` has no address"));
         for address in addresses {
             match TcpStream::connect(address).await {
-                Ok(stream) => return Ok(Connection::of_tcp(stream)),
+                Ok(stream) => return secured(stream, server_name, ca_file).await,
                 Err(error) => last = socket_failure(&error),
             }
         }
@@ -312,6 +348,31 @@ async fn connect(arguments: Arguments, sockets: Sockets) -> Answer {
         connect.await?
     };
     sockets.set(number, kind, port, peer)
+}
+
+/// Returns a connection over TCP, secured by TLS if the server has a name.
+#[cfg(feature = "tls")]
+async fn secured(
+    stream: TcpStream,
+    server_name: Option<String>,
+    ca_file: Option<String>,
+) -> Result<(Kind, i64, String), Failure> {
+    let Some(name) = server_name else { return Ok(Connection::of_tcp(stream)) };
+    let (port, peer) = Connection::ends_of(&stream);
+    Ok((Connection::secured(crate::tls::begin(stream, &name, ca_file).await?), port, peer))
+}
+
+/// Returns a connection over TCP.
+#[cfg(not(feature = "tls"))]
+async fn secured(
+    stream: TcpStream,
+    server_name: Option<String>,
+    _ca_file: Option<String>,
+) -> Result<(Kind, i64, String), Failure> {
+    match server_name {
+        None => Ok(Connection::of_tcp(stream)),
+        Some(_) => Err(failure("TLS-ERROR", "this program was built without TLS")),
+    }
 }
 
 /// `%SOCKET-LISTEN`: number, address.

@@ -1,0 +1,71 @@
+//! TLS for connections: rustls, with the certificates that the system trusts or those of a file.
+
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+
+use esl_vm::host::Failure;
+use tokio::net::TcpStream;
+use tokio_rustls::TlsConnector;
+use tokio_rustls::client::TlsStream;
+use tokio_rustls::rustls::crypto::ring;
+use tokio_rustls::rustls::pki_types::pem::PemObject;
+use tokio_rustls::rustls::pki_types::{CertificateDer, ServerName};
+use tokio_rustls::rustls::{ClientConfig, RootCertStore};
+
+use crate::data::failure;
+
+fn tls_failure(reason: impl ToString) -> Failure {
+    failure("TLS-ERROR", reason)
+}
+
+/// Returns what clients need that trust these certificates.
+fn config_with(roots: RootCertStore) -> Result<Arc<ClientConfig>, String> {
+    let builder = ClientConfig::builder_with_provider(Arc::new(ring::default_provider()));
+    let builder = builder.with_safe_default_protocol_versions().map_err(|error| error.to_string())?;
+    Ok(Arc::new(builder.with_root_certificates(roots).with_no_client_auth()))
+}
+
+/// Returns what clients need that trust what the system trusts. It is read once.
+fn config_of_system() -> Result<Arc<ClientConfig>, String> {
+    static CONFIG: OnceLock<Result<Arc<ClientConfig>, String>> = OnceLock::new();
+    let make = || {
+        let mut roots = RootCertStore::empty();
+        let found = rustls_native_certs::load_native_certs();
+        // Systems have some that are not well-formed; only none at all is a fault.
+        if roots.add_parsable_certificates(found.certs).0 == 0 {
+            return Err("the system has no certificates to trust; `:ca-file` names others".into());
+        }
+        config_with(roots)
+    };
+    CONFIG.get_or_init(make).clone()
+}
+
+/// Returns what clients need that trust the certificates of a file, in PEM.
+fn config_of_file(path: &Path) -> Result<Arc<ClientConfig>, String> {
+    let unread = |error: &dyn std::fmt::Display| format!("the certificates of `{}`: {error}", path.display());
+    let mut roots = RootCertStore::empty();
+    for certificate in CertificateDer::pem_file_iter(path).map_err(|error| unread(&error))? {
+        let certificate = certificate.map_err(|error| unread(&error))?;
+        roots.add(certificate).map_err(|error| unread(&error))?;
+    }
+    if roots.is_empty() {
+        return Err(unread(&"there are none"));
+    }
+    config_with(roots)
+}
+
+/// Begins TLS over a connection to the server of this name, which has to prove that it is that.
+pub(crate) async fn begin(
+    stream: TcpStream,
+    name: &str,
+    ca_file: Option<String>,
+) -> Result<TlsStream<TcpStream>, Failure> {
+    let load = move || match ca_file {
+        Some(path) => config_of_file(Path::new(&path)),
+        None => config_of_system(),
+    };
+    let config = tokio::task::spawn_blocking(load).await.map_err(tls_failure)?.map_err(tls_failure)?;
+    let name = name.trim_matches(['[', ']']).to_owned();
+    let name = ServerName::try_from(name).map_err(tls_failure)?;
+    TlsConnector::from(config).connect(name, stream).await.map_err(tls_failure)
+}
