@@ -6,6 +6,8 @@ mod deadlock;
 mod examples;
 mod folder;
 mod http;
+#[cfg(unix)]
+mod lines;
 #[cfg(target_os = "linux")]
 mod memory;
 mod missions;

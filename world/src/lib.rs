@@ -27,6 +27,8 @@ mod modules;
 mod operation;
 mod os;
 mod process;
+#[cfg(feature = "serial")]
+mod serial;
 mod socket;
 #[cfg(feature = "tls")]
 mod tls;

@@ -14,6 +14,8 @@ const MODULES: &[(&str, &str)] = &[
     ("log", include_str!("../modules/log.esl")),
     ("os", include_str!("../modules/os.esl")),
     ("process", include_str!("../modules/process.esl")),
+    #[cfg(feature = "serial")]
+    ("serial", include_str!("../modules/serial.esl")),
     ("sockets", include_str!("../modules/sockets.esl")),
     ("time", include_str!("../modules/time.esl")),
 ];

@@ -266,6 +266,13 @@ pub(crate) fn install(machine: &mut Vm, sockets: &Sockets) {
             Box::pin(listen_unix(arguments, sockets))
         });
     }
+    #[cfg(feature = "serial")]
+    {
+        let serial = [Need { right: Right::Serial, argument: 1 }];
+        operation("%SERIAL-OPEN", &serial, |arguments, sockets| {
+            Box::pin(crate::serial::open(arguments, sockets))
+        });
+    }
     operation("%SOCKET-ACCEPT", &[], |arguments, sockets| Box::pin(accept(arguments, sockets)));
     operation("%SOCKET-AWAIT", &[], |arguments, sockets| Box::pin(wait(arguments, sockets)));
     operation("%SOCKET-WRITE", &[], |arguments, sockets| Box::pin(write(arguments, sockets)));
