@@ -12,6 +12,8 @@ mod lines;
 mod memory;
 mod missions;
 mod modules;
+#[cfg(unix)]
+mod mqtt;
 mod real_time;
 mod rights;
 #[cfg(unix)]

@@ -24,6 +24,8 @@ mod data;
 mod event_loop;
 mod file;
 mod modules;
+#[cfg(feature = "mqtt")]
+mod mqtt;
 mod operation;
 mod os;
 mod process;
@@ -51,4 +53,6 @@ pub fn install_operations(machine: &mut Vm) {
     let sockets = socket::Sockets::default();
     process::install(machine, &sockets);
     socket::install(machine, &sockets);
+    #[cfg(feature = "mqtt")]
+    mqtt::install(machine);
 }

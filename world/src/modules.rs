@@ -12,6 +12,8 @@ const MODULES: &[(&str, &str)] = &[
     ("http", include_str!("../modules/http.esl")),
     ("json", include_str!("../modules/json.esl")),
     ("log", include_str!("../modules/log.esl")),
+    #[cfg(feature = "mqtt")]
+    ("mqtt", include_str!("../modules/mqtt.esl")),
     ("os", include_str!("../modules/os.esl")),
     ("process", include_str!("../modules/process.esl")),
     #[cfg(feature = "serial")]

@@ -1,0 +1,152 @@
+//! MQTT against a broker, if there is one on this machine.
+#![cfg(unix)]
+
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use esl_conformance::process;
+
+use crate::eslvm;
+use crate::folder::Folder;
+
+/// A broker, which ends with this.
+struct Broker(Child);
+
+impl Drop for Broker {
+    fn drop(&mut self) {
+        drop(self.0.kill());
+        drop(self.0.wait());
+    }
+}
+
+fn broker_program() -> Option<&'static str> {
+    let is_there = |name: &&str| Command::new(name).arg("-h").output().is_ok();
+    ["mosquitto", "/usr/sbin/mosquitto"].into_iter().find(is_there)
+}
+
+/// Starts a broker on a free port of the loopback, and waits until it listens.
+fn start_broker(program: &str, folder: &Folder) -> (Broker, u16) {
+    for _ in 0..20 {
+        // The port is free until somebody else takes it, which the broker says by ending.
+        let port = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr());
+        let port = port.expect("there is a free port").port();
+        let settings = format!("listener {port} 127.0.0.1\nallow_anonymous true\npersistence false\n");
+        let settings = folder.file("broker.conf", settings);
+        let child = Command::new(program)
+            .args(["-c", &settings])
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn();
+        let mut broker = Broker(child.expect("the broker can be started"));
+        let begun = Instant::now();
+        while begun.elapsed() < Duration::from_secs(60) && broker.0.try_wait().is_ok_and(|end| end.is_none())
+        {
+            if TcpStream::connect(("127.0.0.1", port)).is_ok() {
+                return (broker, port);
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+    panic!("no broker could be started");
+}
+
+#[test]
+fn messages_go_through_a_broker() {
+    let Some(program) = broker_program() else {
+        println!("left out: needs `mosquitto`");
+        return;
+    };
+    let folder = Folder::new("mqtt");
+    let (_broker, port) = start_broker(program, &folder);
+    let text = "(require :mqtt)
+(defmacro cause (form) `(print (handler-case ,form (failure (f) (failure-cause f)))))
+(defvar *port* (parse-integer (first (command-line-arguments))))
+(defun next (input) (multiple-value-list (wait-for-event input)))
+(mqtt:with-client (a \"127.0.0.1\" *port* :will '(\"left/a\" \"gone\"))
+  (let ((all (mqtt:subscribe a \"robot/+/state\" :qos 1 :capacity 1000 :when-full :wait))
+        (raw (mqtt:subscribe a \"robot/#\" :bytes t))
+        (wills (mqtt:subscribe a \"left/+\")))
+    (mqtt:with-client (b \"127.0.0.1\" *port* :id \"b\")
+      (mqtt:publish b \"robot/1/state\" \"fährt\" :qos 1)
+      (print (next all))
+      (print (next raw))
+      (mqtt:publish b \"robot/1/other\" (vector 0 255) :qos 2)
+      (print (next raw))
+      (mqtt:publish b \"robot/2/state\" \"kept\" :retain t)
+      (print (next all))
+      (print (mqtt:problem b)))
+    (print (next raw))
+    (mqtt:with-client (c \"127.0.0.1\" *port*)
+      (print (next (mqtt:subscribe c \"robot/2/#\"))))
+    (print (handler-case (with-timeout 0.01 (next wills)) (failure (f) (failure-cause f))))
+    (dotimes (i 500) (mqtt:publish a \"robot/3/state\" (princ-to-string i)))
+    (print (loop for i below 500 always (equal (second (next all)) (princ-to-string i))))
+    (cause (mqtt:publish a \"robot/+\" \"x\"))))
+(cause (mqtt:with-client (c \"127.0.0.1\" 1) c))
+(cause (mqtt:with-client (c \"localhost\" 1883) c))";
+    folder.file("main.esl", text);
+    let port = port.to_string();
+    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "main.esl", &port]);
+    let output =
+        process::run(command.current_dir(folder.path()), "").quiet_output().expect("nothing is wrong");
+    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let expected = [
+        "(\"robot/1/state\" \"fährt\" NIL)",
+        "(\"robot/1/state\" #(102 195 164 104 114 116) NIL)",
+        "(\"robot/1/other\" #(0 255) NIL)",
+        "(\"robot/2/state\" \"kept\" NIL)",
+        "NIL",
+        "(\"robot/2/state\" #(107 101 112 116) NIL)",
+        "(\"robot/2/state\" \"kept\" T)",
+        ":TIMEOUT",
+        "T",
+        ":MQTT-ERROR",
+        ":CONNECTION-REFUSED",
+        ":PERMISSION-DENIED",
+    ];
+    assert_eq!(lines, expected);
+}
+
+#[test]
+fn a_connection_that_is_lost_is_made_again() {
+    let Some(program) = broker_program() else {
+        println!("left out: needs `mosquitto`");
+        return;
+    };
+    let folder = Folder::new("mqtt-lost");
+    let (mut broker, port) = start_broker(program, &folder);
+    let text = "(require :mqtt)
+(defun mark (name) (with-open-file (s name :direction :output) (write-line name s)))
+(mqtt:with-client (c \"127.0.0.1\" (parse-integer (first (command-line-arguments))))
+  (let ((input (mqtt:subscribe c \"a\")))
+    (mark \"begun\")
+    (loop until (mqtt:problem c) do (sleep 0.01))
+    (print (handler-case (mqtt:publish c \"a\" \"x\") (failure (f) (failure-cause f))))
+    (mark \"lost\")
+    (loop
+      (handler-case (progn (mqtt:publish c \"a\" \"again\") (with-timeout 1 (wait-for-event input)) (return nil))
+        (failure () (sleep 0.01))))
+    (print 'again)))";
+    folder.file("main.esl", text);
+    let number = port.to_string();
+    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "main.esl", &number]);
+    let child = process::start(command.current_dir(folder.path()));
+    let await_file = |name: &str| {
+        let begun = Instant::now();
+        while !folder.path().join(name).exists() {
+            assert!(begun.elapsed() < Duration::from_secs(120), "there is no `{name}`");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    };
+    await_file("begun");
+    broker.0.kill().and_then(|()| broker.0.wait()).expect("it is our child");
+    await_file("lost");
+    let settings = folder.path().join("broker.conf");
+    let again =
+        Command::new(program).arg("-c").arg(settings).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    broker.0 = again.expect("the broker can be started");
+    let output = process::finish(child).quiet_output().expect("nothing is wrong");
+    assert_eq!(output.split_whitespace().collect::<Vec<_>>(), [":CONNECTION-LOST", "AGAIN"]);
+}

@@ -1,0 +1,370 @@
+//! MQTT: clients of a broker, which connect again by themselves when the connection is lost.
+//!
+//! A client has a task on the event loop, which keeps the connection up and gathers what arrives, at most
+//! [`MOST_KEPT`] messages: then it does not read on until the program has taken some. While there is no
+//! connection, publishing and subscribing fail with what is wrong.
+
+use std::collections::{HashMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use esl_bytecode::datum::Datum;
+use esl_bytecode::span::Span;
+use esl_vm::embed::{HostFunction, Need};
+use esl_vm::host::{Failure, Right};
+use esl_vm::vm::Vm;
+use rumqttc::{
+    AsyncClient, ConnectionError, Event, EventLoop, LastWill, MqttOptions, Outgoing, Packet, QoS,
+    SubscribeReasonCode,
+};
+use tokio::sync::{Notify, oneshot, watch};
+
+use crate::data::{Arguments, boolean, bytes_of, failure, integer, nil, text, text_of_bytes};
+use crate::event_loop;
+use crate::operation::{Answer, define};
+
+/// Most messages that are kept for the program.
+const MOST_KEPT: usize = 1000;
+/// Requests that wait until they are sent.
+const MOST_REQUESTS: usize = 100;
+/// Most bytes of a message.
+const MOST_BYTES: usize = 16 << 20;
+/// Pauses before the connection is tried again: the first, and the longest.
+const PAUSES: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
+/// Time that the last requests have to be sent when a client is closed.
+const GOODBYE: Duration = Duration::from_secs(2);
+
+/// A message: its topic, its bytes, and whether the broker has kept it for new subscribers.
+type Message = (String, Vec<u8>, bool);
+
+/// How a subscription has come out.
+type Subscribed = oneshot::Sender<bool>;
+
+/// What the task on the event loop shares with the operations.
+struct State {
+    messages: VecDeque<Message>,
+    /// What is subscribed to, for when the connection is made again.
+    filters: HashMap<String, QoS>,
+    /// Who waits for the answers to subscriptions, in their order; nobody for one that is made again.
+    subscribing: VecDeque<Option<Subscribed>>,
+    /// Why there is no connection.
+    problem: Option<String>,
+}
+
+struct Shared {
+    state: Mutex<State>,
+    /// Notified when a message comes.
+    came: Notify,
+    /// Notified when messages were taken.
+    taken: Notify,
+}
+
+impl Shared {
+    fn state(&self) -> MutexGuard<'_, State> {
+        // It is whole at every moment, so a panic elsewhere does not corrupt it.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns the failure for a request, if there is no connection.
+    fn check(&self) -> Result<(), Failure> {
+        match &self.state().problem {
+            None => Ok(()),
+            Some(problem) => Err(failure("CONNECTION-LOST", problem)),
+        }
+    }
+}
+
+/// A client of the program's.
+#[derive(Clone)]
+struct Client {
+    client: AsyncClient,
+    shared: Arc<Shared>,
+    /// Set when the client is to end; dropped with the machine.
+    closing: Arc<watch::Sender<bool>>,
+    /// Changes when it has ended.
+    ended: watch::Receiver<bool>,
+}
+
+/// The clients of a machine, by number, and the greatest number so far.
+#[derive(Clone, Default)]
+struct Clients(Arc<Mutex<(i64, HashMap<i64, Option<Client>>)>>);
+
+impl Clients {
+    fn lock(&self) -> MutexGuard<'_, (i64, HashMap<i64, Option<Client>>)> {
+        // As above.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn get(&self, number: i64) -> Result<Client, Failure> {
+        let client = self.lock().1.get(&number).cloned().flatten();
+        client.ok_or_else(|| mqtt_failure("the client is closed"))
+    }
+}
+
+fn mqtt_failure(reason: impl ToString) -> Failure {
+    failure("MQTT-ERROR", reason)
+}
+
+fn qos(level: i64) -> QoS {
+    match level {
+        0 => QoS::AtMostOnce,
+        1 => QoS::AtLeastOnce,
+        _ => QoS::ExactlyOnce,
+    }
+}
+
+/// Gives a machine the operations of `:mqtt`.
+pub(crate) fn install(machine: &mut Vm) {
+    let clients = Clients::default();
+    let known = clients.clone();
+    let add = move |_: &[Datum]| {
+        let mut clients = known.lock();
+        clients.0 += 1;
+        let number = clients.0;
+        clients.1.insert(number, None);
+        Ok(integer(number))
+    };
+    machine.add_host_function("%MQTT-NEW", HostFunction::AtOnce(Box::new(add)));
+    let known = clients.clone();
+    let take = move |arguments: &[Datum]| {
+        let shared = known.get(Arguments(arguments.to_vec()).integer(0)?)?.shared;
+        let Some((topic, bytes, is_kept)) = shared.state().messages.pop_front() else { return Ok(nil()) };
+        shared.taken.notify_one();
+        Ok(Datum::list([text(&topic), text_of_bytes(&bytes), boolean(is_kept)], Span::default()))
+    };
+    machine.add_host_function("%MQTT-TAKE", HostFunction::AtOnce(Box::new(take)));
+    let known = clients.clone();
+    let problem = move |arguments: &[Datum]| {
+        let shared = known.get(Arguments(arguments.to_vec()).integer(0)?)?.shared;
+        let problem = shared.state().problem.as_deref().map_or_else(nil, text);
+        Ok(problem)
+    };
+    machine.add_host_function("%MQTT-PROBLEM", HostFunction::AtOnce(Box::new(problem)));
+    let known = clients.clone();
+    let net = [Need { right: Right::Net, argument: 1 }];
+    define(machine, "%MQTT-OPEN", &net, move |arguments| open(arguments, known.clone()));
+    let known = clients.clone();
+    define(machine, "%MQTT-AWAIT", &[], move |arguments| {
+        let client = arguments.integer(0).and_then(|number| known.get(number));
+        async move {
+            let Client { shared, mut ended, .. } = client?;
+            let come = async {
+                loop {
+                    let came = shared.came.notified();
+                    if !shared.state().messages.is_empty() {
+                        return;
+                    }
+                    came.await;
+                }
+            };
+            tokio::select! {
+                () = come => Ok(Vec::new()),
+                _ = ended.wait_for(|&has_ended| has_ended) => Err(mqtt_failure("the client is closed")),
+            }
+        }
+    });
+    let known = clients.clone();
+    define(machine, "%MQTT-PUBLISH", &[], move |arguments| publish(arguments, known.clone()));
+    let known = clients.clone();
+    define(machine, "%MQTT-SUBSCRIBE", &[], move |arguments| subscribe(arguments, known.clone()));
+    define(machine, "%MQTT-CLOSE", &[], move |arguments| {
+        let client = arguments.integer(0).map(|number| clients.lock().1.remove(&number).flatten());
+        async move {
+            if let Some(Client { closing, mut ended, .. }) = client? {
+                // It may have ended by itself.
+                _ = closing.send(true);
+                _ = ended.wait_for(|&has_ended| has_ended).await;
+            }
+            Ok(Vec::new())
+        }
+    });
+}
+
+/// `%MQTT-OPEN`: number, address, name of the client, seconds between signs of life, user and password, topic,
+/// payload, level and retention of the last will.
+async fn open(arguments: Arguments, clients: Clients) -> Answer {
+    let (number, address) = (arguments.integer(0)?, arguments.text(1)?);
+    let (host, port) = address.rsplit_once(':').unwrap_or((&address, "1883"));
+    let port = port.parse().map_err(mqtt_failure)?;
+    let mut options = MqttOptions::new(arguments.text(2)?, host.trim_matches(['[', ']']), port);
+    let seconds = u64::try_from(arguments.integer(3)?).unwrap_or(0);
+    options.set_keep_alive(Duration::from_secs(seconds));
+    options.set_max_packet_size(MOST_BYTES, MOST_BYTES);
+    if let Some(user) = arguments.text_if_any(4)? {
+        options.set_credentials(user, arguments.text_if_any(5)?.unwrap_or_default());
+    }
+    if let Some(topic) = arguments.text_if_any(6)? {
+        let payload = bytes_of(&arguments.text(7)?);
+        options.set_last_will(LastWill::new(
+            topic,
+            payload,
+            qos(arguments.integer(8)?),
+            arguments.is_true(9),
+        ));
+    }
+    let (client, mut events) = AsyncClient::new(options, MOST_REQUESTS);
+    match events.poll().await {
+        Ok(_) => {}
+        Err(error) => return Err(connection_failure(&error)),
+    }
+    let state = State {
+        messages: VecDeque::new(),
+        filters: HashMap::new(),
+        subscribing: VecDeque::new(),
+        problem: None,
+    };
+    let shared = Arc::new(Shared { state: Mutex::new(state), came: Notify::new(), taken: Notify::new() });
+    let (closing, close) = watch::channel(false);
+    let (end, ended) = watch::channel(false);
+    let driver = Driver { client: client.clone(), events, shared: shared.clone(), close };
+    let drive = async move {
+        driver.run().await;
+        // Nobody may wait for it.
+        _ = end.send(true);
+    };
+    event_loop::spawn(drive).map_err(mqtt_failure)?;
+    if let Some(place) = clients.lock().1.get_mut(&number) {
+        *place = Some(Client { client, shared, closing: Arc::new(closing), ended });
+    }
+    Ok(vec![integer(number)])
+}
+
+/// Returns the failure for a connection that is not made.
+fn connection_failure(error: &ConnectionError) -> Failure {
+    let cause = match error {
+        ConnectionError::Io(error) if error.kind() == std::io::ErrorKind::ConnectionRefused => {
+            "CONNECTION-REFUSED"
+        }
+        ConnectionError::NetworkTimeout | ConnectionError::FlushTimeout => "TIMEOUT",
+        _ => "MQTT-ERROR",
+    };
+    failure(cause, error)
+}
+
+/// `%MQTT-PUBLISH`: number, topic, bytes, level, whether the broker keeps it.
+async fn publish(arguments: Arguments, clients: Clients) -> Answer {
+    let client = clients.get(arguments.integer(0)?)?;
+    client.shared.check()?;
+    let (topic, bytes) = (arguments.text(1)?, bytes_of(&arguments.text(2)?));
+    let level = qos(arguments.integer(3)?);
+    let refused = |_| mqtt_failure(format!("`{topic}` is no topic, or the client is closed"));
+    client.client.publish(topic.clone(), level, arguments.is_true(4), bytes).await.map_err(refused)?;
+    Ok(Vec::new())
+}
+
+/// `%MQTT-SUBSCRIBE`: number, filter, level.
+async fn subscribe(arguments: Arguments, clients: Clients) -> Answer {
+    let client = clients.get(arguments.integer(0)?)?;
+    client.shared.check()?;
+    let (filter, level) = (arguments.text(1)?, qos(arguments.integer(2)?));
+    let (sender, answer) = oneshot::channel();
+    {
+        // In the order of the requests, which is that of the answers.
+        let mut state = client.shared.state();
+        let refused =
+            |_| mqtt_failure(format!("`{filter}` is no filter of topics, or too much is under way"));
+        client.client.try_subscribe(filter.clone(), level).map_err(refused)?;
+        state.subscribing.push_back(Some(sender));
+        state.filters.insert(filter.clone(), level);
+    }
+    match answer.await {
+        Ok(true) => Ok(Vec::new()),
+        Ok(false) => {
+            client.shared.state().filters.remove(&filter);
+            Err(mqtt_failure(format!("the broker refuses the subscription to `{filter}`")))
+        }
+        Err(_) => Err(failure("CONNECTION-LOST", "the connection was lost before the broker has answered")),
+    }
+}
+
+/// Keeps the connection of a client up.
+struct Driver {
+    client: AsyncClient,
+    events: EventLoop,
+    shared: Arc<Shared>,
+    close: watch::Receiver<bool>,
+}
+
+impl Driver {
+    async fn run(mut self) {
+        let mut pause = PAUSES.0;
+        loop {
+            let next = async {
+                has_room(&self.shared).await;
+                self.events.poll().await
+            };
+            let event = tokio::select! {
+                biased;
+                _ = self.close.wait_for(|&is_closing| is_closing) => None,
+                event = next => Some(event),
+            };
+            let Some(event) = event else { return self.say_goodbye().await };
+            match event {
+                Ok(Event::Incoming(packet)) => {
+                    pause = PAUSES.0;
+                    self.take_in(packet);
+                }
+                Ok(Event::Outgoing(_)) => {}
+                Err(error) => {
+                    {
+                        let mut state = self.shared.state();
+                        state.problem = Some(error.to_string());
+                        // Who waits for an answer hears that there will be none.
+                        state.subscribing.clear();
+                    }
+                    tokio::select! {
+                        _ = self.close.wait_for(|&is_closing| is_closing) => return,
+                        () = tokio::time::sleep(pause) => {}
+                    }
+                    pause = (pause * 2).min(PAUSES.1);
+                }
+            }
+        }
+    }
+
+    fn take_in(&self, packet: Packet) {
+        let mut state = self.shared.state();
+        match packet {
+            Packet::ConnAck(_) => {
+                state.problem = None;
+                for (filter, &level) in state.filters.clone().iter() {
+                    // There is room for all but a great many, which the broker would have to know still.
+                    if self.client.try_subscribe(filter.clone(), level).is_ok() {
+                        state.subscribing.push_back(None);
+                    }
+                }
+            }
+            Packet::SubAck(answer) => {
+                let is_granted = !answer.return_codes.contains(&SubscribeReasonCode::Failure);
+                if let Some(Some(waiting)) = state.subscribing.pop_front() {
+                    // The call may have been left.
+                    _ = waiting.send(is_granted);
+                }
+            }
+            Packet::Publish(message) => {
+                state.messages.push_back((message.topic, message.payload.to_vec(), message.retain));
+                self.shared.came.notify_waiters();
+            }
+            _ => {}
+        }
+    }
+
+    /// Sends what is to be sent, and ends the connection.
+    async fn say_goodbye(mut self) {
+        if self.shared.state().problem.is_some() || self.client.try_disconnect().is_err() {
+            return;
+        }
+        let send_rest = async {
+            while !matches!(self.events.poll().await, Ok(Event::Outgoing(Outgoing::Disconnect)) | Err(_)) {}
+        };
+        // A broker that does not take it is left.
+        drop(tokio::time::timeout(GOODBYE, send_rest).await);
+    }
+}
+
+/// Waits until there is room for messages.
+async fn has_room(shared: &Shared) {
+    while shared.state().messages.len() >= MOST_KEPT {
+        shared.taken.notified().await;
+    }
+}
