@@ -422,3 +422,59 @@ fn a_launched_program_is_talked_to_through_streams() {
     ];
     check("process-streams", text, &["--allow-run=sh,no-such-program"], &expected);
 }
+
+#[test]
+fn messages_go_to_files_that_are_kept_for_a_while() {
+    let text = "(require :log)
+(defun lines (path) (with-open-file (s path) (loop for line = (read-line s nil nil) while line collect line)))
+(defun ends (path) (mapcar (lambda (line) (subseq line (- (length line) 2))) (lines path)))
+(log:to-file \"log\" :max-size 120 :keep 2)
+(let ((tasks (loop for i below 2 collect (let ((i i)) (spawn (dotimes (j 4) (log:info \"message ö ~d~d\" i j)))))))
+  (mapc #'wait-for-task tasks))
+(print (list (length (ends \"log\")) (length (ends \"log.1\")) (length (ends \"log.2\")) (probe-file \"log.3\")))
+(log:to-file nil)
+(log:to-file \"log\" :max-size 1000000)
+(dotimes (j 3) (log:info \"message ö 9~d\" j))
+(print (last (ends \"log\") 3))
+(log:to-file nil)
+(setq log:*stream* *standard-output*)
+(terpri)
+(log:warn \"done\")";
+    let output = run("log-rotation", text, &[]).quiet_output().expect("nothing is wrong");
+    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    assert_eq!(lines[..2], ["(2 2 2 NIL)", "(\"90\" \"91\" \"92\")"]);
+    assert!(lines[2].ends_with("warn  done"), "{}", lines[2]);
+}
+
+#[test]
+fn a_path_is_watched() {
+    let text = "(defun change (path text mode)
+  (with-open-file (s path :direction :output :if-exists mode) (write-string text s)))
+(ensure-directories-exist \"folder/\")
+(defun name (path) (subseq path (+ 1 (position #\\/ path :from-end t))))
+(defun await (input kind name)
+  (loop
+    (multiple-value-bind (found path) (wait-for-event input)
+      (when (and (eq found kind) (equal (name path) name))
+        (return (list kind name))))))
+(with-watched-path (input \"folder\")
+  (change \"folder/a\" \"one\" :supersede)
+  (print (await input :created \"a\"))
+  (change \"folder/a\" \"two\" :append)
+  (print (await input :modified \"a\"))
+  (delete-file \"folder/a\")
+  (print (await input :deleted \"a\")))
+(let ((input (watch-path \"folder\")))
+  (print (list (unwatch-path input) (unwatch-path input))))
+(print (handler-case (watch-path \"no-such-folder\") (file-error () 'refused)))
+(print (handler-case (watch-path \"/etc\") (failure (f) (failure-arguments f))))";
+    let expected = [
+        "(:CREATED \"a\")",
+        "(:MODIFIED \"a\")",
+        "(:DELETED \"a\")",
+        "(T NIL)",
+        "REFUSED",
+        "(:READ \"/etc\" \"--allow-read=/etc\")",
+    ];
+    check("watch-path", text, &[], &expected);
+}

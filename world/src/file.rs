@@ -202,9 +202,12 @@ async fn in_thread<T: Send + 'static>(
     tokio::task::spawn_blocking(function).await.map_err(Error::other)?
 }
 
-/// The open files of a machine, by number, and the greatest number so far.
+/// The greatest number so far, and files by number: nothing while they are being opened.
+type Numbered = (i64, HashMap<i64, Option<Arc<Open>>>);
+
+/// The open files of a machine.
 #[derive(Clone, Default)]
-struct Files(Arc<Mutex<(i64, HashMap<i64, Option<Arc<Open>>>)>>);
+struct Files(Arc<Mutex<Numbered>>);
 
 impl Files {
     /// Returns the number of a file that is about to be opened.

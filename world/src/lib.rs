@@ -34,6 +34,8 @@ mod serial;
 mod socket;
 #[cfg(feature = "tls")]
 mod tls;
+#[cfg(feature = "watch")]
+mod watch;
 
 use esl_vm::vm::Vm;
 
@@ -55,4 +57,6 @@ pub fn install_operations(machine: &mut Vm) {
     socket::install(machine, &sockets);
     #[cfg(feature = "mqtt")]
     mqtt::install(machine);
+    #[cfg(feature = "watch")]
+    watch::install(machine);
 }
