@@ -15,6 +15,7 @@ mod modules;
 #[cfg(unix)]
 mod mqtt;
 mod real_time;
+mod recording;
 mod rights;
 #[cfg(unix)]
 mod streams;
