@@ -123,7 +123,9 @@ pub(crate) fn make_task(
     let mut slots = [Value::NIL; event::TASK_LENGTH];
     slots[event::NAME] = options.name;
     slots[event::COUNT] = Value::small(0);
-    slots[event::RESULT] = maker.map_or(Value::NIL, |task| Value::index(task.number.0 as usize));
+    // A service belongs to nobody, so it is not suspended with its maker.
+    slots[event::RESULT] =
+        maker.filter(|_| !options.is_service).map_or(Value::NIL, |task| Value::index(task.number.0 as usize));
     let object = heap.alloc_record(Kind::Task, 0, 0, &slots)?;
     let mut task = scheduler.tasks.make(object, words);
     interp::start::first_frame(heap, &mut task, scheduler.starter, function, arguments);
