@@ -162,6 +162,8 @@ pub enum Step {
         /// Whether the value is wanted.
         keep: bool,
     },
+    /// A part of the work is done, and the compilation wants to go on. Answer with [`Answer::More`].
+    More,
     /// Find the module that the text being compiled requires by this name. Answer with [`Answer::Module`];
     /// with [`Answer::Loaded`] if it is defined already where macros run, and the program is to find it when
     /// it runs; or with [`Answer::Failed`].
@@ -217,6 +219,8 @@ impl From<String> for CompileTimeFailure {
 pub enum Answer {
     /// First step: there is nothing to answer.
     Start,
+    /// Go on.
+    More,
     /// The macro's expansion.
     Expansion(Datum),
     /// The module has run.
@@ -229,16 +233,65 @@ pub enum Answer {
     Failed(CompileTimeFailure),
 }
 
+/// Work of a step: how much it may do, and how much it has done. The unit is a node of the program that is
+/// made, or a part of a datum or of code that is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Work {
+    allowed: u64,
+    done: u64,
+    passed: u64,
+}
+
+impl Work {
+    /// Units of a step, for a program with tasks that wait for their turns: less than a millisecond.
+    pub const STEP: u64 = 1000;
+
+    /// Creates the work of a step that goes on to the next need, however far that is.
+    pub fn unbounded() -> Work {
+        Work::up_to(u64::MAX)
+    }
+
+    /// Creates the work of a step that returns [`Step::More`] soon after it has done `allowed` units.
+    pub fn up_to(allowed: u64) -> Work {
+        Work { allowed, done: 0, passed: 0 }
+    }
+
+    /// Notes that the forms given to macros, and their expansions, had `parts` since the last step.
+    #[must_use]
+    pub fn after_passing(self, parts: u64) -> Work {
+        Work { passed: parts, ..self }
+    }
+
+    /// Notes that `units` were done.
+    #[inline]
+    pub fn add(&mut self, units: u64) {
+        self.done = self.done.saturating_add(units);
+    }
+
+    /// Returns the units done.
+    pub fn done(&self) -> u64 {
+        self.done
+    }
+
+    /// Returns whether the step has done what it may.
+    #[inline]
+    pub fn is_done(&self) -> bool {
+        self.done >= self.allowed
+    }
+
+    /// Takes the number of parts that passed through macros before the step.
+    pub fn take_passed(&mut self) -> u64 {
+        std::mem::take(&mut self.passed)
+    }
+}
+
 /// A compilation under way.
 pub trait Compilation: Send {
-    /// Takes the outcome of the last step and works up to the next one. Work between two steps is bounded by
-    /// the size of one top-level form; `charge` is called with the number of nodes that were worked on.
-    fn step(
-        &mut self,
-        environment: &mut dyn Environment,
-        answer: Answer,
-        charge: &mut dyn FnMut(u64),
-    ) -> Step;
+    /// Takes the outcome of the last step and works up to the next one, which is [`Step::More`] soon after
+    /// the work that is allowed is done.
+    fn step(&mut self, environment: &mut dyn Environment, answer: Answer, work: &mut Work) -> Step;
+    /// Returns about how many bytes of memory it holds.
+    fn bytes(&self) -> usize;
     /// Draws one of its diagnostics as it is shown to people, with the source line when it is known.
     fn render(&self, diagnostic: &Diagnostic) -> String;
 }
@@ -284,6 +337,18 @@ pub trait Compile: Send {
 
 /// Runs the compile-time parts of a program. Implemented over a virtual machine.
 pub trait CompileTimeHost: Environment {
+    /// Returns the number of parts of data that went through macros since the last call.
+    fn take_passed(&mut self) -> u64 {
+        0
+    }
+    /// Notes that a compilation has done `units` of work since the last call, and holds so many bytes.
+    ///
+    /// # Errors
+    /// Why the compilation must not go on.
+    fn account(&mut self, units: u64, bytes: usize) -> Result<(), Halt> {
+        _ = (units, bytes);
+        Ok(())
+    }
     /// Runs a macro to its end, within a limit of ticks.
     ///
     /// # Errors
@@ -302,27 +367,49 @@ pub trait CompileTimeHost: Environment {
 /// A text that says why there is none, and what to do.
 pub type Library<'a> = &'a mut dyn FnMut(&str) -> Result<Required, String>;
 
+/// Why a compilation was stopped from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Halt {
+    /// It takes more memory than it may.
+    Memory,
+    /// It has spent the budget.
+    Budget,
+    /// The process is asked to end.
+    Signal,
+}
+
+/// Units of work between two calls of [`CompileTimeHost::account`].
+const ACCOUNTED: u64 = 16 * Work::STEP;
+
 /// Works a compilation through to its end with the help of `host`. A text that requires modules cannot be
-/// compiled so.
+/// compiled so. One that is stopped by the host has no module.
 pub fn drive(
     compilation: &mut dyn Compilation,
     host: &mut dyn CompileTimeHost,
 ) -> (Option<Module>, Vec<Diagnostic>) {
-    drive_with(compilation, host, &mut |_| Err("there are no modules here".to_string()))
+    let driven = drive_with(compilation, host, &mut |_| Err("there are no modules here".to_string()));
+    driven.unwrap_or_default()
 }
 
 /// As [`drive`]; `library` finds the modules that the text requires.
+///
+/// # Errors
+/// What [`CompileTimeHost::account`] gives.
 pub fn drive_with(
     compilation: &mut dyn Compilation,
     host: &mut dyn CompileTimeHost,
     library: Library<'_>,
-) -> (Option<Module>, Vec<Diagnostic>) {
+) -> Result<(Option<Module>, Vec<Diagnostic>), Halt> {
     let mut answer = Answer::Start;
     loop {
         // A trait object is not upcast through a method call: say which of its two faces is meant.
+        let mut work = Work::up_to(ACCOUNTED).after_passing(host.take_passed());
         let environment: &mut dyn Environment = host;
-        answer = match compilation.step(environment, answer, &mut |_| {}) {
-            Step::Done(module, diagnostics) => return (module, diagnostics),
+        let step = compilation.step(environment, answer, &mut work);
+        host.account(work.done(), compilation.bytes())?;
+        answer = match step {
+            Step::Done(module, diagnostics) => return Ok((module, diagnostics)),
+            Step::More => Answer::More,
             Step::Expand(call) => match host.expand(&call) {
                 Ok(expansion) => Answer::Expansion(expansion),
                 Err(failure) => Answer::Failed(failure),

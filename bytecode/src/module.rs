@@ -178,3 +178,16 @@ pub struct Module {
     /// The functions of no parameters that run the top-level forms, in this order.
     pub toplevel: Vec<FunctionNumber>,
 }
+
+impl Module {
+    /// Returns about how many bytes it takes.
+    pub fn bytes(&self) -> usize {
+        let functions = self.functions.iter().map(|function| {
+            size_of::<Function>()
+                + size_of_val(&*function.code)
+                + size_of_val(&*function.lines)
+                + size_of_val(&*function.constants)
+        });
+        size_of::<Module>() + size_of_val(&*self.constants) + functions.sum::<usize>()
+    }
+}

@@ -49,6 +49,22 @@ pub struct Core {
     pub tagbodies: Vec<Tagbody>,
 }
 
+/// Bytes of the list entries by which a node refers to others, on average.
+const NODE_LINKS: usize = 16;
+
+impl Core {
+    /// Returns about how many bytes it takes.
+    pub fn bytes(&self) -> usize {
+        self.nodes.capacity() * size_of::<Node>()
+            + self.nodes.len() * NODE_LINKS
+            // Each has an entry among the local names, too.
+            + self.variables.capacity() * 2 * size_of::<Variable>()
+            + self.lambdas.capacity() * size_of::<Lambda>()
+            + self.blocks.capacity() * size_of::<Block>()
+            + self.tagbodies.capacity() * size_of::<Tagbody>()
+    }
+}
+
 /// A node: an expression and its place in the source.
 #[derive(Clone, Debug)]
 pub struct Node {

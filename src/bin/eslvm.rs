@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 use esl::Config;
-use esl::command::{self, NOT_COMPILED, ProgramFile, RightsOptions, USAGE, complain};
+use esl::command::{self, NOT_COMPILED, ProgramFile, RightsOptions, SignalTarget, USAGE, complain};
 use esl::host::{ProcessSignal, RealHost};
 use esl::module_path::ModulePath;
 use esl::program::{self, Ended, Modules, Program, Summary};
@@ -195,16 +195,34 @@ fn parse_speed(text: &str) -> Result<f64, &'static str> {
     }
 }
 
-/// Reads the program in a file, and compiles it if it is a source.
+/// Reads the program in a file, and compiles it if it is a source, within the limits of its run.
 ///
 /// # Errors
 /// The exit status, after a message.
-fn program(file: &Path, path: &ModulePath) -> Result<Program, u8> {
+fn program(
+    file: &Path,
+    path: &ModulePath,
+    options: &MachineOptions,
+    signals: &SignalTarget,
+) -> Result<Program, u8> {
     let source = match command::read_program(file)? {
         ProgramFile::Compiled(program) => return Ok(program),
         ProgramFile::Source(source) => source,
     };
-    let compiled = program::compile_with(&[source], path, Modules::Inside);
+    let mut watch = |inbox| signals.set(inbox);
+    let config = options.config();
+    let compiled = program::compile_for_run(&[source], path, Modules::Inside, &config, &mut watch);
+    if let Some(ended) = compiled.stopped {
+        match ended {
+            Ended::BudgetSpent => complain("compiling the program takes more than the budget"),
+            Ended::Signalled(signal) => complain_of_signal(signal),
+            _ => complain(format_args!(
+                "compiling the program takes more than {} MiB of memory",
+                config.memory >> 20
+            )),
+        }
+        return Err(command::exit_status(ended));
+    }
     let color = std::io::stderr().is_terminal();
     command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
     compiled.program.ok_or(NOT_COMPILED)
@@ -222,7 +240,9 @@ fn run(
     if let Some(timeline) = timeline {
         command::refuse_overwriting(timeline, [file])?;
     }
-    let program = program(file, path)?;
+    let signals = SignalTarget::default();
+    command::end_on_signal(signals.clone());
+    let program = program(file, path, options, &signals)?;
     let setup = |error| {
         complain(error);
         USAGE
@@ -234,7 +254,7 @@ fn run(
     if options.clock == ClockChoice::Real {
         esl_world::install_operations(&mut machine);
     }
-    command::end_on_signal(machine.inbox());
+    signals.set(machine.inbox());
     program::set_module_path(&mut machine, path).map_err(setup)?;
     program::set_traces(&mut machine, trace).map_err(setup)?;
     if let Some(stats) = stats {
@@ -260,9 +280,7 @@ fn run(
             let budget = options.budget.unwrap_or(summary.ticks);
             complain(format_args!("the budget of {budget} ticks is spent"));
         }
-        Ended::Signalled(ProcessSignal::HangUp) => complain("hung up"),
-        Ended::Signalled(ProcessSignal::Interrupt) => complain("interrupted"),
-        Ended::Signalled(ProcessSignal::Terminate) => complain("terminated"),
+        Ended::Signalled(signal) => complain_of_signal(signal),
         _ => {}
     }
     if let Some(stats) = stats {
@@ -274,6 +292,15 @@ fn run(
     // The process ends here: giving the memory back piece by piece would only take time.
     std::mem::forget(machine);
     Ok(status)
+}
+
+/// Prints that a signal has ended the run.
+fn complain_of_signal(signal: ProcessSignal) {
+    complain(match signal {
+        ProcessSignal::HangUp => "hung up",
+        ProcessSignal::Interrupt => "interrupted",
+        ProcessSignal::Terminate => "terminated",
+    });
 }
 
 /// Prints that a file could not be written, and returns the exit status.

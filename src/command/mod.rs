@@ -28,7 +28,7 @@ pub use file::{ProgramFile, read_program, read_source, refuse_overwriting};
 #[cfg(feature = "cli")]
 pub use rights::RightsOptions;
 #[cfg(feature = "cli")]
-pub use signal::{Interrupts, end_on_signal, interrupt_on_signal};
+pub use signal::{Interrupts, SignalTarget, end_on_signal, interrupt_on_signal};
 pub use size::{SizeError, parse_size, parse_stack};
 
 /// Exit status of success.

@@ -1,7 +1,7 @@
 //! Signals of the operating system, passed on to the machine: the first one asks the run to end.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use esl_vm::host::{Inbox, Incoming, ProcessSignal};
 
@@ -43,12 +43,33 @@ pub fn interrupt_on_signal(inbox: Inbox, end: impl Fn(ProcessSignal) + Send + 's
     interrupts
 }
 
-/// Has signals end the run, with its cleanups. A second Ctrl-C cuts that short, and a third one ends the
-/// process whatever the machine does.
-pub fn end_on_signal(inbox: Inbox) {
+/// Inbox of the machine that receives the signals of the process: that in which the program is compiled, then
+/// that in which it runs.
+#[derive(Clone, Default)]
+pub struct SignalTarget(Arc<Mutex<Inbox>>);
+
+impl SignalTarget {
+    /// Has signals put into this inbox from now on, and those that nobody has taken so far.
+    pub fn set(&self, inbox: Inbox) {
+        let mut target = self.lock();
+        let left = std::mem::replace(&mut *target, inbox).take();
+        for signal in left.into_iter().filter(|left| matches!(left, Incoming::Signal(_))) {
+            target.put(signal);
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inbox> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Has signals end the compilation or the run, with its cleanups. A second Ctrl-C cuts that short, and a
+/// third one ends the process whatever the machine does.
+pub fn end_on_signal(target: SignalTarget) {
     let interrupts = AtomicUsize::new(0);
     let all = [ProcessSignal::HangUp, ProcessSignal::Interrupt, ProcessSignal::Terminate];
     on_signal(&all, move |signal| {
+        let inbox = target.lock();
         if !inbox.is_handled(signal)
             && signal == ProcessSignal::Interrupt
             && interrupts.fetch_add(1, Ordering::Relaxed) > 1

@@ -1,14 +1,14 @@
 //! Compiling sources to a program, and expanding their macros.
 
-use esl_bytecode::compile::drive_with;
+use esl_bytecode::compile::{Halt, drive_with};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::span::Span;
 use esl_compiler::diagnostic::{Sources, code};
 use esl_compiler::session::{Compiler, Texts};
-use esl_vm::host::{RealHost, Rights};
+use esl_vm::host::{Inbox, ProcessSignal, RealHost, Rights};
 use esl_vm::vm::{Config, Vm};
 
-use super::{Program, Source, machine, set_module_path};
+use super::{Ended, Program, Source, machine, set_module_path};
 use crate::error::Error;
 use crate::module_path::ModulePath;
 
@@ -21,6 +21,9 @@ pub struct Compiled {
     pub diagnostics: Vec<Diagnostic>,
     /// Sources that the diagnostics refer to.
     pub sources: Sources,
+    /// Way in which the compilation ended before its end, if a limit or a signal has stopped it: as a run
+    /// that does.
+    pub stopped: Option<Ended>,
 }
 
 impl Compiled {
@@ -51,36 +54,88 @@ pub fn compile(sources: &[Source]) -> Compiled {
 
 /// Compiles sources as [`compile`] does, with the modules found in `path`.
 pub fn compile_with(sources: &[Source], path: &ModulePath, modules: Modules) -> Compiled {
+    compile_in(sources, path, modules, Config::DEFAULT, &mut |_| {})
+}
+
+fn compile_in(
+    sources: &[Source],
+    path: &ModulePath,
+    modules: Modules,
+    config: Config,
+    watch: &mut dyn FnMut(Inbox),
+) -> Compiled {
     let mut compiler = Compiler::default();
     if modules == Modules::Apart {
         compiler = compiler.apart();
     }
     let texts: Vec<(&str, &str)> = sources.iter().map(|source| (&*source.name, &*source.text)).collect();
-    compile_texts(&mut compiler.compile_texts(&texts), path)
+    compile_texts(&mut compiler.compile_texts(&texts), path, config, watch)
+}
+
+/// Least limit of memory for a compilation, in bytes: the compiler and the library take that much.
+const LEAST_MEMORY: usize = 32 << 20;
+/// Least budget of a compilation: a fraction of a second.
+const LEAST_BUDGET: u64 = 20_000_000;
+
+/// Compiles sources as [`compile_with`] does, for a run with the settings `config`: the compilation has the
+/// same memory and the same budget, or 32 MiB and 20 million ticks if these are more. `watch` receives the
+/// inbox into which a signal is put that is to stop it.
+pub fn compile_for_run(
+    sources: &[Source],
+    path: &ModulePath,
+    modules: Modules,
+    config: &Config,
+    watch: &mut dyn FnMut(Inbox),
+) -> Compiled {
+    let config = Config {
+        memory: config.memory.max(LEAST_MEMORY),
+        budget: config.budget.map(|budget| budget.max(LEAST_BUDGET)),
+        ..Config::DEFAULT
+    };
+    compile_in(sources, path, modules, config, watch)
 }
 
 /// Expands the macros of a source. Returns its text after that, and the diagnostics. Modules that it requires
 /// are left out.
 pub fn expand(source: &Source, path: &ModulePath) -> (String, Compiled) {
     let mut expansion = Compiler::default().apart().expand_text(&source.name, &source.text);
-    let compiled = compile_texts(&mut expansion, path);
+    let compiled = compile_texts(&mut expansion, path, Config::DEFAULT, &mut |_| {});
     (expansion.expansion().to_string(), Compiled { program: None, ..compiled })
 }
 
-fn compile_texts(texts: &mut Texts, path: &ModulePath) -> Compiled {
+fn compile_texts(
+    texts: &mut Texts,
+    path: &ModulePath,
+    config: Config,
+    watch: &mut dyn FnMut(Inbox),
+) -> Compiled {
     let mut find = |name: &str| path.find(name).map_err(|error| error.to_string());
-    let (module, diagnostics) = match compile_time_machine(path) {
-        Ok(mut machine) => drive_with(texts, &mut machine, &mut find),
+    let mut stopped = None;
+    let (module, diagnostics) = match compile_time_machine(path, config) {
+        Ok(mut machine) => {
+            watch(machine.inbox());
+            let driven = drive_with(texts, &mut machine, &mut find);
+            machine.flush();
+            driven.unwrap_or_else(|halt| {
+                let signal = machine.asked_to_end().unwrap_or(ProcessSignal::Terminate);
+                stopped = Some(match halt {
+                    Halt::Memory => Ended::HeapExhausted,
+                    Halt::Budget => Ended::BudgetSpent,
+                    Halt::Signal => Ended::Signalled(signal),
+                });
+                Default::default()
+            })
+        }
         Err(error) => (None, vec![code::COMPILE_TIME_FAILURE.at(Span::default(), error.to_string())]),
     };
     let program = module.map(|module| Program { module });
-    Compiled { program, diagnostics, sources: texts.sources().clone() }
+    Compiled { program, diagnostics, sources: texts.sources().clone(), stopped }
 }
 
 /// Returns the machine in which macros run. It may read the modules of `path`, and nothing else.
-fn compile_time_machine(path: &ModulePath) -> Result<Vm, Error> {
+fn compile_time_machine(path: &ModulePath, config: Config) -> Result<Vm, Error> {
     let host = RealHost::new(Vec::new()).with_rights(path.with_rights(Rights::none()));
-    let mut machine = machine(Config::DEFAULT, Box::new(host))?;
+    let mut machine = machine(config, Box::new(host))?;
     set_module_path(&mut machine, path)?;
     Ok(machine)
 }

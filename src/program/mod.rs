@@ -28,7 +28,7 @@ use esl_bytecode::verify::verify;
 use esl_bytecode::{disasm, file};
 use esl_vm::load::LoadError;
 
-pub use compile::{Compiled, Modules, compile, compile_with, expand};
+pub use compile::{Compiled, Modules, compile, compile_for_run, compile_with, expand};
 pub(crate) use run::end;
 pub use run::{Ended, Summary, begin, machine, run, run_in, set_module_path, set_traces};
 pub(crate) use run::{begin_with, end_rest, load};

@@ -163,3 +163,63 @@ fn a_signal_ends_a_session_of_the_repl_with_its_cleanups() {
         assert!(rest.contains("off"), "{rest}");
     }
 }
+
+#[test]
+fn a_signal_ends_a_compilation_with_the_cleanups_of_what_runs() {
+    let text = "(eval-when (:compile-toplevel)
+                  (unwind-protect (progn (format t \"begun~%\") (finish-output) (loop (sleep 0.001)))
+                    (format t \"off~%\")))";
+    for (signal, status, said) in [("-TERM", 143, "terminated"), ("-INT", 130, "interrupted")] {
+        let running = Running::start(&format!("compiling{signal}"), text);
+        running.send(signal);
+        let ended = running.end();
+        assert_eq!((ended.status, &*ended.output), (Some(status), "off\n"), "{}", ended.errors);
+        assert!(ended.errors.contains(said), "{}", ended.errors);
+    }
+}
+
+#[test]
+fn the_limits_of_a_run_hold_for_its_compilation() {
+    let folder = Folder::new("compiling-limits");
+    let endless = "(defmacro m (n) `(progn (f ,n) (m ,(1+ n)))) (defun f (x) x) (defun g () (m 0))";
+    let hoarding = "(defmacro m () (let ((hoard nil)) (loop (push (make-array 1000) hoard))))\n(m)";
+    let looping = "(eval-when (:compile-toplevel) (loop))";
+    for (name, text, option, value, status, said) in [
+        ("loop.esl", looping, "--budget", "30000000", 5, "more than the budget"),
+        ("hoard.esl", hoarding, "--memory", "48M", 3, "memory"),
+        ("endless.esl", endless, "--budget", "1000000000", 3, "nested-too-deeply"),
+    ] {
+        let path = folder.file(name, text);
+        let run = process::run(&mut eslvm(&["run", option, value, &path]), "");
+        assert_eq!(run.status, Some(status), "{name}: {}", run.errors);
+        assert!(run.errors.to_lowercase().contains(said), "{name}: {}", run.errors);
+    }
+}
+
+#[test]
+fn expansions_without_end_are_reported_with_the_macro() {
+    let folder = Folder::new("expansions");
+    for (name, text, said) in [
+        (
+            "growing",
+            "(defmacro grow (x) `(grow (cons ,x ,x)))\n(grow 1)",
+            "the expansion of `grow` is too large",
+        ),
+        (
+            "twice",
+            "(defmacro twice () '(progn (twice) (twice)))\n(twice)",
+            "the expansion of `twice` does not end",
+        ),
+        (
+            "doubling",
+            "(defmacro m (n) (if (> n 0) `(list (m ,(- n 1)) (m ,(- n 1))) 1))\n(defun f () (m 40))",
+            "the expansion of `m` is too large",
+        ),
+    ] {
+        let path = folder.file(&format!("{name}.esl"), text);
+        let run = process::run(&mut crate::eslc(&["check", &path]), "");
+        assert_eq!(run.status, Some(3), "{name}: {}", run.errors);
+        assert!(run.errors.contains(said), "{name}: {}", run.errors);
+        assert!(run.errors.contains("1 error\n"), "{name}: {}", run.errors);
+    }
+}

@@ -12,7 +12,7 @@ use esl_bytecode::compile::{Compilation, Compile, Part, Step};
 use esl_bytecode::diagnostic::Diagnostic;
 use slotmap::{Key, KeyData, SlotMap, new_key_type};
 
-use crate::datum::Unit;
+use crate::datum::{DatumWalk, Unit};
 use crate::value::Value;
 
 new_key_type! {
@@ -22,6 +22,8 @@ new_key_type! {
 
 /// Object that a handle names.
 pub(crate) enum CompilerJob {
+    /// A form that becomes a datum, which is then compiled.
+    Form(Box<FormWalk>),
     /// A compilation in progress.
     Compilation(Box<ActiveCompilation>),
     /// A text that is compiled form by form.
@@ -63,6 +65,14 @@ impl FormText {
     }
 }
 
+/// A form that becomes a datum.
+pub(crate) struct FormWalk {
+    /// The walk.
+    pub(crate) walk: DatumWalk,
+    /// Objects and uninterned symbols of the data.
+    pub(crate) unit: Unit,
+}
+
 /// A compilation in progress.
 pub(crate) struct ActiveCompilation {
     /// The compiler's state.
@@ -95,8 +105,13 @@ impl Compilations {
     pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
         self.unit.borrow().roots(visit);
         for job in self.jobs.values() {
-            if let CompilerJob::Compilation(running) = job {
-                running.unit.roots(visit);
+            match job {
+                CompilerJob::Compilation(running) => running.unit.roots(visit),
+                CompilerJob::Form(form) => {
+                    form.walk.roots(visit);
+                    form.unit.roots(visit);
+                }
+                CompilerJob::Text(_) | CompilerJob::Taken => {}
             }
         }
     }
@@ -106,6 +121,17 @@ impl Compilations {
         let id = self.jobs.insert(job).data().as_ffi();
         // A key's version stays far below the limit: it grows by two for each reuse of a slot.
         Value::handle(id as u32, (id >> 32) as u32 % Value::GENERATION_LIMIT).unwrap_or(Value::NIL)
+    }
+
+    /// Returns about how many bytes the jobs take.
+    pub(crate) fn bytes(&self) -> usize {
+        let of_job = |job: &CompilerJob| match job {
+            CompilerJob::Compilation(running) => running.compilation.bytes() + running.unit.bytes(),
+            CompilerJob::Form(form) => form.walk.bytes() + form.unit.bytes(),
+            CompilerJob::Text(text) => text.text.len(),
+            CompilerJob::Taken => 0,
+        };
+        self.jobs.values().map(of_job).sum()
     }
 
     fn find(&self, handle: Value) -> Option<JobId> {

@@ -124,6 +124,11 @@ impl Vm {
         self.embedder.ended_by
     }
 
+    /// Returns the signal of the process that has ended the run, or came while no task was named.
+    pub fn asked_to_end(&self) -> Option<ProcessSignal> {
+        self.embedder.ended_by.or(self.embedder.signal_waits)
+    }
+
     /// Sets how choices are made where the language leaves the order of tasks open.
     pub fn set_choices(&mut self, choices: Choices) {
         self.scheduler.choices = choices;

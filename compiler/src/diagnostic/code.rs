@@ -358,6 +358,11 @@ ASSIGNMENT_TO_CONSTANT = "assignment-to-constant" Error
     fails: "(setq pi 3)\n"
     repaired: "(defvar *pi* 3)\n"
 
+EXPANSION_TOO_LARGE = "expansion-too-large" Error
+    /// A form that expands into more code than the compiler takes, since macros double it again and again.
+    fails: "(defmacro twice (n) (if (> n 0) `(list (twice ,(1- n)) (twice ,(1- n))) 1))\n(print (twice 30))\n"
+    repaired: "(defmacro twice (n) (if (> n 0) `(list (twice ,(1- n)) (twice ,(1- n))) 1))\n(print (twice 3))\n"
+
 MACRO_FAILED = "macro-failed" Error
     /// A macro failed while its call was expanded.
     fails: "(defmacro twice (form)\n  (list 'progn form (car 'form)))\n(twice (print 1))\n"

@@ -6,7 +6,7 @@
 //! Invariants: jobs run in the order of the text, from left to right; exactly one job fills a hole; only jobs
 //! change the [`Scope`], never the code that looks at a form.
 
-use esl_bytecode::compile::{Answer, Environment, MacroCall, MacroRef};
+use esl_bytecode::compile::{Answer, Environment, MacroCall, MacroRef, Work};
 use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::span::Span;
@@ -27,6 +27,13 @@ use crate::diagnostic::code;
 /// Limit on the nesting of nodes.
 pub(super) const MAX_DEPTH: u32 = 5_000;
 
+/// Limit on the size of the expansion of one top-level form, in bytes.
+const MAX_BYTES: usize = 64 << 20;
+/// Limit on the parts of data that go through the macros of one top-level form, as calls or expansions.
+const MAX_PASSED: u64 = 10_000_000;
+/// Forms after which the size of the expansion is looked at again.
+const MEASURED_EACH: u32 = 256;
+
 /// Expands a form of an operator into a node.
 pub(super) type Operator = fn(&mut Expander, &mut dyn Environment, Form, To) -> Checked;
 
@@ -38,6 +45,8 @@ pub enum Stop {
     /// A chunk is finished. If it is to be kept, continue with [`Answer::Object`] or [`Answer::Failed`]; if
     /// it is to be loaded and that failed, with [`Answer::Failed`].
     Chunk(Box<Chunk>),
+    /// The work that is allowed is done. Continue.
+    More,
     /// All forms are expanded.
     Done,
 }
@@ -75,6 +84,13 @@ pub struct Expander {
     pub(super) is_file: bool,
     /// Whether the limit on depth has been reported for the current top-level form.
     is_too_deep: bool,
+    /// Whether a limit on the expansion of the current top-level form has been reported. Its other forms are
+    /// left out.
+    is_given_up: bool,
+    /// Parts of data that went through the macros of the current top-level form.
+    passed: u64,
+    /// Jobs until the size of the current top-level form is looked at.
+    unmeasured: u32,
     /// Uses and definitions of global names.
     pub(super) globals: GlobalUses,
 }
@@ -98,6 +114,9 @@ impl Expander {
             errors: 0,
             is_file: false,
             is_too_deep: false,
+            is_given_up: false,
+            passed: 0,
+            unmeasured: 0,
             globals: GlobalUses::default(),
         }
     }
@@ -118,19 +137,38 @@ impl Expander {
         debug_assert!(self.jobs.is_empty() && self.open.is_empty(), "the last form is finished");
         self.origins.clear();
         self.is_too_deep = false;
+        self.is_given_up = false;
+        self.passed = 0;
         self.jobs.push(Job::TopLevel(form, top));
     }
 
-    /// Works until something is needed from outside. Calls `charge` with the number of jobs done.
-    pub fn run(&mut self, environment: &mut dyn Environment, charge: &mut dyn FnMut(u64)) -> Stop {
+    /// Works until something is needed from outside, or the work that is allowed is done.
+    pub fn run(&mut self, environment: &mut dyn Environment, work: &mut Work) -> Stop {
+        self.passed += work.take_passed();
         loop {
             let Some(job) = self.jobs.pop() else { return Stop::Done };
-            charge(1);
+            let made = self.nodes_made();
             self.work(environment, job);
+            work.add(self.nodes_made().saturating_sub(made) + 1);
             if let Some(stop) = self.stopped.take() {
                 return stop;
             }
+            if work.is_done() {
+                return Stop::More;
+            }
         }
+    }
+
+    /// Returns the number of nodes in the chunk that is being built.
+    fn nodes_made(&self) -> u64 {
+        self.open.last().map_or(0, |open| open.core.nodes.len() as u64)
+    }
+
+    /// Returns about how many bytes the expansion of the current top-level form takes.
+    pub fn bytes(&self) -> usize {
+        let jobs = self.jobs.capacity() * size_of::<Job>();
+        let open: usize = self.open.iter().map(|open| open.core.bytes()).sum();
+        jobs + open + self.origins.bytes()
     }
 
     /// Takes the findings so far.
@@ -168,6 +206,15 @@ impl Expander {
     }
 
     fn work(&mut self, environment: &mut dyn Environment, job: Job) {
+        if self.is_given_up {
+            match job {
+                Job::Expand(_, to) => return self.fill_nil(to),
+                Job::Place(_, to) => return self.places.push(SetfExpansion::broken(to.span)),
+                Job::Macro(..) => return self.objects.push(None),
+                Job::TopLevel(..) => return,
+                _ => {}
+            }
+        }
         match job {
             Job::Expand(form, to) => {
                 let to = to.at(&form);
@@ -236,6 +283,10 @@ impl Expander {
         if to.depth > MAX_DEPTH {
             return self.too_deep(to);
         }
+        self.unmeasured += 1;
+        if self.unmeasured >= MEASURED_EACH {
+            self.measure(to.origin, to.span)?;
+        }
         match datum.kind() {
             DatumKind::Symbol(symbol) => {
                 let symbol = symbol.clone();
@@ -268,7 +319,47 @@ impl Expander {
         }
     }
 
+    /// Checks that the expansion of the current top-level form does not grow without bound.
+    ///
+    /// # Errors
+    /// `expansion-too-large`.
+    fn measure(&mut self, origin: Option<OriginId>, span: Span) -> Checked {
+        self.unmeasured = 0;
+        let reason = if self.bytes() > MAX_BYTES {
+            format!("it takes more than {} MiB", MAX_BYTES >> 20)
+        } else if self.passed > MAX_PASSED {
+            format!("its macros were given more than {} million parts of forms", MAX_PASSED / 1_000_000)
+        } else {
+            return Ok(());
+        };
+        self.is_given_up = true;
+        let outermost = origin.map(|origin| name(&self.origins.get(origin).name));
+        let whose = outermost.unwrap_or_else(|| "this form".to_string());
+        let message = format!("the expansion of {whose} is too large: {reason}");
+        let help = "divide the form, or let the macro make calls of functions instead of copies of forms";
+        Err(Box::new(code::EXPANSION_TOO_LARGE.at(span, message).help(help)))
+    }
+
+    /// Notes a macro call, or the use of a symbol macro, as [`Origins::enter`] does.
+    ///
+    /// # Errors
+    /// `macro-failed`, `expansion-too-large`.
+    pub(super) fn enter_origin(
+        &mut self,
+        operator: &Symbol,
+        span: Span,
+        is_standard: bool,
+        around: Option<OriginId>,
+    ) -> Checked<Option<OriginId>> {
+        self.measure(around, span)?;
+        let origin = self.origins.enter(operator, span, is_standard, around);
+        self.is_given_up |= origin.is_err();
+        origin
+    }
+
     fn too_deep(&mut self, to: To) -> Checked {
+        // Macros may have made many more such forms.
+        self.is_given_up |= to.origin.is_some();
         if self.is_too_deep {
             self.errors += 1;
             self.fill_nil(to);
@@ -294,7 +385,7 @@ impl Expander {
         around: Option<OriginId>,
         waiting: impl FnOnce(Option<OriginId>) -> Waiting,
     ) -> Checked {
-        let origin = self.origins.enter(&form.operator, form.span, is_standard, around)?;
+        let origin = self.enter_origin(&form.operator, form.span, is_standard, around)?;
         self.waiting = waiting(origin);
         self.call = Some(form.datum.clone());
         let locals = self.scope.locals();

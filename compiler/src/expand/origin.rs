@@ -49,6 +49,11 @@ impl Origins {
         self.expansions = 0;
     }
 
+    /// Returns the number of bytes that the calls take.
+    pub(super) fn bytes(&self) -> usize {
+        self.calls.capacity() * size_of::<Origin>()
+    }
+
     /// Returns a call.
     pub(super) fn get(&self, OriginId(index): OriginId) -> &Origin {
         &self.calls[index as usize]
@@ -71,7 +76,12 @@ impl Origins {
             let outermost =
                 parent.filter(|parent| parent.span == span).map_or(operator, |parent| &parent.name);
             let message = format!("the expansion of {} does not end", name(outermost));
-            return Err(Box::new(code::MACRO_FAILED.at(span, message)));
+            let help = format!(
+                "after {} calls of macros within one another it still calls {}: add a case that does not",
+                chain.max(1),
+                name(operator)
+            );
+            return Err(Box::new(code::MACRO_FAILED.at(span, message).help(help)));
         }
         let is_made_by_standard = is_standard;
         let origin = match parent {

@@ -74,7 +74,7 @@ impl Expander {
             }
             Some(Meaning::Variable(VariableMeaning::Special)) => NodeKind::Special(symbol.clone()),
             Some(Meaning::Variable(VariableMeaning::SymbolMacro(form))) => {
-                let origin = self.origins.enter(symbol, to.span, true, to.origin)?;
+                let origin = self.enter_origin(symbol, to.span, true, to.origin)?;
                 self.schedule([Job::Expand(form, To { origin, ..to })]);
                 return Ok(());
             }

@@ -14,7 +14,7 @@ use super::lines::SourceLines;
 use super::pool::Pool;
 use super::regalloc::RegisterStack;
 use crate::core::*;
-use crate::resolve::{Resolution, resolve};
+use crate::resolve::Resolution;
 
 /// A function that does not fit the format.
 pub(super) struct OversizedFunction {
@@ -45,11 +45,11 @@ pub(super) struct ModuleBuilder<'a> {
 }
 
 impl<'a> ModuleBuilder<'a> {
-    /// Creates the builder of the module for a top-level form.
-    pub(super) fn new(core: &'a Core, lines: &'a SourceLines) -> ModuleBuilder<'a> {
+    /// Creates the builder of the module for a top-level form that is resolved.
+    pub(super) fn new(core: &'a Core, resolution: Resolution, lines: &'a SourceLines) -> ModuleBuilder<'a> {
         ModuleBuilder {
             core,
-            resolution: resolve(core),
+            resolution,
             lines,
             pool: Pool::default(),
             numbers: vec![None; core.lambdas.len()],
@@ -60,6 +60,36 @@ impl<'a> ModuleBuilder<'a> {
             tagbodies: vec![Reg(0); core.tagbodies.len()],
             oversized: Vec::new(),
             spills_from: None,
+        }
+    }
+
+    /// Interrupts the work.
+    pub(super) fn suspend(self) -> SuspendedBuilder {
+        let ModuleBuilder {
+            core: _,
+            resolution,
+            lines: _,
+            pool,
+            numbers,
+            numbered,
+            captures,
+            variables,
+            blocks,
+            tagbodies,
+            oversized,
+            spills_from,
+        } = self;
+        SuspendedBuilder {
+            resolution,
+            pool,
+            numbers,
+            numbered,
+            captures,
+            variables,
+            blocks,
+            tagbodies,
+            oversized,
+            spills_from,
         }
     }
 
@@ -80,6 +110,40 @@ impl<'a> ModuleBuilder<'a> {
             constants: self.pool.finish(),
             functions,
             toplevel: vec![FunctionNumber(0)],
+        }
+    }
+}
+
+/// A [`ModuleBuilder`] whose work is interrupted between two functions.
+pub(super) struct SuspendedBuilder {
+    resolution: Resolution,
+    pool: Pool,
+    numbers: Vec<Option<FunctionNumber>>,
+    numbered: Vec<LambdaId>,
+    captures: Vec<Vec<Capture>>,
+    variables: Vec<Reg>,
+    blocks: Vec<Reg>,
+    tagbodies: Vec<Reg>,
+    oversized: Vec<OversizedFunction>,
+    spills_from: Option<u8>,
+}
+
+impl SuspendedBuilder {
+    /// Takes the work up again, with the same form.
+    pub(super) fn resume<'a>(self, core: &'a Core, lines: &'a SourceLines) -> ModuleBuilder<'a> {
+        ModuleBuilder {
+            core,
+            resolution: self.resolution,
+            lines,
+            pool: self.pool,
+            numbers: self.numbers,
+            numbered: self.numbered,
+            captures: self.captures,
+            variables: self.variables,
+            blocks: self.blocks,
+            tagbodies: self.tagbodies,
+            oversized: self.oversized,
+            spills_from: self.spills_from,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Lowering one function: its entry, and the dispatch over kinds of forms.
 
+use esl_bytecode::compile::Work;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::module::{Function, Parameters, PoolIdx};
 use esl_bytecode::opcode::Instr;
@@ -19,20 +20,28 @@ const RED_ZONE: usize = 96 * 1024;
 /// Native stack that is added when less than that is left, in bytes.
 const STACK: usize = 1024 * 1024;
 
+/// Words of code that count as a unit of work.
+const WORDS_PER_UNIT: u64 = 2;
+
 impl ModuleBuilder<'_> {
-    /// Lowers all functions, beginning with the form itself.
-    pub(super) fn functions(&mut self) -> Vec<Function> {
+    /// Lowers functions, beginning with the form itself, and adds them to `functions`. Returns whether these
+    /// are all; otherwise the work that is allowed is done.
+    pub(super) fn functions(&mut self, functions: &mut Vec<Function>, work: &mut Work) -> bool {
         self.number(LambdaId(0));
-        let mut functions = Vec::new();
         // Functions get their numbers when code that refers to them is lowered, and are lowered in that
         // order.
         while let Some(&lambda) = self.numbered.get(functions.len()) {
-            functions.push(self.function(lambda));
+            if work.is_done() {
+                return false;
+            }
+            let function = self.function(lambda);
+            work.add(1 + function.code.len() as u64 / WORDS_PER_UNIT);
+            functions.push(function);
         }
         for (function, lambda) in functions.iter_mut().zip(&self.numbered) {
             function.captures = std::mem::take(&mut self.captures[lambda.index()]);
         }
-        functions
+        true
     }
 
     /// Lowers the function of a lambda. Its captures are left open.

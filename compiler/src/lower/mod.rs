@@ -45,11 +45,13 @@ mod variable;
 #[cfg(test)]
 mod tests;
 
+use esl_bytecode::compile::Work;
 use esl_bytecode::diagnostic::Diagnostic;
-use esl_bytecode::module::Module;
+use esl_bytecode::module::{Function, Module};
 
 use crate::core::{Core, LambdaId};
-use builder::ModuleBuilder;
+use crate::resolve::ResolveWalk;
+use builder::{ModuleBuilder, SuspendedBuilder};
 pub use lines::SourceLines;
 
 /// Lowers a top-level form to a module whose only top-level function it is.
@@ -57,36 +59,96 @@ pub use lines::SourceLines;
 /// # Errors
 /// `function-too-large`, for each function that does not fit the format even in parts.
 pub fn lower(core: &Core, lines: &SourceLines) -> Result<Module, Vec<Diagnostic>> {
-    let mut builder = ModuleBuilder::new(core, lines);
-    let functions = builder.functions();
-    if builder.oversized.is_empty() {
-        return Ok(builder.module(functions));
+    let mut lowering = Lowering::new(core.clone());
+    loop {
+        if let Some(outcome) = lowering.run(lines, &mut Work::unbounded()) {
+            return outcome;
+        }
     }
-    let diagnostics = builder.oversized.iter().map(|function| function.diagnostic.clone()).collect();
-    lower_large(core, lines).ok_or(diagnostics)
 }
 
 /// Number of registers in use from which on variables go to the heap, in forms that do not fit otherwise.
 const SPILLS_FROM: u8 = 80;
 
-/// Lowers a form with functions that do not fit as they are.
-fn lower_large(core: &Core, lines: &SourceLines) -> Option<Module> {
-    let mut divided = core.clone();
-    let mut limits = split::LIMITS.iter();
-    loop {
-        let mut builder = ModuleBuilder::new(&divided, lines);
-        builder.spills_from = Some(SPILLS_FROM);
-        let functions = builder.functions();
-        if builder.oversized.is_empty() {
-            return Some(builder.module(functions));
+/// The lowering of a top-level form in parts. A part ends between two steps of the walk that resolves it, or
+/// between two functions.
+pub struct Lowering {
+    core: Core,
+    stage: Stage,
+    /// What is wrong with the functions that did not fit as they were, once that was tried.
+    oversized: Option<Vec<Diagnostic>>,
+    /// Limits that are left for dividing functions.
+    limits: std::slice::Iter<'static, split::Limits>,
+}
+
+/// What a [`Lowering`] does next.
+enum Stage {
+    Begin,
+    Resolve(Box<ResolveWalk>),
+    Functions(Box<SuspendedBuilder>, Vec<Function>),
+}
+
+impl Lowering {
+    /// Begins to lower a top-level form.
+    pub fn new(core: Core) -> Lowering {
+        Lowering { core, stage: Stage::Begin, oversized: None, limits: split::LIMITS.iter() }
+    }
+
+    /// Returns about how many bytes it takes.
+    pub fn bytes(&self) -> usize {
+        // Resolution and code are about as large as the form.
+        self.core.bytes() * 2
+    }
+
+    /// Goes on with the work. Returns the module, or what is wrong with the form; `None` if the work that is
+    /// allowed is done before.
+    pub fn run(&mut self, lines: &SourceLines, work: &mut Work) -> Option<Result<Module, Vec<Diagnostic>>> {
+        loop {
+            match std::mem::replace(&mut self.stage, Stage::Begin) {
+                Stage::Begin => {
+                    work.add(self.core.nodes.len() as u64 / NODES_PER_UNIT);
+                    self.stage = Stage::Resolve(Box::new(ResolveWalk::new(&self.core)));
+                }
+                Stage::Resolve(mut walk) => {
+                    if !walk.run(&self.core, work) {
+                        self.stage = Stage::Resolve(walk);
+                        return None;
+                    }
+                    let mut builder = ModuleBuilder::new(&self.core, walk.finish(&self.core), lines);
+                    builder.spills_from = self.oversized.is_some().then_some(SPILLS_FROM);
+                    self.stage = Stage::Functions(Box::new(builder.suspend()), Vec::new());
+                }
+                Stage::Functions(builder, mut functions) => {
+                    let mut builder = builder.resume(&self.core, lines);
+                    if !builder.functions(&mut functions, work) {
+                        self.stage = Stage::Functions(Box::new(builder.suspend()), functions);
+                        return None;
+                    }
+                    if builder.oversized.is_empty() {
+                        return Some(Ok(builder.module(functions)));
+                    }
+                    let Some(diagnostics) = self.oversized.take() else {
+                        let found = builder.oversized.iter().map(|function| function.diagnostic.clone());
+                        self.oversized = Some(found.collect());
+                        continue;
+                    };
+                    let Some(&limits) = self.limits.next() else { return Some(Err(diagnostics)) };
+                    self.oversized = Some(diagnostics);
+                    let resolution = &builder.resolution;
+                    let too_large: Vec<LambdaId> = (0..self.core.lambdas.len())
+                        .map(|index| LambdaId(index as u32))
+                        .filter(|&lambda| {
+                            let frame = resolution.frame(lambda);
+                            builder.oversized.iter().any(|function| function.lambda == frame)
+                        })
+                        .collect();
+                    drop(builder);
+                    split::split(&mut self.core, &too_large, limits);
+                }
+            }
         }
-        let resolution = &builder.resolution;
-        let too_large: Vec<LambdaId> = (0..divided.lambdas.len())
-            .map(|index| LambdaId(index as u32))
-            .filter(|&lambda| {
-                builder.oversized.iter().any(|function| function.lambda == resolution.frame(lambda))
-            })
-            .collect();
-        split::split(&mut divided, &too_large, *limits.next()?);
     }
 }
+
+/// Nodes that count as a unit of work where the whole form is looked at.
+const NODES_PER_UNIT: u64 = 8;

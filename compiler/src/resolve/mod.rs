@@ -19,6 +19,7 @@ mod inline;
 
 use std::ops::Range;
 
+use esl_bytecode::compile::Work;
 use rustc_hash::FxHashMap;
 
 use crate::core::*;
@@ -156,16 +157,19 @@ impl Resolution {
 }
 
 /// Resolves `core`.
+#[cfg(test)]
 pub(crate) fn resolve(core: &Core) -> Resolution {
-    let inlining = inline::decide(core);
-    let mut walk = ResolveWalk::new(core, inlining);
-    walk.run();
-    walk.finish()
+    let mut walk = ResolveWalk::new(core);
+    walk.run(core, &mut Work::unbounded());
+    walk.finish(core)
 }
 
-/// The walk over the form in the order of evaluation. Inlined functions are walked where they run.
-struct ResolveWalk<'a> {
-    core: &'a Core,
+/// Steps of the walk that count as a unit of work.
+const STEPS_PER_UNIT: u32 = 8;
+
+/// The walk over the form in the order of evaluation. Inlined functions are walked where they run. It goes on
+/// in parts; each is given the same form.
+pub(crate) struct ResolveWalk {
     frames: Vec<LambdaId>,
     functions: FxHashMap<VarId, LambdaId>,
     used: Vec<bool>,
@@ -201,15 +205,16 @@ enum WalkStep {
     Leave(NodeId),
 }
 
-impl<'a> ResolveWalk<'a> {
-    fn new(core: &'a Core, inlining: inline::Inlining) -> ResolveWalk<'a> {
+impl ResolveWalk {
+    /// Begins the walk over `core`.
+    pub(crate) fn new(core: &Core) -> ResolveWalk {
+        let inlining = inline::decide(core);
         let root = Site { frame: LambdaId(0), cleanups: 0 };
         let mut used = vec![false; core.lambdas.len()];
         if let Some(first) = used.first_mut() {
             *first = true;
         }
-        ResolveWalk {
-            core,
+        let mut walk = ResolveWalk {
             frames: inlining.frames,
             functions: inlining.functions,
             used,
@@ -227,67 +232,74 @@ impl<'a> ResolveWalk<'a> {
             sets: vec![Vec::new(); core.variables.len()],
             clock: 0,
             pending: Vec::new(),
-        }
+        };
+        walk.push_lambda(core, LambdaId(0), root);
+        walk
     }
 
-    fn run(&mut self) {
-        self.push_lambda(LambdaId(0), Site { frame: LambdaId(0), cleanups: 0 });
+    /// Walks on. Returns whether the walk is over; otherwise the work that is allowed is done.
+    pub(crate) fn run(&mut self, core: &Core, work: &mut Work) -> bool {
         while let Some(event) = self.pending.pop() {
+            if self.clock % STEPS_PER_UNIT == 0 {
+                work.add(1);
+                if work.is_done() {
+                    self.pending.push(event);
+                    return false;
+                }
+            }
             self.clock += 1;
             match event {
                 WalkStep::Leave(node) => {
                     self.spans[node.index()].1 = self.clock;
-                    self.single[node.index()] = self.gives_one(node);
+                    self.single[node.index()] = self.gives_one(core, node);
                 }
                 WalkStep::Enter(node, site) => {
                     self.spans[node.index()].0 = self.clock;
                     self.pending.push(WalkStep::Leave(node));
                     let from = self.pending.len();
-                    self.enter(node, site);
+                    self.enter(core, node, site);
                     self.pending[from..].reverse();
                 }
             }
         }
+        true
     }
 
     /// Schedules the nodes of a lambda, in order.
-    fn push_lambda(&mut self, lambda: LambdaId, site: Site) {
+    fn push_lambda(&mut self, core: &Core, lambda: LambdaId, site: Site) {
         let pending = &mut self.pending;
-        lambda_nodes(&self.core.lambdas[lambda.index()], &mut |node| {
-            pending.push(WalkStep::Enter(node, site))
-        });
+        lambda_nodes(&core.lambdas[lambda.index()], &mut |node| pending.push(WalkStep::Enter(node, site)));
     }
 
     /// Notes the effects of a node and schedules the nodes inside it, in order.
-    fn enter(&mut self, node: NodeId, site: Site) {
-        let core = self.core;
+    fn enter(&mut self, core: &Core, node: NodeId, site: Site) {
         let kind = &core.nodes[node.index()].kind;
         match kind {
-            NodeKind::Local(variable) => self.read(*variable, site),
+            NodeKind::Local(variable) => self.read(core, *variable, site),
             NodeKind::SetLocal(variable, _) => {
                 self.sets[variable.index()].push(self.clock);
-                self.capture(Lexical::Variable(*variable), site);
+                self.capture(core, Lexical::Variable(*variable), site);
             }
-            NodeKind::Lambda(lambda) => return self.closure(*lambda, site),
+            NodeKind::Lambda(lambda) => return self.closure(core, *lambda, site),
             NodeKind::Functions { definitions, .. } => {
                 for &(_, lambda) in definitions {
                     if self.frames[lambda.index()] == lambda {
                         self.captures.set_parent(lambda, site.frame);
-                        self.push_lambda(lambda, Site { frame: lambda, cleanups: 0 });
+                        self.push_lambda(core, lambda, Site { frame: lambda, cleanups: 0 });
                     }
                 }
             }
-            NodeKind::Call(callee, arguments) => return self.call(callee, arguments, site),
-            NodeKind::Apply(Callee::Local(variable), _) => self.read(*variable, site),
+            NodeKind::Call(callee, arguments) => return self.call(core, callee, arguments, site),
+            NodeKind::Apply(Callee::Local(variable), _) => self.read(core, *variable, site),
             NodeKind::Block(block, _) => self.block_sites[block.index()] = site,
             NodeKind::ReturnFrom(block, _) if self.block_sites[block.index()] != site => {
                 self.block_catches[block.index()] = true;
-                self.capture(Lexical::Block(*block), site);
+                self.capture(core, Lexical::Block(*block), site);
             }
             NodeKind::Tagbody(tagbody, _) => self.tagbody_sites[tagbody.index()] = site,
             NodeKind::Go(tagbody, _) if self.tagbody_sites[tagbody.index()] != site => {
                 self.tagbody_catches[tagbody.index()] = true;
-                self.capture(Lexical::Tagbody(*tagbody), site);
+                self.capture(core, Lexical::Tagbody(*tagbody), site);
             }
             NodeKind::FailureCleanup(body, cleanup) => {
                 let inside = Site { cleanups: site.cleanups + 1, ..site };
@@ -305,19 +317,19 @@ impl<'a> ResolveWalk<'a> {
         children(kind, &mut |child| pending.push(WalkStep::Enter(child, site)));
     }
 
-    fn closure(&mut self, lambda: LambdaId, site: Site) {
+    fn closure(&mut self, core: &Core, lambda: LambdaId, site: Site) {
         self.used[lambda.index()] = true;
         self.captures.set_parent(lambda, site.frame);
-        self.push_lambda(lambda, Site { frame: lambda, cleanups: 0 });
+        self.push_lambda(core, lambda, Site { frame: lambda, cleanups: 0 });
     }
 
-    fn call(&mut self, callee: &Callee, arguments: &[NodeId], site: Site) {
-        let own = &self.core.lambdas[site.frame.index()];
+    fn call(&mut self, core: &Core, callee: &Callee, arguments: &[NodeId], site: Site) {
+        let own = &core.lambdas[site.frame.index()];
         match callee {
-            Callee::Value(function) => match self.core.nodes[function.index()].kind {
+            Callee::Value(function) => match core.nodes[function.index()].kind {
                 NodeKind::Lambda(lambda) if self.frames[lambda.index()] != lambda => {
                     self.pending.extend(arguments.iter().map(|&child| WalkStep::Enter(child, site)));
-                    return self.push_lambda(lambda, site);
+                    return self.push_lambda(core, lambda, site);
                 }
                 _ => self.pending.push(WalkStep::Enter(*function, site)),
             },
@@ -334,14 +346,14 @@ impl<'a> ResolveWalk<'a> {
                     if std::mem::replace(&mut self.used[lambda.index()], true) {
                         self.self_called[lambda.index()] = true;
                     } else {
-                        self.push_lambda(lambda, site);
+                        self.push_lambda(core, lambda, site);
                     }
                     return;
                 }
                 if target == Some(site.frame) && own.takes_exactly(arguments.len()) {
                     self.self_called[site.frame.index()] = true;
                 } else {
-                    self.read(*variable, site);
+                    self.read(core, *variable, site);
                 }
             }
             Callee::Builtin(_) => {}
@@ -349,24 +361,23 @@ impl<'a> ResolveWalk<'a> {
         self.pending.extend(arguments.iter().map(|&child| WalkStep::Enter(child, site)));
     }
 
-    fn read(&mut self, variable: VarId, site: Site) {
+    fn read(&mut self, core: &Core, variable: VarId, site: Site) {
         if let Some(&lambda) = self.functions.get(&variable) {
             self.used[lambda.index()] = true;
             self.function_references.push((variable, site.frame));
         } else {
             self.reads[variable.index()].push(self.clock);
-            self.capture(Lexical::Variable(variable), site);
+            self.capture(core, Lexical::Variable(variable), site);
         }
     }
 
-    fn capture(&mut self, lexical: Lexical, site: Site) {
-        let owner = lexical.owner(self.core);
+    fn capture(&mut self, core: &Core, lexical: Lexical, site: Site) {
+        let owner = lexical.owner(core);
         self.captures.add(lexical, self.frames[owner.index()], site.frame, &mut |_| {});
     }
 
     /// Whether a node has exactly one value, once this is known of the nodes inside it.
-    fn gives_one(&mut self, node: NodeId) -> bool {
-        let core = self.core;
+    fn gives_one(&mut self, core: &Core, node: NodeId) -> bool {
         let of = |id: &NodeId| self.single[id.index()];
         match &core.nodes[node.index()].kind {
             NodeKind::If(_, consequent, alternative) => of(consequent) && of(alternative),
@@ -401,10 +412,11 @@ impl<'a> ResolveWalk<'a> {
         }
     }
 
-    fn finish(mut self) -> Resolution {
+    /// Returns the facts, when the walk is over.
+    pub(crate) fn finish(mut self, core: &Core) -> Resolution {
         let functions = std::mem::take(&mut self.functions);
         let references = std::mem::take(&mut self.function_references);
-        self.captures.add_functions(self.core, &self.frames, &functions, &references);
+        self.captures.add_functions(core, &self.frames, &functions, &references);
         Resolution {
             single: self.single,
             frames: self.frames,

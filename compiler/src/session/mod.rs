@@ -16,7 +16,9 @@ mod queue;
 
 use std::sync::Arc;
 
-use esl_bytecode::compile::{Answer, Compilation, Compile, Environment, Part, Required, SourcePlace, Step};
+use esl_bytecode::compile::{
+    Answer, Compilation, Compile, Environment, Part, Required, SourcePlace, Step, Work,
+};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::link::join;
@@ -25,8 +27,8 @@ use esl_bytecode::span::{SourceId, Span};
 
 use crate::diagnostic::{Renderer, Sources, code};
 use crate::expand::print::print;
-use crate::expand::{Chunk, Expander, FailurePlace, MacroFailure, Stop};
-use crate::lower::{SourceLines, lower};
+use crate::expand::{Chunk, Expander, FailurePlace, MacroFailure, Purpose, Stop};
+use crate::lower::{Lowering, SourceLines};
 use crate::reader::{datum_end, read_datum};
 
 use calls::FormCalls;
@@ -93,7 +95,9 @@ impl Compiler {
             calls: None,
             lines,
             expander: Expander::new(),
+            lowering: None,
             chunks: Vec::new(),
+            chunk_bytes: 0,
             diagnostics: Vec::new(),
             listing: None,
         }
@@ -157,11 +161,23 @@ struct CompilationState {
     calls: Option<FormCalls>,
     lines: SourceLines,
     expander: Expander,
+    /// Chunk that is being lowered.
+    lowering: Option<Box<ChunkLowering>>,
     /// Chunks of the program.
     chunks: Vec<Module>,
+    /// About how many bytes these take.
+    chunk_bytes: usize,
     diagnostics: Vec<Diagnostic>,
     /// Expansion of the forms, if that is wanted.
     listing: Option<String>,
+}
+
+/// A chunk that is being lowered.
+struct ChunkLowering {
+    lowering: Lowering,
+    purpose: Purpose,
+    /// Place of the chunk.
+    span: Span,
 }
 
 /// A compilation of whole texts.
@@ -180,13 +196,12 @@ impl Texts {
 }
 
 impl Compilation for Texts {
-    fn step(
-        &mut self,
-        environment: &mut dyn Environment,
-        answer: Answer,
-        charge: &mut dyn FnMut(u64),
-    ) -> Step {
-        self.0.step(environment, answer, charge)
+    fn step(&mut self, environment: &mut dyn Environment, answer: Answer, work: &mut Work) -> Step {
+        self.0.step(environment, answer, work)
+    }
+
+    fn bytes(&self) -> usize {
+        self.0.bytes()
     }
 
     fn render(&self, diagnostic: &Diagnostic) -> String {
@@ -195,13 +210,10 @@ impl Compilation for Texts {
 }
 
 impl Compilation for CompilationState {
-    fn step(
-        &mut self,
-        environment: &mut dyn Environment,
-        answer: Answer,
-        charge: &mut dyn FnMut(u64),
-    ) -> Step {
-        if let Some((name, span)) = self.asked.take() {
+    fn step(&mut self, environment: &mut dyn Environment, answer: Answer, work: &mut Work) -> Step {
+        if matches!(answer, Answer::More) {
+            // Nothing was asked.
+        } else if let Some((name, span)) = self.asked.take() {
             self.take_module(&name, span, answer);
         } else if let Some(span) = self.loading.take() {
             if let Answer::Failed(failure) = answer {
@@ -223,13 +235,13 @@ impl Compilation for CompilationState {
             self.expander.answer(answer);
         }
         loop {
-            match self.expander.run(environment, charge) {
+            if let Some(step) = self.go_on_lowering(work) {
+                return step;
+            }
+            match self.expander.run(environment, work) {
                 Stop::Macro(call) => return Step::Expand(call),
-                Stop::Chunk(chunk) => {
-                    if let Some(step) = self.chunk(*chunk, charge) {
-                        return step;
-                    }
-                }
+                Stop::More => return Step::More,
+                Stop::Chunk(chunk) => self.begin_lowering(*chunk),
                 Stop::Done => {
                     self.diagnostics.extend(self.expander.take_diagnostics());
                     if self.is_package_in_doubt() {
@@ -250,7 +262,7 @@ impl Compilation for CompilationState {
                             renumber_uninterned(&mut module, environment);
                             self.take_sources(&mut module);
                             if !self.apart {
-                                self.chunks.push(module.clone());
+                                self.keep_chunk(module.clone());
                             }
                             self.loading = Some(span);
                             return Step::Load { module, keep: false };
@@ -264,6 +276,11 @@ impl Compilation for CompilationState {
 
     fn render(&self, diagnostic: &Diagnostic) -> String {
         Renderer::default().render(diagnostic, &self.sources)
+    }
+
+    fn bytes(&self) -> usize {
+        let lowering = self.lowering.as_ref().map_or(0, |current| current.lowering.bytes());
+        self.expander.bytes() + lowering + self.chunk_bytes
     }
 }
 
@@ -359,17 +376,36 @@ impl CompilationState {
         self.apart && matches!(&self.input, FormSource::Texts(queue) if queue.is_inside_module())
     }
 
-    /// Lowers a chunk; keeps it for the program, asks for it to be loaded, or both.
-    fn chunk(&mut self, chunk: Chunk, charge: &mut dyn FnMut(u64)) -> Option<Step> {
+    /// Begins to lower a chunk.
+    fn begin_lowering(&mut self, chunk: Chunk) {
         let Chunk { core, mut purpose } = chunk;
         purpose.emit &= !self.is_outside();
-        charge(core.nodes.len() as u64);
         let span = core.nodes.first().map(|node| node.span).unwrap_or_default();
         if let (Some(listing), true) = (&mut self.listing, purpose.emit) {
             listing.push_str(&print(&core));
             listing.push_str("\n\n");
         }
-        let module = match lower(&core, &self.lines) {
+        self.lowering = Some(Box::new(ChunkLowering { lowering: Lowering::new(core), purpose, span }));
+    }
+
+    /// Goes on lowering a chunk, if there is one, and returns the next step, if that leads to one.
+    fn go_on_lowering(&mut self, work: &mut Work) -> Option<Step> {
+        let mut current = self.lowering.take()?;
+        let Some(lowered) = current.lowering.run(&self.lines, work) else {
+            self.lowering = Some(current);
+            return Some(Step::More);
+        };
+        self.chunk(lowered, current.purpose, current.span)
+    }
+
+    /// Takes a lowered chunk: keeps it for the program, asks for it to be loaded, or both.
+    fn chunk(
+        &mut self,
+        lowered: Result<Module, Vec<Diagnostic>>,
+        purpose: Purpose,
+        span: Span,
+    ) -> Option<Step> {
+        let module = match lowered {
             Ok(module) => module,
             Err(diagnostics) => {
                 self.diagnostics.extend(diagnostics);
@@ -390,16 +426,22 @@ impl CompilationState {
         }
         match (purpose.load, purpose.emit) {
             (true, true) => {
-                self.chunks.push(module.clone());
+                self.keep_chunk(module.clone());
                 Some(Step::Load { module, keep: purpose.keep })
             }
             (true, false) => Some(Step::Load { module, keep: purpose.keep }),
             (false, true) => {
-                self.chunks.push(module);
+                self.keep_chunk(module);
                 None
             }
             (false, false) => None,
         }
+    }
+
+    /// Adds a chunk to the program.
+    fn keep_chunk(&mut self, module: Module) {
+        self.chunk_bytes += module.bytes();
+        self.chunks.push(module);
     }
 
     /// Whether the last form was to make or enter a package, and has errors.

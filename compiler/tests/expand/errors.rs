@@ -262,6 +262,7 @@ fn the_programs_in_the_table_of_codes_have_them() {
         "unreachable-clause",
         "nothing-to-wait-for",
         "undeclared-cause",
+        "expansion-too-large",
         "outside-clause",
         "unknown-module",
         "circular-module",

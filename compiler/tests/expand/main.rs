@@ -14,7 +14,7 @@ mod toplevel;
 
 use std::sync::Arc;
 
-use esl_bytecode::compile::{Answer, CompileTimeHost};
+use esl_bytecode::compile::{Answer, CompileTimeHost, Work};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::SourceId;
@@ -34,8 +34,9 @@ fn expand_form(expander: &mut Expander, host: &mut FakeHost, form: Datum) -> Vec
 
 fn finish_form(expander: &mut Expander, host: &mut FakeHost, chunks: &mut Vec<Chunk>) {
     loop {
-        match expander.run(host, &mut |_| {}) {
+        match expander.run(host, &mut Work::unbounded()) {
             Stop::Done => return,
+            Stop::More => {}
             Stop::Macro(call) => {
                 let answer = host.expand(&call);
                 expander.answer(answer.map_or_else(Answer::Failed, Answer::Expansion));

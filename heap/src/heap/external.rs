@@ -80,6 +80,12 @@ impl Heap {
         Err(AllocError::NeedCollection)
     }
 
+    /// Returns the number of bytes for which there is room, inside or outside of the heap, without a
+    /// collection.
+    pub fn room(&self) -> usize {
+        self.limit_now().saturating_sub(self.taken())
+    }
+
     /// Returns the number of bytes outside of the heap that count against its limit.
     pub fn external(&self) -> usize {
         self.external.total

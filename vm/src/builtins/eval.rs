@@ -11,13 +11,17 @@
 //!   => :expand function form environment    call it, then answer :expansion value, or :failed text
 //!   => :load functions keep                 call them in order, then answer :loaded value, or :failed text
 //!   => :require name                        have the module, then answer :loaded nil, or :failed text
+//!   => :more                                a part of the work is done: answer :more nil
 //!   => :done functions diagnostics          over; NIL for functions if one of the diagnostics is an error
 //! ```
 //!
 //! Diagnostics are a list of `(severity code text)`. Whoever begins a compilation ends it with
 //! `%end-compilation`.
+//!
+//! Guarantees: a step does a bounded part of the work, for which the task is charged. What compilations hold
+//! counts against the limit of the memory: beyond it, the next step fails for want of room.
 
-use esl_bytecode::compile::{Answer, Compilation, Step};
+use esl_bytecode::compile::{Answer, Compilation, Step, Work};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::file;
@@ -28,10 +32,11 @@ use crate::builtins::expect::optional;
 use crate::builtins::rights::demand;
 use crate::builtins::stream::{Then, file_error, more_input, right_to, skip_source, source};
 use crate::builtins::symbol::{designated_text, text_between, text_of};
-use crate::compiler::{ActiveCompilation, Compilations, CompilerJob, FormText, JobId};
-use crate::datum::Unit;
+use crate::compiler::{ActiveCompilation, CompilerJob, FormText, FormWalk, JobId};
+use crate::datum::{DatumError, DatumWalk, Unit};
 use crate::environment;
 use crate::equality::characters_of;
+use crate::heap::Holder;
 use crate::host::Host;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
@@ -50,16 +55,28 @@ fn is_unfinished(code: &str) -> bool {
     code.starts_with("unclosed-") || code.starts_with("unfinished-")
 }
 
+/// Units that [`Exchange::charge`](crate::exchange::Exchange::charge) takes for a unit of a compilation's
+/// work, which is worth more than a cell of a list.
+const WORK_UNITS: usize = 256;
+
+/// Nodes of a form that become a datum in one step.
+const FORM_STEP: usize = 8192;
+
+/// As [`WORK_UNITS`], for each of these.
+const FORM_UNITS: usize = 16;
+
 /// Begins a compilation and returns its handle. `is_nameless` says whether its form comes from a text
 /// without a name.
-fn begin(
-    compiler: &mut Compilations,
-    compilation: Box<dyn Compilation>,
-    unit: Unit,
-    is_nameless: bool,
-) -> Value {
+fn begin(vm: &mut Vm, compilation: Box<dyn Compilation>, unit: Unit, is_nameless: bool) -> Value {
     let running = ActiveCompilation { compilation, unit, step: None, keeps: false, is_nameless };
-    compiler.add(CompilerJob::Compilation(Box::new(running)))
+    let handle = vm.compiler.add(CompilerJob::Compilation(Box::new(running)));
+    recount(vm);
+    handle
+}
+
+/// Counts the memory that compilations hold. If it is too much, the next step fails.
+fn recount(vm: &mut Vm) {
+    _ = vm.heap.set_external(Holder::Compiler, vm.compiler.bytes());
 }
 
 /// Takes the job that `handle` names out of the table, until `Compilations::put_back`.
@@ -70,14 +87,24 @@ fn take_job(vm: &mut Vm, handle: Value) -> Result<(JobId, CompilerJob), Exit> {
     }
 }
 
-/// `value` as data of a compilation.
-fn as_form(vm: &mut Vm, unit: &mut Unit, value: Value, span: Span) -> Result<Datum, Exit> {
-    let datum = unit.datum_of(&vm.heap, &vm.world, value, span);
-    vm.exchange.charge(unit.take_work() as usize);
-    match datum {
-        Ok(datum) => Ok(datum),
-        Err(error) => vm.exchange.program_error(error.to_string()),
-    }
+/// Goes on making a datum of a form. Returns its compilation when that is over.
+fn go_on_with_form(vm: &mut Vm, form: &mut FormWalk) -> Result<Option<ActiveCompilation>, Exit> {
+    vm.heap.check_room(0)?;
+    let datum = form.walk.run(&mut form.unit, &vm.heap, &vm.world, FORM_STEP);
+    let work = form.unit.take_work();
+    vm.exchange.charge(work as usize * FORM_UNITS);
+    let datum = match datum {
+        Ok(Some(datum)) => datum,
+        Ok(None) => return Ok(None),
+        Err(DatumError::NoRoom(bytes)) => {
+            vm.heap.check_room(bytes)?;
+            return Err(Exit::Collect);
+        }
+        Err(error) => return vm.exchange.program_error(error.to_string()),
+    };
+    let compilation = environment::with_compiler(vm, |_, compiler| compiler.compile_form(datum, None))?;
+    let unit = std::mem::take(&mut form.unit);
+    Ok(Some(ActiveCompilation { compilation, unit, step: None, keeps: false, is_nameless: false }))
 }
 
 /// Returns the outcome of the last step, as the program tells it.
@@ -86,8 +113,13 @@ fn answer(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Va
     let unit = &mut running.unit;
     Ok(match &*kind {
         "START" => Answer::Start,
+        "MORE" => Answer::More,
         "EXPANSION" => match unit.datum_of(&vm.heap, &vm.world, outcome, Span::default()) {
             Ok(expansion) => Answer::Expansion(expansion),
+            Err(DatumError::NoRoom(bytes)) => {
+                vm.heap.check_room(bytes)?;
+                return Err(Exit::Collect);
+            }
             Err(error) => Answer::Failed(error.to_string().into()),
         },
         "LOADED" if running.keeps => Answer::Object(unit.pin(outcome)),
@@ -115,6 +147,7 @@ fn tell(vm: &mut Vm, compilation: &dyn Compilation, step: &Step) -> Outcome {
             results[2] = Value::boolean(*keep);
             "LOAD"
         }
+        Step::More => "MORE",
         Step::Require(name) => {
             results[1] = vm.heap.alloc_str(name)?;
             "REQUIRE"
@@ -130,6 +163,12 @@ fn tell(vm: &mut Vm, compilation: &dyn Compilation, step: &Step) -> Outcome {
     };
     results[0] = vm.world.keyword(&mut vm.heap, kind)?;
     vm.give_values(&results)
+}
+
+/// Tells the program to go on.
+fn tell_more(vm: &mut Vm) -> Outcome {
+    let more = vm.world.keyword(&mut vm.heap, "MORE")?;
+    vm.give_values(&[more, Value::NIL, Value::NIL, Value::NIL])
 }
 
 fn list_of_diagnostics(vm: &mut Vm, compilation: &dyn Compilation, diagnostics: &[Diagnostic]) -> Outcome {
@@ -227,11 +266,10 @@ impl ReadFault {
     }
 }
 
+/// The form becomes a datum in the steps of the compilation.
 pub(super) fn begin_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let mut unit = Unit::default();
-    let form = as_form(vm, &mut unit, arguments[0], Span::default())?;
-    let compilation = environment::with_compiler(vm, |_, compiler| compiler.compile_form(form, None))?;
-    Ok(begin(&mut vm.compiler, compilation, unit, false))
+    let walk = DatumWalk::new(arguments[0], Span::default()).keeping_literals();
+    Ok(vm.compiler.add(CompilerJob::Form(Box::new(FormWalk { walk, unit: Unit::default() }))))
 }
 
 pub(super) fn begin_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -240,7 +278,7 @@ pub(super) fn begin_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(text) = text_of(&vm.heap, text) else { return vm.exchange.type_error(text, "STRING") };
     vm.exchange.charge(text.len());
     let compilation = environment::with_compiler(vm, |_, compiler| compiler.compile_text(&name, &text))?;
-    Ok(begin(&mut vm.compiler, compilation, Unit::default(), false))
+    Ok(begin(vm, compilation, Unit::default(), false))
 }
 
 pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -274,7 +312,9 @@ pub(super) fn open_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         name => Some(designated_text(vm, name)?),
     };
     let text = FormText { text: text.into(), name, position: 0, line: 0, column: 0 };
-    Ok(vm.compiler.add(CompilerJob::Text(text)))
+    let handle = vm.compiler.add(CompilerJob::Text(text));
+    recount(vm);
+    Ok(handle)
 }
 
 pub(super) fn next_form(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -319,7 +359,7 @@ fn begin_form(vm: &mut Vm, text: &mut FormText) -> Outcome {
             let compilation =
                 environment::with_compiler(vm, |_, compiler| compiler.compile_form(datum, part))?;
             text.pass(end);
-            Ok(begin(&mut vm.compiler, compilation, Unit::default(), is_nameless))
+            Ok(begin(vm, compilation, Unit::default(), is_nameless))
         }
     }
 }
@@ -329,9 +369,20 @@ pub(super) fn compilation_step(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (id, mut job) = take_job(vm, handle)?;
     let told = match &mut job {
         CompilerJob::Compilation(running) => step(vm, running, kind, outcome),
+        CompilerJob::Form(form) => match go_on_with_form(vm, form) {
+            Ok(None) => tell_more(vm),
+            Ok(Some(compilation)) => {
+                let mut running = Box::new(compilation);
+                let told = step(vm, &mut running, kind, outcome);
+                job = CompilerJob::Compilation(running);
+                told
+            }
+            Err(exit) => Err(exit),
+        },
         _ => vm.exchange.program_error("a text is no compilation"),
     };
     vm.compiler.put_back(id, job);
+    recount(vm);
     told
 }
 
@@ -339,13 +390,15 @@ fn step(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Valu
     let step = match running.step.take() {
         Some(step) => step,
         None => {
+            vm.heap.check_room(0)?;
             let answer = answer(vm, running, kind, outcome)?;
+            let passed = running.unit.take_work();
+            vm.exchange.charge(passed as usize);
             let outer = vm.compiler.unit.replace(std::mem::take(&mut running.unit));
-            let mut nodes = 0;
-            let step = running.compilation.step(vm, answer, &mut |more| nodes += more);
+            let mut work = Work::up_to(Work::STEP).after_passing(passed);
+            let step = running.compilation.step(vm, answer, &mut work);
             running.unit = vm.compiler.unit.replace(outer);
-            // A node is worth more than a cell of a list.
-            vm.exchange.charge(nodes as usize * 16);
+            vm.exchange.charge(work.done() as usize * WORK_UNITS);
             if let (Step::Done(None, diagnostics), true) = (&step, running.is_nameless) {
                 let is_error = |diagnostic: &&Diagnostic| diagnostic.severity == Severity::Error;
                 vm.compiler.refused = diagnostics.iter().filter(is_error).cloned().collect();
@@ -367,6 +420,7 @@ fn step(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Valu
 
 pub(super) fn end_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.compiler.end(arguments[0]);
+    recount(vm);
     Ok(Value::NIL)
 }
 

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use esl_bytecode::compile::{
-    Compile, CompileTimeFailure, CompileTimeHost, LocalDefinition, MacroCall, MacroRef,
+    Compile, CompileTimeFailure, CompileTimeHost, Halt, LocalDefinition, MacroCall, MacroRef,
 };
 use esl_bytecode::datum::{Datum, ObjectId};
 use esl_bytecode::diagnostic::Diagnostic;
@@ -15,10 +15,10 @@ use esl_bytecode::module::{Constant, Function, FunctionNumber, Module, Parameter
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 
-use crate::datum::Unit;
-use crate::heap::AllocError;
+use crate::datum::{DatumError, Unit};
+use crate::heap::{AllocError, Holder};
 use crate::raise::Exit;
-use crate::run::CallError;
+use crate::run::{CallError, take_in};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::load::{Alone, LoadError, load};
@@ -27,6 +27,8 @@ use crate::world::load::{Alone, LoadError, load};
 const MACRO_TICKS: u64 = 50_000_000;
 /// Greatest number of ticks of the compile-time part of one form.
 const LOAD_TICKS: u64 = 1_000_000_000;
+/// Ticks of a unit of the compiler's work.
+const WORK_TICKS: u64 = 4;
 /// Objects that the failure of a macro mentions, at most.
 const MAX_CULPRITS: usize = 50;
 
@@ -83,7 +85,8 @@ impl Vm {
     /// [`CallError`].
     pub fn run_toplevel(&mut self, functions: Value, ticks: u64) -> Result<Value, CallError> {
         self.embedder.pin(&mut self.heap, functions);
-        let values = runner(self).and_then(|runner| self.call(runner, &[functions], ticks));
+        let call = |vm: &mut Vm, runner| vm.call_until_signal(runner, &[functions], ticks);
+        let values = runner(self).and_then(|runner| call(self, runner).map_err(|(error, _)| error));
         self.embedder.unpin(functions);
         Ok(values?.first().copied().unwrap_or(Value::NIL))
     }
@@ -211,13 +214,36 @@ fn runner_module() -> Module {
 }
 
 impl CompileTimeHost for Vm {
+    fn take_passed(&mut self) -> u64 {
+        self.compiler.unit.borrow_mut().take_work()
+    }
+
+    fn account(&mut self, units: u64, bytes: usize) -> Result<(), Halt> {
+        self.scheduler.spent += units * WORK_TICKS;
+        if self.scheduler.is_budget_spent(&self.config) {
+            return Err(Halt::Budget);
+        }
+        if self.outside.inbox.is_rung() {
+            take_in(self);
+        }
+        if self.asked_to_end().is_some() {
+            return Err(Halt::Signal);
+        }
+        let held = bytes + self.compiler.unit.borrow().bytes();
+        if self.heap.set_external(Holder::Compiler, held).is_err() {
+            self.collect_fully();
+            return self.heap.check_room(0).map_err(|_| Halt::Memory);
+        }
+        Ok(())
+    }
+
     fn expand(&mut self, call: &MacroCall) -> Result<Datum, CompileTimeFailure> {
         let prepared = with_room(self, |vm| macro_call(vm, call)).map_err(|error| error.to_string())?;
         let Some([function, form, environment]) = prepared else {
             return Err("the macro is not defined any more".to_string().into());
         };
         self.embedder.last_place = None;
-        let values = match self.call_or_condition(function, &[form, environment], MACRO_TICKS) {
+        let values = match self.call_until_signal(function, &[form, environment], MACRO_TICKS) {
             Ok(values) => values,
             Err((error, condition)) => {
                 let culprits = self.culprits(condition);
@@ -227,8 +253,17 @@ impl CompileTimeHost for Vm {
             }
         };
         let expansion = values.first().copied().unwrap_or(Value::NIL);
-        let mut unit = self.compiler.unit.borrow_mut();
-        let datum = unit.datum_of(&self.heap, &self.world, expansion, call.form.span());
+        let datum_of = |vm: &Vm| {
+            let mut unit = vm.compiler.unit.borrow_mut();
+            unit.datum_of(&vm.heap, &vm.world, expansion, call.form.span())
+        };
+        let mut datum = datum_of(self);
+        if let Err(DatumError::NoRoom(_)) = datum {
+            self.embedder.pin(&mut self.heap, expansion);
+            self.collect_fully();
+            self.embedder.unpin(expansion);
+            datum = datum_of(self);
+        }
         datum.map_err(|error| error.to_string().into())
     }
 

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use esl_bytecode::assembler::assemble;
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::{
-    Answer, Compilation, Compile, CompileTimeHost, LocalDefinition, MacroCall, MacroRef, Part, Step,
+    Answer, Compilation, Compile, CompileTimeHost, LocalDefinition, MacroCall, MacroRef, Part, Step, Work,
 };
 use esl_bytecode::datum::DatumKind;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
@@ -167,8 +167,8 @@ enum ToyCompilation {
 }
 
 impl Compilation for ToyCompilation {
-    fn step(&mut self, _: &mut dyn Environment, answer: Answer, charge: &mut dyn FnMut(u64)) -> Step {
-        charge(1);
+    fn step(&mut self, _: &mut dyn Environment, answer: Answer, work: &mut Work) -> Step {
+        work.add(1);
         match (std::mem::replace(self, ToyCompilation::Expanding), answer) {
             (ToyCompilation::Start(form), Answer::Start) => {
                 let name = form.as_cons().unwrap().0.as_symbol().unwrap().clone();
@@ -186,6 +186,10 @@ impl Compilation for ToyCompilation {
             }
             (_, answer) => panic!("{answer:?}"),
         }
+    }
+
+    fn bytes(&self) -> usize {
+        0
     }
 
     fn render(&self, diagnostic: &Diagnostic) -> String {

@@ -107,6 +107,25 @@ impl Vm {
         ticks: u64,
     ) -> Result<Vec<Value>, (CallError, Value)> {
         let id = self.spawn(function, arguments).map_err(|_| (CallError::NoMemory, Value::NIL))?;
+        self.run_call(id, ticks)
+    }
+
+    /// As [`Vm::call_or_condition`]; a signal of the process aborts the call.
+    pub(crate) fn call_until_signal(
+        &mut self,
+        function: Value,
+        arguments: &[Value],
+        ticks: u64,
+    ) -> Result<Vec<Value>, (CallError, Value)> {
+        let id = self.spawn(function, arguments).map_err(|_| (CallError::NoMemory, Value::NIL))?;
+        self.embedder.interruptible = Some(id);
+        let result = self.run_call(id, ticks);
+        self.embedder.interruptible = None;
+        result
+    }
+
+    /// Runs tasks until the one of a call has ended, and returns what it gives.
+    fn run_call(&mut self, id: TaskId, ticks: u64) -> Result<Vec<Value>, (CallError, Value)> {
         let outcome = self.run_until(Some(id), ticks);
         let result = self.result(id);
         end_task(self, id);

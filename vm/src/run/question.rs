@@ -152,7 +152,7 @@ fn answer_with(vm: &Vm, values: &[Value]) -> Answer {
         match datum::export(&vm.heap, &vm.world, value) {
             Ok((datum, _)) => data.push(datum),
             Err(DatumError::Circular) => return Answer::Circular,
-            Err(DatumError::TooLarge) => return Answer::TooLarge,
+            Err(DatumError::TooLarge | DatumError::NoRoom(_)) => return Answer::TooLarge,
         }
     }
     Answer::Values(data)

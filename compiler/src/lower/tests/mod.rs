@@ -8,12 +8,14 @@ mod notation;
 mod random;
 mod value;
 
+use esl_bytecode::compile::Work;
 use esl_bytecode::disasm;
 use esl_bytecode::module::Module;
 use esl_bytecode::verify::verify;
 
 use super::{ModuleBuilder, SourceLines, lower};
 use crate::core::Core;
+use crate::resolve::resolve;
 
 /// What a form is lowered to, verified.
 fn module(text: &str) -> Module {
@@ -36,9 +38,10 @@ fn verified(module: Module, text: &str) -> Module {
 /// What a core tree is lowered to when nearly all variables go to the heap.
 fn spilled_module_of(core: &Core, text: &str) -> Module {
     let lines = SourceLines::new();
-    let mut builder = ModuleBuilder::new(core, &lines);
+    let mut builder = ModuleBuilder::new(core, resolve(core), &lines);
     builder.spills_from = Some(2);
-    let functions = builder.functions();
+    let mut functions = Vec::new();
+    assert!(builder.functions(&mut functions, &mut Work::unbounded()));
     assert!(builder.oversized.is_empty(), "{text}");
     verified(builder.module(functions), text)
 }
