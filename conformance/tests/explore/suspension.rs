@@ -66,3 +66,35 @@ fn suspensions_of_two_tasks_nest_by_count() {
         &["(SUCCEEDED 0)"],
     );
 }
+
+#[test]
+fn a_cleanup_that_waits_for_its_own_tasks_comes_to_its_end() {
+    check_suspension(
+        "(let ((task (spawn (handler-case
+                                (with-cleanup-procedure (task-net (inner (go-on))) (fail :lost))
+                              (failure () :ended)))))
+           (suspend-task task)
+           (resume-task task)
+           (princ (list (multiple-value-list (wait-for-task task)) (left))))",
+        &["((SUCCEEDED ENDED) 0)"],
+    );
+}
+
+#[test]
+fn a_task_that_suspends_itself_stands_still_after_those_that_it_has_made() {
+    check_suspension(
+        "(let* ((count 0)
+                (child nil)
+                (task (spawn (setq child (spawn (go-on) (incf count)))
+                             (suspend-task (current-task))
+                             :resumed)))
+           (sleep 1)
+           (let ((before count))
+             (go-on)
+             (unless (= before count) (princ 'moved)))
+           (resume-task task)
+           (wait-for-task child)
+           (princ (list (multiple-value-list (wait-for-task task)) count (left))))",
+        &["((SUCCEEDED RESUMED) 1 0)"],
+    );
+}
