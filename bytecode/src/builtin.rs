@@ -944,6 +944,9 @@ macro_rules! for_each_builtin {
             UnwindToCleanup = failure::unwind_to_cleanup, internal "%UNWIND-TO-CLEANUP" ("index failure");
             /// What the innermost running cleanup was given by `%UNWIND-TO-CLEANUP`, or `NIL`.
             CleaningUp = failure::cleaning_up, internal "%CLEANING-UP" ("");
+            /// Returns true if it is reported when the running task fails: unless it belongs to a form, which
+            /// is told of its end, or in a cleanup while it ends.
+            IsReported = failure::is_reported, internal "%IS-REPORTED" ("");
             /// Ends the running task as failed, with this condition: its text in a few words, and for people
             /// what has happened where, and the line that says that there is no recovery. In a cleanup of a
             /// task that ends already, or that leaves an expired limit, ends the cleanup, and the report goes
@@ -1470,6 +1473,8 @@ macro_rules! for_each_builtin {
             IsOverQuota = task::is_over_quota, internal "%IS-OVER-QUOTA" ("task");
             /// Makes the limit for `tag` of `task` expire with `cause`, a keyword, unless it is closed.
             ExpireLimit = task::expire_limit, internal "%EXPIRE-LIMIT" ("task tag cause");
+            /// Lets other tasks go first while schedules are explored, before a change that they can see.
+            Point = task::point, internal "%POINT" ("");
             /// Begins a critical section: no other task runs.
             BeginCritical = task::begin_critical, internal "%BEGIN-CRITICAL" ("");
             /// Ends a critical section.

@@ -127,6 +127,18 @@ pub(super) fn take_case(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
 }
 
+pub(super) fn is_reported(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    // What happens in its cleanups while it ends is told to nobody else.
+    let is_ending = vm.scheduler.task().control.final_unwinding().is_some();
+    Ok(Value::boolean(is_ending || !belongs_to_form(vm)))
+}
+
+/// Returns whether a form is told of the failure of the running task, and nobody else.
+fn belongs_to_form(vm: &Vm) -> bool {
+    let task = vm.scheduler.task();
+    task.notify.is_true() && !task.flags.kept()
+}
+
 pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [story, ending] = [2, 3].map(|index| vm.heap.string_text(arguments[index]).unwrap_or_default());
     match vm.scheduler.task().control.final_unwinding() {
@@ -139,6 +151,7 @@ pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             let label = report::task_label(vm, vm.scheduler.task().object);
             vm.outside.complain(&format!("In a cleanup of {label}:\n{story}{ending}"));
         }
+        None if belongs_to_form(vm) => {}
         None => {
             vm.embedder.last_words = vm.heap.string_text(arguments[1]);
             vm.embedder.last_place = report::place_in_program(vm, vm.scheduler.task(), vm.frames());

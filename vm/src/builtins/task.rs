@@ -354,6 +354,11 @@ pub(super) fn expire_limit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::NIL)
 }
 
+pub(super) fn point(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    vm.scheduler.point()?;
+    Ok(Value::NIL)
+}
+
 pub(super) fn begin_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
     let ticks = i64::from(vm.config.critical_ticks);
