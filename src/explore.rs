@@ -21,7 +21,7 @@
 
 use std::cell::RefCell;
 
-pub use esl_vm::explore::{Ending, Exploration, Grain, Settings};
+pub use esl_vm::explore::{Exploration, ExploredEnding, Grain, Settings};
 use esl_vm::host::{Captured, VirtualHost};
 use esl_vm::task::TaskId;
 use esl_vm::vm::Vm;

@@ -39,7 +39,8 @@ fn build(folder: &Path) -> Result<Vec<u8>, String> {
     let order = read(&folder.join("load-order"))?;
     let machine =
         Vm::new(Config::default(), Box::new(VirtualHost::new())).map_err(|error| format!("{error:?}"))?;
-    let mut library = Library { machine, sources: Sources::new(), modules: Vec::new(), doubts: Vec::new() };
+    let mut library =
+        LibraryBuild { machine, sources: Sources::new(), modules: Vec::new(), doubts: Vec::new() };
     library.machine.set_compiler(Box::new(Compiler::default()));
     for name in order.lines().filter(|line| !line.is_empty() && !line.starts_with('#')) {
         let path = folder.join(format!("{name}.esl"));
@@ -56,7 +57,7 @@ fn read(path: &Path) -> Result<String, String> {
 }
 
 /// State of the compilation.
-struct Library {
+struct LibraryBuild {
     machine: Vm,
     sources: Sources,
     modules: Vec<Module>,
@@ -64,7 +65,7 @@ struct Library {
     doubts: Vec<Diagnostic>,
 }
 
-impl Library {
+impl LibraryBuild {
     /// Compiles a file and runs it in the machine.
     fn add(&mut self, name: &str, text: Arc<str>) -> Result<(), String> {
         self.machine.enter_package(ESL_PACKAGE).map_err(|error| format!("{error:?}"))?;

@@ -152,21 +152,21 @@ pub struct MacroCall {
 /// Next need of a compilation.
 #[derive(Debug)]
 pub enum Step {
-    /// Run this macro and answer with [`Answer::Expansion`] or [`Answer::Failed`].
+    /// Run this macro and answer with [`StepOutcome::Expansion`] or [`StepOutcome::Failed`].
     Expand(MacroCall),
-    /// Load this module and run its top level, at compile time. Answer with [`Answer::Loaded`], or
-    /// [`Answer::Failed`]; if `keep`, with [`Answer::Object`], the value of its last top-level form.
+    /// Load this module and run its top level, at compile time. Answer with [`StepOutcome::Loaded`], or
+    /// [`StepOutcome::Failed`]; if `keep`, with [`StepOutcome::Object`], the value of its last top-level form.
     Load {
         /// The module.
         module: Module,
         /// Whether the value is wanted.
         keep: bool,
     },
-    /// A part of the work is done, and the compilation wants to go on. Answer with [`Answer::More`].
+    /// A part of the work is done, and the compilation wants to go on. Answer with [`StepOutcome::More`].
     More,
-    /// Find the module that the text being compiled requires by this name. Answer with [`Answer::Module`];
-    /// with [`Answer::Loaded`] if it is defined already where macros run, and the program is to find it when
-    /// it runs; or with [`Answer::Failed`].
+    /// Find the module that the text being compiled requires by this name. Answer with [`StepOutcome::Module`];
+    /// with [`StepOutcome::Loaded`] if it is defined already where macros run, and the program is to find it when
+    /// it runs; or with [`StepOutcome::Failed`].
     Require(String),
     /// The compilation is over. There is no module when one of the diagnostics is an error.
     Done(Option<Module>, Vec<Diagnostic>),
@@ -216,7 +216,7 @@ impl From<String> for CompileTimeFailure {
 
 /// Outcome of a step.
 #[derive(Debug)]
-pub enum Answer {
+pub enum StepOutcome {
     /// First step: there is nothing to answer.
     Start,
     /// Go on.
@@ -289,7 +289,7 @@ impl Work {
 pub trait Compilation: Send {
     /// Takes the outcome of the last step and works up to the next one, which is [`Step::More`] soon after
     /// the work that is allowed is done.
-    fn step(&mut self, environment: &mut dyn Environment, answer: Answer, work: &mut Work) -> Step;
+    fn step(&mut self, environment: &mut dyn Environment, answer: StepOutcome, work: &mut Work) -> Step;
     /// Returns about how many bytes of memory it holds.
     fn bytes(&self) -> usize;
     /// Draws one of its diagnostics as it is shown to people, with the source line when it is known.
@@ -400,7 +400,7 @@ pub fn drive_with(
     host: &mut dyn CompileTimeHost,
     library: Library<'_>,
 ) -> Result<(Option<Module>, Vec<Diagnostic>), Halt> {
-    let mut answer = Answer::Start;
+    let mut answer = StepOutcome::Start;
     loop {
         // A trait object is not upcast through a method call: say which of its two faces is meant.
         let mut work = Work::up_to(ACCOUNTED).after_passing(host.take_passed());
@@ -409,19 +409,19 @@ pub fn drive_with(
         host.account(work.done(), compilation.bytes())?;
         answer = match step {
             Step::Done(module, diagnostics) => return Ok((module, diagnostics)),
-            Step::More => Answer::More,
+            Step::More => StepOutcome::More,
             Step::Expand(call) => match host.expand(&call) {
-                Ok(expansion) => Answer::Expansion(expansion),
-                Err(failure) => Answer::Failed(failure),
+                Ok(expansion) => StepOutcome::Expansion(expansion),
+                Err(failure) => StepOutcome::Failed(failure),
             },
             Step::Load { module, keep } => match host.load(module, keep) {
-                Ok(Some(object)) => Answer::Object(object),
-                Ok(None) => Answer::Loaded,
-                Err(failure) => Answer::Failed(failure),
+                Ok(Some(object)) => StepOutcome::Object(object),
+                Ok(None) => StepOutcome::Loaded,
+                Err(failure) => StepOutcome::Failed(failure),
             },
             Step::Require(name) => match library(&name) {
-                Ok(module) => Answer::Module(module),
-                Err(reason) => Answer::Failed(reason.into()),
+                Ok(module) => StepOutcome::Module(module),
+                Err(reason) => StepOutcome::Failed(reason.into()),
             },
         };
     }

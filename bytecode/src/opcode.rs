@@ -389,7 +389,7 @@ impl CallTarget {
 
 /// The operands that all calls have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Call {
+pub struct CallOperands {
     /// Function called.
     pub callee: CallTarget,
     /// First register of the window.
@@ -464,7 +464,7 @@ macro_rules! call {
     ($instr:expr, $name:ident call $callee:ident) => {
         match $instr {
             Instr::$name { window, count, want, .. } => {
-                Some(Call { callee: CallTarget::$callee, window, count, want: Some(want) })
+                Some(CallOperands { callee: CallTarget::$callee, window, count, want: Some(want) })
             }
             _ => None,
         }
@@ -472,7 +472,7 @@ macro_rules! call {
     ($instr:expr, $name:ident tail $callee:ident) => {
         match $instr {
             Instr::$name { window, count, .. } => {
-                Some(Call { callee: CallTarget::$callee, window, count, want: None })
+                Some(CallOperands { callee: CallTarget::$callee, window, count, want: None })
             }
             _ => None,
         }
@@ -670,7 +670,7 @@ macro_rules! define_opcodes {
             }
 
             /// Returns the operands that all calls have; `None` unless it is a call.
-            pub fn call(&self) -> Option<Call> {
+            pub fn call(&self) -> Option<CallOperands> {
                 match self {
                     $( Instr::$name { .. } => call!(*self, $name $($kind)+), )*
                 }

@@ -9,7 +9,7 @@ mod support;
 use esl_bytecode::assembler::assemble;
 use esl_bytecode::disasm;
 use esl_bytecode::module::{CaptureSource, Constant, Function, FunctionNumber, Module};
-use esl_bytecode::opcode::{Call, Instr, OPCODES, Substitute};
+use esl_bytecode::opcode::{CallOperands, Instr, OPCODES, Substitute};
 use esl_bytecode::operand::{Count, Role, Want, Window};
 use esl_bytecode::verify::verify;
 use support::{Random, build, module_with_random_code};
@@ -174,7 +174,7 @@ impl<'a> Model<'a> {
             }
             (Substitute::Test | Substitute::TestNot, _) => self.maybe_jump(instr, next),
             (Substitute::Call | Substitute::Tail, _) => match instr.call() {
-                Some(Call { window, want: Some(want), .. }) => {
+                Some(CallOperands { window, want: Some(want), .. }) => {
                     self.deliver(window, want);
                     ModelNext::Instruction
                 }
@@ -256,7 +256,7 @@ impl<'a> Model<'a> {
         self.value_list = want == Want::ALL;
     }
 
-    fn call(&mut self, Call { callee, window, count, want }: Call) -> ModelNext {
+    fn call(&mut self, CallOperands { callee, window, count, want }: CallOperands) -> ModelNext {
         assert!(u32::from(window.0) + 2 + u32::from(count.0) <= u32::from(self.function.registers), "V3");
         if callee.is_in_window() {
             self.read(window.0);

@@ -16,7 +16,7 @@ use crate::value::Value;
 
 /// A test that the machine knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Test {
+pub enum KeyTest {
     /// The same object.
     Eq,
     /// The same object, or numbers of one type and value.
@@ -30,16 +30,16 @@ pub enum Test {
 /// Returns whether `a` and `b` are equal by `test`, and takes the work done from `work`. `None` if there is
 /// more work than that, or only ESL can tell.
 #[inline]
-pub fn same(heap: &Heap, test: Test, a: Value, b: Value, work: &mut usize) -> Option<bool> {
+pub fn same(heap: &Heap, test: KeyTest, a: Value, b: Value, work: &mut usize) -> Option<bool> {
     if a == b {
         return Some(true);
     }
     match test {
-        Test::Eq => Some(false),
-        Test::Eql => Some(number::eql(heap, a, b)),
+        KeyTest::Eq => Some(false),
+        KeyTest::Eql => Some(number::eql(heap, a, b)),
         // A value without an address has no inside.
-        Test::Equal if !(a.is_address() && b.is_address()) => Some(false),
-        _ => walk(heap, test == Test::Equalp, a, b, work),
+        KeyTest::Equal if !(a.is_address() && b.is_address()) => Some(false),
+        _ => walk(heap, test == KeyTest::Equalp, a, b, work),
     }
 }
 
@@ -186,28 +186,28 @@ pub fn fixnum_hash(n: i64) -> u32 {
 
 /// Returns a hash of `v` that agrees with `test`.
 #[inline(always)]
-pub fn hash(heap: &Heap, test: Test, v: Value) -> u32 {
+pub fn hash(heap: &Heap, test: KeyTest, v: Value) -> u32 {
     match v.as_fixnum() {
-        Some(n) if test != Test::Equalp => fixnum_hash(n),
+        Some(n) if test != KeyTest::Equalp => fixnum_hash(n),
         _ => other_hash(heap, test, v),
     }
 }
 
 /// Returns a hash of a value that is not a fixnum, or is compared by `equalp`.
-fn other_hash(heap: &Heap, test: Test, v: Value) -> u32 {
-    if test == Test::Equal
+fn other_hash(heap: &Heap, test: KeyTest, v: Value) -> u32 {
+    if test == KeyTest::Equal
         && let Some(characters) = heap.string(v)
     {
         return finish(mix(0, characters_hash(characters, false)));
     }
-    if !v.is_address() && test != Test::Equalp {
+    if !v.is_address() && test != KeyTest::Equalp {
         return finish(mix(0, v.bits()));
     }
     let word = match test {
-        Test::Eq => heap.identity(v),
-        Test::Eql => number_hash(heap, v).unwrap_or_else(|| heap.identity(v)),
-        Test::Equal => return finish(parts_hash(heap, v, false)),
-        Test::Equalp => return finish(parts_hash(heap, v, true)),
+        KeyTest::Eq => heap.identity(v),
+        KeyTest::Eql => number_hash(heap, v).unwrap_or_else(|| heap.identity(v)),
+        KeyTest::Equal => return finish(parts_hash(heap, v, false)),
+        KeyTest::Equalp => return finish(parts_hash(heap, v, true)),
     };
     finish(mix(0, word))
 }
@@ -217,7 +217,7 @@ fn other_hash(heap: &Heap, test: Test, v: Value) -> u32 {
 pub fn sxhash(heap: &Heap, v: Value) -> u32 {
     match heap.symbol(v).and_then(|symbol| heap.string(symbol.name)) {
         Some(name) => finish(characters_hash(name, false)),
-        None => hash(heap, Test::Equal, v),
+        None => hash(heap, KeyTest::Equal, v),
     }
 }
 

@@ -2,7 +2,7 @@
 
 #![allow(unsafe_code, reason = "tests keep the promises that the heap asks of its owner")]
 
-use esl_heap::heap::layout::{Array, Code, Header, KINDS, Symbol};
+use esl_heap::heap::layout::{Array, CodeObject, Header, KINDS, SymbolObject};
 use esl_heap::heap::{AllocError, CodeParts, Heap, HeapConfig, Kind};
 use esl_heap::value::Value;
 
@@ -31,7 +31,7 @@ fn function(heap: &mut Heap) -> Value {
 fn symbol(heap: &mut Heap, name: &str) -> Value {
     let name = heap.alloc_str(name).unwrap();
     let function = function(heap);
-    heap.alloc_symbol(Symbol::KEYWORD, name, n(9), function).unwrap()
+    heap.alloc_symbol(SymbolObject::KEYWORD, name, n(9), function).unwrap()
 }
 
 /// One object of every kind, and a cons.
@@ -188,7 +188,7 @@ fn symbols_have_their_cells() {
         (made.package, made.value, made.macro_function, made.plist),
         (n(9), Value::UNBOUND, Value::NIL, Value::NIL)
     );
-    assert_eq!(made.header.flags, Symbol::KEYWORD);
+    assert_eq!(made.header.flags, SymbolObject::KEYWORD);
     heap.symbol_set_value(s, n(1)).unwrap();
     heap.symbol_set_macro_function(s, n(3)).unwrap();
     heap.symbol_set_plist(s, n(4)).unwrap();
@@ -206,7 +206,7 @@ fn code_has_constants_and_words() {
         let v = code(&mut heap, &constants, &words);
         assert_eq!(heap.code_constants(v), Some(&constants[..]));
         assert_eq!(heap.code_words(v), Some(&words[..]));
-        let code: &Code = heap.code(v).unwrap();
+        let code: &CodeObject = heap.code(v).unwrap();
         assert_eq!((code.name, code.debug, code.owner), (n(1), n(2), n(3)));
         assert_eq!((code.arity, code.nregs, code.spare), (2, 5, [7, 8]));
         assert_eq!(code.entry, heap.code_words(v).unwrap().as_ptr());

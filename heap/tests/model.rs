@@ -10,7 +10,7 @@
 
 #![allow(unsafe_code, reason = "tests keep the promises that the heap asks of its owner")]
 
-use esl_heap::heap::layout::Code;
+use esl_heap::heap::layout::CodeObject;
 use esl_heap::heap::{AllocError, CodeParts, Heap, HeapConfig, Kind, Phase, SliceOutcome};
 use esl_heap::value::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -225,7 +225,7 @@ impl Model {
                     name: values[0],
                     debug: values[1],
                     owner: values[2],
-                    arity: Code::ANY_ARITY,
+                    arity: CodeObject::ANY_ARITY,
                     nregs: 3,
                     spare: [0; 2],
                     constants: &values[3..],

@@ -14,9 +14,9 @@ use esl_compiler::diagnostic::{Format, Renderer};
 /// The compiler of ESL, the Execution Support Language.
 #[derive(Parser)]
 #[command(name = "eslc", version, propagate_version = true, max_term_width = 100)]
-struct Command {
+struct Eslc {
     #[command(subcommand)]
-    action: Action,
+    action: EslcAction,
     #[command(flatten)]
     style: Style,
     /// Folder to search for required modules, after the folder of the file and before those of ESL_LIBRARY
@@ -53,7 +53,7 @@ enum Color {
 }
 
 #[derive(Subcommand)]
-enum Action {
+enum EslcAction {
     /// Compile files to bytecode
     ///
     /// Without -o each FILE.esl becomes a FILE.eslb of its own, which finds the modules that it requires when
@@ -86,18 +86,18 @@ enum Action {
 }
 
 fn main() -> ExitCode {
-    let command = Command::parse();
+    let command = Eslc::parse();
     let style = &command.style;
     let folders = &command.library;
     let path = |files: &[PathBuf]| ModulePath::new(files.iter().map(PathBuf::as_path), folders);
     let status = match &command.action {
-        Action::Compile { files, output: Some(output) } => {
+        EslcAction::Compile { files, output: Some(output) } => {
             compile(files, output, &path(files), Modules::Inside, style)
         }
-        Action::Compile { files, output: None } => compile_each(files, folders, style),
-        Action::Check { files } => check(files, &path(files), style),
-        Action::Disasm { file } => disassemble(file, &path(std::slice::from_ref(file)), style),
-        Action::Expand { file } => expand(file, &path(std::slice::from_ref(file)), style),
+        EslcAction::Compile { files, output: None } => compile_each(files, folders, style),
+        EslcAction::Check { files } => check(files, &path(files), style),
+        EslcAction::Disasm { file } => disassemble(file, &path(std::slice::from_ref(file)), style),
+        EslcAction::Expand { file } => expand(file, &path(std::slice::from_ref(file)), style),
     };
     ExitCode::from(status.unwrap_or_else(|status| status))
 }

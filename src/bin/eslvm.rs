@@ -21,16 +21,16 @@ use esl_vm::vm::Vm;
 /// The virtual machine of ESL, the Execution Support Language.
 #[derive(Parser)]
 #[command(name = "eslvm", version, propagate_version = true, max_term_width = 100)]
-struct Command {
+struct Eslvm {
     #[command(subcommand)]
-    action: Action,
+    action: EslvmAction,
     /// Folder to search for required modules, after the folder of the program and before those of ESL_LIBRARY
     #[arg(long, value_name = "FOLDER", global = true)]
     library: Vec<PathBuf>,
 }
 
 #[derive(Subcommand)]
-enum Action {
+enum EslvmAction {
     /// Run a program
     ///
     /// Exit status: 0 success, or the status that the program asks for; 1 a failure left the main task; 2
@@ -157,9 +157,9 @@ impl MachineOptions {
 }
 
 fn main() -> ExitCode {
-    let Command { action, library } = Command::parse();
+    let Eslvm { action, library } = Eslvm::parse();
     let status = match action {
-        Action::Run { options, speed, stats, timeline, trace, file, arguments } => {
+        EslvmAction::Run { options, speed, stats, timeline, trace, file, arguments } => {
             let path = ModulePath::new([file.as_path()], &library);
             let rights = options.rights.rights();
             rights.and_then(|rights| {
@@ -167,7 +167,7 @@ fn main() -> ExitCode {
                 run(&file, host, &options, stats, timeline.as_deref(), &trace, &path)
             })
         }
-        Action::Test { filter, jobs, seed, junit, budget, memory, rights, sources } => {
+        EslvmAction::Test { filter, jobs, seed, junit, budget, memory, rights, sources } => {
             rights.rights().map(|rights| {
                 let processors = || std::thread::available_parallelism().map_or(1, usize::from);
                 let config = Config { budget: Some(budget), memory, ..Config::default() };
@@ -179,7 +179,7 @@ fn main() -> ExitCode {
                 )
             })
         }
-        Action::Repl { options } => options.rights.rights().and_then(|rights| {
+        EslvmAction::Repl { options } => options.rights.rights().and_then(|rights| {
             let path = ModulePath::new([Path::new("-")], &library);
             esl::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)
         }),

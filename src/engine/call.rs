@@ -53,9 +53,9 @@ impl Failure {
         Failure::new("HOST-PANIC", text.map(Data::String))
     }
 
-    pub(super) fn to_host(&self) -> host::Failure {
+    pub(super) fn to_host(&self) -> host::HostFailure {
         let arguments = self.arguments.iter().map(|argument| argument.to_datum(USER_PACKAGE)).collect();
-        host::Failure { cause: self.cause.clone(), arguments }
+        host::HostFailure { cause: self.cause.clone(), arguments }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use esl_vm::host::{Callee, Inbox, Kept};
+use esl_vm::host::{FunctionRef, Inbox, Kept};
 use esl_vm::value::Value;
 
 use super::{Engine, handle};
@@ -33,17 +33,17 @@ impl fmt::Debug for Function {
 /// What names a function of a program: its name, in any case, or a [`Function`].
 pub trait Callable {
     /// Returns the function, as the machine with this inbox knows it.
-    fn callee(&self, inbox: &Inbox) -> Callee;
+    fn callee(&self, inbox: &Inbox) -> FunctionRef;
 }
 
 impl Callable for &str {
-    fn callee(&self, _inbox: &Inbox) -> Callee {
-        Callee::Named(self.to_uppercase())
+    fn callee(&self, _inbox: &Inbox) -> FunctionRef {
+        FunctionRef::Named(self.to_uppercase())
     }
 }
 
 impl Callable for &Function {
-    fn callee(&self, inbox: &Inbox) -> Callee {
+    fn callee(&self, inbox: &Inbox) -> FunctionRef {
         self.0.callee(inbox)
     }
 }

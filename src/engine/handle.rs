@@ -8,7 +8,9 @@ use std::task::{Context, Poll};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::USER_PACKAGE;
 use esl_vm::embed::ExportError;
-use esl_vm::host::{Answer, Callee, Incoming, Pending, ProcessSignal, Question, SendError, Sender, TaskInfo};
+use esl_vm::host::{
+    Answer, FunctionRef, Incoming, Pending, ProcessSignal, Question, SendError, Sender, TaskInfo,
+};
 use esl_vm::observe::{Coming, Observer};
 use esl_vm::vm::Vm;
 
@@ -74,12 +76,12 @@ impl Handle {
 
     /// Adds a fact to the program's database. The answer is whether it is new.
     pub fn assert(&self, fact: impl Into<Data>) -> Reply<bool> {
-        self.ask(Callee::Named("ESL:ASSERT".into()), [fact.into()], true)
+        self.ask(FunctionRef::Named("ESL:ASSERT".into()), [fact.into()], true)
     }
 
     /// Removes the facts that match a pattern. The answer is how many there were.
     pub fn retract(&self, pattern: impl Into<Data>) -> Reply<i64> {
-        self.ask(Callee::Named("ESL:RETRACT".into()), [pattern.into()], true)
+        self.ask(FunctionRef::Named("ESL:RETRACT".into()), [pattern.into()], true)
     }
 
     /// Sets a property of the program, in place of the value that it has for these arguments. The answer is
@@ -92,7 +94,7 @@ impl Handle {
     ) -> Reply<bool> {
         let name = Data::Symbol(property.to_uppercase());
         self.ask(
-            Callee::Named("ESL::%SET-PROPERTY".into()),
+            FunctionRef::Named("ESL::%SET-PROPERTY".into()),
             [name, Data::list(arguments), value.into()],
             true,
         )
@@ -155,7 +157,7 @@ impl Handle {
 
     fn ask<T: FromData>(
         &self,
-        function: Callee,
+        function: FunctionRef,
         arguments: impl IntoIterator<Item = Data>,
         is_urgent: bool,
     ) -> Reply<T> {

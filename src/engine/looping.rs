@@ -7,7 +7,7 @@ use std::task::{Context, Waker};
 use std::time::{Duration, Instant};
 
 use esl_bytecode::datum::Datum;
-use esl_vm::host::{Callee, Question, Sender};
+use esl_vm::host::{FunctionRef, Question, Sender};
 use esl_vm::run::RunOutcome;
 
 use super::{Engine, Reply};
@@ -51,7 +51,7 @@ impl Engine {
     /// [`Engine::eval`], does not run anything.
     pub fn begin(&mut self, text: &str) -> Reply<Data> {
         let text = Datum::string(text, Default::default());
-        let function = Callee::Named("ESL::%EVAL-TEXT".into());
+        let function = FunctionRef::Named("ESL::%EVAL-TEXT".into());
         let question = Question::Call { function, arguments: vec![text], is_urgent: false };
         Reply::of_value(Sender::new(&self.machine.inbox()).ask(question))
     }
@@ -167,7 +167,7 @@ impl Future for Running<'_> {
 
 /// What an alarm is set to.
 #[derive(Default)]
-struct Setting {
+struct AlarmSetting {
     next: Option<(Instant, Waker)>,
     is_over: bool,
 }
@@ -175,12 +175,12 @@ struct Setting {
 /// State of an alarm, shared with its thread.
 #[derive(Default)]
 struct Bell {
-    setting: Mutex<Setting>,
+    setting: Mutex<AlarmSetting>,
     has_changed: Condvar,
 }
 
 impl Bell {
-    fn setting(&self) -> MutexGuard<'_, Setting> {
+    fn setting(&self) -> MutexGuard<'_, AlarmSetting> {
         // The setting is whole at every moment, so a panic elsewhere does not corrupt it.
         self.setting.lock().unwrap_or_else(PoisonError::into_inner)
     }

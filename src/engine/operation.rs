@@ -32,12 +32,12 @@ use crate::data::Data;
 /// # Ok::<(), esl::Error>(())
 /// ```
 pub struct Operation {
-    host: host::Operation,
+    host: host::HostOperation,
     call: Call,
 }
 
 impl Operation {
-    pub(super) fn new(host: host::Operation, names: Arc<[String]>) -> Operation {
+    pub(super) fn new(host: host::HostOperation, names: Arc<[String]>) -> Operation {
         let arguments = host.arguments().iter().map(Data::from_datum).collect();
         Operation { host, call: Call { names, arguments } }
     }

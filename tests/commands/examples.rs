@@ -96,11 +96,10 @@ fn the_executive_flies_by_lines_of_json() {
 }
 
 #[test]
-#[allow(clippy::print_stderr, reason = "whoever runs the tests sees what is left out")]
 fn the_executive_flies_what_basilisk_simulates() {
     let has_basilisk = Command::new("python3").args(["-c", "import Basilisk"]).output();
     if !has_basilisk.is_ok_and(|done| done.status.success()) {
-        eprintln!("left out: it needs python3 with Basilisk, by `pip install bsk`");
+        crate::say_left_out("it needs `python3` with Basilisk, by `pip install bsk`");
         return;
     }
     let mut command = Command::new("python3");

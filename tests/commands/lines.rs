@@ -96,7 +96,7 @@ fn a_secured_connection_needs_a_server_that_proves_who_it_is() {
     python.arg("server.py").current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::piped());
     let has_ssl = Command::new("python3").args(["-c", "import ssl"]).output();
     if !make_certificates(&folder) || !has_ssl.is_ok_and(|output| output.status.success()) {
-        println!("left out: needs `openssl` and `python3` with its `ssl`");
+        crate::say_left_out("it needs `openssl`, and `python3` with its `ssl`");
         return;
     }
     let mut server = python.stderr(Stdio::null()).spawn().expect("Python is there");

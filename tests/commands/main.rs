@@ -47,3 +47,9 @@ fn command(program: &str, arguments: &[&str]) -> Command {
     command.args(arguments).env_remove("ESL_LIBRARY");
     command
 }
+
+/// Says that a test was left out, and why.
+#[allow(clippy::print_stderr, reason = "whoever runs the tests sees what is left out")]
+fn say_left_out(reason: &str) {
+    eprintln!("left out: {reason}");
+}

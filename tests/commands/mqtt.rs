@@ -55,7 +55,7 @@ fn start_broker(program: &str, folder: &Folder) -> (Broker, u16) {
 #[test]
 fn messages_go_through_a_broker() {
     let Some(program) = broker_program() else {
-        println!("left out: needs `mosquitto`");
+        crate::say_left_out("it needs `mosquitto`");
         return;
     };
     let folder = Folder::new("mqtt");
@@ -112,7 +112,7 @@ fn messages_go_through_a_broker() {
 #[test]
 fn a_connection_that_is_lost_is_made_again() {
     let Some(program) = broker_program() else {
-        println!("left out: needs `mosquitto`");
+        crate::say_left_out("it needs `mosquitto`");
         return;
     };
     let folder = Folder::new("mqtt-lost");

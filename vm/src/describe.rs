@@ -5,7 +5,7 @@
 
 use num_bigint::BigInt;
 
-use crate::heap::layout::{Code, Symbol};
+use crate::heap::layout::{CodeObject, SymbolObject};
 use crate::heap::{Heap, Kind};
 use crate::value::Value;
 use crate::world::class;
@@ -28,7 +28,7 @@ pub(crate) fn describe(heap: &Heap, value: Value) -> String {
 pub(crate) fn function_name(heap: &Heap, function: Value) -> String {
     let code = heap.function_code(function).and_then(|code| heap.code(code));
     match code {
-        Some(Code { name, .. }) if name.is_true() => describe(heap, *name),
+        Some(CodeObject { name, .. }) if name.is_true() => describe(heap, *name),
         _ => "an anonymous function".into(),
     }
 }
@@ -151,7 +151,7 @@ fn describe_object(heap: &Heap, value: Value, depth: usize, text: &mut String) {
 
 fn describe_symbol(heap: &Heap, symbol: Value, text: &mut String) {
     let Some(cell) = heap.symbol(symbol) else { return };
-    if cell.header.flags & Symbol::KEYWORD != 0 {
+    if cell.header.flags & SymbolObject::KEYWORD != 0 {
         text.push(':');
     }
     text.push_str(&heap.string_text(cell.name).unwrap_or_default());

@@ -22,7 +22,7 @@ use crate::exchange::Exchange;
 use crate::observe::{Figures, Observers, Watch};
 use crate::outside::{Operations, Outside};
 use crate::schedule::{Accounts, Clock, Counts, EndOfAll, Points, RunQueues, Scheduler, Timers, Turn};
-use crate::task::{Control, Extra, Running, Task};
+use crate::task::{Control, Extra, RunningCleanup, Task};
 use crate::vm::Vm;
 use crate::wait::Deliveries;
 use crate::world::World;
@@ -111,7 +111,7 @@ state! {
 
 state! {
     /// Visits the content of a running cleanup.
-    Running by VisitRunning :: running_content {
+    RunningCleanup by VisitRunning :: running_content {
         content { pending, values, allowance }
         derived { entry, bound }
     }

@@ -11,7 +11,7 @@ use esl_bytecode::builtin::Builtin;
 use esl_bytecode::module::Module;
 use esl_bytecode::verify::{VerifyError, verify};
 
-use crate::heap::layout::Code;
+use crate::heap::layout::CodeObject;
 use crate::heap::{AllocError, CodeParts, Heap, HeapConfig};
 use crate::shape::{Shape, Sort};
 use crate::value::Value;
@@ -93,7 +93,7 @@ pub(crate) fn alloc_stub(
         name,
         debug: Value::NIL,
         owner,
-        arity: Code::ANY_ARITY,
+        arity: CodeObject::ANY_ARITY,
         nregs: 0,
         spare: [shape.pack(), captures as u64],
         constants: &[],
@@ -105,7 +105,7 @@ pub(crate) fn alloc_stub(
 }
 
 /// Whether code reads captures of its function: only bytecode does, and `spare[1]` says how many.
-fn reads_captures(code: &Code) -> bool {
+fn reads_captures(code: &CodeObject) -> bool {
     Shape::unpack(code.spare[0]).sort == Sort::Bytecode && code.spare[1] != 0
 }
 

@@ -4,7 +4,7 @@ use esl_bytecode::opcode::TypeCode;
 
 use esl_heap::array::storage;
 
-use crate::heap::layout::Symbol;
+use crate::heap::layout::SymbolObject;
 use crate::heap::{Heap, Kind};
 use crate::number;
 use crate::value::Value;
@@ -17,7 +17,9 @@ pub(crate) fn has_type_code(heap: &Heap, value: Value, code: TypeCode) -> bool {
         TypeCode::List => value.is_list(),
         TypeCode::Null => value.is_nil(),
         TypeCode::Symbol => is_symbol(heap, value),
-        TypeCode::Keyword => heap.symbol(value).is_some_and(|cell| cell.header.flags & Symbol::KEYWORD != 0),
+        TypeCode::Keyword => {
+            heap.symbol(value).is_some_and(|cell| cell.header.flags & SymbolObject::KEYWORD != 0)
+        }
         TypeCode::Number => number::is_number(heap, value),
         TypeCode::Real => number::is_real(heap, value),
         TypeCode::Integer => number::is_integer(heap, value),

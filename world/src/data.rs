@@ -2,10 +2,12 @@
 //!
 //! Bytes pass as strings of the characters 0 to 255, since data have no vectors of bytes.
 
+use std::collections::HashMap;
+
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
-use esl_vm::host::Failure;
+use esl_vm::host::HostFailure;
 
 /// Returns the text of a string.
 pub(crate) fn text_of(datum: &Datum) -> Option<&str> {
@@ -46,31 +48,35 @@ pub(crate) fn nil() -> Datum {
 }
 
 /// Returns the failure of a cause, a keyword's name, with a text.
-pub(crate) fn failure(cause: &str, reason: impl ToString) -> Failure {
-    Failure { cause: cause.into(), arguments: vec![text(&reason.to_string())] }
+pub(crate) fn failure(cause: &str, reason: impl ToString) -> HostFailure {
+    HostFailure { cause: cause.into(), arguments: vec![text(&reason.to_string())] }
 }
 
-/// The arguments of a call, in the order of the lambda list.
-pub(crate) struct Arguments(pub(crate) Vec<Datum>);
+/// Things that a program knows by numbers: the greatest number so far, and the things; `None` for one that is
+/// still being opened.
+pub(crate) type Numbered<T> = (i64, HashMap<i64, Option<T>>);
 
-impl Arguments {
-    fn get(&self, index: usize, expected: &str) -> Result<&Datum, Failure> {
+/// The arguments of a call, in the order of the lambda list.
+pub(crate) struct CallArguments(pub(crate) Vec<Datum>);
+
+impl CallArguments {
+    fn get(&self, index: usize, expected: &str) -> Result<&Datum, HostFailure> {
         self.0.get(index).ok_or_else(|| wrong(&nil(), expected))
     }
 
     /// Returns an argument that is a string.
-    pub(crate) fn text(&self, index: usize) -> Result<String, Failure> {
+    pub(crate) fn text(&self, index: usize) -> Result<String, HostFailure> {
         let datum = self.get(index, "STRING")?;
         text_of(datum).map(str::to_owned).ok_or_else(|| wrong(datum, "STRING"))
     }
 
     /// Returns an argument that is a string or `NIL`.
-    pub(crate) fn text_if_any(&self, index: usize) -> Result<Option<String>, Failure> {
+    pub(crate) fn text_if_any(&self, index: usize) -> Result<Option<String>, HostFailure> {
         if self.is_true(index) { self.text(index).map(Some) } else { Ok(None) }
     }
 
     /// Returns an argument that is an integer.
-    pub(crate) fn integer(&self, index: usize) -> Result<i64, Failure> {
+    pub(crate) fn integer(&self, index: usize) -> Result<i64, HostFailure> {
         let datum = self.get(index, "INTEGER")?;
         match datum.kind() {
             DatumKind::Integer(value) => i64::try_from(value).map_err(|_| wrong(datum, "FIXNUM")),
@@ -79,7 +85,7 @@ impl Arguments {
     }
 
     /// Returns an argument that is a list of strings.
-    pub(crate) fn texts(&self, index: usize) -> Result<Vec<String>, Failure> {
+    pub(crate) fn texts(&self, index: usize) -> Result<Vec<String>, HostFailure> {
         let datum = self.get(index, "LIST")?;
         let items = datum.as_list().ok_or_else(|| wrong(datum, "LIST"))?;
         items
@@ -89,7 +95,7 @@ impl Arguments {
     }
 
     /// Returns an argument that is an association list of strings.
-    pub(crate) fn pairs(&self, index: usize) -> Result<Vec<(String, String)>, Failure> {
+    pub(crate) fn pairs(&self, index: usize) -> Result<Vec<(String, String)>, HostFailure> {
         let datum = self.get(index, "LIST")?;
         let items = datum.as_list().ok_or_else(|| wrong(datum, "LIST"))?;
         items
@@ -110,6 +116,6 @@ impl Arguments {
     }
 }
 
-fn wrong(datum: &Datum, expected: &str) -> Failure {
-    Failure { cause: "TYPE-ERROR".into(), arguments: vec![datum.clone(), text(expected)] }
+fn wrong(datum: &Datum, expected: &str) -> HostFailure {
+    HostFailure { cause: "TYPE-ERROR".into(), arguments: vec![datum.clone(), text(expected)] }
 }

@@ -8,7 +8,6 @@
 //! A regular file that is written is opened for each part, by the path that was permitted, so that a stream
 //! that nobody closes takes no descriptor; one that is read as text is closed at its end.
 
-use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
 use std::io::{Error, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -16,13 +15,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use esl_bytecode::datum::Datum;
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{Failure, HostError, Right};
+use esl_vm::host::{HostError, HostFailure, Right};
 use esl_vm::vm::Vm;
 use tokio::sync::watch;
 
 use crate::arrived::Arrived;
-use crate::data::{Arguments, boolean, bytes_of, failure, integer, nil, text};
-use crate::operation::{Answer, define, define_with_end};
+use crate::data::{CallArguments, Numbered, boolean, bytes_of, failure, integer, nil, text};
+use crate::operation::{Completion, define, define_with_end};
 
 /// Most bytes that are read at a time.
 const CHUNK: usize = 1 << 15;
@@ -202,12 +201,9 @@ async fn in_thread<T: Send + 'static>(
     tokio::task::spawn_blocking(function).await.map_err(Error::other)?
 }
 
-/// The greatest number so far, and files by number: nothing while they are being opened.
-type Numbered = (i64, HashMap<i64, Option<Arc<Open>>>);
-
 /// The open files of a machine.
 #[derive(Clone, Default)]
-struct Files(Arc<Mutex<Numbered>>);
+struct Files(Arc<Mutex<Numbered<Arc<Open>>>>);
 
 impl Files {
     /// Returns the number of a file that is about to be opened.
@@ -219,7 +215,7 @@ impl Files {
         number
     }
 
-    fn get(&self, number: i64) -> Result<Arc<Open>, Failure> {
+    fn get(&self, number: i64) -> Result<Arc<Open>, HostFailure> {
         let open = lock(&self.0).1.get(&number).cloned().flatten();
         open.ok_or_else(|| failure("SIMPLE-ERROR", "The file is closed."))
     }
@@ -241,7 +237,7 @@ impl Files {
 }
 
 /// Returns the values of an operation on a file: one, or `NIL` and what is wrong.
-fn answer(result: Result<Datum, Error>) -> Answer {
+fn answer(result: Result<Datum, Error>) -> Completion {
     Ok(match result {
         Ok(value) => vec![value],
         Err(error) => vec![nil(), text(&HostError::from(&error).to_string())],
@@ -304,9 +300,9 @@ pub(crate) fn install(machine: &mut Vm) {
 
 /// Gives a machine the functions that do not wait.
 fn define_immediate(machine: &mut Vm, files: &Files) {
-    let mut define = |name: &str, function: fn(Arguments, &Files) -> Result<Datum, Failure>| {
+    let mut define = |name: &str, function: fn(CallArguments, &Files) -> Result<Datum, HostFailure>| {
         let files = files.clone();
-        let function = move |arguments: &[Datum]| function(Arguments(arguments.to_vec()), &files);
+        let function = move |arguments: &[Datum]| function(CallArguments(arguments.to_vec()), &files);
         machine.add_host_function(name, HostFunction::AtOnce(Box::new(function)));
     };
     define("%FILE-NEW", |_, files| Ok(integer(files.add())));
@@ -344,7 +340,7 @@ fn polled(file: &File, interest: tokio::io::Interest) -> Option<Access> {
 }
 
 /// `%FILE-OPEN-INPUT`: number, path, whether it is read as text.
-async fn open_input(arguments: Arguments, files: Files) -> Answer {
+async fn open_input(arguments: CallArguments, files: Files) -> Completion {
     let (number, path) = (arguments.integer(0)?, arguments.text(1)?);
     let open = move || {
         let file = at_once(OpenOptions::new().read(true)).open(&path)?;
@@ -369,7 +365,7 @@ async fn open_input(arguments: Arguments, files: Files) -> Answer {
 }
 
 /// `%FILE-OPEN-OUTPUT`: number, path, mode: 0 replaces the file, 1 appends to it, 2 fails if there is one.
-async fn open_output(arguments: Arguments, files: Files) -> Answer {
+async fn open_output(arguments: CallArguments, files: Files) -> Completion {
     let (number, path, mode) =
         (arguments.integer(0)?, PathBuf::from(arguments.text(1)?), arguments.integer(2)?);
     #[cfg(unix)]

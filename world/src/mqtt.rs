@@ -11,7 +11,7 @@ use std::time::Duration;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{Failure, Right};
+use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
 use rumqttc::{
     AsyncClient, ConnectionError, Event, EventLoop, LastWill, MqttOptions, Outgoing, Packet, QoS,
@@ -19,9 +19,9 @@ use rumqttc::{
 };
 use tokio::sync::{Notify, oneshot, watch};
 
-use crate::data::{Arguments, boolean, bytes_of, failure, integer, nil, text, text_of_bytes};
+use crate::data::{CallArguments, Numbered, boolean, bytes_of, failure, integer, nil, text, text_of_bytes};
 use crate::event_loop;
-use crate::operation::{Answer, define};
+use crate::operation::{Completion, define};
 
 /// Most messages that are kept for the program.
 const MOST_KEPT: usize = 1000;
@@ -66,7 +66,7 @@ impl Shared {
     }
 
     /// Returns the failure for a request, if there is no connection.
-    fn check(&self) -> Result<(), Failure> {
+    fn check(&self) -> Result<(), HostFailure> {
         match &self.state().problem {
             None => Ok(()),
             Some(problem) => Err(failure("CONNECTION-LOST", problem)),
@@ -87,21 +87,21 @@ struct Client {
 
 /// The clients of a machine, by number, and the greatest number so far.
 #[derive(Clone, Default)]
-struct Clients(Arc<Mutex<(i64, HashMap<i64, Option<Client>>)>>);
+struct Clients(Arc<Mutex<Numbered<Client>>>);
 
 impl Clients {
-    fn lock(&self) -> MutexGuard<'_, (i64, HashMap<i64, Option<Client>>)> {
+    fn lock(&self) -> MutexGuard<'_, Numbered<Client>> {
         // As above.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn get(&self, number: i64) -> Result<Client, Failure> {
+    fn get(&self, number: i64) -> Result<Client, HostFailure> {
         let client = self.lock().1.get(&number).cloned().flatten();
         client.ok_or_else(|| mqtt_failure("the client is closed"))
     }
 }
 
-fn mqtt_failure(reason: impl ToString) -> Failure {
+fn mqtt_failure(reason: impl ToString) -> HostFailure {
     failure("MQTT-ERROR", reason)
 }
 
@@ -127,7 +127,7 @@ pub(crate) fn install(machine: &mut Vm) {
     machine.add_host_function("%MQTT-NEW", HostFunction::AtOnce(Box::new(add)));
     let known = clients.clone();
     let take = move |arguments: &[Datum]| {
-        let shared = known.get(Arguments(arguments.to_vec()).integer(0)?)?.shared;
+        let shared = known.get(CallArguments(arguments.to_vec()).integer(0)?)?.shared;
         let Some((topic, bytes, is_kept)) = shared.state().messages.pop_front() else { return Ok(nil()) };
         shared.taken.notify_one();
         Ok(Datum::list([text(&topic), text_of_bytes(&bytes), boolean(is_kept)], Span::default()))
@@ -135,7 +135,7 @@ pub(crate) fn install(machine: &mut Vm) {
     machine.add_host_function("%MQTT-TAKE", HostFunction::AtOnce(Box::new(take)));
     let known = clients.clone();
     let problem = move |arguments: &[Datum]| {
-        let shared = known.get(Arguments(arguments.to_vec()).integer(0)?)?.shared;
+        let shared = known.get(CallArguments(arguments.to_vec()).integer(0)?)?.shared;
         let problem = shared.state().problem.as_deref().map_or_else(nil, text);
         Ok(problem)
     };
@@ -182,7 +182,7 @@ pub(crate) fn install(machine: &mut Vm) {
 
 /// `%MQTT-OPEN`: number, address, name of the client, seconds between signs of life, user and password, topic,
 /// payload, level and retention of the last will.
-async fn open(arguments: Arguments, clients: Clients) -> Answer {
+async fn open(arguments: CallArguments, clients: Clients) -> Completion {
     let (number, address) = (arguments.integer(0)?, arguments.text(1)?);
     let (host, port) = address.rsplit_once(':').unwrap_or((&address, "1883"));
     let port = port.parse().map_err(mqtt_failure)?;
@@ -230,7 +230,7 @@ async fn open(arguments: Arguments, clients: Clients) -> Answer {
 }
 
 /// Returns the failure for a connection that is not made.
-fn connection_failure(error: &ConnectionError) -> Failure {
+fn connection_failure(error: &ConnectionError) -> HostFailure {
     let cause = match error {
         ConnectionError::Io(error) if error.kind() == std::io::ErrorKind::ConnectionRefused => {
             "CONNECTION-REFUSED"
@@ -242,7 +242,7 @@ fn connection_failure(error: &ConnectionError) -> Failure {
 }
 
 /// `%MQTT-PUBLISH`: number, topic, bytes, level, whether the broker keeps it.
-async fn publish(arguments: Arguments, clients: Clients) -> Answer {
+async fn publish(arguments: CallArguments, clients: Clients) -> Completion {
     let client = clients.get(arguments.integer(0)?)?;
     client.shared.check()?;
     let (topic, bytes) = (arguments.text(1)?, bytes_of(&arguments.text(2)?));
@@ -253,7 +253,7 @@ async fn publish(arguments: Arguments, clients: Clients) -> Answer {
 }
 
 /// `%MQTT-SUBSCRIBE`: number, filter, level.
-async fn subscribe(arguments: Arguments, clients: Clients) -> Answer {
+async fn subscribe(arguments: CallArguments, clients: Clients) -> Completion {
     let client = clients.get(arguments.integer(0)?)?;
     client.shared.check()?;
     let (filter, level) = (arguments.text(1)?, qos(arguments.integer(2)?));

@@ -4,15 +4,15 @@ use std::future::Future;
 
 use esl_bytecode::datum::Datum;
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{Failure, Operation};
+use esl_vm::host::{HostFailure, HostOperation};
 use esl_vm::vm::Vm;
 use tokio::sync::oneshot;
 
-use crate::data::{Arguments, failure};
+use crate::data::{CallArguments, failure};
 use crate::event_loop;
 
 /// What an operation comes to.
-pub(crate) type Answer = Result<Vec<Datum>, Failure>;
+pub(crate) type Completion = Result<Vec<Datum>, HostFailure>;
 
 /// Told when the program has cancelled an operation.
 pub(crate) struct Cancelled(oneshot::Receiver<()>);
@@ -30,8 +30,8 @@ impl Cancelled {
 /// Gives a machine an operation. A call that is left drops the future, and is over then.
 pub(crate) fn define<F, R>(machine: &mut Vm, name: &str, needs: &[Need], mut function: F)
 where
-    F: FnMut(Arguments) -> R + Send + 'static,
-    R: Future<Output = Answer> + Send + 'static,
+    F: FnMut(CallArguments) -> R + Send + 'static,
+    R: Future<Output = Completion> + Send + 'static,
 {
     define_with_end(machine, name, needs, move |arguments, mut cancelled| {
         let future = function(arguments);
@@ -48,13 +48,13 @@ where
 /// Gives a machine an operation that itself sees to its end when it is cancelled.
 pub(crate) fn define_with_end<F, R>(machine: &mut Vm, name: &str, needs: &[Need], mut function: F)
 where
-    F: FnMut(Arguments, Cancelled) -> R + Send + 'static,
-    R: Future<Output = Answer> + Send + 'static,
+    F: FnMut(CallArguments, Cancelled) -> R + Send + 'static,
+    R: Future<Output = Completion> + Send + 'static,
 {
-    let begin = move |operation: Operation| {
+    let begin = move |operation: HostOperation| {
         let (cancel, cancelled) = oneshot::channel();
         operation.on_cancel(move || _ = cancel.send(()));
-        let future = function(Arguments(operation.arguments().to_vec()), Cancelled(cancelled));
+        let future = function(CallArguments(operation.arguments().to_vec()), Cancelled(cancelled));
         let run = async move {
             match future.await {
                 Ok(values) => operation.complete(values),

@@ -5,17 +5,18 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::span::Span;
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{Failure, Right};
+use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
 
-use crate::data::{Arguments, integer, nil, text};
+use crate::data::{CallArguments, integer, nil, text};
 
 /// Gives a machine functions about the process.
 pub(crate) fn install(machine: &mut Vm) {
-    let mut define = |name: &str, function: fn(Arguments) -> Result<Datum, Failure>, needs: &[Need]| {
-        let function = move |arguments: &[Datum]| function(Arguments(arguments.to_vec()));
-        machine.add_guarded_function(name, HostFunction::AtOnce(Box::new(function)), needs);
-    };
+    let mut define =
+        |name: &str, function: fn(CallArguments) -> Result<Datum, HostFailure>, needs: &[Need]| {
+            let function = move |arguments: &[Datum]| function(CallArguments(arguments.to_vec()));
+            machine.add_guarded_function(name, HostFunction::AtOnce(Box::new(function)), needs);
+        };
     define("%OS-GETENV", getenv, &[Need { right: Right::Env, argument: 0 }]);
     define("%OS-HOSTNAME", |_| Ok(text(&host_name())), &[]);
     define("%OS-PROCESS-ID", |_| Ok(integer(std::process::id())), &[]);
@@ -32,7 +33,7 @@ pub(crate) fn install_clock(machine: &mut Vm) {
     machine.add_host_function("%TIME-NOW", HostFunction::AtOnce(Box::new(now)));
 }
 
-fn getenv(arguments: Arguments) -> Result<Datum, Failure> {
+fn getenv(arguments: CallArguments) -> Result<Datum, HostFailure> {
     let name = arguments.text(0)?;
     // The system has no variables of other names.
     if name.is_empty() || name.contains(['=', '\0']) {

@@ -11,15 +11,15 @@ use std::time::Duration;
 
 use esl_bytecode::datum::Datum;
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{Failure, Right};
+use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
 use tokio::process::{Child, Command};
 use tokio::sync::{mpsc, watch};
 
-use crate::data::{Arguments, boolean, failure, integer, nil, text};
+use crate::data::{CallArguments, boolean, failure, integer, nil, text};
 use crate::event_loop;
-use crate::operation::{Answer, Cancelled, define, define_with_end};
+use crate::operation::{Cancelled, Completion, define, define_with_end};
 use crate::socket::{Connection, Sockets};
 
 /// Time that a program has between SIGTERM and SIGKILL.
@@ -33,11 +33,11 @@ struct Launched {
     /// Its exit status, when it has ended.
     status: watch::Receiver<Option<i32>>,
     /// Requests to end.
-    end: mpsc::UnboundedSender<End>,
+    end: mpsc::UnboundedSender<StopRequest>,
 }
 
 /// How a program is asked to end.
-enum End {
+enum StopRequest {
     Politely,
     AtOnce,
 }
@@ -52,7 +52,7 @@ impl Programs {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn get(&self, number: i64) -> Result<Launched, Failure> {
+    fn get(&self, number: i64) -> Result<Launched, HostFailure> {
         self.lock().get(&number).cloned().ok_or_else(|| failure("PROCESS-ERROR", "there is no such process"))
     }
 
@@ -84,7 +84,7 @@ pub(crate) fn install(machine: &mut Vm, sockets: &Sockets) {
         async move { Ok(vec![integer(end(launched?).await)]) }
     });
     let alive = move |arguments: &[Datum]| {
-        let launched = programs.get(Arguments(arguments.to_vec()).integer(0)?)?;
+        let launched = programs.get(CallArguments(arguments.to_vec()).integer(0)?)?;
         let is_alive = launched.status.borrow().is_none();
         Ok(boolean(is_alive))
     };
@@ -117,7 +117,7 @@ fn is_executable(path: &Path) -> bool {
 
 /// Returns the command of a call whose arguments begin with the program and its arguments, and have the
 /// folder and the environment from `index` on.
-fn command(arguments: &Arguments, index: usize) -> Result<Command, Failure> {
+fn command(arguments: &CallArguments, index: usize) -> Result<Command, HostFailure> {
     let name = arguments.text(0)?;
     let unknown = || failure("PROCESS-ERROR", format!("there is no program `{name}`"));
     let mut command = Command::new(find_program(&name).ok_or_else(unknown)?);
@@ -131,7 +131,7 @@ fn command(arguments: &Arguments, index: usize) -> Result<Command, Failure> {
     Ok(command)
 }
 
-fn start(mut command: Command, name: &str) -> Result<Child, Failure> {
+fn start(mut command: Command, name: &str) -> Result<Child, HostFailure> {
     command.spawn().map_err(|error| failure("PROCESS-ERROR", format!("`{name}` cannot be run: {error}")))
 }
 
@@ -149,7 +149,7 @@ fn status_number(status: ExitStatus) -> i32 {
 }
 
 /// `%PROCESS-RUN`: program, arguments, input, whether output and error output are wanted, folder, environment.
-async fn run(arguments: Arguments, mut cancelled: Cancelled) -> Answer {
+async fn run(arguments: CallArguments, mut cancelled: Cancelled) -> Completion {
     let name = arguments.text(0)?;
     let input = arguments.text_if_any(2)?;
     let mut command = command(&arguments, 5)?;
@@ -181,7 +181,7 @@ async fn run(arguments: Arguments, mut cancelled: Cancelled) -> Answer {
 }
 
 /// Reads all that a program writes. `NIL` if nobody wants it.
-async fn text_from(pipe: Option<impl AsyncRead + Unpin>) -> Result<Datum, Failure> {
+async fn text_from(pipe: Option<impl AsyncRead + Unpin>) -> Result<Datum, HostFailure> {
     let Some(pipe) = pipe else { return Ok(nil()) };
     let mut bytes = Vec::new();
     let read = pipe.take(MOST_OUTPUT + 1).read_to_end(&mut bytes).await;
@@ -220,7 +220,7 @@ fn terminate(child: &mut Child) {
 
 /// Where the output of a launched program goes: to the connection of a number, nowhere for `NIL`, and for anything
 /// else to where that of this process goes.
-fn output_of(arguments: &Arguments, index: usize) -> (Stdio, Option<i64>) {
+fn output_of(arguments: &CallArguments, index: usize) -> (Stdio, Option<i64>) {
     match arguments.integer(index) {
         Ok(number) => (Stdio::piped(), Some(number)),
         Err(_) if arguments.is_true(index) => (Stdio::inherit(), None),
@@ -230,7 +230,7 @@ fn output_of(arguments: &Arguments, index: usize) -> (Stdio, Option<i64>) {
 
 /// `%PROCESS-LAUNCH`: program, arguments, the number of a connection for its input or `NIL`, where output and error
 /// output go, folder, environment.
-async fn launch(arguments: Arguments, programs: Programs, sockets: Sockets) -> Answer {
+async fn launch(arguments: CallArguments, programs: Programs, sockets: Sockets) -> Completion {
     let name = arguments.text(0)?;
     let mut command = command(&arguments, 5)?;
     let input = if arguments.is_true(2) { Some(arguments.integer(2)?) } else { None };
@@ -257,8 +257,8 @@ async fn launch(arguments: Arguments, programs: Programs, sockets: Sockets) -> A
             tokio::select! {
                 status = child.wait() => break status,
                 Some(end) = ends.recv() => match end {
-                    End::Politely => terminate(&mut child),
-                    End::AtOnce => drop(child.start_kill()),
+                    StopRequest::Politely => terminate(&mut child),
+                    StopRequest::AtOnce => drop(child.start_kill()),
                 },
             }
         };
@@ -280,11 +280,11 @@ async fn status_of(mut launched: Launched) -> i32 {
 /// Ends a launched program, and returns its exit status.
 async fn end(launched: Launched) -> i32 {
     // One that has ended does not hear it.
-    drop(launched.end.send(End::Politely));
+    drop(launched.end.send(StopRequest::Politely));
     match tokio::time::timeout(GRACE, status_of(launched.clone())).await {
         Ok(status) => status,
         Err(_) => {
-            drop(launched.end.send(End::AtOnce));
+            drop(launched.end.send(StopRequest::AtOnce));
             status_of(launched).await
         }
     }

@@ -1,18 +1,18 @@
 //! Serial lines, as connections.
 
-use esl_vm::host::Failure;
+use esl_vm::host::HostFailure;
 use tokio_serial::{DataBits, FlowControl, Parity, SerialPortBuilderExt, StopBits};
 
-use crate::data::{Arguments, failure, integer};
-use crate::operation::Answer;
+use crate::data::{CallArguments, failure, integer};
+use crate::operation::Completion;
 use crate::socket::{Connection, Sockets};
 
-fn serial_failure(reason: impl ToString) -> Failure {
+fn serial_failure(reason: impl ToString) -> HostFailure {
     failure("SERIAL-ERROR", reason)
 }
 
 /// `%SERIAL-OPEN`: number, path, baud, data bits, parity, stop bits, flow control.
-pub(crate) async fn open(arguments: Arguments, sockets: Sockets) -> Answer {
+pub(crate) async fn open(arguments: CallArguments, sockets: Sockets) -> Completion {
     let (number, path) = (arguments.integer(0)?, arguments.text(1)?);
     let baud = u32::try_from(arguments.integer(2)?).map_err(serial_failure)?;
     let data_bits = match arguments.integer(3)? {

@@ -14,29 +14,29 @@ use std::time::Duration;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{Failure, Right};
+use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream, UdpSocket};
 use tokio::sync::watch;
 
 use crate::arrived::{Arrived, whole_characters};
-use crate::data::{Arguments, bytes_of, failure, integer, nil, text, text_of_bytes};
+use crate::data::{CallArguments, bytes_of, failure, integer, nil, text, text_of_bytes};
 use crate::event_loop;
-use crate::operation::{Answer, define};
+use crate::operation::{Completion, define};
 
 /// Most bytes that are read at a time.
 const CHUNK: usize = 1 << 16;
 /// Time that a peer has to take the end of a connection.
 const GOODBYE: Duration = Duration::from_secs(1);
 
-type Reader = Box<dyn AsyncRead + Send + Unpin>;
-type Writer = Box<dyn AsyncWrite + Send + Unpin>;
+type SocketReader = Box<dyn AsyncRead + Send + Unpin>;
+type SocketWriter = Box<dyn AsyncWrite + Send + Unpin>;
 
 /// A connection.
 pub(crate) struct Connection {
-    reader: tokio::sync::Mutex<Reader>,
-    writer: tokio::sync::Mutex<Writer>,
+    reader: tokio::sync::Mutex<SocketReader>,
+    writer: tokio::sync::Mutex<SocketWriter>,
     arrived: Mutex<Arrived>,
     /// Whether the peer is to be told that nothing more comes, beside by the end of the connection.
     says_goodbye: bool,
@@ -67,7 +67,7 @@ pub(crate) type Datagrams = Arc<Mutex<VecDeque<Datagram>>>;
 
 /// What a socket is.
 #[derive(Clone)]
-pub(crate) enum Kind {
+pub(crate) enum SocketKind {
     /// Not connected yet.
     New,
     Connection(Arc<Connection>),
@@ -78,7 +78,7 @@ pub(crate) enum Kind {
 
 #[derive(Clone)]
 struct Socket {
-    kind: Kind,
+    kind: SocketKind,
     port: i64,
     peer: String,
     /// Changes when the socket is closed.
@@ -95,12 +95,12 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn closed() -> Failure {
+fn closed() -> HostFailure {
     failure("SOCKET-CLOSED", "the socket is closed")
 }
 
 /// Returns the failure for an error of the system.
-fn socket_failure(error: &Error) -> Failure {
+fn socket_failure(error: &Error) -> HostFailure {
     let cause = match error.kind() {
         ErrorKind::ConnectionRefused => "CONNECTION-REFUSED",
         ErrorKind::ConnectionReset | ErrorKind::ConnectionAborted | ErrorKind::BrokenPipe => {
@@ -114,7 +114,7 @@ fn socket_failure(error: &Error) -> Failure {
 }
 
 impl Sockets {
-    fn add(&self, kind: Kind, port: i64, peer: String) -> i64 {
+    fn add(&self, kind: SocketKind, port: i64, peer: String) -> i64 {
         let (closer, closing) = watch::channel(false);
         let mut sockets = lock(&self.0);
         sockets.0 += 1;
@@ -123,12 +123,12 @@ impl Sockets {
         number
     }
 
-    fn get(&self, number: i64) -> Result<Socket, Failure> {
+    fn get(&self, number: i64) -> Result<Socket, HostFailure> {
         lock(&self.0).1.get(&number).cloned().ok_or_else(closed)
     }
 
     /// Says what a new socket is. It may have been closed meanwhile.
-    pub(crate) fn set(&self, number: i64, kind: Kind, port: i64, peer: String) -> Answer {
+    pub(crate) fn set(&self, number: i64, kind: SocketKind, port: i64, peer: String) -> Completion {
         let mut sockets = lock(&self.0);
         let socket = sockets.1.get_mut(&number).ok_or_else(closed)?;
         (socket.kind, socket.port, socket.peer) = (kind, port, peer);
@@ -140,7 +140,7 @@ impl Sockets {
         if let Some(socket) = socket {
             // Nobody may wait for it.
             _ = socket.closer.send(true);
-            if let Kind::Connection(connection) = socket.kind
+            if let SocketKind::Connection(connection) = socket.kind
                 && connection.says_goodbye
             {
                 // Without the event loop there is nobody to be told.
@@ -153,22 +153,25 @@ impl Sockets {
 }
 
 impl Socket {
-    fn connection(&self) -> Result<Arc<Connection>, Failure> {
+    fn connection(&self) -> Result<Arc<Connection>, HostFailure> {
         match &self.kind {
-            Kind::Connection(connection) => Ok(connection.clone()),
+            SocketKind::Connection(connection) => Ok(connection.clone()),
             _ => Err(failure("SOCKET-ERROR", "it is not connected")),
         }
     }
 
-    fn datagrams(&self) -> Result<(Arc<UdpSocket>, Datagrams), Failure> {
+    fn datagrams(&self) -> Result<(Arc<UdpSocket>, Datagrams), HostFailure> {
         match &self.kind {
-            Kind::Udp(socket, datagrams) => Ok((socket.clone(), datagrams.clone())),
+            SocketKind::Udp(socket, datagrams) => Ok((socket.clone(), datagrams.clone())),
             _ => Err(failure("SOCKET-ERROR", "it is not a UDP socket")),
         }
     }
 
     /// Returns what a future comes to, unless the socket is closed before.
-    async fn unless_closed<T>(&self, future: impl Future<Output = Result<T, Failure>>) -> Result<T, Failure> {
+    async fn unless_closed<T>(
+        &self,
+        future: impl Future<Output = Result<T, HostFailure>>,
+    ) -> Result<T, HostFailure> {
         let mut closing = self.closing.clone();
         tokio::select! {
             biased;
@@ -183,8 +186,8 @@ impl Connection {
     pub(crate) fn over(
         reader: impl AsyncRead + Send + Unpin + 'static,
         writer: impl AsyncWrite + Send + Unpin + 'static,
-    ) -> Kind {
-        Kind::Connection(Arc::new(Connection {
+    ) -> SocketKind {
+        SocketKind::Connection(Arc::new(Connection {
             reader: tokio::sync::Mutex::new(Box::new(reader)),
             writer: tokio::sync::Mutex::new(Box::new(writer)),
             arrived: Mutex::default(),
@@ -194,9 +197,9 @@ impl Connection {
 
     /// Returns a connection whose protocol has an end of its own.
     #[cfg(feature = "tls")]
-    fn secured(stream: impl AsyncRead + AsyncWrite + Send + 'static) -> Kind {
+    fn secured(stream: impl AsyncRead + AsyncWrite + Send + 'static) -> SocketKind {
         let (reader, writer) = tokio::io::split(stream);
-        Kind::Connection(Arc::new(Connection {
+        SocketKind::Connection(Arc::new(Connection {
             reader: tokio::sync::Mutex::new(Box::new(reader)),
             writer: tokio::sync::Mutex::new(Box::new(writer)),
             arrived: Mutex::default(),
@@ -204,7 +207,7 @@ impl Connection {
         }))
     }
 
-    fn of_tcp(stream: TcpStream) -> (Kind, i64, String) {
+    fn of_tcp(stream: TcpStream) -> (SocketKind, i64, String) {
         let (port, peer) = Connection::ends_of(&stream);
         let (reader, writer) = stream.into_split();
         (Connection::over(reader, writer), port, peer)
@@ -219,7 +222,7 @@ impl Connection {
     }
 
     /// Waits until something has arrived, or the connection has ended.
-    async fn wait(&self) -> Result<(), Failure> {
+    async fn wait(&self) -> Result<(), HostFailure> {
         let mut reader = self.reader.lock().await;
         if lock(&self.arrived).is_something() {
             return Ok(());
@@ -249,7 +252,7 @@ pub(crate) fn install(machine: &mut Vm, sockets: &Sockets) {
     let path = [Need { right: Right::Read, argument: 1 }, Need { right: Right::Write, argument: 1 }];
     let mut operation = {
         let sockets = sockets.clone();
-        move |name: &str, needs: &[Need], function: Function| {
+        move |name: &str, needs: &[Need], function: SocketFunction| {
             let sockets = sockets.clone();
             define(machine, name, needs, move |arguments| function(arguments, sockets.clone()));
         }
@@ -281,16 +284,17 @@ pub(crate) fn install(machine: &mut Vm, sockets: &Sockets) {
     operation("%UDP-AWAIT", &[], |arguments, sockets| Box::pin(wait_for_datagram(arguments, sockets)));
 }
 
-type Function = fn(Arguments, Sockets) -> std::pin::Pin<Box<dyn Future<Output = Answer> + Send>>;
+type SocketFunction =
+    fn(CallArguments, Sockets) -> std::pin::Pin<Box<dyn Future<Output = Completion> + Send>>;
 
 /// Gives a machine the functions that do not wait.
 fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
-    let mut define = |name: &str, function: fn(Arguments, &Sockets) -> Result<Datum, Failure>| {
+    let mut define = |name: &str, function: fn(CallArguments, &Sockets) -> Result<Datum, HostFailure>| {
         let sockets = sockets.clone();
-        let function = move |arguments: &[Datum]| function(Arguments(arguments.to_vec()), &sockets);
+        let function = move |arguments: &[Datum]| function(CallArguments(arguments.to_vec()), &sockets);
         machine.add_host_function(name, HostFunction::AtOnce(Box::new(function)));
     };
-    define("%SOCKET-NEW", |_, sockets| Ok(integer(sockets.add(Kind::New, 0, String::new()))));
+    define("%SOCKET-NEW", |_, sockets| Ok(integer(sockets.add(SocketKind::New, 0, String::new()))));
     define("%SOCKET-CLOSE", |arguments, sockets| {
         sockets.close(arguments.integer(0)?);
         Ok(nil())
@@ -310,7 +314,7 @@ fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
         Ok(connection.take(|arrived| arrived.take_bytes(limit)))
     });
     define("%SOCKET-ACCEPTED", |arguments, sockets| match sockets.get(arguments.integer(0)?)?.kind {
-        Kind::Listener(_, accepted) => Ok(lock(&accepted).pop_front().map_or_else(nil, integer)),
+        SocketKind::Listener(_, accepted) => Ok(lock(&accepted).pop_front().map_or_else(nil, integer)),
         _ => Err(failure("SOCKET-ERROR", "it is no listener")),
     });
     define("%BYTES-OF-TEXT", |arguments, _| Ok(text_of_bytes(arguments.text(0)?.as_bytes())));
@@ -331,7 +335,7 @@ fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
 
 /// `%SOCKET-CONNECT`: number, address, milliseconds, and for TLS the name of the server and a file of
 /// certificates.
-async fn connect(arguments: Arguments, sockets: Sockets) -> Answer {
+async fn connect(arguments: CallArguments, sockets: Sockets) -> Completion {
     let (number, address) = (arguments.integer(0)?, arguments.text(1)?);
     let server_name = arguments.text_if_any(3)?;
     let ca_file = arguments.text_if_any(4)?;
@@ -363,7 +367,7 @@ async fn secured(
     stream: TcpStream,
     server_name: Option<String>,
     ca_file: Option<String>,
-) -> Result<(Kind, i64, String), Failure> {
+) -> Result<(SocketKind, i64, String), HostFailure> {
     let Some(name) = server_name else { return Ok(Connection::of_tcp(stream)) };
     let (port, peer) = Connection::ends_of(&stream);
     Ok((Connection::secured(crate::tls::begin(stream, &name, ca_file).await?), port, peer))
@@ -375,7 +379,7 @@ async fn secured(
     stream: TcpStream,
     server_name: Option<String>,
     _ca_file: Option<String>,
-) -> Result<(Kind, i64, String), Failure> {
+) -> Result<(SocketKind, i64, String), HostFailure> {
     match server_name {
         None => Ok(Connection::of_tcp(stream)),
         Some(_) => Err(failure("TLS-ERROR", "this program was built without TLS")),
@@ -383,21 +387,21 @@ async fn secured(
 }
 
 /// `%SOCKET-LISTEN`: number, address.
-async fn listen(arguments: Arguments, sockets: Sockets) -> Answer {
+async fn listen(arguments: CallArguments, sockets: Sockets) -> Completion {
     let listener = TcpListener::bind(arguments.text(1)?).await.map_err(|error| bind_failure(&error))?;
     let port = listener.local_addr().map_or(0, |address| address.port().into());
-    let kind = Kind::Listener(Arc::new(Listener::Tcp(listener)), Arc::default());
+    let kind = SocketKind::Listener(Arc::new(Listener::Tcp(listener)), Arc::default());
     sockets.set(arguments.integer(0)?, kind, port, String::new())
 }
 
 /// Returns the failure for an address that cannot be used here.
-fn bind_failure(error: &Error) -> Failure {
+fn bind_failure(error: &Error) -> HostFailure {
     // What the resolver says is no error of the system.
     if error.raw_os_error().is_none() { failure("HOST-NOT-FOUND", error) } else { socket_failure(error) }
 }
 
 #[cfg(unix)]
-async fn connect_unix(arguments: Arguments, sockets: Sockets) -> Answer {
+async fn connect_unix(arguments: CallArguments, sockets: Sockets) -> Completion {
     let (number, path) = (arguments.integer(0)?, arguments.text(1)?);
     let stream = tokio::net::UnixStream::connect(&path).await.map_err(|error| socket_failure(&error))?;
     let (reader, writer) = stream.into_split();
@@ -405,17 +409,17 @@ async fn connect_unix(arguments: Arguments, sockets: Sockets) -> Answer {
 }
 
 #[cfg(unix)]
-async fn listen_unix(arguments: Arguments, sockets: Sockets) -> Answer {
+async fn listen_unix(arguments: CallArguments, sockets: Sockets) -> Completion {
     let (number, path) = (arguments.integer(0)?, arguments.text(1)?);
     let listener = tokio::net::UnixListener::bind(&path).map_err(|error| socket_failure(&error))?;
-    let kind = Kind::Listener(Arc::new(Listener::Unix(listener, path.into())), Arc::default());
+    let kind = SocketKind::Listener(Arc::new(Listener::Unix(listener, path.into())), Arc::default());
     sockets.set(number, kind, 0, String::new())
 }
 
 /// `%SOCKET-ACCEPT`: waits until a connection is there to be taken.
-async fn accept(arguments: Arguments, sockets: Sockets) -> Answer {
+async fn accept(arguments: CallArguments, sockets: Sockets) -> Completion {
     let socket = sockets.get(arguments.integer(0)?)?;
-    let Kind::Listener(listener, accepted) = &socket.kind else {
+    let SocketKind::Listener(listener, accepted) = &socket.kind else {
         return Err(failure("SOCKET-ERROR", "it is no listener"));
     };
     if !lock(accepted).is_empty() {
@@ -442,7 +446,7 @@ async fn accept(arguments: Arguments, sockets: Sockets) -> Answer {
 }
 
 /// `%SOCKET-AWAIT`: waits until there is something to be taken.
-async fn wait(arguments: Arguments, sockets: Sockets) -> Answer {
+async fn wait(arguments: CallArguments, sockets: Sockets) -> Completion {
     let socket = sockets.get(arguments.integer(0)?)?;
     let connection = socket.connection()?;
     socket.unless_closed(connection.wait()).await?;
@@ -450,7 +454,7 @@ async fn wait(arguments: Arguments, sockets: Sockets) -> Answer {
 }
 
 /// `%SOCKET-WRITE`: number, text, whether its characters are bytes.
-async fn write(arguments: Arguments, sockets: Sockets) -> Answer {
+async fn write(arguments: CallArguments, sockets: Sockets) -> Completion {
     let socket = sockets.get(arguments.integer(0)?)?;
     let connection = socket.connection()?;
     let text = arguments.text(1)?;
@@ -468,14 +472,14 @@ async fn write(arguments: Arguments, sockets: Sockets) -> Answer {
 }
 
 /// `%UDP-OPEN`: number, address.
-async fn open_udp(arguments: Arguments, sockets: Sockets) -> Answer {
+async fn open_udp(arguments: CallArguments, sockets: Sockets) -> Completion {
     let socket = UdpSocket::bind(arguments.text(1)?).await.map_err(|error| bind_failure(&error))?;
     let port = socket.local_addr().map_or(0, |address| address.port().into());
-    sockets.set(arguments.integer(0)?, Kind::Udp(Arc::new(socket), Arc::default()), port, String::new())
+    sockets.set(arguments.integer(0)?, SocketKind::Udp(Arc::new(socket), Arc::default()), port, String::new())
 }
 
 /// `%UDP-SEND`: number, address, text, whether its characters are bytes.
-async fn send(arguments: Arguments, sockets: Sockets) -> Answer {
+async fn send(arguments: CallArguments, sockets: Sockets) -> Completion {
     let (socket, _) = sockets.get(arguments.integer(0)?)?.datagrams()?;
     let (address, text) = (arguments.text(1)?, arguments.text(2)?);
     let bytes = if arguments.is_true(3) { bytes_of(&text) } else { text.into_bytes() };
@@ -484,7 +488,7 @@ async fn send(arguments: Arguments, sockets: Sockets) -> Answer {
 }
 
 /// `%UDP-AWAIT`: waits until there is a datagram to be taken.
-async fn wait_for_datagram(arguments: Arguments, sockets: Sockets) -> Answer {
+async fn wait_for_datagram(arguments: CallArguments, sockets: Sockets) -> Completion {
     let socket = sockets.get(arguments.integer(0)?)?;
     let (udp, datagrams) = socket.datagrams()?;
     if !lock(&datagrams).is_empty() {

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-use esl_vm::host::Failure;
+use esl_vm::host::HostFailure;
 use tokio::net::TcpStream;
 use tokio_rustls::TlsConnector;
 use tokio_rustls::client::TlsStream;
@@ -14,7 +14,7 @@ use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 
 use crate::data::failure;
 
-fn tls_failure(reason: impl ToString) -> Failure {
+fn tls_failure(reason: impl ToString) -> HostFailure {
     failure("TLS-ERROR", reason)
 }
 
@@ -59,7 +59,7 @@ pub(crate) async fn begin(
     stream: TcpStream,
     name: &str,
     ca_file: Option<String>,
-) -> Result<TlsStream<TcpStream>, Failure> {
+) -> Result<TlsStream<TcpStream>, HostFailure> {
     let load = move || match ca_file {
         Some(path) => config_of_file(Path::new(&path)),
         None => config_of_system(),

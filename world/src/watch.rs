@@ -1,18 +1,18 @@
 //! Watching paths: what is made, changed and removed there.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{Failure, Right};
+use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
 use notify::event::ModifyKind;
 use notify::{Event, EventKind, RecommendedWatcher, RecursiveMode, Watcher};
 use tokio::sync::Notify;
 
-use crate::data::{Arguments, failure, integer, nil, text};
+use crate::data::{CallArguments, Numbered, failure, integer, nil, text};
 use crate::operation::define;
 
 /// Most changes that are kept for the program.
@@ -74,15 +74,15 @@ struct Watched {
 
 /// The watched paths of a machine, by number, and the greatest number so far.
 #[derive(Clone, Default)]
-struct Watches(Arc<Mutex<(i64, HashMap<i64, Option<Watched>>)>>);
+struct Watches(Arc<Mutex<Numbered<Watched>>>);
 
 impl Watches {
-    fn lock(&self) -> MutexGuard<'_, (i64, HashMap<i64, Option<Watched>>)> {
+    fn lock(&self) -> MutexGuard<'_, Numbered<Watched>> {
         // As above.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn get(&self, number: i64) -> Result<Arc<Changes>, Failure> {
+    fn get(&self, number: i64) -> Result<Arc<Changes>, HostFailure> {
         let watches = self.lock();
         let watched = watches.1.get(&number).and_then(Option::as_ref);
         watched.map(|watched| watched.changes.clone()).ok_or_else(|| failure("CANCELLED", ""))
@@ -92,11 +92,12 @@ impl Watches {
 /// Gives a machine the operations of `watch-path`.
 pub(crate) fn install(machine: &mut Vm) {
     let watches = Watches::default();
-    let mut define_immediate = |name: &str, function: fn(Arguments, &Watches) -> Result<Datum, Failure>| {
-        let watches = watches.clone();
-        let function = move |arguments: &[Datum]| function(Arguments(arguments.to_vec()), &watches);
-        machine.add_host_function(name, HostFunction::AtOnce(Box::new(function)));
-    };
+    let mut define_immediate =
+        |name: &str, function: fn(CallArguments, &Watches) -> Result<Datum, HostFailure>| {
+            let watches = watches.clone();
+            let function = move |arguments: &[Datum]| function(CallArguments(arguments.to_vec()), &watches);
+            machine.add_host_function(name, HostFunction::AtOnce(Box::new(function)));
+        };
     define_immediate("%WATCH-NEW", |_, watches| {
         let mut watches = watches.lock();
         watches.0 += 1;

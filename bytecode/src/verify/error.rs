@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::state::EntryKind;
+use super::state::VerifiedEntry;
 use crate::module::{FunctionNumber, MAX_CAPTURES, MAX_CODE, MAX_CONTROL, MAX_REGISTERS, PoolIdx};
 
 /// Why a module is refused.
@@ -110,12 +110,12 @@ pub enum Fault {
         /// Expected kind.
         expected: &'static str,
         /// Kind found.
-        found: Option<EntryKind>,
+        found: Option<VerifiedEntry>,
     },
     /// V9: fewer bindings were made since the innermost entry.
     UnbindCount(u8),
     /// V9: entries still stand.
-    StandingEntry(EntryKind),
+    StandingEntry(VerifiedEntry),
     /// V9: bindings are still in force.
     StandingBindings(u32),
     /// V9: paths that come together have different entries or numbers of bindings.
@@ -255,18 +255,18 @@ impl fmt::Display for Fault {
     }
 }
 
-impl fmt::Display for EntryKind {
+impl fmt::Display for VerifiedEntry {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            EntryKind::Catch => "a catch",
-            EntryKind::Cleanup => "a cleanup",
-            EntryKind::RunningCleanup => "a running cleanup",
-            EntryKind::Recovery => "recovery procedures",
-            EntryKind::FailureCleanup => "a cleanup for failures",
-            EntryKind::HandlerCase => "a handler-case",
-            EntryKind::Handlers => "handlers",
-            EntryKind::Mask => "a mask",
-            EntryKind::Scope => "a scope",
+            VerifiedEntry::Catch => "a catch",
+            VerifiedEntry::Cleanup => "a cleanup",
+            VerifiedEntry::RunningCleanup => "a running cleanup",
+            VerifiedEntry::Recovery => "recovery procedures",
+            VerifiedEntry::FailureCleanup => "a cleanup for failures",
+            VerifiedEntry::HandlerCase => "a handler-case",
+            VerifiedEntry::Handlers => "handlers",
+            VerifiedEntry::Mask => "a mask",
+            VerifiedEntry::Scope => "a scope",
         })
     }
 }

@@ -11,9 +11,9 @@ use super::error::{Fault, FaultPlace, VerifyError};
 use super::pool;
 use super::registers::{Class, Registers};
 use super::shape::CodeShape;
-use super::state::{EntryKind, KnownEntry, LandingState, State};
+use super::state::{KnownEntry, LandingState, PlaceState, VerifiedEntry};
 use crate::module::{CaptureSource, Constant, Function, FunctionNumber, MAX_CONTROL, Module, Parameters};
-use crate::opcode::{Call, Instr, RegisterAccess, Substitute};
+use crate::opcode::{CallOperands, Instr, RegisterAccess, Substitute};
 use crate::operand::{Count, FunctionIdx, Role, Want, Window};
 
 /// Work for each instruction: how often it may be gone through, times the control entries that then stand.
@@ -44,7 +44,7 @@ struct Flow<'a> {
     function: &'a Function,
     shape: &'a CodeShape,
     /// For words that control gets to from elsewhere: what is known there.
-    states: Vec<Option<Box<State>>>,
+    states: Vec<Option<Box<PlaceState>>>,
     /// Words whose state has changed since they were gone through.
     pending: BTreeSet<usize>,
     /// How much may still be done.
@@ -55,7 +55,7 @@ struct Flow<'a> {
 
 impl Flow<'_> {
     fn run(&mut self) -> Result<(), (usize, Fault)> {
-        let entry = State::new(on_entry(&self.function.parameters));
+        let entry = PlaceState::new(on_entry(&self.function.parameters));
         self.arrive(0, &entry).map_err(|fault| (0, fault))?;
         while let Some(pc) = self.pending.pop_first() {
             self.run_from(pc)?;
@@ -89,7 +89,7 @@ impl Flow<'_> {
     }
 
     /// Control comes to `pc` with `state`.
-    fn arrive(&mut self, pc: usize, state: &State) -> Result<(), Fault> {
+    fn arrive(&mut self, pc: usize, state: &PlaceState) -> Result<(), Fault> {
         let changed = match &mut self.states[pc] {
             Some(known) => {
                 let before = known.weight();
@@ -99,7 +99,7 @@ impl Flow<'_> {
             }
             unknown @ None => {
                 self.weight += state.weight();
-                *unknown = Some(Box::new(State { lost: false, ..state.clone() }));
+                *unknown = Some(Box::new(PlaceState { lost: false, ..state.clone() }));
                 true
             }
         };
@@ -113,13 +113,13 @@ impl Flow<'_> {
     }
 
     /// Control may leave the straight path for `to`.
-    fn jump(&mut self, state: &mut State, to: usize) -> Result<(), Fault> {
+    fn jump(&mut self, state: &mut PlaceState, to: usize) -> Result<(), Fault> {
         self.tell_landings(state)?;
         self.arrive(to, state)
     }
 
     /// If something was lost that code relies on at which entries land, that code is told.
-    fn tell_landings(&mut self, state: &mut State) -> Result<(), Fault> {
+    fn tell_landings(&mut self, state: &mut PlaceState) -> Result<(), Fault> {
         if std::mem::take(&mut state.lost) {
             for at in 0..state.entries.len() {
                 self.land(state, at)?;
@@ -129,7 +129,7 @@ impl Flow<'_> {
     }
 
     /// An unwinding may end at entry `at`.
-    fn land(&mut self, state: &State, at: usize) -> Result<(), Fault> {
+    fn land(&mut self, state: &PlaceState, at: usize) -> Result<(), Fault> {
         if let Some(landing) = state.entries[at].landing {
             let landed = state.landed(at, landing);
             self.charge(landed.weight())?;
@@ -144,7 +144,7 @@ impl Flow<'_> {
     }
 
     /// Works `instr` on `state`, and says whether control goes on with the next instruction.
-    fn step(&mut self, state: &mut State, instr: Instr, next: usize) -> Result<bool, Fault> {
+    fn step(&mut self, state: &mut PlaceState, instr: Instr, next: usize) -> Result<bool, Fault> {
         let value_list = state.registers.value_list;
         if instr.opcode().substitute() != Substitute::Silent {
             // A recovery may have run.
@@ -219,7 +219,7 @@ impl Flow<'_> {
             Instr::BindList { symbols, values } => {
                 read(state, symbols.0)?;
                 read(state, values.0)?;
-                expect_entry(state, EntryKind::Scope, "a scope")?;
+                expect_entry(state, VerifiedEntry::Scope, "a scope")?;
                 // Only popping the scope undoes these, and so whatever lies under them.
                 state.bindings = 0;
             }
@@ -258,48 +258,48 @@ impl Flow<'_> {
                 read(state, tag.0)?;
                 let (results, value_list) = (want.registers(), want == Want::ALL);
                 let landing = LandingState { to: target(next, to.0) as u32, results, value_list };
-                self.push(state, EntryKind::Catch, window, Some(landing))?;
+                self.push(state, VerifiedEntry::Catch, window, Some(landing))?;
             }
             Instr::PushCleanup { window, to } => {
                 let landing = LandingState { to: target(next, to.0) as u32, results: 0, value_list: false };
-                self.push(state, EntryKind::Cleanup, window, Some(landing))?;
+                self.push(state, VerifiedEntry::Cleanup, window, Some(landing))?;
             }
             Instr::PushRecovery { window, state: table, to } => {
                 read(state, table.0)?;
                 let landing = LandingState { to: target(next, to.0) as u32, results: 2, value_list: false };
-                self.push(state, EntryKind::Recovery, window, Some(landing))?;
+                self.push(state, VerifiedEntry::Recovery, window, Some(landing))?;
             }
             Instr::PushFailureCleanup { window, to } => {
                 let landing = LandingState { to: target(next, to.0) as u32, results: 0, value_list: false };
-                self.push(state, EntryKind::FailureCleanup, window, Some(landing))?;
+                self.push(state, VerifiedEntry::FailureCleanup, window, Some(landing))?;
             }
             Instr::PushHandlerCase { window, to, .. } => {
                 let landing = LandingState { to: target(next, to.0) as u32, results: 2, value_list: false };
-                self.push(state, EntryKind::HandlerCase, window, Some(landing))?;
+                self.push(state, VerifiedEntry::HandlerCase, window, Some(landing))?;
             }
             Instr::PushHandlers { window, handlers } => {
                 read(state, handlers.0)?;
-                self.push(state, EntryKind::Handlers, window, None)?;
+                self.push(state, VerifiedEntry::Handlers, window, None)?;
             }
             Instr::PushMask { window, from } => {
                 read(state, from.0)?;
-                self.push(state, EntryKind::Mask, window, None)?;
+                self.push(state, VerifiedEntry::Mask, window, None)?;
             }
-            Instr::PushScope { window } => self.push(state, EntryKind::Scope, window, None)?,
+            Instr::PushScope { window } => self.push(state, VerifiedEntry::Scope, window, None)?,
             Instr::PopControl { count } => pop(state, count)?,
             Instr::EnterCleanup {} => {
-                expect_entry(state, EntryKind::Cleanup, "a cleanup")?;
+                expect_entry(state, VerifiedEntry::Cleanup, "a cleanup")?;
                 expect_no_bindings(state)?;
                 let entered = Box::new(state.registers.clone());
                 if let Some(entry) = state.entries.last_mut() {
-                    entry.kind = EntryKind::RunningCleanup;
+                    entry.kind = VerifiedEntry::RunningCleanup;
                     entry.landing = None;
                     entry.entered = Some(entered);
                 }
                 state.registers.value_list = false;
             }
             Instr::EndCleanup {} => {
-                expect_entry(state, EntryKind::RunningCleanup, "a running cleanup")?;
+                expect_entry(state, VerifiedEntry::RunningCleanup, "a running cleanup")?;
                 expect_no_bindings(state)?;
                 let Some(entry) = state.entries.pop() else { return Ok(false) };
                 state.bindings = entry.bindings_below;
@@ -319,7 +319,7 @@ impl Flow<'_> {
     }
 
     /// Checks an instruction whose operands tell everything: reads, then writes, then perhaps a jump.
-    fn step_plain(&mut self, state: &mut State, instr: Instr, next: usize) -> Result<bool, Fault> {
+    fn step_plain(&mut self, state: &mut PlaceState, instr: Instr, next: usize) -> Result<bool, Fault> {
         let (mut fault, mut distance) = (None, None);
         instr.visit_registers(|access| {
             if let RegisterAccess::Read { first, count } = access {
@@ -349,7 +349,7 @@ impl Flow<'_> {
         Ok(instr.opcode().falls_through())
     }
 
-    fn make_closure(&self, state: &mut State, dst: u8, operand: FunctionIdx) -> Result<(), Fault> {
+    fn make_closure(&self, state: &mut PlaceState, dst: u8, operand: FunctionIdx) -> Result<(), Fault> {
         let found = u32::from(operand.0);
         let count = self.function.constants.len();
         let index = *self.function.constants.get(found as usize).ok_or(Fault::Constant { found, count })?;
@@ -380,8 +380,8 @@ impl Flow<'_> {
 
     fn push(
         &mut self,
-        state: &mut State,
-        kind: EntryKind,
+        state: &mut PlaceState,
+        kind: VerifiedEntry,
         window: Window,
         landing: Option<LandingState>,
     ) -> Result<(), Fault> {
@@ -415,7 +415,7 @@ fn target(next: usize, distance: i32) -> usize {
 }
 
 /// Returns the contents of `register`, if it may be read at all.
-fn readable(state: &State, register: u8) -> Result<Class, Fault> {
+fn readable(state: &PlaceState, register: u8) -> Result<Class, Fault> {
     match state.registers.class(register) {
         Some(Class::MaybeUnsupplied) => Err(Fault::MaybeUnsupplied(register)),
         Some(class) => Ok(class),
@@ -424,7 +424,7 @@ fn readable(state: &State, register: u8) -> Result<Class, Fault> {
 }
 
 /// Checks that `register` holds an object of the program.
-fn read(state: &State, register: u8) -> Result<(), Fault> {
+fn read(state: &PlaceState, register: u8) -> Result<(), Fault> {
     match readable(state, register)? {
         Class::Box => Err(Fault::Box(register)),
         _ => Ok(()),
@@ -432,18 +432,18 @@ fn read(state: &State, register: u8) -> Result<(), Fault> {
 }
 
 /// Checks that `register` holds a box.
-fn read_box(state: &State, register: u8) -> Result<(), Fault> {
+fn read_box(state: &PlaceState, register: u8) -> Result<(), Fault> {
     match readable(state, register)? {
         Class::Box => Ok(()),
         _ => Err(Fault::NotBox(register)),
     }
 }
 
-fn read_all(state: &State, first: u8, count: Count) -> Result<(), Fault> {
+fn read_all(state: &PlaceState, first: u8, count: Count) -> Result<(), Fault> {
     (0..count.0).try_for_each(|i| read(state, first + i))
 }
 
-fn assign(state: &mut State, first: u8, count: u8) {
+fn assign(state: &mut PlaceState, first: u8, count: u8) {
     for i in 0..count {
         state.set(first + i, Some(Class::Value));
     }
@@ -451,7 +451,10 @@ fn assign(state: &mut State, first: u8, count: u8) {
 
 /// Checks a call with the arguments of a window, which clobbers the registers above it. Returns whether
 /// control continues with the next instruction.
-fn call(state: &mut State, Call { callee, window, count, want }: Call) -> Result<bool, Fault> {
+fn call(
+    state: &mut PlaceState,
+    CallOperands { callee, window, count, want }: CallOperands,
+) -> Result<bool, Fault> {
     if callee.is_in_window() {
         read(state, window.0)?;
     }
@@ -464,11 +467,14 @@ fn call(state: &mut State, Call { callee, window, count, want }: Call) -> Result
     Ok(true)
 }
 
-fn pop(state: &mut State, Count(count): Count) -> Result<(), Fault> {
+fn pop(state: &mut PlaceState, Count(count): Count) -> Result<(), Fault> {
     for _ in 0..count {
         match state.entries.pop() {
             None => return Err(Fault::PopCount(count)),
-            Some(KnownEntry { kind: found @ (EntryKind::Cleanup | EntryKind::RunningCleanup), .. }) => {
+            Some(KnownEntry {
+                kind: found @ (VerifiedEntry::Cleanup | VerifiedEntry::RunningCleanup),
+                ..
+            }) => {
                 let expected = "an entry that may be popped";
                 return Err(Fault::Entry { expected, found: Some(found) });
             }
@@ -479,14 +485,14 @@ fn pop(state: &mut State, Count(count): Count) -> Result<(), Fault> {
 }
 
 /// Control leaves the function: it does not go on with the next instruction.
-fn leave(state: &State) -> Result<bool, Fault> {
+fn leave(state: &PlaceState) -> Result<bool, Fault> {
     match state.entries.last() {
         Some(entry) => Err(Fault::StandingEntry(entry.kind)),
         None => expect_no_bindings(state).map(|()| false),
     }
 }
 
-fn expect_no_bindings(state: &State) -> Result<(), Fault> {
+fn expect_no_bindings(state: &PlaceState) -> Result<(), Fault> {
     if state.bindings == 0 { Ok(()) } else { Err(Fault::StandingBindings(state.bindings)) }
 }
 
@@ -494,12 +500,12 @@ fn expect_value_list(set: bool) -> Result<(), Fault> {
     if set { Ok(()) } else { Err(Fault::ValueList) }
 }
 
-fn expect_entry(state: &State, kind: EntryKind, expected: &'static str) -> Result<(), Fault> {
+fn expect_entry(state: &PlaceState, kind: VerifiedEntry, expected: &'static str) -> Result<(), Fault> {
     let found = state.entries.last().map(|entry| entry.kind);
     if found == Some(kind) { Ok(()) } else { Err(Fault::Entry { expected, found }) }
 }
 
-fn expect_window(state: &State, Window(window): Window) -> Result<(), Fault> {
+fn expect_window(state: &PlaceState, Window(window): Window) -> Result<(), Fault> {
     let entry = state.floor();
     if window < entry { Err(Fault::WindowBelowEntry { window, entry }) } else { Ok(()) }
 }

@@ -89,7 +89,7 @@ mod state;
 
 pub use error::{Fault, FaultPlace, VerifyError};
 pub use pool::MAX_RATIO_BITS;
-pub use state::EntryKind;
+pub use state::VerifiedEntry;
 
 #[allow(unused_imports, reason = "named by the text above")]
 use crate::module::{CaptureSource, Constant, MAX_CAPTURES, MAX_CODE, MAX_CONTROL, MAX_REGISTERS};

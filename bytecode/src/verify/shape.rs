@@ -7,7 +7,7 @@ use crate::builtin::Builtin;
 use crate::module::{
     Constant, Function, FunctionNumber, MAX_CAPTURES, MAX_CODE, MAX_REGISTERS, Module, PoolIdx,
 };
-use crate::opcode::{Call, CallTarget, Instr, Opcode, RegisterAccess, TypeCode};
+use crate::opcode::{CallOperands, CallTarget, Instr, Opcode, RegisterAccess, TypeCode};
 use crate::operand::{Count, Role, Want};
 
 /// Where instructions begin, and to which of them control may come from elsewhere than the one before.
@@ -239,7 +239,11 @@ impl Check<'_> {
 
     /// A call needs arguments that its callee takes, as far as that is known, and room for a callee, a link
     /// word, the arguments and the results.
-    fn call(self, instr: Instr, Call { callee, window, count, want }: Call) -> Result<(), Fault> {
+    fn call(
+        self,
+        instr: Instr,
+        CallOperands { callee, window, count, want }: CallOperands,
+    ) -> Result<(), Fault> {
         let takes_them = match callee {
             CallTarget::Given | CallTarget::Global => true,
             CallTarget::Running => {

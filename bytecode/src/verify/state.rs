@@ -6,7 +6,7 @@ use super::registers::{Class, Registers};
 
 /// The kind of a control entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EntryKind {
+pub enum VerifiedEntry {
     /// Of `push-catch`.
     Catch,
     /// Of `push-cleanup`, before it runs.
@@ -41,7 +41,7 @@ pub(super) struct LandingState {
 /// A control entry.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct KnownEntry {
-    pub(super) kind: EntryKind,
+    pub(super) kind: VerifiedEntry,
     pub(super) window: u8,
     /// Bindings made before it was pushed, since the entry below it.
     pub(super) bindings_below: u32,
@@ -53,7 +53,7 @@ pub(super) struct KnownEntry {
 
 /// Facts that hold at one place.
 #[derive(Clone, Debug)]
-pub(super) struct State {
+pub(super) struct PlaceState {
     pub(super) registers: Registers,
     /// Bindings made since the innermost entry.
     pub(super) bindings: u32,
@@ -64,10 +64,10 @@ pub(super) struct State {
     pub(super) lost: bool,
 }
 
-impl State {
+impl PlaceState {
     /// Returns a frame of which nothing is known but `registers`.
-    pub(super) fn new(registers: Registers) -> State {
-        State { registers, bindings: 0, entries: Vec::new(), lost: false }
+    pub(super) fn new(registers: Registers) -> PlaceState {
+        PlaceState { registers, bindings: 0, entries: Vec::new(), lost: false }
     }
 
     /// Registers below this one are to be kept for landings.
@@ -104,9 +104,9 @@ impl State {
     }
 
     /// Returns the state in which an unwinding leaves the frame that ends at entry `at`, which has a landing.
-    pub(super) fn landed(&self, at: usize, landing: LandingState) -> State {
+    pub(super) fn landed(&self, at: usize, landing: LandingState) -> PlaceState {
         let entry = &self.entries[at];
-        let mut state = State {
+        let mut state = PlaceState {
             registers: self.registers.clone(),
             bindings: entry.bindings_below,
             entries: self.entries[..at].to_vec(),
@@ -117,16 +117,16 @@ impl State {
             state.set(register, Some(Class::Value));
         }
         state.registers.value_list = landing.value_list;
-        if matches!(entry.kind, EntryKind::Cleanup | EntryKind::FailureCleanup) {
+        if matches!(entry.kind, VerifiedEntry::Cleanup | VerifiedEntry::FailureCleanup) {
             // A cleanup for a failure goes on behind its end, with the failure in the value list.
-            let entered = (entry.kind == EntryKind::FailureCleanup).then(|| {
+            let entered = (entry.kind == VerifiedEntry::FailureCleanup).then(|| {
                 let mut registers = state.registers.clone();
                 registers.value_list = true;
                 Box::new(registers)
             });
             state.bindings = 0;
             state.entries.push(KnownEntry {
-                kind: EntryKind::RunningCleanup,
+                kind: VerifiedEntry::RunningCleanup,
                 landing: None,
                 entered,
                 ..entry.clone()
@@ -136,7 +136,7 @@ impl State {
     }
 
     /// Only what holds in `other` too is known; says whether anything is not any more.
-    pub(super) fn meet(&mut self, other: &State) -> Result<bool, Fault> {
+    pub(super) fn meet(&mut self, other: &PlaceState) -> Result<bool, Fault> {
         if self.entries.len() != other.entries.len() || self.bindings != other.bindings {
             return Err(Fault::PathsDisagree);
         }

@@ -337,15 +337,15 @@ fn v9_entries_are_popped_in_order_and_by_their_own() {
     let scoped = |code: &str| format!("load-nil r0.. 2 \n push-scope r2.. \n {code} \n return r0");
     check(&scoped("pop-control 1"), Ok(()));
     check(&scoped("pop-control 2"), Err(Fault::PopCount(2)));
-    check(&scoped(""), Err(Fault::StandingEntry(EntryKind::Scope)));
-    check(&scoped("tail-call-global r3.. 0 k0"), Err(Fault::StandingEntry(EntryKind::Scope)));
-    check(&scoped("return-values r0 0"), Err(Fault::StandingEntry(EntryKind::Scope)));
-    check(&scoped("set-values r0.. 1 \n return-all"), Err(Fault::StandingEntry(EntryKind::Scope)));
+    check(&scoped(""), Err(Fault::StandingEntry(VerifiedEntry::Scope)));
+    check(&scoped("tail-call-global r3.. 0 k0"), Err(Fault::StandingEntry(VerifiedEntry::Scope)));
+    check(&scoped("return-values r0 0"), Err(Fault::StandingEntry(VerifiedEntry::Scope)));
+    check(&scoped("set-values r0.. 1 \n return-all"), Err(Fault::StandingEntry(VerifiedEntry::Scope)));
     check(&scoped("bind-list r0 r1 \n pop-control 1"), Ok(()));
-    check(&scoped("push-mask r2.. r0 \n bind-list r0 r1"), found("a scope", Some(EntryKind::Mask)));
+    check(&scoped("push-mask r2.. r0 \n bind-list r0 r1"), found("a scope", Some(VerifiedEntry::Mask)));
     check("load-nil r0.. 2 \n bind-list r0 r1 \n return r0", found("a scope", None));
-    check(&scoped("enter-cleanup"), found("a cleanup", Some(EntryKind::Scope)));
-    check(&scoped("end-cleanup"), found("a running cleanup", Some(EntryKind::Scope)));
+    check(&scoped("enter-cleanup"), found("a cleanup", Some(VerifiedEntry::Scope)));
+    check(&scoped("end-cleanup"), found("a running cleanup", Some(VerifiedEntry::Scope)));
     check(&scoped("push-handlers r2.. r0 \n pop-control 2"), Ok(()));
     check(&scoped("jump-if-nil r0 L1 \n pop-control 1 \n L1:"), Err(Fault::PathsDisagree));
     check(&scoped("L1: push-scope r2.. \n loop L1"), Err(Fault::PathsDisagree));
@@ -378,17 +378,20 @@ fn v9_cleanups_run() {
     let cleanup = |code: &str| format!("load-nil r0.. 2 \n push-cleanup r2.. L1 \n {code} \n return r0");
     check(&cleanup("enter-cleanup \n L1: end-cleanup"), Ok(()));
     check(&cleanup("bind r0 k0 \n unbind 1 \n enter-cleanup \n L1: end-cleanup"), Ok(()));
-    let popped = found("an entry that may be popped", Some(EntryKind::Cleanup));
+    let popped = found("an entry that may be popped", Some(VerifiedEntry::Cleanup));
     check(&cleanup("pop-control 1 \n L1: end-cleanup"), popped);
-    let popped = found("an entry that may be popped", Some(EntryKind::RunningCleanup));
+    let popped = found("an entry that may be popped", Some(VerifiedEntry::RunningCleanup));
     check(&cleanup("enter-cleanup \n L1: pop-control 1"), popped);
-    check(&cleanup("enter-cleanup \n L1: return r0"), Err(Fault::StandingEntry(EntryKind::RunningCleanup)));
+    check(
+        &cleanup("enter-cleanup \n L1: return r0"),
+        Err(Fault::StandingEntry(VerifiedEntry::RunningCleanup)),
+    );
     check(&cleanup("L1: return r0"), Err(Fault::PathsDisagree));
     check(&cleanup("bind r0 k0 \n enter-cleanup \n L1: end-cleanup"), Err(Fault::StandingBindings(1)));
     check(&cleanup("enter-cleanup \n L1: bind r0 k0 \n end-cleanup"), Err(Fault::StandingBindings(1)));
     check(
         &cleanup("enter-cleanup \n L1: enter-cleanup"),
-        found("a cleanup", Some(EntryKind::RunningCleanup)),
+        found("a cleanup", Some(VerifiedEntry::RunningCleanup)),
     );
     // Code for unwinding only does not go on after its end; code for the normal way does.
     let apart = "enter-cleanup \n end-cleanup \n return r0 \n L1: end-cleanup";
@@ -469,7 +472,7 @@ fn v10_inner_landings_keep_outer_entries() {
         )
     };
     check(&nested("pop-control 1 \n return r4"), Ok(()));
-    check(&nested("return r4"), Err(Fault::StandingEntry(EntryKind::Scope)));
+    check(&nested("return r4"), Err(Fault::StandingEntry(VerifiedEntry::Scope)));
 }
 
 #[test]

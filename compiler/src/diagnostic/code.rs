@@ -1,7 +1,7 @@
 //! The table of diagnostic codes: each with its severity, its meaning, a failing program and the same program
 //! repaired.
 //!
-//! Each row defines a constant. Every diagnostic is made by [`Code::at`] of such a constant, so no code is
+//! Each row defines a constant. Every diagnostic is made by [`DiagnosticCode::at`] of such a constant, so no code is
 //! reported that the table lacks; a test in `tests/diagnostics/table.rs` looks through the sources for other
 //! ways. `docs/diagnostics.md` is generated from the table. To add a code, add a row, run
 //! `ESL_BLESS=1 cargo test -p esl-compiler --test diagnostics`, and look at the difference.
@@ -13,7 +13,7 @@ use esl_bytecode::span::Span;
 
 /// A kind of diagnostic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Code {
+pub struct DiagnosticCode {
     /// The code itself, such as `unclosed-list`. Programs and tools look for codes, so they are not renamed.
     pub name: &'static str,
     /// Error or warning.
@@ -28,7 +28,7 @@ pub struct Code {
     pub repaired: &'static str,
 }
 
-impl Code {
+impl DiagnosticCode {
     /// Returns a diagnostic of this code at `span`.
     pub fn at(&self, span: Span, message: impl Into<String>) -> Diagnostic {
         Diagnostic::new(self.name, self.severity, message, span)
@@ -61,7 +61,7 @@ impl Stage {
 }
 
 /// Returns the code called `name`.
-pub fn find(name: &str) -> Option<&'static Code> {
+pub fn find(name: &str) -> Option<&'static DiagnosticCode> {
     ALL.iter().copied().find(|code| code.name == name)
 }
 
@@ -70,7 +70,7 @@ macro_rules! codes {
         #[doc = $summary:literal] fails: $failing:literal repaired: $repaired:literal)* })*) => {
         $($(
             #[doc = $summary]
-            pub const $constant: &Code = &Code {
+            pub const $constant: &DiagnosticCode = &DiagnosticCode {
                 name: $name,
                 severity: Severity::$severity,
                 stage: Stage::$stage,
@@ -81,7 +81,7 @@ macro_rules! codes {
         )*)*
 
         /// All codes, in the order of the table.
-        pub const ALL: &[&Code] = &[$($($constant),*),*];
+        pub const ALL: &[&DiagnosticCode] = &[$($($constant),*),*];
     };
 }
 

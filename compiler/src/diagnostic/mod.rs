@@ -11,7 +11,7 @@ mod json;
 pub mod render;
 pub mod source;
 
-pub use code::{Code, Stage};
+pub use code::{DiagnosticCode, Stage};
 pub use esl_bytecode::diagnostic::{Diagnostic, Label, Severity};
 pub use render::{Format, Renderer};
 pub use source::Sources;

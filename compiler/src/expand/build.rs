@@ -6,7 +6,7 @@ use esl_bytecode::symbol::Symbol;
 
 use super::chunk::{Chunk, OpenChunk, Purpose};
 use super::expander::{Expander, Stop};
-use super::job::{Job, To, Waiting};
+use super::job::{AwaitedOutcome, Job, To};
 use super::origin::OriginId;
 use super::scope::{FunctionMeaning, ScopeEntry};
 use crate::core::{
@@ -180,9 +180,9 @@ impl Expander {
             "all nodes are filled"
         );
         self.waiting = match purpose {
-            Purpose { keep: true, .. } => Waiting::Object(open.span),
-            Purpose { load: true, .. } => Waiting::Load(open.span),
-            _ => Waiting::Nothing,
+            Purpose { keep: true, .. } => AwaitedOutcome::Object(open.span),
+            Purpose { load: true, .. } => AwaitedOutcome::Load(open.span),
+            _ => AwaitedOutcome::Nothing,
         };
         self.stopped = Some(Stop::Chunk(Box::new(Chunk { core: open.core, purpose })));
     }

@@ -9,7 +9,7 @@ use super::expander::Expander;
 use super::form::{Checked, Form, Make, arguments, constant_value, is_cl_form, name};
 use super::function::{FunctionName, WrittenName};
 use super::global::{accepts, wrong_count};
-use super::job::{Job, To, Waiting};
+use super::job::{AwaitedOutcome, Job, To};
 use super::lambda_list::{LambdaList, LambdaListKind};
 use super::scope::{FunctionMeaning, Visible};
 use crate::core::{Callee, NodeId, NodeKind, VarId};
@@ -77,7 +77,7 @@ impl Expander {
             && let Some(compiler_macro) = compiler_macro.as_symbol()
         {
             let function = MacroRef::Global(compiler_macro.clone());
-            let waiting = |origin| Waiting::Call(form.clone(), To { origin, ..to });
+            let waiting = |origin| AwaitedOutcome::Call(form.clone(), To { origin, ..to });
             return self.stop_for_macro(function, &form, true, to.origin, waiting);
         }
         if global.locked && global.instead.is_some() {
@@ -93,7 +93,7 @@ impl Expander {
 
     /// Stops for the expansion of a macro call in a form.
     fn stop_for_form(&mut self, function: MacroRef, form: &Form, is_standard: bool, to: To) -> Checked {
-        let waiting = |origin| Waiting::Form(To { origin, ..to });
+        let waiting = |origin| AwaitedOutcome::Form(To { origin, ..to });
         self.stop_for_macro(function, form, is_standard, to.origin, waiting)
     }
 

@@ -6,7 +6,7 @@
 //! Invariants: jobs run in the order of the text, from left to right; exactly one job fills a hole; only jobs
 //! change the [`Scope`], never the code that looks at a form.
 
-use esl_bytecode::compile::{Answer, Environment, MacroCall, MacroRef, Work};
+use esl_bytecode::compile::{Environment, MacroCall, MacroRef, StepOutcome, Work};
 use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::span::Span;
@@ -17,7 +17,7 @@ use super::chunk::{Chunk, OpenChunk, Purpose};
 use super::failure::{FailurePlace, MacroFailure};
 use super::form::{Checked, Form, Make, is_known, name, span_of};
 use super::global::GlobalUses;
-use super::job::{Job, To, Top, Waiting};
+use super::job::{AwaitedOutcome, Job, To, Top};
 use super::origin::{OriginId, Origins};
 use super::scope::Scope;
 use super::setf::SetfExpansion;
@@ -40,10 +40,10 @@ pub(super) type Operator = fn(&mut Expander, &mut dyn Environment, Form, To) -> 
 /// Why the expander stopped.
 #[derive(Debug)]
 pub enum Stop {
-    /// A macro is to be run. Continue with [`Answer::Expansion`] or [`Answer::Failed`].
+    /// A macro is to be run. Continue with [`StepOutcome::Expansion`] or [`StepOutcome::Failed`].
     Macro(MacroCall),
-    /// A chunk is finished. If it is to be kept, continue with [`Answer::Object`] or [`Answer::Failed`]; if
-    /// it is to be loaded and that failed, with [`Answer::Failed`].
+    /// A chunk is finished. If it is to be kept, continue with [`StepOutcome::Object`] or [`StepOutcome::Failed`]; if
+    /// it is to be loaded and that failed, with [`StepOutcome::Failed`].
     Chunk(Box<Chunk>),
     /// The work that is allowed is done. Continue.
     More,
@@ -69,7 +69,7 @@ pub struct Expander {
     /// Functions of local macros that have no name yet; `None` for one whose definition failed.
     pub(super) objects: Vec<Option<ObjectId>>,
     /// What the next answer is about.
-    pub(super) waiting: Waiting,
+    pub(super) waiting: AwaitedOutcome,
     /// Form of the last macro call for which the expander stopped.
     call: Option<Datum>,
     /// Why the expander stops after the current job.
@@ -106,7 +106,7 @@ impl Expander {
             origins: Origins::default(),
             places: Vec::new(),
             objects: Vec::new(),
-            waiting: Waiting::Nothing,
+            waiting: AwaitedOutcome::Nothing,
             call: None,
             stopped: None,
             diagnostics: Vec::new(),
@@ -383,7 +383,7 @@ impl Expander {
         form: &Form,
         is_standard: bool,
         around: Option<OriginId>,
-        waiting: impl FnOnce(Option<OriginId>) -> Waiting,
+        waiting: impl FnOnce(Option<OriginId>) -> AwaitedOutcome,
     ) -> Checked {
         let origin = self.enter_origin(&form.operator, form.span, is_standard, around)?;
         self.waiting = waiting(origin);
@@ -394,61 +394,63 @@ impl Expander {
     }
 
     /// Takes the answer to the last stop.
-    pub fn answer(&mut self, answer: Answer) {
-        let waiting = std::mem::replace(&mut self.waiting, Waiting::Nothing);
+    pub fn answer(&mut self, answer: StepOutcome) {
+        let waiting = std::mem::replace(&mut self.waiting, AwaitedOutcome::Nothing);
         match (waiting, answer) {
-            (Waiting::Form(to), Answer::Expansion(form)) => self.jobs.push(Job::Expand(form, to)),
-            (Waiting::Call(call, to), Answer::Expansion(form)) => {
+            (AwaitedOutcome::Form(to), StepOutcome::Expansion(form)) => self.jobs.push(Job::Expand(form, to)),
+            (AwaitedOutcome::Call(call, to), StepOutcome::Expansion(form)) => {
                 // A compiler macro declines by returning the form itself.
                 let form = if form.is_same(&call.datum) { call.globally() } else { form };
                 self.jobs.push(Job::Expand(form, to));
             }
-            (Waiting::Call(call, to), _) => self.jobs.push(Job::Expand(call.globally(), to)),
-            (Waiting::Place(to), Answer::Expansion(form)) => self.jobs.push(Job::Place(form, to)),
-            (Waiting::SetfExpansion(place, to), Answer::Expansion(values)) => {
+            (AwaitedOutcome::Call(call, to), _) => self.jobs.push(Job::Expand(call.globally(), to)),
+            (AwaitedOutcome::Place(to), StepOutcome::Expansion(form)) => self.jobs.push(Job::Place(form, to)),
+            (AwaitedOutcome::SetfExpansion(place, to), StepOutcome::Expansion(values)) => {
                 let outcome = SetfExpansion::from_values(&place, &values, to.span);
                 match outcome {
                     Ok(place) => self.places.push(place),
                     Err(fault) => self.settle_place(Err(fault), to),
                 }
             }
-            (Waiting::TopLevel(top), Answer::Expansion(form)) => self.jobs.push(Job::TopLevel(form, top)),
-            (Waiting::Object(_), Answer::Object(object)) => self.objects.push(Some(object)),
-            (waiting, Answer::Failed(failure)) => {
+            (AwaitedOutcome::TopLevel(top), StepOutcome::Expansion(form)) => {
+                self.jobs.push(Job::TopLevel(form, top))
+            }
+            (AwaitedOutcome::Object(_), StepOutcome::Object(object)) => self.objects.push(Some(object)),
+            (waiting, StepOutcome::Failed(failure)) => {
                 self.waiting = waiting;
                 self.fail(&failure.into());
             }
-            (Waiting::Object(_), _) => self.objects.push(None),
+            (AwaitedOutcome::Object(_), _) => self.objects.push(None),
             // There is nothing to do, or the driver has mixed up its answers: the form stays as it is.
-            (Waiting::Form(to), _) => self.fill_nil(to),
-            (Waiting::Place(to) | Waiting::SetfExpansion(_, to), _) => {
+            (AwaitedOutcome::Form(to), _) => self.fill_nil(to),
+            (AwaitedOutcome::Place(to) | AwaitedOutcome::SetfExpansion(_, to), _) => {
                 self.places.push(SetfExpansion::broken(to.span));
             }
-            (Waiting::Nothing | Waiting::TopLevel(_) | Waiting::Load(_), _) => {}
+            (AwaitedOutcome::Nothing | AwaitedOutcome::TopLevel(_) | AwaitedOutcome::Load(_), _) => {}
         }
     }
 
     /// Takes the failure of the last stop.
     pub fn fail(&mut self, failure: &MacroFailure) {
-        match std::mem::replace(&mut self.waiting, Waiting::Nothing) {
-            Waiting::Nothing => {}
-            Waiting::Form(to) => {
+        match std::mem::replace(&mut self.waiting, AwaitedOutcome::Nothing) {
+            AwaitedOutcome::Nothing => {}
+            AwaitedOutcome::Form(to) => {
                 self.macro_failed(failure, to.origin, to.span);
                 self.fill_nil(to);
             }
             // Without its compiler macro, a call is an ordinary one.
-            Waiting::Call(call, to) => self.jobs.push(Job::Expand(call.globally(), to)),
-            Waiting::Place(to) | Waiting::SetfExpansion(_, to) => {
+            AwaitedOutcome::Call(call, to) => self.jobs.push(Job::Expand(call.globally(), to)),
+            AwaitedOutcome::Place(to) | AwaitedOutcome::SetfExpansion(_, to) => {
                 self.macro_failed(failure, to.origin, to.span);
                 self.places.push(SetfExpansion::broken(to.span));
             }
-            Waiting::TopLevel(top) => self.macro_failed(failure, top.origin, top.span),
-            Waiting::Object(span) => {
+            AwaitedOutcome::TopLevel(top) => self.macro_failed(failure, top.origin, top.span),
+            AwaitedOutcome::Object(span) => {
                 let message = format!("the definition of a local macro failed: {}", failure.report);
                 self.report(failure.located(code::MACRO_FAILED.at(span, message)), None);
                 self.objects.push(None);
             }
-            Waiting::Load(span) => {
+            AwaitedOutcome::Load(span) => {
                 let message = format!("this form failed at compile time: {}", failure.report);
                 let diagnostic = match failure.place {
                     FailurePlace::Here(part) if span.contains(part) => {

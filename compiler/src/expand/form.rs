@@ -10,7 +10,7 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{ESL_PACKAGE, Symbol};
 use rustc_hash::FxHashMap;
 
-use crate::diagnostic::{Code, code};
+use crate::diagnostic::{DiagnosticCode, code};
 
 /// Outcome of a check of a form.
 pub(super) type Checked<T = ()> = Result<T, Box<Diagnostic>>;
@@ -68,7 +68,7 @@ impl Form {
     }
 
     /// Returns an error of this code at `span`. The message is the name of the operator, followed by `what`.
-    pub(super) fn fault(&self, code: &Code, span: Span, what: &str) -> Box<Diagnostic> {
+    pub(super) fn fault(&self, code: &DiagnosticCode, span: Span, what: &str) -> Box<Diagnostic> {
         Box::new(code.at(self.at(span), format!("{} {what}", name(&self.operator))))
     }
 

@@ -116,7 +116,7 @@ pub(super) enum Job {
 
 /// What the next answer is about.
 #[derive(Debug)]
-pub(super) enum Waiting {
+pub(super) enum AwaitedOutcome {
     /// Nothing was asked.
     Nothing,
     /// The expansion of a form.

@@ -18,9 +18,9 @@ use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, Symbol};
 use super::expander::Expander;
 use super::form::{Checked, Form, Make, is_constant, name, quoted};
 use super::function::WrittenName;
-use super::job::{Job, To, Waiting};
+use super::job::{AwaitedOutcome, Job, To};
 use super::scope::{FunctionMeaning, VariableMeaning, Visible};
-use super::setf::{SetfExpansion, Writer};
+use super::setf::{PlaceWriter, SetfExpansion};
 use super::variable::Meaning;
 use crate::diagnostic::code;
 
@@ -81,7 +81,8 @@ impl Expander {
             Some(Meaning::Variable(_)) | None => {
                 let store = make.fresh(environment, "NEW");
                 let before = vec![make.symbol(&Symbol::cl("SETQ")), datum.clone()];
-                let place = SetfExpansion::new(make, vec![store], Writer::Call(before, Vec::new()), datum);
+                let place =
+                    SetfExpansion::new(make, vec![store], PlaceWriter::Call(before, Vec::new()), datum);
                 self.places.push(SetfExpansion { is_direct: true, ..place });
             }
         }
@@ -111,13 +112,13 @@ impl Expander {
                 let (temporaries, args) = arguments(environment, &form.args, make);
                 let stores: Vec<Datum> = (0..count).map(|_| make.fresh(environment, "NEW")).collect();
                 let call = [make.symbol(&expander), make.items(stores.iter().cloned())];
-                let writer = Writer::Form(make.items(call.into_iter().chain(args.iter().cloned())));
+                let writer = PlaceWriter::Form(make.items(call.into_iter().chain(args.iter().cloned())));
                 let place = SetfExpansion::new(make, stores, writer, reader(&form, args, make));
                 self.places.push(SetfExpansion { temporaries, ..place });
             }
             Some(Update::Expander(expander)) => {
                 let place = form.datum.clone();
-                let waiting = |origin| Waiting::SetfExpansion(place, To { origin, ..to });
+                let waiting = |origin| AwaitedOutcome::SetfExpansion(place, To { origin, ..to });
                 return self.stop_for_macro(MacroRef::Global(expander), &form, true, to.origin, waiting);
             }
             None if self.is_operator(&form.operator) => {
@@ -137,7 +138,7 @@ impl Expander {
 
     /// Stops for the expansion of a macro call that stands for a place.
     fn stop_for_place(&mut self, function: MacroRef, form: &Form, is_standard: bool, to: To) -> Checked {
-        let waiting = |origin| Waiting::Place(To { origin, ..to });
+        let waiting = |origin| AwaitedOutcome::Place(To { origin, ..to });
         self.stop_for_macro(function, form, is_standard, to.origin, waiting)
     }
 
@@ -149,7 +150,7 @@ impl Expander {
         let before = vec![make.symbol(&Symbol::cl("FUNCALL")), make.cl("FUNCTION", [setter])];
         let store = make.fresh(environment, "NEW");
         let reader = reader(&form, args.clone(), make);
-        let place = SetfExpansion::new(make, vec![store], Writer::Call(before, args), reader);
+        let place = SetfExpansion::new(make, vec![store], PlaceWriter::Call(before, args), reader);
         self.places.push(SetfExpansion { temporaries, ..place });
     }
 
@@ -171,7 +172,7 @@ impl Expander {
         let place = SetfExpansion::new(
             make,
             vec![store],
-            Writer::Call(before, Vec::new()),
+            PlaceWriter::Call(before, Vec::new()),
             reader(&form, args, make),
         );
         self.places.push(SetfExpansion { temporaries, is_direct, ..place });

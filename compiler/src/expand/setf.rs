@@ -13,7 +13,7 @@ use crate::diagnostic::code;
 
 /// How the new value is stored.
 #[derive(Clone, Debug)]
-pub(super) enum Writer {
+pub(super) enum PlaceWriter {
     /// By the form `(before… value after…)`.
     Call(Vec<Datum>, Vec<Datum>),
     /// By this form, within which the variables for the new values are bound.
@@ -27,7 +27,7 @@ pub(super) struct SetfExpansion {
     pub(super) temporaries: Vec<(Datum, Datum)>,
     /// Variables for the new values.
     pub(super) stores: Vec<Datum>,
-    pub(super) writer: Writer,
+    pub(super) writer: PlaceWriter,
     /// Form that reads the old value.
     pub(super) reader: Datum,
     /// Whether the writer takes the temporaries in order and the value after them.
@@ -41,12 +41,12 @@ impl SetfExpansion {
     /// Returns the stand-in for a faulty place.
     pub(super) fn broken(span: Span) -> SetfExpansion {
         let make = Make(span);
-        let writer = Writer::Form(make.nil());
+        let writer = PlaceWriter::Form(make.nil());
         SetfExpansion { is_broken: true, ..SetfExpansion::new(make, Vec::new(), writer, make.nil()) }
     }
 
     /// Creates an expansion without temporaries.
-    pub(super) fn new(make: Make, stores: Vec<Datum>, writer: Writer, reader: Datum) -> SetfExpansion {
+    pub(super) fn new(make: Make, stores: Vec<Datum>, writer: PlaceWriter, reader: Datum) -> SetfExpansion {
         SetfExpansion {
             temporaries: Vec::new(),
             stores,
@@ -77,7 +77,7 @@ impl SetfExpansion {
         if variables.len() != forms.len() || stores.is_empty() {
             return Err(wrong());
         }
-        let writer = Writer::Form((*writer).clone());
+        let writer = PlaceWriter::Form((*writer).clone());
         let mut found = SetfExpansion::new(Make(span), stores, writer, (*reader).clone());
         found.temporaries = variables.into_iter().cloned().zip(forms.into_iter().cloned()).collect();
         Ok(found)
@@ -104,13 +104,13 @@ impl SetfExpansion {
     pub(super) fn write(&self, value: Datum) -> Datum {
         let make = self.make;
         match (&self.writer, self.stores.as_slice()) {
-            (Writer::Call(before, after), _) => {
+            (PlaceWriter::Call(before, after), _) => {
                 make.items(before.iter().cloned().chain([value]).chain(after.iter().cloned()))
             }
-            (Writer::Form(form), [store]) => {
+            (PlaceWriter::Form(form), [store]) => {
                 make.let_in_order(vec![(store.clone(), value)], vec![form.clone()])
             }
-            (Writer::Form(form), stores) => {
+            (PlaceWriter::Form(form), stores) => {
                 make.cl("MULTIPLE-VALUE-BIND", [make.items(stores.iter().cloned()), value, form.clone()])
             }
         }
@@ -119,15 +119,15 @@ impl SetfExpansion {
     /// Returns the form that stores the values of the variables for new values.
     pub(super) fn write_stores(&self) -> Datum {
         match (&self.writer, self.stores.first()) {
-            (Writer::Call(..), Some(store)) => self.write(store.clone()),
-            (Writer::Form(form), _) => form.clone(),
-            (Writer::Call(..), None) => self.make.nil(),
+            (PlaceWriter::Call(..), Some(store)) => self.write(store.clone()),
+            (PlaceWriter::Form(form), _) => form.clone(),
+            (PlaceWriter::Call(..), None) => self.make.nil(),
         }
     }
 
     /// Returns the form that binds the temporaries and stores `value`.
     pub(super) fn set(&self, value: Datum) -> Datum {
-        if let (true, Writer::Call(before, _)) = (self.is_direct, &self.writer) {
+        if let (true, PlaceWriter::Call(before, _)) = (self.is_direct, &self.writer) {
             // As arguments, subforms and value are evaluated in the right order: nothing has to be bound.
             let inlined = before.iter().map(|item| {
                 let temporary = self.temporaries.iter().find(|(name, _)| name.is_same(item));

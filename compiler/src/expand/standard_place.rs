@@ -9,7 +9,7 @@ use super::form::{self, Checked, Form, Make, is_cl_form};
 use super::job::{Job, To};
 use super::place::{Update, arguments, no_place, reader, update_of};
 use super::scope::Visible;
-use super::setf::{PlaceUse, SetfExpansion, Writer};
+use super::setf::{PlaceUse, PlaceWriter, SetfExpansion};
 
 impl Expander {
     /// Finds a place of the standard that needs more than an update function. Returns `None` for all others.
@@ -58,7 +58,8 @@ impl Expander {
                 if let Some(end) = args.get(2) {
                     replace.extend([keyword("END1"), end.clone()]);
                 }
-                let writer = Writer::Form(make.progn(vec![make.call_cl("REPLACE", replace), store.clone()]));
+                let writer =
+                    PlaceWriter::Form(make.progn(vec![make.call_cl("REPLACE", replace), store.clone()]));
                 let place = SetfExpansion::new(make, vec![store], writer, reader(form, args, make));
                 self.places.push(SetfExpansion { temporaries, ..place });
             }
@@ -100,11 +101,11 @@ impl Expander {
                 let last = args.pop().expect("apply has a list");
                 let list = make.call_cl("APPEND", [last, make.call_cl("LIST", [store.clone()])]);
                 let call = std::iter::once(make.symbol(&update)).chain(args).chain([list]);
-                Writer::Form(make.esl("%APPLY-GLOBAL", call))
+                PlaceWriter::Form(make.esl("%APPLY-GLOBAL", call))
             }
             _ => {
                 let setter = make.cl("FUNCTION", [make.cl("SETF", [make.symbol(symbol)])]);
-                Writer::Call(vec![make.symbol(&Symbol::cl("APPLY")), setter], args)
+                PlaceWriter::Call(vec![make.symbol(&Symbol::cl("APPLY")), setter], args)
             }
         };
         let place = SetfExpansion::new(make, vec![store], writer, reader);
@@ -130,7 +131,7 @@ impl Expander {
             readers.push(place.reader);
             temporaries.extend(place.temporaries);
         }
-        let writer = Writer::Form(make.cl("VALUES", writers));
+        let writer = PlaceWriter::Form(make.cl("VALUES", writers));
         let place = SetfExpansion::new(make, stores, writer, make.cl("VALUES", readers));
         self.places.push(SetfExpansion { temporaries, is_broken, ..place });
     }
@@ -182,7 +183,7 @@ impl Expander {
         order: impl FnOnce(Vec<(Datum, Datum)>) -> Vec<(Datum, Datum)>,
         make: Make,
     ) {
-        let writer = Writer::Form(make.progn(vec![inner.write(put), store.clone()]));
+        let writer = PlaceWriter::Form(make.progn(vec![inner.write(put), store.clone()]));
         let place = SetfExpansion::new(make, vec![store], writer, get);
         let is_broken = inner.is_broken;
         self.places.push(SetfExpansion { temporaries: order(inner.temporaries), is_broken, ..place });

@@ -17,7 +17,7 @@ use super::control::{Situations, situations};
 use super::define::{package_change, proclamations};
 use super::expander::Expander;
 use super::form::{Checked, Form, is_constant};
-use super::job::{Job, Mode, To, Top, Waiting};
+use super::job::{AwaitedOutcome, Job, Mode, To, Top};
 use super::local::local_macros;
 use super::scope::{FunctionMeaning, Visible};
 use crate::core::{LambdaId, NodeId};
@@ -107,7 +107,7 @@ impl Expander {
 
     /// Stops for the expansion of a top-level macro call.
     fn stop_for_top(&mut self, function: MacroRef, form: &Form, is_standard: bool, top: Top) -> Checked {
-        let waiting = |origin| Waiting::TopLevel(Top { origin, ..top });
+        let waiting = |origin| AwaitedOutcome::TopLevel(Top { origin, ..top });
         self.stop_for_macro(function, form, is_standard, top.origin, waiting)
     }
 

@@ -6,7 +6,7 @@ use esl_bytecode::opcode::{Instr, Substitute};
 use esl_bytecode::operand::*;
 use esl_bytecode::span::Span;
 
-use super::graph::{Cond, Graph, Label, SegmentExit};
+use super::graph::{Cond, Graph, SegmentExit, SegmentLabel};
 use super::lines::SourceLines;
 
 /// The code of a function is longer than [`MAX_CODE`].
@@ -16,7 +16,7 @@ pub(crate) struct TooLong;
 /// An instruction in its final order, with the segment to which it jumps.
 struct Placed {
     instr: Instr,
-    target: Option<Label>,
+    target: Option<SegmentLabel>,
     span: Span,
 }
 
@@ -39,7 +39,7 @@ pub(crate) fn assemble(graph: &Graph, lines: &SourceLines) -> Result<(Vec<u32>, 
         }));
         let mut put = |instr, target| placed.push(Placed { instr, target: Some(target), span: segment.span });
         let next = graph.order.get(position + 1).copied();
-        let is_back = |label: Label| positions[label.index()] <= position;
+        let is_back = |label: SegmentLabel| positions[label.index()] <= position;
         let go = |label| {
             if is_back(label) { Instr::Loop { to: Back24(0) } } else { Instr::JumpAlways { to: Jump24(0) } }
         };

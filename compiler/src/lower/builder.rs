@@ -9,7 +9,7 @@ use esl_bytecode::symbol::Symbol;
 use rustc_hash::FxHashMap;
 
 use super::dest::Dest;
-use super::graph::{Graph, Label, SegmentExit};
+use super::graph::{Graph, SegmentExit, SegmentLabel};
 use super::lines::SourceLines;
 use super::pool::Pool;
 use super::regalloc::RegisterStack;
@@ -163,14 +163,14 @@ pub(super) enum Extent {
 #[derive(Clone, Copy)]
 pub(super) struct BlockExit {
     pub(super) dest: Dest,
-    pub(super) end: Label,
+    pub(super) end: SegmentLabel,
     /// Number of extents outside of the block, its own catch apart.
     pub(super) depth: usize,
 }
 
 /// How to go to the tags of a tagbody of this frame.
 pub(super) struct TagbodyExits {
-    pub(super) tags: Vec<Label>,
+    pub(super) tags: Vec<SegmentLabel>,
     /// Number of extents open while the forms of the tagbody run.
     pub(super) depth: usize,
 }
@@ -178,7 +178,7 @@ pub(super) struct TagbodyExits {
 /// The head of an inlined function whose body is being lowered.
 #[derive(Clone, Copy)]
 pub(super) struct LoopHead {
-    pub(super) label: Label,
+    pub(super) label: SegmentLabel,
     /// Number of extents open there.
     pub(super) depth: usize,
 }
@@ -226,7 +226,7 @@ pub(super) struct FunctionBuilder<'b, 'a> {
     /// Lambda whose frame the function has.
     pub(super) lambda: LambdaId,
     pub(super) graph: Graph,
-    pub(super) entry: Label,
+    pub(super) entry: SegmentLabel,
     pub(super) registers: RegisterStack,
     /// Open dynamic extents, the innermost last.
     pub(super) extents: Vec<Extent>,
@@ -291,7 +291,7 @@ impl<'b, 'a> FunctionBuilder<'b, 'a> {
     }
 
     /// Pushes a control entry with a landing.
-    pub(super) fn push_entry(&mut self, instr: Instr, landing: Label, extent: Extent) {
+    pub(super) fn push_entry(&mut self, instr: Instr, landing: SegmentLabel, extent: Extent) {
         self.graph.push(instr, Some(landing), self.span);
         self.open(extent);
     }

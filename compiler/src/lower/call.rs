@@ -19,7 +19,7 @@ const MAX_LIST: usize = 64;
 
 /// Target of a call.
 #[derive(Clone, Copy)]
-pub(super) enum CallTarget<'a> {
+pub(super) enum CallRoute<'a> {
     Global(&'a Symbol),
     Builtin(Builtin),
     /// The running function.
@@ -32,13 +32,13 @@ pub(super) enum CallTarget<'a> {
     Form(NodeId),
 }
 
-impl CallTarget<'_> {
+impl CallRoute<'_> {
     /// Whether the function must be fetched before the arguments.
     fn comes_first(self) -> bool {
         matches!(
             self,
-            CallTarget::Form(_)
-                | CallTarget::Variable(VariableLocation::Box(_) | VariableLocation::CaptureBox(_))
+            CallRoute::Form(_)
+                | CallRoute::Variable(VariableLocation::Box(_) | VariableLocation::CaptureBox(_))
         )
     }
 
@@ -64,7 +64,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
         if own.is_named(name) && own.takes_exactly(arguments.len()) {
             self.call_itself(arguments, dest);
         } else {
-            self.emit_call(CallTarget::Global(name), arguments, dest);
+            self.emit_call(CallRoute::Global(name), arguments, dest);
         }
     }
 
@@ -72,7 +72,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
         if let Dest::Tail = dest {
             self.jump_to_function(self.lambda, self.entry, arguments);
         } else {
-            self.emit_call(CallTarget::Itself, arguments, dest);
+            self.emit_call(CallRoute::Itself, arguments, dest);
         }
     }
 
@@ -81,7 +81,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
         let Some(lambda) = resolution.function(variable) else {
             // A variable that holds a function.
             let location = self.location(variable);
-            return self.emit_call(CallTarget::Variable(location), arguments, dest);
+            return self.emit_call(CallRoute::Variable(location), arguments, dest);
         };
         let kind = resolution.function_kind(lambda);
         if kind == FunctionKind::Inline {
@@ -90,9 +90,9 @@ impl<'a> FunctionBuilder<'_, 'a> {
             self.call_itself(arguments, dest);
         } else if kind == FunctionKind::Closure {
             let location = self.location(variable);
-            self.emit_call(CallTarget::Variable(location), arguments, dest);
+            self.emit_call(CallRoute::Variable(location), arguments, dest);
         } else {
-            self.emit_call(CallTarget::Constant(lambda), arguments, dest);
+            self.emit_call(CallRoute::Constant(lambda), arguments, dest);
         }
     }
 
@@ -107,14 +107,14 @@ impl<'a> FunctionBuilder<'_, 'a> {
                 self.builtin(*builtin, arguments, dest);
             }
             NodeKind::Constant(datum) => match datum.as_symbol().filter(|name| !name.is_cl("T")) {
-                Some(name) => self.emit_call(CallTarget::Global(name), arguments, dest),
-                None => self.emit_call(CallTarget::Form(function), arguments, dest),
+                Some(name) => self.emit_call(CallRoute::Global(name), arguments, dest),
+                None => self.emit_call(CallRoute::Form(function), arguments, dest),
             },
             NodeKind::Local(variable) if self.keeps_its_value(*variable, arguments) => {
                 let location = self.location(*variable);
-                self.emit_call(CallTarget::Variable(location), arguments, dest);
+                self.emit_call(CallRoute::Variable(location), arguments, dest);
             }
-            _ => self.emit_call(CallTarget::Form(function), arguments, dest),
+            _ => self.emit_call(CallRoute::Form(function), arguments, dest),
         }
     }
 
@@ -176,13 +176,13 @@ impl<'a> FunctionBuilder<'_, 'a> {
     }
 
     /// Lowers a call that is not opened up.
-    pub(super) fn emit_call(&mut self, target: CallTarget<'a>, arguments: &'a [NodeId], dest: Dest) {
-        let fails = matches!(target, CallTarget::Global(name) if fails(name));
+    pub(super) fn emit_call(&mut self, target: CallRoute<'a>, arguments: &'a [NodeId], dest: Dest) {
+        let fails = matches!(target, CallRoute::Global(name) if fails(name));
         if self.keeps_its_frame(dest) || matches!(dest, Dest::Tail) && fails {
             self.emit_call(target, arguments, Dest::All);
             return self.finish(Dest::All, dest);
         }
-        if arguments.len() > MAX_DIRECT && !matches!(target, CallTarget::Itself) {
+        if arguments.len() > MAX_DIRECT && !matches!(target, CallRoute::Itself) {
             return self.call_with_list(target, arguments, dest);
         }
         let top = self.registers.top();
@@ -203,7 +203,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
         let first = window.offset(2);
         self.registers.take(usize::from(first.0.saturating_sub(top.0)));
         self.arguments(arguments);
-        if !target.comes_first() && matches!(target, CallTarget::Variable(_) | CallTarget::Constant(_)) {
+        if !target.comes_first() && matches!(target, CallRoute::Variable(_) | CallRoute::Constant(_)) {
             self.load_target(target, window);
         }
         self.registers.release(top);
@@ -211,11 +211,11 @@ impl<'a> FunctionBuilder<'_, 'a> {
         let (count, want, pad) = (Count(arguments.len() as u8), dest.want(), Pad(0));
         if let Dest::Tail = dest {
             let instr = match target {
-                CallTarget::Global(name) => {
+                CallRoute::Global(name) => {
                     let symbol = WideSymbolIdx(u32::from(self.symbol_index(name).0));
                     Instr::TailCallGlobal { window: base, count, symbol }
                 }
-                CallTarget::Builtin(builtin) => {
+                CallRoute::Builtin(builtin) => {
                     Instr::TailCallBuiltin { window: base, count, builtin: BuiltinIdx(builtin.number()) }
                 }
                 _ => Instr::TailCall { window: base, count, pad },
@@ -223,14 +223,14 @@ impl<'a> FunctionBuilder<'_, 'a> {
             return self.end(instr);
         }
         let instr = match target {
-            CallTarget::Global(name) => {
+            CallRoute::Global(name) => {
                 let symbol = WideSymbolIdx(u32::from(self.symbol_index(name).0));
                 Instr::CallGlobal { window: base, count, want, symbol }
             }
-            CallTarget::Builtin(builtin) => {
+            CallRoute::Builtin(builtin) => {
                 Instr::CallBuiltin { window: base, count, want, builtin: BuiltinIdx(builtin.number()) }
             }
-            CallTarget::Itself => Instr::CallSelf { window: base, count, want, pad },
+            CallRoute::Itself => Instr::CallSelf { window: base, count, want, pad },
             _ => Instr::Call { window: base, count, want, pad },
         };
         self.emit(instr);
@@ -260,15 +260,15 @@ impl<'a> FunctionBuilder<'_, 'a> {
     }
 
     /// Puts the function that is called into `window`.
-    fn load_target(&mut self, target: CallTarget<'a>, window: Reg) {
+    fn load_target(&mut self, target: CallRoute<'a>, window: Reg) {
         let dest = Dest::Fresh(window);
         match target {
-            CallTarget::Global(name) => self.function_ref(name, dest),
-            CallTarget::Builtin(builtin) => self.builtin_ref(builtin, dest),
-            CallTarget::Variable(location) => self.fetch(location, dest),
-            CallTarget::Constant(lambda) => self.constant_function(lambda, dest),
-            CallTarget::Form(function) => self.form(function, dest),
-            CallTarget::Itself => unreachable!("a function that calls itself has its arguments in registers"),
+            CallRoute::Global(name) => self.function_ref(name, dest),
+            CallRoute::Builtin(builtin) => self.builtin_ref(builtin, dest),
+            CallRoute::Variable(location) => self.fetch(location, dest),
+            CallRoute::Constant(lambda) => self.constant_function(lambda, dest),
+            CallRoute::Form(function) => self.form(function, dest),
+            CallRoute::Itself => unreachable!("a function that calls itself has its arguments in registers"),
         }
     }
 
@@ -282,7 +282,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
     }
 
     /// Lowers a call with too many arguments for registers.
-    fn call_with_list(&mut self, target: CallTarget<'a>, arguments: &'a [NodeId], dest: Dest) {
+    fn call_with_list(&mut self, target: CallRoute<'a>, arguments: &'a [NodeId], dest: Dest) {
         let window = self.registers.top();
         self.load_target(target, window);
         self.registers.take(2);

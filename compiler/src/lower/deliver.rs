@@ -5,7 +5,7 @@ use esl_bytecode::operand::{Count, Dst, Reg};
 
 use super::builder::FunctionBuilder;
 use super::dest::Dest;
-use super::graph::{Cond, Label, SegmentExit};
+use super::graph::{Cond, SegmentExit, SegmentLabel};
 
 impl FunctionBuilder<'_, '_> {
     /// Returns the register in which a single value for `dest` is best computed. It is free, unless `dest`
@@ -95,7 +95,11 @@ impl FunctionBuilder<'_, '_> {
     }
 
     /// Delivers `T` or `NIL`, depending on the segment to which `test` jumps.
-    pub(super) fn deliver_test(&mut self, dest: Dest, test: impl FnOnce(&mut Self, Label, Label)) {
+    pub(super) fn deliver_test(
+        &mut self,
+        dest: Dest,
+        test: impl FnOnce(&mut Self, SegmentLabel, SegmentLabel),
+    ) {
         if let Dest::Test { holds, fails } = dest {
             return test(self, holds, fails);
         }
@@ -149,19 +153,19 @@ impl FunctionBuilder<'_, '_> {
     }
 
     /// Jumps to `end` after a form with the destination `dest`, unless control has gone elsewhere.
-    pub(super) fn join(&mut self, end: Label, dest: Dest) {
+    pub(super) fn join(&mut self, end: SegmentLabel, dest: Dest) {
         if dest.goes_on() {
             self.jump(end);
         }
     }
 
     /// Jumps to a segment.
-    pub(super) fn jump(&mut self, to: Label) {
+    pub(super) fn jump(&mut self, to: SegmentLabel) {
         self.graph.leave(SegmentExit::Jump(to), self.span);
     }
 
     /// Jumps to one of two segments.
-    pub(super) fn branch(&mut self, cond: Cond, holds: Label, fails: Label) {
+    pub(super) fn branch(&mut self, cond: Cond, holds: SegmentLabel, fails: SegmentLabel) {
         self.graph.leave(SegmentExit::Branch { cond, holds, fails }, self.span);
     }
 }

@@ -2,7 +2,7 @@
 
 use esl_bytecode::operand::{Reg, Want};
 
-use super::graph::Label;
+use super::graph::SegmentLabel;
 
 /// Destination of the value or values of a form.
 #[derive(Clone, Copy, Debug)]
@@ -25,9 +25,9 @@ pub(super) enum Dest {
     /// To one of two segments, depending on whether the value is true.
     Test {
         /// Segment for a true value.
-        holds: Label,
+        holds: SegmentLabel,
         /// Segment for `NIL`.
-        fails: Label,
+        fails: SegmentLabel,
     },
 }
 

@@ -9,7 +9,7 @@ use esl_bytecode::operand::*;
 
 use super::builder::{BlockExit, Extent, FunctionBuilder, TagbodyExits};
 use super::dest::Dest;
-use super::graph::{Cond, Label};
+use super::graph::{Cond, SegmentLabel};
 use super::variable::VariableLocation;
 use crate::core::*;
 use crate::resolve::Lexical;
@@ -42,7 +42,7 @@ impl FunctionBuilder<'_, '_> {
     }
 
     /// Lowers a body inside a catch for the tag in a register. Both ways out meet at `end`.
-    fn guarded(&mut self, tag: Reg, end: Label, inner: Dest, body: NodeId) {
+    fn guarded(&mut self, tag: Reg, end: SegmentLabel, inner: Dest, body: NodeId) {
         let depth = self.extents.len();
         let (window, want) = (self.registers.top(), inner.want());
         self.registers.reserve(window, usize::from(want.registers()));
@@ -76,7 +76,7 @@ impl FunctionBuilder<'_, '_> {
     /// Lowers a tagbody.
     pub(super) fn tagbody(&mut self, tagbody: TagbodyId, items: &[TagbodyItem], dest: Dest) {
         let count = items.iter().filter(|item| matches!(item, TagbodyItem::Tag)).count();
-        let tags: Vec<Label> = (0..count).map(|_| self.graph.label()).collect();
+        let tags: Vec<SegmentLabel> = (0..count).map(|_| self.graph.label()).collect();
         let top = self.registers.top();
         let has_literals = self.load_tagbody_literals(tagbody, items);
         if self.module.resolution.tagbody_needs_catch(tagbody) {
@@ -119,7 +119,7 @@ impl FunctionBuilder<'_, '_> {
     /// caught: number := what was thrown; loop to `again`
     /// end:
     /// ```
-    fn catching_tagbody(&mut self, tagbody: TagbodyId, items: &[TagbodyItem], tags: Vec<Label>) {
+    fn catching_tagbody(&mut self, tagbody: TagbodyId, items: &[TagbodyItem], tags: Vec<SegmentLabel>) {
         let [again, caught, end] = [self.graph.label(), self.graph.label(), self.graph.label()];
         let tag = self.registers.take(1);
         let number = self.registers.take(1);

@@ -10,7 +10,7 @@
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::Reg;
 
-use super::graph::{Cond, Graph, Label, SegmentExit};
+use super::graph::{Cond, Graph, SegmentExit, SegmentLabel};
 
 /// Instructions of a test that is copied to the jumps to it, at most.
 const ROTATED_LENGTH: usize = 8;
@@ -30,10 +30,10 @@ fn thread(graph: &mut Graph) {
     let positions = graph.positions();
     for position in 0..graph.order.len() {
         let index = graph.order[position].index();
-        let resolve = |label: Label| resolve(graph, label);
-        let is_back = |label: Label| positions[label.index()] <= position;
+        let resolve = |label: SegmentLabel| resolve(graph, label);
+        let is_back = |label: SegmentLabel| positions[label.index()] <= position;
         // A conditional edge may turn into one that goes back only if there is an instruction for it.
-        let follow = |label: Label, cond: Cond, sense: bool| {
+        let follow = |label: SegmentLabel, cond: Cond, sense: bool| {
             let end = resolve(label);
             if is_back(end) && !is_back(label) && !cond.loops(sense) { label } else { end }
         };
@@ -68,7 +68,7 @@ fn cannot_fail(cond: Cond) -> bool {
 }
 
 /// Returns the segment that control reaches from `label` by way of empty segments.
-fn resolve(graph: &Graph, label: Label) -> Label {
+fn resolve(graph: &Graph, label: SegmentLabel) -> SegmentLabel {
     let mut end = label;
     // An empty loop has no end. After this many steps the segments count as one.
     for _ in 0..64 {
@@ -113,7 +113,7 @@ fn rotate(graph: &mut Graph) {
         // The copy pays if a test can then jump back by itself: the copy, from the end of a loop to its body;
         // or the original, if it is at the end already, joined with the code before it.
         let from = position.max(positions[head.index()]);
-        let is_back = |label: Label| positions[label.index()] <= from;
+        let is_back = |label: SegmentLabel| positions[label.index()] <= from;
         let pays = (is_back(holds) && cond.loops(true)) || (is_back(fails) && cond.loops(false));
         if !pays || test.ops.len() > ROTATED_LENGTH || test.ops.iter().any(|op| op.landing.is_some()) {
             continue;

@@ -1,7 +1,7 @@
 //! The graph of a function's code: straight segments and the edges between them.
 //!
 //! Lowering appends instructions to the open segment and ends it with a [`SegmentExit`]. Jumps refer to
-//! segments by [`Label`]s, which may be bound later. The order in which segments are bound is the order of
+//! segments by [`SegmentLabel`]s, which may be bound later. The order in which segments are bound is the order of
 //! the finished code, so an edge to its own segment or an earlier one is a turn of a loop. Code that is
 //! emitted while no segment is open is unreachable and vanishes.
 //!
@@ -13,9 +13,9 @@ use esl_bytecode::span::Span;
 
 /// A segment, bound or not yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct Label(u32);
+pub(crate) struct SegmentLabel(u32);
 
-impl Label {
+impl SegmentLabel {
     /// Returns the index into the segments.
     pub(crate) fn index(self) -> usize {
         self.0 as usize
@@ -82,7 +82,7 @@ pub(crate) struct Op {
     /// The instruction. The distance of its jump, if any, is still open.
     pub(crate) instr: Instr,
     /// Segment at which an unwinding to the pushed entry continues.
-    pub(crate) landing: Option<Label>,
+    pub(crate) landing: Option<SegmentLabel>,
     /// Place in the source.
     pub(crate) span: Span,
 }
@@ -93,17 +93,17 @@ pub(crate) enum SegmentExit {
     /// Not at all: the last instruction is a return or a tail call.
     End,
     /// To a segment.
-    Jump(Label),
+    Jump(SegmentLabel),
     /// To the segment that must come next. The last instruction is `enter-cleanup`.
-    Fall(Label),
+    Fall(SegmentLabel),
     /// To one of two segments.
     Branch {
         /// Condition.
         cond: Cond,
         /// Segment if the condition holds.
-        holds: Label,
+        holds: SegmentLabel,
         /// Segment if it fails.
-        fails: Label,
+        fails: SegmentLabel,
     },
 }
 
@@ -124,13 +124,13 @@ pub(crate) struct Graph {
     /// Segments, by label.
     pub(crate) segments: Vec<Segment>,
     /// Bound segments in the order of the finished code. The first is the entry.
-    pub(crate) order: Vec<Label>,
-    open: Option<Label>,
+    pub(crate) order: Vec<SegmentLabel>,
+    open: Option<SegmentLabel>,
 }
 
 impl Graph {
     /// Creates the graph of an empty function, with its entry open. Returns the graph and the entry.
-    pub(crate) fn new() -> (Graph, Label) {
+    pub(crate) fn new() -> (Graph, SegmentLabel) {
         let mut graph = Graph { segments: Vec::new(), order: Vec::new(), open: None };
         let entry = graph.label();
         graph.order.push(entry);
@@ -139,8 +139,8 @@ impl Graph {
     }
 
     /// Creates a label, to be bound later.
-    pub(crate) fn label(&mut self) -> Label {
-        let label = Label(self.segments.len() as u32);
+    pub(crate) fn label(&mut self) -> SegmentLabel {
+        let label = SegmentLabel(self.segments.len() as u32);
         self.segments.push(Segment { ops: Vec::new(), exit: SegmentExit::End, span: Span::default() });
         label
     }
@@ -151,7 +151,7 @@ impl Graph {
     }
 
     /// Appends an instruction.
-    pub(crate) fn push(&mut self, instr: Instr, landing: Option<Label>, span: Span) {
+    pub(crate) fn push(&mut self, instr: Instr, landing: Option<SegmentLabel>, span: Span) {
         if let Some(open) = self.open {
             self.segments[open.index()].ops.push(Op { instr, landing, span });
         }
@@ -168,7 +168,7 @@ impl Graph {
 
     /// Opens the segment of `label`, which is bound here and only here. Control continues in it from the open
     /// segment.
-    pub(crate) fn bind(&mut self, label: Label) {
+    pub(crate) fn bind(&mut self, label: SegmentLabel) {
         self.leave(SegmentExit::Jump(label), Span::default());
         self.order.push(label);
         self.open = Some(label);

@@ -43,7 +43,7 @@ use esl_bytecode::operand::Reg;
 
 use super::builder::{FunctionBuilder, LoopHead};
 use super::dest::Dest;
-use super::graph::Label;
+use super::graph::SegmentLabel;
 use super::variable::VariableLocation;
 use crate::core::*;
 
@@ -93,7 +93,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
 
     /// Assigns new values to the parameters of a function and jumps to `head`, before the code that boxes
     /// them.
-    pub(super) fn jump_to_function(&mut self, lambda: LambdaId, head: Label, arguments: &'a [NodeId]) {
+    pub(super) fn jump_to_function(&mut self, lambda: LambdaId, head: SegmentLabel, arguments: &'a [NodeId]) {
         let text = &self.core.lambdas[lambda.index()];
         let targets: Vec<VarId> = text.required.iter().map(|parameter| parameter.variable).collect();
         self.assign(&targets, arguments);

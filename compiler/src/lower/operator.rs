@@ -11,7 +11,7 @@ use esl_bytecode::operand::*;
 
 use super::arithmetic::{Binary, Comparison, addend, literal_int};
 use super::builder::FunctionBuilder;
-use super::call::{CallTarget, MAX_DIRECT};
+use super::call::{CallRoute, MAX_DIRECT};
 use super::dest::Dest;
 use crate::core::*;
 
@@ -153,7 +153,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
     pub(super) fn builtin(&mut self, builtin: Builtin, arguments: &'a [NodeId], dest: Dest) {
         let top = self.registers.top();
         let Some(shape) = shape(builtin, arguments.len()) else {
-            return self.emit_call(CallTarget::Builtin(builtin), arguments, dest);
+            return self.emit_call(CallRoute::Builtin(builtin), arguments, dest);
         };
         match (shape, arguments) {
             (OperatorShape::Unary(instr), [object]) => {
@@ -218,7 +218,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
             (OperatorShape::Apply, [function, arguments @ ..]) => {
                 self.apply_form(|frame, dest| frame.form(*function, dest), arguments, dest);
             }
-            _ => self.emit_call(CallTarget::Builtin(builtin), arguments, dest),
+            _ => self.emit_call(CallRoute::Builtin(builtin), arguments, dest),
         }
     }
 

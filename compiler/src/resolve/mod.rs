@@ -240,7 +240,7 @@ impl ResolveWalk {
     /// Walks on. Returns whether the walk is over; otherwise the work that is allowed is done.
     pub(crate) fn run(&mut self, core: &Core, work: &mut Work) -> bool {
         while let Some(event) = self.pending.pop() {
-            if self.clock % STEPS_PER_UNIT == 0 {
+            if self.clock.is_multiple_of(STEPS_PER_UNIT) {
                 work.add(1);
                 if work.is_done() {
                     self.pending.push(event);

@@ -17,7 +17,7 @@ mod queue;
 use std::sync::Arc;
 
 use esl_bytecode::compile::{
-    Answer, Compilation, Compile, Environment, Part, Required, SourcePlace, Step, Work,
+    Compilation, Compile, Environment, Part, Required, SourcePlace, Step, StepOutcome, Work,
 };
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
@@ -196,7 +196,7 @@ impl Texts {
 }
 
 impl Compilation for Texts {
-    fn step(&mut self, environment: &mut dyn Environment, answer: Answer, work: &mut Work) -> Step {
+    fn step(&mut self, environment: &mut dyn Environment, answer: StepOutcome, work: &mut Work) -> Step {
         self.0.step(environment, answer, work)
     }
 
@@ -210,13 +210,13 @@ impl Compilation for Texts {
 }
 
 impl Compilation for CompilationState {
-    fn step(&mut self, environment: &mut dyn Environment, answer: Answer, work: &mut Work) -> Step {
-        if matches!(answer, Answer::More) {
+    fn step(&mut self, environment: &mut dyn Environment, answer: StepOutcome, work: &mut Work) -> Step {
+        if matches!(answer, StepOutcome::More) {
             // Nothing was asked.
         } else if let Some((name, span)) = self.asked.take() {
             self.take_module(&name, span, answer);
         } else if let Some(span) = self.loading.take() {
-            if let Answer::Failed(failure) = answer {
+            if let StepOutcome::Failed(failure) = answer {
                 let message = format!("the module failed at compile time: {}", failure.report);
                 self.diagnostics.push(code::COMPILE_TIME_FAILURE.at(span, message));
             }
@@ -224,7 +224,7 @@ impl Compilation for CompilationState {
             if let Some(step) = self.take_call(calls, answer) {
                 return step;
             }
-        } else if let Answer::Failed(failure) = answer {
+        } else if let StepOutcome::Failed(failure) = answer {
             let here = failure.place.as_ref().and_then(|place| self.span_of(place));
             let mut failure = MacroFailure::from(failure);
             if let Some(span) = here {
@@ -315,13 +315,13 @@ impl CompilationState {
     }
 
     /// Takes what a call in a form has given. A form with a call that fails is left out.
-    fn take_call(&mut self, mut calls: FormCalls, answer: Answer) -> Option<Step> {
+    fn take_call(&mut self, mut calls: FormCalls, answer: StepOutcome) -> Option<Step> {
         match answer {
-            Answer::Expansion(expansion) => {
+            StepOutcome::Expansion(expansion) => {
                 calls.take(&expansion);
                 self.make_calls(calls)
             }
-            Answer::Failed(failure) => {
+            StepOutcome::Failed(failure) => {
                 let message = format!("this failed when it was read: {}", failure.report);
                 self.diagnostics.push(code::READ_TIME_FAILURE.at(calls.span(), message));
                 None
@@ -341,16 +341,16 @@ impl CompilationState {
     }
 
     /// Puts the module that was asked for in the place of the form that requires it.
-    fn take_module(&mut self, name: &str, span: Span, answer: Answer) {
+    fn take_module(&mut self, name: &str, span: Span, answer: StepOutcome) {
         let FormSource::Texts(queue) = &mut self.input else { return };
         match answer {
-            Answer::Module(Required::Source { name: path, text }) => {
+            StepOutcome::Module(Required::Source { name: path, text }) => {
                 self.sources.add(path.clone(), Some(text.clone()));
                 let source = self.lines.add(&path, text.clone());
                 queue.enter(name, span, source, text);
             }
-            Answer::Module(Required::Compiled(module)) => queue.enter_compiled(name, span, *module),
-            Answer::Failed(failure) => {
+            StepOutcome::Module(Required::Compiled(module)) => queue.enter_compiled(name, span, *module),
+            StepOutcome::Failed(failure) => {
                 let message = format!("the module `{name}` is not available: {}", failure.report);
                 self.diagnostics.push(code::UNKNOWN_MODULE.at(span, message));
             }
@@ -410,7 +410,7 @@ impl CompilationState {
             Err(diagnostics) => {
                 self.diagnostics.extend(diagnostics);
                 if purpose.load || purpose.keep {
-                    self.expander.answer(Answer::Start);
+                    self.expander.answer(StepOutcome::Start);
                 }
                 return None;
             }

@@ -1,6 +1,6 @@
 //! What is said of wrong and doubtful forms.
 
-use esl_compiler::diagnostic::code::{ALL, Code, Stage};
+use esl_compiler::diagnostic::code::{ALL, DiagnosticCode, Stage};
 
 use crate::host::FakeHost;
 use crate::{codes, findings, snapshot};
@@ -269,7 +269,7 @@ fn the_programs_in_the_table_of_codes_have_them() {
         "name-not-in-subset",
         "read-only-slot",
     ];
-    let stage = |code: &&&Code| code.stage == Stage::Expander;
+    let stage = |code: &&&DiagnosticCode| code.stage == Stage::Expander;
     for code in ALL.iter().filter(stage).filter(|code| !needs_library.contains(&code.name)) {
         let found = |program: &str| {
             let (_, findings) = crate::expand_file(&mut FakeHost::locked(), program);

@@ -14,7 +14,7 @@ mod toplevel;
 
 use std::sync::Arc;
 
-use esl_bytecode::compile::{Answer, CompileTimeHost, Work};
+use esl_bytecode::compile::{CompileTimeHost, StepOutcome, Work};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::SourceId;
@@ -39,15 +39,15 @@ fn finish_form(expander: &mut Expander, host: &mut FakeHost, chunks: &mut Vec<Ch
             Stop::More => {}
             Stop::Macro(call) => {
                 let answer = host.expand(&call);
-                expander.answer(answer.map_or_else(Answer::Failed, Answer::Expansion));
+                expander.answer(answer.map_or_else(StepOutcome::Failed, StepOutcome::Expansion));
             }
             Stop::Chunk(chunk) => {
                 if chunk.purpose.load {
                     let object = host.load(Default::default(), chunk.purpose.keep);
                     expander.answer(match object {
-                        Ok(Some(object)) => Answer::Object(object),
-                        Ok(None) => Answer::Loaded,
-                        Err(failure) => Answer::Failed(failure),
+                        Ok(Some(object)) => StepOutcome::Object(object),
+                        Ok(None) => StepOutcome::Loaded,
+                        Err(failure) => StepOutcome::Failed(failure),
                     });
                 }
                 chunks.push(*chunk);

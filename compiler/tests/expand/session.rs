@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use esl_bytecode::compile::{Answer, Compilation, Compile, Part, SourcePlace, Step, Work, drive};
+use esl_bytecode::compile::{Compilation, Compile, Part, SourcePlace, Step, StepOutcome, Work, drive};
 use esl_bytecode::diagnostic::Severity;
 use esl_bytecode::span::SourceId;
 use esl_bytecode::verify::verify;
@@ -111,7 +111,7 @@ fn the_work_between_steps_is_charged() {
     let mut host = FakeHost::new();
     let mut compilation = Compiler::default().compile_text("test.esl", "(list (list 1) (list 2) (list 3))");
     let mut work = Work::unbounded();
-    let step = compilation.step(&mut host, Answer::Start, &mut work);
+    let step = compilation.step(&mut host, StepOutcome::Start, &mut work);
     assert!(matches!(step, Step::Done(Some(_), _)));
     assert!(work.done() >= 10, "{work:?}");
 }
@@ -122,7 +122,7 @@ fn a_step_does_a_bounded_part_of_the_work() {
     let function = format!("(lambda () (list {}))", "(f 1) ".repeat(20));
     let text = format!("(list {})", format!("(list {}) ", function.repeat(20)).repeat(20));
     let mut compilation = Compiler::default().compile_text("test.esl", &text);
-    let mut answer = Answer::Start;
+    let mut answer = StepOutcome::Start;
     let (mut steps, mut most) = (0, 0);
     loop {
         let mut work = Work::up_to(Work::STEP);
@@ -135,7 +135,7 @@ fn a_step_does_a_bounded_part_of_the_work() {
         assert!(compilation.bytes() > 0);
         most = most.max(work.done());
         steps += 1;
-        answer = Answer::More;
+        answer = StepOutcome::More;
     }
     assert!(steps >= 10, "{steps}");
     // The walk over the whole form before the first function is in one piece.

@@ -38,7 +38,7 @@ fn check_that_it_shows(text: &str, expected: &[&str], changes: &[TextChange]) {
     let settings = Settings { states: 50_000, ..Settings::default() };
     let prepare = |machine: &mut Vm| defect.put_into(machine);
     let found = explore_with(&compile(text), &settings, &prepare).expect("the program can start");
-    let is_well = |ending: &esl::explore::Ending<esl::explore::Behaviour>| {
+    let is_well = |ending: &esl::explore::ExploredEnding<esl::explore::Behaviour>| {
         let output = ending.what.output.split_whitespace().collect::<Vec<_>>().join(" ");
         ending.what.ended == Ended::Normally(0) && expected.contains(&&*output)
     };

@@ -10,7 +10,10 @@
 //! the data of an array, the class of a structure. These have setters of their own, or none.
 
 use super::Heap;
-use super::layout::{Array, Bignum, Bytes, Code, Cons, Float, Function, Header, Kind, Structure, Symbol};
+use super::layout::{
+    Array, Bignum, Bytes, CodeObject, Cons, Float, FunctionObject, Header, Kind, StructureObject,
+    SymbolObject,
+};
 use super::object::is_vouched_for;
 use crate::value::Value;
 use std::slice;
@@ -235,10 +238,10 @@ impl Heap {
         self.set_slot(v, Kind::Structure, index.checked_add(1)?, new)
     }
 
-    /// Whether `v` is a structure that may get another class: see [`Structure::INSTANCE`].
+    /// Whether `v` is a structure that may get another class: see [`StructureObject::INSTANCE`].
     #[inline]
     pub fn is_instance(&self, v: Value) -> bool {
-        self.flags(v, Kind::Structure).is_some_and(|flags| flags & Structure::INSTANCE != 0)
+        self.flags(v, Kind::Structure).is_some_and(|flags| flags & StructureObject::INSTANCE != 0)
     }
 
     /// Makes `v`, an instance, one of another class; `None` if it is none, or `class` is not a Class.
@@ -253,7 +256,7 @@ impl Heap {
 
     /// Returns the symbol object, if `v` is one. The values `nil` and `t` are not.
     #[inline(always)]
-    pub fn symbol(&self, v: Value) -> Option<&Symbol> {
+    pub fn symbol(&self, v: Value) -> Option<&SymbolObject> {
         let object = self.object_of(v, Kind::Symbol)?;
         // SAFETY: H3: the kind says that this is a Symbol; H5: it is borrowed with the heap.
         Some(unsafe { &*object.cast() })
@@ -287,7 +290,7 @@ impl Heap {
     pub fn function_code(&self, v: Value) -> Option<Value> {
         let object = self.object_of(v, Kind::Function)?;
         // SAFETY: H3: the kind says that this is a Function.
-        Some(unsafe { (*object.cast::<Function>()).code })
+        Some(unsafe { (*object.cast::<FunctionObject>()).code })
     }
 
     /// Replaces the code of a function; `None` if `v` is not a function or `code` not a Code.
@@ -310,10 +313,10 @@ impl Heap {
         let object = self.object_of(v, Kind::Code)?;
         // SAFETY: H3: a Code has `nconsts` values at a fixed offset, and `index` is below that.
         unsafe {
-            if index >= (*object.cast::<Code>()).nconsts as usize {
+            if index >= (*object.cast::<CodeObject>()).nconsts as usize {
                 return None;
             }
-            self.store(object.byte_add(Code::CONSTANTS_OFFSET).cast::<Value>().add(index), new);
+            self.store(object.byte_add(CodeObject::CONSTANTS_OFFSET).cast::<Value>().add(index), new);
         }
         Some(())
     }
@@ -334,7 +337,7 @@ impl Heap {
 
     /// Returns the fixed part of code.
     #[inline(always)]
-    pub fn code(&self, v: Value) -> Option<&Code> {
+    pub fn code(&self, v: Value) -> Option<&CodeObject> {
         let object = self.object_of(v, Kind::Code)?;
         // SAFETY: H3: the kind says that this is a Code; H5: it is borrowed with the heap.
         Some(unsafe { &*object.cast() })
@@ -345,8 +348,8 @@ impl Heap {
         let object = self.object_of(v, Kind::Code)?;
         // SAFETY: H3: a Code has `nconsts` values at a fixed offset; H5: they are borrowed with the heap.
         unsafe {
-            let n = (*object.cast::<Code>()).nconsts as usize;
-            Some(slice::from_raw_parts(object.byte_add(Code::CONSTANTS_OFFSET).cast(), n))
+            let n = (*object.cast::<CodeObject>()).nconsts as usize;
+            Some(slice::from_raw_parts(object.byte_add(CodeObject::CONSTANTS_OFFSET).cast(), n))
         }
     }
 
@@ -355,7 +358,7 @@ impl Heap {
         let object = self.object_of(v, Kind::Code)?;
         // SAFETY: H3: a Code has `nwords` words after its constants; H5: they are borrowed with the heap.
         unsafe {
-            let code = &*object.cast::<Code>();
+            let code = &*object.cast::<CodeObject>();
             Some(slice::from_raw_parts(object.byte_add(code.words_offset()).cast(), code.nwords as usize))
         }
     }

@@ -30,9 +30,9 @@ pub const MAX_LENGTH: usize = 1 << 31;
 #[repr(u8)]
 #[derive(Copy, Clone, PartialEq, Eq, Debug, Hash)]
 pub enum Kind {
-    /// A symbol: [`Symbol`].
+    /// A symbol: [`SymbolObject`].
     Symbol = 0x01,
-    /// A function with its captured variables: [`Function`].
+    /// A function with its captured variables: [`FunctionObject`].
     Function = 0x02,
     /// A variable that is captured and assigned: [`Boxed`].
     Box = 0x03,
@@ -44,7 +44,7 @@ pub enum Kind {
     Ratio = 0x06,
     /// A complex number: real part, imaginary part; two rationals or two floats.
     Complex = 0x07,
-    /// An instance of a structure or condition type: class, then the slots. [`Structure`].
+    /// An instance of a structure or condition type: class, then the slots. [`StructureObject`].
     Structure = 0x08,
     /// The description of a structure or condition type.
     Class = 0x09,
@@ -66,7 +66,7 @@ pub enum Kind {
     Record = 0x11,
     /// A hash table: [`HashTable`]; `aux` is its test.
     HashTable = 0x1F,
-    /// Compiled code with its constants: [`Code`].
+    /// Compiled code with its constants: [`CodeObject`].
     Code = 0x20,
     /// A double outside the window of [`Value::double`]: [`Float`].
     Float = 0x40,
@@ -191,7 +191,7 @@ const _: () = assert!(size_of::<Cons>() == GRANULE);
 /// A symbol. The heap guarantees that `name` is a String and `function` a Function.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
-pub struct Symbol {
+pub struct SymbolObject {
     /// Kind, length 6, and the flags below.
     pub header: Header,
     /// Name, a String.
@@ -208,7 +208,7 @@ pub struct Symbol {
     pub plist: Value,
 }
 
-impl Symbol {
+impl SymbolObject {
     /// Number of slots.
     pub const LEN: usize = 6;
     /// Flag: proclaimed special.
@@ -223,12 +223,12 @@ impl Symbol {
     pub const KEYWORD: u8 = 16;
 }
 
-const _: () = assert!(size_of::<Symbol>() == 8 + 8 * Symbol::LEN);
+const _: () = assert!(size_of::<SymbolObject>() == 8 + 8 * SymbolObject::LEN);
 
 /// A function: code and captured variables. The heap guarantees that `code` is a Code.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
-pub struct Function {
+pub struct FunctionObject {
     /// Kind; length 1 + number of captures.
     pub header: Header,
     /// Code, a Code object.
@@ -237,7 +237,7 @@ pub struct Function {
     pub captures: [Value; 0],
 }
 
-const _: () = assert!(size_of::<Function>() == 16);
+const _: () = assert!(size_of::<FunctionObject>() == 16);
 
 /// Compiled code.
 ///
@@ -245,7 +245,7 @@ const _: () = assert!(size_of::<Function>() == 16);
 /// (quickening, inline caches): they must not hold addresses of objects.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
-pub struct Code {
+pub struct CodeObject {
     /// Kind; length in units of 8 bytes of all that follows the header.
     pub header: Header,
     /// Name in a backtrace.
@@ -256,7 +256,7 @@ pub struct Code {
     pub owner: Value,
     /// Address at which execution begins; normally that of the first word.
     pub entry: *const u32,
-    /// Exact number of arguments, or [`Code::ANY_ARITY`] if a call has to go the slow way.
+    /// Exact number of arguments, or [`CodeObject::ANY_ARITY`] if a call has to go the slow way.
     pub arity: u32,
     /// Number of registers of a frame.
     pub nregs: u32,
@@ -270,11 +270,11 @@ pub struct Code {
     pub constants: [Value; 0],
 }
 
-impl Code {
+impl CodeObject {
     /// Value of `arity` for code that takes optional, rest or keyword arguments.
     pub const ANY_ARITY: u32 = u32::MAX;
     /// Offset of the first constant from the start of the object, in bytes.
-    pub const CONSTANTS_OFFSET: usize = std::mem::offset_of!(Code, constants);
+    pub const CONSTANTS_OFFSET: usize = std::mem::offset_of!(CodeObject, constants);
 
     /// Returns `header.len` for this many constants and words.
     pub(crate) const fn len(nconsts: usize, nwords: usize) -> usize {
@@ -288,7 +288,7 @@ impl Code {
     }
 }
 
-const _: () = assert!(size_of::<Code>() == 72 && Code::CONSTANTS_OFFSET == 72);
+const _: () = assert!(size_of::<CodeObject>() == 72 && CodeObject::CONSTANTS_OFFSET == 72);
 
 /// A variable that is captured and assigned.
 #[repr(C)]
@@ -417,7 +417,7 @@ const _: () = assert!(size_of::<HashTable>() == 80);
 /// An instance of a structure.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
-pub struct Structure {
+pub struct StructureObject {
     /// Kind; length 1 + number of slots.
     pub header: Header,
     /// Class, a Class object. The heap guarantees that, and that it never changes.
@@ -426,12 +426,12 @@ pub struct Structure {
     pub slots: [Value; 0],
 }
 
-impl Structure {
+impl StructureObject {
     /// Flag of an instance of a class of `defclass`, which may get another class.
     pub const INSTANCE: u8 = 1;
 }
 
-const _: () = assert!(size_of::<Structure>() == 16);
+const _: () = assert!(size_of::<StructureObject>() == 16);
 
 #[cfg(test)]
 mod tests {
@@ -442,7 +442,7 @@ mod tests {
         let table = [
             (Kind::Box, 1, 16),
             (Kind::Float, 1, 16),
-            (Kind::Symbol, Symbol::LEN, 64),
+            (Kind::Symbol, SymbolObject::LEN, 64),
             (Kind::SimpleVector, 0, 16),
             (Kind::SimpleVector, 1, 16),
             (Kind::SimpleVector, 2, 32),
@@ -454,8 +454,8 @@ mod tests {
             (Kind::Words32, 2, 16),
             (Kind::Words64, 2, 32),
             (Kind::HashTable, 9, 80),
-            (Kind::Code, Code::len(0, 0), 80),
-            (Kind::Code, Code::len(2, 3), 112),
+            (Kind::Code, CodeObject::len(0, 0), 80),
+            (Kind::Code, CodeObject::len(2, 3), 112),
         ];
         for (kind, len, size) in table {
             assert_eq!(kind.size(len), size, "{kind:?} of {len}");

@@ -27,7 +27,7 @@
 
 use super::arena::{self, Arena, BLOCKS, metadata_of};
 use super::large;
-use super::layout::{Code, Cons, GRANULE, Header, Kind};
+use super::layout::{CodeObject, Cons, GRANULE, Header, Kind};
 use super::metadata::{END, EPOCH, GRAY, GRAY_CONS, next_epoch, next_gray};
 use super::{Heap, Phase, SliceOutcome};
 use crate::list_state;
@@ -297,8 +297,8 @@ impl Heap {
             let header = *object;
             let first = object.add(1).cast::<Value>();
             if header.kind == Kind::Code {
-                let code = object.cast::<Code>();
-                let constants = object.byte_add(Code::CONSTANTS_OFFSET).cast::<Value>();
+                let code = object.cast::<CodeObject>();
+                let constants = object.byte_add(CodeObject::CONSTANTS_OFFSET).cast::<Value>();
                 let n = (*code).nconsts as usize;
                 (std::slice::from_raw_parts(first, 3), std::slice::from_raw_parts(constants, n))
             } else {

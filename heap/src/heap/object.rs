@@ -7,7 +7,8 @@
 //! The functions assert the contents that the interpreter relies on (H4 in [`super`]).
 
 use super::layout::{
-    Bignum, Boxed, Bytes, Code, Cons, Float, Function, Header, Kind, MAX_LENGTH, Symbol, Vector,
+    Bignum, Boxed, Bytes, CodeObject, Cons, Float, FunctionObject, Header, Kind, MAX_LENGTH, SymbolObject,
+    Vector,
 };
 use super::{AllocError, Heap};
 use crate::value::Value;
@@ -21,7 +22,7 @@ pub struct CodeParts<'a> {
     pub debug: Value,
     /// Owner, or `nil`.
     pub owner: Value,
-    /// Exact number of arguments, or [`Code::ANY_ARITY`].
+    /// Exact number of arguments, or [`CodeObject::ANY_ARITY`].
     pub arity: u32,
     /// Number of registers of a frame.
     pub nregs: u32,
@@ -296,7 +297,8 @@ impl Heap {
     ) -> Result<Value, AllocError> {
         assert_eq!(self.kind(name), Some(Kind::String), "the name of a symbol is a string");
         assert_eq!(self.kind(function), Some(Kind::Function), "the function of a symbol is a function");
-        let slots: [Value; Symbol::LEN] = [name, package, Value::UNBOUND, function, Value::NIL, Value::NIL];
+        let slots: [Value; SymbolObject::LEN] =
+            [name, package, Value::UNBOUND, function, Value::NIL, Value::NIL];
         self.record_from(Kind::Symbol, flags, 0, &[], &slots)
     }
 
@@ -320,9 +322,9 @@ impl Heap {
         &mut self,
         code: Value,
         ncaptures: usize,
-    ) -> Result<*mut Function, AllocError> {
+    ) -> Result<*mut FunctionObject, AllocError> {
         debug_assert_eq!(self.kind(code), Some(Kind::Code));
-        let function = self.begin_object(Kind::Function, 0, 0, 1 + ncaptures)?.cast::<Function>();
+        let function = self.begin_object(Kind::Function, 0, 0, 1 + ncaptures)?.cast::<FunctionObject>();
         // SAFETY: `begin_object` gave room for the code and the captures; all are written before the address
         // is given out.
         unsafe {
@@ -343,19 +345,19 @@ impl Heap {
     /// same rules: the interpreter runs them without a check.
     pub unsafe fn alloc_code(&mut self, parts: CodeParts<'_>) -> Result<Value, AllocError> {
         let (nconsts, nwords) = (parts.constants.len(), parts.words.len());
-        let len = Code::len(nconsts, nwords);
+        let len = CodeObject::len(nconsts, nwords);
         if nconsts > MAX_LENGTH || nwords > MAX_LENGTH {
             return Err(AllocError::TooLarge { requested: len.saturating_mul(8) });
         }
         let object = self.begin_object(Kind::Code, 0, 0, len)?;
-        let code = object.cast::<Code>();
-        // SAFETY: `begin_object` gave room for `len` units of 8 bytes, which `Code::len` computed for exactly
+        let code = object.cast::<CodeObject>();
+        // SAFETY: `begin_object` gave room for `len` units of 8 bytes, which `CodeObject::len` computed for exactly
         // these constants and words; everything is written before the value is made. Provenance is exposed
         // because the interpreter walks from `entry` through the whole object.
         unsafe {
             let constants = (&raw mut (*code).constants).cast::<Value>();
             let words = constants.add(nconsts).cast::<u32>();
-            code.write(Code {
+            code.write(CodeObject {
                 header: *object,
                 name: parts.name,
                 debug: parts.debug,

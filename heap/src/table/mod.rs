@@ -17,7 +17,7 @@
 //! Source: Larson, "Dynamic hash tables", 1988, for growing by one bucket. We keep the entries apart from the
 //! buckets, for the sake of their order.
 
-use crate::equality::{self, Test};
+use crate::equality::{self, KeyTest};
 use crate::heap::{AllocError, Heap, Kind};
 use crate::value::Value;
 use storage::{Counter, ENTRY, MOST, PER_ENTRY, SEGMENT, Storage};
@@ -85,7 +85,7 @@ fn next(storage: &Storage<'_>, link: Link) -> Link {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KeyComparison {
     /// By a test of the machine.
-    Native(Test),
+    Native(KeyTest),
     /// By a function of the program.
     Program,
 }
@@ -128,10 +128,10 @@ impl Table {
         functions: [Value; 2],
     ) -> Result<Value, AllocError> {
         let number = match comparison {
-            KeyComparison::Native(Test::Eq) => 0,
-            KeyComparison::Native(Test::Eql) => 1,
-            KeyComparison::Native(Test::Equal) => 2,
-            KeyComparison::Native(Test::Equalp) => 3,
+            KeyComparison::Native(KeyTest::Eq) => 0,
+            KeyComparison::Native(KeyTest::Eql) => 1,
+            KeyComparison::Native(KeyTest::Equal) => 2,
+            KeyComparison::Native(KeyTest::Equalp) => 3,
             KeyComparison::Program => 4,
         };
         heap.alloc_table(number, size.clamp(LEAST, SEGMENT), functions)
@@ -141,10 +141,10 @@ impl Table {
     #[inline(always)]
     pub fn comparison(self, heap: &Heap) -> KeyComparison {
         match self.storage(heap).which_test() {
-            0 => KeyComparison::Native(Test::Eq),
-            1 => KeyComparison::Native(Test::Eql),
-            2 => KeyComparison::Native(Test::Equal),
-            3 => KeyComparison::Native(Test::Equalp),
+            0 => KeyComparison::Native(KeyTest::Eq),
+            1 => KeyComparison::Native(KeyTest::Eql),
+            2 => KeyComparison::Native(KeyTest::Equal),
+            3 => KeyComparison::Native(KeyTest::Equalp),
             _ => KeyComparison::Program,
         }
     }
@@ -235,7 +235,7 @@ impl Table {
     pub fn find(
         self,
         heap: &Heap,
-        test: Test,
+        test: KeyTest,
         key: Value,
         hash: u32,
         work: &mut usize,
@@ -252,7 +252,7 @@ impl Table {
                 if candidate == key {
                     return Ok(Some((entry, value)));
                 }
-                if test != Test::Eq {
+                if test != KeyTest::Eq {
                     match equality::same(heap, test, key, candidate, work) {
                         Some(true) => return Ok(Some((entry, value))),
                         Some(false) => {}
@@ -398,22 +398,22 @@ mod tests {
         }
     }
 
-    fn new(heap: &mut Heap, test: Test) -> Table {
+    fn new(heap: &mut Heap, test: KeyTest) -> Table {
         let v = Table::make(heap, KeyComparison::Native(test), 0, [Value::NIL; 2]).unwrap();
         Table::of(heap, v).unwrap()
     }
 
     fn find(heap: &Heap, table: Table, key: i32) -> Option<usize> {
         let key = Value::small(key);
-        let hash = equality::hash(heap, Test::Eql, key);
-        table.find(heap, Test::Eql, key, hash, &mut 4096).unwrap().map(|(entry, _)| entry)
+        let hash = equality::hash(heap, KeyTest::Eql, key);
+        table.find(heap, KeyTest::Eql, key, hash, &mut 4096).unwrap().map(|(entry, _)| entry)
     }
 
     fn put(heap: &mut Heap, table: Table, key: i32, value: i32) {
         match find(heap, table, key) {
             Some(entry) => table.set_value(heap, entry, Value::small(value)),
             None => {
-                let hash = equality::hash(heap, Test::Eql, Value::small(key));
+                let hash = equality::hash(heap, KeyTest::Eql, Value::small(key));
                 table.add(heap, hash, Value::small(key), Value::small(value)).unwrap();
             }
         }
@@ -442,7 +442,7 @@ mod tests {
             operations in prop::collection::vec((0u8..10, any::<u16>(), any::<i16>()), 0..800),
         ) {
             let mut heap = Heap::for_tests();
-            let table = new(&mut heap, Test::Eql);
+            let table = new(&mut heap, KeyTest::Eql);
             let mut model = Model::default();
             for (operation, key, value) in operations {
                 let (key, value) = (i32::from(key) % range, i32::from(value));
@@ -454,7 +454,7 @@ mod tests {
                     6..9 => {
                         let found = find(&heap, table, key);
                         if let Some(entry) = found {
-                            let hash = equality::hash(&heap, Test::Eql, Value::small(key));
+                            let hash = equality::hash(&heap, KeyTest::Eql, Value::small(key));
                             assert!(table.delete(&mut heap, entry, hash));
                         }
                         prop_assert_eq!(found.is_some(), model.remove(key));
@@ -477,7 +477,7 @@ mod tests {
     #[test]
     fn a_large_table_keeps_everything() {
         let mut heap = Heap::for_tests();
-        let table = new(&mut heap, Test::Eql);
+        let table = new(&mut heap, KeyTest::Eql);
         let n = 3 * SEGMENT as i32 + 17;
         for key in 0..n {
             put(&mut heap, table, key * 7, key);
@@ -490,7 +490,7 @@ mod tests {
         }
         for key in (0..n).step_by(2) {
             let entry = find(&heap, table, key * 7).unwrap();
-            let hash = equality::hash(&heap, Test::Eql, Value::small(key * 7));
+            let hash = equality::hash(&heap, KeyTest::Eql, Value::small(key * 7));
             assert!(table.delete(&mut heap, entry, hash));
         }
         let expected: Vec<(i32, i32)> = (0..n).skip(1).step_by(2).map(|key| (key * 7, key)).collect();
@@ -508,7 +508,7 @@ mod tests {
     #[test]
     fn nobody_else_gets_hold_of_the_storage() {
         let mut heap = Heap::for_tests();
-        let v = new(&mut heap, Test::Eq).0;
+        let v = new(&mut heap, KeyTest::Eq).0;
         assert_eq!(heap.record(v, Kind::HashTable), None);
         assert_eq!((0..9).find_map(|index| heap.slot(v, index)), None);
         assert_eq!(heap.record_set(v, Kind::HashTable, 0, Value::NIL), None);
@@ -517,7 +517,7 @@ mod tests {
     #[test]
     fn keys_of_one_hash_are_candidates() {
         let mut heap = Heap::for_tests();
-        let table = new(&mut heap, Test::Eql);
+        let table = new(&mut heap, KeyTest::Eql);
         for key in 0..20 {
             table.add(&mut heap, 5 + 8 * (key as u32 % 2), Value::small(key), Value::NIL).unwrap();
         }

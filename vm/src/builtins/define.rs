@@ -2,7 +2,7 @@
 
 use crate::environment::property;
 use crate::heap::Kind;
-use crate::heap::layout::Symbol;
+use crate::heap::layout::SymbolObject;
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -40,11 +40,11 @@ pub(crate) fn proclaim_special(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let name = arguments[0];
     let symbol = symbol_object(vm, name)?;
     let flags = vm.heap.flags(symbol, Kind::Symbol).unwrap_or(0);
-    if flags & Symbol::CONSTANT != 0 {
+    if flags & SymbolObject::CONSTANT != 0 {
         let name = vm.describe(name);
         return vm.exchange.program_error(format!("{name} is a constant and cannot be made a variable"));
     }
-    vm.heap.set_flags(symbol, Kind::Symbol, flags | Symbol::SPECIAL);
+    vm.heap.set_flags(symbol, Kind::Symbol, flags | SymbolObject::SPECIAL);
     Ok(name)
 }
 
@@ -53,19 +53,19 @@ pub(crate) fn define_constant(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let symbol = symbol_object(vm, name)?;
     let flags = vm.heap.flags(symbol, Kind::Symbol).unwrap_or(0);
     let old = vm.heap.symbol(symbol).map_or(Value::UNBOUND, |symbol| symbol.value);
-    if flags & Symbol::CONSTANT != 0 {
+    if flags & SymbolObject::CONSTANT != 0 {
         if crate::number::eql(&vm.heap, old, value) {
             return Ok(name);
         }
         let (name, old) = (vm.describe(name), vm.describe(old));
         return vm.exchange.program_error(format!("{name} is a constant already, with the value {old}"));
     }
-    if vm.world.is_locked(&vm.heap, name) || flags & Symbol::SPECIAL != 0 {
+    if vm.world.is_locked(&vm.heap, name) || flags & SymbolObject::SPECIAL != 0 {
         let name = vm.describe(name);
         return vm.exchange.program_error(format!("{name} is a variable and cannot be made a constant"));
     }
     vm.heap.symbol_set_value(symbol, value);
-    vm.heap.set_flags(symbol, Kind::Symbol, flags | Symbol::CONSTANT);
+    vm.heap.set_flags(symbol, Kind::Symbol, flags | SymbolObject::CONSTANT);
     Ok(name)
 }
 

@@ -1,6 +1,6 @@
 //! `eq`, `eql`, `equal`, `equalp` and `sxhash`, as far as they go without a call.
 
-use crate::equality::{self, Test};
+use crate::equality::{self, KeyTest};
 use crate::number;
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
@@ -10,7 +10,7 @@ use super::expect::exactly;
 
 use super::LIMIT;
 
-fn compare(vm: &mut Vm, test: Test, arguments: &[Value]) -> Outcome {
+fn compare(vm: &mut Vm, test: KeyTest, arguments: &[Value]) -> Outcome {
     let mut work = LIMIT;
     let result = equality::same(&vm.heap, test, arguments[0], arguments[1], &mut work);
     match result {
@@ -32,11 +32,11 @@ pub(super) fn eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn equal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    compare(vm, Test::Equal, arguments)
+    compare(vm, KeyTest::Equal, arguments)
 }
 
 pub(super) fn equalp(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    compare(vm, Test::Equalp, arguments)
+    compare(vm, KeyTest::Equalp, arguments)
 }
 
 pub(super) fn sxhash(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -21,7 +21,7 @@
 //! Guarantees: a step does a bounded part of the work, for which the task is charged. What compilations hold
 //! counts against the limit of the memory: beyond it, the next step fails for want of room.
 
-use esl_bytecode::compile::{Answer, Compilation, Step, Work};
+use esl_bytecode::compile::{Compilation, Step, StepOutcome, Work};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::file;
@@ -108,23 +108,28 @@ fn go_on_with_form(vm: &mut Vm, form: &mut FormWalk) -> Result<Option<ActiveComp
 }
 
 /// Returns the outcome of the last step, as the program tells it.
-fn answer(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Value) -> Result<Answer, Exit> {
+fn answer(
+    vm: &mut Vm,
+    running: &mut ActiveCompilation,
+    kind: Value,
+    outcome: Value,
+) -> Result<StepOutcome, Exit> {
     let kind = designated_text(vm, kind)?;
     let unit = &mut running.unit;
     Ok(match &*kind {
-        "START" => Answer::Start,
-        "MORE" => Answer::More,
+        "START" => StepOutcome::Start,
+        "MORE" => StepOutcome::More,
         "EXPANSION" => match unit.datum_of(&vm.heap, &vm.world, outcome, Span::default()) {
-            Ok(expansion) => Answer::Expansion(expansion),
+            Ok(expansion) => StepOutcome::Expansion(expansion),
             Err(DatumError::NoRoom(bytes)) => {
                 vm.heap.check_room(bytes)?;
                 return Err(Exit::Collect);
             }
-            Err(error) => Answer::Failed(error.to_string().into()),
+            Err(error) => StepOutcome::Failed(error.to_string().into()),
         },
-        "LOADED" if running.keeps => Answer::Object(unit.pin(outcome)),
-        "LOADED" => Answer::Loaded,
-        "FAILED" => Answer::Failed(designated_text(vm, outcome)?.into()),
+        "LOADED" if running.keeps => StepOutcome::Object(unit.pin(outcome)),
+        "LOADED" => StepOutcome::Loaded,
+        "FAILED" => StepOutcome::Failed(designated_text(vm, outcome)?.into()),
         _ => return vm.exchange.program_error(format!("{kind} is no outcome of a step")),
     })
 }

@@ -7,7 +7,7 @@ use crate::raise::{Exit, Outcome, Raised};
 use crate::report;
 use crate::run;
 use crate::task::FailureReport;
-use crate::task::{End, EntryKind, Target, Unwinding};
+use crate::task::{EntryKind, TaskEnd, UnwindTarget, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -87,7 +87,7 @@ pub(super) fn stand_in(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(base) = vm.frame_of_operation(around) else { return vm.give_values(&items) };
     let control = &mut vm.scheduler.task_mut().control;
     let entries = control.entries.partition_point(|entry| entry.base < base);
-    control.unwinding = Some(Unwinding { target: Target::Return { entries, base }, values: items });
+    control.unwinding = Some(Unwinding { target: UnwindTarget::Return { entries, base }, values: items });
     Err(Exit::Unwind)
 }
 
@@ -98,7 +98,7 @@ pub(super) fn unwind_to_cleanup(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match control.entries.get(index) {
         Some(entry) if entry.kind == EntryKind::FailureCleanup => {
             let values = vec![failure];
-            control.unwinding = Some(Unwinding { target: Target::Entry(index), values });
+            control.unwinding = Some(Unwinding { target: UnwindTarget::Entry(index), values });
             Err(Exit::Unwind)
         }
         _ => vm.exchange.raise(Raised::Control("the cleanup for a failure is no longer there".into())),
@@ -118,7 +118,7 @@ pub(super) fn take_case(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match control.entries.get(index) {
         Some(entry) if entry.kind == EntryKind::HandlerCase => {
             let values = arguments[1..].to_vec();
-            control.unwinding = Some(Unwinding { target: Target::Entry(index), values });
+            control.unwinding = Some(Unwinding { target: UnwindTarget::Entry(index), values });
             Err(Exit::Unwind)
         }
         _ => {
@@ -142,7 +142,7 @@ fn belongs_to_form(vm: &Vm) -> bool {
 pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [story, ending] = [2, 3].map(|index| vm.heap.string_text(arguments[index]).unwrap_or_default());
     match vm.scheduler.task().control.final_unwinding() {
-        Some(Target::Root(End::Failed(_))) => {
+        Some(UnwindTarget::Root(TaskEnd::Failed(_))) => {
             if let Some(report) = &mut vm.scheduler.task_mut().extra_mut().report {
                 report.add_cleanup(&story);
             }
@@ -158,7 +158,7 @@ pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
             vm.scheduler.task_mut().extra_mut().report = Some(FailureReport { story, ending });
         }
     }
-    vm.scheduler.task_mut().begin_end(End::Failed(arguments[0]));
+    vm.scheduler.task_mut().begin_end(TaskEnd::Failed(arguments[0]));
     Err(Exit::Unwind)
 }
 
@@ -167,7 +167,7 @@ pub(super) fn exit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(status) = status else { return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE") };
     vm.outside.exit_status = Some(status);
     run::abort_others(vm);
-    vm.scheduler.task_mut().begin_end(End::Aborted);
+    vm.scheduler.task_mut().begin_end(TaskEnd::Aborted);
     Err(Exit::Unwind)
 }
 

@@ -10,7 +10,7 @@
 //! slot up.
 
 use crate::builtins::class::superclasses;
-use crate::heap::layout::Structure;
+use crate::heap::layout::StructureObject;
 use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
@@ -74,7 +74,7 @@ pub(super) fn new_instance(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return vm.exchange.type_error(class, "CLASS");
     }
     let instance = vm.heap.alloc_structure(class, &[layout, slots])?;
-    vm.heap.set_flags(instance, Kind::Structure, Structure::INSTANCE);
+    vm.heap.set_flags(instance, Kind::Structure, StructureObject::INSTANCE);
     Ok(instance)
 }
 

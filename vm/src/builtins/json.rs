@@ -5,7 +5,7 @@
 
 use crate::builtins::stream::{few_characters, write_part as write_characters};
 use crate::builtins::table::puthash;
-use crate::equality::Test;
+use crate::equality::KeyTest;
 use crate::number::text;
 use crate::raise::{Exit, Outcome};
 use crate::table::{KeyComparison, Table};
@@ -20,7 +20,7 @@ const LENGTH: usize = 1 << 13;
 const DEPTH: usize = 100;
 
 /// Reason why a value is not read.
-enum Stop {
+enum JsonStop {
     /// The text is wrong here.
     Fault(usize, &'static str),
     /// The value is too long or too deep for one call.
@@ -29,23 +29,23 @@ enum Stop {
     Exit(Exit),
 }
 
-impl From<Exit> for Stop {
-    fn from(exit: Exit) -> Stop {
+impl From<Exit> for JsonStop {
+    fn from(exit: Exit) -> JsonStop {
         match exit {
-            Exit::Slowly => Stop::Large,
-            exit => Stop::Exit(exit),
+            Exit::Slowly => JsonStop::Large,
+            exit => JsonStop::Exit(exit),
         }
     }
 }
 
-impl From<crate::heap::AllocError> for Stop {
-    fn from(error: crate::heap::AllocError) -> Stop {
-        Stop::Exit(error.into())
+impl From<crate::heap::AllocError> for JsonStop {
+    fn from(error: crate::heap::AllocError) -> JsonStop {
+        JsonStop::Exit(error.into())
     }
 }
 
 /// A text that is being read.
-struct Reader<'a> {
+struct JsonReader<'a> {
     vm: &'a mut Vm,
     text: &'a [u32],
     at: usize,
@@ -98,7 +98,7 @@ fn extent(text: &[u32]) -> Option<usize> {
     (text.len() <= LENGTH).then_some(text.len())
 }
 
-impl Reader<'_> {
+impl JsonReader<'_> {
     fn peek(&self) -> Option<u32> {
         self.text.get(self.at).copied()
     }
@@ -115,20 +115,20 @@ impl Reader<'_> {
         is_next
     }
 
-    fn word(&mut self, word: &str, value: Value) -> Result<Value, Stop> {
+    fn word(&mut self, word: &str, value: Value) -> Result<Value, JsonStop> {
         let is_here = word
             .chars()
             .enumerate()
             .all(|(index, character)| self.text.get(self.at + index).copied() == Some(u32::from(character)));
         if !is_here {
-            return Err(Stop::Fault(self.at, "expected a value"));
+            return Err(JsonStop::Fault(self.at, "expected a value"));
         }
         self.at += word.len();
         Ok(value)
     }
 
     /// Reads a value, after blanks.
-    fn value(&mut self) -> Result<Value, Stop> {
+    fn value(&mut self) -> Result<Value, JsonStop> {
         self.skip_blanks();
         match self.peek().and_then(char::from_u32) {
             Some('{') => self.object(),
@@ -141,11 +141,11 @@ impl Reader<'_> {
                 let null = self.vm.world.keyword(&mut self.vm.heap, "NULL")?;
                 self.word("null", null)
             }
-            _ => Err(Stop::Fault(self.at, "expected a value")),
+            _ => Err(JsonStop::Fault(self.at, "expected a value")),
         }
     }
 
-    fn array(&mut self) -> Result<Value, Stop> {
+    fn array(&mut self) -> Result<Value, JsonStop> {
         self.at += 1;
         let mut items = Vec::new();
         self.skip_blanks();
@@ -157,14 +157,14 @@ impl Reader<'_> {
                     break;
                 }
                 if !self.is_next(',') {
-                    return Err(Stop::Fault(self.at, "expected `,` or `]`"));
+                    return Err(JsonStop::Fault(self.at, "expected `,` or `]`"));
                 }
             }
         }
         Ok(self.vm.heap.alloc_vector(&items)?)
     }
 
-    fn object(&mut self) -> Result<Value, Stop> {
+    fn object(&mut self) -> Result<Value, JsonStop> {
         self.at += 1;
         let mut members = Vec::new();
         self.skip_blanks();
@@ -172,12 +172,12 @@ impl Reader<'_> {
             loop {
                 self.skip_blanks();
                 if self.peek() != Some(u32::from('"')) {
-                    return Err(Stop::Fault(self.at, "expected a key, a string"));
+                    return Err(JsonStop::Fault(self.at, "expected a key, a string"));
                 }
                 let key = self.string()?;
                 self.skip_blanks();
                 if !self.is_next(':') {
-                    return Err(Stop::Fault(self.at, "expected `:` after the key"));
+                    return Err(JsonStop::Fault(self.at, "expected `:` after the key"));
                 }
                 members.push((key, self.value()?));
                 self.skip_blanks();
@@ -185,7 +185,7 @@ impl Reader<'_> {
                     break;
                 }
                 if !self.is_next(',') {
-                    return Err(Stop::Fault(self.at, "expected `,` or `}`"));
+                    return Err(JsonStop::Fault(self.at, "expected `,` or `}`"));
                 }
             }
         }
@@ -194,7 +194,7 @@ impl Reader<'_> {
                 members.into_iter().map(|(key, value)| self.vm.heap.cons(key, value)).collect();
             return Ok(self.vm.heap.list(&pairs?)?);
         }
-        let comparison = KeyComparison::Native(Test::Equal);
+        let comparison = KeyComparison::Native(KeyTest::Equal);
         let table = Table::make(&mut self.vm.heap, comparison, members.len(), [Value::NIL; 2])?;
         for (key, value) in members {
             puthash(self.vm, &[key, table, value])?;
@@ -202,19 +202,19 @@ impl Reader<'_> {
         Ok(table)
     }
 
-    fn string(&mut self) -> Result<Value, Stop> {
+    fn string(&mut self) -> Result<Value, JsonStop> {
         let mut characters = Vec::new();
         self.at += 1;
         let (at, end) = string_part_of(self.text, self.at, &mut characters);
         self.at = at;
         match end {
             PartEnd::Quote => Ok(self.vm.heap.alloc_string(&characters)?),
-            PartEnd::Limit => Err(Stop::Large),
-            PartEnd::Fault(reason) => Err(Stop::Fault(at, reason)),
+            PartEnd::Limit => Err(JsonStop::Large),
+            PartEnd::Fault(reason) => Err(JsonStop::Fault(at, reason)),
         }
     }
 
-    fn number(&mut self) -> Result<Value, Stop> {
+    fn number(&mut self) -> Result<Value, JsonStop> {
         let start = self.at;
         self.is_next('-');
         let first = self.at;
@@ -222,10 +222,10 @@ impl Reader<'_> {
             self.at += 1;
         }
         if self.at == first {
-            return Err(Stop::Fault(self.at, "expected a digit"));
+            return Err(JsonStop::Fault(self.at, "expected a digit"));
         }
         if self.at > first + 1 && self.text[first] == u32::from('0') {
-            return Err(Stop::Fault(first, "expected no digit after a leading zero"));
+            return Err(JsonStop::Fault(first, "expected no digit after a leading zero"));
         }
         let end_of_integer = self.at;
         if self.is_next('.') {
@@ -241,22 +241,22 @@ impl Reader<'_> {
         if self.at == end_of_integer {
             return match text::parse_integer(text, 0, 10) {
                 text::Parsed::Integer(integer, _) => Ok(self.vm.integer_value("PARSE-INTEGER", &integer)?),
-                _ => Err(Stop::Large),
+                _ => Err(JsonStop::Large),
             };
         }
         let text: String = text.iter().filter_map(|&code| char::from_u32(code)).collect();
         match text.parse::<f64>() {
             Ok(number) if number.is_finite() => Ok(self.vm.heap.float(number)?),
-            _ => Err(Stop::Fault(start, "expected a number in the range of doubles")),
+            _ => Err(JsonStop::Fault(start, "expected a number in the range of doubles")),
         }
     }
 
-    fn digits(&mut self) -> Result<(), Stop> {
+    fn digits(&mut self) -> Result<(), JsonStop> {
         let start = self.at;
         while is_digit(self.peek()) {
             self.at += 1;
         }
-        if self.at == start { Err(Stop::Fault(self.at, "expected a digit")) } else { Ok(()) }
+        if self.at == start { Err(JsonStop::Fault(self.at, "expected a digit")) } else { Ok(()) }
     }
 }
 
@@ -364,17 +364,17 @@ pub(super) fn value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     // One more, so that what follows the value is seen.
     let text = text[start..].iter().take(length + 1).copied().collect::<Vec<u32>>();
     vm.exchange.charge((blanks + length) / 4);
-    let mut reader = Reader { vm, text: &text, at: 0, are_tables: are_tables.is_true() };
+    let mut reader = JsonReader { vm, text: &text, at: 0, are_tables: are_tables.is_true() };
     let result = reader.value();
     let end = start + reader.at;
     match result {
         Ok(value) => vm.give_values(&[value, Value::index(end), Value::NIL]),
-        Err(Stop::Large) => vm.give_values(&[Value::NIL, Value::index(start), Value::T]),
-        Err(Stop::Fault(at, reason)) => {
+        Err(JsonStop::Large) => vm.give_values(&[Value::NIL, Value::index(start), Value::T]),
+        Err(JsonStop::Fault(at, reason)) => {
             let reason = vm.heap.alloc_str(reason)?;
             vm.give_values(&[Value::NIL, Value::index(start + at), reason])
         }
-        Err(Stop::Exit(exit)) => Err(exit),
+        Err(JsonStop::Exit(exit)) => Err(exit),
     }
 }
 

@@ -3,7 +3,7 @@
 //! The functions with keyword arguments are written in ESL over these.
 
 use crate::builtins::list::list_items;
-use crate::equality::{self, Test};
+use crate::equality::{self, KeyTest};
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -33,18 +33,18 @@ fn find_pair(
 }
 
 /// Returns whether two objects are the same by `test`, within what is left of `work`.
-fn same(vm: &Vm, test: Test, a: Value, b: Value, work: &mut usize) -> Result<bool, Exit> {
+fn same(vm: &Vm, test: KeyTest, a: Value, b: Value, work: &mut usize) -> Result<bool, Exit> {
     equality::same(&vm.heap, test, a, b, work).ok_or(Exit::Slowly)
 }
 
-fn member(vm: &mut Vm, test: Test, arguments: &[Value]) -> Outcome {
+fn member(vm: &mut Vm, test: KeyTest, arguments: &[Value]) -> Outcome {
     let item = arguments[0];
     let mut work = LIMIT;
     find_pair(vm, arguments[1], |vm, candidate| same(vm, test, item, candidate, &mut work))
 }
 
 /// Returns the first pair of an alist whose key, or value, is the same as `item`.
-fn assoc(vm: &mut Vm, test: Test, arguments: &[Value], by_value: bool) -> Outcome {
+fn assoc(vm: &mut Vm, test: KeyTest, arguments: &[Value], by_value: bool) -> Outcome {
     let item = arguments[0];
     let mut work = LIMIT;
     let found = find_pair(vm, arguments[1], |vm, entry| match vm.heap.as_cons(entry) {
@@ -61,17 +61,17 @@ macro_rules! searches {
         $(
             #[doc = concat!("`(%member-", stringify!($test), " item list)`")]
             pub(super) fn $member(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-                member(vm, Test::$test, arguments)
+                member(vm, KeyTest::$test, arguments)
             }
 
             #[doc = concat!("`(%assoc-", stringify!($test), " item alist)`")]
             pub(super) fn $assoc(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-                assoc(vm, Test::$test, arguments, false)
+                assoc(vm, KeyTest::$test, arguments, false)
             }
 
             #[doc = concat!("`(%rassoc-", stringify!($test), " item alist)`")]
             pub(super) fn $rassoc(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-                assoc(vm, Test::$test, arguments, true)
+                assoc(vm, KeyTest::$test, arguments, true)
             }
         )*
     };

@@ -2,7 +2,7 @@
 
 use crate::builtins::operation::host_call;
 use crate::datum;
-use crate::host::{Failure, Host};
+use crate::host::{Host, HostFailure};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -61,7 +61,7 @@ pub(super) fn call_host(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 /// Returns the value of an embedder's function, or requests a call that fails as the function has failed.
-fn give_answer(vm: &mut Vm, answer: &Result<Datum, Failure>) -> Outcome {
+fn give_answer(vm: &mut Vm, answer: &Result<Datum, HostFailure>) -> Outcome {
     match answer {
         Ok(datum) => import(vm, datum),
         Err(failure) => {

@@ -12,7 +12,7 @@ use crate::builtins::expect::{exactly, optional};
 use crate::builtins::list::list_items;
 use crate::builtins::symbol::{designated_text, text_of};
 use crate::heap::Kind;
-use crate::heap::layout::Symbol;
+use crate::heap::layout::SymbolObject;
 use crate::host::{Host, Permit, Right, Rights};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::task::{Binding, EntryKind};
@@ -69,7 +69,7 @@ fn decode(text: &str) -> Rights {
 
 /// Returns the right of which `v` is the name, a keyword.
 fn expect_right(vm: &mut Vm, v: Value) -> Result<Right, Exit> {
-    let is_keyword = vm.heap.flags(v, Kind::Symbol).is_some_and(|flags| flags & Symbol::KEYWORD != 0);
+    let is_keyword = vm.heap.flags(v, Kind::Symbol).is_some_and(|flags| flags & SymbolObject::KEYWORD != 0);
     let right = if is_keyword { Right::of_name(&designated_text(vm, v)?) } else { None };
     match right {
         Some(right) => Ok(right),

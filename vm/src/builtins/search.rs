@@ -3,7 +3,7 @@
 
 use crate::builtins::array::{ArrayElements, vector_elements};
 use crate::builtins::list::list_items;
-use crate::equality::{self, Test};
+use crate::equality::{self, KeyTest};
 use crate::number;
 use crate::raise::{Exit, Outcome};
 use crate::value::Value;
@@ -14,7 +14,7 @@ use super::{COPY_LIMIT, LIMIT};
 
 /// Returns the index of an element that is the same as `item`, between two bounds, the first or the last of
 /// them.
-fn position(vm: &mut Vm, test: Test, arguments: &[Value]) -> Outcome {
+fn position(vm: &mut Vm, test: KeyTest, arguments: &[Value]) -> Outcome {
     let [item, sequence, start, end, from_end] = exactly(arguments);
     let from_end = from_end.is_true();
     if let Some(elements) = vector_elements(&vm.heap, sequence) {
@@ -43,14 +43,14 @@ fn position(vm: &mut Vm, test: Test, arguments: &[Value]) -> Outcome {
 
 fn in_vector(
     vm: &mut Vm,
-    test: Test,
+    test: KeyTest,
     item: Value,
     vector: Value,
     range: std::ops::Range<usize>,
     from_end: bool,
 ) -> Result<Option<usize>, Exit> {
     let Some(elements) = vector_elements(&vm.heap, vector) else { return Ok(None) };
-    let limit = if test == Test::Equal { LIMIT } else { COPY_LIMIT };
+    let limit = if test == KeyTest::Equal { LIMIT } else { COPY_LIMIT };
     // Of many elements a part is looked at: what is found there need not be left to the twin.
     let is_partial = range.len() > limit;
     let range = match is_partial {
@@ -103,11 +103,11 @@ fn in_vector(
 }
 
 pub(super) fn position_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    position(vm, Test::Eql, arguments)
+    position(vm, KeyTest::Eql, arguments)
 }
 
 pub(super) fn position_equal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    position(vm, Test::Equal, arguments)
+    position(vm, KeyTest::Equal, arguments)
 }
 
 pub(super) fn count_eql(vm: &mut Vm, arguments: &[Value]) -> Outcome {

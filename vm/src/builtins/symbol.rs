@@ -8,7 +8,7 @@ use crate::builtins::list::list_items;
 use crate::builtins::lookup;
 use crate::environment;
 use crate::equality::characters_of;
-use crate::heap::layout::Symbol;
+use crate::heap::layout::SymbolObject;
 use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
@@ -17,7 +17,7 @@ use crate::vm::Vm;
 use super::expect::exactly;
 
 /// Returns a copy of the fixed part of a symbol's object.
-fn cell(vm: &mut Vm, v: Value) -> Result<Symbol, Exit> {
+fn cell(vm: &mut Vm, v: Value) -> Result<SymbolObject, Exit> {
     let object = symbol_object(vm, v)?;
     match vm.heap.symbol(object) {
         Some(cell) => Ok(*cell),
@@ -188,12 +188,12 @@ pub(super) fn macro_function(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn special_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let flags = cell(vm, arguments[0])?.header.flags;
-    Ok(Value::boolean(flags & Symbol::SPECIAL != 0))
+    Ok(Value::boolean(flags & SymbolObject::SPECIAL != 0))
 }
 
 pub(super) fn constant_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let flags = cell(vm, arguments[0])?.header.flags;
-    Ok(Value::boolean(flags & Symbol::CONSTANT != 0))
+    Ok(Value::boolean(flags & SymbolObject::CONSTANT != 0))
 }
 
 pub(super) fn locked_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -5,7 +5,7 @@
 //! can be interrupted, what it has found is checked again where it is used: an entry must still have the very
 //! key, a table the same keys.
 
-use crate::equality::{self, Test};
+use crate::equality::{self, KeyTest};
 use crate::number;
 use crate::raise::{Exit, Outcome};
 use crate::table::{KeyComparison, Table, Trouble};
@@ -43,20 +43,20 @@ fn find(vm: &mut Vm, table: Table, key: Value) -> Result<KeyPlace, Exit> {
     }
     match key.as_fixnum() {
         // A fixnum is the same as itself alone.
-        Some(n) if test != Test::Equalp => search(vm, table, Test::Eq, key, equality::fixnum_hash(n)),
+        Some(n) if test != KeyTest::Equalp => search(vm, table, KeyTest::Eq, key, equality::fixnum_hash(n)),
         _ => find_other(vm, table, test, key),
     }
 }
 
 /// As [`find`], for keys of any kind.
 #[inline(never)]
-fn find_other(vm: &mut Vm, table: Table, test: Test, key: Value) -> Result<KeyPlace, Exit> {
+fn find_other(vm: &mut Vm, table: Table, test: KeyTest, key: Value) -> Result<KeyPlace, Exit> {
     let hash = equality::hash(&vm.heap, test, key);
     search(vm, table, test, key, hash)
 }
 
 #[inline(always)]
-fn search(vm: &mut Vm, table: Table, test: Test, key: Value, hash: u32) -> Result<KeyPlace, Exit> {
+fn search(vm: &mut Vm, table: Table, test: KeyTest, key: Value, hash: u32) -> Result<KeyPlace, Exit> {
     let mut work = LIMIT;
     let found = table.find(&vm.heap, test, key, hash, &mut work)?;
     if work != LIMIT {
@@ -82,10 +82,10 @@ enum KeyPlace {
 pub(super) fn make_hash_table(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [test, size, test_function, hash_function] = exactly(arguments);
     let comparison = match test.as_index() {
-        Some(0) => KeyComparison::Native(Test::Eq),
-        Some(1) => KeyComparison::Native(Test::Eql),
-        Some(2) => KeyComparison::Native(Test::Equal),
-        Some(3) => KeyComparison::Native(Test::Equalp),
+        Some(0) => KeyComparison::Native(KeyTest::Eq),
+        Some(1) => KeyComparison::Native(KeyTest::Eql),
+        Some(2) => KeyComparison::Native(KeyTest::Equal),
+        Some(3) => KeyComparison::Native(KeyTest::Equalp),
         Some(4) => KeyComparison::Program,
         _ => return vm.exchange.index_error(test, 5),
     };
@@ -172,10 +172,10 @@ pub(super) fn hash_table_size(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 pub(super) fn hash_table_test(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, arguments[0])?;
     let number = match table.comparison(&vm.heap) {
-        KeyComparison::Native(Test::Eq) => 0,
-        KeyComparison::Native(Test::Eql) => 1,
-        KeyComparison::Native(Test::Equal) => 2,
-        KeyComparison::Native(Test::Equalp) => 3,
+        KeyComparison::Native(KeyTest::Eq) => 0,
+        KeyComparison::Native(KeyTest::Eql) => 1,
+        KeyComparison::Native(KeyTest::Equal) => 2,
+        KeyComparison::Native(KeyTest::Equalp) => 3,
         KeyComparison::Program => 4,
     };
     let [test, hash] = table.functions(&vm.heap);
@@ -215,7 +215,7 @@ pub(super) fn table_hash(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let table = table(vm, table_value)?;
     let test = match table.comparison(&vm.heap) {
         KeyComparison::Native(test) => test,
-        KeyComparison::Program => Test::Equalp,
+        KeyComparison::Program => KeyTest::Equalp,
     };
     Ok(Value::index(equality::hash(&vm.heap, test, key) as usize))
 }

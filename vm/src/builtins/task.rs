@@ -6,7 +6,7 @@ use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Outcome, Raised};
 use crate::run::{self, SpawnOptions};
 use crate::schedule::{Amount, Measure, Scheduler};
-use crate::task::{DEFAULT_PRIORITY, End, PRIORITIES, TaskIndex, TaskNumber, TaskState, guard};
+use crate::task::{DEFAULT_PRIORITY, PRIORITIES, TaskEnd, TaskIndex, TaskNumber, TaskState, guard};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{WaitOptions, event};
@@ -216,7 +216,7 @@ pub(super) fn abort_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
                 return request_abort(vm, arguments);
             }
             vm.scheduler.task_mut().flags.set_urgent(true);
-            vm.scheduler.task_mut().begin_end(End::Aborted);
+            vm.scheduler.task_mut().begin_end(TaskEnd::Aborted);
             return Err(Exit::Unwind);
         }
         request_abort(vm, arguments)?;

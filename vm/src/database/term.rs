@@ -10,7 +10,7 @@
 //! A function that makes a term returns it held; the caller keeps it until [`Terms::release`].
 
 use super::bucket::{Buckets, finish, mix};
-use crate::equality::{self, Test};
+use crate::equality::{self, KeyTest};
 use crate::heap::{AllocError, Heap};
 use crate::table::{KeyComparison, Table};
 use crate::value::Value;
@@ -290,10 +290,10 @@ impl Terms {
 
     fn find_object(&self, heap: &Heap, v: Value) -> Option<(Table, u32, Option<usize>)> {
         let table = Table::of(heap, self.objects)?;
-        let hash = equality::hash(heap, Test::Eq, v);
+        let hash = equality::hash(heap, KeyTest::Eq, v);
         // Comparison by identity needs no limit.
         let mut work = usize::MAX;
-        let entry = table.find(heap, Test::Eq, v, hash, &mut work).unwrap_or_default();
+        let entry = table.find(heap, KeyTest::Eq, v, hash, &mut work).unwrap_or_default();
         Some((table, hash, entry.map(|(entry, _)| entry)))
     }
 
@@ -311,7 +311,7 @@ impl Terms {
         if self.objects.is_true() {
             return Ok(None);
         }
-        self.objects = Table::make(heap, KeyComparison::Native(Test::Eq), 8, [Value::NIL; 2])?;
+        self.objects = Table::make(heap, KeyComparison::Native(KeyTest::Eq), 8, [Value::NIL; 2])?;
         Ok(Some(self.objects))
     }
 

@@ -18,7 +18,7 @@ use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol, set
 pub(crate) use host::{load_in_unit, macro_call, with_compiler};
 
 use crate::heap::Heap;
-use crate::heap::layout::Symbol as SymbolObject;
+use crate::heap::layout::SymbolObject;
 use crate::shape::{Shape, Sort};
 use crate::value::Value;
 use crate::vm::Vm;

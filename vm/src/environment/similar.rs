@@ -3,7 +3,7 @@
 use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
-use crate::heap::layout::Symbol as SymbolObject;
+use crate::heap::layout::SymbolObject;
 use crate::value::Value;
 use crate::vm::Vm;
 

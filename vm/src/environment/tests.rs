@@ -3,7 +3,8 @@ use std::sync::Arc;
 use esl_bytecode::assembler::assemble;
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::{
-    Answer, Compilation, Compile, CompileTimeHost, LocalDefinition, MacroCall, MacroRef, Part, Step, Work,
+    Compilation, Compile, CompileTimeHost, LocalDefinition, MacroCall, MacroRef, Part, Step, StepOutcome,
+    Work,
 };
 use esl_bytecode::datum::DatumKind;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
@@ -167,14 +168,14 @@ enum ToyCompilation {
 }
 
 impl Compilation for ToyCompilation {
-    fn step(&mut self, _: &mut dyn Environment, answer: Answer, work: &mut Work) -> Step {
+    fn step(&mut self, _: &mut dyn Environment, answer: StepOutcome, work: &mut Work) -> Step {
         work.add(1);
         match (std::mem::replace(self, ToyCompilation::Expanding), answer) {
-            (ToyCompilation::Start(form), Answer::Start) => {
+            (ToyCompilation::Start(form), StepOutcome::Start) => {
                 let name = form.as_cons().unwrap().0.as_symbol().unwrap().clone();
                 Step::Expand(MacroCall { function: MacroRef::Global(name), form, locals: [].into() })
             }
-            (_, Answer::Expansion(expansion)) => {
+            (_, StepOutcome::Expansion(expansion)) => {
                 let DatumKind::Object(id) = expansion.kind() else {
                     let message = format!("{expansion} is no object");
                     return Step::Done(

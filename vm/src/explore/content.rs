@@ -3,7 +3,7 @@
 
 use super::fingerprint::{Walk, sort_of};
 use crate::compiler::Compilations;
-use crate::heap::layout::Symbol as SymbolObject;
+use crate::heap::layout::SymbolObject;
 use crate::interp::frames::entry_word;
 use crate::outside::Outside;
 use crate::schedule::{Due, Scheduler};
@@ -12,7 +12,7 @@ use crate::state::{
     VisitCompiler, VisitControl, VisitExtra, VisitOutside, VisitRunning, VisitScheduler, VisitTask, VisitVm,
     VisitWorld,
 };
-use crate::task::{Allowance, Control, Entry, Extra, Running, Task, TaskState};
+use crate::task::{Allowance, Control, Entry, Extra, RunningCleanup, Task, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::World;
@@ -191,15 +191,15 @@ impl VisitControl for Walk<'_> {
 }
 
 impl VisitRunning for Walk<'_> {
-    fn pending(&mut self, running: &Running) {
+    fn pending(&mut self, running: &RunningCleanup) {
         Walk::unwinding(self, running.pending.as_ref());
     }
 
-    fn values(&mut self, running: &Running) {
+    fn values(&mut self, running: &RunningCleanup) {
         Walk::values(self, &running.values);
     }
 
-    fn allowance(&mut self, running: &Running) {
+    fn allowance(&mut self, running: &RunningCleanup) {
         match running.allowance {
             Some(Allowance::OVER) => self.word(1),
             Some(allowance) => self.time(allowance.time),

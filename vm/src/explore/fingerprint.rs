@@ -20,7 +20,7 @@ use crate::interp::frames::Frames;
 use crate::shape::{Shape, Sort};
 use crate::state::VisitVm;
 use crate::table::Table;
-use crate::task::{End, Target, Task, Unwinding};
+use crate::task::{Task, TaskEnd, UnwindTarget, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{event, link};
@@ -182,17 +182,17 @@ impl Walk<'_> {
     pub(super) fn unwinding(&mut self, unwinding: Option<&Unwinding>) {
         let Some(Unwinding { target, values }) = unwinding else { return self.word(0) };
         match *target {
-            Target::Root(End::Succeeded) => self.word(1),
-            Target::Root(End::Aborted) => self.word(2),
-            Target::Root(End::Spent) => self.word(3),
-            Target::Root(End::Failed(condition)) => {
+            UnwindTarget::Root(TaskEnd::Succeeded) => self.word(1),
+            UnwindTarget::Root(TaskEnd::Aborted) => self.word(2),
+            UnwindTarget::Root(TaskEnd::Spent) => self.word(3),
+            UnwindTarget::Root(TaskEnd::Failed(condition)) => {
                 self.word(4);
                 self.value(condition);
             }
-            Target::Entry(index) => self.word((index as u64) << 4 | 5),
-            Target::Limit(index) => self.word((index as u64) << 4 | 6),
-            Target::Cleanup(index) => self.word((index as u64) << 4 | 7),
-            Target::Return { entries, base } => {
+            UnwindTarget::Entry(index) => self.word((index as u64) << 4 | 5),
+            UnwindTarget::Limit(index) => self.word((index as u64) << 4 | 6),
+            UnwindTarget::Cleanup(index) => self.word((index as u64) << 4 | 7),
+            UnwindTarget::Return { entries, base } => {
                 self.word((entries as u64) << 4 | 8);
                 self.word(u64::from(base));
             }

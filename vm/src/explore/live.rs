@@ -5,7 +5,7 @@
 //! a landing of a control entry reads is live everywhere in its function.
 
 use esl_bytecode::module::CaptureSource;
-use esl_bytecode::opcode::{Call, Instr, RegisterAccess};
+use esl_bytecode::opcode::{CallOperands, Instr, RegisterAccess};
 use esl_bytecode::operand::{Role, Window};
 
 use crate::heap::Heap;
@@ -96,7 +96,7 @@ fn step(heap: &Heap, constants: &[Value], at: usize, instruction: Instr) -> Live
         RegisterAccess::Read { first, count } => reads.insert_range(first, count),
         RegisterAccess::Write { first, count } => writes.insert_range(first, count),
     });
-    if let Some(Call { callee, window: Window(window), count, .. }) = instruction.call() {
+    if let Some(CallOperands { callee, window: Window(window), count, .. }) = instruction.call() {
         if callee.is_in_window() {
             reads.insert(usize::from(window));
         }

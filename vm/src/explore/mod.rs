@@ -75,7 +75,7 @@ impl Default for Settings {
 
 /// A way in which runs end.
 #[derive(Clone, Debug)]
-pub struct Ending<T> {
+pub struct ExploredEnding<T> {
     /// The caller's description.
     pub what: T,
     /// Choices of the first schedule that ends so.
@@ -93,7 +93,7 @@ pub struct Exploration<T> {
     /// and for each ending.
     pub runs: usize,
     /// The ways of ending, the one with the fewest preemptions first.
-    pub endings: Vec<Ending<T>>,
+    pub endings: Vec<ExploredEnding<T>>,
     /// Choices that lead to a state from which no schedule leads to an end, if there is one.
     pub endless: Option<Vec<u32>>,
     /// Whether a schedule returns to a state: then it can go on for ever, if only by treating tasks unfairly.
@@ -217,7 +217,7 @@ pub fn explore<T: PartialEq, E>(
     let root = search.node(ChoiceNode { parent: ROOT, choice: 0, state: 0 });
     search.open(0, root);
     let mut fingerprints = Fingerprints::default();
-    let mut endings: Vec<Ending<T>> = Vec::new();
+    let mut endings: Vec<ExploredEnding<T>> = Vec::new();
     let (mut runs, mut is_complete) = (0, true);
     while let Some((switches, place)) = search.next() {
         if !is_complete {
@@ -274,7 +274,7 @@ pub fn explore<T: PartialEq, E>(
         let what = judge(&mut machine, outcome);
         match endings.iter_mut().find(|ending| ending.what == what) {
             Some(ending) => ending.runs += 1,
-            None => endings.push(Ending { what, choices: search.choices(node), runs: 1 }),
+            None => endings.push(ExploredEnding { what, choices: search.choices(node), runs: 1 }),
         }
     }
     let endless = if is_complete { search.endless() } else { None };

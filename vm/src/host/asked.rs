@@ -4,14 +4,14 @@
 use esl_bytecode::datum::Datum;
 
 use super::{
-    Awaited, Failure, FileAnswer, FileRequest, Host, HostError, Inbox, Incoming, Input, Output, Permit,
+    Awaited, FileAnswer, FileRequest, Host, HostError, HostFailure, Inbox, Incoming, Input, Output, Permit,
     Right, Rights, Wake, WriteMode,
 };
 use crate::canary::Canary;
 
 /// Questions to a host.
 #[derive(Clone, Copy)]
-enum Question {
+enum AskedQuestion {
     Monotonic = 1,
     WallClock,
     Due,
@@ -49,21 +49,21 @@ impl Asked {
         self.canary
     }
 
-    fn note(&mut self, question: Question) {
+    fn note(&mut self, question: AskedQuestion) {
         self.canary.mix(question as u64);
     }
 
-    fn note_word(&mut self, question: Question, word: u64) {
+    fn note_word(&mut self, question: AskedQuestion, word: u64) {
         self.note(question);
         self.canary.mix(word);
     }
 
-    fn note_bytes(&mut self, question: Question, bytes: &[u8]) {
+    fn note_bytes(&mut self, question: AskedQuestion, bytes: &[u8]) {
         self.note(question);
         self.canary.mix_bytes(bytes);
     }
 
-    fn note_call(&mut self, question: Question, name: &str, arguments: &[Datum]) {
+    fn note_call(&mut self, question: AskedQuestion, name: &str, arguments: &[Datum]) {
         self.note_bytes(question, name.as_bytes());
         for argument in arguments {
             self.canary.mix_bytes(argument.to_string().as_bytes());
@@ -73,22 +73,22 @@ impl Asked {
 
 impl Host for Asked {
     fn monotonic(&mut self) -> u64 {
-        self.note(Question::Monotonic);
+        self.note(AskedQuestion::Monotonic);
         self.host.monotonic()
     }
 
     fn wall_clock(&mut self) -> i64 {
-        self.note(Question::WallClock);
+        self.note(AskedQuestion::WallClock);
         self.host.wall_clock()
     }
 
     fn due(&mut self, deadline: u64) -> Option<u64> {
-        self.note_word(Question::Due, deadline);
+        self.note_word(AskedQuestion::Due, deadline);
         self.host.due(deadline)
     }
 
     fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
-        self.note_word(Question::Wait, deadline.unwrap_or(u64::MAX));
+        self.note_word(AskedQuestion::Wait, deadline.unwrap_or(u64::MAX));
         self.host.wait(deadline, awaited)
     }
 
@@ -102,72 +102,72 @@ impl Host for Asked {
     }
 
     fn advance(&mut self, nanoseconds: u64) {
-        self.note_word(Question::Advance, nanoseconds);
+        self.note_word(AskedQuestion::Advance, nanoseconds);
         self.host.advance(nanoseconds);
     }
 
     fn seed(&mut self) -> u64 {
-        self.note(Question::Seed);
+        self.note(AskedQuestion::Seed);
         self.host.seed()
     }
 
     fn arguments(&mut self) -> Vec<String> {
-        self.note(Question::Arguments);
+        self.note(AskedQuestion::Arguments);
         self.host.arguments()
     }
 
     fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError> {
-        self.note_word(Question::Write, output as u64);
+        self.note_word(AskedQuestion::Write, output as u64);
         self.canary.mix_bytes(bytes);
         self.host.write(output, bytes)
     }
 
     fn write_ready(&mut self, output: Output, bytes: &[u8]) -> Result<usize, HostError> {
-        self.note_word(Question::Write, output as u64);
+        self.note_word(AskedQuestion::Write, output as u64);
         self.canary.mix_bytes(bytes);
         self.host.write_ready(output, bytes)
     }
 
     fn read_input(&mut self) -> Input {
-        self.note(Question::ReadInput);
+        self.note(AskedQuestion::ReadInput);
         self.host.read_input()
     }
 
     fn is_interactive(&mut self) -> bool {
-        self.note(Question::IsInteractive);
+        self.note(AskedQuestion::IsInteractive);
         self.host.is_interactive()
     }
 
     fn request_of_files(&mut self, request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
-        self.note_bytes(Question::RequestOfFiles, format!("{request:?}").as_bytes());
+        self.note_bytes(AskedQuestion::RequestOfFiles, format!("{request:?}").as_bytes());
         self.host.request_of_files(request)
     }
 
     fn permit(&mut self, right: Right, object: &str, narrowed: &[Rights]) -> Permit {
-        self.note_bytes(Question::Permit, object.as_bytes());
+        self.note_bytes(AskedQuestion::Permit, object.as_bytes());
         self.canary.mix(right as u64);
         self.host.permit(right, object, narrowed)
     }
 
     fn read_file(&mut self, path: &str) -> Result<Vec<u8>, HostError> {
-        self.note_bytes(Question::ReadFile, path.as_bytes());
+        self.note_bytes(AskedQuestion::ReadFile, path.as_bytes());
         self.host.read_file(path)
     }
 
     fn write_file(&mut self, path: &str, bytes: &[u8], mode: WriteMode) -> Result<(), HostError> {
-        self.note_bytes(Question::WriteFile, path.as_bytes());
+        self.note_bytes(AskedQuestion::WriteFile, path.as_bytes());
         self.canary.mix(mode as u64);
         self.canary.mix_bytes(bytes);
         self.host.write_file(path, bytes, mode)
     }
 
     fn file_exists(&mut self, path: &str) -> bool {
-        self.note_bytes(Question::FileExists, path.as_bytes());
+        self.note_bytes(AskedQuestion::FileExists, path.as_bytes());
         self.host.file_exists(path)
     }
 
     fn delete_file(&mut self, path: &str) -> Result<(), HostError> {
-        self.note_bytes(Question::DeleteFile, path.as_bytes());
+        self.note_bytes(AskedQuestion::DeleteFile, path.as_bytes());
         self.host.delete_file(path)
     }
 
@@ -175,14 +175,14 @@ impl Host for Asked {
         &mut self,
         name: &str,
         arguments: &[Datum],
-        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, Failure>,
-    ) -> Result<Datum, Failure> {
-        self.note_call(Question::Call, name, arguments);
+        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
+    ) -> Result<Datum, HostFailure> {
+        self.note_call(AskedQuestion::Call, name, arguments);
         self.host.call(name, arguments, function)
     }
 
     fn begin(&mut self, name: &str, arguments: &[Datum], function: &mut dyn FnMut(&[Datum])) {
-        self.note_call(Question::Begin, name, arguments);
+        self.note_call(AskedQuestion::Begin, name, arguments);
         self.host.begin(name, arguments, function);
     }
 

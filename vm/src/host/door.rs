@@ -48,7 +48,7 @@ struct Door {
 }
 
 #[derive(Default)]
-struct State {
+struct DoorTable {
     doors: BTreeMap<String, Door>,
     is_closed: bool,
 }
@@ -56,13 +56,13 @@ struct State {
 /// The doors of one machine.
 #[derive(Default)]
 pub(super) struct Doors {
-    state: Mutex<State>,
+    state: Mutex<DoorTable>,
     /// Notified when there may be room, or the doors are closed.
     room: Condvar,
 }
 
 impl Doors {
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, DoorTable> {
         // The state is whole at every moment, so a panic elsewhere does not corrupt it.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -33,8 +33,8 @@ pub(crate) use console::{Console, Taken, column_after, encode};
 pub use door::{SendError, Sender};
 pub use inbox::{Inbox, Incoming};
 pub(crate) use operation::Canceller;
-pub use operation::{Failure, News, Operation};
-pub use question::{Answer, Callee, Kept, Pending, Question, TaskInfo};
+pub use operation::{HostFailure, HostOperation, News};
+pub use question::{Answer, FunctionRef, Kept, Pending, Question, TaskInfo};
 pub use real::{RealHost, Screen};
 pub use record::{Record, Recording, RecordingHost, ReplayHost};
 pub use rights::{Permit, Right, Rights};
@@ -268,8 +268,8 @@ pub trait Host {
         &mut self,
         name: &str,
         arguments: &[Datum],
-        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, Failure>,
-    ) -> Result<Datum, Failure> {
+        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
+    ) -> Result<Datum, HostFailure> {
         let _ = name;
         function(arguments)
     }

@@ -13,7 +13,7 @@ use super::{Inbox, Incoming};
 
 /// A failure as it crosses the border between a program and its host, in either direction.
 #[derive(Clone, Debug)]
-pub struct Failure {
+pub struct HostFailure {
     /// Name of the cause, a keyword: `VALVE-STUCK`. The name of a condition type stands for that type.
     pub cause: String,
     /// Arguments of the failure.
@@ -28,7 +28,7 @@ pub enum News {
     /// It has come to its end, with these values.
     Completed(Vec<Datum>),
     /// It has failed, or stopped because it was cancelled.
-    Failed(Failure),
+    Failed(HostFailure),
 }
 
 /// What happens when the program cancels an operation.
@@ -105,7 +105,7 @@ impl Canceller {
 ///
 /// The task waits until then. Dropping the operation is a failure of the cause `:OPERATION-DROPPED`, or of
 /// the cause `:HOST-PANIC` if a panic has dropped it.
-pub struct Operation {
+pub struct HostOperation {
     number: u64,
     arguments: Vec<Datum>,
     inbox: Inbox,
@@ -113,10 +113,15 @@ pub struct Operation {
     is_over: bool,
 }
 
-impl Operation {
+impl HostOperation {
     /// Begins the operation with this number, of which the inbox will hear.
-    pub(crate) fn new(number: u64, arguments: Vec<Datum>, inbox: Inbox, canceller: Canceller) -> Operation {
-        Operation { number, arguments, inbox, canceller, is_over: false }
+    pub(crate) fn new(
+        number: u64,
+        arguments: Vec<Datum>,
+        inbox: Inbox,
+        canceller: Canceller,
+    ) -> HostOperation {
+        HostOperation { number, arguments, inbox, canceller, is_over: false }
     }
 
     /// Returns its number, unique in the machine.
@@ -140,7 +145,7 @@ impl Operation {
     }
 
     /// Ends the operation: the call fails.
-    pub fn fail(mut self, failure: Failure) {
+    pub fn fail(mut self, failure: HostFailure) {
         self.is_over = true;
         self.tell(News::Failed(failure));
     }
@@ -184,11 +189,11 @@ impl Operation {
     }
 }
 
-impl Drop for Operation {
+impl Drop for HostOperation {
     fn drop(&mut self) {
         if !self.is_over {
             let cause = if std::thread::panicking() { "HOST-PANIC" } else { "OPERATION-DROPPED" };
-            self.tell(News::Failed(Failure { cause: cause.into(), arguments: Vec::new() }));
+            self.tell(News::Failed(HostFailure { cause: cause.into(), arguments: Vec::new() }));
         }
     }
 }
@@ -197,9 +202,9 @@ impl Drop for Operation {
 mod tests {
     use super::*;
 
-    fn begun() -> (Operation, Inbox, Canceller) {
+    fn begun() -> (HostOperation, Inbox, Canceller) {
         let (inbox, canceller) = (Inbox::new(), Canceller::default());
-        (Operation::new(7, Vec::new(), inbox.clone(), canceller.clone()), inbox, canceller)
+        (HostOperation::new(7, Vec::new(), inbox.clone(), canceller.clone()), inbox, canceller)
     }
 
     fn heard(inbox: &Inbox) -> String {

@@ -17,7 +17,7 @@ use super::{Inbox, Incoming, Sender};
 
 /// A function of the program, as the outside knows it.
 #[derive(Clone, Debug)]
-pub enum Callee {
+pub enum FunctionRef {
     /// Its name, in upper case; `PACKAGE:NAME` outside of the package of programs.
     Named(String),
     /// One that the machine keeps under this number.
@@ -51,8 +51,8 @@ impl Kept {
     }
 
     /// Returns what a question to the machine with this inbox calls the value: nothing, if another one keeps it.
-    pub fn callee(&self, inbox: &Inbox) -> Callee {
-        Callee::Kept(if self.0.inbox.is_same(inbox) { self.0.number } else { u64::MAX })
+    pub fn callee(&self, inbox: &Inbox) -> FunctionRef {
+        FunctionRef::Kept(if self.0.inbox.is_same(inbox) { self.0.number } else { u64::MAX })
     }
 }
 
@@ -62,7 +62,7 @@ pub enum Question {
     /// What a function returns, which is called in a task of its own.
     Call {
         /// The function.
-        function: Callee,
+        function: FunctionRef,
         /// The arguments.
         arguments: Vec<Datum>,
         /// Whether the task has its first turn before those that can run already.
@@ -143,10 +143,10 @@ impl Slot {
 
 /// Those who wait for answers, by the numbers of their questions.
 #[derive(Default)]
-pub(super) struct Asking(Mutex<Waiting>);
+pub(super) struct Asking(Mutex<OpenQuestions>);
 
 #[derive(Default)]
-struct Waiting {
+struct OpenQuestions {
     slots: BTreeMap<u64, Arc<Slot>>,
     /// Number of questions so far.
     asked: u64,
@@ -154,7 +154,7 @@ struct Waiting {
 }
 
 impl Asking {
-    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+    fn waiting(&self) -> MutexGuard<'_, OpenQuestions> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -25,9 +25,9 @@ pub type Screen = Box<dyn FnMut(&[u8]) -> std::io::Result<()> + Send>;
 
 /// Chunk of standard input that was read and not taken yet.
 #[derive(Clone, Default)]
-struct Arrived(Arc<Mutex<Option<Input>>>);
+struct PendingInput(Arc<Mutex<Option<Input>>>);
 
-impl Arrived {
+impl PendingInput {
     fn lock(&self) -> MutexGuard<'_, Option<Input>> {
         // The chunk is whole at every moment, so a panic elsewhere does not corrupt it.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
@@ -40,7 +40,7 @@ pub struct RealHost {
     arguments: Vec<String>,
     rights: Rights,
     inbox: Inbox,
-    input: Arrived,
+    input: PendingInput,
     /// Requests a chunk from the reading thread, which is started at the first request.
     reader: Option<Sender<()>>,
     is_reading: bool,
@@ -63,7 +63,7 @@ impl RealHost {
             arguments,
             rights: Rights::none(),
             inbox: Inbox::new(),
-            input: Arrived::default(),
+            input: PendingInput::default(),
             reader: None,
             is_reading: false,
             #[cfg(unix)]

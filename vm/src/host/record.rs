@@ -15,7 +15,7 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 
 use super::{
-    Awaited, Captured, Failure, FileAnswer, FileRequest, Host, HostError, Inbox, Incoming, Input, Output,
+    Awaited, Captured, FileAnswer, FileRequest, Host, HostError, HostFailure, Inbox, Incoming, Input, Output,
     Permit, Right, Rights, Wake, WriteMode,
 };
 
@@ -85,7 +85,7 @@ define_records! {
     /// Whether a file exists.
     Exists(bool);
     /// Result of a function of the embedder's.
-    Called(Result<Datum, Failure>);
+    Called(Result<Datum, HostFailure>);
     /// How many questions before it were answered no, and the time, for a timer that is due.
     Due((u64, u64));
     /// Round of the machine, and the contents of the inbox then.
@@ -236,8 +236,8 @@ impl<H: Host> Host for RecordingHost<H> {
         &mut self,
         name: &str,
         arguments: &[Datum],
-        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, Failure>,
-    ) -> Result<Datum, Failure> {
+        function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
+    ) -> Result<Datum, HostFailure> {
         let answer = Called(self.host.call(name, arguments, function));
         self.note(answer).0
     }
@@ -412,9 +412,9 @@ impl Host for ReplayHost {
         &mut self,
         name: &str,
         _arguments: &[Datum],
-        _function: &mut dyn FnMut(&[Datum]) -> Result<Datum, Failure>,
-    ) -> Result<Datum, Failure> {
-        let is_missing = || Failure {
+        _function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
+    ) -> Result<Datum, HostFailure> {
+        let is_missing = || HostFailure {
             cause: "NOT-IN-THIS-WORLD".into(),
             arguments: vec![Datum::string(name, Span::default())],
         };

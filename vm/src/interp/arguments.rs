@@ -3,7 +3,7 @@
 
 use super::constants_of;
 use crate::describe;
-use crate::heap::layout::Code;
+use crate::heap::layout::CodeObject;
 use crate::raise::Arguments;
 use crate::raise::Exit;
 use crate::shape::Shape;
@@ -36,7 +36,7 @@ pub(super) fn spread(vm: &mut Vm, arguments: &mut Arguments) -> Result<(), Exit>
 pub(super) unsafe fn arrange(
     vm: &mut Vm,
     function: Value,
-    code: *mut Code,
+    code: *mut CodeObject,
     shape: Shape,
     arguments: &[Value],
     arranged: &mut Arguments,

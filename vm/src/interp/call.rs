@@ -11,7 +11,7 @@ use esl_bytecode::word::Word;
 use super::arguments::{arrange, count_of_arguments, describe_arity, spread};
 use super::substitute::{deliver, return_all, substitute};
 use super::{Signal, aux_at, code_of, constant, failure, pc_as_value, stubs, word_at};
-use crate::heap::layout::{Kind, Symbol};
+use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::Arguments;
 use crate::raise::{Exit, Raised};
 use crate::shape::{Shape, Sort};
@@ -211,7 +211,9 @@ impl Vm {
     pub(crate) fn callable(&mut self, callee: Value) -> Result<Value, Exit> {
         let function = match self.heap.kind(callee) {
             Some(Kind::Function) => callee,
-            Some(Kind::Symbol) => self.heap.symbol(callee).map_or(Value::NIL, |cell: &Symbol| cell.function),
+            Some(Kind::Symbol) => {
+                self.heap.symbol(callee).map_or(Value::NIL, |cell: &SymbolObject| cell.function)
+            }
             _ if callee == Value::NIL || callee == Value::T => {
                 return self.exchange.raise(Raised::UndefinedFunction(callee));
             }

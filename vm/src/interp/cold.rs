@@ -11,7 +11,7 @@ use esl_bytecode::operand::Role;
 
 use super::arguments::MAX_SPREAD;
 use super::{Signal, aux_at, code_of, constant, constants_of, failure, word_at};
-use crate::heap::layout::{Code, Function, Kind};
+use crate::heap::layout::{CodeObject, FunctionObject, Kind};
 use crate::number;
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::shape::capture_source;
@@ -333,13 +333,13 @@ pub(super) unsafe fn closure(vm: &mut Vm, code: Value, base: *mut Value) -> Resu
     // before the value is made.
     unsafe {
         let running = *base.sub(2);
-        let layout = code.object_ptr().cast::<Code>();
+        let layout = code.object_ptr().cast::<CodeObject>();
         let count = (*layout).spare[1] as usize;
         let closure = vm.heap.alloc_closure(code, count)?;
         let sources = layout.byte_add((*layout).words_offset()).cast::<u32>();
         let sources = sources.add((*layout).nwords as usize - count);
         let captures = (&raw mut (*closure).captures).cast::<Value>();
-        let own = (&raw const (*running.object_ptr().cast::<Function>()).captures).cast::<Value>();
+        let own = (&raw const (*running.object_ptr().cast::<FunctionObject>()).captures).cast::<Value>();
         for i in 0..count {
             let value = match capture_source(*sources.add(i)) {
                 CaptureSource::Register(register) => *base.add(usize::from(register)),

@@ -6,7 +6,7 @@
 
 use super::{Leave, start};
 use crate::saved_pc::SavedPc;
-use crate::task::{End, Entry, EntryKind, Running, Target, Unwinding};
+use crate::task::{Entry, EntryKind, RunningCleanup, TaskEnd, UnwindTarget, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
@@ -29,7 +29,7 @@ pub(super) fn end_task(vm: &mut Vm) -> Result<(), Leave> {
 
 /// Begins a cleanup at the root of the running task, after which the task ends as it would now.
 fn put_off_end(vm: &mut Vm) {
-    let target = Target::Root(vm.scheduler.turn.ending.take().unwrap_or(End::Succeeded));
+    let target = UnwindTarget::Root(vm.scheduler.turn.ending.take().unwrap_or(TaskEnd::Succeeded));
     let Vm { scheduler, outside, config, cpu, .. } = vm;
     let allowance = if target.is_forced() {
         // Others wait for what is let go, so what the cleanups before have used up does not count.
@@ -49,7 +49,7 @@ fn put_off_end(vm: &mut Vm) {
         want: 0,
         kind: EntryKind::Running,
     };
-    let running = Running { pending, allowance, ..Running::default() };
+    let running = RunningCleanup { pending, allowance, ..RunningCleanup::default() };
     vm.scheduler.task_mut().control.run_cleanup(entry, running);
 }
 
@@ -61,7 +61,7 @@ fn resume_end(vm: &mut Vm) {
     }
     task.control.entries.pop();
     let pending = task.control.running.pop().and_then(|running| running.pending);
-    if let Some(Unwinding { target: Target::Root(end), values }) = pending {
+    if let Some(Unwinding { target: UnwindTarget::Root(end), values }) = pending {
         vm.scheduler.turn.ending = Some(end);
         vm.exchange.values = values;
     }

@@ -9,7 +9,7 @@ use super::{Signal, aux_at, failure, word_at};
 use crate::describe::describe;
 use crate::raise::{Exit, Raised};
 use crate::saved_pc::SavedPc;
-use crate::task::End;
+use crate::task::TaskEnd;
 use crate::vm::Vm;
 
 /// Live bytes over which a collection goes in the time of a tick, about.
@@ -76,7 +76,7 @@ unsafe fn raise(vm: &mut Vm) -> Signal {
         // Without a library nobody can handle it.
         let words: Vec<String> = arguments.iter().map(|&v| describe(&vm.heap, v)).collect();
         vm.embedder.last_words = Some(words.join(" "));
-        vm.scheduler.task_mut().begin_end(End::Failed(arguments[0]));
+        vm.scheduler.task_mut().begin_end(TaskEnd::Failed(arguments[0]));
         return Signal::Unwind;
     }
     // SAFETY: F1 holds by the contract, and a frame above the running one needs no window.

@@ -4,7 +4,7 @@
 use std::marker::PhantomData;
 
 use super::{code_of, pc_from_value, stubs, word_at};
-use crate::heap::layout::Code;
+use crate::heap::layout::CodeObject;
 use crate::task::Entry;
 use crate::task::Task;
 use crate::value::Value;
@@ -131,7 +131,7 @@ impl<'a> Iterator for Frames<'a> {
 ///
 /// # Safety
 /// `code` points to a Code.
-unsafe fn word_in(code: *mut Code, pc: *const u32) -> usize {
+unsafe fn word_in(code: *mut CodeObject, pc: *const u32) -> usize {
     // SAFETY: by the contract this is a live Code, and its words are at this offset.
     let start = unsafe { code.byte_add((*code).words_offset()) };
     pc.addr().wrapping_sub(start.addr()) / size_of::<u32>()

@@ -5,7 +5,7 @@
 //! [`super::arguments`], which also says what is wrong; nothing has changed then.
 
 use super::constants_of;
-use crate::heap::layout::Code;
+use crate::heap::layout::CodeObject;
 use crate::shape::Shape;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -26,7 +26,7 @@ const MOST_KEYS: usize = 23;
 #[inline(never)]
 pub(super) unsafe fn arrange(
     vm: &mut Vm,
-    code: *mut Code,
+    code: *mut CodeObject,
     registers: *mut Value,
     count: usize,
 ) -> Option<usize> {

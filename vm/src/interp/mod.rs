@@ -56,7 +56,7 @@ use esl_bytecode::opcode::Opcode;
 use esl_bytecode::word::Word;
 
 use crate::cpu::Cpu;
-use crate::heap::layout::{Boxed, Code, Function, Kind, Structure, Symbol, Vector};
+use crate::heap::layout::{Boxed, CodeObject, FunctionObject, Kind, StructureObject, SymbolObject, Vector};
 use crate::raise::{Exit, Raised};
 use crate::shape::Shape;
 use crate::value::Value;
@@ -69,7 +69,7 @@ macro_rules! define_operations {
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
         #[allow(dead_code, reason = "operations are made by reading code")]
-        pub(crate) enum Operation {
+        pub(crate) enum LoopOperation {
             $( $name = $number, )*
             /// The function that took the place of an instruction has returned: see `substitute`.
             ErrorReturn = stubs::ERROR_RETURN,
@@ -123,9 +123,9 @@ pub(crate) enum Leave {
 /// # Safety
 /// `function` is a Function.
 #[inline(always)]
-pub(crate) unsafe fn code_of(function: Value) -> *mut Code {
+pub(crate) unsafe fn code_of(function: Value) -> *mut CodeObject {
     // SAFETY: by the contract this is a live Function; the heap guarantees that its code is a Code.
-    unsafe { (*function.object_ptr().cast::<Function>()).code.object_ptr().cast() }
+    unsafe { (*function.object_ptr().cast::<FunctionObject>()).code.object_ptr().cast() }
 }
 
 /// Returns the constants of a code.
@@ -133,9 +133,9 @@ pub(crate) unsafe fn code_of(function: Value) -> *mut Code {
 /// # Safety
 /// `code` points to a Code.
 #[inline(always)]
-pub(crate) unsafe fn constants_of(code: *mut Code) -> *const Value {
+pub(crate) unsafe fn constants_of(code: *mut CodeObject) -> *const Value {
     // SAFETY: the constants are at a fixed offset inside the Code.
-    unsafe { code.byte_add(Code::CONSTANTS_OFFSET).cast() }
+    unsafe { code.byte_add(CodeObject::CONSTANTS_OFFSET).cast() }
 }
 
 /// Constant `index` of the function whose frame has its registers at `base`.
@@ -173,7 +173,7 @@ unsafe fn aux_at(pc: *const u32) -> u32 {
 /// # Safety
 /// The word is one of code that has passed the verifier, or of a stub.
 #[inline(always)]
-unsafe fn operation(word: Word) -> Operation {
+unsafe fn operation(word: Word) -> LoopOperation {
     // SAFETY: V1: the low byte of an instruction is the number of an operation; those of stubs are operations
     // too.
     unsafe { std::mem::transmute(word.number()) }
@@ -510,7 +510,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             // Makes the frame of a function with bytecode that takes exactly the given arguments.
             macro_rules! enter {
                 ($window:expr, $function:expr, $code:expr, $return_to:expr) => {{
-                    let (window, code): (*mut Value, *mut Code) = ($window, $code);
+                    let (window, code): (*mut Value, *mut CodeObject) = ($window, $code);
                     let registers = window.add(2);
                     // The registers may end behind the stack, where `add` has no meaning.
                     if registers.wrapping_add((*code).nregs as usize) > vm.cpu.stack_end() {
@@ -597,33 +597,33 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
 
             match operation(word) {
                 // ---- moves and constants
-                Operation::Move => {
+                LoopOperation::Move => {
                     set!(word.a(), get!(word.b()));
                     next!(1)
                 }
-                Operation::LoadInt => {
+                LoopOperation::LoadInt => {
                     set!(word.a(), Value::small(word.signed_d()));
                     next!(1)
                 }
-                Operation::LoadConst => {
+                LoopOperation::LoadConst => {
                     set!(word.a(), *k.add(word.d()));
                     next!(1)
                 }
-                Operation::LoadNil => {
+                LoopOperation::LoadNil => {
                     for i in 0..word.b() {
                         set!(word.a() + i, Value::NIL);
                     }
                     next!(1)
                 }
-                Operation::LoadTrue => {
+                LoopOperation::LoadTrue => {
                     set!(word.a(), Value::T);
                     next!(1)
                 }
 
                 // ---- arithmetic
-                Operation::Add => arithmetic!(Add, overflowing_add, +, double::mixed_add),
-                Operation::Sub => arithmetic!(Sub, overflowing_sub, -, double::mixed_subtract),
-                Operation::Mul => {
+                LoopOperation::Add => arithmetic!(Add, overflowing_add, +, double::mixed_add),
+                LoopOperation::Sub => arithmetic!(Sub, overflowing_sub, -, double::mixed_subtract),
+                LoopOperation::Mul => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) {
                         let (product, overflow) = (x.bits() as i64 >> 2).overflowing_mul(y.bits() as i64);
@@ -641,7 +641,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     mixed!(Mul, double::mixed_multiply, x, y)
                 }
-                Operation::Div => {
+                LoopOperation::Div => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_windowed_doubles(x, y)
                         && double::store(
@@ -653,7 +653,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     mixed!(Div, double::mixed_divide, x, y)
                 }
-                Operation::AddInt => {
+                LoopOperation::AddInt => {
                     let x = get!(word.b());
                     if x.is_fixnum() {
                         let addend = i64::from(word.signed_c()) << 2;
@@ -672,7 +672,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(AddInt)
                 }
-                Operation::Floor => {
+                LoopOperation::Floor => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
                         let quotient = (x.bits() as i64).div_euclid(y.bits() as i64);
@@ -681,7 +681,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(Floor)
                 }
-                Operation::Truncate => {
+                LoopOperation::Truncate => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
                         let quotient = (x.bits() as i64) / (y.bits() as i64);
@@ -690,7 +690,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(Truncate)
                 }
-                Operation::Mod => {
+                LoopOperation::Mod => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
                         // Both are shifted by two, and so is the remainder.
@@ -700,7 +700,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(Mod)
                 }
-                Operation::Rem => {
+                LoopOperation::Rem => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
                         let remainder = (x.bits() as i64) % (y.bits() as i64);
@@ -709,10 +709,10 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(Rem)
                 }
-                Operation::LogAnd => bitwise!(LogAnd, &),
-                Operation::LogIor => bitwise!(LogIor, |),
-                Operation::LogXor => bitwise!(LogXor, ^),
-                Operation::Ash => {
+                LoopOperation::LogAnd => bitwise!(LogAnd, &),
+                LoopOperation::LogIor => bitwise!(LogIor, |),
+                LoopOperation::LogXor => bitwise!(LogXor, ^),
+                LoopOperation::Ash => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) {
                         let (n, shift) = (x.bits() as i64, y.bits() as i64 >> 2);
@@ -730,34 +730,34 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 }
 
                 // ---- comparisons that give T or NIL
-                Operation::Not => {
+                LoopOperation::Not => {
                     set!(word.a(), Value::boolean(get!(word.b()).is_nil()));
                     next!(1)
                 }
-                Operation::Eq => {
+                LoopOperation::Eq => {
                     set!(word.a(), Value::boolean(get!(word.b()) == get!(word.c())));
                     next!(1)
                 }
-                Operation::Eql => {
+                LoopOperation::Eql => {
                     set!(word.a(), Value::boolean(cold::eql(vm, get!(word.b()), get!(word.c()))));
                     next!(1)
                 }
-                Operation::NumEq => {
+                LoopOperation::NumEq => {
                     compare!(==, get!(word.b()), get!(word.c()),
                         { set!(word.a(), Value::T); next!(1) }, { set!(word.a(), Value::NIL); next!(1) });
                     compute!(NumEq)
                 }
-                Operation::Less => {
+                LoopOperation::Less => {
                     compare!(<, get!(word.b()), get!(word.c()),
                         { set!(word.a(), Value::T); next!(1) }, { set!(word.a(), Value::NIL); next!(1) });
                     compute!(Less)
                 }
-                Operation::LessEq => {
+                LoopOperation::LessEq => {
                     compare!(<=, get!(word.b()), get!(word.c()),
                         { set!(word.a(), Value::T); next!(1) }, { set!(word.a(), Value::NIL); next!(1) });
                     compute!(LessEq)
                 }
-                Operation::CharEq => {
+                LoopOperation::CharEq => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if x.is_character() && y.is_character() {
                         set!(word.a(), Value::boolean(x == y));
@@ -765,88 +765,96 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(CharEq)
                 }
-                Operation::IsType => {
+                LoopOperation::IsType => {
                     set!(word.a(), Value::boolean(cold::is_type(vm, get!(word.b()), word.c() as u8)));
                     next!(1)
                 }
 
                 // ---- jumps forward
-                Operation::JumpAlways => jump!(1, word.signed_e() as isize),
-                Operation::JumpIfNil => jump_if!(1, get!(word.a()).is_nil(), word.signed_d() as isize),
-                Operation::JumpIfNotNil => jump_if!(1, get!(word.a()).is_true(), word.signed_d() as isize),
-                Operation::JumpIfCons => jump_if!(1, get!(word.a()).is_cons(), word.signed_d() as isize),
-                Operation::JumpIfNotCons => jump_if!(1, !get!(word.a()).is_cons(), word.signed_d() as isize),
-                Operation::JumpIfSupplied => {
+                LoopOperation::JumpAlways => jump!(1, word.signed_e() as isize),
+                LoopOperation::JumpIfNil => jump_if!(1, get!(word.a()).is_nil(), word.signed_d() as isize),
+                LoopOperation::JumpIfNotNil => {
+                    jump_if!(1, get!(word.a()).is_true(), word.signed_d() as isize)
+                }
+                LoopOperation::JumpIfCons => jump_if!(1, get!(word.a()).is_cons(), word.signed_d() as isize),
+                LoopOperation::JumpIfNotCons => {
+                    jump_if!(1, !get!(word.a()).is_cons(), word.signed_d() as isize)
+                }
+                LoopOperation::JumpIfSupplied => {
                     jump_if!(1, get!(word.a()) != Value::UNSUPPLIED, word.signed_d() as isize)
                 }
-                Operation::JumpEq => jump_if!(2, get!(word.a()) == get!(word.b()), aux!() as i32 as isize),
-                Operation::JumpNotEq => jump_if!(2, get!(word.a()) != get!(word.b()), aux!() as i32 as isize),
-                Operation::JumpEql => {
+                LoopOperation::JumpEq => {
+                    jump_if!(2, get!(word.a()) == get!(word.b()), aux!() as i32 as isize)
+                }
+                LoopOperation::JumpNotEq => {
+                    jump_if!(2, get!(word.a()) != get!(word.b()), aux!() as i32 as isize)
+                }
+                LoopOperation::JumpEql => {
                     jump_if!(2, cold::eql(vm, get!(word.a()), get!(word.b())), aux!() as i32 as isize)
                 }
-                Operation::JumpNotEql => {
+                LoopOperation::JumpNotEql => {
                     jump_if!(2, !cold::eql(vm, get!(word.a()), get!(word.b())), aux!() as i32 as isize)
                 }
-                Operation::JumpEqlConst => {
+                LoopOperation::JumpEqlConst => {
                     jump_if!(2, cold::eql(vm, get!(word.a()), *k.add(word.d())), aux!() as i32 as isize)
                 }
-                Operation::JumpNotEqlConst => {
+                LoopOperation::JumpNotEqlConst => {
                     jump_if!(2, !cold::eql(vm, get!(word.a()), *k.add(word.d())), aux!() as i32 as isize)
                 }
-                Operation::JumpIfType => {
+                LoopOperation::JumpIfType => {
                     jump_if!(2, cold::is_type(vm, get!(word.a()), word.b() as u8), aux!() as i32 as isize)
                 }
-                Operation::JumpIfNotType => {
+                LoopOperation::JumpIfNotType => {
                     jump_if!(2, !cold::is_type(vm, get!(word.a()), word.b() as u8), aux!() as i32 as isize)
                 }
-                Operation::JumpNumEq => jump_compare!(JumpNumEq, ==),
-                Operation::JumpNotNumEq => jump_compare!(JumpNotNumEq, ==),
-                Operation::JumpLess => jump_compare!(JumpLess, <),
-                Operation::JumpNotLess => jump_compare!(JumpNotLess, <),
-                Operation::JumpLessEq => jump_compare!(JumpLessEq, <=),
-                Operation::JumpNotLessEq => jump_compare!(JumpNotLessEq, <=),
-                Operation::JumpNumEqInt => jump_compare_int!(JumpNumEqInt, ==),
-                Operation::JumpNotNumEqInt => jump_compare_int!(JumpNotNumEqInt, ==),
-                Operation::JumpLessInt => jump_compare_int!(JumpLessInt, <),
-                Operation::JumpNotLessInt => jump_compare_int!(JumpNotLessInt, <),
-                Operation::JumpGreaterInt => jump_compare_int!(JumpGreaterInt, >),
-                Operation::JumpNotGreaterInt => jump_compare_int!(JumpNotGreaterInt, >),
+                LoopOperation::JumpNumEq => jump_compare!(JumpNumEq, ==),
+                LoopOperation::JumpNotNumEq => jump_compare!(JumpNotNumEq, ==),
+                LoopOperation::JumpLess => jump_compare!(JumpLess, <),
+                LoopOperation::JumpNotLess => jump_compare!(JumpNotLess, <),
+                LoopOperation::JumpLessEq => jump_compare!(JumpLessEq, <=),
+                LoopOperation::JumpNotLessEq => jump_compare!(JumpNotLessEq, <=),
+                LoopOperation::JumpNumEqInt => jump_compare_int!(JumpNumEqInt, ==),
+                LoopOperation::JumpNotNumEqInt => jump_compare_int!(JumpNotNumEqInt, ==),
+                LoopOperation::JumpLessInt => jump_compare_int!(JumpLessInt, <),
+                LoopOperation::JumpNotLessInt => jump_compare_int!(JumpNotLessInt, <),
+                LoopOperation::JumpGreaterInt => jump_compare_int!(JumpGreaterInt, >),
+                LoopOperation::JumpNotGreaterInt => jump_compare_int!(JumpNotGreaterInt, >),
 
                 // ---- loops
-                Operation::Loop => {
+                LoopOperation::Loop => {
                     tick!();
                     jump!(1, word.signed_e() as isize)
                 }
-                Operation::LoopIfNil => {
+                LoopOperation::LoopIfNil => {
                     if get!(word.a()).is_nil() {
                         tick!();
                         jump!(1, word.signed_d() as isize);
                     }
                     next!(1)
                 }
-                Operation::LoopIfNotNil => {
+                LoopOperation::LoopIfNotNil => {
                     if get!(word.a()).is_true() {
                         tick!();
                         jump!(1, word.signed_d() as isize);
                     }
                     next!(1)
                 }
-                Operation::LoopIfCons => {
+                LoopOperation::LoopIfCons => {
                     if get!(word.a()).is_cons() {
                         tick!();
                         jump!(1, word.signed_d() as isize);
                     }
                     next!(1)
                 }
-                Operation::LoopLess => {
+                LoopOperation::LoopLess => {
                     tick!();
                     jump_compare!(LoopLess, <)
                 }
-                Operation::LoopNotLess => {
+                LoopOperation::LoopNotLess => {
                     tick!();
                     jump_compare!(LoopNotLess, <)
                 }
-                Operation::LoopCount => {
+                LoopOperation::LoopCount => {
                     tick!();
                     let (x, limit) = (get!(word.a()), get!(word.b()));
                     let step = i64::from(word.signed_c()) << 2;
@@ -861,14 +869,14 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 }
 
                 // ---- lists
-                Operation::Cons => {
+                LoopOperation::Cons => {
                     if let Some(v) = vm.heap.cons_in_hole(get!(word.b()), get!(word.c())) {
                         set!(word.a(), v);
                         next!(1);
                     }
                     compute!(Cons)
                 }
-                Operation::Car => {
+                LoopOperation::Car => {
                     let list = get!(word.b());
                     if list.is_cons() {
                         set!(word.a(), (*list.cons_ptr()).car);
@@ -876,7 +884,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(Car)
                 }
-                Operation::Cdr => {
+                LoopOperation::Cdr => {
                     let list = get!(word.b());
                     if list.is_cons() {
                         set!(word.a(), (*list.cons_ptr()).cdr);
@@ -884,7 +892,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(Cdr)
                 }
-                Operation::Cadr => {
+                LoopOperation::Cadr => {
                     let list = get!(word.b());
                     if list.is_cons() {
                         let rest = (*list.cons_ptr()).cdr;
@@ -895,7 +903,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(Cadr)
                 }
-                Operation::Cddr => {
+                LoopOperation::Cddr => {
                     let list = get!(word.b());
                     if list.is_cons() {
                         let rest = (*list.cons_ptr()).cdr;
@@ -906,7 +914,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(Cddr)
                 }
-                Operation::SetCar => {
+                LoopOperation::SetCar => {
                     let pair = get!(word.a());
                     if pair.is_cons() {
                         vm.heap.store(&raw mut (*pair.cons_ptr()).car, get!(word.b()));
@@ -914,7 +922,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(SetCar)
                 }
-                Operation::SetCdr => {
+                LoopOperation::SetCdr => {
                     let pair = get!(word.a());
                     if pair.is_cons() {
                         vm.heap.store(&raw mut (*pair.cons_ptr()).cdr, get!(word.b()));
@@ -922,10 +930,10 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(SetCdr)
                 }
-                Operation::List => cold!(1, cold::list),
+                LoopOperation::List => cold!(1, cold::list),
 
                 // ---- vectors and structures
-                Operation::VectorRef | Operation::ArrayRef => {
+                LoopOperation::VectorRef | LoopOperation::ArrayRef => {
                     let (vector, index) = (get!(word.b()), get!(word.c()));
                     if is_simple_vector(vector)
                         && index.is_fixnum()
@@ -939,7 +947,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(ArrayRef)
                 }
-                Operation::VectorSet | Operation::ArraySet => {
+                LoopOperation::VectorSet | LoopOperation::ArraySet => {
                     let (vector, index) = (get!(word.a()), get!(word.b()));
                     if is_simple_vector(vector)
                         && index.is_fixnum()
@@ -953,7 +961,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(ArraySet)
                 }
-                Operation::CharRef => {
+                LoopOperation::CharRef => {
                     let (string, index) = (get!(word.b()), get!(word.c()));
                     if string.is_object() && index.is_fixnum() {
                         let header = string.object_ptr();
@@ -968,7 +976,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(CharRef)
                 }
-                Operation::Slot => {
+                LoopOperation::Slot => {
                     let instance = get!(word.b());
                     if is_instance_of_exactly(instance, *k.add(aux!() as usize)) {
                         // The class has the slot: the compiler took its number from it, and `cold::slot`
@@ -982,7 +990,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     cold!(2, cold::slot)
                 }
-                Operation::SetSlot => {
+                LoopOperation::SetSlot => {
                     let instance = get!(word.a());
                     if is_instance_of_exactly(instance, *k.add(aux!() as usize)) {
                         let slot = word.b() + 1;
@@ -993,7 +1001,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     cold!(2, cold::set_slot)
                 }
-                Operation::JumpIfNotInstance => {
+                LoopOperation::JumpIfNotInstance => {
                     let value = get!(word.a());
                     let holds = is_instance_of_exactly(value, *k.add(word.d()))
                         || (value.is_object() && cold::is_instance(vm, base, value, word.d()));
@@ -1001,19 +1009,19 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 }
 
                 // ---- variables
-                Operation::MakeBox => cold!(1, cold::make_box),
-                Operation::BoxRef => {
+                LoopOperation::MakeBox => cold!(1, cold::make_box),
+                LoopOperation::BoxRef => {
                     // SAFETY: V7: the register holds a box. In the three arms below that deal with boxes, V7
                     // says the same of the register or capture.
                     set!(word.a(), (*get!(word.b()).object_ptr().cast::<Boxed>()).value);
                     next!(1)
                 }
-                Operation::BoxSet => {
+                LoopOperation::BoxSet => {
                     let cell = get!(word.a()).object_ptr().cast::<Boxed>();
                     vm.heap.store(&raw mut (*cell).value, get!(word.b()));
                     next!(1)
                 }
-                Operation::MakeClosure => {
+                LoopOperation::MakeClosure => {
                     let function = *k.add(word.d());
                     // Functions without captures are made when their code is loaded.
                     if (*function.object_ptr()).kind == Kind::Function {
@@ -1022,52 +1030,52 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     cold!(1, cold::make_closure)
                 }
-                Operation::PatchCapture => {
+                LoopOperation::PatchCapture => {
                     // SAFETY: V8: the register holds a closure with such a capture.
                     vm.heap.store(element(get!(word.a()), 1 + word.b()), get!(word.c()));
                     next!(1)
                 }
-                Operation::CaptureRef => {
+                LoopOperation::CaptureRef => {
                     // SAFETY: V8: the running function has such a capture.
                     set!(word.a(), *element(*base.sub(2), 1 + word.b()));
                     next!(1)
                 }
-                Operation::CaptureBoxRef => {
+                LoopOperation::CaptureBoxRef => {
                     let cell = *element(*base.sub(2), 1 + word.b());
                     set!(word.a(), (*cell.object_ptr().cast::<Boxed>()).value);
                     next!(1)
                 }
-                Operation::CaptureBoxSet => {
+                LoopOperation::CaptureBoxSet => {
                     let cell = *element(*base.sub(2), 1 + word.b());
                     vm.heap.store(&raw mut (*cell.object_ptr().cast::<Boxed>()).value, get!(word.a()));
                     next!(1)
                 }
-                Operation::SymbolValue => {
+                LoopOperation::SymbolValue => {
                     // SAFETY: V4: the constant is a symbol.
-                    let symbol = (*k.add(word.d())).object_ptr().cast::<Symbol>();
+                    let symbol = (*k.add(word.d())).object_ptr().cast::<SymbolObject>();
                     let value = (*symbol).value;
-                    if (*symbol).header.flags & Symbol::EVER_BOUND == 0 && value != Value::UNBOUND {
+                    if (*symbol).header.flags & SymbolObject::EVER_BOUND == 0 && value != Value::UNBOUND {
                         set!(word.a(), value);
                         next!(1);
                     }
                     cold!(1, variable::symbol_value)
                 }
-                Operation::SetSymbolValue => {
+                LoopOperation::SetSymbolValue => {
                     // SAFETY: V4: the constant is a symbol.
-                    let symbol = (*k.add(word.d())).object_ptr().cast::<Symbol>();
-                    if (*symbol).header.flags & (Symbol::EVER_BOUND | Symbol::CONSTANT) == 0 {
+                    let symbol = (*k.add(word.d())).object_ptr().cast::<SymbolObject>();
+                    if (*symbol).header.flags & (SymbolObject::EVER_BOUND | SymbolObject::CONSTANT) == 0 {
                         vm.heap.store(&raw mut (*symbol).value, get!(word.a()));
                         next!(1);
                     }
                     cold!(1, variable::set_symbol_value)
                 }
-                Operation::Bind => cold!(1, variable::bind),
-                Operation::Unbind => cold!(1, variable::unbind),
-                Operation::BindList => cold!(1, unwind::bind_list),
-                Operation::FunctionRef => cold!(1, variable::function_ref),
+                LoopOperation::Bind => cold!(1, variable::bind),
+                LoopOperation::Unbind => cold!(1, variable::unbind),
+                LoopOperation::BindList => cold!(1, unwind::bind_list),
+                LoopOperation::FunctionRef => cold!(1, variable::function_ref),
 
                 // ---- calls
-                Operation::Call => {
+                LoopOperation::Call => {
                     tick!();
                     let window = base.add(word.a());
                     let function = *window;
@@ -1080,10 +1088,10 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     break Signal::Call;
                 }
-                Operation::CallGlobal => {
+                LoopOperation::CallGlobal => {
                     tick!();
                     // SAFETY: V4: the constant is a symbol, and the function of a symbol is a Function.
-                    let symbol = (*k.add(aux!() as usize)).object_ptr().cast::<Symbol>();
+                    let symbol = (*k.add(aux!() as usize)).object_ptr().cast::<SymbolObject>();
                     let function = (*symbol).function;
                     let code = code_of(function);
                     if (*code).arity == word.b() as u32 {
@@ -1092,13 +1100,13 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     enter_arranged!(base.add(word.a()), function, code, pc.add(2));
                     break Signal::Call;
                 }
-                Operation::CallSelf => {
+                LoopOperation::CallSelf => {
                     tick!();
                     // SAFETY: V5: the running function takes exactly these arguments.
-                    let code = k.byte_sub(Code::CONSTANTS_OFFSET).cast::<Code>().cast_mut();
+                    let code = k.byte_sub(CodeObject::CONSTANTS_OFFSET).cast::<CodeObject>().cast_mut();
                     enter!(base.add(word.a()), *base.sub(2), code, pc.add(2));
                 }
-                Operation::CallBuiltin => {
+                LoopOperation::CallBuiltin => {
                     tick!();
                     let window = base.add(word.a());
                     match call_native!(word.c() == 0) {
@@ -1123,11 +1131,11 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         }
                     }
                 }
-                Operation::Apply | Operation::TailApply => {
+                LoopOperation::Apply | LoopOperation::TailApply => {
                     tick!();
                     break Signal::Call;
                 }
-                Operation::TailCall => {
+                LoopOperation::TailCall => {
                     tick!();
                     let window = base.add(word.a());
                     let function = *window;
@@ -1136,14 +1144,14 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     break Signal::Call;
                 }
-                Operation::TailCallGlobal => {
+                LoopOperation::TailCallGlobal => {
                     tick!();
                     // SAFETY: V4: the constant is a symbol, and the function of a symbol is a Function.
-                    let symbol = (*k.add(aux!() as usize)).object_ptr().cast::<Symbol>();
+                    let symbol = (*k.add(aux!() as usize)).object_ptr().cast::<SymbolObject>();
                     enter_in_place!(base.add(word.a()), (*symbol).function);
                     break Signal::Call;
                 }
-                Operation::TailCallBuiltin => {
+                LoopOperation::TailCallBuiltin => {
                     tick!();
                     match call_native!(false) {
                         Ok(value) => {
@@ -1159,42 +1167,42 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         }
                     }
                 }
-                Operation::Return => return_value!(get!(word.a())),
-                Operation::ReturnValues => {
+                LoopOperation::Return => return_value!(get!(word.a())),
+                LoopOperation::ReturnValues => {
                     if word.b() == 1 {
                         return_value!(get!(word.a()))
                     }
                     cold::set_values(vm, pc, base);
                     break Signal::ReturnAll;
                 }
-                Operation::ReturnAll => break Signal::ReturnAll,
+                LoopOperation::ReturnAll => break Signal::ReturnAll,
 
                 // ---- the value list
-                Operation::SetValues => cold!(1, cold::set_values),
-                Operation::GetValues => cold!(1, cold::get_values),
-                Operation::ValuesToList => cold!(1, cold::values_to_list),
-                Operation::ListToValues => cold!(1, cold::list_to_values),
+                LoopOperation::SetValues => cold!(1, cold::set_values),
+                LoopOperation::GetValues => cold!(1, cold::get_values),
+                LoopOperation::ValuesToList => cold!(1, cold::values_to_list),
+                LoopOperation::ListToValues => cold!(1, cold::list_to_values),
 
                 // ---- the control stack
-                Operation::NewTag => cold!(1, unwind::new_tag),
-                Operation::PushCatch => cold!(2, unwind::push_catch),
-                Operation::PushCleanup => cold!(2, unwind::push_cleanup),
-                Operation::PushHandlerCase => cold!(2, unwind::push_handler_case),
-                Operation::PushRecovery => cold!(2, unwind::push_recovery),
-                Operation::PushFailureCleanup => cold!(2, unwind::push_failure_cleanup),
-                Operation::PushHandlers => cold!(1, unwind::push_handlers),
-                Operation::PushMask => cold!(1, unwind::push_mask),
-                Operation::PushScope => cold!(1, unwind::push_scope),
-                Operation::PopControl => cold!(1, unwind::pop),
-                Operation::EnterCleanup => cold!(1, unwind::enter_cleanup),
-                Operation::EndCleanup => cold!(1, unwind::end_cleanup),
-                Operation::Throw => match unwind::throw(vm, pc, base) {
+                LoopOperation::NewTag => cold!(1, unwind::new_tag),
+                LoopOperation::PushCatch => cold!(2, unwind::push_catch),
+                LoopOperation::PushCleanup => cold!(2, unwind::push_cleanup),
+                LoopOperation::PushHandlerCase => cold!(2, unwind::push_handler_case),
+                LoopOperation::PushRecovery => cold!(2, unwind::push_recovery),
+                LoopOperation::PushFailureCleanup => cold!(2, unwind::push_failure_cleanup),
+                LoopOperation::PushHandlers => cold!(1, unwind::push_handlers),
+                LoopOperation::PushMask => cold!(1, unwind::push_mask),
+                LoopOperation::PushScope => cold!(1, unwind::push_scope),
+                LoopOperation::PopControl => cold!(1, unwind::pop),
+                LoopOperation::EnterCleanup => cold!(1, unwind::enter_cleanup),
+                LoopOperation::EndCleanup => cold!(1, unwind::end_cleanup),
+                LoopOperation::Throw => match unwind::throw(vm, pc, base) {
                     Signal::Next => next!(1),
                     signal => break signal,
                 },
 
                 // ---- stubs
-                Operation::ErrorReturn | Operation::InterruptReturn => {
+                LoopOperation::ErrorReturn | LoopOperation::InterruptReturn => {
                     let signal = if word.number() == stubs::ERROR_RETURN {
                         substitute::error_return(vm, base)
                     } else {
@@ -1205,7 +1213,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     base = vm.cpu.base();
                     break signal;
                 }
-                Operation::TaskExit => break Signal::TaskExit,
+                LoopOperation::TaskExit => break Signal::TaskExit,
             }
         }
     };
@@ -1225,6 +1233,6 @@ unsafe fn is_instance_of_exactly(value: Value, class: Value) -> bool {
     value.is_object()
         && unsafe {
             (*value.object_ptr()).kind == Kind::Structure
-                && (*value.object_ptr().cast::<Structure>()).class == class
+                && (*value.object_ptr().cast::<StructureObject>()).class == class
         }
 }

@@ -1,7 +1,7 @@
 //! Room on the running task's stack, and the reserves that are for handling the exhaustion of stack and heap.
 
 use crate::raise::{Exit, Raised};
-use crate::task::{Bindings, End, Entry, Target, Unwinding};
+use crate::task::{Bindings, Entry, TaskEnd, UnwindTarget, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -152,10 +152,10 @@ impl Vm {
         self.exchange.charge(height - found.unwrap_or(0));
         match found {
             Some(index) => {
-                let unwinding = Unwinding { target: Target::Entry(index), values: Vec::new() };
+                let unwinding = Unwinding { target: UnwindTarget::Entry(index), values: Vec::new() };
                 self.scheduler.task_mut().control.unwinding = Some(unwinding);
             }
-            None => self.scheduler.task_mut().begin_end(End::Failed(cause)),
+            None => self.scheduler.task_mut().begin_end(TaskEnd::Failed(cause)),
         }
     }
 }

@@ -6,7 +6,7 @@ use esl_bytecode::operand::{Count, Pad, Window};
 
 use super::collect::LARGE_STACK;
 use super::{code_of, stubs};
-use crate::heap::layout::Code;
+use crate::heap::layout::CodeObject;
 use crate::heap::{AllocError, CodeParts, Heap};
 use crate::saved_pc::SavedPc;
 use crate::shape::{Shape, Sort};
@@ -31,7 +31,7 @@ pub(crate) fn first_words(heap: &Heap, function: Value, arguments: Value) -> usi
 }
 
 /// Returns the code of `function`, if it can be entered without arguments just as it is.
-fn direct_code(heap: &Heap, function: Value, arguments: Value) -> Option<&Code> {
+fn direct_code(heap: &Heap, function: Value, arguments: Value) -> Option<&CodeObject> {
     let code = heap.code(heap.function_code(function)?)?;
     (arguments.is_nil() && code.arity == 0 && Shape::unpack(code.spare[0]).sort == Sort::Bytecode)
         .then_some(code)

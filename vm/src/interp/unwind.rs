@@ -11,7 +11,7 @@ use super::{Signal, aux_at, cold, constant, failure, word_at};
 use crate::heap::layout::Kind;
 use crate::raise::{Exit, Raised};
 use crate::saved_pc::SavedPc;
-use crate::task::{Allowance, Entry, EntryKind, Running, Target, Unwinding};
+use crate::task::{Allowance, Entry, EntryKind, RunningCleanup, UnwindTarget, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -187,7 +187,7 @@ pub(super) unsafe fn enter_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Val
     let values = std::mem::take(&mut vm.exchange.values);
     let control = &mut vm.scheduler.task_mut().control;
     if let Some(entry) = control.entries.pop() {
-        control.run_cleanup(entry, Running { values, ..Running::default() });
+        control.run_cleanup(entry, RunningCleanup { values, ..RunningCleanup::default() });
     }
     Signal::Next
 }
@@ -197,7 +197,7 @@ pub(super) unsafe fn enter_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Val
 pub(super) unsafe fn end_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value) -> Signal {
     let control = &mut vm.scheduler.task_mut().control;
     control.entries.pop();
-    let Running { pending, values, .. } = control.running.pop().unwrap_or_default();
+    let RunningCleanup { pending, values, .. } = control.running.pop().unwrap_or_default();
     control.unwinding = pending;
     let unwinds = control.unwinding.is_some();
     vm.exchange.values = values;
@@ -223,7 +223,7 @@ pub(super) unsafe fn throw(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Sig
         Some(index) => {
             let values = std::mem::take(&mut vm.exchange.values);
             vm.scheduler.task_mut().control.unwinding =
-                Some(Unwinding { target: Target::Entry(index), values });
+                Some(Unwinding { target: UnwindTarget::Entry(index), values });
             Signal::Unwind
         }
         None => {
@@ -252,11 +252,11 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
         let Some(unwinding) = task.control.unwinding.take() else { return Signal::Reload };
         let height = task.control.entries.len();
         match unwinding.target {
-            Target::Entry(index) | Target::Limit(index) if index + 1 >= height => {
+            UnwindTarget::Entry(index) | UnwindTarget::Limit(index) if index + 1 >= height => {
                 // SAFETY: the contract of `unwind` is that of `land`, and the target is the topmost entry.
                 return unsafe { land(vm, unwinding.values) };
             }
-            Target::Return { entries, base } if height <= entries => {
+            UnwindTarget::Return { entries, base } if height <= entries => {
                 task.control.bindings.truncate_from(base);
                 vm.exchange.values = unwinding.values;
                 // SAFETY: the base is that of a frame that the task has not left, so it lies in the stack.
@@ -264,7 +264,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
                 vm.close_reserves();
                 return Signal::ReturnAll;
             }
-            Target::Root(end) if height == 0 => {
+            UnwindTarget::Root(end) if height == 0 => {
                 task.control.bindings.truncate(0);
                 vm.exchange.values = unwinding.values;
                 vm.scheduler.turn.ending = Some(end);
@@ -293,7 +293,8 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
                     // What these cleanups may use together is spent.
                     vm.scheduler.task_mut().control.unwinding = Some(unwinding);
                 } else {
-                    let running = Running { pending: Some(unwinding), allowance, ..Running::default() };
+                    let running =
+                        RunningCleanup { pending: Some(unwinding), allowance, ..RunningCleanup::default() };
                     vm.scheduler.task_mut().control.run_cleanup(entry, running);
                     // SAFETY: F5: the entry's frame is live, and its pc is the cleanup's first instruction.
                     unsafe { vm.resume_at(&entry) };
@@ -302,7 +303,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
             }
             EntryKind::Running => {
                 let interrupted = task.control.running.pop().and_then(|running| running.pending);
-                let next = if unwinding.target == Target::Cleanup(task.control.entries.len()) {
+                let next = if unwinding.target == UnwindTarget::Cleanup(task.control.entries.len()) {
                     Some(vm.scheduler.task_mut().after_cut_off(interrupted))
                 } else {
                     Some(unwinding.or_interrupted(interrupted))
@@ -335,7 +336,7 @@ unsafe fn land(vm: &mut Vm, values: Vec<Value>) -> Signal {
     control.bindings.truncate(entry.bindings as usize);
     if entry.kind == EntryKind::FailureCleanup {
         // The failure waits for the end of the cleanup as the values of a protected form do.
-        control.run_cleanup(entry, Running { values, ..Running::default() });
+        control.run_cleanup(entry, RunningCleanup { values, ..RunningCleanup::default() });
         vm.exchange.values.clear();
         // SAFETY: F5: the entry's frame is live, and its pc is the cleanup's first instruction.
         unsafe { vm.resume_at(&entry) };
@@ -386,9 +387,9 @@ impl Vm {
 
     /// Returns the allowance of the cleanup at the control entry `index`, which a forced unwinding to
     /// `target` meets. `None` if it is not to be run.
-    fn allow_cleanup(&mut self, target: Target, index: usize) -> Option<Allowance> {
+    fn allow_cleanup(&mut self, target: UnwindTarget, index: usize) -> Option<Allowance> {
         let depth = match target {
-            Target::Cleanup(_) => None,
+            UnwindTarget::Cleanup(_) => None,
             target => Some(target.depth()),
         };
         let Vm { scheduler, outside, config, cpu, exchange, .. } = self;

@@ -4,7 +4,7 @@
 //! serves, `base` is the running frame's, and what the verifier proved holds (V1 to V13).
 
 use super::{Signal, code_of, constant, failure, word_at};
-use crate::heap::layout::{Kind, Symbol};
+use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::{Exit, Raised};
 use crate::shape::{Shape, Sort};
 use crate::task::Binding;
@@ -77,7 +77,7 @@ pub(super) unsafe fn function_ref(vm: &mut Vm, pc: *const u32, base: *mut Value)
     unsafe {
         let word = word_at(pc);
         let symbol = constant(base, word.d());
-        let function = (*symbol.object_ptr().cast::<Symbol>()).function;
+        let function = (*symbol.object_ptr().cast::<SymbolObject>()).function;
         if Shape::unpack((*code_of(function)).spare[0]).sort == Sort::Undefined {
             return failure(vm, Raised::UndefinedFunction(symbol));
         }
@@ -90,7 +90,7 @@ impl Vm {
     /// Returns the value of a special variable in the running task; `None` if it has none.
     pub(crate) fn symbol_value(&self, symbol: Value) -> Option<Value> {
         let cell = self.heap.symbol(symbol)?;
-        let value = if cell.header.flags & Symbol::EVER_BOUND == 0 {
+        let value = if cell.header.flags & SymbolObject::EVER_BOUND == 0 {
             cell.value
         } else {
             self.scheduler
@@ -108,11 +108,11 @@ impl Vm {
     pub(crate) fn set_symbol_value(&mut self, symbol: Value, value: Value) -> Result<(), Exit> {
         let Some(cell) = self.heap.symbol(symbol) else { return self.exchange.type_error(symbol, "SYMBOL") };
         let flags = cell.header.flags;
-        if flags & Symbol::CONSTANT != 0 {
+        if flags & SymbolObject::CONSTANT != 0 {
             let name = self.heap.string_text(cell.name).unwrap_or_default();
             return self.exchange.program_error(format!("{name} is a constant and cannot be set"));
         }
-        if flags & Symbol::EVER_BOUND != 0
+        if flags & SymbolObject::EVER_BOUND != 0
             && let Some(task) = self.scheduler.running.as_mut()
             && let Some(place) = task.control.bindings.get_mut(symbol)
         {
@@ -130,12 +130,12 @@ impl Vm {
     pub(crate) fn bind(&mut self, symbol: Value, value: Value, base: u32) -> Result<(), Exit> {
         let Some(cell) = self.heap.symbol(symbol) else { return self.exchange.type_error(symbol, "SYMBOL") };
         let flags = cell.header.flags;
-        if flags & Symbol::CONSTANT != 0 {
+        if flags & SymbolObject::CONSTANT != 0 {
             let name = self.heap.string_text(cell.name).unwrap_or_default();
             return self.exchange.program_error(format!("{name} is a constant and cannot be bound"));
         }
-        if flags & Symbol::EVER_BOUND == 0 {
-            self.heap.set_flags(symbol, Kind::Symbol, flags | Symbol::EVER_BOUND);
+        if flags & SymbolObject::EVER_BOUND == 0 {
+            self.heap.set_flags(symbol, Kind::Symbol, flags | SymbolObject::EVER_BOUND);
         }
         let mut bindings = &mut self.scheduler.task_mut().control.bindings;
         if bindings.is_full() {

@@ -7,20 +7,20 @@ use std::collections::BTreeMap;
 
 use esl_bytecode::datum::Datum;
 
-use crate::host::{Asked, Canceller, Console, Failure, Host, Inbox, Operation, Output, Right};
+use crate::host::{Asked, Canceller, Console, Host, HostFailure, HostOperation, Inbox, Output, Right};
 use crate::task::TaskNumber;
 use crate::value::Value;
 pub(crate) use operations::Operations;
 
 /// Code of the embedder's that takes and returns data, and cannot call back.
-pub type DataFunction = Box<dyn FnMut(&[Datum]) -> Result<Datum, Failure> + Send>;
+pub type DataFunction = Box<dyn FnMut(&[Datum]) -> Result<Datum, HostFailure> + Send>;
 
 /// A function that the embedder gives to programs.
 pub enum HostFunction {
     /// It returns at once.
     AtOnce(DataFunction),
     /// It begins an operation.
-    Operation(Box<dyn FnMut(Operation) + Send>),
+    Operation(Box<dyn FnMut(HostOperation) + Send>),
 }
 
 /// A right that a function of the embedder's needs: to the text that is this argument of a call. The function
@@ -50,7 +50,7 @@ pub(crate) struct Outside {
     /// The embedder's functions, by name.
     pub(crate) functions: BTreeMap<String, Given>,
     /// Answer of one of them, while there is no room for it in the heap.
-    pub(crate) answer: Option<Result<Datum, Failure>>,
+    pub(crate) answer: Option<Result<Datum, HostFailure>>,
     /// The operations under way.
     pub(crate) operations: Operations,
     /// The inputs that the outside may signal, by name.
@@ -81,7 +81,7 @@ impl Outside {
     }
 
     /// Calls a function of the embedder's that returns at once; `None` if there is none of this name.
-    pub(crate) fn call(&mut self, name: &str, arguments: &[Datum]) -> Option<Result<Datum, Failure>> {
+    pub(crate) fn call(&mut self, name: &str, arguments: &[Datum]) -> Option<Result<Datum, HostFailure>> {
         match &mut self.functions.get_mut(name)?.function {
             HostFunction::AtOnce(function) => Some(self.host.call(name, arguments, function)),
             HostFunction::Operation(_) => None,
@@ -113,7 +113,7 @@ impl Outside {
         self.operations.begin(handle, canceller.clone(), is_detached, begun_by);
         let number = self.operations.begun;
         self.host.begin(name, arguments, &mut |arguments| {
-            function(Operation::new(number, arguments.to_vec(), self.inbox.clone(), canceller.clone()));
+            function(HostOperation::new(number, arguments.to_vec(), self.inbox.clone(), canceller.clone()));
         });
     }
 

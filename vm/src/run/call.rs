@@ -8,7 +8,7 @@ use super::RunOutcome;
 use super::ending::end_task;
 use crate::observe::Seen;
 use crate::report;
-use crate::task::{End, Task, TaskId, TaskResult};
+use crate::task::{Task, TaskEnd, TaskId, TaskResult};
 use crate::value::Value;
 use crate::vm::Vm;
 
@@ -169,7 +169,7 @@ impl Vm {
         let extra = self.scheduler.tasks.get(id)?.extra.as_ref()?;
         match (&extra.report, extra.end) {
             (Some(report), _) => Some(report.text()),
-            (None, Some(End::Failed(condition))) => Some(report::report_in_short(&self.heap, condition)),
+            (None, Some(TaskEnd::Failed(condition))) => Some(report::report_in_short(&self.heap, condition)),
             _ => None,
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::report;
 use crate::schedule::Due;
-use crate::task::{Allowance, Running, Target, Unwinding};
+use crate::task::{Allowance, RunningCleanup, UnwindTarget, Unwinding};
 use crate::vm::Vm;
 use crate::wait::link;
 
@@ -15,7 +15,7 @@ pub(super) fn allow_cleanups(vm: &mut Vm, depth: usize) {
     let Vm { scheduler, outside, config, cpu, .. } = vm;
     let running = scheduler.task().control.get().map_or(&[][..], |control| &control.running[..]);
     let position = running.partition_point(|running| running.entry < depth);
-    let Some(&Running { entry, allowance: None, .. }) = running.get(position) else { return };
+    let Some(&RunningCleanup { entry, allowance: None, .. }) = running.get(position) else { return };
     let allowance = scheduler.allow_cleanup(Some(depth), entry, cpu.used(), &mut outside.host, config);
     let allowance = allowance.unwrap_or(Allowance { ticks: 0, time: 0 });
     scheduler.task_mut().control.set_allowance(position, allowance);
@@ -45,9 +45,9 @@ pub(super) fn cut_off_cleanup(vm: &mut Vm) -> bool {
     let is_under_way = control
         .unwinding
         .as_ref()
-        .is_some_and(|unwinding| matches!(unwinding.target, Target::Cleanup(index) if index <= entry));
+        .is_some_and(|unwinding| matches!(unwinding.target, UnwindTarget::Cleanup(index) if index <= entry));
     if !is_under_way {
-        control.unwinding = Some(Unwinding { target: Target::Cleanup(entry), values: Vec::new() });
+        control.unwinding = Some(Unwinding { target: UnwindTarget::Cleanup(entry), values: Vec::new() });
         report_cut_off(vm);
     }
     true

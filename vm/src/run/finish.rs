@@ -9,33 +9,33 @@ use crate::interp;
 use crate::raise::Exit;
 use crate::report;
 use crate::schedule::Measure;
-use crate::task::{AccountId, End, TaskState};
+use crate::task::{AccountId, TaskEnd, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
 
 /// Notes how the running task has ended, and tells whoever wants to know.
 pub(super) fn finish_task(vm: &mut Vm) {
-    let end = match vm.scheduler.turn.ending.take().unwrap_or(End::Succeeded) {
-        End::Spent => End::Failed(vm.world.known.budget_exhausted),
+    let end = match vm.scheduler.turn.ending.take().unwrap_or(TaskEnd::Succeeded) {
+        TaskEnd::Spent => TaskEnd::Failed(vm.world.known.budget_exhausted),
         end => end,
     };
     let mut values = std::mem::take(&mut vm.exchange.values);
     let object = vm.scheduler.task().object;
     // What others are told of has to be made before; here there is nothing to go back to.
     let result = match (end, &values[..]) {
-        (End::Succeeded, &[value]) => value,
-        (End::Succeeded, values) => allocate_without_retry(vm, |vm| Ok(vm.heap.list(values)?)),
-        (End::Failed(condition), _) => condition,
+        (TaskEnd::Succeeded, &[value]) => value,
+        (TaskEnd::Succeeded, values) => allocate_without_retry(vm, |vm| Ok(vm.heap.list(values)?)),
+        (TaskEnd::Failed(condition), _) => condition,
         _ => Value::NIL,
     };
-    let has_one_value = end == End::Succeeded && values.len() == 1;
+    let has_one_value = end == TaskEnd::Succeeded && values.len() == 1;
     vm.heap.set_aux(object, Kind::Task, u16::from(has_one_value));
     vm.heap.slot_set(object, event::RESULT, result);
     let status = match end {
-        End::Succeeded => vm.world.known.succeeded,
-        End::Failed(_) | End::Spent => vm.world.known.failed,
-        End::Aborted => vm.world.known.aborted,
+        TaskEnd::Succeeded => vm.world.known.succeeded,
+        TaskEnd::Failed(_) | TaskEnd::Spent => vm.world.known.failed,
+        TaskEnd::Aborted => vm.world.known.aborted,
     };
     vm.heap.slot_set(object, event::STATE, status);
     let is_awaited = event::is_awaited(&vm.heap, object);
@@ -95,12 +95,12 @@ pub(super) fn allocate_without_retry(
 }
 
 /// Reports the failure that has ended the running task, unless a task waits for it or the embedder wants to.
-fn report_end(vm: &mut Vm, end: End, is_awaited: bool) {
+fn report_end(vm: &mut Vm, end: TaskEnd, is_awaited: bool) {
     let task = vm.scheduler.task_mut();
     if task.flags.kept() || is_awaited {
         return;
     }
-    let End::Failed(condition) = end else { return };
+    let TaskEnd::Failed(condition) = end else { return };
     let report = task.extra.as_mut().and_then(|extra| extra.report.take());
     let (name, number) = (vm.heap.slot_or_nil(task.object, event::NAME), task.number);
     let label = report::label_of(vm, name, number);
@@ -109,14 +109,14 @@ fn report_end(vm: &mut Vm, end: End, is_awaited: bool) {
 }
 
 /// Ends the run with the running task, if it is the last that matters.
-fn end_run_if_over(vm: &mut Vm, end: End) {
+fn end_run_if_over(vm: &mut Vm, end: TaskEnd) {
     let scheduler = &mut vm.scheduler;
     scheduler.counts.alive -= 1;
     if !scheduler.task().flags.daemon() {
         scheduler.counts.foreground -= 1;
     }
     let Some(main) = scheduler.main else { return };
-    let main_has_failed = main.index == scheduler.turn.index && end != End::Succeeded;
+    let main_has_failed = main.index == scheduler.turn.index && end != TaskEnd::Succeeded;
     // All others may have been asked before; each of them comes by here.
     let has_newer = scheduler.counts.made > scheduler.counts.made_at_end;
     if has_newer && (main_has_failed || scheduler.counts.foreground == 0) {

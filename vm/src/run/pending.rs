@@ -9,7 +9,7 @@
 use super::cleanup::{allow_cleanups, cut_off_cleanup};
 use super::wake::call_attention;
 use crate::interp::{self, Leave};
-use crate::task::{AccountId, Control, End, Target, Unwinding, guard};
+use crate::task::{AccountId, Control, TaskEnd, UnwindTarget, Unwinding, guard};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
@@ -96,7 +96,7 @@ fn end_running_task(vm: &mut Vm) {
     vm.scheduler.cancel_wait(&mut vm.heap);
     let is_over_quota = vm.scheduler.is_task_over_quota();
     let task = vm.scheduler.task_mut();
-    let end = if task.flags.abort_pending() || is_over_quota { End::Aborted } else { End::Spent };
+    let end = if task.flags.abort_pending() || is_over_quota { TaskEnd::Aborted } else { TaskEnd::Spent };
     task.flags.set_abort_pending(false);
     task.flags.set_attention(false);
     task.flags.set_urgent(true);
@@ -104,7 +104,7 @@ fn end_running_task(vm: &mut Vm) {
         extra.interrupts.clear();
     }
     let unwinding = task.control.get().and_then(|control| control.unwinding.as_ref());
-    if !unwinding.is_some_and(|unwinding| matches!(unwinding.target, Target::Root(_))) {
+    if !unwinding.is_some_and(|unwinding| matches!(unwinding.target, UnwindTarget::Root(_))) {
         task.begin_end(end);
     }
 }
@@ -114,12 +114,14 @@ fn unwind_to_limit(vm: &mut Vm, entry: usize, cause: Value) {
     vm.scheduler.cancel_wait(&mut vm.heap);
     let control = &mut vm.scheduler.task_mut().control;
     let passes_by = control.unwinding.as_ref().is_some_and(|unwinding| match unwinding.target {
-        Target::Root(_) => true,
-        Target::Entry(index) | Target::Limit(index) | Target::Cleanup(index) => index <= entry,
-        Target::Return { entries, .. } => entries <= entry,
+        UnwindTarget::Root(_) => true,
+        UnwindTarget::Entry(index) | UnwindTarget::Limit(index) | UnwindTarget::Cleanup(index) => {
+            index <= entry
+        }
+        UnwindTarget::Return { entries, .. } => entries <= entry,
     });
     if !passes_by {
-        control.unwinding = Some(Unwinding { target: Target::Limit(entry), values: vec![cause] });
+        control.unwinding = Some(Unwinding { target: UnwindTarget::Limit(entry), values: vec![cause] });
     }
 }
 

@@ -5,9 +5,9 @@ use esl_bytecode::symbol::{Symbol, USER_PACKAGE};
 
 use super::finish::allocate_without_retry;
 use crate::datum::{self, DatumError};
-use crate::host::{Answer, Callee, Kept, Question, TaskInfo};
+use crate::host::{Answer, FunctionRef, Kept, Question, TaskInfo};
 use crate::report;
-use crate::task::{End, Task, TaskId, TaskNumber, TaskState};
+use crate::task::{Task, TaskEnd, TaskId, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::event;
@@ -36,9 +36,9 @@ pub(super) fn take_question(vm: &mut Vm, number: u64, question: Question) {
     }
 }
 
-fn no_call(function: &Callee) -> Answer {
+fn no_call(function: &FunctionRef) -> Answer {
     let (cause, message) = match function {
-        Callee::Kept(u64::MAX) => (":PROGRAM-ERROR", "The function belongs to another engine."),
+        FunctionRef::Kept(u64::MAX) => (":PROGRAM-ERROR", "The function belongs to another engine."),
         _ => (":HEAP-EXHAUSTED", "There is no memory left for a task."),
     };
     Answer::Failed {
@@ -58,10 +58,10 @@ impl Vm {
 
     /// Returns the function that the outside calls so: a symbol, or a value that is kept. `None` if there is no
     /// room for the symbol, or no such value.
-    pub fn callee(&mut self, callee: &Callee) -> Option<Value> {
+    pub fn callee(&mut self, callee: &FunctionRef) -> Option<Value> {
         let name = match callee {
-            Callee::Named(name) => name,
-            Callee::Kept(number) => return self.embedder.kept.get(number).copied(),
+            FunctionRef::Named(name) => name,
+            FunctionRef::Kept(number) => return self.embedder.kept.get(number).copied(),
         };
         let (package, name) = match name.rsplit_once(':') {
             Some((package, name)) => (package.trim_end_matches(':'), name),
@@ -91,7 +91,7 @@ fn import_datum(vm: &mut Vm, datum: &Datum) -> Option<Value> {
 }
 
 /// Makes the task that calls a function for somebody outside; `None` if there is no room for it.
-fn begin_call(vm: &mut Vm, function: &Callee, arguments: &[Datum]) -> Option<TaskId> {
+fn begin_call(vm: &mut Vm, function: &FunctionRef, arguments: &[Datum]) -> Option<TaskId> {
     let function = vm.callee(function)?;
     vm.embedder.pin(&mut vm.heap, function);
     let mut values = vec![function];
@@ -125,11 +125,11 @@ pub(super) fn abort_task(vm: &mut Vm, number: TaskNumber) {
 
 /// Answers whoever waits for the call of the running task, which has ended with these values. Returns whether
 /// it was for a call.
-pub(super) fn answer_call(vm: &mut Vm, end: End, values: &[Value]) -> bool {
+pub(super) fn answer_call(vm: &mut Vm, end: TaskEnd, values: &[Value]) -> bool {
     let Some(number) = vm.embedder.calls.remove(&vm.scheduler.turn.index) else { return false };
     let answer = match end {
-        End::Succeeded => answer_with(vm, values),
-        End::Failed(condition) => {
+        TaskEnd::Succeeded => answer_with(vm, values),
+        TaskEnd::Failed(condition) => {
             let extra = vm.scheduler.task_mut().extra.as_mut();
             let report = extra.and_then(|extra| extra.report.take());
             let message = vm.embedder.last_words.take().unwrap_or_else(|| vm.describe(condition));
@@ -139,7 +139,7 @@ pub(super) fn answer_call(vm: &mut Vm, end: End, values: &[Value]) -> bool {
                 (report::cause_label(&vm.heap, condition), report::failure_arguments(vm, condition));
             Answer::Failed { cause, message, report, arguments }
         }
-        End::Aborted | End::Spent => Answer::Aborted,
+        TaskEnd::Aborted | TaskEnd::Spent => Answer::Aborted,
     };
     vm.outside.inbox.answer(number, answer);
     true

@@ -6,7 +6,7 @@
 
 use super::{Scheduler, TurnEnd};
 use crate::raise::Exit;
-use crate::task::{End, Target, Unwinding};
+use crate::task::{TaskEnd, UnwindTarget, Unwinding};
 use crate::value::Value;
 
 /// Kinds of operations before which a task stands at a point.
@@ -90,7 +90,7 @@ impl Scheduler {
         if self.points.grain.is_none() || !self.stops_here() {
             return false;
         }
-        let target = Target::Root(self.turn.ending.take().unwrap_or(End::Succeeded));
+        let target = UnwindTarget::Root(self.turn.ending.take().unwrap_or(TaskEnd::Succeeded));
         let values = std::mem::take(values);
         self.task_mut().control.unwinding = Some(Unwinding { target, values });
         true

@@ -1,6 +1,6 @@
 //! The turn of the running task.
 
-use crate::task::{End, TaskIndex};
+use crate::task::{TaskEnd, TaskIndex};
 
 /// Why a task is about to park.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,7 +44,7 @@ pub(crate) struct Turn {
     /// Why it is about to park.
     pub(crate) parking: Parking,
     /// How it ends, once its unwinding has reached the root.
-    pub(crate) ending: Option<End>,
+    pub(crate) ending: Option<TaskEnd>,
 }
 
 impl Turn {

@@ -69,7 +69,7 @@ pub(crate) struct Entry {
 
 /// Way a task ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum End {
+pub(crate) enum TaskEnd {
     /// The function returned.
     Succeeded,
     /// A failure left it; the value is the condition.
@@ -82,11 +82,11 @@ pub(crate) enum End {
 
 /// Target of an unwinding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Target {
+pub(crate) enum UnwindTarget {
     /// At the entry with this index.
     Entry(usize),
     /// At the task's root, which ends it.
-    Root(End),
+    Root(TaskEnd),
     /// At the entry with this index, an expired limit.
     Limit(usize),
     /// At the entry with this index, a running cleanup that is cut off.
@@ -101,24 +101,31 @@ pub(crate) enum Target {
     },
 }
 
-impl Target {
+impl UnwindTarget {
     /// Returns whether nothing that the program does may cancel an unwinding to it.
     pub(crate) fn is_forced(self) -> bool {
-        matches!(self, Target::Root(End::Aborted | End::Spent) | Target::Limit(_) | Target::Cleanup(_))
+        matches!(
+            self,
+            UnwindTarget::Root(TaskEnd::Aborted | TaskEnd::Spent)
+                | UnwindTarget::Limit(_)
+                | UnwindTarget::Cleanup(_)
+        )
     }
 
     /// Returns whether nothing that runs on the way can cancel the unwinding: the task ends, or is made to
     /// leave a form.
     pub(crate) fn is_final(self) -> bool {
-        self.is_forced() || matches!(self, Target::Root(_))
+        self.is_forced() || matches!(self, UnwindTarget::Root(_))
     }
 
     /// Returns the number of control entries that are left at it: the greater, the further inside.
     pub(crate) fn depth(self) -> usize {
         match self {
-            Target::Root(_) => 0,
-            Target::Entry(index) | Target::Limit(index) | Target::Cleanup(index) => index + 1,
-            Target::Return { entries, .. } => entries,
+            UnwindTarget::Root(_) => 0,
+            UnwindTarget::Entry(index) | UnwindTarget::Limit(index) | UnwindTarget::Cleanup(index) => {
+                index + 1
+            }
+            UnwindTarget::Return { entries, .. } => entries,
         }
     }
 }
@@ -127,7 +134,7 @@ impl Target {
 #[derive(Clone, Debug)]
 pub(crate) struct Unwinding {
     /// Target.
-    pub target: Target,
+    pub target: UnwindTarget,
     /// Values that it carries.
     pub values: Vec<Value>,
 }
@@ -136,7 +143,7 @@ impl Unwinding {
     /// Calls `visit` with every value that it holds.
     fn visit(&self, visit: &mut dyn FnMut(Value)) {
         self.values.iter().copied().for_each(&mut *visit);
-        if let Target::Root(End::Failed(condition)) = self.target {
+        if let UnwindTarget::Root(TaskEnd::Failed(condition)) = self.target {
             visit(condition);
         }
     }
@@ -147,7 +154,7 @@ impl Unwinding {
     /// when the cleanup is left that is cut off, the task goes on as if that one had ended.
     pub(crate) fn or_interrupted(self, interrupted: Option<Unwinding>) -> Unwinding {
         let Some(interrupted) = interrupted else { return self };
-        let is_cut_off = matches!(self.target, Target::Cleanup(_)) && !interrupted.target.is_forced();
+        let is_cut_off = matches!(self.target, UnwindTarget::Cleanup(_)) && !interrupted.target.is_forced();
         let is_further = interrupted.target.depth() < self.target.depth() && !is_cut_off;
         if interrupted.target.is_final() && (!self.target.is_forced() || is_further) {
             interrupted
@@ -159,7 +166,7 @@ impl Unwinding {
 
 /// Running cleanup: what it has interrupted, and what it may use.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Running {
+pub(crate) struct RunningCleanup {
     /// Index of its entry in the control stack.
     pub entry: usize,
     /// Unwinding that goes on when it ends; `None` if the protected form returned.
@@ -178,7 +185,7 @@ pub(crate) struct Control {
     /// Entries, innermost last.
     pub entries: Vec<Entry>,
     /// Running cleanups, innermost last.
-    pub running: Vec<Running>,
+    pub running: Vec<RunningCleanup>,
     /// Dynamic bindings.
     pub bindings: Bindings,
     /// Unwinding under way.
@@ -235,11 +242,11 @@ pub(crate) struct Found {
 
 impl Control {
     /// Begins to run the cleanup `entry`, on top of the stack. `running` is what it interrupts.
-    pub(crate) fn run_cleanup(&mut self, entry: Entry, running: Running) {
+    pub(crate) fn run_cleanup(&mut self, entry: Entry, running: RunningCleanup) {
         let data = Value::index(self.running.len());
         self.bindings.truncate(entry.bindings as usize);
         let bound = self.bound().around(running.allowance);
-        self.running.push(Running { entry: self.entries.len(), bound, ..running });
+        self.running.push(RunningCleanup { entry: self.entries.len(), bound, ..running });
         self.entries.push(Entry { kind: EntryKind::Running, data, ..entry });
     }
 
@@ -275,7 +282,7 @@ impl Control {
     }
 
     /// Returns the target of an interrupted unwinding that the running cleanup cannot cancel.
-    pub(crate) fn final_unwinding(&self) -> Option<Target> {
+    pub(crate) fn final_unwinding(&self) -> Option<UnwindTarget> {
         let pending = self.running.iter().rev().filter_map(|running| running.pending.as_ref());
         pending.map(|unwinding| unwinding.target).find(|target| target.is_final())
     }
@@ -321,7 +328,7 @@ impl Control {
     pub(crate) fn bytes(&self) -> usize {
         size_of::<Control>()
             + self.entries.capacity() * size_of::<Entry>()
-            + self.running.capacity() * size_of::<Running>()
+            + self.running.capacity() * size_of::<RunningCleanup>()
             + self.bindings.bytes()
     }
 

@@ -16,7 +16,9 @@ mod limit;
 mod tasks;
 
 pub(crate) use binding::{Binding, Bindings};
-pub(crate) use control_stack::{Control, End, Entry, EntryKind, LazyControl, Running, Target, Unwinding};
+pub(crate) use control_stack::{
+    Control, Entry, EntryKind, LazyControl, RunningCleanup, TaskEnd, UnwindTarget, Unwinding,
+};
 pub use id::TaskNumber;
 pub(crate) use id::{LimitNumber, Serial, TaskIndex};
 pub(crate) use limit::{AccountId, Allowance, Fund, Limit};
@@ -167,7 +169,7 @@ pub(crate) struct Extra {
     /// Report of the failure that ends it.
     pub report: Option<FailureReport>,
     /// Way it ended, for the embedder.
-    pub end: Option<End>,
+    pub end: Option<TaskEnd>,
     /// Values that it returned, for the embedder.
     pub values: Vec<Value>,
     /// Open limits, outermost first: one for each entry of the control stack of that kind.
@@ -192,7 +194,7 @@ impl Extra {
     pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
         self.limits.iter().filter_map(|limit| limit.expired).for_each(&mut *visit);
         self.interrupts.iter().chain(&self.values).copied().for_each(&mut *visit);
-        if let Some(End::Failed(condition)) = self.end {
+        if let Some(TaskEnd::Failed(condition)) = self.end {
             visit(condition);
         }
     }
@@ -313,8 +315,8 @@ impl Task {
     }
 
     /// Begins to unwind it to its root, which ends it.
-    pub(crate) fn begin_end(&mut self, end: End) {
-        self.control.unwinding = Some(Unwinding { target: Target::Root(end), values: Vec::new() });
+    pub(crate) fn begin_end(&mut self, end: TaskEnd) {
+        self.control.unwinding = Some(Unwinding { target: UnwindTarget::Root(end), values: Vec::new() });
     }
 
     /// Returns the unwinding that goes on when the entry of a cleanup that was cut off has been popped.
@@ -326,28 +328,28 @@ impl Task {
         // It followed a form that had returned. What made it end is for the whole task or for a form further
         // out; with a cleanup around it that one is what ends.
         if let Some(entry) = self.control.innermost_cleanup() {
-            return Unwinding { target: Target::Cleanup(entry), values: Vec::new() };
+            return Unwinding { target: UnwindTarget::Cleanup(entry), values: Vec::new() };
         }
         if !self.flags.abort_pending()
             && let Some((entry, cause)) = self.expired_limit()
         {
-            return Unwinding { target: Target::Limit(entry), values: vec![cause] };
+            return Unwinding { target: UnwindTarget::Limit(entry), values: vec![cause] };
         }
-        let end = if self.flags.abort_pending() { End::Aborted } else { End::Spent };
+        let end = if self.flags.abort_pending() { TaskEnd::Aborted } else { TaskEnd::Spent };
         self.flags.set_abort_pending(false);
         self.flags.set_urgent(true);
-        Unwinding { target: Target::Root(end), values: Vec::new() }
+        Unwinding { target: UnwindTarget::Root(end), values: Vec::new() }
     }
 
     /// Returns its result, as far as that is kept for the embedder.
     pub(crate) fn result(&self) -> TaskResult {
         let Some(extra) = &self.extra else { return TaskResult::Running };
         match extra.end {
-            Some(End::Succeeded) => TaskResult::Succeeded(extra.values.clone()),
-            Some(End::Failed(condition)) => TaskResult::Failed(condition),
-            Some(End::Aborted) => TaskResult::Aborted,
+            Some(TaskEnd::Succeeded) => TaskResult::Succeeded(extra.values.clone()),
+            Some(TaskEnd::Failed(condition)) => TaskResult::Failed(condition),
+            Some(TaskEnd::Aborted) => TaskResult::Aborted,
             // A budget that was spent is noted as a failure.
-            Some(End::Spent) | None => TaskResult::Running,
+            Some(TaskEnd::Spent) | None => TaskResult::Running,
         }
     }
 }

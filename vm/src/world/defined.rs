@@ -10,7 +10,7 @@ use esl_bytecode::file::ModuleImage;
 use esl_bytecode::package::PackageId;
 use esl_bytecode::symbol::Symbol;
 
-use crate::heap::layout::Symbol as SymbolObject;
+use crate::heap::layout::SymbolObject;
 use crate::heap::{AllocError, Heap, Kind};
 use crate::value::Value;
 use crate::world::load::{self, ImageClass, LoadError};

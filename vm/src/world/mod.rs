@@ -21,7 +21,7 @@ use esl_bytecode::builtin::{BUILTINS, Builtin, Visibility};
 use esl_bytecode::package::{PackageId, Packages};
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 
-use crate::heap::layout::Symbol as SymbolObject;
+use crate::heap::layout::SymbolObject;
 use crate::heap::{AllocError, Heap, Holder, Kind};
 use crate::shape::{Shape, Sort};
 use crate::trust;

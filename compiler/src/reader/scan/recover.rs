@@ -1,7 +1,7 @@
 //! Texts that end too early, close too much or nest too deeply: the diagnostics, and the offset at which
 //! reading continues.
 
-use crate::diagnostic::{Code, code};
+use crate::diagnostic::{DiagnosticCode, code};
 use crate::reader::lexer::{LexError, Lexeme, Token};
 
 use super::{Level, MAX_DEPTH, NONE, OpenKind, Scan, Scanner, Unclosed};
@@ -86,7 +86,7 @@ impl Scanner {
 
     /// Reports a token without an end; returns the offset at which to continue.
     pub(super) fn runaway(&mut self, error: LexError, text: &str, start: u32, end: u32) -> usize {
-        let (code, width, what): (&Code, u32, _) = match error {
+        let (code, width, what): (&DiagnosticCode, u32, _) = match error {
             LexError::UnclosedString => (code::UNCLOSED_STRING, 1, "the `\"` that ends this string"),
             LexError::UnclosedComment => (code::UNCLOSED_COMMENT, 2, "the `|#` that ends this comment"),
             LexError::UnclosedBar => {

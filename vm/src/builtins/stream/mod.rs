@@ -21,7 +21,7 @@ use crate::host::{Host, HostError, Output, Right, Taken, WriteMode, column_after
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::run;
 use crate::schedule::Parking;
-use crate::task::End;
+use crate::task::TaskEnd;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::stream::{StreamKind, make_stream, slot};
@@ -313,7 +313,7 @@ fn check_output(vm: &mut Vm) -> Result<(), Exit> {
         }
         vm.outside.exit_status = Some(vm.outside.host.broken_output_status());
         run::abort_others(vm);
-        vm.scheduler.task_mut().begin_end(End::Aborted);
+        vm.scheduler.task_mut().begin_end(TaskEnd::Aborted);
         return Err(Exit::Unwind);
     }
     match vm.outside.console.take_failure() {

@@ -195,7 +195,7 @@ fn without_a_library_a_failure_ends_the_task_and_says_why() {
 #[cfg_attr(miri, ignore = "there is nothing unsafe in a text")]
 fn the_loop_has_an_arm_for_each_row_in_the_order_of_the_table() {
     // An arm begins with its opcodes, one or several, in a column of its own.
-    const ARM: &str = "\n                Operation::";
+    const ARM: &str = "\n                LoopOperation::";
     let source = include_str!("../mod.rs");
     let arms = source.split(ARM).skip(1).filter_map(|arm| Some(arm.split_once(" =>")?.0));
     let operations: Vec<&str> = arms.flat_map(|names| names.split(" | Operation::")).collect();

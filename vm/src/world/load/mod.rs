@@ -22,7 +22,7 @@ use esl_bytecode::package::PackageId;
 use esl_bytecode::symbol::{Home, Symbol};
 use esl_bytecode::verify::VerifyError;
 
-use crate::heap::layout::Code;
+use crate::heap::layout::CodeObject;
 use crate::heap::{AllocError, CodeParts, Heap, Kind};
 use crate::shape::{Shape, Sort, capture_word};
 use crate::trust::LAZY_WORD;
@@ -251,7 +251,7 @@ fn make_code(
     let mut words = function.code.clone();
     words.extend(function.captures.iter().copied().map(capture_word));
     let parameters = &function.parameters;
-    let arity = if parameters.is_exact() { u32::from(parameters.required) } else { Code::ANY_ARITY };
+    let arity = if parameters.is_exact() { u32::from(parameters.required) } else { CodeObject::ANY_ARITY };
     let parts = CodeParts {
         name: parts.name,
         debug: parts.debug,
