@@ -1,7 +1,8 @@
 //! `ARCHITECTURE.md` maps the code completely and correctly: its tables list exactly the modules that exist,
 //! and each type in its glossary exists. So does each file that it and the other documents at the root name.
+//! The name of a type means one thing in the whole workspace.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -77,6 +78,53 @@ fn declared_types(folder: PathBuf) -> BTreeSet<String> {
         }
     }
     types
+}
+
+/// Returns the files of Rust below a folder that are no tests.
+fn product_sources(folder: PathBuf) -> Vec<PathBuf> {
+    let (mut folders, mut files) = (vec![folder], Vec::new());
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("the sources can be listed") {
+            let path = entry.expect("the sources can be listed").path();
+            let is_test = path.file_stem().is_some_and(|name| name == "tests");
+            if path.is_dir() && !is_test {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") && !is_test {
+                files.push(path);
+            }
+        }
+    }
+    files
+}
+
+/// Returns the name of the type that a line declares outside of every block.
+fn declared_type(line: &str) -> Option<&str> {
+    let line = line.strip_prefix("pub").map_or(line, |rest| match rest.strip_prefix('(') {
+        Some(scope) => scope.split_once(") ").map_or(rest, |(_, rest)| rest),
+        None => rest.trim_start(),
+    });
+    let name =
+        ["struct ", "enum ", "trait ", "type "].iter().find_map(|keyword| line.strip_prefix(keyword))?;
+    name.split(|c: char| !c.is_alphanumeric() && c != '_').next()
+}
+
+#[test]
+fn each_type_name_means_one_thing() {
+    let mut declared: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
+    for (_, folder) in SECTIONS {
+        for path in product_sources(root().join(folder)) {
+            let text = fs::read_to_string(&path).expect("a source can be read");
+            let product = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+            let names: BTreeSet<&str> = product.lines().filter_map(declared_type).collect();
+            for name in names {
+                declared.entry(name.to_string()).or_default().push(path.clone());
+            }
+        }
+    }
+    // Each crate has one, for the examples of its README.
+    declared.remove("Readme");
+    declared.retain(|_, paths| paths.len() > 1);
+    assert!(declared.is_empty(), "these names are declared in several files: {declared:#?}");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 
 use num_bigint::BigInt;
 
-use crate::module::{Constant, Function, FunctionNumber, LineEntry, Module, PoolIdx};
+use crate::module::{Constant, FunctionNumber, LineEntry, Module, ModuleFunction, PoolIdx};
 use crate::symbol::{Home, Symbol};
 
 /// Returns the module that does what `modules` do one after the other.
@@ -182,7 +182,7 @@ fn move_all(indexes: &mut [PoolIdx], places: &Places) {
     }
 }
 
-fn relocate(function: &mut Function, places: &Places) {
+fn relocate(function: &mut ModuleFunction, places: &Places) {
     for place in [&mut function.name, &mut function.lambda_list, &mut function.documentation] {
         *place = place.map(|index| places.constant(index));
     }
@@ -200,10 +200,10 @@ mod tests {
     use super::*;
 
     fn module(constants: Vec<Constant>) -> Module {
-        let function = Function {
+        let function = ModuleFunction {
             constants: (0..constants.len() as u32).map(PoolIdx).collect(),
             lines: vec![LineEntry { pc: 0, source: 0, line: 1, column: 1 }],
-            ..Function::default()
+            ..ModuleFunction::default()
         };
         Module {
             sources: vec!["a.esl".to_owned()],

@@ -134,7 +134,7 @@ pub struct LineEntry {
 
 /// A function.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Function {
+pub struct ModuleFunction {
     /// Name: a symbol, or a list such as `(SETF X)` or `(FLET X)`. `None` for an anonymous function.
     pub name: Option<PoolIdx>,
     /// The lambda list as written.
@@ -172,7 +172,7 @@ pub struct Module {
     /// The constants.
     pub constants: Vec<Constant>,
     /// The functions.
-    pub functions: Vec<Function>,
+    pub functions: Vec<ModuleFunction>,
     /// Names of the modules that it requires and that are not part of it.
     pub requires: Vec<String>,
     /// The functions of no parameters that run the top-level forms, in this order.
@@ -183,7 +183,7 @@ impl Module {
     /// Returns about how many bytes it takes.
     pub fn bytes(&self) -> usize {
         let functions = self.functions.iter().map(|function| {
-            size_of::<Function>()
+            size_of::<ModuleFunction>()
                 + size_of_val(&*function.code)
                 + size_of_val(&*function.lines)
                 + size_of_val(&*function.constants)

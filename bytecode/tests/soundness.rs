@@ -8,7 +8,7 @@ mod support;
 
 use esl_bytecode::assembler::assemble;
 use esl_bytecode::disasm;
-use esl_bytecode::module::{CaptureSource, Constant, Function, FunctionNumber, Module};
+use esl_bytecode::module::{CaptureSource, Constant, FunctionNumber, Module, ModuleFunction};
 use esl_bytecode::opcode::{CallOperands, Instr, OPCODES, Substitute};
 use esl_bytecode::operand::{Count, Role, Want, Window};
 use esl_bytecode::verify::verify;
@@ -80,7 +80,7 @@ enum ModelNext {
 
 struct Model<'a> {
     module: &'a Module,
-    function: &'a Function,
+    function: &'a ModuleFunction,
     random: &'a mut Random,
     registers: Vec<ModelCell>,
     entries: Vec<ModelEntry>,

@@ -115,8 +115,9 @@ fn compile_texts(
         Ok(mut machine) => {
             watch(machine.inbox());
             let driven = drive_with(texts, &mut machine, &mut find);
-            machine.flush();
             driven.unwrap_or_else(|halt| {
+                // What cleanups of macros have said on the way out.
+                machine.flush();
                 let signal = machine.asked_to_end().unwrap_or(ProcessSignal::Terminate);
                 stopped = Some(match halt {
                     Halt::Memory => Ended::HeapExhausted,

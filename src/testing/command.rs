@@ -44,7 +44,7 @@ struct Suite<'a> {
 pub(super) struct Run<'a> {
     suite: &'a Suite<'a>,
     pub(super) test: Test,
-    pub(super) result: Mutex<Option<Finished>>,
+    pub(super) result: Mutex<Option<FinishedTest>>,
 }
 
 impl Run<'_> {
@@ -55,7 +55,7 @@ impl Run<'_> {
 }
 
 /// What became of a test.
-pub(super) struct Finished {
+pub(super) struct FinishedTest {
     pub(super) verdict: Verdict,
     /// Seed with which it has failed.
     seed: Option<u64>,
@@ -139,13 +139,13 @@ fn has_failed(run: &Run<'_>) -> bool {
 }
 
 /// Runs a test with each of its seeds, until it fails.
-fn finish(run: &Run<'_>, options: &Options) -> Finished {
+fn finish(run: &Run<'_>, options: &Options) -> FinishedTest {
     let start = Instant::now();
     let seeds = match options.seed {
         Some(seed) => seed..seed.saturating_add(1),
         None => 0..if run.test.explores { 1 } else { run.test.seeds },
     };
-    let mut finished = Finished { verdict: Verdict::Passed, seed: None, time: Duration::ZERO };
+    let mut finished = FinishedTest { verdict: Verdict::Passed, seed: None, time: Duration::ZERO };
     for seed in seeds {
         let verdict = run_test(&run.suite.program, &run.test, seed, &run.suite.setup);
         let verdict = verdict.unwrap_or_else(|error| Verdict::Failed {
@@ -153,11 +153,11 @@ fn finish(run: &Run<'_>, options: &Options) -> Finished {
             output: error.to_string(),
         });
         if verdict != Verdict::Passed {
-            finished = Finished { verdict, seed: (!run.test.explores).then_some(seed), ..finished };
+            finished = FinishedTest { verdict, seed: (!run.test.explores).then_some(seed), ..finished };
             break;
         }
     }
-    Finished { time: start.elapsed(), ..finished }
+    FinishedTest { time: start.elapsed(), ..finished }
 }
 
 /// Prints what became of the tests from `told` on that have ended, in the order of the files.
@@ -174,7 +174,7 @@ fn tell(runs: &[Run<'_>], told: &mut usize, options: &Options) {
 }
 
 /// Returns the lines that say what became of a test.
-fn text(run: &Run<'_>, finished: &Finished, options: &Options) -> String {
+fn text(run: &Run<'_>, finished: &FinishedTest, options: &Options) -> String {
     let Test { name, seeds, explores } = &run.test;
     let Verdict::Failed { why, output } = &finished.verdict else {
         let how = match options.seed {

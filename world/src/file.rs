@@ -27,7 +27,7 @@ use crate::operation::{Completion, define, define_with_end};
 const CHUNK: usize = 1 << 15;
 
 /// How a file is reached.
-enum Access {
+enum FileAccess {
     /// When the system says that it is ready.
     #[cfg(unix)]
     Polled(tokio::io::unix::AsyncFd<File>),
@@ -39,7 +39,7 @@ enum Access {
 
 /// A file that is open.
 struct Open {
-    access: Access,
+    access: FileAccess,
     /// Whether it is read as text, and then closed at its end.
     is_text: bool,
     arrived: Mutex<Arrived>,
@@ -55,7 +55,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Open {
-    fn new(access: Access, is_text: bool) -> Open {
+    fn new(access: FileAccess, is_text: bool) -> Open {
         let (closing, _) = watch::channel(false);
         Open { access, is_text, arrived: Mutex::default(), turn: tokio::sync::Mutex::new(()), closing }
     }
@@ -78,7 +78,7 @@ impl Open {
         }
         match &self.access {
             #[cfg(unix)]
-            Access::Polled(file) => {
+            FileAccess::Polled(file) => {
                 let read = |mut file: &File| {
                     let mut bytes = vec![0; CHUNK];
                     let count = file.read(&mut bytes)?;
@@ -98,7 +98,7 @@ impl Open {
 
     /// Reads the next part of a file that threads read, unless another one has.
     fn fill_now(&self) -> Result<(), Error> {
-        let Access::Threads(file) = &self.access else { return Ok(()) };
+        let FileAccess::Threads(file) = &self.access else { return Ok(()) };
         let mut file = lock(file);
         if lock(&self.arrived).is_something() {
             return Ok(());
@@ -124,7 +124,7 @@ impl Open {
     /// Takes what is there without waiting.
     fn take(&self, as_text: bool) -> Datum {
         #[cfg(unix)]
-        if let Access::Polled(file) = &self.access
+        if let FileAccess::Polled(file) = &self.access
             && !lock(&self.arrived).is_something()
             && self.turn.try_lock().is_ok()
         {
@@ -143,7 +143,7 @@ impl Open {
     async fn write(self: Arc<Open>, bytes: Vec<u8>) -> Result<(), Error> {
         let _turn = self.turn.lock().await;
         #[cfg(unix)]
-        if let Access::Polled(file) = &self.access {
+        if let FileAccess::Polled(file) = &self.access {
             let mut rest = &bytes[..];
             while !rest.is_empty() {
                 let write = |mut file: &File| file.write(rest);
@@ -154,21 +154,21 @@ impl Open {
         }
         let open = self.clone();
         in_thread(move || match &open.access {
-            Access::Threads(file) => match lock(file).as_mut() {
+            FileAccess::Threads(file) => match lock(file).as_mut() {
                 Some(file) => file.write_all(&bytes),
                 None => Err(Error::other("it is closed")),
             },
-            Access::Appended(path) => {
+            FileAccess::Appended(path) => {
                 OpenOptions::new().append(true).create(true).open(path)?.write_all(&bytes)
             }
             #[cfg(unix)]
-            Access::Polled(_) => Ok(()),
+            FileAccess::Polled(_) => Ok(()),
         })
         .await
     }
 
     fn seek(&self, position: u64) -> Result<bool, Error> {
-        let Access::Threads(file) = &self.access else { return Ok(false) };
+        let FileAccess::Threads(file) = &self.access else { return Ok(false) };
         let mut file = lock(file);
         let Some(file) = file.as_mut() else { return Ok(false) };
         file.seek(SeekFrom::Start(position))?;
@@ -269,7 +269,7 @@ pub(crate) fn install(machine: &mut Vm) {
             let (open, text) = (known.get(arguments.integer(0)?)?, arguments.text(1)?);
             let bytes = if arguments.is_true(2) { bytes_of(&text) } else { text.into_bytes() };
             // A disk is waited for: what is left half-written would come later, among other things.
-            let is_disk = matches!(open.access, Access::Appended(_));
+            let is_disk = matches!(open.access, FileAccess::Appended(_));
             let target = open.clone();
             let write = open.unless_closed(target.write(bytes));
             tokio::select! {
@@ -326,7 +326,7 @@ fn at_once(options: &mut OpenOptions) -> &mut OpenOptions {
 
 /// Returns how a file that is open is reached: `None` stands for by threads.
 #[cfg(unix)]
-fn polled(file: &File, interest: tokio::io::Interest) -> Option<Access> {
+fn polled(file: &File, interest: tokio::io::Interest) -> Option<FileAccess> {
     if file.metadata().is_ok_and(|metadata| metadata.is_file()) {
         return None;
     }
@@ -336,7 +336,7 @@ fn polled(file: &File, interest: tokio::io::Interest) -> Option<Access> {
         reason = "what its successor has to be promised, a `File` keeps: one open descriptor"
     )]
     let registered = tokio::io::unix::AsyncFd::with_interest(file.try_clone().ok()?, interest);
-    registered.ok().map(Access::Polled)
+    registered.ok().map(FileAccess::Polled)
 }
 
 /// `%FILE-OPEN-INPUT`: number, path, whether it is read as text.
@@ -355,7 +355,7 @@ async fn open_input(arguments: CallArguments, files: Files) -> Completion {
     let polled = polled(&file, tokio::io::Interest::READABLE);
     #[cfg(not(unix))]
     let polled = None;
-    let access = polled.unwrap_or_else(|| Access::Threads(Mutex::new(Some(file))));
+    let access = polled.unwrap_or_else(|| FileAccess::Threads(Mutex::new(Some(file))));
     files.set(number, Open::new(access, arguments.is_true(2)));
     if is_regular {
         // What cannot be read fails here, and a short file is there at once.
@@ -389,7 +389,7 @@ async fn open_output(arguments: CallArguments, files: Files) -> Completion {
     if let Err(error) = in_thread(make).await {
         return answer(Err(error));
     }
-    files.set(number, Open::new(Access::Appended(path), true));
+    files.set(number, Open::new(FileAccess::Appended(path), true));
     answer(Ok(nil()))
 }
 
@@ -411,7 +411,7 @@ async fn open_device(number: i64, path: PathBuf, files: &Files) -> Result<(), Er
         match in_thread(move || at_once(OpenOptions::new().write(true)).open(opened)).await {
             Ok(file) => {
                 let polled = polled(&file, tokio::io::Interest::WRITABLE);
-                let access = polled.unwrap_or_else(|| Access::Threads(Mutex::new(Some(file))));
+                let access = polled.unwrap_or_else(|| FileAccess::Threads(Mutex::new(Some(file))));
                 files.set(number, Open::new(access, true));
                 return Ok(());
             }

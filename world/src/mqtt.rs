@@ -51,7 +51,7 @@ struct State {
     problem: Option<String>,
 }
 
-struct Shared {
+struct ClientState {
     state: Mutex<State>,
     /// Notified when a message comes.
     came: Notify,
@@ -59,7 +59,7 @@ struct Shared {
     taken: Notify,
 }
 
-impl Shared {
+impl ClientState {
     fn state(&self) -> MutexGuard<'_, State> {
         // It is whole at every moment, so a panic elsewhere does not corrupt it.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
@@ -78,7 +78,7 @@ impl Shared {
 #[derive(Clone)]
 struct Client {
     client: AsyncClient,
-    shared: Arc<Shared>,
+    shared: Arc<ClientState>,
     /// Set when the client is to end; dropped with the machine.
     closing: Arc<watch::Sender<bool>>,
     /// Changes when it has ended.
@@ -213,7 +213,8 @@ async fn open(arguments: CallArguments, clients: Clients) -> Completion {
         subscribing: VecDeque::new(),
         problem: None,
     };
-    let shared = Arc::new(Shared { state: Mutex::new(state), came: Notify::new(), taken: Notify::new() });
+    let shared =
+        Arc::new(ClientState { state: Mutex::new(state), came: Notify::new(), taken: Notify::new() });
     let (closing, close) = watch::channel(false);
     let (end, ended) = watch::channel(false);
     let driver = Driver { client: client.clone(), events, shared: shared.clone(), close };
@@ -281,7 +282,7 @@ async fn subscribe(arguments: CallArguments, clients: Clients) -> Completion {
 struct Driver {
     client: AsyncClient,
     events: EventLoop,
-    shared: Arc<Shared>,
+    shared: Arc<ClientState>,
     close: watch::Receiver<bool>,
 }
 
@@ -363,7 +364,7 @@ impl Driver {
 }
 
 /// Waits until there is room for messages.
-async fn has_room(shared: &Shared) {
+async fn has_room(shared: &ClientState) {
     while shared.state().messages.len() >= MOST_KEPT {
         shared.taken.notified().await;
     }

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use std::fmt::{self, Write};
 
 use crate::builtin::Builtin;
-use crate::module::{CaptureSource, Constant, Function, FunctionNumber, LineEntry, Module, PoolIdx};
+use crate::module::{CaptureSource, Constant, FunctionNumber, LineEntry, Module, ModuleFunction, PoolIdx};
 use crate::opcode::{Instr, TypeCode};
 use crate::operand::Role;
 
@@ -65,7 +65,7 @@ fn push(text: &mut String, arguments: fmt::Arguments<'_>) {
     text.write_fmt(arguments).expect("writing to a string does not fail");
 }
 
-fn title(module: &Module, function: &Function) -> String {
+fn title(module: &Module, function: &ModuleFunction) -> String {
     let name = function.name.map_or("(anonymous)".to_owned(), |name| constant(module, name));
     match function.lambda_list {
         Some(lambda_list) if module.constants.get(lambda_list.0 as usize) == Some(&Constant::Nil) => {
@@ -76,7 +76,7 @@ fn title(module: &Module, function: &Function) -> String {
     }
 }
 
-fn frame(module: &Module, function: &Function) -> String {
+fn frame(module: &Module, function: &ModuleFunction) -> String {
     let parameters = &function.parameters;
     let mut text = format!("{} registers; {} required", function.registers, parameters.required);
     if parameters.optional > 0 {
@@ -108,7 +108,7 @@ impl fmt::Display for CaptureSource {
 }
 
 /// Where instructions begin; the words in between are `None`.
-fn instructions(function: &Function) -> impl Iterator<Item = (usize, Option<Instr>)> + '_ {
+fn instructions(function: &ModuleFunction) -> impl Iterator<Item = (usize, Option<Instr>)> + '_ {
     let mut pc = 0;
     std::iter::from_fn(move || {
         if pc >= function.code.len() {
@@ -122,7 +122,7 @@ fn instructions(function: &Function) -> impl Iterator<Item = (usize, Option<Inst
 }
 
 /// Names for the words that jumps go to, in order.
-fn labels(function: &Function) -> BTreeMap<usize, usize> {
+fn labels(function: &ModuleFunction) -> BTreeMap<usize, usize> {
     let mut labels: BTreeMap<usize, usize> = BTreeMap::new();
     for (pc, instr) in instructions(function) {
         let Some(instr) = instr else { continue };
@@ -146,7 +146,7 @@ fn target(pc: usize, instr: Instr, distance: i32) -> Option<usize> {
 
 struct Listing<'a> {
     module: &'a Module,
-    function: &'a Function,
+    function: &'a ModuleFunction,
     labels: BTreeMap<usize, usize>,
 }
 

@@ -10,7 +10,7 @@ fn sample() -> Module {
         L1: load-const r2 k1\n L2: call-builtin r3.. 0 want all b0\n is-type r3 r3 t0\n call r3.. 0 want 1\n\
         loop-less r0 r1 L2\n push-catch r4.. r0 want 2 L3\n tail-call-global r3.. 1 k0\n L3: return-all";
     let line = |pc, line| LineEntry { pc, source: 0, line, column: 1 };
-    let function = Function {
+    let function = ModuleFunction {
         name: Some(PoolIdx(0)),
         lambda_list: Some(PoolIdx(4)),
         parameters: Parameters {
@@ -24,7 +24,7 @@ fn sample() -> Module {
         constants: vec![PoolIdx(0), PoolIdx(4)],
         code: assemble(code).unwrap(),
         lines: vec![line(0, 3), line(1, 3), line(2, 4), line(9, 4)],
-        ..Function::default()
+        ..ModuleFunction::default()
     };
     Module {
         sources: vec!["count.esl".to_owned()],
@@ -93,7 +93,7 @@ fn long_and_broken_constants_are_cut_off() {
 
 #[test]
 fn words_that_are_no_instructions_are_shown_too() {
-    let function = Function { code: vec![0xFF, 0x68, 0x20_00_20, 0x73], ..Function::default() };
+    let function = ModuleFunction { code: vec![0xFF, 0x68, 0x20_00_20, 0x73], ..ModuleFunction::default() };
     let module = Module { functions: vec![function], ..Module::default() };
     let text = super::function(&module, FunctionNumber(0));
     let expected = "    0  ; no instruction: 0x000000ff\n    1  call r0.. 0 want 1\n    3  return-all\n";

@@ -14,7 +14,7 @@
 
 use super::cursor::{ByteOutput, Cursor};
 use super::{NONE, Problem, ReadError};
-use crate::module::{Capture, CaptureSource, Function, LineEntry, Parameters, PoolIdx};
+use crate::module::{Capture, CaptureSource, LineEntry, ModuleFunction, Parameters, PoolIdx};
 
 const FLAG_REST: u8 = 1;
 const FLAG_KEYS: u8 = 2;
@@ -26,7 +26,7 @@ const CAPTURE_LATER: u8 = 2;
 const CAPTURE_BOXED: u8 = 0x80;
 
 /// Appends the record of `function`.
-pub(super) fn write(function: &Function, out: &mut ByteOutput) {
+pub(super) fn write(function: &ModuleFunction, out: &mut ByteOutput) {
     for place in [function.name, function.lambda_list, function.documentation] {
         out.u32(place.map_or(NONE, |PoolIdx(index)| index));
     }
@@ -75,7 +75,7 @@ fn write_pool_indexes(indexes: &[PoolIdx], out: &mut ByteOutput) {
 }
 
 /// Decodes a record, of a module with `pool` constants.
-pub(super) fn read(mut from: Cursor<'_>, pool: usize) -> Result<Function, ReadError> {
+pub(super) fn read(mut from: Cursor<'_>, pool: usize) -> Result<ModuleFunction, ReadError> {
     let name = optional_constant(&mut from, pool)?;
     let lambda_list = optional_constant(&mut from, pool)?;
     let documentation = optional_constant(&mut from, pool)?;
@@ -106,7 +106,17 @@ pub(super) fn read(mut from: Cursor<'_>, pool: usize) -> Result<Function, ReadEr
     let code = from.words(count)?.collect();
     let lines = read_lines(&mut from)?;
     from.end()?;
-    Ok(Function { name, lambda_list, documentation, parameters, registers, captures, constants, code, lines })
+    Ok(ModuleFunction {
+        name,
+        lambda_list,
+        documentation,
+        parameters,
+        registers,
+        captures,
+        constants,
+        code,
+        lines,
+    })
 }
 
 /// Returns the number of captures in a record.

@@ -11,7 +11,7 @@ use super::{
     FORMAT_VERSION, HEADER_LENGTH, MAGIC, NONE, Problem, ReadError, SECTION_ENTRY, SECTION_TABLE, Section,
     function, tag,
 };
-use crate::module::{Function, FunctionNumber, PoolIdx};
+use crate::module::{FunctionNumber, ModuleFunction, PoolIdx};
 
 /// The bytes of a file, embedded in the program or shared.
 #[derive(Clone, Debug)]
@@ -374,7 +374,7 @@ impl ModuleImage {
     ///
     /// # Errors
     /// [`ReadError::Damaged`], also if there is no such function.
-    pub fn function(&self, number: FunctionNumber) -> Result<Function, ReadError> {
+    pub fn function(&self, number: FunctionNumber) -> Result<ModuleFunction, ReadError> {
         let (offset, length) = self.function_place(number)?;
         function::read(self.part(Section::Functions, offset as usize, length as usize)?, self.constant_count)
     }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::datum::ObjectId;
 use crate::module::{
-    Capture, CaptureSource, Constant, Function, FunctionNumber, LineEntry, Parameters, PoolIdx,
+    Capture, CaptureSource, Constant, FunctionNumber, LineEntry, ModuleFunction, Parameters, PoolIdx,
 };
 use crate::symbol::Symbol;
 use num_bigint::BigInt;
@@ -34,7 +34,7 @@ fn sample() -> Module {
         Constant::Function(FunctionNumber(1)),
         Constant::Class(Symbol::esl("POINT")),
     ];
-    let full = Function {
+    let full = ModuleFunction {
         name: Some(PoolIdx(2)),
         lambda_list: Some(PoolIdx(17)),
         documentation: Some(PoolIdx(15)),
@@ -62,7 +62,7 @@ fn sample() -> Module {
         sources: vec!["a.esl".to_owned(), "b.esl".to_owned()],
         requires: vec!["c".to_owned()],
         constants,
-        functions: vec![full, Function::default()],
+        functions: vec![full, ModuleFunction::default()],
         toplevel: vec![FunctionNumber(1), FunctionNumber(1)],
     }
 }

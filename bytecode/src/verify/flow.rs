@@ -12,7 +12,9 @@ use super::pool;
 use super::registers::{Class, Registers};
 use super::shape::CodeShape;
 use super::state::{KnownEntry, LandingState, PlaceState, VerifiedEntry};
-use crate::module::{CaptureSource, Constant, Function, FunctionNumber, MAX_CONTROL, Module, Parameters};
+use crate::module::{
+    CaptureSource, Constant, FunctionNumber, MAX_CONTROL, Module, ModuleFunction, Parameters,
+};
 use crate::opcode::{CallOperands, Instr, RegisterAccess, Substitute};
 use crate::operand::{Count, FunctionIdx, Role, Want, Window};
 
@@ -41,7 +43,7 @@ pub(super) fn verify(module: &Module, number: FunctionNumber, shape: &CodeShape)
 
 struct Flow<'a> {
     module: &'a Module,
-    function: &'a Function,
+    function: &'a ModuleFunction,
     shape: &'a CodeShape,
     /// For words that control gets to from elsewhere: what is known there.
     states: Vec<Option<Box<PlaceState>>>,

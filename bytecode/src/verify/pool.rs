@@ -86,6 +86,9 @@ pub(super) fn constant(module: &Module, index: PoolIdx) -> Result<&Constant, Fau
 }
 
 /// Returns the function `number`, if there is one.
-pub(super) fn function(module: &Module, number: FunctionNumber) -> Result<&crate::module::Function, Fault> {
+pub(super) fn function(
+    module: &Module,
+    number: FunctionNumber,
+) -> Result<&crate::module::ModuleFunction, Fault> {
     module.functions.get(number.0 as usize).ok_or(Fault::FunctionNumber(number))
 }

@@ -5,7 +5,7 @@ use super::error::{Fault, FaultPlace, VerifyError};
 use super::pool;
 use crate::builtin::Builtin;
 use crate::module::{
-    Constant, Function, FunctionNumber, MAX_CAPTURES, MAX_CODE, MAX_REGISTERS, Module, PoolIdx,
+    Constant, FunctionNumber, MAX_CAPTURES, MAX_CODE, MAX_REGISTERS, Module, ModuleFunction, PoolIdx,
 };
 use crate::opcode::{CallOperands, CallTarget, Instr, Opcode, RegisterAccess, TypeCode};
 use crate::operand::{Count, Role, Want};
@@ -70,7 +70,7 @@ pub(super) fn verify(module: &Module, number: FunctionNumber) -> Result<CodeShap
     Ok(shape)
 }
 
-fn verify_header(module: &Module, function: &Function) -> Result<(), Fault> {
+fn verify_header(module: &Module, function: &ModuleFunction) -> Result<(), Fault> {
     if function.code.is_empty() || function.code.len() > MAX_CODE {
         return Err(Fault::CodeLength(function.code.len()));
     }
@@ -97,7 +97,7 @@ fn verify_header(module: &Module, function: &Function) -> Result<(), Fault> {
     verify_lines(module, function)
 }
 
-fn verify_captures(function: &Function) -> Result<(), Fault> {
+fn verify_captures(function: &ModuleFunction) -> Result<(), Fault> {
     use crate::module::CaptureSource::Later;
     if function.captures.len() > MAX_CAPTURES {
         return Err(Fault::CaptureCount(function.captures.len()));
@@ -108,7 +108,7 @@ fn verify_captures(function: &Function) -> Result<(), Fault> {
     }
 }
 
-fn verify_lines(module: &Module, function: &Function) -> Result<(), Fault> {
+fn verify_lines(module: &Module, function: &ModuleFunction) -> Result<(), Fault> {
     let ascending = function.lines.windows(2).all(|pair| pair[0].pc < pair[1].pc);
     let known = function.lines.iter().all(|line| {
         (line.source as usize) < module.sources.len() && (line.pc as usize) < function.code.len()
@@ -120,7 +120,7 @@ fn verify_lines(module: &Module, function: &Function) -> Result<(), Fault> {
 #[derive(Clone, Copy)]
 struct Check<'a> {
     module: &'a Module,
-    function: &'a Function,
+    function: &'a ModuleFunction,
     /// The word after the instruction.
     next: usize,
 }

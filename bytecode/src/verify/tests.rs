@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::assembler::assemble;
-use crate::module::{Capture, Constant, Function, LineEntry, Parameters, PoolIdx};
+use crate::module::{Capture, Constant, LineEntry, ModuleFunction, Parameters, PoolIdx};
 use crate::symbol::Symbol;
 
 /// The functions that code under test can refer to, besides itself, which is function 0.
@@ -31,21 +31,21 @@ fn constants() -> Vec<Constant> {
     ]
 }
 
-fn function(code: &str) -> Function {
-    Function {
+fn function(code: &str) -> ModuleFunction {
+    ModuleFunction {
         registers: 10,
         constants: (0..constants().len() as u32).map(PoolIdx).collect(),
         code: assemble(code).unwrap(),
-        ..Function::default()
+        ..ModuleFunction::default()
     }
 }
 
-fn with_captures(captures: impl IntoIterator<Item = Capture>) -> Function {
-    Function { captures: captures.into_iter().collect(), ..function("load-true r0 \n return r0") }
+fn with_captures(captures: impl IntoIterator<Item = Capture>) -> ModuleFunction {
+    ModuleFunction { captures: captures.into_iter().collect(), ..function("load-true r0 \n return r0") }
 }
 
 /// Returns a module with `first` as its function 0.
-fn module(first: Function) -> Module {
+fn module(first: ModuleFunction) -> Module {
     Module {
         sources: vec!["a.esl".to_owned()],
         requires: Vec::new(),
@@ -66,7 +66,7 @@ fn module(first: Function) -> Module {
 }
 
 #[track_caller]
-fn check_function(function: Function, expected: Result<(), Fault>) {
+fn check_function(function: ModuleFunction, expected: Result<(), Fault>) {
     let text = crate::disasm::function(&module(function.clone()), FunctionNumber(0));
     assert_eq!(verify(&module(function)).map_err(|error| error.fault), expected, "{text}");
 }
@@ -86,7 +86,7 @@ fn check_module(change: impl FnOnce(&mut Module), expected: Fault) {
 }
 
 #[track_caller]
-fn check_header(change: impl FnOnce(&mut Function), expected: Result<(), Fault>) {
+fn check_header(change: impl FnOnce(&mut ModuleFunction), expected: Result<(), Fault>) {
     let mut function = function("load-true r0 \n return r0");
     change(&mut function);
     check_function(function, expected);
@@ -94,7 +94,7 @@ fn check_header(change: impl FnOnce(&mut Function), expected: Result<(), Fault>)
 
 #[track_caller]
 fn check_with_parameters(parameters: Parameters, code: &str, expected: Result<(), Fault>) {
-    check_function(Function { parameters, ..function(code) }, expected);
+    check_function(ModuleFunction { parameters, ..function(code) }, expected);
 }
 
 #[test]
@@ -286,7 +286,7 @@ fn v7_captures_are_used_as_they_are_declared() {
             Capture::boxed(CaptureSource::Register(1)),
             Capture::value(CaptureSource::Later),
         ];
-        check_function(Function { captures: captures.to_vec(), ..function(code) }, expected);
+        check_function(ModuleFunction { captures: captures.to_vec(), ..function(code) }, expected);
     };
     check("capture-ref r0 #0 \n capture-box-set r0 #1 \n capture-box-ref r0 #1 \n return r0", Ok(()));
     check("capture-ref r0 #2 \n return r0", Ok(()));
@@ -302,7 +302,7 @@ fn v7_captures_are_used_as_they_are_declared() {
 #[test]
 fn v8_makers_provide_what_is_captured() {
     check("make-closure r0 k9 \n return r0", Err(Fault::Capture(0)));
-    let swapped = Function {
+    let swapped = ModuleFunction {
         captures: vec![
             Capture::boxed(CaptureSource::Register(0)),
             Capture::boxed(CaptureSource::Register(0)),
@@ -310,9 +310,10 @@ fn v8_makers_provide_what_is_captured() {
         ..function("make-closure r0 k9 \n return r0")
     };
     check_function(swapped, Err(Fault::CaptureKind(0)));
-    let later_box = |f: &mut Function| f.captures.push(Capture::boxed(CaptureSource::Later));
+    let later_box = |f: &mut ModuleFunction| f.captures.push(Capture::boxed(CaptureSource::Later));
     check_header(later_box, Err(Fault::LaterBox(0)));
-    let many = |f: &mut Function| f.captures = vec![Capture::value(CaptureSource::Later); MAX_CAPTURES + 1];
+    let many =
+        |f: &mut ModuleFunction| f.captures = vec![Capture::value(CaptureSource::Later); MAX_CAPTURES + 1];
     check_header(many, Err(Fault::CaptureCount(MAX_CAPTURES + 1)));
 }
 

@@ -6,7 +6,7 @@
 
 use esl_bytecode::for_each_opcode;
 use esl_bytecode::module::{
-    Capture, CaptureSource, Constant, Function, FunctionNumber, LineEntry, Module, Parameters, PoolIdx,
+    Capture, CaptureSource, Constant, FunctionNumber, LineEntry, Module, ModuleFunction, Parameters, PoolIdx,
 };
 use esl_bytecode::opcode::{Instr, OPCODES, Opcode};
 use esl_bytecode::operand::*;
@@ -83,7 +83,8 @@ pub(crate) fn module_with_random_code(random: &mut Random) -> Module {
         vec![Capture::value(CaptureSource::Later), Capture::value(CaptureSource::Register(1))],
         vec![Capture::value(CaptureSource::Capture(0)), Capture::boxed(CaptureSource::Capture(1))],
     ];
-    let others = captures.map(|captures| Function { captures, code: code.clone(), ..Function::default() });
+    let others =
+        captures.map(|captures| ModuleFunction { captures, code: code.clone(), ..ModuleFunction::default() });
     let parameters = match random.below(3) {
         0 => Parameters::default(),
         1 => Parameters { required: 1, optional: 1, ..Parameters::default() },
@@ -93,13 +94,13 @@ pub(crate) fn module_with_random_code(random: &mut Random) -> Module {
     };
     let own = [Capture::value(CaptureSource::Later), Capture::boxed(CaptureSource::Register(0))];
     let captures = if random.once_in(2) { vec![] } else { vec![random.pick(&own), random.pick(&own)] };
-    let first = Function {
+    let first = ModuleFunction {
         parameters,
         captures,
         registers: REGISTERS,
         constants: (0..constants.len() as u32).map(PoolIdx).collect(),
         code: random_code(random),
-        ..Function::default()
+        ..ModuleFunction::default()
     };
     let functions = std::iter::once(first).chain(others).collect();
     Module { constants, functions, ..Module::default() }
@@ -342,7 +343,7 @@ fn encode(opcodes: &[Opcode], palette: &Palette, random: &mut Random) -> Vec<u32
 /// A module in which anything may stand that a file can hold, whether it makes sense or not.
 pub(crate) fn any_module(random: &mut Random) -> Module {
     let sources = (0..random.below(3)).map(|number| format!("source-{number}.esl")).collect();
-    let functions: Vec<Function> = Vec::new();
+    let functions: Vec<ModuleFunction> = Vec::new();
     let mut module = Module { sources, functions, ..Module::default() };
     let function_count = random.below(5);
     for _ in 0..random.below(30) {
@@ -400,7 +401,7 @@ fn num_bigint_of(value: u64) -> esl_bytecode::BigInt {
     value.into()
 }
 
-fn any_function(random: &mut Random, pool: usize) -> Function {
+fn any_function(random: &mut Random, pool: usize) -> ModuleFunction {
     let index = |random: &mut Random| {
         if pool == 0 || random.once_in(3) { None } else { Some(PoolIdx(random.below(pool) as u32)) }
     };
@@ -417,7 +418,7 @@ fn any_function(random: &mut Random, pool: usize) -> Function {
         CaptureSource::Capture(random.next() as u8),
         CaptureSource::Later,
     ];
-    Function {
+    ModuleFunction {
         name,
         lambda_list,
         documentation,

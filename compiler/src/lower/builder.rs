@@ -1,7 +1,7 @@
 //! The state of lowering: the module and the function that are being made.
 
 use esl_bytecode::diagnostic::Diagnostic;
-use esl_bytecode::module::{Capture, Function, FunctionNumber, MAX_CONTROL, Module, PoolIdx};
+use esl_bytecode::module::{Capture, FunctionNumber, MAX_CONTROL, Module, ModuleFunction, PoolIdx};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::{Count, Int16, Reg, SymbolIdx};
 use esl_bytecode::span::Span;
@@ -103,7 +103,7 @@ impl<'a> ModuleBuilder<'a> {
     }
 
     /// Returns the finished module.
-    pub(super) fn module(self, functions: Vec<Function>) -> Module {
+    pub(super) fn module(self, functions: Vec<ModuleFunction>) -> Module {
         Module {
             sources: self.lines.names().map(str::to_string).collect(),
             requires: Vec::new(),

@@ -2,7 +2,7 @@
 
 use esl_bytecode::compile::Work;
 use esl_bytecode::datum::{Datum, DatumKind};
-use esl_bytecode::module::{Function, Parameters, PoolIdx};
+use esl_bytecode::module::{ModuleFunction, Parameters, PoolIdx};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::{ConstIdx, Count, Reg};
 
@@ -26,7 +26,7 @@ const WORDS_PER_UNIT: u64 = 2;
 impl ModuleBuilder<'_> {
     /// Lowers functions, beginning with the form itself, and adds them to `functions`. Returns whether these
     /// are all; otherwise the work that is allowed is done.
-    pub(super) fn functions(&mut self, functions: &mut Vec<Function>, work: &mut Work) -> bool {
+    pub(super) fn functions(&mut self, functions: &mut Vec<ModuleFunction>, work: &mut Work) -> bool {
         self.number(LambdaId(0));
         // Functions get their numbers when code that refers to them is lowered, and are lowered in that
         // order.
@@ -45,7 +45,7 @@ impl ModuleBuilder<'_> {
     }
 
     /// Lowers the function of a lambda. Its captures are left open.
-    fn function(&mut self, lambda: LambdaId) -> Function {
+    fn function(&mut self, lambda: LambdaId) -> ModuleFunction {
         let text = &self.core.lambdas[lambda.index()];
         let mut builder = FunctionBuilder::new(self, lambda);
         let parameters = builder.parameters(text);
@@ -71,7 +71,7 @@ impl ModuleBuilder<'_> {
             self.oversized.push(OversizedFunction { lambda, diagnostic });
         }
         let mut datum = |datum: &Option<Datum>| datum.as_ref().map(|datum| self.pool.datum(datum));
-        Function {
+        ModuleFunction {
             name: datum(&text.name),
             lambda_list: datum(&text.lambda_list),
             documentation: datum(&text.documentation),

@@ -47,7 +47,7 @@ mod tests;
 
 use esl_bytecode::compile::Work;
 use esl_bytecode::diagnostic::Diagnostic;
-use esl_bytecode::module::{Function, Module};
+use esl_bytecode::module::{Module, ModuleFunction};
 
 use crate::core::{Core, LambdaId};
 use crate::resolve::ResolveWalk;
@@ -74,7 +74,7 @@ const SPILLS_FROM: u8 = 80;
 /// between two functions.
 pub struct Lowering {
     core: Core,
-    stage: Stage,
+    stage: LoweringStage,
     /// What is wrong with the functions that did not fit as they were, once that was tried.
     oversized: Option<Vec<Diagnostic>>,
     /// Limits that are left for dividing functions.
@@ -82,16 +82,16 @@ pub struct Lowering {
 }
 
 /// What a [`Lowering`] does next.
-enum Stage {
+enum LoweringStage {
     Begin,
     Resolve(Box<ResolveWalk>),
-    Functions(Box<SuspendedBuilder>, Vec<Function>),
+    Functions(Box<SuspendedBuilder>, Vec<ModuleFunction>),
 }
 
 impl Lowering {
     /// Begins to lower a top-level form.
     pub fn new(core: Core) -> Lowering {
-        Lowering { core, stage: Stage::Begin, oversized: None, limits: split::LIMITS.iter() }
+        Lowering { core, stage: LoweringStage::Begin, oversized: None, limits: split::LIMITS.iter() }
     }
 
     /// Returns about how many bytes it takes.
@@ -104,24 +104,24 @@ impl Lowering {
     /// allowed is done before.
     pub fn run(&mut self, lines: &SourceLines, work: &mut Work) -> Option<Result<Module, Vec<Diagnostic>>> {
         loop {
-            match std::mem::replace(&mut self.stage, Stage::Begin) {
-                Stage::Begin => {
+            match std::mem::replace(&mut self.stage, LoweringStage::Begin) {
+                LoweringStage::Begin => {
                     work.add(self.core.nodes.len() as u64 / NODES_PER_UNIT);
-                    self.stage = Stage::Resolve(Box::new(ResolveWalk::new(&self.core)));
+                    self.stage = LoweringStage::Resolve(Box::new(ResolveWalk::new(&self.core)));
                 }
-                Stage::Resolve(mut walk) => {
+                LoweringStage::Resolve(mut walk) => {
                     if !walk.run(&self.core, work) {
-                        self.stage = Stage::Resolve(walk);
+                        self.stage = LoweringStage::Resolve(walk);
                         return None;
                     }
                     let mut builder = ModuleBuilder::new(&self.core, walk.finish(&self.core), lines);
                     builder.spills_from = self.oversized.is_some().then_some(SPILLS_FROM);
-                    self.stage = Stage::Functions(Box::new(builder.suspend()), Vec::new());
+                    self.stage = LoweringStage::Functions(Box::new(builder.suspend()), Vec::new());
                 }
-                Stage::Functions(builder, mut functions) => {
+                LoweringStage::Functions(builder, mut functions) => {
                     let mut builder = builder.resume(&self.core, lines);
                     if !builder.functions(&mut functions, work) {
-                        self.stage = Stage::Functions(Box::new(builder.suspend()), functions);
+                        self.stage = LoweringStage::Functions(Box::new(builder.suspend()), functions);
                         return None;
                     }
                     if builder.oversized.is_empty() {

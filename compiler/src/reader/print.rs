@@ -16,7 +16,7 @@ use super::name::fold;
 use super::number;
 
 /// A part that is still to be printed.
-enum Work<'a> {
+enum PrintStep<'a> {
     /// A datum, the number of backquotes around it, and whether `,@` can stand in its place.
     Datum(&'a Datum, u32, bool),
     /// The elements of a list from this pair or tail on, then `)`.
@@ -30,35 +30,35 @@ enum Work<'a> {
 /// [`Packages::qualifier`](esl_bytecode::package::Packages::qualifier).
 pub fn print(datum: &Datum, qualifier: &dyn Fn(&Symbol) -> Qualifier) -> String {
     let mut out = String::new();
-    let mut work = vec![Work::Datum(datum, 0, false)];
+    let mut work = vec![PrintStep::Datum(datum, 0, false)];
     while let Some(item) = work.pop() {
         match item {
-            Work::Text(text) => out.push_str(text),
-            Work::Datum(datum, level, can_splice) => {
+            PrintStep::Text(text) => out.push_str(text),
+            PrintStep::Datum(datum, level, can_splice) => {
                 print_one(datum, level, can_splice, qualifier, &mut out, &mut work)
             }
-            Work::Rest(rest, level) => match rest.kind() {
+            PrintStep::Rest(rest, level) => match rest.kind() {
                 DatumKind::Nil => out.push(')'),
                 // `(a . ,b)` is `(a %unquote b)`.
                 DatumKind::Cons(car, cdr)
                     if mark(car, cdr, level, false).is_some_and(|mark| mark.0 == ",") =>
                 {
                     out.push_str(" . ");
-                    work.push(Work::Text(")"));
-                    work.push(Work::Datum(rest, level, false));
+                    work.push(PrintStep::Text(")"));
+                    work.push(PrintStep::Datum(rest, level, false));
                 }
                 DatumKind::Cons(car, cdr) => {
                     out.push(' ');
-                    work.push(Work::Rest(cdr, level));
-                    work.push(Work::Datum(car, level, true));
+                    work.push(PrintStep::Rest(cdr, level));
+                    work.push(PrintStep::Datum(car, level, true));
                 }
                 _ => {
                     out.push_str(" . ");
-                    work.push(Work::Text(")"));
-                    work.push(Work::Datum(rest, level, false));
+                    work.push(PrintStep::Text(")"));
+                    work.push(PrintStep::Datum(rest, level, false));
                 }
             },
-            Work::Axis(dimensions, items, offset) => {
+            PrintStep::Axis(dimensions, items, offset) => {
                 print_axis(dimensions, items, offset, &mut out, &mut work)
             }
         }
@@ -72,7 +72,7 @@ fn print_one<'a>(
     can_splice: bool,
     qualifier: &dyn Fn(&Symbol) -> Qualifier,
     out: &mut String,
-    work: &mut Vec<Work<'a>>,
+    work: &mut Vec<PrintStep<'a>>,
 ) {
     // Writing to a string cannot fail.
     let _ = match datum.kind() {
@@ -88,7 +88,7 @@ fn print_one<'a>(
         DatumKind::Object(ObjectId(id)) => write!(out, "#<object {id}>"),
         DatumKind::Call(call) => {
             out.push_str("#.");
-            work.push(Work::Datum(call, level, true));
+            work.push(PrintStep::Datum(call, level, true));
             Ok(())
         }
         DatumKind::Character(c) => print_character(*c, out),
@@ -101,39 +101,39 @@ fn print_one<'a>(
                     let is_glued =
                         mark == "," && inner.as_symbol().is_some_and(|s| s.name().starts_with(['@', '.']));
                     out.push_str(if is_glued { " " } else { "" });
-                    work.push(Work::Datum(inner, level, !mark.starts_with('`')));
+                    work.push(PrintStep::Datum(inner, level, !mark.starts_with('`')));
                 }
                 None => {
                     out.push('(');
-                    work.push(Work::Rest(cdr, level));
-                    work.push(Work::Datum(car, level, true));
+                    work.push(PrintStep::Rest(cdr, level));
+                    work.push(PrintStep::Datum(car, level, true));
                 }
             }
             Ok(())
         }
         DatumKind::Vector(items) => {
-            print_items(items.iter().map(|item| Work::Datum(item, level, true)), "#(", out, work);
+            print_items(items.iter().map(|item| PrintStep::Datum(item, level, true)), "#(", out, work);
             Ok(())
         }
         DatumKind::Array(dimensions, items) => {
-            work.push(Work::Axis(dimensions, items, 0));
+            work.push(PrintStep::Axis(dimensions, items, 0));
             write!(out, "#{}A", dimensions.len())
         }
     };
 }
 
 fn print_items<'a>(
-    items: impl DoubleEndedIterator<Item = Work<'a>>,
+    items: impl DoubleEndedIterator<Item = PrintStep<'a>>,
     open: &str,
     out: &mut String,
-    work: &mut Vec<Work<'a>>,
+    work: &mut Vec<PrintStep<'a>>,
 ) {
     out.push_str(open);
-    work.push(Work::Text(")"));
+    work.push(PrintStep::Text(")"));
     let bottom = work.len();
     for item in items.rev() {
         work.push(item);
-        work.push(Work::Text(" "));
+        work.push(PrintStep::Text(" "));
     }
     // No blank before the first.
     if work.len() > bottom {
@@ -146,13 +146,13 @@ fn print_axis<'a>(
     items: &'a [Datum],
     offset: usize,
     out: &mut String,
-    work: &mut Vec<Work<'a>>,
+    work: &mut Vec<PrintStep<'a>>,
 ) {
     let Some((&length, inner)) = dimensions.split_first() else {
-        return work.push(Work::Datum(&items[offset], 0, false));
+        return work.push(PrintStep::Datum(&items[offset], 0, false));
     };
     let step: usize = inner.iter().map(|&dimension| dimension as usize).product();
-    let parts = (0..length as usize).map(|i| Work::Axis(inner, items, offset + i * step));
+    let parts = (0..length as usize).map(|i| PrintStep::Axis(inner, items, offset + i * step));
     print_items(parts, "(", out, work);
 }
 

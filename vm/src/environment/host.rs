@@ -11,7 +11,7 @@ use esl_bytecode::compile::{
 use esl_bytecode::datum::{Datum, ObjectId};
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::file::ModuleImage;
-use esl_bytecode::module::{Constant, Function, FunctionNumber, Module, Parameters, PoolIdx};
+use esl_bytecode::module::{Constant, FunctionNumber, Module, ModuleFunction, Parameters, PoolIdx};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 
@@ -173,7 +173,7 @@ fn runner(vm: &mut Vm) -> Result<Value, CallError> {
 /// Returns a module whose form returns a function that calls the functions of a list, and returns the value
 /// of the last.
 fn runner_module() -> Module {
-    let function = |registers, constants: &[u32], code: &[Instr]| Function {
+    let function = |registers, constants: &[u32], code: &[Instr]| ModuleFunction {
         registers,
         constants: constants.iter().map(|&index| PoolIdx(index)).collect(),
         code: code
@@ -183,7 +183,7 @@ fn runner_module() -> Module {
                 [word].into_iter().chain(aux)
             })
             .collect(),
-        ..Function::default()
+        ..ModuleFunction::default()
     };
     let give = function(
         1,

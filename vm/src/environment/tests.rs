@@ -9,7 +9,7 @@ use esl_bytecode::compile::{
 use esl_bytecode::datum::DatumKind;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::file::{ImageBytes, ModuleImage, write};
-use esl_bytecode::module::{Constant, Function, FunctionNumber, Module, PoolIdx};
+use esl_bytecode::module::{Constant, FunctionNumber, Module, ModuleFunction, PoolIdx};
 
 use super::*;
 use crate::world::load::prepare;
@@ -19,13 +19,13 @@ fn span() -> Span {
 }
 
 /// Returns a function with these parameters, constants and code.
-fn function(required: u8, registers: u8, constants: &[u32], code: &str) -> Function {
-    Function {
+fn function(required: u8, registers: u8, constants: &[u32], code: &str) -> ModuleFunction {
+    ModuleFunction {
         parameters: Parameters::exactly(required),
         registers,
         constants: constants.iter().map(|&index| PoolIdx(index)).collect(),
         code: assemble(code).unwrap(),
-        ..Function::default()
+        ..ModuleFunction::default()
     }
 }
 

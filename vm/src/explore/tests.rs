@@ -4,7 +4,7 @@
 use std::convert::Infallible;
 
 use esl_bytecode::builtin::Builtin;
-use esl_bytecode::module::{Constant, Function, FunctionNumber, Module, PoolIdx};
+use esl_bytecode::module::{Constant, FunctionNumber, Module, ModuleFunction, PoolIdx};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::*;
 use esl_bytecode::symbol::Symbol;
@@ -32,7 +32,8 @@ fn machine(tasks: &[&[Instr]]) -> Vm {
     let mut vm = Vm::for_tests();
     for code in tasks {
         let code = words(code);
-        let function = Function { registers: 8, constants: vec![PoolIdx(0)], code, ..Function::default() };
+        let function =
+            ModuleFunction { registers: 8, constants: vec![PoolIdx(0)], code, ..ModuleFunction::default() };
         let module = Module {
             constants: vec![Constant::Symbol(Symbol::esl("F"))],
             functions: vec![function],

@@ -10,7 +10,7 @@ use esl_bytecode::BigInt;
 use esl_bytecode::assembler::assemble;
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::module::{
-    Capture, CaptureSource, Constant, Function, FunctionNumber, Module, Parameters, PoolIdx,
+    Capture, CaptureSource, Constant, FunctionNumber, Module, ModuleFunction, Parameters, PoolIdx,
 };
 use esl_bytecode::opcode::{OPCODES, Opcode};
 use esl_bytecode::symbol::Symbol;
@@ -51,19 +51,19 @@ fn constants() -> Vec<Constant> {
     ]
 }
 
-fn function(parameters: Parameters, registers: u8, captures: Vec<Capture>, text: &str) -> Function {
-    Function {
+fn function(parameters: Parameters, registers: u8, captures: Vec<Capture>, text: &str) -> ModuleFunction {
+    ModuleFunction {
         parameters,
         registers,
         captures,
         constants: (0..constants().len() as u32).map(PoolIdx).collect(),
         code: assemble(text).unwrap_or_else(|error| panic!("{error}\n{text}")),
-        ..Function::default()
+        ..ModuleFunction::default()
     }
 }
 
 /// Returns the functions that programs may use.
-fn shared_functions() -> Vec<Function> {
+fn shared_functions() -> Vec<ModuleFunction> {
     let later = CaptureSource::Later;
     let captures = vec![
         Capture::value(CaptureSource::Register(0)),
@@ -116,7 +116,7 @@ fn shared_functions() -> Vec<Function> {
 }
 
 /// Returns the shared functions, then a function for each program.
-fn functions<'a>(programs: impl IntoIterator<Item = &'a str>) -> Vec<Function> {
+fn functions<'a>(programs: impl IntoIterator<Item = &'a str>) -> Vec<ModuleFunction> {
     let mains = programs.into_iter().map(|text| function(Parameters::default(), 16, vec![], text));
     shared_functions().into_iter().chain(mains).collect()
 }

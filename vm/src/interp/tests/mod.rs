@@ -1,6 +1,6 @@
 //! The loop on programs assembled by hand: calls, ticks, unwinding, tasks that take turns.
 
-use esl_bytecode::module::{Constant, Function, FunctionNumber, Module, Parameters, PoolIdx};
+use esl_bytecode::module::{Constant, FunctionNumber, Module, ModuleFunction, Parameters, PoolIdx};
 use esl_bytecode::opcode::{Instr, OPCODES};
 use esl_bytecode::operand::*;
 use esl_bytecode::symbol::Symbol;
@@ -20,23 +20,23 @@ fn machine(config: Config) -> Vm {
 }
 
 /// Returns a function of some required parameters.
-fn function(required: u8, registers: u8, constants: &[u32], code: &[Instr]) -> Function {
+fn function(required: u8, registers: u8, constants: &[u32], code: &[Instr]) -> ModuleFunction {
     let code = code.iter().flat_map(|instruction| {
         let (word, aux) = instruction.encode();
         std::iter::once(word).chain(aux)
     });
-    Function {
+    ModuleFunction {
         parameters: Parameters::exactly(required),
         registers,
         constants: constants.iter().map(|&index| PoolIdx(index)).collect(),
         code: code.collect(),
-        ..Function::default()
+        ..ModuleFunction::default()
     }
 }
 
 /// Loads the functions as a module of which the first runs at top level. Its pool is the symbol `F`, then the
 /// functions from the second on.
-fn install(vm: &mut Vm, functions: Vec<Function>) -> Value {
+fn install(vm: &mut Vm, functions: Vec<ModuleFunction>) -> Value {
     let mut constants = vec![Constant::Symbol(Symbol::esl("F"))];
     constants.extend((1..functions.len()).map(|number| Constant::Function(FunctionNumber(number as u32))));
     let module = Module { constants, functions, toplevel: vec![FunctionNumber(0)], ..Module::default() };

@@ -4,7 +4,7 @@
 //! simple vector, shared by the functions of a module), and the places: words, four for each entry.
 
 use esl_bytecode::compile::SourcePlace;
-use esl_bytecode::module::{Function, LineEntry, PoolIdx};
+use esl_bytecode::module::{LineEntry, ModuleFunction, PoolIdx};
 
 use crate::heap::{AllocError, Heap, Kind};
 use crate::value::Value;
@@ -29,7 +29,7 @@ pub(super) fn sources(heap: &mut Heap, sources: &[String]) -> Result<Value, Allo
 /// Makes the record of a function of a module with this pool.
 pub(super) fn describe(
     heap: &mut Heap,
-    function: &Function,
+    function: &ModuleFunction,
     pool: &[Value],
     sources: Value,
 ) -> Result<Value, AllocError> {

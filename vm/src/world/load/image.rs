@@ -13,7 +13,7 @@ use std::sync::Arc;
 use esl_bytecode::compile::SourcePlace;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::file::{ConstantRecord, ModuleImage, SymbolHome};
-use esl_bytecode::module::{Function, FunctionNumber, PoolIdx};
+use esl_bytecode::module::{FunctionNumber, ModuleFunction, PoolIdx};
 use esl_bytecode::symbol::Symbol;
 
 use super::definitions::{Definitions, ImageDefinition, name_of};
@@ -87,7 +87,7 @@ impl Images {
     }
 
     /// Decodes a function.
-    pub(crate) fn decode(&self, image: usize, function: u32) -> Option<Function> {
+    pub(crate) fn decode(&self, image: usize, function: u32) -> Option<ModuleFunction> {
         self.0.get(image)?.module.function(FunctionNumber(function)).ok()
     }
 

@@ -17,7 +17,7 @@ use std::fmt;
 use esl_bytecode::BigInt;
 use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::file::ReadError;
-use esl_bytecode::module::{Constant, Function, Module, PoolIdx};
+use esl_bytecode::module::{Constant, Module, ModuleFunction, PoolIdx};
 use esl_bytecode::package::PackageId;
 use esl_bytecode::symbol::{Home, Symbol};
 use esl_bytecode::verify::VerifyError;
@@ -234,7 +234,7 @@ pub(crate) const TOP_LEVEL: u16 = 1;
 
 /// The parts from which a Code is made.
 struct LoadedFunction<'a> {
-    function: &'a Function,
+    function: &'a ModuleFunction,
     /// Constants of the function, then the names of its keys.
     constants: &'a [Value],
     name: Value,
@@ -266,12 +266,12 @@ fn make_code(
 }
 
 /// Returns the constants of a function's Code: its own, then the names of its keys.
-fn own_constants(function: &Function, value: impl FnMut(PoolIdx) -> Value) -> Vec<Value> {
+fn own_constants(function: &ModuleFunction, value: impl FnMut(PoolIdx) -> Value) -> Vec<Value> {
     let keys = function.parameters.keys.iter().flatten();
     function.constants.iter().chain(keys).copied().map(value).collect()
 }
 
-fn name_of(function: &Function, pool: &[Value]) -> Value {
+fn name_of(function: &ModuleFunction, pool: &[Value]) -> Value {
     function.name.map_or(Value::NIL, |PoolIdx(index)| pool[index as usize])
 }
 

@@ -4,7 +4,7 @@ use esl_bytecode::assembler::assemble;
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::file::{ImageBytes, ModuleImage, write};
 use esl_bytecode::module::{
-    Capture, CaptureSource, Constant, Function, FunctionNumber, LineEntry, Module, Parameters, PoolIdx,
+    Capture, CaptureSource, Constant, FunctionNumber, LineEntry, Module, ModuleFunction, Parameters, PoolIdx,
 };
 use esl_bytecode::symbol::Symbol;
 
@@ -12,12 +12,12 @@ use super::*;
 use crate::vm::Vm;
 
 /// Returns a function with these constants and this code.
-fn function(registers: u8, constants: &[u32], code: &str) -> Function {
-    Function {
+fn function(registers: u8, constants: &[u32], code: &str) -> ModuleFunction {
+    ModuleFunction {
         registers,
         constants: constants.iter().map(|&index| PoolIdx(index)).collect(),
         code: assemble(code).unwrap(),
-        ..Function::default()
+        ..ModuleFunction::default()
     }
 }
 

@@ -1,0 +1,251 @@
+//! The walk from an object to its datum, in parts.
+
+use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::span::Span;
+
+use super::{DatumError, MAX_NODES, NODE_BYTES, Unit};
+use crate::heap::layout::Array;
+use crate::heap::{Heap, Kind};
+use crate::value::Value;
+use crate::world::{GivenMap, GivenSet, World};
+
+/// Circular literals in one form, at most.
+const MAX_CIRCULAR: usize = 64;
+
+/// Why a walk from object to datum has ended.
+enum WalkError {
+    /// This quoted object contains itself.
+    Quoted(Value),
+    Datum(DatumError),
+}
+
+/// The next step of a walk from object to datum.
+enum ToDatum {
+    Visit(Value),
+    /// With the number of its parts.
+    Build(Value, usize),
+}
+
+/// A walk from an object to its datum, which goes on in parts. The program may change the object between two
+/// of them; then the datum is that of some of its states.
+pub(crate) struct DatumWalk {
+    object: Value,
+    span: Span,
+    /// Whether large quoted objects are represented as wholes.
+    keeps_literals: bool,
+    /// Objects that are represented as wholes: quoted ones that contain themselves, or are large.
+    wholes: GivenSet<u64>,
+    /// Number of those that contain themselves.
+    circular: usize,
+    steps: Vec<ToDatum>,
+    made: Vec<Datum>,
+    /// Compound objects met by this walk; without a datum while it is inside.
+    met: GivenMap<u64, (Value, Option<Datum>)>,
+    nodes: usize,
+}
+
+impl DatumWalk {
+    /// Begins a walk. Parts without a remembered datum get the place `span`.
+    pub(crate) fn new(object: Value, span: Span) -> DatumWalk {
+        DatumWalk {
+            object,
+            span,
+            keeps_literals: false,
+            wholes: GivenSet::default(),
+            circular: 0,
+            steps: vec![ToDatum::Visit(object)],
+            made: Vec::new(),
+            met: GivenMap::default(),
+            nodes: 0,
+        }
+    }
+
+    /// Has the walk represent large quoted objects as wholes: nobody looks into them.
+    #[must_use]
+    pub(crate) fn keeping_literals(self) -> DatumWalk {
+        DatumWalk { keeps_literals: true, ..self }
+    }
+
+    /// Calls `visit` with every object that the walk keeps alive.
+    pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
+        visit(self.object);
+        self.met.values().for_each(|&(object, _)| visit(object));
+        for step in &self.steps {
+            let (ToDatum::Visit(object) | ToDatum::Build(object, _)) = step;
+            visit(*object);
+        }
+    }
+
+    /// Returns about how many bytes the walk takes.
+    pub(crate) fn bytes(&self) -> usize {
+        self.steps.capacity() * size_of::<ToDatum>() + (self.made.len() + self.met.len()) * NODE_BYTES
+    }
+
+    /// Goes on with the walk. Returns the datum, or `None` after `allowed` nodes more.
+    ///
+    /// # Errors
+    /// [`DatumError`]; for want of room, the walk can go on when there is some.
+    pub(crate) fn run(
+        &mut self,
+        unit: &mut Unit,
+        heap: &Heap,
+        world: &World,
+        allowed: usize,
+    ) -> Result<Option<Datum>, DatumError> {
+        let start = self.nodes;
+        let outcome = self.go_on(unit, heap, world, start.saturating_add(allowed));
+        unit.work += (self.nodes - start) as u64;
+        match outcome {
+            Ok(datum) => Ok(datum),
+            Err(WalkError::Quoted(part)) if self.circular < MAX_CIRCULAR => {
+                self.wholes.insert(part.bits());
+                self.circular += 1;
+                self.steps = vec![ToDatum::Visit(self.object)];
+                self.made.clear();
+                self.met.clear();
+                Ok(None)
+            }
+            Err(WalkError::Quoted(_)) => Err(DatumError::Circular),
+            Err(WalkError::Datum(error)) => Err(error),
+        }
+    }
+
+    fn go_on(
+        &mut self,
+        unit: &mut Unit,
+        heap: &Heap,
+        world: &World,
+        end: usize,
+    ) -> Result<Option<Datum>, WalkError> {
+        let span = self.span;
+        // What has been made already is counted when a part of the walk is over.
+        let room = heap.room() / NODE_BYTES;
+        let before = self.made.len() + self.met.len();
+        while !self.steps.is_empty() {
+            if self.nodes >= end {
+                return Ok(None);
+            }
+            if self.made.len() + self.met.len() > room.saturating_add(before) {
+                return Err(WalkError::Datum(DatumError::NoRoom((room + 1) * NODE_BYTES)));
+            }
+            match self.steps.pop() {
+                None => break,
+                Some(ToDatum::Visit(object)) => {
+                    self.nodes += 1;
+                    if self.nodes > MAX_NODES {
+                        return Err(WalkError::Datum(DatumError::TooLarge));
+                    }
+                    if self.wholes.contains(&object.bits()) {
+                        self.made.push(Datum::new(DatumKind::Object(unit.pin(object)), span));
+                        continue;
+                    }
+                    let Some(parts) = parts_of(heap, object) else {
+                        self.made.push(unit.atom_datum(heap, world, object, span));
+                        continue;
+                    };
+                    match self.met.get(&object.bits()) {
+                        Some((_, Some(datum))) => self.made.push(datum.clone()),
+                        Some((_, None)) => return Err(circle(heap, world, &self.steps)),
+                        None => {
+                            self.met.insert(object.bits(), (object, None));
+                            let count = match &parts {
+                                ObjectParts::Pair(..) => 2,
+                                ObjectParts::Items(_, items) => items.len(),
+                            };
+                            if self.keeps_literals
+                                && let Some(quoted) = quoted_in(heap, world, object)
+                                && is_large(heap, quoted)
+                            {
+                                self.wholes.insert(quoted.bits());
+                            }
+                            self.steps.push(ToDatum::Build(object, count));
+                            visit_parts(parts, &mut self.steps);
+                        }
+                    }
+                }
+                Some(ToDatum::Build(object, count)) => {
+                    let parts = self.made.split_off(self.made.len() - count);
+                    let datum = unit.compound(heap, object, parts, span);
+                    self.met.insert(object.bits(), (object, Some(datum.clone())));
+                    self.made.push(datum);
+                }
+            }
+        }
+        Ok(Some(self.made.pop().unwrap_or_else(|| Datum::nil(span))))
+    }
+}
+
+/// Nodes above which a quoted object counts as large.
+const LARGE: usize = 2000;
+
+/// Returns whether an object has more than [`LARGE`] nodes.
+fn is_large(heap: &Heap, object: Value) -> bool {
+    let mut pending = vec![object];
+    let mut nodes = 0;
+    while let Some(object) = pending.pop() {
+        nodes += 1;
+        match parts_of(heap, object) {
+            Some(ObjectParts::Pair(car, cdr)) => pending.extend([car, cdr]),
+            Some(ObjectParts::Items(_, items)) => {
+                nodes += items.len();
+                pending.extend(items.iter().take(LARGE));
+            }
+            None => {}
+        }
+        if nodes > LARGE {
+            return true;
+        }
+    }
+    false
+}
+
+/// Returns the object in a form `(quote object)`.
+fn quoted_in(heap: &Heap, world: &World, form: Value) -> Option<Value> {
+    let pair = heap.as_cons(form).filter(|pair| pair.car == world.known.quote)?;
+    let rest = heap.as_cons(pair.cdr).filter(|rest| rest.cdr.is_nil())?;
+    Some(rest.car)
+}
+
+/// Returns the error for an object that the steps of a walk have met within itself.
+fn circle(heap: &Heap, world: &World, steps: &[ToDatum]) -> WalkError {
+    let quoted = steps.iter().rev().find_map(|step| match step {
+        ToDatum::Build(form, _) => quoted_in(heap, world, *form),
+        ToDatum::Visit(_) => None,
+    });
+    quoted.map_or(WalkError::Datum(DatumError::Circular), WalkError::Quoted)
+}
+
+/// The parts of an object other than an atom.
+pub(super) enum ObjectParts<'a> {
+    Pair(Value, Value),
+    /// Dimensions (unless it is a simple vector) and elements.
+    Items(Option<&'a [Value]>, &'a [Value]),
+}
+
+pub(super) fn parts_of(heap: &Heap, object: Value) -> Option<ObjectParts<'_>> {
+    if let Some(pair) = heap.as_cons(object) {
+        return Some(ObjectParts::Pair(pair.car, pair.cdr));
+    }
+    match heap.kind(object)? {
+        Kind::SimpleVector => Some(ObjectParts::Items(None, heap.vector(object)?)),
+        Kind::Array => {
+            let dimensions = heap.array_dimensions(object)?;
+            let array = heap.array(object)?;
+            // Data cannot express fill pointers, adjustability, displacement, and elements that are not
+            // values.
+            let is_plain = array.header.flags & (Array::HAS_FILL_POINTER | Array::ADJUSTABLE) == 0
+                && array.offset.is_nil();
+            let items = heap.vector(array.data).filter(|_| is_plain && dimensions.len() != 1)?;
+            Some(ObjectParts::Items(Some(dimensions), items))
+        }
+        _ => None,
+    }
+}
+
+/// Pushes visits onto `steps`, the first part on top.
+fn visit_parts(parts: ObjectParts<'_>, steps: &mut Vec<ToDatum>) {
+    match parts {
+        ObjectParts::Pair(car, cdr) => steps.extend([ToDatum::Visit(cdr), ToDatum::Visit(car)]),
+        ObjectParts::Items(_, items) => steps.extend(items.iter().rev().copied().map(ToDatum::Visit)),
+    }
+}
