@@ -156,7 +156,18 @@ impl MachineOptions {
     }
 }
 
+/// Lets the process have as many open files and connections as the system allows it.
+#[cfg(unix)]
+fn raise_limit_of_descriptors() {
+    use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+    let limit = getrlimit(Resource::Nofile);
+    // A system that refuses leaves the limit as it is.
+    _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });
+}
+
 fn main() -> ExitCode {
+    #[cfg(unix)]
+    raise_limit_of_descriptors();
     let Eslvm { action, library } = Eslvm::parse();
     let status = match action {
         EslvmAction::Run { options, speed, stats, timeline, trace, file, arguments } => {

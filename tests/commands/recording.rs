@@ -31,7 +31,7 @@ fn fly(host: impl FnOnce(&ModulePath) -> Box<dyn Host + Send>) -> (Ended, u64, u
 /// replayed, and the run is the same to the tick.
 #[test]
 fn a_recorded_flight_is_replayed_without_the_spacecraft() {
-    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "--speed", "20"]);
+    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "--speed", "10"]);
     command.arg(example("spacecraft/stand-in.esl")).arg("0");
     let (mut simulator, _output, port) = start_simulator(&mut command);
     let said = Arc::new(Mutex::new(Vec::new()));
@@ -44,7 +44,7 @@ fn a_recorded_flight_is_replayed_without_the_spacecraft() {
         };
         let host = RealHost::new(vec![port, "crater".into()])
             .with_rights(path.with_rights(Rights::none().with(Right::Net, "127.0.0.1")))
-            .with_speed(20.0)
+            .with_speed(10.0)
             .with_screen(Box::new(screen));
         let host = RecordingHost::new(host);
         recording = Some(host.recording());
