@@ -198,7 +198,10 @@ fn the_loop_has_an_arm_for_each_row_in_the_order_of_the_table() {
     const ARM: &str = "\n                LoopOperation::";
     let source = include_str!("../mod.rs");
     let arms = source.split(ARM).skip(1).filter_map(|arm| Some(arm.split_once(" =>")?.0));
-    let operations: Vec<&str> = arms.flat_map(|names| names.split(" | Operation::")).collect();
+    let operations: Vec<&str> = arms
+        .flat_map(|names| names.split("LoopOperation::"))
+        .map(|name| name.trim_matches([' ', '\n', '|']))
+        .collect();
     let rows: Vec<String> = OPCODES.iter().map(|row| format!("{:?}", row.opcode)).collect();
     let (of_rows, of_stubs) = operations.split_at(rows.len());
     assert_eq!(of_rows, rows);
