@@ -21,8 +21,8 @@
 //! ```
 #![forbid(unsafe_code)]
 
-/// The examples of the manual's chapter on embedding, compiled and run.
-#[cfg(doctest)]
+/// The examples of the manual's chapter on embedding, compiled and run. One of them needs `serde`.
+#[cfg(all(doctest, feature = "serde"))]
 #[doc = include_str!("../docs/manual/embedding.md")]
 struct Embedding;
 
