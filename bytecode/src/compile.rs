@@ -155,7 +155,8 @@ pub enum Step {
     /// Run this macro and answer with [`StepOutcome::Expansion`] or [`StepOutcome::Failed`].
     Expand(MacroCall),
     /// Load this module and run its top level, at compile time. Answer with [`StepOutcome::Loaded`], or
-    /// [`StepOutcome::Failed`]; if `keep`, with [`StepOutcome::Object`], the value of its last top-level form.
+    /// [`StepOutcome::Failed`]; if `keep`, with [`StepOutcome::Object`], the value of its last top-level
+    /// form.
     Load {
         /// The module.
         module: Module,
@@ -164,9 +165,9 @@ pub enum Step {
     },
     /// A part of the work is done, and the compilation wants to go on. Answer with [`StepOutcome::More`].
     More,
-    /// Find the module that the text being compiled requires by this name. Answer with [`StepOutcome::Module`];
-    /// with [`StepOutcome::Loaded`] if it is defined already where macros run, and the program is to find it when
-    /// it runs; or with [`StepOutcome::Failed`].
+    /// Find the module that the text being compiled requires by this name. Answer with
+    /// [`StepOutcome::Module`]; with [`StepOutcome::Loaded`] if it is defined already where macros run, and
+    /// the program is to find it when it runs; or with [`StepOutcome::Failed`].
     Require(String),
     /// The compilation is over. There is no module when one of the diagnostics is an error.
     Done(Option<Module>, Vec<Diagnostic>),

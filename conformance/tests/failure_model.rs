@@ -1,6 +1,6 @@
 //! Compares the machine with a model on random nests of recovery forms, cleanups, handlers, throws and
-//! failures, and of the forms of coordination: tasks that belong to a form, supervision, resources, quotas and
-//! suspension.
+//! failures, and of the forms of coordination: tasks that belong to a form, supervision, resources, quotas
+//! and suspension.
 //!
 //! The model states the promises of the language in a few lines: a failure searches the enclosing forms from
 //! the inside out and calls what it finds; leaving a form is an error value; nothing outside of a task is

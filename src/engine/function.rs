@@ -16,8 +16,9 @@ use crate::error::Error;
 ///
 /// let mut engine = Engine::new()?;
 /// let count = engine.function("(let ((n 10)) (lambda (by) (incf n by)))")?;
-/// let counts: Vec<i64> = [1, 5].into_iter().map(|by| engine.call(&count, [by.into()])).collect::<Result<_, _>>()?;
-/// assert_eq!(counts, [11, 16]);
+/// let first: i64 = engine.call(&count, [1.into()])?;
+/// let second: i64 = engine.call(&count, [5.into()])?;
+/// assert_eq!((first, second), (11, 16));
 /// assert!(engine.function("(list 1)").is_err());
 /// # Ok::<(), esl::Error>(())
 /// ```
@@ -62,7 +63,7 @@ impl Engine {
         }
     }
 
-    /// Calls a function of the program, by its name or as a [`Function`], and returns its first value, converted.
+    /// Calls a function of the program, by its name or as a [`Function`]. Returns its first value, converted.
     ///
     /// # Errors
     /// As [`Engine::eval`]; [`Error::NotOfType`] if the value is of another type, or the function belongs to

@@ -76,10 +76,10 @@ impl Operation {
         self.host.on_cancel(function);
     }
 
-    /// Has `function` called with true when the task that has begun the operation is suspended, and with false
-    /// when it goes on; at once if it is suspended already. An operation that knows no pause need not listen:
-    /// if it ends meanwhile, the task learns of it when it goes on. A task that is aborted while it stands
-    /// still does not go on; its operations are cancelled.
+    /// Has `function` called with true when the task that has begun the operation is suspended, and with
+    /// false when it goes on; at once if it is suspended already. An operation that knows no pause need not
+    /// listen: if it ends meanwhile, the task learns of it when it goes on. A task that is aborted while it
+    /// stands still does not go on; its operations are cancelled.
     ///
     /// The engine waits for the function, which should only pass the message on.
     pub fn on_suspension(&self, function: impl FnMut(bool) + Send + 'static) {

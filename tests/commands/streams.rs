@@ -55,7 +55,8 @@ const MARK: &str = "(defun mark (name) (with-open-file (s name :direction :outpu
 
 #[test]
 fn a_slow_reader_of_standard_output_delays_only_who_prints() {
-    // The output is much more than a pipe holds, and is not read before the other task has gone on for a while.
+    // The output is much more than a pipe holds, and is not read before the other task has gone on for a
+    // while.
     let text = "(defvar *printed* 0)
 (spawn (:name 'other :daemon t)
   (loop until (plusp *printed*) do (sleep 0.001))

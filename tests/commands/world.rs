@@ -249,8 +249,8 @@ fn datagrams_come_whole() {
 #[cfg(unix)]
 #[test]
 fn a_thousand_connections_are_served_by_one_program() {
-    // All are open before the first is answered. They come in at most fifty at a time, since the system drops some
-    // where more wait than it has room for.
+    // All are open before the first is answered. They come in at most fifty at a time, since the system drops
+    // some where more wait than it has room for.
     let server = "(require :sockets)
 (let ((listener (sockets:listen \"127.0.0.1\" 0)) (served 0) (all (make-event 'all)))
   (format t \"~a~%\" (sockets:local-port listener))

@@ -218,8 +218,8 @@ fn terminate(child: &mut Child) {
     drop(child.start_kill());
 }
 
-/// Where the output of a launched program goes: to the connection of a number, nowhere for `NIL`, and for anything
-/// else to where that of this process goes.
+/// Where the output of a launched program goes: to the connection of a number, nowhere for `NIL`, and for
+/// anything else to where that of this process goes.
 fn output_of(arguments: &CallArguments, index: usize) -> (Stdio, Option<i64>) {
     match arguments.integer(index) {
         Ok(number) => (Stdio::piped(), Some(number)),

@@ -1,9 +1,9 @@
 //! The table of diagnostic codes: each with its severity, its meaning, a failing program and the same program
 //! repaired.
 //!
-//! Each row defines a constant. Every diagnostic is made by [`DiagnosticCode::at`] of such a constant, so no code is
-//! reported that the table lacks; a test in `tests/diagnostics/table.rs` looks through the sources for other
-//! ways. `docs/diagnostics.md` is generated from the table. To add a code, add a row, run
+//! Each row defines a constant. Every diagnostic is made by [`DiagnosticCode::at`] of such a constant, so no
+//! code is reported that the table lacks; a test in `tests/diagnostics/table.rs` looks through the sources
+//! for other ways. `docs/diagnostics.md` is generated from the table. To add a code, add a row, run
 //! `ESL_BLESS=1 cargo test -p esl-compiler --test diagnostics`, and look at the difference.
 //!
 //! The programs are complete files. They are empty if no short program shows the fault.

@@ -42,8 +42,8 @@ pub(super) type Operator = fn(&mut Expander, &mut dyn Environment, Form, To) -> 
 pub enum Stop {
     /// A macro is to be run. Continue with [`StepOutcome::Expansion`] or [`StepOutcome::Failed`].
     Macro(MacroCall),
-    /// A chunk is finished. If it is to be kept, continue with [`StepOutcome::Object`] or [`StepOutcome::Failed`]; if
-    /// it is to be loaded and that failed, with [`StepOutcome::Failed`].
+    /// A chunk is finished. If it is to be kept, continue with [`StepOutcome::Object`] or
+    /// [`StepOutcome::Failed`]; if it is to be loaded and that failed, with [`StepOutcome::Failed`].
     Chunk(Box<Chunk>),
     /// The work that is allowed is done. Continue.
     More,

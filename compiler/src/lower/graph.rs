@@ -1,9 +1,9 @@
 //! The graph of a function's code: straight segments and the edges between them.
 //!
 //! Lowering appends instructions to the open segment and ends it with a [`SegmentExit`]. Jumps refer to
-//! segments by [`SegmentLabel`]s, which may be bound later. The order in which segments are bound is the order of
-//! the finished code, so an edge to its own segment or an earlier one is a turn of a loop. Code that is
-//! emitted while no segment is open is unreachable and vanishes.
+//! segments by [`SegmentLabel`]s, which may be bound later. The order in which segments are bound is the
+//! order of the finished code, so an edge to its own segment or an earlier one is a turn of a loop. Code that
+//! is emitted while no segment is open is unreachable and vanishes.
 //!
 //! Not here: improving the graph ([`super::fuse`]), choosing jump instructions ([`super::assemble`]).
 

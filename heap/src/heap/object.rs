@@ -351,9 +351,9 @@ impl Heap {
         }
         let object = self.begin_object(Kind::Code, 0, 0, len)?;
         let code = object.cast::<CodeObject>();
-        // SAFETY: `begin_object` gave room for `len` units of 8 bytes, which `CodeObject::len` computed for exactly
-        // these constants and words; everything is written before the value is made. Provenance is exposed
-        // because the interpreter walks from `entry` through the whole object.
+        // SAFETY: `begin_object` gave room for `len` units of 8 bytes, which `CodeObject::len` computed for
+        // exactly these constants and words; everything is written before the value is made. Provenance is
+        // exposed because the interpreter walks from `entry` through the whole object.
         unsafe {
             let constants = (&raw mut (*code).constants).cast::<Value>();
             let words = constants.add(nconsts).cast::<u32>();

@@ -4,8 +4,8 @@
 //! input, and at its end. Standard error is written at once, after the contents of standard output's buffer,
 //! so that both appear in the order of the program. Input is decoded as UTF-8; invalid bytes become U+FFFD.
 //!
-//! What a program prints is written as far as there is room. The rest stays in the buffer, and tasks that print
-//! more wait meanwhile; only the end of a run, and its reports, wait for the reader.
+//! What a program prints is written as far as there is room. The rest stays in the buffer, and tasks that
+//! print more wait meanwhile; only the end of a run, and its reports, wait for the reader.
 //!
 //! Guarantees: once nobody reads standard output any more, everything written to it is dropped, and
 //! [`Console::is_broken`] holds: the run ends quietly.

@@ -167,9 +167,9 @@ impl HostOperation {
         *state = OnCancel::Call(Box::new(function));
     }
 
-    /// Has `function` called with true when the task that has begun the operation is suspended, and with false
-    /// when it goes on; at once if it is suspended already. The machine waits for the function, so it should
-    /// only pass the message on; it may not ask this operation whether it is suspended.
+    /// Has `function` called with true when the task that has begun the operation is suspended, and with
+    /// false when it goes on; at once if it is suspended already. The machine waits for the function, so it
+    /// should only pass the message on; it may not ask this operation whether it is suspended.
     pub fn on_suspension(&self, mut function: impl FnMut(bool) + Send + 'static) {
         let mut suspension = self.canceller.lock_suspension();
         if suspension.is_suspended {

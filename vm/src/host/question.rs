@@ -50,7 +50,8 @@ impl Kept {
         Kept(Arc::new(KeptNumber { number, inbox }))
     }
 
-    /// Returns what a question to the machine with this inbox calls the value: nothing, if another one keeps it.
+    /// Returns what a question to the machine with this inbox calls the value: nothing, if another one keeps
+    /// it.
     pub fn callee(&self, inbox: &Inbox) -> FunctionRef {
         FunctionRef::Kept(if self.0.inbox.is_same(inbox) { self.0.number } else { u64::MAX })
     }

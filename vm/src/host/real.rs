@@ -158,7 +158,8 @@ fn with_descriptor<T>(output: Output, function: impl FnOnce(rustix::fd::Borrowed
     }
 }
 
-/// Waits until a write to an output stream would not wait, or for no time at all. Returns whether it would not.
+/// Waits until a write to an output stream would not wait, or for no time at all. Returns whether it would
+/// not.
 #[cfg(unix)]
 fn await_room(output: Output, waits: bool) -> bool {
     use rustix::event::{PollFd, PollFlags, Timespec, poll};

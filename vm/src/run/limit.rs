@@ -99,8 +99,8 @@ pub(super) fn charge_account(vm: &mut Vm, id: AccountId, measure: Measure, units
 /// Sees to it that the running task may take a unit more of a measure.
 ///
 /// # Errors
-/// [`Exit::Again`] if that is more than a quota allows: before the task does it again, the form with the quota
-/// ends. Where it cannot, as in a cleanup, the unit may be taken then.
+/// [`Exit::Again`] if that is more than a quota allows: before the task does it again, the form with the
+/// quota ends. Where it cannot, as in a cleanup, the unit may be taken then.
 pub(crate) fn admit(vm: &mut Vm, measure: Measure) -> Result<(), Exit> {
     let account = vm.scheduler.running_account();
     let Err(expired) = vm.scheduler.accounts.admit(account, measure) else { return Ok(()) };

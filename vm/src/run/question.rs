@@ -56,8 +56,8 @@ impl Vm {
         Kept::new(number, self.outside.inbox.clone())
     }
 
-    /// Returns the function that the outside calls so: a symbol, or a value that is kept. `None` if there is no
-    /// room for the symbol, or no such value.
+    /// Returns the function that the outside calls so: a symbol, or a value that is kept. `None` if there is
+    /// no room for the symbol, or no such value.
     pub fn callee(&mut self, callee: &FunctionRef) -> Option<Value> {
         let name = match callee {
             FunctionRef::Named(name) => name,

@@ -101,8 +101,8 @@ fn try_spawn(vm: &mut Vm, function: Value, arguments: &[Value]) -> Result<TaskId
 /// running task.
 ///
 /// # Errors
-/// [`Exit::Collect`] if there is no room for it, [`Exit::Again`] if it would be more than a quota allows, and a
-/// failure if it would belong to a form of a cleanup that is being cut off; then nothing has happened.
+/// [`Exit::Collect`] if there is no room for it, [`Exit::Again`] if it would be more than a quota allows, and
+/// a failure if it would belong to a form of a cleanup that is being cut off; then nothing has happened.
 pub(crate) fn make_task(
     vm: &mut Vm,
     function: Value,

@@ -24,8 +24,8 @@ pub(crate) mod slot {
     /// Mode in which the next block is written to the file: number of a `WriteMode`. For a channel 1 if
     /// nothing comes after what it has to read; for its output 1, since that is bounded.
     pub(crate) const MODE: usize = 6;
-    /// List of the full strings gathered before the buffer, the last first. For a channel what it is for: 1 for
-    /// reading, 2 for writing, otherwise both.
+    /// List of the full strings gathered before the buffer, the last first. For a channel what it is for: 1
+    /// for reading, 2 for writing, otherwise both.
     pub(crate) const FULL: usize = 7;
     /// Number of characters in the full strings. For a channel of those that were read and are not in the
     /// buffer any more.
