@@ -1426,7 +1426,8 @@ macro_rules! for_each_builtin {
             Taskp = task::taskp, internal "%TASKP" ("object");
             /// `:running`, `:waiting`, `:succeeded`, `:failed` or `:aborted`.
             TaskStatus = task::task_status, esl "TASK-STATUS" ("task");
-            /// The number of a task, and that of the task that made it; `NIL` when it has ended.
+            /// The number of a task, and that of the task that it belongs to: the one that made it, or, where that
+            /// has ended, the one that that belonged to. `NIL` when it has ended.
             TaskNumber = task::task_number, internal "%TASK-NUMBER" ("task");
             /// The ticks that a task has used; `NIL` when it has ended.
             TaskTicks = task::task_ticks, internal "%TASK-TICKS" ("task");

@@ -98,3 +98,20 @@ fn a_task_that_suspends_itself_stands_still_after_those_that_it_has_made() {
         &["((SUCCEEDED RESUMED) 1 0)"],
     );
 }
+
+#[test]
+fn a_task_whose_maker_has_ended_stands_still_with_the_maker_of_that() {
+    check_suspension(
+        "(let* ((count 0)
+                (task (spawn (spawn (spawn (go-on) (incf count)))
+                             (wait-until (= count 1)))))
+           (suspend-task task)
+           (let ((before count))
+             (go-on)
+             (unless (= before count) (princ 'moved)))
+           (resume-task task)
+           (wait-for-task task)
+           (princ (list count (left))))",
+        &["(1 0)"],
+    );
+}

@@ -9,7 +9,7 @@ use crate::schedule::{Amount, Measure, Scheduler};
 use crate::task::{DEFAULT_PRIORITY, PRIORITIES, TaskEnd, TaskIndex, TaskNumber, TaskState, guard};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::{WaitOptions, event};
+use crate::wait::{WaitOptions, event, lineage};
 
 use super::expect::exactly;
 
@@ -111,8 +111,9 @@ pub(super) fn task_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = expect_task(vm, arguments[0])?;
     let Some(index) = event::task_index(&vm.heap, task) else { return Ok(Value::NIL) };
     let number = vm.scheduler.find(index).map_or(TaskNumber::NONE, |task| task.number);
-    let parent = vm.heap.slot_or_nil(task, event::RESULT);
-    vm.give_values(&[Value::index(number.0 as usize), parent])
+    let owner = lineage::owner_of(&vm.heap, task, number);
+    let owner = if owner == TaskNumber::NONE { Value::NIL } else { Value::index(owner.0 as usize) };
+    vm.give_values(&[Value::index(number.0 as usize), owner])
 }
 
 pub(super) fn task_ticks(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -238,7 +238,7 @@ impl Walk<'_> {
                 let slots = vm.heap.record(v, Kind::Task).unwrap_or_default().to_vec();
                 let is_alive = slots[event::STATE].is_fixnum();
                 for (index, v) in slots.into_iter().enumerate() {
-                    // Where it is, and the number of its maker.
+                    // Where it is, and what it belongs to.
                     if !(is_alive && (index == event::STATE || index == event::RESULT)) {
                         self.value(v);
                     }

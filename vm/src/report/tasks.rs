@@ -11,7 +11,7 @@ use crate::interp::start::first_code_of;
 use crate::task::{Task, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::event;
+use crate::wait::lineage;
 
 /// Maximal number of tasks that a deadlock report names.
 const SHOWN: usize = 20;
@@ -101,8 +101,7 @@ impl Vm {
             .filter(|task| task.state != TaskState::Ended && !task.flags.hidden() && !task.flags.kept())
             .collect();
         tasks.sort_unstable_by_key(|task| task.number);
-        let maker =
-            |task: &Task| self.heap.slot_or_nil(task.object, event::RESULT).as_index().unwrap_or(0) as u64;
+        let maker = |task: &Task| lineage::owner_of(&self.heap, task.object, task.number).0;
         let depths = depths(tasks.iter().map(|task| (task.number.0, maker(task))));
         let mut text = String::new();
         for (position, depth) in depths.iter().take(SHOWN_IN_TREE) {

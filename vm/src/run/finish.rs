@@ -12,7 +12,7 @@ use crate::schedule::Measure;
 use crate::task::{AccountId, TaskEnd, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::event;
+use crate::wait::{event, lineage};
 
 /// Notes how the running task has ended, and tells whoever wants to know.
 pub(super) fn finish_task(vm: &mut Vm) {
@@ -31,6 +31,7 @@ pub(super) fn finish_task(vm: &mut Vm) {
     };
     let has_one_value = end == TaskEnd::Succeeded && values.len() == 1;
     vm.heap.set_aux(object, Kind::Task, u16::from(has_one_value));
+    lineage::end(&mut vm.heap, object, vm.scheduler.task().number);
     vm.heap.slot_set(object, event::RESULT, result);
     let status = match end {
         TaskEnd::Succeeded => vm.world.known.succeeded,

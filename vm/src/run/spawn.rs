@@ -12,7 +12,7 @@ use crate::schedule::{AccountOwner, Amount, Measure};
 use crate::task::{Bindings, DEFAULT_PRIORITY, Fund, Task, TaskId, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::event;
+use crate::wait::{event, lineage};
 
 /// Properties of a new task.
 #[derive(Clone, Copy, Debug)]
@@ -77,13 +77,15 @@ impl Vm {
         if task.state != TaskState::Ended {
             scheduler.counts.alive -= 1;
             scheduler.counts.foreground -= usize::from(!task.flags.daemon());
-            let (object, wait, account) = (task.object, task.wait, task.account);
+            let (object, wait, account, number) = (task.object, task.wait, task.account, task.number);
             let hidden = task.flags.hidden();
             scheduler.close_wait(&mut self.heap, wait);
             if !hidden {
                 scheduler.accounts.give_back(account, Measure::Tasks);
             }
             scheduler.accounts.leave(account);
+            lineage::end(&mut self.heap, object, number);
+            self.heap.slot_set(object, event::RESULT, Value::NIL);
             self.heap.slot_set(object, event::STATE, self.world.known.aborted);
         }
         if let Some(mut task) = self.scheduler.tasks.remove(id) {
@@ -124,8 +126,9 @@ pub(crate) fn make_task(
     slots[event::NAME] = options.name;
     slots[event::COUNT] = Value::small(0);
     // A service belongs to nobody, so it is not suspended with its maker.
-    slots[event::RESULT] =
-        maker.filter(|_| !options.is_service).map_or(Value::NIL, |task| Value::index(task.number.0 as usize));
+    if let Some(maker) = maker.filter(|_| !options.is_service) {
+        slots[event::RESULT] = lineage::node_of(heap, maker.object, maker.number)?;
+    }
     let object = heap.alloc_record(Kind::Task, 0, 0, &slots)?;
     let mut task = scheduler.tasks.make(object, words);
     interp::start::first_frame(heap, &mut task, scheduler.starter, function, arguments);

@@ -6,6 +6,7 @@
 //! operation | as an event | state | result | progress | number | performer |
 //! input | as an event | first kept | last kept | size | capacity | rule | dropped | room |
 //! link  | owner | event | previous | next | more | queue | deadline |
+//! node  | number, or NIL | node of the maker |
 //! ```
 //!
 //! Guarantees: to look at a count and to begin to wait is one step; a wait that has ended is in no list. A
@@ -16,6 +17,7 @@
 mod delivery;
 pub(crate) mod event;
 pub(crate) mod input;
+pub(crate) mod lineage;
 pub(crate) mod link;
 pub(crate) mod operation;
 

@@ -1,0 +1,129 @@
+//! The tree of tasks: which task belongs to which.
+//!
+//! A task belongs to the one that has made it; when that one ends, to the one that that one belonged to, and
+//! so on. So those that an ended task has made are still of the tree of its maker.
+//!
+//! A task that has made others has a *node*: a cons of its number and the node of its maker. When it ends, the
+//! number gives way to `NIL`, and the node, which the tasks that it has made know it by, is all that is kept of
+//! it. Nodes of ended tasks are skipped for good when they are met, so endless chains of tasks each of which
+//! makes the next one take no room: what is left of the ended ones is no more than there were alive at a time.
+
+use super::event;
+use crate::heap::{AllocError, Heap};
+use crate::task::TaskNumber;
+use crate::value::Value;
+
+/// Most nodes of ended tasks that are skipped in one step.
+const AT_ONCE: usize = 1000;
+
+/// Returns the node of a task that is about to make another, a new one if it has none.
+///
+/// # Errors
+/// As for every allocation; then nothing has happened.
+pub(crate) fn node_of(heap: &mut Heap, task: Value, number: TaskNumber) -> Result<Value, AllocError> {
+    let node = heap.slot_or_nil(task, event::RESULT);
+    let own = Value::index(number.0 as usize);
+    if heap.as_cons(node).is_some_and(|pair| pair.car == own) {
+        return Ok(node);
+    }
+    let new = heap.cons(own, node)?;
+    heap.slot_set(task, event::RESULT, new);
+    Ok(new)
+}
+
+/// Notes in the tree that a task ends. Its node has to be in its place still.
+pub(crate) fn end(heap: &mut Heap, task: Value, number: TaskNumber) {
+    let node = heap.slot_or_nil(task, event::RESULT);
+    let Some(pair) = heap.as_cons(node) else { return };
+    if pair.car == Value::index(number.0 as usize) {
+        heap.set_car(node, Value::NIL);
+        skip_ended(heap, node);
+    }
+}
+
+/// Has nodes of ended tasks, from `node` on, lead to that of a task that lives, or as far towards it as one
+/// step goes.
+fn skip_ended(heap: &mut Heap, node: Value) {
+    let mut end = node;
+    for _ in 0..AT_ONCE {
+        match heap.as_cons(end) {
+            Some(pair) if pair.car.is_nil() => end = pair.cdr,
+            _ => break,
+        }
+    }
+    let mut rest = node;
+    while rest != end
+        && let Some(pair) = heap.as_cons(rest)
+    {
+        heap.set_cdr(rest, end);
+        rest = pair.cdr;
+    }
+}
+
+/// Returns the number of the task that a living task belongs to; [`TaskNumber::NONE`] if that is none.
+pub(crate) fn owner_of(heap: &Heap, task: Value, number: TaskNumber) -> TaskNumber {
+    let own = Value::index(number.0 as usize);
+    let mut node = heap.slot_or_nil(task, event::RESULT);
+    while let Some(pair) = heap.as_cons(node) {
+        if pair.car.is_true() && pair.car != own {
+            return TaskNumber(pair.car.as_index().unwrap_or(0) as u64);
+        }
+        node = pair.cdr;
+    }
+    TaskNumber::NONE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::heap::Kind;
+    use crate::trust::heap_for_tests;
+
+    fn task(heap: &mut Heap, node: Value) -> Value {
+        let mut slots = [Value::NIL; event::TASK_LENGTH];
+        slots[event::RESULT] = node;
+        heap.alloc_record(Kind::Task, 0, 0, &slots).unwrap()
+    }
+
+    fn length(heap: &Heap, mut node: Value) -> usize {
+        let mut length = 0;
+        while let Some(pair) = heap.as_cons(node) {
+            length += 1;
+            node = pair.cdr;
+        }
+        length
+    }
+
+    #[test]
+    fn a_task_whose_maker_has_ended_belongs_to_the_maker_of_that() {
+        let mut heap = heap_for_tests();
+        let first = task(&mut heap, Value::NIL);
+        let node = node_of(&mut heap, first, TaskNumber(1)).unwrap();
+        assert_eq!(node_of(&mut heap, first, TaskNumber(1)).unwrap(), node);
+        let second = task(&mut heap, node);
+        let node = node_of(&mut heap, second, TaskNumber(2)).unwrap();
+        let third = task(&mut heap, node);
+        assert_eq!(owner_of(&heap, third, TaskNumber(3)), TaskNumber(2));
+        end(&mut heap, second, TaskNumber(2));
+        assert_eq!(owner_of(&heap, third, TaskNumber(3)), TaskNumber(1));
+        end(&mut heap, first, TaskNumber(1));
+        assert_eq!(owner_of(&heap, third, TaskNumber(3)), TaskNumber::NONE);
+    }
+
+    #[test]
+    fn a_chain_of_tasks_keeps_no_more_nodes_than_are_alive_at_a_time() {
+        let mut heap = heap_for_tests();
+        let mut alive = std::collections::VecDeque::new();
+        alive.push_back((task(&mut heap, Value::NIL), TaskNumber(1)));
+        for number in 2..1000 {
+            let &(last, its) = alive.back().unwrap();
+            let node = node_of(&mut heap, last, its).unwrap();
+            alive.push_back((task(&mut heap, node), TaskNumber(number)));
+            if alive.len() > 10 {
+                let (first, its) = alive.pop_front().unwrap();
+                end(&mut heap, first, its);
+            }
+            assert!(length(&heap, node) < 30);
+        }
+    }
+}
