@@ -1,5 +1,5 @@
-//! The examples of the manual, `docs/manual/*.md`, and of `README.md`, run by the commands;
-//! `conformance/src/chapter.rs` describes their form.
+//! The examples of the manual, of the cookbook, of the pages for those who come from another language, and of
+//! `README.md`, run by the commands; `conformance/src/chapter.rs` describes their form.
 
 use std::path::Path;
 use std::process::Command;
@@ -16,20 +16,23 @@ fn main() {
     let arguments = Arguments::from_args();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut paths = vec![root.join("README.md")];
-    for entry in std::fs::read_dir(root.join("docs/manual")).expect("the manual is there") {
-        paths.push(entry.expect("the folder of the manual can be read").path());
+    for folder in ["docs/manual", "docs/cookbook", "docs/coming-from"] {
+        for entry in std::fs::read_dir(root.join(folder)).expect("the documentation is there") {
+            paths.push(entry.expect("the folder can be read").path());
+        }
     }
     let mut trials = Vec::new();
     for path in paths {
         if path.extension().is_some_and(|extension| extension == "md") {
-            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            trials.push(Trial::test(name, move || check(&std::fs::read_to_string(&path)?)));
+            let name = path.strip_prefix(root).unwrap_or(&path).with_extension("").display().to_string();
+            let chapter = name.clone();
+            trials.push(Trial::test(name, move || check(&chapter, &std::fs::read_to_string(&path)?)));
         }
     }
     libtest_mimic::run(&arguments, trials).exit();
 }
 
-fn check(markdown: &str) -> Result<(), Failed> {
+fn check(name: &str, markdown: &str) -> Result<(), Failed> {
     let mut program = String::new();
     let mut outputs: Vec<(usize, Option<String>)> = Vec::new();
     for (line, example) in examples(markdown)? {
@@ -63,6 +66,14 @@ fn check(markdown: &str) -> Result<(), Failed> {
         let plain: String =
             found.lines().filter(|line| !line.is_empty()).flat_map(|line| [line, "\n"]).collect();
         compare(expected, &plain).map_err(|text| format!("the program on line {line}: {text}"))?;
+    }
+    if program.contains("(deftest ") {
+        let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}.esl", name.replace('/', "-")));
+        std::fs::write(&file, &program)?;
+        let told = eslvm(&["test", &file.to_string_lossy()], "")?;
+        if !told.trim_end().ends_with(" 0 failed") {
+            return Err(told.into());
+        }
     }
     Ok(())
 }

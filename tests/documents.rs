@@ -1,0 +1,133 @@
+//! The documents hang together: each link among them leads to a file and a heading that exist, and the contents of
+//! the site, `docs/SUMMARY.md`, have every page.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+/// Folders of documents; `docs` and `examples` with all that is below them.
+const FOLDERS: [&str; 12] = [
+    "",
+    "benches",
+    "bytecode",
+    "compiler",
+    "conformance",
+    "docs",
+    "examples",
+    "fuzz",
+    "heap",
+    "stdlib",
+    "vm",
+    "world",
+];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Adds the documents of a folder, with their texts, by their paths from the root.
+fn collect(folder: &Path, is_deep: bool, found: &mut BTreeMap<PathBuf, String>) {
+    for entry in fs::read_dir(root().join(folder)).expect("the folder can be listed") {
+        let name = entry.expect("the folder can be listed").file_name();
+        let path = folder.join(name);
+        if root().join(&path).is_dir() {
+            if is_deep {
+                collect(&path, true, found);
+            }
+        } else if path.extension().is_some_and(|extension| extension == "md") {
+            let text = fs::read_to_string(root().join(&path)).expect("the document can be read");
+            found.insert(path, text);
+        }
+    }
+}
+
+fn documents() -> BTreeMap<PathBuf, String> {
+    let mut found = BTreeMap::new();
+    for folder in FOLDERS {
+        collect(Path::new(folder), folder == "docs" || folder == "examples", &mut found);
+    }
+    found
+}
+
+/// Returns the lines of a document that are no part of a block of code.
+fn prose(text: &str) -> impl Iterator<Item = &str> {
+    let mut is_code = false;
+    text.lines().filter(move |line| {
+        let is_fence = line.starts_with("```");
+        is_code ^= is_fence;
+        !is_code && !is_fence
+    })
+}
+
+/// Returns the anchors of the headings of a document, as GitHub and mdBook make them.
+fn anchors(text: &str) -> BTreeSet<String> {
+    let headings = prose(text).filter(|line| line.starts_with('#'));
+    let words = headings.map(|line| line.trim_start_matches('#').trim().to_lowercase());
+    let kept = words.map(|words| {
+        let kept = words.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
+        kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+    });
+    kept.collect()
+}
+
+/// Returns the targets of the links of a document.
+fn links(text: &str) -> Vec<&str> {
+    let mut found = Vec::new();
+    for line in prose(text) {
+        // What is in backticks is no link.
+        for part in line.split('`').step_by(2) {
+            found.extend(
+                part.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(link, _)| link),
+            );
+        }
+    }
+    found.retain(|link| !link.contains("://"));
+    found
+}
+
+/// Returns the path that a link of a document leads to, from the root.
+fn target(document: &Path, link: &str) -> PathBuf {
+    let mut path = document.parent().unwrap_or(Path::new("")).to_path_buf();
+    for component in Path::new(link).components() {
+        match component {
+            Component::ParentDir => drop(path.pop()),
+            Component::Normal(name) => path.push(name),
+            _ => {}
+        }
+    }
+    path
+}
+
+#[test]
+fn every_link_leads_somewhere() {
+    let documents = documents();
+    let mut dead = Vec::new();
+    for (document, text) in &documents {
+        for link in links(text) {
+            let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let path = if file.is_empty() { document.clone() } else { target(document, file) };
+            let is_there = root().join(&path).exists()
+                && (anchor.is_empty()
+                    || documents.get(&path).is_some_and(|text| anchors(text).contains(anchor)));
+            if !is_there {
+                dead.push(format!("{}: {link}", document.display()));
+            }
+        }
+    }
+    assert!(documents.len() > 50 && dead.is_empty(), "{}", dead.join("\n"));
+}
+
+#[test]
+fn the_contents_of_the_site_have_every_page() {
+    let documents = documents();
+    let contents = Path::new("docs/SUMMARY.md");
+    let listed: BTreeSet<PathBuf> =
+        links(&documents[contents]).into_iter().map(|link| target(contents, link)).collect();
+    let pages: BTreeSet<PathBuf> = documents
+        .into_keys()
+        .filter(|path| path.starts_with("docs") || path.starts_with("examples"))
+        .filter(|path| path != contents)
+        .collect();
+    let missing: Vec<_> = pages.difference(&listed).collect();
+    assert!(missing.is_empty(), "docs/SUMMARY.md leaves out {missing:?}");
+}
