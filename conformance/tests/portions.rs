@@ -44,6 +44,7 @@ struct Course {
     output: String,
     ticks: u64,
     canary: u64,
+    fingerprint: Option<u128>,
 }
 
 /// Runs a program in portions as `next` says, then to its end.
@@ -59,8 +60,12 @@ fn course(program: &Program, config: &Config, mut next: impl FnMut() -> Option<u
             outcome => break outcome,
         }
     };
+    // Where a budget ends a turn, how the scheduler notes that may depend on the portion; what follows does not.
+    let fingerprint = (outcome != RunOutcome::BudgetSpent).then(|| machine.fingerprint());
+    machine.end_run();
     machine.flush();
-    Course { outcome, output: captured.output(), ticks: machine.ticks(), canary: machine.canary() }
+    let (ticks, canary) = (machine.ticks(), machine.canary());
+    Course { outcome, output: captured.output(), ticks, canary, fingerprint }
 }
 
 fn check(text: &str, config: &Config, portions: &[u64]) {
@@ -71,6 +76,7 @@ fn check(text: &str, config: &Config, portions: &[u64]) {
     assert_eq!(parts.output, whole.output, "portions {portions:?} of {text}");
     assert_eq!((parts.outcome, parts.ticks), (whole.outcome, whole.ticks), "portions {portions:?} of {text}");
     assert_eq!(parts.canary, whole.canary, "portions {portions:?} of {text}");
+    assert_eq!(parts.fingerprint, whole.fingerprint, "portions {portions:?} of {text}");
 }
 
 #[test]

@@ -31,7 +31,7 @@ pub struct Stack {
 }
 
 // The words behind `start` are the run's, their address is the process's.
-list_state! { Stack { start: Run, capacity: Run, scan: Derived } }
+list_state! { Stack { start: Visited, capacity: Run, scan: Derived } }
 
 // SAFETY: a stack owns its segment; the values in it belong to the heap of the machine that owns the stack.
 unsafe impl Send for Stack {}

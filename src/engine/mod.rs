@@ -260,6 +260,12 @@ impl Engine {
         left
     }
 
+    /// Returns the strict fingerprint of the state between two turns: of everything that decides how the run
+    /// goes on. Takes a time in proportion to the state, and changes nothing.
+    pub fn fingerprint(&self) -> u128 {
+        self.machine.fingerprint()
+    }
+
     /// Returns the canary of the run so far: a hash of the turns of its tasks and of the questions to its
     /// host. Runs are compared by it: a recorded one and its replay have the same.
     pub fn canary(&self) -> u64 {

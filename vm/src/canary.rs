@@ -3,9 +3,13 @@
 //! A canary is mixed from what the machine has done so far, not from its state, so that it costs a few
 //! instructions a turn. Two runs of one program by different courses have different canaries, but for chance.
 
+use esl_heap::list_state;
+
 /// Hash of a sequence of words.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Canary(u64);
+
+list_state! { Canary { 0: Run } }
 
 impl Canary {
     /// Mixes in a word.

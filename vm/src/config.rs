@@ -1,5 +1,7 @@
 //! Limits and settings of a virtual machine.
 
+use esl_heap::list_state;
+
 /// Ticks that a cleanup may take once an abort or an expired limit is pending.
 const CLEANUP_TICKS: u64 = 1_000_000;
 /// Nanoseconds that it may take then.
@@ -31,6 +33,18 @@ pub struct Config {
     /// Nanoseconds that it may take then.
     pub cleanup_time: u64,
 }
+
+list_state! { Config {
+    memory: Run,
+    stack: Run,
+    slice: Run,
+    budget: Run,
+    seed: Run,
+    collect_always: Run,
+    critical_ticks: Run,
+    cleanup_ticks: Run,
+    cleanup_time: Run,
+} }
 
 impl Config {
     /// Default limits and settings.

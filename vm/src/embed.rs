@@ -6,6 +6,7 @@ use std::fmt;
 use esl_bytecode::datum::Datum;
 
 use crate::builtins::NATIVES;
+use crate::canary::Canary;
 use crate::compiler::Compilations;
 use crate::config::Config;
 use crate::cpu::Cpu;
@@ -210,11 +211,13 @@ impl Vm {
         self.spawn(function, arguments).map_err(|_| LibraryError::NoMemory)
     }
 
-    /// Sets limits and settings from here on, except the limit of memory. Ticks are counted anew.
+    /// Sets limits and settings from here on, except the limit of memory. Ticks are counted anew, and the
+    /// canary of turns begins.
     pub fn begin_program(&mut self, config: Config) {
         self.config = Config { memory: self.config.memory, ..config };
         self.scheduler.choices = Choices::seeded(self.config.seed);
         self.scheduler.spent = 0;
+        self.scheduler.canary = Canary::default();
         (
             self.scheduler.clock.looked_at,
             self.scheduler.clock.moved_at,

@@ -7,14 +7,21 @@
 //!   The list makes a trait with a method for each of these fields, which whoever visits a state implements:
 //!   a field that is not visited does not compile either.
 //! * `course`: state of the run that says how it came here, and decides when things happen: ticks, numbers,
-//!   the order of queues. It is saved and compared strictly, but two states that differ here only are one to
-//!   the explorer.
+//!   the order of queues. Two states that differ here only are one to the explorer; the strict fingerprint is
+//!   made of it too, as the list tells it, by the function behind `by` if there is one.
 //! * `parts`: made of structs that are listed themselves.
 //! * `transient`: without meaning while no task runs. A state is one between two turns.
 //! * `derived`: follows from other fields, and is kept to save time.
 //! * `process`: belongs to the process: an address, a handle, a setting of those who watch.
 
+use std::cell::Cell;
+use std::collections::BTreeMap;
+
+use esl_bytecode::compile::SourcePlace;
+use esl_bytecode::package::{PackageId, Packages};
+use esl_bytecode::symbol::Symbol;
 use esl_heap::list_state;
+use esl_heap::state::{StateSink, Stated};
 
 use crate::compiler::Compilations;
 use crate::embedder::Embedder;
@@ -23,23 +30,30 @@ use crate::observe::{Figures, Observers, Watch};
 use crate::outside::{Operations, Outside};
 use crate::schedule::{Accounts, Clock, Counts, EndOfAll, Points, RunQueues, Scheduler, Timers, Turn};
 use crate::task::{Control, Extra, RunningCleanup, Task};
+use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::Deliveries;
-use crate::world::World;
+use crate::world::{GivenMap, World};
+
+/// What those who visit content do with the course: the fields that tell themselves.
+pub(crate) trait VisitCourse {
+    /// Visits the course of a struct.
+    fn course(&mut self, whole: &dyn Stated);
+}
 
 /// Lists the fields of a struct by groups, and declares the trait of those who visit its content.
 macro_rules! state {
     ($(#[$doc:meta])* $owner:ident by $visitor:ident :: $visit:ident {
         content { $($content:ident),* $(,)? }
-        $(course { $($course:ident),* $(,)? })?
+        $(course { $($course:ident $(by $by:expr)?),* $(,)? })?
         $(parts { $($part:ident),* $(,)? })?
         $(transient { $($transient:ident),* $(,)? })?
         $(derived { $($derived:ident),* $(,)? })?
         $(process { $($process:ident),* $(,)? })?
     }) => {
         list_state! { $owner {
-            $($content: Run,)*
-            $($($course: Run,)*)?
+            $($content: Visited,)*
+            $($($course: Run $(by $by)?,)*)?
             $($($part: Parts,)*)?
             $($($transient: Derived,)*)?
             $($($derived: Derived,)*)?
@@ -47,15 +61,16 @@ macro_rules! state {
         } }
 
         $(#[$doc])*
-        pub(crate) trait $visitor {
+        pub(crate) trait $visitor: VisitCourse {
             $(
                 #[doc = concat!("Visits the field `", stringify!($content), "`.")]
                 fn $content(&mut self, whole: &$owner);
             )*
 
-            /// Visits the content, in the order of the list.
+            /// Visits the content, in the order of the list, and then the course.
             fn $visit(&mut self, whole: &$owner) {
                 $(self.$content(whole);)*
+                self.course(whole);
             }
         }
     };
@@ -77,8 +92,8 @@ state! {
     Scheduler by VisitScheduler :: scheduler_content {
         content { tasks, timers }
         course {
-            choices, readers, writers, end_of_all, main, main_number, serial, spent, rounds, is_paused, canary, open_turn, any_event,
-            starter,
+            choices, readers, writers, end_of_all, main, main_number, serial, spent, rounds, is_paused, canary,
+            open_turn, any_event, starter,
         }
         parts { queues, accounts, deliveries, counts, clock, points, turn }
         transient { running }
@@ -89,7 +104,7 @@ state! {
     /// Visits the content of a task.
     Task by VisitTask :: task_content {
         content { flags, priority, critical, state, wait, notify, stack, control, account, extra }
-        course { object, ticks, serial, number, turns, pc, base }
+        course { object, ticks, serial, number, turns, pc by nothing, base }
         derived { scanned, counted }
     }
 }
@@ -121,7 +136,15 @@ state! {
     /// Visits the content of a world of names.
     World by VisitWorld :: world_content {
         content { symbols }
-        course { fresh, packages, package_objects, classes, is_open, images, undefined_yet }
+        course {
+            fresh by tell_fresh,
+            packages by tell_packages,
+            package_objects by tell_objects,
+            classes by tell_count,
+            is_open,
+            images,
+            undefined_yet by tell_symbols,
+        }
         transient { is_defining }
         derived { known, names, homes, runner, streams, nil, t, rights, undefined }
     }
@@ -143,6 +166,38 @@ state! {
         course { senders }
         transient { answer }
         process { host, inbox, functions, complaints }
+    }
+}
+
+/// The frames of a task tell where it is.
+fn nothing<T>(_: &T, _: &mut dyn StateSink) {}
+
+fn tell_fresh(fresh: &Cell<u32>, sink: &mut dyn StateSink) {
+    sink.word(u64::from(fresh.get()));
+}
+
+/// Packages are made and changed by the program only, so that what they take tells them apart well enough.
+fn tell_packages(packages: &Packages, sink: &mut dyn StateSink) {
+    sink.word(packages.bytes() as u64);
+}
+
+fn tell_objects(objects: &BTreeMap<PackageId, Value>, sink: &mut dyn StateSink) {
+    objects.values().for_each(|&object| sink.value(object));
+}
+
+/// The classes themselves are reached from their names.
+fn tell_count(classes: &GivenMap<u64, Value>, sink: &mut dyn StateSink) {
+    sink.word(classes.len() as u64);
+}
+
+fn tell_symbols(symbols: &[Symbol], sink: &mut dyn StateSink) {
+    symbols.iter().for_each(|symbol| symbol.name().as_bytes().tell(sink));
+}
+
+fn tell_place(place: &Option<SourcePlace>, sink: &mut dyn StateSink) {
+    if let Some(SourcePlace { source, line, column }) = place {
+        source.tell(sink);
+        (*line, *column).tell(sink);
     }
 }
 
@@ -184,7 +239,7 @@ list_state! { Embedder {
     is_ending: Run,
     is_cut_short: Run,
     last_words: Run,
-    last_place: Run,
+    last_place: Run by tell_place,
 } }
 list_state! { Watch { is_watched: Derived, observers: Process, coming: Process, figures: Process, traces_tasks: Process } }
 list_state! { Observers {

@@ -84,11 +84,11 @@ pub(super) struct Region {
 
 list_state! {
     Region {
-        next: Run,
-        end: Run,
-        hole_end: Run,
-        counted: Run,
-        black_from: Run,
+        next: Address,
+        end: Address,
+        hole_end: Address,
+        counted: Address,
+        black_from: Address,
         scan: Run,
         cursor: Run,
         fresh: Run,

@@ -18,6 +18,7 @@
 use super::layout::GRANULE;
 use super::metadata::{self, SweepCounts};
 use crate::list_state;
+use crate::state::StateSink;
 use std::alloc::{Layout, alloc, dealloc};
 use std::ops::Range;
 use std::ptr::NonNull;
@@ -68,7 +69,7 @@ pub(super) struct BlockInfo {
 }
 
 list_state! { ArenaHeader { number: Derived, grays: Derived } }
-list_state! { BlockInfo { state: Run, counts: Parts } }
+list_state! { BlockInfo { state: Run by |&state: &BlockState, sink: &mut dyn StateSink| sink.word(state as u64), counts: Parts } }
 
 impl BlockInfo {
     const EMPTY: BlockInfo = BlockInfo {
@@ -89,7 +90,7 @@ pub(super) struct Arena {
 }
 
 // The objects and metadata behind `base` are the run's, their address is the process's.
-list_state! { Arena { base: Run, blocks: Parts } }
+list_state! { Arena { base: Visited, blocks: Parts } }
 
 impl Arena {
     /// Creates an arena with empty blocks; `None` if the system has no memory.

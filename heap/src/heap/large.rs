@@ -11,6 +11,7 @@
 use super::arena::LARGE;
 use super::layout::{GRANULE, Header};
 use crate::list_state;
+use crate::state::{StateSink, Stated};
 use std::alloc::{Layout, alloc, dealloc, realloc};
 use std::ptr::NonNull;
 
@@ -59,7 +60,12 @@ pub(super) const fn is_large(bytes: usize) -> bool {
 pub(super) struct LargeObject(NonNull<LargeHeader>);
 
 // The header and the object are the run's, their address is the process's.
-list_state! { LargeObject { 0: Parts } }
+list_state! { LargeObject { 0: Parts by tell_header } }
+
+fn tell_header(header: &NonNull<LargeHeader>, sink: &mut dyn StateSink) {
+    // SAFETY: the header lives as long as the object that owns it, which the caller borrows.
+    unsafe { header.as_ref() }.tell(sink);
+}
 
 impl LargeObject {
     /// Allocates memory for an object of `bytes`; `None` if the system has none.

@@ -67,6 +67,7 @@ pub use layout::Kind;
 pub use object::CodeParts;
 
 use crate::list_state;
+use crate::state::StateSink;
 use crate::value::{TAG_MASK, Value};
 use alloc::Region;
 use arena::{ARENA, Arena};
@@ -211,7 +212,7 @@ list_state! {
         marking: Derived,
         due: Derived,
         reserve_open: Run,
-        phase: Run,
+        phase: Run by |&phase: &Phase, sink: &mut dyn StateSink| sink.word(phase as u64),
         epoch: Run,
         cycle_id: Run,
         pacing: Parts,
@@ -333,6 +334,15 @@ impl Heap {
             let arena = u64::from((*arena::header_of(mark::address_of(v))).number);
             arena * ARENA as u64 + v.bits() % ARENA as u64
         }
+    }
+
+    /// Returns a number for an address in an arena, or behind its last object, that is the same in every run
+    /// of the same program; 0 for any other address.
+    pub fn place(&self, address: usize) -> u64 {
+        let inside = address.saturating_sub(1);
+        let holds = |arena: &Arena| std::ptr::from_ref(arena.header()).addr() == inside & !(ARENA - 1);
+        let number = self.arenas.iter().position(|arena| arena.as_ref().is_some_and(holds));
+        number.map_or(0, |number| (number * ARENA + inside % ARENA) as u64 + 1)
     }
 
     /// Returns the figures of this heap.

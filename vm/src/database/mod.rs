@@ -95,14 +95,14 @@ pub(crate) struct Database {
 }
 
 list_state! { Database {
-    terms: Run,
-    relations: Run,
+    terms: Visited,
+    relations: Visited,
     by_name: Derived,
-    rules: Run,
+    rules: Visited,
     time: Run,
     facts: Derived,
     bytes: Derived,
-    queries: Run,
+    queries: Visited,
     serial: Run,
     ended: Derived,
     unlinked: Derived,

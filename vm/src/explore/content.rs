@@ -9,8 +9,8 @@ use crate::outside::Outside;
 use crate::schedule::{Due, Scheduler};
 use crate::shape::Sort;
 use crate::state::{
-    VisitCompiler, VisitControl, VisitExtra, VisitOutside, VisitRunning, VisitScheduler, VisitTask, VisitVm,
-    VisitWorld,
+    VisitCompiler, VisitControl, VisitCourse, VisitExtra, VisitOutside, VisitRunning, VisitScheduler,
+    VisitTask, VisitVm, VisitWorld,
 };
 use crate::task::{Allowance, Control, Entry, Extra, RunningCleanup, Task, TaskState};
 use crate::value::Value;
@@ -28,6 +28,7 @@ impl VisitVm for Walk<'_> {
     }
 
     fn database(&mut self, vm: &Vm) {
+        self.course(&vm.database);
         if !vm.database.is_quiet() {
             // Where a query stands is not looked into.
             self.unlike_any_other();
@@ -48,9 +49,11 @@ impl VisitVm for Walk<'_> {
 }
 
 impl VisitScheduler for Walk<'_> {
-    fn tasks(&mut self, _: &Scheduler) {
+    fn tasks(&mut self, scheduler: &Scheduler) {
+        self.course(&scheduler.tasks);
         let all = self.vm.scheduler.tasks.iter();
-        let mut tasks: Vec<&Task> = all.filter(|task| task.state != TaskState::Ended).collect();
+        let is_strict = self.is_strict;
+        let mut tasks: Vec<&Task> = all.filter(|task| is_strict || task.state != TaskState::Ended).collect();
         tasks.sort_unstable_by_key(|task| task.number);
         self.word(tasks.len() as u64);
         for task in &tasks {
@@ -67,7 +70,7 @@ impl VisitScheduler for Walk<'_> {
     fn timers(&mut self, scheduler: &Scheduler) {
         for timer in scheduler.timers.in_order() {
             let Some(task) = scheduler.tasks.at(timer.index) else { continue };
-            if !scheduler.is_wanted(timer) {
+            if self.is_strict || !scheduler.is_wanted(timer) {
                 continue;
             }
             self.time(timer.time);
@@ -111,6 +114,7 @@ impl VisitTask for Walk<'_> {
     }
 
     fn stack(&mut self, task: &Task) {
+        self.course(&task.stack);
         self.frames(task);
     }
 
@@ -137,6 +141,7 @@ impl VisitExtra for Walk<'_> {
     fn limits(&mut self, extra: &Extra) {
         self.word(extra.limits.len() as u64);
         for limit in &extra.limits {
+            self.course(limit);
             self.word(u64::from(limit.entry));
             self.value(limit.expired.unwrap_or(Value::NIL));
         }
@@ -147,6 +152,7 @@ impl VisitExtra for Walk<'_> {
     }
 
     fn fund(&mut self, extra: &Extra) {
+        self.course(&extra.fund);
         match extra.fund {
             Some(fund) => {
                 self.word(fund.depth as u64);
@@ -200,6 +206,7 @@ impl VisitRunning for Walk<'_> {
     }
 
     fn allowance(&mut self, running: &RunningCleanup) {
+        self.course(&running.allowance);
         match running.allowance {
             Some(Allowance::OVER) => self.word(1),
             Some(allowance) => self.time(allowance.time),
@@ -252,10 +259,12 @@ impl VisitOutside for Walk<'_> {
     }
 
     fn console(&mut self, outside: &Outside) {
+        self.course(&outside.console);
         self.word(outside.console.noted());
     }
 
     fn operations(&mut self, outside: &Outside) {
+        self.course(&outside.operations);
         for open in outside.operations.open.values() {
             self.value(open.handle);
             self.word(u64::from(open.is_cancelled));

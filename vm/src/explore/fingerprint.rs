@@ -10,15 +10,21 @@
 //! state: ticks (but for budgets), the numbers of tasks, the order of queues, registers that will not be read
 //! (`live`), what is reachable from code only, and the outside. While a query or a compilation is under way
 //! at a point, the state equals no other.
+//!
+//! A *strict* fingerprint is of all that the list calls state of the run: ticks, numbers, the order of
+//! queues, times as they are, all registers, the collector's state, and where objects lie. Two runs that agree
+//! in it go on alike to the tick, and it says so of a run and its replay, in other processes too.
 
 use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::live::Live;
+use esl_heap::state::{StateSink, Stated};
+
 use crate::heap::{Heap, Kind};
 use crate::interp::frames::Frames;
 use crate::shape::{Shape, Sort};
-use crate::state::VisitVm;
+use crate::state::{VisitCourse, VisitVm};
 use crate::table::Table;
 use crate::task::{Task, TaskEnd, UnwindTarget, Unwinding};
 use crate::value::Value;
@@ -78,6 +84,10 @@ impl Fingerprints {
             self.codes.clear();
         }
         let now = vm.scheduler.clock.read(&mut vm.outside.host);
+        self.walk(vm, now, false)
+    }
+
+    fn walk(&mut self, vm: &Vm, now: u64, is_strict: bool) -> u128 {
         let mut walk = Walk {
             vm,
             known: self,
@@ -87,6 +97,7 @@ impl Fingerprints {
             next: 0,
             now,
             task: None,
+            is_strict,
         };
         walk.machine(walk.vm);
         while let Some(&object) = walk.met.get(walk.next) {
@@ -94,6 +105,14 @@ impl Fingerprints {
             walk.object(object);
         }
         walk.digest.bits()
+    }
+}
+
+impl Vm {
+    /// Returns the strict fingerprint of the state between two portions of a run: of all that decides how the
+    /// run goes on, and how it came here. It does not depend on addresses, and changes nothing.
+    pub fn fingerprint(&self) -> u128 {
+        Fingerprints::default().walk(self, 0, true)
     }
 }
 
@@ -117,6 +136,30 @@ pub(super) struct Walk<'a> {
     now: u64,
     /// The task that is being visited.
     pub(super) task: Option<&'a Task>,
+    /// Whether the course belongs to the fingerprint.
+    pub(super) is_strict: bool,
+}
+
+impl StateSink for Walk<'_> {
+    fn word(&mut self, word: u64) {
+        self.digest.add(word);
+    }
+
+    fn value(&mut self, v: Value) {
+        Walk::value(self, v);
+    }
+
+    fn address(&mut self, address: usize) {
+        self.digest.add(self.vm.heap.place(address));
+    }
+}
+
+impl VisitCourse for Walk<'_> {
+    fn course(&mut self, whole: &dyn Stated) {
+        if self.is_strict {
+            whole.tell(self);
+        }
+    }
 }
 
 impl Walk<'_> {
@@ -138,6 +181,9 @@ impl Walk<'_> {
         let number = *self.numbers.entry(v.bits()).or_insert(next);
         if number == next {
             self.met.push(v);
+            if self.is_strict {
+                self.word(self.vm.heap.identity(v));
+            }
         }
         self.word(1);
         self.word(u64::from(number));
@@ -171,7 +217,7 @@ impl Walk<'_> {
             }
             is_innermost = false;
             for (register, &v) in frame.registers().iter().enumerate() {
-                if registers.contains(register) {
+                if registers.contains(register) || self.is_strict {
                     self.word(register as u64);
                     self.value(v);
                 }
@@ -239,7 +285,7 @@ impl Walk<'_> {
                 let is_alive = slots[event::STATE].is_fixnum();
                 for (index, v) in slots.into_iter().enumerate() {
                     // Where it is, and what it belongs to.
-                    if !(is_alive && (index == event::STATE || index == event::RESULT)) {
+                    if self.is_strict || !(is_alive && (index == event::STATE || index == event::RESULT)) {
                         self.value(v);
                     }
                 }

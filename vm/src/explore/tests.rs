@@ -13,6 +13,7 @@ use super::fingerprint::Fingerprints;
 use super::live::Live;
 use super::{Exploration, Settings, explore};
 use crate::run::RunOutcome;
+use crate::schedule::Choices;
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::world::load::{Alone, load};
@@ -157,6 +158,36 @@ fn a_fingerprint_depends_on_the_state_alone() {
         vm.set_symbol_value(symbol, pair).unwrap();
     };
     assert_ne!(of(&|vm, symbol| pair(vm, symbol, true)), of(&|vm, symbol| pair(vm, symbol, false)));
+}
+
+#[test]
+fn a_strict_fingerprint_depends_on_how_the_state_came_about_and_on_no_address() {
+    let of = |prepare: &dyn Fn(&mut Vm)| {
+        let mut vm = machine(&[&[Instr::ReturnValues { first: Items(0), count: Count(0) }]]);
+        prepare(&mut vm);
+        vm.fingerprint()
+    };
+    let preparations: [&dyn Fn(&mut Vm); 9] = [
+        &|_| {},
+        // Garbage counts: the next cycle of the collector comes sooner.
+        &|vm| _ = vm.heap.list(&[Value::T; 7]).unwrap(),
+        &|vm| vm.scheduler.spent += 1,
+        &|vm| vm.scheduler.rounds += 1,
+        &|vm| _ = vm.scheduler.serial.advance(),
+        &|vm| vm.config.slice += 1,
+        &|vm| vm.set_choices(Choices::seeded(5)),
+        &|vm| vm.pin(Value::T),
+        &|vm| vm.outside.senders += 1,
+    ];
+    let mut found: Vec<u128> = preparations.iter().map(|prepare| of(prepare)).collect();
+    assert_eq!(
+        found,
+        preparations.iter().map(|prepare| of(prepare)).collect::<Vec<_>>(),
+        "other machines, other addresses"
+    );
+    found.sort_unstable();
+    found.dedup();
+    assert_eq!(found.len(), preparations.len());
 }
 
 #[test]

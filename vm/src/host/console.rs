@@ -10,6 +10,8 @@
 //! Guarantees: once nobody reads standard output any more, everything written to it is dropped, and
 //! [`Console::is_broken`] holds: the run ends quietly.
 
+use esl_heap::list_state;
+use esl_heap::state::StateSink;
 use std::collections::VecDeque;
 
 use super::{Host, HostError, Input, Output};
@@ -50,6 +52,18 @@ pub(crate) enum Taken<T> {
     /// Reading failed.
     Failed(HostError),
 }
+
+list_state! { Console {
+    output: Run,
+    errors: Run,
+    columns: Run,
+    noted: Visited,
+    broken: Run,
+    failure: Run by |failure: &Option<HostError>, sink: &mut dyn StateSink| sink.word(u64::from(failure.is_some())),
+    input: Run,
+    partial: Run,
+    at_end: Run,
+} }
 
 impl Console {
     /// Writes characters.

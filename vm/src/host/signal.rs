@@ -1,5 +1,7 @@
 //! Signals of the operating system to the process.
 
+use esl_heap::state::{StateSink, Stated};
+
 /// A signal that asks the process to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProcessSignal {
@@ -9,6 +11,12 @@ pub enum ProcessSignal {
     Interrupt = 2,
     /// Another process wants it: `SIGTERM`.
     Terminate = 15,
+}
+
+impl Stated for ProcessSignal {
+    fn tell(&self, sink: &mut dyn StateSink) {
+        sink.word(u64::from(self.number()));
+    }
 }
 
 impl ProcessSignal {

@@ -1,5 +1,6 @@
 //! The operations under way, as the machine knows them.
 
+use esl_heap::list_state;
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::host::Canceller;
@@ -30,6 +31,14 @@ pub(crate) struct Operations {
     /// Those under way, each behind the task that has begun it.
     pub(crate) by_task: BTreeSet<(TaskNumber, u64)>,
 }
+
+list_state! { OpenOperation {
+    handle: Run,
+    canceller: Process,
+    is_cancelled: Run,
+    is_detached: Run,
+    begun_by: Run,
+} }
 
 impl Operations {
     /// Returns whether none is under way.

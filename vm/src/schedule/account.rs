@@ -7,6 +7,8 @@
 //! Each account is of one measure, and what is charged passes by those of another one.
 
 use crate::task::{AccountId, LimitNumber, TaskIndex};
+use esl_heap::list_state;
+use esl_heap::state::{StateSink, Stated};
 
 /// Subject of an account: it ends when the account is spent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +69,26 @@ pub(crate) struct Account {
     users: u32,
     /// Subject, which ends when the account is spent.
     owner: AccountOwner,
+}
+
+list_state! { Account {
+    measure: Run by |&measure: &Measure, sink: &mut dyn StateSink| sink.word(measure as u64),
+    left: Run,
+    is_spent: Run,
+    is_quota: Run,
+    parent: Run,
+    users: Run,
+    owner: Run,
+} }
+
+impl Stated for AccountOwner {
+    fn tell(&self, sink: &mut dyn StateSink) {
+        match self {
+            AccountOwner::Form(task, limit) => (*task, *limit).tell(sink),
+            AccountOwner::Tasks => sink.word(1),
+            AccountOwner::Nobody => sink.word(2),
+        }
+    }
 }
 
 impl Account {

@@ -1,5 +1,7 @@
 //! Choices of a run where the language leaves an order open.
 
+use esl_heap::list_state;
+use esl_heap::state::{StateSink, Stated};
 use std::collections::VecDeque;
 
 /// Source of choices.
@@ -19,6 +21,18 @@ enum ChoiceSource {
 pub struct Choices {
     source: ChoiceSource,
     record: Option<Vec<u32>>,
+}
+
+list_state! { Choices { source: Run, record: Process } }
+
+impl Stated for ChoiceSource {
+    fn tell(&self, sink: &mut dyn StateSink) {
+        match self {
+            ChoiceSource::First => sink.word(1),
+            ChoiceSource::Seeded(state) => sink.word(*state),
+            ChoiceSource::Given(rest) => rest.tell(sink),
+        }
+    }
 }
 
 impl Choices {

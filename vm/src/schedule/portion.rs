@@ -3,6 +3,8 @@
 //! So the end of a portion ends no turn. What is known of the slice that it falls into is kept, and the next
 //! portion begins with the rest of that slice. Until then nothing that a program can see has been counted.
 
+use esl_heap::list_state;
+
 use crate::task::{AccountId, TaskId};
 
 /// A slice of which ticks are left.
@@ -28,3 +30,6 @@ pub(crate) struct OpenTurn {
     /// Slice under way; `None` if the turn goes on with another slice.
     pub(crate) slice: Option<OpenSlice>,
 }
+
+list_state! { OpenSlice { left: Run, used: Run, bytes: Run, account: Run, collections: Run } }
+list_state! { OpenTurn { task: Run, slice: Run } }

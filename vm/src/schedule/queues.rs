@@ -11,6 +11,7 @@
 //! A place in a queue is good while the task has the serial number that it had when it was put there, so a
 //! task changes queues without a search.
 
+use esl_heap::list_state;
 use std::collections::VecDeque;
 
 use super::Choices;
@@ -38,6 +39,8 @@ pub(crate) struct RunQueues {
     /// Number of turns so far.
     pub(crate) turns: u64,
 }
+
+list_state! { Queued { index: Run, serial: Run } }
 
 impl RunQueues {
     /// Adds a task.

@@ -4,6 +4,8 @@
 //! timer that is no longer wanted is not searched for but recognised by its serial number when it fires; when
 //! more than half are no longer wanted, all of these are dropped at once.
 
+use esl_heap::list_state;
+use esl_heap::state::{StateSink, Stated};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -41,6 +43,18 @@ pub(crate) struct Timers {
     pub(crate) sequence: u64,
     /// Length at which timers that are no longer wanted are dropped.
     pub(crate) sweep_at: usize,
+}
+
+list_state! { Timer { time: Run, sequence: Run, index: Run, due: Run } }
+
+impl Stated for Due {
+    fn tell(&self, sink: &mut dyn StateSink) {
+        match self {
+            Due::Wait(serial) => (1_u8, *serial).tell(sink),
+            Due::Limit(number) => (2_u8, *number).tell(sink),
+            Due::Cleanup => sink.word(3),
+        }
+    }
 }
 
 impl Timers {

@@ -8,6 +8,7 @@
 //! Invariant: an entry of a frame is popped before the frame is left (the verifier's V9), so every entry's
 //! `base` is that of a live frame.
 
+use esl_heap::state::{StateSink, Stated};
 use std::cell::OnceCell;
 use std::ops::{Deref, DerefMut, Range};
 
@@ -99,6 +100,17 @@ pub(crate) enum UnwindTarget {
         /// Offset of the frame's base in the stack.
         base: u32,
     },
+}
+
+impl Stated for TaskEnd {
+    fn tell(&self, sink: &mut dyn StateSink) {
+        match *self {
+            TaskEnd::Succeeded => sink.word(1),
+            TaskEnd::Failed(condition) => sink.value(condition),
+            TaskEnd::Aborted => sink.word(2),
+            TaskEnd::Spent => sink.word(3),
+        }
+    }
 }
 
 impl UnwindTarget {

@@ -1,10 +1,16 @@
 //! Numbers by which tasks, their states and their limits are told apart.
 
+use esl_heap::list_state;
 use std::fmt;
 
 /// Index of a task in the table of tasks. Used again after the task's end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct TaskIndex(pub(crate) u32);
+
+list_state! { TaskIndex { 0: Run } }
+list_state! { TaskNumber { 0: Run } }
+list_state! { Serial { 0: Run } }
+list_state! { LimitNumber { 0: Run } }
 
 impl TaskIndex {
     /// Index of no task.

@@ -2,10 +2,16 @@
 
 use super::LimitNumber;
 use crate::value::Value;
+use esl_heap::list_state;
 
 /// Names an account of ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct AccountId(pub(crate) u32);
+
+list_state! { AccountId { 0: Run } }
+list_state! { Limit { entry: Run, number: Run, account: Run, ends: Run, expired: Run } }
+list_state! { Allowance { ticks: Run, time: Run } }
+list_state! { Fund { depth: Run, ends: Run, floor: Run, is_reported: Run } }
 
 impl AccountId {
     /// No account: ticks are not limited.

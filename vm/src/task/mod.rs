@@ -29,6 +29,7 @@ use crate::heap::{Heap, Holder};
 use crate::saved_pc::SavedPc;
 use crate::stack::Stack;
 use crate::value::Value;
+use esl_heap::list_state;
 
 /// State of a task with regard to running.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,6 +150,8 @@ pub(crate) struct FailureReport {
     /// Line that says that there is no recovery.
     pub ending: String,
 }
+
+list_state! { FailureReport { story: Run, ending: Run } }
 
 impl FailureReport {
     /// Adds the story of a failure of a cleanup that this one has had run.

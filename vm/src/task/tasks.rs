@@ -44,6 +44,8 @@ pub(crate) struct Tasks {
     discarded: Vec<Stack>,
 }
 
+list_state! { TaskId { index: Run, generation: Run } }
+list_state! { TaskPlace { task: Visited, generation: Run, taken: Run } }
 list_state! { Tasks { places: Run, free: Run, spare: Derived, unmet: Derived, discarded: Derived } }
 
 impl Tasks {

@@ -4,6 +4,7 @@
 //! time. Until then no task may notice that others have not got it yet: the task that signals is held back,
 //! and operations on waits try again.
 
+use esl_heap::list_state;
 use std::collections::VecDeque;
 
 use crate::task::{AccountId, Serial, TaskIndex, TaskNumber};
@@ -32,6 +33,8 @@ pub(crate) struct Deliveries {
     /// Tasks held back, each with its serial number then.
     pub(crate) held: Vec<(TaskIndex, Serial)>,
 }
+
+list_state! { Delivery { event: Run, arguments: Run, next: Run, account: Run, by: Run } }
 
 impl Deliveries {
     /// Returns whether no signal is under delivery.

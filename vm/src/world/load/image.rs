@@ -15,6 +15,7 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::file::{ConstantRecord, ModuleImage, SymbolHome};
 use esl_bytecode::module::{FunctionNumber, ModuleFunction, PoolIdx};
 use esl_bytecode::symbol::Symbol;
+use esl_heap::state::{StateSink, Stated};
 
 use super::definitions::{Definitions, ImageDefinition, name_of};
 use super::{LoadError, LoadedFunction, character, data, debug, integer, make_code, own_constants, ratio};
@@ -43,6 +44,12 @@ struct Image {
     /// Code of functions before their first call. Its owner is the number of the image; capture 0 of the
     /// function is its number in the image.
     lazy: Value,
+}
+
+impl Stated for Images {
+    fn tell(&self, sink: &mut dyn StateSink) {
+        self.roots(&mut |root| sink.value(root));
+    }
 }
 
 impl Images {
