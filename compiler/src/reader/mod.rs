@@ -140,6 +140,28 @@ pub fn read_datum(
     }
 }
 
+/// Returns the faults of a text that keep its forms from being told apart: lists, strings and comments without
+/// an end, marks out of place. Other faults, such as those of names, are not looked for.
+pub fn structure_faults(source: SourceId, text: &str) -> Vec<Diagnostic> {
+    if !is_readable(text) {
+        return vec![too_large(source)];
+    }
+    let mut scanner = Scanner::new(source);
+    let mut faults = Vec::new();
+    let mut position = preamble(text);
+    while faults.len() < MAX_ERRORS {
+        match scanner.scan(text, position, &|name| FEATURES.contains(&name)) {
+            Scan::Datum(end) => position = end,
+            Scan::Errors(resume) => {
+                faults.append(&mut scanner.errors);
+                position = resume;
+            }
+            Scan::End => break,
+        }
+    }
+    faults
+}
+
 /// Returns the end of the datum of `text` that begins at byte `start`; `None` if it is faulty.
 pub(crate) fn datum_end(text: &str, start: usize) -> Option<usize> {
     match Scanner::new(SourceId::default()).scan(text, start, &|name| FEATURES.contains(&name)) {
