@@ -5,7 +5,6 @@ mod bad_input;
 mod deadlock;
 mod examples;
 mod folder;
-mod format;
 mod http;
 #[cfg(unix)]
 mod lines;
