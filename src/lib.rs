@@ -31,10 +31,12 @@ pub mod data;
 pub mod engine;
 pub mod error;
 pub mod explore;
+pub mod format;
 pub mod module_path;
 pub mod program;
 #[cfg(feature = "cli")]
 pub mod repl;
+pub mod syntax;
 pub mod testing;
 pub mod timeline;
 

@@ -25,6 +25,7 @@ fn main() {
         PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo names the folder of the package"));
     let output =
         PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo names the folder for what is built"));
+    std::fs::write(output.join("sources.rs"), sources(&folder)).expect("the list of sources can be written");
     match build(&folder) {
         Ok(image) => std::fs::write(output.join("image.eslb"), image).expect("the image can be written"),
         Err(text) => {
@@ -34,15 +35,31 @@ fn main() {
     }
 }
 
+/// Returns the names of the files of the library, in the order in which they are loaded.
+fn load_order(folder: &Path) -> Result<Vec<String>, String> {
+    let order = read(&folder.join("load-order"))?;
+    let names = order.lines().filter(|line| !line.is_empty() && !line.starts_with('#'));
+    Ok(names.map(str::to_owned).collect())
+}
+
+/// Returns the list of sources, as Rust.
+fn sources(folder: &Path) -> String {
+    let names = load_order(folder).unwrap_or_default();
+    let row = |name: &String| {
+        let file = format!("concat!(env!(\"CARGO_MANIFEST_DIR\"), \"/{name}.esl\")");
+        format!("(\"stdlib/{name}.esl\", include_str!({file})),\n")
+    };
+    format!("&[\n{}]", names.iter().map(row).collect::<String>())
+}
+
 /// Returns the bytes of the image.
 fn build(folder: &Path) -> Result<Vec<u8>, String> {
-    let order = read(&folder.join("load-order"))?;
     let machine =
         Vm::new(Config::default(), Box::new(VirtualHost::new())).map_err(|error| format!("{error:?}"))?;
     let mut library =
         LibraryBuild { machine, sources: Sources::new(), modules: Vec::new(), doubts: Vec::new() };
     library.machine.set_compiler(Box::new(Compiler::default()));
-    for name in order.lines().filter(|line| !line.is_empty() && !line.starts_with('#')) {
+    for name in load_order(folder)? {
         let path = folder.join(format!("{name}.esl"));
         println!("cargo::rerun-if-changed={}", path.display());
         library.add(&format!("stdlib/{name}.esl"), read(&path)?.into())?;

@@ -1463,6 +1463,21 @@ macro_rules! for_each_builtin {
             /// From now on only the end of this task is delivered, of what becomes pending, and its clock is
             /// stopped if it is to; or, without `stands`, no longer.
             StandStill = task::stand_still, internal "%STAND-STILL" ("stands stops-clock");
+            /// The number of tasks made so far, and one above all places of those that there are.
+            TasksMade = suspension::tasks_made, internal "%TASKS-MADE" ("");
+            /// Adds to the lists in `generations`, by depth, the tasks of a part of the tree of `root`, those
+            /// whose numbers are above `above` and not above `below`, from the places below `end`. Returns the
+            /// `end` of the next part, `NIL` if the root has ended, and the largest depth. `depths` is a
+            /// vector of what is known.
+            TreePart = suspension::tree_part, internal "%TREE-PART" ("root above below end depths generations");
+            /// Has those of the first of `tasks` stand still that can do so where they wait, with the clock
+            /// stopped if it is to. Returns a list of the others, and the tasks that are left.
+            BeginRest = suspension::begin_rest, internal "%BEGIN-REST" ("tasks stops-clock");
+            /// Resumes the first of `tasks`, up to the cell `end`, that stand still by `%BEGIN-REST`. Returns the
+            /// tasks that are left, and a list of those that do not.
+            ResumeFromRest = suspension::resume_from_rest, internal "%RESUME-FROM-REST" ("tasks end");
+            /// Has a task stand still by `%BEGIN-REST` no more. Returns how often it did.
+            EndRest = suspension::end_rest, internal "%END-REST" ("task");
             /// Has a guard interrupt its task, again if it has done so before.
             InterruptBy = task::interrupt_by, internal "%INTERRUPT-BY" ("guard");
             /// Lets a guard interrupt no more.

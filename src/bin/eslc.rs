@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use esl::command::{self, NOT_COMPILED, ProgramFile, SUCCESS, USAGE, complain};
+use esl::format::{FormatOptions, format_files};
 use esl::module_path::ModulePath;
 use esl::program::{self, Compiled, Modules, Program, Source};
 use esl_compiler::diagnostic::{Format, Renderer};
@@ -83,6 +84,12 @@ enum EslcAction {
         /// Source file; `-` is standard input
         file: PathBuf,
     },
+    /// Indent files as Lisp programmers expect
+    ///
+    /// Lines keep their breaks; comments, strings and all that is read stay the same. What stands under what
+    /// follows from the operators: library macros and those that the file and its modules define are indented
+    /// by the `&body` of their lambda lists, or as `(declare (indent N))` says in them.
+    Format(FormatOptions),
 }
 
 fn main() -> ExitCode {
@@ -97,6 +104,7 @@ fn main() -> ExitCode {
         EslcAction::Compile { files, output: None } => compile_each(files, folders, style),
         EslcAction::Check { files } => check(files, &path(files), style),
         EslcAction::Disasm { file } => disassemble(file, &path(std::slice::from_ref(file)), style),
+        EslcAction::Format(options) => Ok(format_files(options, folders)),
         EslcAction::Expand { file } => expand(file, &path(std::slice::from_ref(file)), style),
     };
     ExitCode::from(status.unwrap_or_else(|status| status))
@@ -160,19 +168,13 @@ fn compile_each(files: &[PathBuf], folders: &[PathBuf], style: &Style) -> Result
     Ok(status)
 }
 
-/// Writes a program to a file: beside it first, so that an existing file is never left half written.
+/// Writes a program to a file.
 fn write(program: &Program, output: &Path) -> Result<u8, u8> {
     let bytes = program.to_bytes().map_err(|error| {
         complain(error);
         NOT_COMPILED
     })?;
-    let mut name = output.file_name().unwrap_or_default().to_os_string();
-    name.push(format!(".{}.tmp", std::process::id()));
-    let partial = output.with_file_name(name);
-    let result = std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, output));
-    result.map(|()| SUCCESS).map_err(|error| {
-        // The error that counts is the first one.
-        _ = std::fs::remove_file(&partial);
+    command::replace_file(output, &bytes).map(|()| SUCCESS).map_err(|error| {
         complain(format_args!("{} cannot be written: {error}", output.display()));
         USAGE
     })

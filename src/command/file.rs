@@ -65,6 +65,30 @@ pub fn refuse_overwriting<'a>(output: &Path, inputs: impl IntoIterator<Item = &'
     Ok(())
 }
 
+/// Writes a file: beside it first, so that an existing one is never left half written. An existing file keeps
+/// its permissions.
+///
+/// # Errors
+/// The first error.
+pub fn replace_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    // What a link leads to is replaced, not the link.
+    let path = &path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(format!(".{}.tmp", std::process::id()));
+    let partial = path.with_file_name(name);
+    let result = std::fs::write(&partial, bytes)
+        .and_then(|()| match std::fs::metadata(path) {
+            Ok(before) => std::fs::set_permissions(&partial, before.permissions()),
+            Err(_) => Ok(()),
+        })
+        .and_then(|()| std::fs::rename(&partial, path));
+    if result.is_err() {
+        // The error that counts is the first one.
+        _ = std::fs::remove_file(&partial);
+    }
+    result
+}
+
 fn read_bytes(path: &Path) -> Result<(String, Vec<u8>), u8> {
     let is_stdin = path.as_os_str() == "-";
     let name = if is_stdin { "<stdin>".into() } else { path.display().to_string() };

@@ -24,7 +24,7 @@ use esl_compiler::diagnostic::{Format, Renderer};
 
 use crate::program::{Compiled, Ended};
 
-pub use file::{ProgramFile, read_program, read_source, refuse_overwriting};
+pub use file::{ProgramFile, read_program, read_source, refuse_overwriting, replace_file};
 #[cfg(feature = "cli")]
 pub use rights::RightsOptions;
 #[cfg(feature = "cli")]

@@ -15,6 +15,10 @@ use esl_vm::vm::Vm;
 /// The image: the bytes of an `.eslb` file.
 pub static IMAGE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/image.eslb"));
 
+/// The texts of the library, in the order in which they are loaded: the names of the files, as backtraces and
+/// diagnostics have them, and what is in them.
+pub static SOURCES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/sources.rs"));
+
 /// Reason why a machine does not get the library. With an intact image, that is want of memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum StdlibError {

@@ -5,6 +5,7 @@ mod bad_input;
 mod deadlock;
 mod examples;
 mod folder;
+mod format;
 mod http;
 #[cfg(unix)]
 mod lines;

@@ -405,6 +405,13 @@ NOTHING_TO_WAIT_FOR = "nothing-to-wait-for" Warning
     fails: "(defvar *level* 0)\n(spawn (:daemon t)\n  (whenever (> *level* 5)\n    (print 'high)))\n"
     repaired: "(define-fluent level 0)\n(spawn (:daemon t)\n  (whenever (> level 5)\n    (print 'high)))\n"
 
+AMOUNT_ABOVE_CAPACITY = "amount-above-capacity" Warning
+    /// A request for more of a resource than there is.
+    fails: "(define-resource battery :capacity 10)\n(defun charge ()\n  \
+            (with-resource (battery :amount 12)\n    (sleep 1)))\n"
+    repaired: "(define-resource battery :capacity 12)\n(defun charge ()\n  \
+               (with-resource (battery :amount 12)\n    (sleep 1)))\n"
+
 UNDECLARED_CAUSE = "undeclared-cause" Warning
     /// A cause that is not declared, in a program that declares causes.
     fails: "(define-cause :broken ())\n(with-recovery-procedures\n    ((:brocken (abort)))\n  \

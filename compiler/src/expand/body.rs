@@ -14,6 +14,7 @@ use crate::diagnostic::code;
 
 /// Declarations that are accepted without effect.
 const WITHOUT_EFFECT: &[&str] = &[
+    "INDENT",
     "TYPE",
     "FTYPE",
     "FUNCTION",

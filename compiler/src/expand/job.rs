@@ -102,8 +102,8 @@ pub(super) enum Job {
     EnterMacros(Vec<Symbol>),
     /// Checks the expanded body of a recovery clause; the flag says whether the body is empty.
     CheckClause(To, bool),
-    /// Checks which local functions, whose texts are expanded, can return.
-    CheckReturns(Vec<(VarId, LambdaId)>),
+    /// Checks whether a local function, whose text is expanded, can return.
+    CheckReturn(VarId, LambdaId),
     /// Processes a top-level form.
     TopLevel(Datum, Top),
     /// Finishes the innermost chunk.

@@ -82,7 +82,6 @@ mod chunk;
 mod control;
 mod define;
 mod destructure;
-mod ending;
 mod expander;
 mod failure;
 mod form;

@@ -207,3 +207,13 @@ fn unclosed_bar(lexer: &mut Lexer<'_, Token>) -> Result<(), LexError> {
 fn unfinished_escape(_: &mut Lexer<'_, Token>) -> Result<(), LexError> {
     Err(LexError::UnfinishedEscape)
 }
+
+/// Returns the tokens of a text with their places in bytes, from byte `start` on. Behind an error, tokens go on
+/// where its own text ends.
+pub fn tokens(
+    text: &str,
+    start: usize,
+) -> impl Iterator<Item = (Result<Token, LexError>, std::ops::Range<usize>)> {
+    let lexer = Token::lexer(&text[start..]).spanned();
+    lexer.map(move |(token, place)| (token, place.start + start..place.end + start))
+}

@@ -76,37 +76,6 @@ impl Reader {
         Reader { text, position, scanner: Scanner::new(source), room: MAX_FILL, waiting, errors: 0 }
     }
 
-    /// Returns whether no diagnostics about what was read are left.
-    pub(crate) fn is_sound(&self) -> bool {
-        self.waiting.is_empty()
-    }
-
-    /// Returns whether all of the text has been read.
-    pub(crate) fn is_at_end(&self) -> bool {
-        self.position >= self.text.len()
-    }
-
-    /// Returns up to `size` bytes of the text that has not been read yet, and whether these are all.
-    pub(crate) fn part(&self, size: usize) -> (&str, bool) {
-        let rest = &self.text[self.position..];
-        let end = rest.floor_char_boundary(size);
-        (&rest[..end], end == rest.len())
-    }
-
-    /// Returns the place of the first character of the text that has not been read yet and is not blank.
-    pub(crate) fn next_span(&self) -> Span {
-        let rest = &self.text[self.position..];
-        let start = self.position + rest.find(|c: char| !c.is_whitespace()).unwrap_or(0);
-        let end = self.text.ceil_char_boundary(start + 1);
-        Span::new(self.scanner.source(), start as u32, end as u32)
-    }
-
-    /// Leaves out `count` characters of the text, which something else has read.
-    pub(crate) fn skip(&mut self, count: usize) {
-        let rest = &self.text[self.position..];
-        self.position += rest.char_indices().nth(count).map_or(rest.len(), |(at, _)| at);
-    }
-
     /// Returns the byte from which the next datum is read.
     pub fn position(&self) -> usize {
         self.position
@@ -169,6 +138,28 @@ pub fn read_datum(
             Err(Box::new(errors.swap_remove(wrong.unwrap_or(0))))
         }
     }
+}
+
+/// Returns the faults of a text that keep its forms from being told apart: lists, strings and comments without
+/// an end, marks out of place. Other faults, such as those of names, are not looked for.
+pub fn structure_faults(source: SourceId, text: &str) -> Vec<Diagnostic> {
+    if !is_readable(text) {
+        return vec![too_large(source)];
+    }
+    let mut scanner = Scanner::new(source);
+    let mut faults = Vec::new();
+    let mut position = preamble(text);
+    while faults.len() < MAX_ERRORS {
+        match scanner.scan(text, position, &|name| FEATURES.contains(&name)) {
+            Scan::Datum(end) => position = end,
+            Scan::Errors(resume) => {
+                faults.append(&mut scanner.errors);
+                position = resume;
+            }
+            Scan::End => break,
+        }
+    }
+    faults
 }
 
 /// Returns the end of the datum of `text` that begins at byte `start`; `None` if it is faulty.

@@ -115,3 +115,20 @@ fn a_task_whose_maker_has_ended_stands_still_with_the_maker_of_that() {
         &["(1 0)"],
     );
 }
+
+#[test]
+fn a_task_that_waits_goes_on_where_it_was() {
+    check_suspension(
+        "(let* ((count 0)
+                (child nil)
+                (root (spawn (setq child (spawn (wait-for-events *step* :unless-count 0) (incf count)))
+                             (wait-for-task child)
+                             :ended)))
+           (sleep 1)
+           (task-net (a (suspend-task root) (resume-task root))
+                     (b (suspend-task child) (resume-task child)))
+           (go-on)
+           (princ (list (nth-value 1 (wait-for-task root)) count (left))))",
+        &["(ENDED 1 0)"],
+    );
+}

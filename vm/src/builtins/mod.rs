@@ -84,6 +84,7 @@ mod sequence;
 pub(crate) mod stream;
 mod string;
 mod structure;
+mod suspension;
 mod symbol;
 mod table;
 mod task;

@@ -4,12 +4,13 @@ use crate::builtins::LIMIT;
 use crate::builtins::event::{nanoseconds, take_or_park};
 use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Outcome, Raised};
+use crate::report;
 use crate::run::{self, SpawnOptions};
 use crate::schedule::{Amount, Measure, Scheduler};
 use crate::task::{DEFAULT_PRIORITY, PRIORITIES, TaskEnd, TaskIndex, TaskNumber, TaskState, guard};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::{WaitOptions, event, lineage};
+use crate::wait::{WaitOptions, event};
 
 use super::expect::exactly;
 
@@ -111,8 +112,10 @@ pub(super) fn task_number(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = expect_task(vm, arguments[0])?;
     let Some(index) = event::task_index(&vm.heap, task) else { return Ok(Value::NIL) };
     let number = vm.scheduler.find(index).map_or(TaskNumber::NONE, |task| task.number);
-    let owner = lineage::owner_of(&vm.heap, task, number);
-    let owner = if owner == TaskNumber::NONE { Value::NIL } else { Value::index(owner.0 as usize) };
+    let owner = match report::number_of_owner(vm, task) {
+        0 => Value::NIL,
+        owner => Value::index(owner as usize),
+    };
     vm.give_values(&[Value::index(number.0 as usize), owner])
 }
 

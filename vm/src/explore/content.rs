@@ -162,6 +162,10 @@ impl VisitExtra for Walk<'_> {
             None => self.word(0),
         }
     }
+
+    fn rests(&mut self, extra: &Extra) {
+        self.word(u64::from(extra.rests));
+    }
 }
 
 impl VisitControl for Walk<'_> {

@@ -86,6 +86,11 @@ impl Operations {
         open.inspect(|open| open.canceller.suspend(is_suspended)).count()
     }
 
+    /// Returns whether a task has begun one that is under way.
+    pub(crate) fn has_begun_one(&self, task: TaskNumber) -> bool {
+        !self.open.is_empty() && self.by_task.range((task, 0)..=(task, u64::MAX)).next().is_some()
+    }
+
     /// Cancels an operation, once. The outside says when it has stopped.
     pub(crate) fn cancel(&mut self, number: u64) {
         if let Some(open) = self.open.get_mut(&number)

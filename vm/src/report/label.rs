@@ -59,6 +59,9 @@ pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
     if task.state == TaskState::Writing {
         return "room for output".into();
     }
+    if let Some(by) = task.extra.as_ref().and_then(|extra| extra.suspended_by) {
+        return format!("RESUME-TASK, suspended by {}", event_label(vm, by));
+    }
     if task.wait.is_nil() {
         return "a time".into();
     }
@@ -72,6 +75,7 @@ pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
             ":CHILDREN" => children_label(vm, pair.cdr),
             ":SUSPENDED" => format!("RESUME-TASK, suspended by {}", event_label(vm, pair.cdr)),
             ":RESOURCE" => resources_label(vm, pair.cdr),
+            ":RETRY" => retry_label(vm, pair.cdr),
             _ => vm.heap.string_text(pair.cdr).unwrap_or(datum),
         };
     }
@@ -119,6 +123,15 @@ fn children_label(vm: &Vm, children: Value) -> String {
         parts.push(format!("the time to restart {}", in_words(&due, "and")));
     }
     if parts.is_empty() { "its children".into() } else { parts.join(" or ") }
+}
+
+/// Returns what reports call the time of a retry: its cause, and which of how many it is, if that is limited.
+fn retry_label(vm: &Vm, retry: Value) -> String {
+    let words: Vec<String> = items(vm, retry).map(|item| describe(&vm.heap, item)).collect();
+    match &words[..] {
+        [cause, number, of] => format!("the time to retry after {cause}, {number} of {of}"),
+        words => format!("the time to retry after {}", words.concat()),
+    }
 }
 
 /// Returns a list in words.

@@ -64,6 +64,12 @@ fn depths(tasks: impl Iterator<Item = (u64, u64)>) -> Vec<(usize, usize)> {
     order
 }
 
+/// Returns the number of the task that a living task belongs to; 0 if that is none.
+pub(crate) fn number_of_owner(vm: &Vm, task: Value) -> u64 {
+    let owner = lineage::owner_of(&vm.heap, task).and_then(|index| vm.scheduler.find(index));
+    owner.map_or(0, |owner| owner.number.0)
+}
+
 impl Vm {
     /// Returns a text that names the waiting tasks of the program, what they wait for, and the lines where
     /// they do.
@@ -101,7 +107,7 @@ impl Vm {
             .filter(|task| task.state != TaskState::Ended && !task.flags.hidden() && !task.flags.kept())
             .collect();
         tasks.sort_unstable_by_key(|task| task.number);
-        let maker = |task: &Task| lineage::owner_of(&self.heap, task.object, task.number).0;
+        let maker = |task: &Task| number_of_owner(self, task.object);
         let depths = depths(tasks.iter().map(|task| (task.number.0, maker(task))));
         let mut text = String::new();
         for (position, depth) in depths.iter().take(SHOWN_IN_TREE) {

@@ -1,5 +1,6 @@
 //! Asking tasks to end.
 
+use super::rest::end_rest;
 use super::wake::call_attention;
 use crate::report::{self, Happening};
 use crate::schedule::EndOfAll;
@@ -15,6 +16,11 @@ impl Vm {
     pub fn abort(&mut self, id: TaskId) {
         if !self.scheduler.tasks.contains(id) {
             return;
+        }
+        // Nothing but its end reaches one at rest, and that does.
+        if self.scheduler.find(id.index).is_some_and(|task| task.flags.rests()) {
+            let now = self.scheduler.clock.read(&mut self.outside.host);
+            end_rest(self, id.index, now);
         }
         if let Some(task) = self.scheduler.find_mut(id.index)
             && task.state != TaskState::Ended

@@ -31,7 +31,7 @@ pub(super) fn finish_task(vm: &mut Vm) {
     };
     let has_one_value = end == TaskEnd::Succeeded && values.len() == 1;
     vm.heap.set_aux(object, Kind::Task, u16::from(has_one_value));
-    lineage::end(&mut vm.heap, object, vm.scheduler.task().number);
+    lineage::end(&mut vm.heap, object);
     vm.heap.slot_set(object, event::RESULT, result);
     let status = match end {
         TaskEnd::Succeeded => vm.world.known.succeeded,

@@ -23,10 +23,13 @@ pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, amount: Opt
     }
     entry.kind = EntryKind::Limit;
     let entry = task.control.entries.len() as u32 - 1;
-    let parent = task.account;
+    let outer = task.account;
+    // In a cleanup of a form that has spent its account, the new one is not to be spent with that.
+    let is_free = task.runs_cleanup();
     let ends = time.map(|time| task.time_at(now).saturating_add(time));
-    let mut limit = Limit { entry, number, account: AccountId::NONE, ends, expired: None };
+    let mut limit = Limit { entry, number, account: AccountId::NONE, outer, ends, expired: None };
     if let Some(amount) = amount {
+        let parent = scheduler.accounts.for_child(outer, is_free);
         limit.account = scheduler.accounts.open(parent, amount, AccountOwner::Form(index, number));
         scheduler.task_mut().account = limit.account;
         // What the slice has used so far is not charged to it, and the next one is to be no longer than it

@@ -10,7 +10,7 @@
 //!           outside, and its result             into the inbox
 //! operation news of operations        cleanup   allowances of cleanups, and cutting off
 //! question  calls from outside,       ending    the end of a run, wherever it stands
-//!           and what is asked of tasks
+//!           and what is asked of tasks rest     suspended tasks that stand where they wait
 //! ```
 //!
 //! A runnable task has a slice of ticks and goes to the end of its queue; `schedule` says whose turn it is.
@@ -28,6 +28,7 @@ mod limit;
 mod operation;
 mod pending;
 mod question;
+mod rest;
 mod signal;
 mod spawn;
 mod timers;
@@ -39,6 +40,7 @@ pub(crate) use arrival::take_in;
 pub use call::{CallError, FailureArguments};
 pub(crate) use limit::{admit, expire_limit, go_on, open_limit, stand_still};
 pub(crate) use pending::interrupt_by;
+pub(crate) use rest::{begin_rest, can_rest, end_rest, resume_from_rest};
 pub(crate) use signal::{deliver_some, show_kept};
 pub(crate) use spawn::{SpawnOptions, make_task};
 pub(crate) use timers::idle;

@@ -71,15 +71,14 @@ fn take_pending(vm: &mut Vm) -> Option<Value> {
         return None;
     }
     let mut waits = ends;
-    let expired = scheduler.task().expired_limit();
-    if let Some((entry, cause)) = expired {
-        if cleanup.is_none_or(|cleanup| cleanup < entry) {
-            unwind_to_limit(vm, entry, cause);
-            // What is noted besides is looked at again when that is over.
-            return None;
-        }
-        waits = true;
+    // One that was opened in the cleanup ends its form there, whatever else is pending.
+    if let Some((entry, cause)) = scheduler.task().expired_limit(cleanup) {
+        unwind_to_limit(vm, entry, cause);
+        // What is noted besides is looked at again when that is over.
+        return None;
     }
+    let expired = scheduler.task().expired_limit(None);
+    waits |= expired.is_some();
     if waits {
         let depth = if ends { 0 } else { expired.map_or(0, |(entry, _)| entry + 1) };
         allow_cleanups(vm, depth);

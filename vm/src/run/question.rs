@@ -10,7 +10,6 @@ use crate::report;
 use crate::task::{Task, TaskEnd, TaskId, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::lineage;
 
 /// Most tasks that an answer names.
 const SHOWN: usize = 10_000;
@@ -167,7 +166,7 @@ fn tasks(vm: &Vm) -> Vec<TaskInfo> {
         .filter(|task| task.state != TaskState::Ended && !task.flags.hidden())
         .collect();
     tasks.sort_unstable_by_key(|task| task.number);
-    let maker = |task: &Task| lineage::owner_of(&vm.heap, task.object, task.number).0;
+    let maker = |task: &Task| report::number_of_owner(vm, task.object);
     let info = |task: &Task| TaskInfo {
         number: task.number.0,
         maker: maker(task),

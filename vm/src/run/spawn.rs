@@ -77,14 +77,14 @@ impl Vm {
         if task.state != TaskState::Ended {
             scheduler.counts.alive -= 1;
             scheduler.counts.foreground -= usize::from(!task.flags.daemon());
-            let (object, wait, account, number) = (task.object, task.wait, task.account, task.number);
+            let (object, wait, account) = (task.object, task.wait, task.account);
             let hidden = task.flags.hidden();
             scheduler.close_wait(&mut self.heap, wait);
             if !hidden {
                 scheduler.accounts.give_back(account, Measure::Tasks);
             }
             scheduler.accounts.leave(account);
-            lineage::end(&mut self.heap, object, number);
+            lineage::end(&mut self.heap, object);
             self.heap.slot_set(object, event::RESULT, Value::NIL);
             self.heap.slot_set(object, event::STATE, self.world.known.aborted);
         }
@@ -127,7 +127,7 @@ pub(crate) fn make_task(
     slots[event::COUNT] = Value::small(0);
     // A service belongs to nobody, so it is not suspended with its maker.
     if let Some(maker) = maker.filter(|_| !options.is_service) {
-        slots[event::RESULT] = lineage::node_of(heap, maker.object, maker.number)?;
+        slots[event::RESULT] = lineage::node_of(heap, maker.object)?;
     }
     let object = heap.alloc_record(Kind::Task, 0, 0, &slots)?;
     let mut task = scheduler.tasks.make(object, words);

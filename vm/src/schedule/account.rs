@@ -153,16 +153,14 @@ impl Accounts {
         }
     }
 
-    /// Closes the account of a form that is left, and returns the account above it. `None` if there is no
-    /// such account.
-    pub(crate) fn close_form(&mut self, id: AccountId) -> Option<AccountId> {
-        let account = self.get_mut(id)?;
+    /// Closes the account of a form that is left. Returns whether there is such an account. The task never
+    /// ceased to be a user of the one that it charged before.
+    pub(crate) fn close_form(&mut self, id: AccountId) -> bool {
+        let Some(account) = self.get_mut(id) else { return false };
         // Tasks made inside that have not had their turn since it was spent are still to end.
         account.owner = if account.is_spent { AccountOwner::Tasks } else { AccountOwner::Nobody };
-        // The task never ceased to be a user of the account above.
-        let parent = account.parent;
         self.leave(id);
-        Some(parent)
+        true
     }
 
     /// Adds a user.

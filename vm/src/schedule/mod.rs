@@ -186,10 +186,15 @@ impl Scheduler {
         if self.is_running(index) { self.running.as_deref_mut() } else { self.tasks.at_mut(index) }
     }
 
-    /// Puts a task at the end of its queue, or of the urgent one. Returns whether it was parked.
+    /// Puts a task at the end of its queue, or of the urgent one. Returns whether it was parked. One at rest
+    /// stays there; that it was to go on is noted.
     pub(crate) fn make_runnable(&mut self, index: TaskIndex, urgent: bool) -> bool {
-        let serial = self.serial.advance();
         let Some(task) = self.tasks.at_mut(index) else { return false };
+        if task.flags.rests() {
+            task.flags.set_woken(true);
+            return false;
+        }
+        let serial = self.serial.advance();
         let was_parked = std::mem::replace(&mut task.state, TaskState::Runnable) != TaskState::Runnable;
         task.serial = serial;
         let (priority, urgent) = (task.priority, urgent || task.flags.urgent());
@@ -287,8 +292,8 @@ impl Scheduler {
             // What the limit was for is done.
             extra.fund = extra.fund.filter(|fund| fund.depth != limit.entry as usize + 1);
         }
-        if let Some(parent) = self.accounts.close_form(limit.account) {
-            self.task_mut().account = parent;
+        if self.accounts.close_form(limit.account) {
+            self.task_mut().account = limit.outer;
         }
     }
 

@@ -9,7 +9,7 @@ use esl_heap::list_state;
 pub(crate) struct AccountId(pub(crate) u32);
 
 list_state! { AccountId { 0: Run } }
-list_state! { Limit { entry: Run, number: Run, account: Run, ends: Run, expired: Run } }
+list_state! { Limit { entry: Run, number: Run, account: Run, outer: Run, ends: Run, expired: Run } }
 list_state! { Allowance { ticks: Run, time: Run } }
 list_state! { Fund { depth: Run, ends: Run, floor: Run, is_reported: Run } }
 
@@ -27,6 +27,8 @@ pub(crate) struct Limit {
     pub(crate) number: LimitNumber,
     /// Account, if it limits ticks.
     pub(crate) account: AccountId,
+    /// Account that the task charges when it is closed.
+    pub(crate) outer: AccountId,
     /// Time of the task's clock at which it expires, if it limits time.
     pub(crate) ends: Option<u64>,
     /// Cause of its expiry, a keyword.

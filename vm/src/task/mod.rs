@@ -140,6 +140,10 @@ define_flags! {
     at_point set_at_point = 8;
     /// It stands still: of what is pending only its end is delivered.
     suspended set_suspended = 9;
+    /// It is suspended, and stands still where it waits; no wake-up reaches it.
+    rests set_rests = 10;
+    /// It was to go on since it is at rest.
+    woken set_woken = 11;
 }
 
 /// Report of a failure.
@@ -185,6 +189,10 @@ pub(crate) struct Extra {
     pub clock_behind: u64,
     /// Time of the machine at which its clock was stopped, if it is.
     pub clock_stopped: Option<u64>,
+    /// How often it was suspended where it is at rest.
+    pub rests: u32,
+    /// The task that has put it at rest first.
+    pub suspended_by: Option<Value>,
 }
 
 impl Extra {
@@ -196,7 +204,7 @@ impl Extra {
     /// Calls `visit` with every value that it holds.
     pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
         self.limits.iter().filter_map(|limit| limit.expired).for_each(&mut *visit);
-        self.interrupts.iter().chain(&self.values).copied().for_each(&mut *visit);
+        self.interrupts.iter().chain(&self.values).chain(&self.suspended_by).copied().for_each(&mut *visit);
         if let Some(TaskEnd::Failed(condition)) = self.end {
             visit(condition);
         }
@@ -311,10 +319,12 @@ impl Task {
         (bound.ticks != u64::MAX).then(|| bound.ticks.saturating_sub(self.ticks))
     }
 
-    /// Returns the entry of its outermost limit that has expired, and the cause.
-    pub(crate) fn expired_limit(&self) -> Option<(usize, Value)> {
+    /// Returns the entry of its outermost limit that has expired, of those that were opened in the cleanup
+    /// with the entry `cleanup`, if there is one; and the cause.
+    pub(crate) fn expired_limit(&self, cleanup: Option<usize>) -> Option<(usize, Value)> {
         let limits = self.extra.as_ref().map_or(&[][..], |extra| &extra.limits[..]);
-        limits.iter().find_map(|limit| Some((limit.entry as usize, limit.expired?)))
+        let inside = limits.iter().filter(|limit| cleanup.is_none_or(|entry| entry < limit.entry as usize));
+        inside.into_iter().find_map(|limit| Some((limit.entry as usize, limit.expired?)))
     }
 
     /// Begins to unwind it to its root, which ends it.
@@ -334,7 +344,7 @@ impl Task {
             return Unwinding { target: UnwindTarget::Cleanup(entry), values: Vec::new() };
         }
         if !self.flags.abort_pending()
-            && let Some((entry, cause)) = self.expired_limit()
+            && let Some((entry, cause)) = self.expired_limit(None)
         {
             return Unwinding { target: UnwindTarget::Limit(entry), values: vec![cause] };
         }

@@ -3,14 +3,14 @@
 //! A task belongs to the one that has made it; when that one ends, to the one that that one belonged to, and
 //! so on. So those that an ended task has made are still of the tree of its maker.
 //!
-//! A task that has made others has a *node*: a cons of its number and the node of its maker. When it ends, the
-//! number gives way to `NIL`, and the node, which the tasks that it has made know it by, is all that is kept of
+//! A task that has made others has a *node*: a cons of its index and the node of its maker. When it ends, the
+//! index gives way to `NIL`, and the node, which the tasks that it has made know it by, is all that is kept of
 //! it. Nodes of ended tasks are skipped for good when they are met, so endless chains of tasks each of which
 //! makes the next one take no room: what is left of the ended ones is no more than there were alive at a time.
 
 use super::event;
 use crate::heap::{AllocError, Heap};
-use crate::task::TaskNumber;
+use crate::task::TaskIndex;
 use crate::value::Value;
 
 /// Most nodes of ended tasks that are skipped in one step.
@@ -20,9 +20,9 @@ const AT_ONCE: usize = 1000;
 ///
 /// # Errors
 /// As for every allocation; then nothing has happened.
-pub(crate) fn node_of(heap: &mut Heap, task: Value, number: TaskNumber) -> Result<Value, AllocError> {
+pub(crate) fn node_of(heap: &mut Heap, task: Value) -> Result<Value, AllocError> {
     let node = heap.slot_or_nil(task, event::RESULT);
-    let own = Value::index(number.0 as usize);
+    let own = heap.slot_or_nil(task, event::STATE);
     if heap.as_cons(node).is_some_and(|pair| pair.car == own) {
         return Ok(node);
     }
@@ -31,11 +31,11 @@ pub(crate) fn node_of(heap: &mut Heap, task: Value, number: TaskNumber) -> Resul
     Ok(new)
 }
 
-/// Notes in the tree that a task ends. Its node has to be in its place still.
-pub(crate) fn end(heap: &mut Heap, task: Value, number: TaskNumber) {
+/// Notes in the tree that a task ends. Its index and its node have to be in their places still.
+pub(crate) fn end(heap: &mut Heap, task: Value) {
     let node = heap.slot_or_nil(task, event::RESULT);
     let Some(pair) = heap.as_cons(node) else { return };
-    if pair.car == Value::index(number.0 as usize) {
+    if pair.car == heap.slot_or_nil(task, event::STATE) {
         heap.set_car(node, Value::NIL);
         skip_ended(heap, node);
     }
@@ -60,17 +60,19 @@ fn skip_ended(heap: &mut Heap, node: Value) {
     }
 }
 
-/// Returns the number of the task that a living task belongs to; [`TaskNumber::NONE`] if that is none.
-pub(crate) fn owner_of(heap: &Heap, task: Value, number: TaskNumber) -> TaskNumber {
-    let own = Value::index(number.0 as usize);
+/// Returns the place of the task that a living task belongs to, if it belongs to one.
+pub(crate) fn owner_of(heap: &Heap, task: Value) -> Option<TaskIndex> {
+    let own = heap.slot_or_nil(task, event::STATE);
     let mut node = heap.slot_or_nil(task, event::RESULT);
     while let Some(pair) = heap.as_cons(node) {
-        if pair.car.is_true() && pair.car != own {
-            return TaskNumber(pair.car.as_index().unwrap_or(0) as u64);
+        if pair.car != own
+            && let Some(index) = pair.car.as_index()
+        {
+            return Some(TaskIndex(index as u32));
         }
         node = pair.cdr;
     }
-    TaskNumber::NONE
+    None
 }
 
 #[cfg(test)]
@@ -79,8 +81,9 @@ mod tests {
     use crate::heap::Kind;
     use crate::trust::heap_for_tests;
 
-    fn task(heap: &mut Heap, node: Value) -> Value {
+    fn task(heap: &mut Heap, index: usize, node: Value) -> Value {
         let mut slots = [Value::NIL; event::TASK_LENGTH];
+        slots[event::STATE] = Value::index(index);
         slots[event::RESULT] = node;
         heap.alloc_record(Kind::Task, 0, 0, &slots).unwrap()
     }
@@ -97,31 +100,31 @@ mod tests {
     #[test]
     fn a_task_whose_maker_has_ended_belongs_to_the_maker_of_that() {
         let mut heap = heap_for_tests();
-        let first = task(&mut heap, Value::NIL);
-        let node = node_of(&mut heap, first, TaskNumber(1)).unwrap();
-        assert_eq!(node_of(&mut heap, first, TaskNumber(1)).unwrap(), node);
-        let second = task(&mut heap, node);
-        let node = node_of(&mut heap, second, TaskNumber(2)).unwrap();
-        let third = task(&mut heap, node);
-        assert_eq!(owner_of(&heap, third, TaskNumber(3)), TaskNumber(2));
-        end(&mut heap, second, TaskNumber(2));
-        assert_eq!(owner_of(&heap, third, TaskNumber(3)), TaskNumber(1));
-        end(&mut heap, first, TaskNumber(1));
-        assert_eq!(owner_of(&heap, third, TaskNumber(3)), TaskNumber::NONE);
+        let first = task(&mut heap, 1, Value::NIL);
+        let node = node_of(&mut heap, first).unwrap();
+        assert_eq!(node_of(&mut heap, first).unwrap(), node);
+        let second = task(&mut heap, 2, node);
+        let node = node_of(&mut heap, second).unwrap();
+        let third = task(&mut heap, 3, node);
+        assert_eq!(owner_of(&heap, third), Some(TaskIndex(2)));
+        end(&mut heap, second);
+        assert_eq!(owner_of(&heap, third), Some(TaskIndex(1)));
+        end(&mut heap, first);
+        assert_eq!(owner_of(&heap, third), None);
     }
 
     #[test]
     fn a_chain_of_tasks_keeps_no_more_nodes_than_are_alive_at_a_time() {
         let mut heap = heap_for_tests();
         let mut alive = std::collections::VecDeque::new();
-        alive.push_back((task(&mut heap, Value::NIL), TaskNumber(1)));
-        for number in 2..1000 {
-            let &(last, its) = alive.back().unwrap();
-            let node = node_of(&mut heap, last, its).unwrap();
-            alive.push_back((task(&mut heap, node), TaskNumber(number)));
+        alive.push_back(task(&mut heap, 1, Value::NIL));
+        for index in 2..1000 {
+            let &last = alive.back().unwrap();
+            let node = node_of(&mut heap, last).unwrap();
+            alive.push_back(task(&mut heap, index, node));
             if alive.len() > 10 {
-                let (first, its) = alive.pop_front().unwrap();
-                end(&mut heap, first, its);
+                let first = alive.pop_front().unwrap();
+                end(&mut heap, first);
             }
             assert!(length(&heap, node) < 30);
         }

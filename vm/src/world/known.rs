@@ -48,7 +48,6 @@ define_known! {
     package = cl "*PACKAGE*";
     gensym_counter = cl "*GENSYM-COUNTER*";
     read_base = cl "*READ-BASE*";
-    readtable = cl "*READTABLE*";
     features = cl "*FEATURES*";
     quote = cl "QUOTE";
     standard_input = cl "*STANDARD-INPUT*";
@@ -75,6 +74,7 @@ define_known! {
     task = esl "TASK";
     restarts = esl "*RESTARTS*";
     recoveries = esl "*RECOVERIES*";
+    suspension_procedures = esl "*%SUSPENSION-PROCEDURES*";
     task_end = keyword "TASK-END";
     succeeded = keyword "SUCCEEDED";
     failed = keyword "FAILED";

@@ -1,0 +1,104 @@
+//! Tasks at rest: suspended ones that stand still just where they wait.
+//!
+//! A task that is suspended is interrupted, and a function of the library in it does what there is to do
+//! around a suspension, and waits for the end of it. Most tasks of a large tree only wait, and have nothing to
+//! do: for these it is enough that no wake-up reaches them. What comes meanwhile is noted, and they go on with
+//! it later.
+
+use super::wake::make_runnable;
+use crate::report::{self, Happening};
+use crate::task::{Task, TaskIndex, TaskState};
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::wait::link;
+
+/// Most procedures for suspension that are looked through for one of a task.
+const PROCEDURES: usize = 100;
+
+/// Returns whether a task can stand still where it is, with nothing to do for it: it waits without an end, in
+/// no cleanup, no form has a limit, and neither procedures nor operations are to be told.
+pub(crate) fn can_rest(vm: &Vm, task: &Task) -> bool {
+    if task.flags.rests() {
+        return true;
+    }
+    let flags = task.flags;
+    let waits = task.state == TaskState::Waiting && task.wait.is_true() && task.critical == 0;
+    waits
+        && !(flags.attention() || flags.abort_pending() || flags.suspended())
+        && link::deadline(&vm.heap, task.wait).is_none()
+        && task.extra.as_ref().is_none_or(|extra| {
+            extra.limits.is_empty() && extra.interrupts.is_empty() && extra.fund.is_none()
+        })
+        && task.control.get().is_none_or(|control| control.running.is_empty() && control.unwinding.is_none())
+        && !has_procedures(vm, task)
+        && !vm.outside.operations.has_begun_one(task.number)
+}
+
+/// Returns whether a task is in a form with procedures for its suspension, as far as it takes to know.
+fn has_procedures(vm: &Vm, task: &Task) -> bool {
+    let bindings = task.control.get().map(|control| &control.bindings);
+    let symbol = vm.world.known.suspension_procedures;
+    let Some(mut rest) = bindings.and_then(|bindings| bindings.get(symbol)) else { return false };
+    for _ in 0..PROCEDURES {
+        // Each is a list that begins with its task; those of makers are not its own.
+        let Some(pair) = vm.heap.as_cons(rest) else { return false };
+        if vm.heap.car(pair.car) == Some(task.object) {
+            return true;
+        }
+        rest = pair.cdr;
+    }
+    true
+}
+
+/// Has a task that [`can_rest`] stand still once more, by the running task, at the time `now`.
+pub(crate) fn begin_rest(vm: &mut Vm, index: TaskIndex, stops_clock: bool, now: u64) {
+    let by = vm.scheduler.task().object;
+    let Some(task) = vm.scheduler.tasks.at_mut(index) else { return };
+    let was_at_rest = task.flags.rests();
+    task.flags.set_rests(true);
+    task.flags.set_suspended(true);
+    let extra = task.extra_mut();
+    extra.rests = extra.rests.saturating_add(1);
+    if was_at_rest {
+        return;
+    }
+    extra.suspended_by = Some(by);
+    if stops_clock {
+        extra.clock_stopped = Some(now);
+    }
+    task.recount(&mut vm.heap);
+    report::note(vm, index, Happening::Waits);
+}
+
+/// Resumes a task at rest once. It goes on if it was suspended no more often.
+pub(crate) fn resume_from_rest(vm: &mut Vm, index: TaskIndex, now: u64) {
+    let Some(task) = vm.scheduler.tasks.at_mut(index).filter(|task| task.flags.rests()) else { return };
+    let extra = task.extra_mut();
+    extra.rests = extra.rests.saturating_sub(1);
+    if extra.rests == 0 {
+        end_rest(vm, index, now);
+    }
+}
+
+/// Has a task at rest stand still no more: what has come meanwhile reaches it. Returns how often it was to be
+/// resumed; 0 if it was not at rest.
+pub(crate) fn end_rest(vm: &mut Vm, index: TaskIndex, now: u64) -> u32 {
+    let Some(task) = vm.scheduler.tasks.at_mut(index).filter(|task| task.flags.rests()) else { return 0 };
+    let was_woken = task.flags.woken();
+    task.flags.set_rests(false);
+    task.flags.set_suspended(false);
+    task.flags.set_woken(false);
+    let is_urgent = task.flags.attention();
+    let extra = task.extra_mut();
+    let times = std::mem::take(&mut extra.rests);
+    if let Some(stopped) = extra.clock_stopped.take() {
+        extra.clock_behind = extra.clock_behind.saturating_add(now.saturating_sub(stopped));
+    }
+    vm.heap.log_if_marking(extra.suspended_by.take().unwrap_or(Value::NIL));
+    if was_woken {
+        make_runnable(vm, index, is_urgent);
+    } else {
+        report::note(vm, index, Happening::Waits);
+    }
+    times
+}
