@@ -32,7 +32,11 @@ pub mod engine;
 pub mod error;
 pub mod explore;
 pub mod format;
+#[cfg(feature = "cli")]
+pub mod lsp;
 pub mod module_path;
+#[cfg(feature = "cli")]
+pub mod new;
 pub mod program;
 #[cfg(feature = "cli")]
 pub mod repl;

@@ -5,7 +5,7 @@ use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use esl::command::{self, NOT_COMPILED, ProgramFile, SUCCESS, USAGE, complain};
 use esl::format::{FormatOptions, format_files};
 use esl::module_path::ModulePath;
@@ -55,6 +55,11 @@ enum Color {
 
 #[derive(Subcommand)]
 enum EslcAction {
+    /// Make a project: a plan, a stand-in for the outside, tests, settings of editors
+    New {
+        /// Folder to be made
+        name: PathBuf,
+    },
     /// Compile files to bytecode
     ///
     /// Without -o each FILE.esl becomes a FILE.eslb of its own, which finds the modules that it requires when
@@ -90,6 +95,24 @@ enum EslcAction {
     /// follows from the operators: library macros and those that the file and its modules define are indented
     /// by the `&body` of their lambda lists, or as `(declare (indent N))` says in them.
     Format(FormatOptions),
+    /// Serve an editor: a language server over standard input and output
+    Lsp {
+        /// Taken for the sake of editors that name the way of talking
+        #[arg(long, hide = true)]
+        stdio: bool,
+    },
+    /// Print the completions for a shell
+    ///
+    /// For bash: eslc completions bash > ~/.local/share/bash-completion/completions/eslc
+    Completions {
+        /// Shell
+        shell: clap_complete::Shell,
+    },
+    /// Write the manual pages, in the form of `man`
+    Man {
+        /// Folder to write them to, one page for each subcommand; without it, the first page is printed
+        folder: Option<PathBuf>,
+    },
 }
 
 fn main() -> ExitCode {
@@ -105,6 +128,10 @@ fn main() -> ExitCode {
         EslcAction::Check { files } => check(files, &path(files), style),
         EslcAction::Disasm { file } => disassemble(file, &path(std::slice::from_ref(file)), style),
         EslcAction::Format(options) => Ok(format_files(options, folders)),
+        EslcAction::New { name } => Ok(esl::new::new_project(name)),
+        EslcAction::Lsp { .. } => Ok(esl::lsp::serve(folders.clone())),
+        EslcAction::Completions { shell } => Ok(command::print_completions(*shell, Eslc::command())),
+        EslcAction::Man { folder } => Ok(command::write_man_pages(Eslc::command(), folder.as_deref())),
         EslcAction::Expand { file } => expand(file, &path(std::slice::from_ref(file)), style),
     };
     ExitCode::from(status.unwrap_or_else(|status| status))

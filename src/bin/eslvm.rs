@@ -6,7 +6,7 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use esl::Config;
 use esl::command::{self, NOT_COMPILED, ProgramFile, RightsOptions, SignalTarget, USAGE, complain};
 use esl::host::{ProcessSignal, RealHost};
@@ -94,6 +94,18 @@ enum EslvmAction {
     Repl {
         #[command(flatten)]
         options: MachineOptions,
+    },
+    /// Print the completions for a shell
+    ///
+    /// For bash: eslvm completions bash > ~/.local/share/bash-completion/completions/eslvm
+    Completions {
+        /// Shell
+        shell: clap_complete::Shell,
+    },
+    /// Write the manual pages, in the form of `man`
+    Man {
+        /// Folder to write them to, one page for each subcommand; without it, the first page is printed
+        folder: Option<PathBuf>,
     },
 }
 
@@ -190,6 +202,8 @@ fn main() -> ExitCode {
                 )
             })
         }
+        EslvmAction::Completions { shell } => Ok(command::print_completions(shell, Eslvm::command())),
+        EslvmAction::Man { folder } => Ok(command::write_man_pages(Eslvm::command(), folder.as_deref())),
         EslvmAction::Repl { options } => options.rights.rights().and_then(|rights| {
             let path = ModulePath::new([Path::new("-")], &library);
             esl::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)

@@ -14,6 +14,8 @@ mod file;
 #[cfg(feature = "cli")]
 mod rights;
 #[cfg(feature = "cli")]
+mod shell;
+#[cfg(feature = "cli")]
 mod signal;
 mod size;
 
@@ -27,6 +29,8 @@ use crate::program::{Compiled, Ended};
 pub use file::{ProgramFile, read_program, read_source, refuse_overwriting, replace_file};
 #[cfg(feature = "cli")]
 pub use rights::RightsOptions;
+#[cfg(feature = "cli")]
+pub use shell::{print_completions, write_man_pages};
 #[cfg(feature = "cli")]
 pub use signal::{Interrupts, SignalTarget, end_on_signal, interrupt_on_signal};
 pub use size::{SizeError, parse_size, parse_stack};

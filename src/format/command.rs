@@ -138,7 +138,7 @@ fn show(source: &Source, formatted: &str, options: &FormatOptions, is_changed: b
 }
 
 /// Returns the styles for a text: those of the library, of the modules that it requires, and its own.
-fn styles_of(tree: &SyntaxTree, path: &ModulePath) -> Styles {
+pub(crate) fn styles_of(tree: &SyntaxTree, path: &ModulePath) -> Styles {
     let mut styles = library().clone();
     let mut known = Vec::new();
     add_modules(tree, path, &mut known, &mut styles);
@@ -175,7 +175,7 @@ fn add_modules(tree: &SyntaxTree, path: &ModulePath, known: &mut Vec<String>, st
 }
 
 /// Returns the names of the modules that a text requires.
-fn required(tree: &SyntaxTree) -> Vec<String> {
+pub(crate) fn required(tree: &SyntaxTree) -> Vec<String> {
     let calls = tree.data(SyntaxTree::ROOT).filter(|&form| tree.operator(form).as_deref() == Some("require"));
     let argument = |form| tree.data(form).nth(1).map(|argument| tree.text(argument));
     calls.filter_map(argument).filter_map(module_name).collect()

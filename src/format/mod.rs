@@ -25,6 +25,8 @@ use crate::syntax::{LineStarts, SyntaxKind, SyntaxTree};
 
 #[cfg(feature = "cli")]
 pub use command::{FormatOptions, format_files};
+#[cfg(feature = "cli")]
+pub(crate) use command::{required, styles_of};
 pub use style::Styles;
 
 use indent::Indenter;

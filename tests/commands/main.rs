@@ -1,14 +1,16 @@
 //! The commands `eslc` and `eslvm`, run as processes: exit statuses, outputs, and what they do to files.
 
+mod author;
 mod background;
 mod bad_input;
 mod deadlock;
+mod editors;
 mod examples;
 mod folder;
-mod format;
 mod http;
 #[cfg(unix)]
 mod lines;
+mod lsp;
 #[cfg(target_os = "linux")]
 mod memory;
 mod missions;

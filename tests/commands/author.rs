@@ -1,4 +1,4 @@
-//! `eslc format`: what it writes, shows and refuses.
+//! What `eslc` does for authors: formatting, completions and manual pages, new projects.
 
 use esl_conformance::process::run;
 
@@ -45,4 +45,39 @@ fn a_text_without_its_ends_is_left_as_it_is() {
     assert_eq!(status, 3);
     assert!(messages.contains("unclosed-list") && messages.contains("repair it first"), "{messages}");
     assert_eq!(std::fs::read_to_string(&broken).expect("it is there"), "(when a\nb\n");
+}
+
+#[test]
+fn shells_and_man_know_the_commands() {
+    let folder = Folder::new("completions_and_man");
+    for (make, name) in [(eslc as fn(&[&str]) -> std::process::Command, "eslc"), (crate::eslvm, "eslvm")] {
+        for shell in ["bash", "zsh", "fish"] {
+            let done = run(&mut make(&["completions", shell]), "");
+            assert_eq!(done.status, Some(0));
+            assert!(done.output.contains("completions"), "{name} {shell}");
+        }
+        let pages = folder.join("man");
+        assert_eq!(run(&mut make(&["man", &pages]), "").status, Some(0));
+        let page = std::fs::read_to_string(folder.path().join("man").join(format!("{name}.1")));
+        assert!(page.expect("it was written").contains(".SH SYNOPSIS"));
+        assert!(run(&mut make(&["man"]), "").output.contains(".SH SYNOPSIS"));
+    }
+}
+
+#[test]
+fn a_new_project_runs_and_its_tests_pass() {
+    let folder = Folder::new("new_project");
+    let project = folder.join("rover");
+    let done = run(&mut eslc(&["new", &project]), "");
+    assert_eq!((done.status, &*done.output), (Some(0), ""), "{}", done.errors);
+    let main = format!("{project}/main.esl");
+    let done = run(&mut crate::eslvm(&["run", "--clock", "virtual", &main]), "");
+    assert_eq!((done.status, &*done.errors), (Some(0), ""));
+    assert!(done.output.contains("(PICTURE HILL)"), "{}", done.output);
+    let done = run(&mut crate::eslvm(&["test", &format!("{project}/test.esl")]), "");
+    assert!(done.status == Some(0) && done.output.contains("3 passed"), "{}", done.output);
+    assert_eq!(format(&["--check", &project], ""), (0, String::new(), String::new()));
+    let readme = std::fs::read_to_string(format!("{project}/README.md")).expect("it was written");
+    assert!(readme.starts_with("# rover\n"), "{readme}");
+    assert_eq!(run(&mut eslc(&["new", &project]), "").status, Some(2), "it is there already");
 }

@@ -1,0 +1,105 @@
+//! Requests: which function answers which.
+
+use lsp_server::{ErrorCode, Request, Response};
+use lsp_types::request::{
+    CodeActionRequest, Completion, DocumentHighlightRequest, DocumentSymbolRequest, ExecuteCommand,
+    FoldingRangeRequest, Formatting, GotoDefinition, HoverRequest, InlayHintRequest, PrepareRenameRequest,
+    RangeFormatting, References, Rename, Request as RequestKind, SemanticTokensFullRequest,
+    SemanticTokensRangeRequest, SignatureHelpRequest, WorkspaceSymbolRequest,
+};
+use lsp_types::{TextEdit, Uri};
+
+use super::project::Project;
+use super::{complete, describe, expand, navigate, outline, recovery, repair, semantic};
+use crate::format::{format, styles_of};
+
+/// Answers a request.
+pub(super) fn answer(project: &Project, request: Request) -> Response {
+    match &*request.method.clone() {
+        HoverRequest::METHOD => reply::<HoverRequest>(request, |p| describe::hover(project, &p)),
+        SignatureHelpRequest::METHOD => {
+            reply::<SignatureHelpRequest>(request, |p| describe::signature(project, &p))
+        }
+        Completion::METHOD => reply::<Completion>(request, |p| complete::complete(project, &p)),
+        GotoDefinition::METHOD => reply::<GotoDefinition>(request, |p| navigate::definition(project, &p)),
+        References::METHOD => reply::<References>(request, |p| navigate::references(project, &p)),
+        DocumentHighlightRequest::METHOD => {
+            reply::<DocumentHighlightRequest>(request, |p| navigate::highlights(project, &p))
+        }
+        PrepareRenameRequest::METHOD => {
+            reply::<PrepareRenameRequest>(request, |p| navigate::prepare_rename(project, &p))
+        }
+        Rename::METHOD => match serde_json::from_value(request.params) {
+            Ok(parameters) => match navigate::rename(project, &parameters) {
+                Ok(edit) => Response::new_ok(request.id, edit),
+                Err(reason) => Response::new_err(request.id, ErrorCode::RequestFailed as i32, reason),
+            },
+            Err(error) => refuse(request.id, &error),
+        },
+        DocumentSymbolRequest::METHOD => {
+            reply::<DocumentSymbolRequest>(request, |p| outline::symbols(project, &p))
+        }
+        WorkspaceSymbolRequest::METHOD => {
+            reply::<WorkspaceSymbolRequest>(request, |p| outline::workspace_symbols(project, &p))
+        }
+        FoldingRangeRequest::METHOD => reply::<FoldingRangeRequest>(request, |p| outline::folds(project, &p)),
+        SemanticTokensFullRequest::METHOD => {
+            reply::<SemanticTokensFullRequest>(request, |p| semantic::full(project, &p))
+        }
+        SemanticTokensRangeRequest::METHOD => {
+            reply::<SemanticTokensRangeRequest>(request, |p| semantic::range(project, &p))
+        }
+        InlayHintRequest::METHOD => reply::<InlayHintRequest>(request, |p| recovery::hints(project, &p)),
+        CodeActionRequest::METHOD => reply::<CodeActionRequest>(request, |p| repair::actions(project, &p)),
+        Formatting::METHOD => {
+            reply::<Formatting>(request, |p| formatted(project, &p.text_document.uri, None))
+        }
+        RangeFormatting::METHOD => reply::<RangeFormatting>(request, |p| {
+            let last = p.range.end.line
+                - u32::from(p.range.end.character == 0 && p.range.end.line > p.range.start.line);
+            formatted(project, &p.text_document.uri, Some((p.range.start.line, last)))
+        }),
+        ExecuteCommand::METHOD => match serde_json::from_value(request.params) {
+            Ok(parameters) => match expand::execute(project, &parameters) {
+                Ok(text) => Response::new_ok(request.id, text),
+                Err(reason) => Response::new_err(request.id, ErrorCode::RequestFailed as i32, reason),
+            },
+            Err(error) => refuse(request.id, &error),
+        },
+        method => {
+            let message = format!("`{method}` is not among what this server offers");
+            Response::new_err(request.id, ErrorCode::MethodNotFound as i32, message)
+        }
+    }
+}
+
+fn reply<R: RequestKind>(request: Request, answer: impl FnOnce(R::Params) -> R::Result) -> Response {
+    match serde_json::from_value(request.params) {
+        Ok(parameters) => Response::new_ok(request.id, answer(parameters)),
+        Err(error) => refuse(request.id, &error),
+    }
+}
+
+fn refuse(id: lsp_server::RequestId, error: &serde_json::Error) -> Response {
+    Response::new_err(id, ErrorCode::InvalidParams as i32, error.to_string())
+}
+
+/// Returns the edits that format a text, or some of its lines: one for each line that changes.
+fn formatted(project: &Project, uri: &Uri, lines: Option<(u32, u32)>) -> Option<Vec<TextEdit>> {
+    let text = project.text(uri)?;
+    let styles = styles_of(&text.tree, &project.module_path(&text.path()));
+    let lines = lines.map(|(first, last)| first as usize..=last as usize);
+    let after = format(&text.tree, &styles, lines);
+    let before = text.tree.source();
+    let mut edits = Vec::new();
+    let mut at = 0;
+    let mut new_lines = after.split_inclusive('\n');
+    for line in before.split_inclusive('\n') {
+        let new = new_lines.next().unwrap_or_default();
+        if new != line {
+            edits.push(TextEdit::new(text.range(at..at + line.len()), new.to_owned()));
+        }
+        at += line.len();
+    }
+    Some(edits)
+}

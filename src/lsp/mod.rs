@@ -1,0 +1,181 @@
+//! `eslc lsp`: a language server over standard input and output, for editors.
+//!
+//! Guarantees: a request is answered from the texts as the editor has them; what is asked of a name works on
+//! the lossless tree, so also in a file that does not compile. Diagnostics are those of the compiler, found on
+//! a thread of its own once the typing pauses. Not here: the protocol (`lsp-server`, `lsp-types`), formatting
+//! ([`crate::format`]).
+
+mod answer;
+mod check;
+mod complete;
+mod definition;
+mod describe;
+mod document;
+mod expand;
+mod library;
+mod navigate;
+mod outline;
+mod project;
+mod recovery;
+mod repair;
+mod scope;
+mod semantic;
+
+use std::path::PathBuf;
+
+use lsp_server::{Connection, Message, Notification};
+use lsp_types::notification::{
+    DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, DidSaveTextDocument,
+    Notification as NotificationKind,
+};
+use lsp_types::{
+    CodeActionProviderCapability, CompletionOptions, ExecuteCommandOptions, FoldingRangeProviderCapability,
+    HoverProviderCapability, InitializeParams, OneOf, PositionEncodingKind, RenameOptions,
+    SemanticTokensFullOptions, SemanticTokensOptions, ServerCapabilities, SignatureHelpOptions,
+    TextDocumentSyncCapability, TextDocumentSyncKind,
+};
+
+use crate::command::{SUCCESS, USAGE, complain};
+use check::Checker;
+use document::{ColumnUnit, path_of};
+use project::Project;
+
+/// Serves one client until it says goodbye. Returns the exit status.
+pub fn serve(folders: Vec<PathBuf>) -> u8 {
+    let (connection, threads) = Connection::stdio();
+    let result = session(&connection, folders);
+    // The writing thread ends when nobody can send any more.
+    drop(connection);
+    match result.and_then(|()| threads.join().map_err(|error| error.to_string())) {
+        Ok(()) => SUCCESS,
+        Err(error) => {
+            complain(error);
+            USAGE
+        }
+    }
+}
+
+fn session(connection: &Connection, folders: Vec<PathBuf>) -> Result<(), String> {
+    let (id, parameters) = connection.initialize_start().map_err(|error| error.to_string())?;
+    let parameters: InitializeParams = serde_json::from_value(parameters)
+        .map_err(|error| format!("the client says hello wrongly: {error}"))?;
+    let unit = unit_of(&parameters);
+    let result = serde_json::json!({
+        "capabilities": capabilities(unit),
+        "serverInfo": { "name": "eslc", "version": env!("CARGO_PKG_VERSION") },
+    });
+    connection.initialize_finish(id, result).map_err(|error| error.to_string())?;
+    let roots = parameters.workspace_folders.unwrap_or_default();
+    let roots = roots.iter().map(|folder| path_of(&folder.uri)).collect();
+    let mut project = Project::new(folders, roots, unit);
+    let sender = connection.sender.clone();
+    let checker = Checker::start(move |message| sender.send(message).is_ok());
+    for message in &connection.receiver {
+        match message {
+            Message::Request(request) => {
+                if connection.handle_shutdown(&request).map_err(|error| error.to_string())? {
+                    return Ok(());
+                }
+                let response = answer::answer(&project, request);
+                if connection.sender.send(Message::Response(response)).is_err() {
+                    return Ok(());
+                }
+            }
+            Message::Notification(notification) => take(&mut project, &checker, notification),
+            Message::Response(_) => {}
+        }
+    }
+    Ok(())
+}
+
+/// Takes a change of a text in the editor. A notification that cannot be understood is left aside, as the
+/// protocol wants.
+fn take(project: &mut Project, checker: &Checker, notification: Notification) {
+    let Notification { method, params } = notification;
+    match &*method {
+        DidOpenTextDocument::METHOD => {
+            let Ok(opened) = parameters::<DidOpenTextDocument>(params) else { return };
+            let opened = opened.text_document;
+            let uri = opened.uri.clone();
+            project.open(opened.uri, opened.version, opened.text);
+            checker.check(project, &uri);
+        }
+        DidChangeTextDocument::METHOD => {
+            let Ok(changed) = parameters::<DidChangeTextDocument>(params) else { return };
+            let identity = changed.text_document;
+            if let Some(text) = project.text_mut(&identity.uri) {
+                text.change(identity.version, changed.content_changes);
+                checker.check(project, &identity.uri);
+            }
+        }
+        DidSaveTextDocument::METHOD => {
+            let Ok(saved) = parameters::<DidSaveTextDocument>(params) else { return };
+            checker.check(project, &saved.text_document.uri);
+        }
+        DidCloseTextDocument::METHOD => {
+            let Ok(closed) = parameters::<DidCloseTextDocument>(params) else { return };
+            project.close(&closed.text_document.uri);
+            checker.forget(&closed.text_document.uri);
+        }
+        _ => {}
+    }
+}
+
+fn parameters<N: NotificationKind>(value: serde_json::Value) -> Result<N::Params, serde_json::Error> {
+    serde_json::from_value(value)
+}
+
+fn unit_of(parameters: &InitializeParams) -> ColumnUnit {
+    let general = parameters.capabilities.general.as_ref();
+    let offered = general.and_then(|general| general.position_encodings.as_ref());
+    match offered.is_some_and(|offered| offered.contains(&PositionEncodingKind::UTF8)) {
+        true => ColumnUnit::Bytes,
+        false => ColumnUnit::Utf16,
+    }
+}
+
+fn capabilities(unit: ColumnUnit) -> ServerCapabilities {
+    let tokens = SemanticTokensOptions {
+        legend: semantic::legend(),
+        full: Some(SemanticTokensFullOptions::Bool(true)),
+        range: Some(true),
+        ..SemanticTokensOptions::default()
+    };
+    let triggers = |characters: &[&str]| Some(characters.iter().map(|text| text.to_string()).collect());
+    ServerCapabilities {
+        position_encoding: Some(match unit {
+            ColumnUnit::Bytes => PositionEncodingKind::UTF8,
+            ColumnUnit::Utf16 => PositionEncodingKind::UTF16,
+        }),
+        text_document_sync: Some(TextDocumentSyncCapability::Kind(TextDocumentSyncKind::INCREMENTAL)),
+        hover_provider: Some(HoverProviderCapability::Simple(true)),
+        completion_provider: Some(CompletionOptions {
+            trigger_characters: triggers(&["(", ":", "-"]),
+            ..CompletionOptions::default()
+        }),
+        signature_help_provider: Some(SignatureHelpOptions {
+            trigger_characters: triggers(&["(", " "]),
+            ..SignatureHelpOptions::default()
+        }),
+        definition_provider: Some(OneOf::Left(true)),
+        references_provider: Some(OneOf::Left(true)),
+        document_highlight_provider: Some(OneOf::Left(true)),
+        document_symbol_provider: Some(OneOf::Left(true)),
+        workspace_symbol_provider: Some(OneOf::Left(true)),
+        code_action_provider: Some(CodeActionProviderCapability::Simple(true)),
+        document_formatting_provider: Some(OneOf::Left(true)),
+        document_range_formatting_provider: Some(OneOf::Left(true)),
+        rename_provider: Some(OneOf::Right(RenameOptions {
+            prepare_provider: Some(true),
+            work_done_progress_options: Default::default(),
+        })),
+        folding_range_provider: Some(FoldingRangeProviderCapability::Simple(true)),
+        inlay_hint_provider: Some(OneOf::Left(true)),
+        semantic_tokens_provider: Some(tokens.into()),
+        execute_command_provider: Some(ExecuteCommandOptions {
+            commands: vec![expand::COMMAND.into()],
+            ..ExecuteCommandOptions::default()
+        }),
+        ..ServerCapabilities::default()
+    }
+}

@@ -1,0 +1,222 @@
+//! Local names: which forms bind them, and to which binding a name refers.
+//!
+//! This works on the text alone, so also in a file that does not compile. It knows the binding forms of the
+//! language; a macro of the program that binds names by itself is known only if it is called `do-…` or
+//! `with-…` and takes the name first in its first argument, as those of the library do.
+
+use crate::syntax::{NodeId, SyntaxKind, SyntaxTree, bare_name};
+
+/// A local binding of a name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct LocalBinding {
+    /// The name where it is bound.
+    pub(super) name: NodeId,
+    /// The form in which the binding holds.
+    pub(super) scope: NodeId,
+    pub(super) is_function: bool,
+}
+
+/// Returns the bindings around a node, the innermost first.
+pub(super) fn bindings_around(tree: &SyntaxTree, node: NodeId) -> Vec<LocalBinding> {
+    let mut bindings = Vec::new();
+    let mut at = Some(node);
+    while let Some(scope) = at {
+        if tree.kind(scope) == SyntaxKind::List {
+            bound_by(tree, scope, &mut bindings);
+        }
+        at = tree.parent(scope);
+    }
+    bindings
+}
+
+/// Returns the binding to which a name refers; `None` if it is global.
+pub(super) fn binding_of(tree: &SyntaxTree, node: NodeId) -> Option<LocalBinding> {
+    let name = bare_name(tree.name(node)?);
+    let bindings = bindings_around(tree, node);
+    if let Some(own) = bindings.iter().find(|binding| binding.name == node) {
+        return Some(*own);
+    }
+    let wants_function = is_operator(tree, node);
+    let same = |binding: &&LocalBinding| tree.name(binding.name).map(bare_name).as_ref() == Some(&name);
+    bindings.iter().filter(same).find(|binding| binding.is_function == wants_function).copied()
+}
+
+/// Whether a name stands where an operator does, or after `#'`.
+pub(super) fn is_operator(tree: &SyntaxTree, node: NodeId) -> bool {
+    use esl_compiler::reader::lexer::Token;
+    match tree.parent(node).map(|parent| (parent, tree.kind(parent))) {
+        Some((_, SyntaxKind::Mark(Token::Function))) => true,
+        Some((parent, SyntaxKind::List)) => {
+            tree.data(parent).next() == Some(node) && !is_clause(tree, parent)
+        }
+        _ => false,
+    }
+}
+
+/// Whether a list is a clause of a `cond` or `case`, or a binding of a `let`: no call.
+fn is_clause(tree: &SyntaxTree, list: NodeId) -> bool {
+    let Some(parent) = tree.parent(list) else { return false };
+    match tree.operator(parent).as_deref() {
+        Some("cond") => true,
+        Some("case" | "ecase" | "ccase") => tree.data(parent).nth(1) != Some(list),
+        _ => {
+            let outer = tree.parent(parent).and_then(|outer| Some((outer, tree.operator(outer)?)));
+            outer.is_some_and(|(outer, operator)| {
+                let is_let = matches!(&*operator, "let" | "let*" | "do" | "do*" | "prog" | "symbol-macrolet");
+                is_let && tree.data(outer).nth(1) == Some(parent)
+            })
+        }
+    }
+}
+
+/// Adds what a list binds.
+fn bound_by(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBinding>) {
+    let mut variable = |name: NodeId| found.push(LocalBinding { name, scope: list, is_function: false });
+    let argument = |at: usize| tree.data(list).nth(at);
+    let Some(operator) = tree.operator(list) else { return bound_by_clause(tree, list, found) };
+    match &*operator {
+        "let" | "let*" | "do" | "do*" | "prog" | "prog*" | "symbol-macrolet" | "with-slots"
+        | "with-accessors" => {
+            let bindings = argument(1).into_iter().flat_map(|bindings| tree.data(bindings));
+            bindings.filter_map(|binding| head_name(tree, binding)).for_each(variable);
+        }
+        "lambda" => argument(1).into_iter().for_each(|list| parameters(tree, list, &mut variable)),
+        "multiple-value-bind" | "destructuring-bind" => {
+            argument(1).into_iter().for_each(|list| parameters(tree, list, &mut variable));
+        }
+        "%named-lambda" | "define-fluent" => {
+            argument(2).into_iter().for_each(|list| parameters(tree, list, &mut variable));
+        }
+        "defmethod" => {
+            let lists = tree.data(list).skip(2).find(|&part| tree.kind(part) == SyntaxKind::List);
+            lists.into_iter().for_each(|list| parameters(tree, list, &mut variable));
+        }
+        "to-achieve" => {
+            let goal = argument(1).into_iter().flat_map(|goal| tree.data(goal).skip(1));
+            goal.filter(|&part| tree.name(part).is_some()).for_each(variable);
+        }
+        "loop" => loop_variables(tree, list, &mut variable),
+        "flet" | "labels" | "macrolet" => {
+            let functions = argument(1).into_iter().flat_map(|functions| tree.data(functions));
+            let names = functions.filter_map(|function| tree.data(function).next());
+            let names = names.filter(|&name| tree.name(name).is_some());
+            found.extend(names.map(|name| LocalBinding { name, scope: list, is_function: true }));
+        }
+        "task-net" | "or-parallel" | "try-all" | "pursue" | "try-in-order" | "supervise" => {
+            let clauses = tree.data(list).skip(1).filter(|&clause| tree.kind(clause) == SyntaxKind::List);
+            clauses.filter_map(|clause| head_name(tree, clause)).for_each(variable);
+        }
+        name if name.starts_with("def") => {
+            if let Some(list) = argument(2).filter(|&list| tree.kind(list) == SyntaxKind::List) {
+                parameters(tree, list, &mut variable);
+            }
+        }
+        name if name.starts_with("do") || name.starts_with("with-") => {
+            if let Some(header) = argument(1).filter(|&header| tree.kind(header) == SyntaxKind::List) {
+                tree.data(header)
+                    .next()
+                    .filter(|&name| tree.name(name).is_some())
+                    .into_iter()
+                    .for_each(variable);
+            }
+        }
+        _ => bound_by_clause(tree, list, found),
+    }
+}
+
+/// Adds what a list binds by its place in another form: a local function, a clause.
+fn bound_by_clause(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBinding>) {
+    let mut variable = |name: NodeId| found.push(LocalBinding { name, scope: list, is_function: false });
+    let Some(parent) = tree.parent(list) else { return };
+    if matches!(tree.operator(parent).as_deref(), Some("handler-case" | "restart-case"))
+        && tree.data(parent).nth(1) != Some(list)
+    {
+        return tree.data(list).nth(1).into_iter().for_each(|list| parameters(tree, list, &mut variable));
+    }
+    let Some(outer) = tree.parent(parent) else { return };
+    if tree.data(outer).nth(1) != Some(parent) {
+        return;
+    }
+    match tree.operator(outer).as_deref() {
+        Some("flet" | "labels" | "macrolet") => {
+            tree.data(list).nth(1).into_iter().for_each(|list| parameters(tree, list, &mut variable));
+        }
+        Some("with-recovery-procedures") => {
+            let cause = tree.data(list).next().into_iter();
+            let names = cause.flat_map(|cause| tree.data(cause).skip(1));
+            names.filter(|&name| tree.name(name).is_some()).for_each(variable);
+        }
+        _ => {}
+    }
+}
+
+/// Returns the name that a binding binds: itself, or the first of a list.
+fn head_name(tree: &SyntaxTree, binding: NodeId) -> Option<NodeId> {
+    let name = match tree.kind(binding) {
+        SyntaxKind::List => tree.data(binding).next()?,
+        _ => binding,
+    };
+    tree.name(name).filter(|name| !name.starts_with(':')).map(|_| name)
+}
+
+/// Passes the names that a lambda list or pattern binds to `variable`.
+fn parameters(tree: &SyntaxTree, list: NodeId, variable: &mut dyn FnMut(NodeId)) {
+    if tree.kind(list) != SyntaxKind::List {
+        return;
+    }
+    let mut waiting = vec![list];
+    while let Some(list) = waiting.pop() {
+        let mut has_defaults = false;
+        for item in tree.data(list) {
+            match (tree.name(item), tree.kind(item)) {
+                (Some(word), _) if word.starts_with('&') => {
+                    has_defaults =
+                        !matches!(&*word.to_lowercase(), "&rest" | "&body" | "&whole" | "&environment");
+                }
+                (Some(word), _) if word.starts_with(':') || word == "." => {}
+                (Some(_), _) => variable(item),
+                (None, SyntaxKind::List) if has_defaults => {
+                    // `(name default supplied-p)`, `((:key name) default)`.
+                    let mut parts = tree.data(item);
+                    let (first, _, supplied) = (parts.next(), parts.next(), parts.next());
+                    for part in [first, supplied].into_iter().flatten() {
+                        match tree.kind(part) {
+                            SyntaxKind::List => tree.data(part).nth(1).into_iter().for_each(&mut *variable),
+                            _ if tree.name(part).is_some() => variable(part),
+                            _ => {}
+                        }
+                    }
+                }
+                (None, SyntaxKind::List) => waiting.push(item),
+                _ => {}
+            }
+        }
+    }
+}
+
+fn loop_variables(tree: &SyntaxTree, list: NodeId, variable: &mut dyn FnMut(NodeId)) {
+    let items: Vec<NodeId> = tree.data(list).collect();
+    let mut binds = false;
+    for pair in items.windows(2) {
+        let word = tree.name(pair[0]).map(bare_name);
+        match word.as_deref() {
+            Some("for" | "as" | "with") => binds = true,
+            Some("and") => {}
+            // Other clauses can be joined by `and` too.
+            Some(
+                "do" | "collect" | "append" | "sum" | "count" | "when" | "unless" | "if" | "while" | "until",
+            ) => {
+                binds = false;
+                continue;
+            }
+            _ => continue,
+        }
+        if binds {
+            match tree.kind(pair[1]) {
+                SyntaxKind::List => parameters(tree, pair[1], variable),
+                _ if tree.name(pair[1]).is_some() => variable(pair[1]),
+                _ => {}
+            }
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! `eslc lsp`, as an editor talks to it: a scripted session over standard input and output.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, ChildStdin, ChildStdout};
+
+use esl_conformance::process::{finish, start};
+use serde_json::{Value, json};
+
+use crate::eslc;
+use crate::folder::Folder;
+
+/// An editor that talks to a server.
+struct Editor {
+    child: Child,
+    input: ChildStdin,
+    output: BufReader<ChildStdout>,
+    last_id: u64,
+    /// Diagnostics of each text, as they were told last.
+    told: std::collections::HashMap<String, Value>,
+}
+
+impl Editor {
+    /// Starts a server and says hello; its copies of the library go to `folder`.
+    fn new(folder: &Folder) -> Editor {
+        let mut child = start(eslc(&["lsp"]).env("XDG_CACHE_HOME", folder.join("cache")));
+        let input = child.stdin.take().expect("standard input is a pipe");
+        let output = BufReader::new(child.stdout.take().expect("standard output is a pipe"));
+        let mut editor = Editor { child, input, output, last_id: 0, told: Default::default() };
+        let root = uri(&folder.path().display().to_string());
+        let hello = json!({ "capabilities": {}, "workspaceFolders": [{ "uri": root, "name": "test" }] });
+        let answer = editor.ask("initialize", hello);
+        assert_eq!(answer["serverInfo"]["name"], "eslc");
+        editor.tell("initialized", json!({}));
+        editor
+    }
+
+    fn send(&mut self, message: &Value) {
+        let text = message.to_string();
+        write!(self.input, "Content-Length: {}\r\n\r\n{text}", text.len()).expect("the server reads");
+        self.input.flush().expect("the server reads");
+    }
+
+    fn receive(&mut self) -> Value {
+        let mut length = 0;
+        loop {
+            let mut line = String::new();
+            assert!(self.output.read_line(&mut line).expect("it can be read") > 0, "the server has ended");
+            match line.trim_end().split_once(": ") {
+                Some(("Content-Length", number)) => length = number.parse().expect("it is a number"),
+                Some(_) => {}
+                None => break,
+            }
+        }
+        let mut bytes = vec![0; length];
+        self.output.read_exact(&mut bytes).expect("it can be read");
+        let message: Value = serde_json::from_slice(&bytes).expect("it is JSON");
+        if message["method"] == "textDocument/publishDiagnostics" {
+            let uri = message["params"]["uri"].as_str().expect("it names a text").to_owned();
+            self.told.insert(uri, message["params"]["diagnostics"].clone());
+        }
+        message
+    }
+
+    fn tell(&mut self, method: &str, parameters: Value) {
+        self.send(&json!({ "jsonrpc": "2.0", "method": method, "params": parameters }));
+    }
+
+    /// Sends a request. Returns the message that answers it.
+    fn request(&mut self, method: &str, parameters: Value) -> Value {
+        self.last_id += 1;
+        let id = self.last_id;
+        self.send(&json!({ "jsonrpc": "2.0", "id": id, "method": method, "params": parameters }));
+        loop {
+            let message = self.receive();
+            if message["id"] == id {
+                return message;
+            }
+        }
+    }
+
+    #[track_caller]
+    fn ask(&mut self, method: &str, parameters: Value) -> Value {
+        let answer = self.request(method, parameters);
+        assert!(answer["error"].is_null(), "{method}: {answer}");
+        answer["result"].clone()
+    }
+
+    fn open(&mut self, path: &str, text: &str) {
+        let document = json!({ "uri": uri(path), "languageId": "esl", "version": 1, "text": text });
+        self.tell("textDocument/didOpen", json!({ "textDocument": document }));
+    }
+
+    /// Asks about the place at which the `occurrence`-th `word` of a text begins.
+    #[track_caller]
+    fn ask_at(&mut self, method: &str, path: &str, place: Value, more: Value) -> Value {
+        let mut parameters = json!({ "textDocument": { "uri": uri(path) }, "position": place });
+        for (key, value) in more.as_object().into_iter().flatten() {
+            parameters[key] = value.clone();
+        }
+        self.ask(method, parameters)
+    }
+
+    /// Waits for diagnostics of a text that `wanted` likes.
+    fn diagnostics(&mut self, path: &str, wanted: impl Fn(&[Value]) -> bool) -> Vec<Value> {
+        loop {
+            let told = self.told.get(&uri(path)).and_then(Value::as_array).cloned();
+            if let Some(told) = told.filter(|told| wanted(told)) {
+                return told;
+            }
+            self.receive();
+        }
+    }
+
+    /// Says goodbye.
+    fn end(mut self) {
+        self.ask("shutdown", Value::Null);
+        self.tell("exit", Value::Null);
+        drop(self.input);
+        assert_eq!(finish(self.child).status, Some(0));
+    }
+}
+
+fn uri(path: &str) -> String {
+    format!("file://{path}")
+}
+
+/// The position of the `occurrence`-th `word` in a text, counted from 0.
+fn place(text: &str, word: &str, occurrence: usize) -> Value {
+    let at = text.match_indices(word).nth(occurrence).expect("the word is there").0;
+    let line_start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
+    let line = text[..at].matches('\n').count();
+    json!({ "line": line, "character": text[line_start..at].encode_utf16().count() })
+}
+
+/// What a hover shows.
+fn hover(editor: &mut Editor, path: &str, place: Value) -> String {
+    let answer = editor.ask_at("textDocument/hover", path, place, Value::Null);
+    answer["contents"]["value"].as_str().unwrap_or_default().to_owned()
+}
+
+const ARM: &str = "(defpackage :arm (:use :esl :cl) (:export #:raise))\n(in-package :arm)\n\n\
+    (defun raise (angle &key (speed 1))\n  \"Raises the arm by ANGLE.\"\n  (list angle speed))\n";
+
+const MAIN: &str = "(require \"arm\")\n\
+    (define-cause :stuck ())\n\
+    \n\
+    (defun grip (force)\n  \"Closes the hand — carefully.\"\n  (when (> force 3)\n    (fail :stuck force))\n  force)\n\
+    \n\
+    (defun work (force)\n  (with-recovery-procedures ((:stuck :retries 2 (retry)))\n    (arm:raise 30 :speed 2)\n\
+    \x20   (grip force)))\n\
+    (print (work 1))\n";
+
+#[test]
+fn an_editor_is_told_what_names_mean() {
+    let folder = Folder::with("lsp_names", &[("arm.esl", ARM), ("main.esl", MAIN)]);
+    let (main, arm) = (folder.join("main.esl"), folder.join("arm.esl"));
+    let mut editor = Editor::new(&folder);
+    editor.open(&main, MAIN);
+
+    let shown = hover(&mut editor, &main, place(MAIN, "grip force", 0));
+    assert!(shown.contains("(grip force)") && shown.contains("Closes the hand — carefully."), "{shown}");
+    let shown = hover(&mut editor, &main, place(MAIN, "arm:raise", 0));
+    assert!(shown.contains("(raise angle &key (speed 1))") && shown.contains("Raises the arm"), "{shown}");
+    let shown = hover(&mut editor, &main, place(MAIN, "with-recovery-procedures", 0));
+    assert!(shown.contains("*macro*"), "{shown}");
+    let shown = hover(&mut editor, &main, place(MAIN, "when", 0));
+    assert!(shown.contains("Evaluates BODY if TEST is true"), "{shown}");
+    assert_eq!(hover(&mut editor, &main, place(MAIN, "3)", 0)), "", "there is nothing to say");
+
+    let found = editor.ask_at("textDocument/definition", &main, place(MAIN, "arm:raise", 0), Value::Null);
+    assert_eq!(
+        (found[0]["uri"].as_str(), &found[0]["range"]["start"]["line"]),
+        (Some(&*uri(&arm)), &json!(3))
+    );
+    let found = editor.ask_at("textDocument/definition", &main, place(MAIN, "force)", 2), Value::Null);
+    assert_eq!(found["range"]["start"]["line"], 3, "a local variable: {found}");
+    let found = editor.ask_at("textDocument/definition", &main, place(MAIN, "with-recovery", 0), Value::Null);
+    let library =
+        found[0]["uri"].as_str().expect("there is a place").trim_start_matches("file://").to_owned();
+    assert!(library.ends_with("stdlib/recovery.esl"), "{library}");
+    assert!(std::fs::read_to_string(library).expect("it is shown").contains("with-recovery-procedures"));
+
+    let more = json!({ "context": { "includeDeclaration": true } });
+    let uses = editor.ask_at("textDocument/references", &main, place(MAIN, "arm:raise", 0), more);
+    assert_eq!(uses.as_array().map(Vec::len), Some(3), "{uses}");
+    let edit = editor.ask_at(
+        "textDocument/rename",
+        &main,
+        place(MAIN, "arm:raise", 0),
+        json!({ "newName": "lift" }),
+    );
+    let edits = &edit["changes"];
+    assert_eq!(edits[uri(&main)][0]["range"]["start"]["character"], 9, "the package stays: {edit}");
+    assert_eq!(edits[uri(&arm)].as_array().map(Vec::len), Some(2), "exported, too: {edit}");
+    let local =
+        editor.ask_at("textDocument/rename", &main, place(MAIN, "force)", 0), json!({ "newName": "f" }));
+    assert_eq!(local["changes"][uri(&main)].as_array().map(Vec::len), Some(4), "{local}");
+    let refused = editor.request(
+        "textDocument/rename",
+        json!({ "textDocument": { "uri": uri(&main) }, "position": place(MAIN, "print", 0), "newName": "x" }),
+    );
+    assert!(refused["error"]["message"].as_str().is_some_and(|text| text.contains("`print`")), "{refused}");
+
+    let range = json!({ "start": { "line": 0, "character": 0 }, "end": { "line": 99, "character": 0 } });
+    let whole = json!({ "textDocument": { "uri": uri(&main) }, "range": range });
+    let hints = editor.ask("textDocument/inlayHint", whole);
+    assert_eq!(hints[0]["label"], "handles line 7", "{hints}");
+    let text = json!({ "textDocument": { "uri": uri(&main) } });
+    let symbols = editor.ask("textDocument/documentSymbol", text.clone());
+    let names: Vec<&str> =
+        symbols.as_array().expect("a list").iter().filter_map(|s| s["name"].as_str()).collect();
+    assert_eq!(names, [":stuck", "grip", "work"]);
+    let symbols = editor.ask("workspace/symbol", json!({ "query": "rse" }));
+    assert_eq!(symbols[0]["name"], "raise", "{symbols}");
+    let folds = editor.ask("textDocument/foldingRange", text.clone());
+    assert_eq!((&folds[0]["startLine"], &folds[0]["endLine"]), (&json!(3), &json!(7)), "{folds}");
+    let tokens = editor.ask("textDocument/semanticTokens/full", text);
+    assert!(tokens["data"].as_array().is_some_and(|data| data.len() > 50 && data.len() % 5 == 0), "{tokens}");
+    let arguments = json!([{ "textDocument": { "uri": uri(&main) }, "position": place(MAIN, "(when", 0) }]);
+    let expansion =
+        editor.ask("workspace/executeCommand", json!({ "command": "esl.expand", "arguments": arguments }));
+    assert!(expansion.as_str().is_some_and(|text| text.contains("if") || text.contains("IF")), "{expansion}");
+    editor.end();
+}
+
+#[test]
+fn an_editor_is_helped_while_a_program_is_typed() {
+    let folder = Folder::with("lsp_typing", &[("arm.esl", ARM)]);
+    let main = folder.join("main.esl");
+    let mut editor = Editor::new(&folder);
+    // It does not compile, and the list has no end.
+    let text = "(require \"arm\")\n(defun work (force)\n(let ((other 1))\n(arm:raise 30 :sp\n(defun rest-of-it () 1)\n";
+    editor.open(&main, text);
+    let broken = editor.diagnostics(&main, |told| !told.is_empty());
+    assert_eq!(broken[0]["code"], "unclosed-list", "{broken:?}");
+    let labels = |answer: &Value| -> Vec<String> {
+        let items = answer["items"].as_array().cloned().unwrap_or_default();
+        items.iter().filter_map(|item| item["label"].as_str()).map(str::to_owned).collect()
+    };
+    let end = json!({ "line": 3, "character": 17 });
+    let keys = editor.ask_at("textDocument/completion", &main, end.clone(), Value::Null);
+    assert_eq!(labels(&keys), [":speed"]);
+    let help = editor.ask_at("textDocument/signatureHelp", &main, end, Value::Null);
+    assert_eq!(help["signatures"][0]["label"], "(raise angle &key (speed 1))", "{help}");
+    let names = json!({ "line": 3, "character": 4 });
+    let names = editor.ask_at("textDocument/completion", &main, names, Value::Null);
+    assert!(
+        labels(&names).is_empty() || labels(&names).iter().all(|name| name.starts_with("arm")),
+        "{names}"
+    );
+
+    // The user types the rest; the columns are those of UTF-16.
+    let range = json!({ "start": { "line": 2, "character": 0 }, "end": { "line": 3, "character": 17 } });
+    let change = json!({ "range": range, "text": "(prnit \"é𝄞\" force))" });
+    let identity = json!({ "uri": uri(&main), "version": 2 });
+    editor.tell("textDocument/didChange", json!({ "textDocument": identity, "contentChanges": [change] }));
+    let told =
+        editor.diagnostics(&main, |told| told.iter().any(|found| found["code"] == "undefined-function"));
+    let wrong = told.iter().find(|found| found["code"] == "undefined-function").expect("just seen").clone();
+    let whole = wrong["range"].clone();
+    let actions = editor.ask(
+        "textDocument/codeAction",
+        json!({ "textDocument": { "uri": uri(&main) }, "range": whole, "context": { "diagnostics": [wrong] } }),
+    );
+    assert_eq!(actions[0]["title"], "Write `print`", "{actions}");
+    let edit = &actions[0]["edit"]["changes"][uri(&main)][0];
+    assert_eq!(
+        (&edit["newText"], &edit["range"]["start"]["character"]),
+        (&json!("print"), &json!(1)),
+        "{edit}"
+    );
+    let options = json!({ "tabSize": 8, "insertSpaces": true });
+    let edits = editor
+        .ask("textDocument/formatting", json!({ "textDocument": { "uri": uri(&main) }, "options": options }));
+    assert_eq!(edits.as_array().map(Vec::len), Some(1), "{edits}");
+    assert_eq!(edits[0]["newText"], "  (prnit \"é𝄞\" force))\n");
+    editor.end();
+}
