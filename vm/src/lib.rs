@@ -34,6 +34,7 @@ mod describe;
 mod embedder;
 mod environment;
 mod exchange;
+mod fused;
 mod interp;
 mod number;
 mod outside;

@@ -13,6 +13,7 @@ const LAYERS: &[&str] = &[
     // Below everything: hashes, settings, the outside, promises on which unsafe code relies.
     "canary",
     "config",
+    "fused",
     "host",
     "shape",
     "trust",

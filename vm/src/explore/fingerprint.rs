@@ -21,6 +21,7 @@ use std::rc::Rc;
 use super::live::Live;
 use esl_heap::state::{StateSink, Stated};
 
+use crate::fused::unfused;
 use crate::heap::{Heap, Kind};
 use crate::interp::frames::Frames;
 use crate::shape::{Shape, Sort};
@@ -357,8 +358,8 @@ impl Walk<'_> {
         }
         let heap = &self.vm.heap;
         let mut digest = Digest(1, 1);
-        let words = heap.code_words(code).unwrap_or_default();
-        digest.add_all(words.iter().map(|&word| u64::from(word)));
+        let words = unfused(heap.code_words(code).unwrap_or_default());
+        digest.add_all(words.into_iter().map(u64::from));
         let mut open: Vec<Value> = heap.code(code).map_or(Vec::new(), |code| vec![code.debug, code.name]);
         open.extend(heap.code_constants(code).unwrap_or_default());
         // Constants are not looked into further than a look shows; the places in the source tell the rest.
@@ -388,7 +389,7 @@ impl Walk<'_> {
         let words = heap.code_words(code).unwrap_or_default();
         let captures = heap.code(code).map_or(0, |code| code.spare[1] as usize);
         let words = &words[..words.len().saturating_sub(captures)];
-        let live = Rc::new(Live::of(heap, words, heap.code_constants(code).unwrap_or_default()));
+        let live = Rc::new(Live::of(heap, &unfused(words), heap.code_constants(code).unwrap_or_default()));
         self.known.live.insert(digest, live.clone());
         live
     }

@@ -7,7 +7,6 @@
 //! Not here: comparisons, which nobody waits for, and doubles in boxes, which are the numeric tower's.
 #![allow(unsafe_code)]
 
-use crate::number::unboxed_doubles;
 use crate::value::Value;
 
 #[cfg(all(target_arch = "x86_64", not(miri)))]
@@ -122,9 +121,9 @@ macro_rules! define_mixed {
     ($($name:ident $operator:tt;)*) => { $(
         #[inline(never)]
         pub(super) fn $name(a: Value, b: Value) -> Value {
-            match unboxed_doubles(a, b) {
-                Some((x, y)) => finite(x $operator y),
-                None => Value::UNBOUND,
+            match (unboxed(a), unboxed(b)) {
+                (Some(x), Some(y)) if !Value::both_fixnums(a, b) => encoded(x $operator y),
+                _ => Value::UNBOUND,
             }
         }
     )* };
@@ -137,9 +136,23 @@ define_mixed! {
     mixed_divide /;
 }
 
-#[inline]
-fn finite(x: f64) -> Value {
-    if x.is_finite() { Value::double(x).unwrap_or(Value::UNBOUND) } else { Value::UNBOUND }
+/// Returns a double without a box, or a fixnum, as a double.
+#[inline(always)]
+fn unboxed(v: Value) -> Option<f64> {
+    match v.as_fixnum() {
+        Some(n) => Some(n as f64),
+        None => v.as_double(),
+    }
+}
+
+/// Returns a finite double that needs no box, or `UNBOUND`.
+#[inline(always)]
+fn encoded(x: f64) -> Value {
+    match Value::double(x) {
+        Some(v) if v.is_windowed_double() => v,
+        Some(v) if x == 0.0 => v,
+        _ => Value::UNBOUND,
+    }
 }
 
 #[cfg(test)]

@@ -28,6 +28,10 @@
 //!   popped before it is left; the entry's pc is the landing that the entry's instruction names (V2).
 //!
 //! Only this module and its children write the fields behind F1, F3 and F5.
+//!
+//! The loop reads words as they were loaded, with fused instructions (`crate::fused`); all other code asks
+//! [`word_at`], which gives the instructions that the verifier has seen. The arm of a fused instruction leaves
+//! `pc` at the part that could not be done.
 #![allow(unsafe_code)]
 
 pub(crate) mod arguments;
@@ -56,6 +60,7 @@ use esl_bytecode::opcode::Opcode;
 use esl_bytecode::word::Word;
 
 use crate::cpu::Cpu;
+use crate::fused::{for_each_fused, original};
 use crate::heap::layout::{Boxed, CodeObject, FunctionObject, Kind, StructureObject, SymbolObject, Vector};
 use crate::raise::{Exit, Raised};
 use crate::shape::Shape;
@@ -63,9 +68,12 @@ use crate::value::Value;
 use crate::vm::Vm;
 
 macro_rules! define_operations {
-    ($( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $($kind:ident)+
-        { $( $field:ident : $ty:ident ),* } ; )*) => {
-        /// The operations of the loop: every opcode, and those that only the machine's own stubs contain.
+    ({ $( $(#[doc = $doc:literal])* $name:ident = $number:literal, $mnemonic:literal, $($kind:ident)+
+        { $( $field:ident : $ty:ident ),* } ; )* }
+     $( $(#[doc = $fused_doc:literal])* $fused:ident = $fused_number:literal, [$($part:ident)+], $fits:ident; )*
+    ) => {
+        /// The operations of the loop: every opcode, those that only the machine's own stubs contain, and
+        /// fused instructions.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
         #[allow(dead_code, reason = "operations are made by reading code")]
@@ -77,10 +85,16 @@ macro_rules! define_operations {
             TaskExit = stubs::TASK_EXIT,
             /// The function that ran where the task was interrupted has returned: see `interrupt`.
             InterruptReturn = stubs::INTERRUPT_RETURN,
+            $( $fused = $fused_number, )*
         }
     };
 }
-for_each_opcode!(define_operations);
+macro_rules! define_operations_with_fused {
+    ($($opcodes:tt)*) => {
+        for_each_fused! { define_operations { $($opcodes)* } }
+    };
+}
+for_each_opcode!(define_operations_with_fused);
 
 /// Why the inner loop was left, or what a cold function wants of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -148,12 +162,22 @@ unsafe fn constant(base: *mut Value, index: usize) -> Value {
     unsafe { *constants_of(code_of(*base.sub(2))).add(index) }
 }
 
-/// Returns the word of the instruction at `pc`.
+/// Returns the word of the instruction at `pc`, which may be the first part of a fused one.
 ///
 /// # Safety
 /// `pc` points into code.
 #[inline(always)]
 unsafe fn word_at(pc: *const u32) -> Word {
+    // SAFETY: by the contract there is a word of live code.
+    original(Word(unsafe { *pc }))
+}
+
+/// Returns the word at `pc` as the loop runs it.
+///
+/// # Safety
+/// `pc` points into code.
+#[inline(always)]
+unsafe fn loaded_word_at(pc: *const u32) -> Word {
     // SAFETY: by the contract there is a word of live code.
     Word(unsafe { *pc })
 }
@@ -171,11 +195,11 @@ unsafe fn aux_at(pc: *const u32) -> u32 {
 /// Returns the operation of a word.
 ///
 /// # Safety
-/// The word is one of code that has passed the verifier, or of a stub.
+/// The word is one of code that has passed the verifier and may have been fused, or of a stub.
 #[inline(always)]
 unsafe fn operation(word: Word) -> LoopOperation {
     // SAFETY: V1: the low byte of an instruction is the number of an operation; those of stubs are operations
-    // too.
+    // too, and so are the numbers that `fused::fuse` puts in the place of others.
     unsafe { std::mem::transmute(word.number()) }
 }
 
@@ -321,8 +345,15 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
     // makes every register read hold an object of the program, whose value is the address of a live object.
     // What depends on data is tested before it is used (M6).
     let signal = unsafe {
+        let mut word = loaded_word_at(pc);
         loop {
-            let word = word_at(pc);
+            // Goes on with the instruction at `pc`.
+            macro_rules! go_on {
+                () => {{
+                    word = loaded_word_at(pc);
+                    continue;
+                }};
+            }
             macro_rules! aux {
                 () => {
                     aux_at(pc)
@@ -362,7 +393,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 ($words:literal, $which:literal) => {{
                     pc = pc.add($words);
                     apart!($which);
-                    continue;
+                    go_on!();
                 }};
             }
             // Jumps from behind an instruction of this many words.
@@ -370,7 +401,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 ($words:literal, $offset:expr) => {{
                     pc = pc.add($words).offset($offset);
                     apart!();
-                    continue;
+                    go_on!();
                 }};
             }
             macro_rules! jump_if {
@@ -422,7 +453,9 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             macro_rules! cold_test {
                 ($operation:ident, $function:path, $offset:expr) => {{
                     match $function(vm, pc, base) {
-                        Ok(holds) => jump_if!(2, holds == const { Opcode::$operation.jumps_when() }, $offset),
+                        Ok(holds) => {
+                            jump_if!(2, holds == const { Opcode::$operation.jumps_when() }, $offset)
+                        }
                         Err(signal) => break signal,
                     }
                 }};
@@ -521,7 +554,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     base = registers;
                     k = constants_of(code);
                     pc = (*code).entry;
-                    continue;
+                    go_on!();
                 }};
             }
             // As `enter!`, after the arguments have been put in the order of the function's parameters.
@@ -561,7 +594,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     *base.sub(2) = $function;
                     k = constants_of($code);
                     pc = (*$code).entry;
-                    continue;
+                    go_on!();
                 }};
             }
             // Calls the builtin of the instruction with the arguments in its window.
@@ -577,21 +610,303 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     native(vm, arguments)
                 }};
             }
+            // Returns the value list.
+            macro_rules! return_all {
+                () => {{
+                    vm.cpu.set_base(base);
+                    substitute::return_all(vm);
+                    pc = vm.cpu.pc();
+                    base = vm.cpu.base();
+                    k = constants_of(code_of(*base.sub(2)));
+                    go_on!();
+                }};
+            }
             macro_rules! return_value {
                 ($value:expr) => {{
                     let value = $value;
                     let return_to = pc_from_value(*base.sub(1));
-                    let call = word_at(return_to.sub(2));
+                    // Calls are no parts of fused instructions.
+                    let call = loaded_word_at(return_to.sub(2));
                     if call.c() != 0 {
                         vm.exchange.values.clear();
                         vm.exchange.values.push(value);
-                        break Signal::ReturnAll;
+                        return_all!();
                     }
                     *base.sub(2) = value;
                     base = base.sub(2 + call.a());
                     pc = return_to;
                     k = constants_of(code_of(*base.sub(2)));
+                    go_on!();
+                }};
+            }
+            macro_rules! multiply {
+                () => {{
+                    let (x, y) = (get!(word.b()), get!(word.c()));
+                    if Value::both_fixnums(x, y) {
+                        let (product, overflow) = (x.bits() as i64 >> 2).overflowing_mul(y.bits() as i64);
+                        if !overflow {
+                            set!(word.a(), Value::from_bits(product as u64));
+                            next!(1);
+                        }
+                    } else if Value::both_windowed_doubles(x, y)
+                        && double::store(
+                            base.add(word.a()),
+                            double::load(base.add(word.b())) * double::load(base.add(word.c())),
+                        )
+                    {
+                        next!(1, 1);
+                    }
+                    mixed!(Mul, double::mixed_multiply, x, y)
+                }};
+            }
+            macro_rules! modulo {
+                () => {{
+                    let (x, y) = (get!(word.b()), get!(word.c()));
+                    if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
+                        // Both are shifted by two, and so is the remainder.
+                        let remainder = (x.bits() as i64).rem_euclid(y.bits() as i64);
+                        set!(word.a(), Value::from_bits(remainder as u64));
+                        next!(1);
+                    }
+                    compute!(Mod)
+                }};
+            }
+            // Goes on with the next part of a fused instruction.
+            macro_rules! next_part {
+                () => {{
+                    pc = pc.add(1);
+                    word = loaded_word_at(pc);
+                }};
+            }
+            macro_rules! on_fixnums {
+                (Add, $x:expr, $y:expr) => {
+                    ($x.bits() as i64).overflowing_add($y.bits() as i64)
+                };
+                (Sub, $x:expr, $y:expr) => {
+                    ($x.bits() as i64).overflowing_sub($y.bits() as i64)
+                };
+                (Mul, $x:expr, $y:expr) => {
+                    ($x.bits() as i64 >> 2).overflowing_mul($y.bits() as i64)
+                };
+            }
+            macro_rules! on_doubles {
+                (Add, $x:expr, $y:expr) => {
+                    $x + $y
+                };
+                (Sub, $x:expr, $y:expr) => {
+                    $x - $y
+                };
+                (Mul, $x:expr, $y:expr) => {
+                    $x * $y
+                };
+            }
+            // Applies an operation to the result of the part before and to another operand.
+            macro_rules! on_result {
+                ($apply:ident, $operation:ident, right, $result:expr, $other:expr) => {
+                    $apply!($operation, $other, $result)
+                };
+                ($apply:ident, $operation:ident, $side:ident, $result:expr, $other:expr) => {
+                    $apply!($operation, $result, $other)
+                };
+            }
+            // Register of the operand of a second part that is not the result of the first.
+            macro_rules! other_operand {
+                ($second:expr, left) => {
+                    $second.c()
+                };
+                ($second:expr, right) => {
+                    $second.b()
+                };
+                // One of the two is the result of the first part.
+                ($second:expr, either) => {
+                    $second.b() ^ $second.c() ^ word.a()
+                };
+            }
+            // The second part of a fused instruction, as the instruction that it is.
+            macro_rules! part {
+                (Add) => {
+                    arithmetic!(Add, overflowing_add, +, double::mixed_add)
+                };
+                (Sub) => {
+                    arithmetic!(Sub, overflowing_sub, -, double::mixed_subtract)
+                };
+                (Mul) => {
+                    multiply!()
+                };
+                (Mod) => {
+                    modulo!()
+                };
+            }
+            // Does the first part of a fused instruction as the instruction that it is.
+            macro_rules! first_part {
+                () => {{
+                    word = original(word);
                     continue;
+                }};
+            }
+            // Two operations, of which the second uses the result of the first. Registers are written in the
+            // order of the parts, since the second may write to that of the first.
+            macro_rules! arithmetic_twice {
+                ($first:ident, $second:ident, $side:ident) => {{
+                    let (x, y) = (get!(word.b()), get!(word.c()));
+                    let second = loaded_word_at(pc.add(1));
+                    let other = base.add(other_operand!(second, $side));
+                    if Value::both_fixnums(x, y) {
+                        let (result, overflow) = on_fixnums!($first, x, y);
+                        if !overflow {
+                            let result = Value::from_bits(result as u64);
+                            set!(word.a(), result);
+                            let other = *other;
+                            if other.is_fixnum() {
+                                let (result, overflow) =
+                                    on_result!(on_fixnums, $second, $side, result, other);
+                                if !overflow {
+                                    set!(second.a(), Value::from_bits(result as u64));
+                                    next!(2);
+                                }
+                            }
+                            next!(1, 1);
+                        }
+                    } else if Value::both_windowed_doubles(x, y) {
+                        let (x, y) = (base.add(word.b()), base.add(word.c()));
+                        let result = on_doubles!($first, double::load(x), double::load(y));
+                        if double::store(base.add(word.a()), result) {
+                            if (*other).is_windowed_double() {
+                                let result =
+                                    on_result!(on_doubles, $second, $side, result, double::load(other));
+                                if double::store(base.add(second.a()), result) {
+                                    next!(2, 2);
+                                }
+                            }
+                            next!(1, 3);
+                        }
+                    }
+                    first_part!()
+                }};
+            }
+            // The sum or difference of two products.
+            macro_rules! products {
+                ($operation:ident) => {{
+                    let (second, third) = (loaded_word_at(pc.add(1)), loaded_word_at(pc.add(2)));
+                    let (x, y) = (base.add(word.b()), base.add(word.c()));
+                    let (v, w) = (base.add(second.b()), base.add(second.c()));
+                    if Value::both_windowed_doubles(*x, *y) && Value::both_windowed_doubles(*v, *w) {
+                        let left = double::load(x) * double::load(y);
+                        let right = double::load(v) * double::load(w);
+                        if double::store(base.add(word.a()), left) {
+                            if double::store(base.add(second.a()), right) {
+                                let result = on_doubles!($operation, left, right);
+                                if double::store(base.add(third.a()), result) {
+                                    next!(3);
+                                }
+                                next!(2, 1);
+                            }
+                            next!(1, 2);
+                        }
+                    }
+                    first_part!()
+                }};
+            }
+            // An operation on an element of a simple vector.
+            macro_rules! element_and {
+                ($second:ident, $side:ident) => {{
+                    let (vector, index) = (get!(word.b()), get!(word.c()));
+                    if is_simple_vector(vector)
+                        && index.is_fixnum()
+                        && index.bits() >> 2 < u64::from((*vector.object_ptr()).len)
+                    {
+                        let place = element(vector, (index.bits() >> 2) as usize);
+                        let value = *place;
+                        set!(word.a(), value);
+                        let second = loaded_word_at(pc.add(1));
+                        let other = base.add(other_operand!(second, $side));
+                        if Value::both_windowed_doubles(value, *other) {
+                            let (value, other) = (double::load(place), double::load(other));
+                            let result = on_result!(on_doubles, $second, $side, value, other);
+                            if double::store(base.add(second.a()), result) {
+                                next!(2);
+                            }
+                        }
+                        next!(1, 1);
+                    }
+                    first_part!()
+                }};
+            }
+            // An element of a simple vector times something, added to something else.
+            macro_rules! element_product_and_sum {
+                () => {{
+                    let (vector, index) = (get!(word.b()), get!(word.c()));
+                    if is_simple_vector(vector)
+                        && index.is_fixnum()
+                        && index.bits() >> 2 < u64::from((*vector.object_ptr()).len)
+                    {
+                        let place = element(vector, (index.bits() >> 2) as usize);
+                        let value = *place;
+                        set!(word.a(), value);
+                        let (second, third) = (loaded_word_at(pc.add(1)), loaded_word_at(pc.add(2)));
+                        let factor = base.add(second.b() ^ second.c() ^ word.a());
+                        if Value::both_windowed_doubles(value, *factor) {
+                            let product = double::load(place) * double::load(factor);
+                            if double::store(base.add(second.a()), product) {
+                                let other = base.add(third.b() ^ third.c() ^ second.a());
+                                if (*other).is_windowed_double()
+                                    && double::store(base.add(third.a()), product + double::load(other))
+                                {
+                                    next!(3);
+                                }
+                                next!(2, 1);
+                            }
+                        }
+                        next!(1, 2);
+                    }
+                    first_part!()
+                }};
+            }
+            // Loads a value, then goes on with an operation.
+            macro_rules! load_and {
+                ($value:expr, $second:ident) => {{
+                    set!(word.a(), $value);
+                    next_part!();
+                    part!($second)
+                }};
+            }
+            macro_rules! car {
+                () => {{
+                    let list = get!(word.b());
+                    if !list.is_cons() {
+                        compute!(Car)
+                    }
+                    set!(word.a(), (*list.cons_ptr()).car);
+                }};
+            }
+            macro_rules! cdr {
+                () => {{
+                    let list = get!(word.b());
+                    if !list.is_cons() {
+                        compute!(Cdr)
+                    }
+                    set!(word.a(), (*list.cons_ptr()).cdr);
+                }};
+            }
+            macro_rules! add_int {
+                ($next:expr) => {{
+                    let x = get!(word.b());
+                    if x.is_fixnum() {
+                        let addend = i64::from(word.signed_c()) << 2;
+                        let (sum, overflow) = (x.bits() as i64).overflowing_add(addend);
+                        if !overflow {
+                            set!(word.a(), Value::from_bits(sum as u64));
+                            $next
+                        }
+                    } else if x.is_windowed_double()
+                        && double::store(
+                            base.add(word.a()),
+                            double::load(base.add(word.b())) + f64::from(word.signed_c()),
+                        )
+                    {
+                        next!(1, 1);
+                    }
+                    compute!(AddInt)
                 }};
             }
 
@@ -623,24 +938,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 // ---- arithmetic
                 LoopOperation::Add => arithmetic!(Add, overflowing_add, +, double::mixed_add),
                 LoopOperation::Sub => arithmetic!(Sub, overflowing_sub, -, double::mixed_subtract),
-                LoopOperation::Mul => {
-                    let (x, y) = (get!(word.b()), get!(word.c()));
-                    if Value::both_fixnums(x, y) {
-                        let (product, overflow) = (x.bits() as i64 >> 2).overflowing_mul(y.bits() as i64);
-                        if !overflow {
-                            set!(word.a(), Value::from_bits(product as u64));
-                            next!(1);
-                        }
-                    } else if Value::both_windowed_doubles(x, y)
-                        && double::store(
-                            base.add(word.a()),
-                            double::load(base.add(word.b())) * double::load(base.add(word.c())),
-                        )
-                    {
-                        next!(1, 1);
-                    }
-                    mixed!(Mul, double::mixed_multiply, x, y)
-                }
+                LoopOperation::Mul => multiply!(),
                 LoopOperation::Div => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_windowed_doubles(x, y)
@@ -653,25 +951,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     mixed!(Div, double::mixed_divide, x, y)
                 }
-                LoopOperation::AddInt => {
-                    let x = get!(word.b());
-                    if x.is_fixnum() {
-                        let addend = i64::from(word.signed_c()) << 2;
-                        let (sum, overflow) = (x.bits() as i64).overflowing_add(addend);
-                        if !overflow {
-                            set!(word.a(), Value::from_bits(sum as u64));
-                            next!(1);
-                        }
-                    } else if x.is_windowed_double()
-                        && double::store(
-                            base.add(word.a()),
-                            double::load(base.add(word.b())) + f64::from(word.signed_c()),
-                        )
-                    {
-                        next!(1, 1);
-                    }
-                    compute!(AddInt)
-                }
+                LoopOperation::AddInt => add_int!(next!(1)),
                 LoopOperation::Floor => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
@@ -690,16 +970,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     compute!(Truncate)
                 }
-                LoopOperation::Mod => {
-                    let (x, y) = (get!(word.b()), get!(word.c()));
-                    if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
-                        // Both are shifted by two, and so is the remainder.
-                        let remainder = (x.bits() as i64).rem_euclid(y.bits() as i64);
-                        set!(word.a(), Value::from_bits(remainder as u64));
-                        next!(1);
-                    }
-                    compute!(Mod)
-                }
+                LoopOperation::Mod => modulo!(),
                 LoopOperation::Rem => {
                     let (x, y) = (get!(word.b()), get!(word.c()));
                     if Value::both_fixnums(x, y) && (y.bits() as i64) > 0 {
@@ -772,11 +1043,15 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
 
                 // ---- jumps forward
                 LoopOperation::JumpAlways => jump!(1, word.signed_e() as isize),
-                LoopOperation::JumpIfNil => jump_if!(1, get!(word.a()).is_nil(), word.signed_d() as isize),
+                LoopOperation::JumpIfNil => {
+                    jump_if!(1, get!(word.a()).is_nil(), word.signed_d() as isize)
+                }
                 LoopOperation::JumpIfNotNil => {
                     jump_if!(1, get!(word.a()).is_true(), word.signed_d() as isize)
                 }
-                LoopOperation::JumpIfCons => jump_if!(1, get!(word.a()).is_cons(), word.signed_d() as isize),
+                LoopOperation::JumpIfCons => {
+                    jump_if!(1, get!(word.a()).is_cons(), word.signed_d() as isize)
+                }
                 LoopOperation::JumpIfNotCons => {
                     jump_if!(1, !get!(word.a()).is_cons(), word.signed_d() as isize)
                 }
@@ -877,20 +1152,12 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     compute!(Cons)
                 }
                 LoopOperation::Car => {
-                    let list = get!(word.b());
-                    if list.is_cons() {
-                        set!(word.a(), (*list.cons_ptr()).car);
-                        next!(1);
-                    }
-                    compute!(Car)
+                    car!();
+                    next!(1)
                 }
                 LoopOperation::Cdr => {
-                    let list = get!(word.b());
-                    if list.is_cons() {
-                        set!(word.a(), (*list.cons_ptr()).cdr);
-                        next!(1);
-                    }
-                    compute!(Cdr)
+                    cdr!();
+                    next!(1)
                 }
                 LoopOperation::Cadr => {
                     let list = get!(word.b());
@@ -1052,9 +1319,14 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 }
                 LoopOperation::SymbolValue => {
                     // SAFETY: V4: the constant is a symbol.
-                    let symbol = (*k.add(word.d())).object_ptr().cast::<SymbolObject>();
-                    let value = (*symbol).value;
-                    if (*symbol).header.flags & SymbolObject::EVER_BOUND == 0 && value != Value::UNBOUND {
+                    let symbol = *k.add(word.d());
+                    let cell = symbol.object_ptr().cast::<SymbolObject>();
+                    let value = if (*cell).header.flags & SymbolObject::EVER_BOUND == 0 {
+                        (*cell).value
+                    } else {
+                        variable::bound_value(vm, symbol)
+                    };
+                    if value != Value::UNBOUND {
                         set!(word.a(), value);
                         next!(1);
                     }
@@ -1160,7 +1432,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         }
                         Err(Exit::Values) => {
                             attend!();
-                            break Signal::ReturnAll;
+                            return_all!();
                         }
                         Err(exit) => {
                             break Signal::Exit(exit);
@@ -1173,9 +1445,9 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                         return_value!(get!(word.a()))
                     }
                     cold::set_values(vm, pc, base);
-                    break Signal::ReturnAll;
+                    return_all!();
                 }
-                LoopOperation::ReturnAll => break Signal::ReturnAll,
+                LoopOperation::ReturnAll => return_all!(),
 
                 // ---- the value list
                 LoopOperation::SetValues => cold!(1, cold::set_values),
@@ -1214,6 +1486,85 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     break signal;
                 }
                 LoopOperation::TaskExit => break Signal::TaskExit,
+
+                // ---- fused instructions
+                LoopOperation::MulMulAdd => products!(Add),
+                LoopOperation::MulMulSub => products!(Sub),
+                LoopOperation::VectorRefMulAdd | LoopOperation::ArrayRefMulAdd => {
+                    element_product_and_sum!()
+                }
+                LoopOperation::AddAdd => arithmetic_twice!(Add, Add, either),
+                LoopOperation::AddMul => arithmetic_twice!(Add, Mul, either),
+                LoopOperation::AddSubLeft => arithmetic_twice!(Add, Sub, left),
+                LoopOperation::AddSubRight => arithmetic_twice!(Add, Sub, right),
+                LoopOperation::SubAdd => arithmetic_twice!(Sub, Add, either),
+                LoopOperation::SubMul => arithmetic_twice!(Sub, Mul, either),
+                LoopOperation::SubSubLeft => arithmetic_twice!(Sub, Sub, left),
+                LoopOperation::SubSubRight => arithmetic_twice!(Sub, Sub, right),
+                LoopOperation::MulAdd => arithmetic_twice!(Mul, Add, either),
+                LoopOperation::MulMul => arithmetic_twice!(Mul, Mul, either),
+                LoopOperation::MulSubLeft => arithmetic_twice!(Mul, Sub, left),
+                LoopOperation::MulSubRight => arithmetic_twice!(Mul, Sub, right),
+                LoopOperation::AddIntDiv => {
+                    let second = loaded_word_at(pc.add(1));
+                    let (addend, dividend) = (base.add(word.b()), base.add(second.b()));
+                    if Value::both_windowed_doubles(*addend, *dividend) {
+                        let sum = double::load(addend) + f64::from(word.signed_c());
+                        if double::store(base.add(word.a()), sum) {
+                            if double::store(base.add(second.a()), double::load(dividend) / sum) {
+                                next!(2);
+                            }
+                            next!(1, 1);
+                        }
+                    }
+                    first_part!()
+                }
+                LoopOperation::AddIntMul => add_int!({
+                    next_part!();
+                    multiply!()
+                }),
+                LoopOperation::VectorRefAdd | LoopOperation::ArrayRefAdd => element_and!(Add, either),
+                LoopOperation::VectorRefMul | LoopOperation::ArrayRefMul => element_and!(Mul, either),
+                LoopOperation::VectorRefSubLeft | LoopOperation::ArrayRefSubLeft => {
+                    element_and!(Sub, left)
+                }
+                LoopOperation::VectorRefSubRight | LoopOperation::ArrayRefSubRight => {
+                    element_and!(Sub, right)
+                }
+                LoopOperation::LoadConstAdd => load_and!(*k.add(word.d()), Add),
+                LoopOperation::LoadConstSub => load_and!(*k.add(word.d()), Sub),
+                LoopOperation::LoadConstMul => load_and!(*k.add(word.d()), Mul),
+                LoopOperation::LoadConstMod => load_and!(*k.add(word.d()), Mod),
+                LoopOperation::LoadIntMul => load_and!(Value::small(word.signed_d()), Mul),
+                LoopOperation::LoadIntMod => load_and!(Value::small(word.signed_d()), Mod),
+                LoopOperation::MoveMove => {
+                    set!(word.a(), get!(word.b()));
+                    next_part!();
+                    set!(word.a(), get!(word.b()));
+                    next!(1)
+                }
+                LoopOperation::MoveLoop => {
+                    set!(word.a(), get!(word.b()));
+                    next_part!();
+                    tick!();
+                    jump!(1, word.signed_e() as isize)
+                }
+                LoopOperation::AddIntMove => add_int!({
+                    next_part!();
+                    set!(word.a(), get!(word.b()));
+                    next!(1)
+                }),
+                LoopOperation::CarCdr => {
+                    car!();
+                    next_part!();
+                    cdr!();
+                    next!(1)
+                }
+                LoopOperation::CarJumpNumEq => {
+                    car!();
+                    next_part!();
+                    jump_compare!(JumpNumEq, ==)
+                }
             }
         }
     };

@@ -11,7 +11,21 @@ use crate::task::Binding;
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// `symbol-value` of a symbol that some task has bound, or that has no value.
+/// Returns the value of a special variable that some task has bound: that of the running task's newest
+/// binding, or else the global one.
+///
+/// # Safety
+/// `symbol` is a Symbol.
+#[inline(never)]
+pub(super) unsafe fn bound_value(vm: &Vm, symbol: Value) -> Value {
+    let bindings = vm.scheduler.running.as_ref().map(|task| &task.control.bindings);
+    // SAFETY: by the contract this is a live Symbol.
+    let global = unsafe { (*symbol.object_ptr().cast::<SymbolObject>()).value };
+    bindings.and_then(|bindings| bindings.get(symbol)).unwrap_or(global)
+}
+
+/// `symbol-value` of a symbol that has no value.
+#[cold]
 #[inline(never)]
 pub(super) unsafe fn symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {
     // SAFETY: V3: the operand is a register of the frame at `base`; V4: the constant is there.

@@ -142,7 +142,7 @@ pub(crate) fn float_quotient(vm: &mut Vm, op: &'static str, operands: [Value; 2]
 
 /// Returns two doubles, or a double and a fixnum, as doubles, if neither is an object in the heap.
 #[inline]
-pub(crate) fn unboxed_doubles(a: Value, b: Value) -> Option<(f64, f64)> {
+fn unboxed_doubles(a: Value, b: Value) -> Option<(f64, f64)> {
     match (a.as_fixnum(), b.as_fixnum()) {
         (Some(_), Some(_)) => None,
         (Some(x), None) => Some((x as f64, b.as_double()?)),

@@ -25,7 +25,7 @@ use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
 
-pub(crate) use arithmetic::{add, check_gcd, divide, multiply, negate, subtract, unboxed_doubles};
+pub(crate) use arithmetic::{add, check_gcd, divide, multiply, negate, subtract};
 pub(crate) use compare::{less, less_or_equal, num_equal, sign, sign_of};
 pub(crate) use esl_heap::number::{
     eql, is_float, is_integer, is_number, is_rational, is_real, is_zero, same_value,

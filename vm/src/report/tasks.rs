@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use esl_bytecode::compile::SourcePlace;
-use esl_bytecode::opcode::Opcode;
+use esl_bytecode::word::Word;
 
 use super::{event_label, lack_of, reason_of, task_label};
+use crate::fused::original;
 use crate::interp::frames::{Frame, Frames};
 use crate::interp::start::first_code_of;
 use crate::task::{Task, TaskState};
@@ -29,7 +30,7 @@ fn is_of_library(source: &str) -> bool {
 fn tail_call_in(words: &[u32]) -> Option<usize> {
     let mut found = None;
     let mut at = 0;
-    while let Some(opcode) = words.get(at).and_then(|&word| Opcode::from_number(word as u8)) {
+    while let Some(opcode) = words.get(at).and_then(|&word| original(Word(word)).opcode()) {
         if opcode.is_tail() && found.replace(at).is_some() {
             return None;
         }

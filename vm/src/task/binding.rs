@@ -42,6 +42,14 @@ struct BindingTable {
     previous: Vec<u32>,
 }
 
+impl BindingTable {
+    /// Returns the index of the newest binding of `symbol` in the table.
+    #[cold]
+    fn find(&self, symbol: Value) -> Option<usize> {
+        self.newest.get(&symbol.bits()).map(|&index| index as usize)
+    }
+}
+
 impl Bindings {
     /// Returns the number of bindings.
     #[inline]
@@ -116,7 +124,11 @@ impl Bindings {
     /// Returns the value of the newest binding of `symbol`.
     #[inline]
     pub(crate) fn get(&self, symbol: Value) -> Option<Value> {
-        self.find(symbol).map(|index| self.all[index].value)
+        let near = self.all.get(self.covered()..).unwrap_or_default();
+        match near.iter().rev().find(|binding| binding.symbol == symbol) {
+            Some(binding) => Some(binding.value),
+            None => self.table.as_ref().and_then(|table| Some(self.all[table.find(symbol)?].value)),
+        }
     }
 
     /// Returns the value of the newest binding of `symbol`, to be set.
@@ -131,7 +143,7 @@ impl Bindings {
         let near = self.all[covered..].iter().rposition(|binding| binding.symbol == symbol);
         match (near, &self.table) {
             (Some(index), _) => Some(covered + index),
-            (None, Some(table)) => table.newest.get(&symbol.bits()).map(|&index| index as usize),
+            (None, Some(table)) => table.find(symbol),
             (None, None) => None,
         }
     }

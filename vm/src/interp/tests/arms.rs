@@ -122,14 +122,14 @@ fn functions<'a>(programs: impl IntoIterator<Item = &'a str>) -> Vec<ModuleFunct
 }
 
 /// A machine without a library, with a class `POINT`, an instance of it in `V`, and the function `SUCCESSOR`.
-struct Machine(Vm);
+pub(super) struct Machine(Vm);
 
 impl Machine {
-    fn new() -> Machine {
+    pub(super) fn new() -> Machine {
         Machine::with(Config::default())
     }
 
-    fn with(config: Config) -> Machine {
+    pub(super) fn with(config: Config) -> Machine {
         let mut vm = Vm::new(config, Box::new(VirtualHost::new())).unwrap();
         let Vm { heap, world, .. } = &mut vm;
         let mut intern = |name| world.intern(heap, &Symbol::esl(name)).unwrap();
@@ -144,6 +144,11 @@ impl Machine {
         machine
     }
 
+    /// Returns the ticks of all tasks.
+    pub(super) fn ticks(&self) -> u64 {
+        self.0.ticks()
+    }
+
     /// Sets the special variable to a new point.
     fn set_point(&mut self) {
         let Vm { heap, world, .. } = &mut self.0;
@@ -155,7 +160,7 @@ impl Machine {
     }
 
     /// Loads the programs as one module, and returns their functions.
-    fn load<'a>(&mut self, programs: impl IntoIterator<Item = &'a str>) -> Vec<Value> {
+    pub(super) fn load<'a>(&mut self, programs: impl IntoIterator<Item = &'a str>) -> Vec<Value> {
         let functions = functions(programs);
         let mains = shared_functions().len()..functions.len();
         let toplevel = mains.clone().map(|number| FunctionNumber(number as u32)).collect();
@@ -172,7 +177,7 @@ impl Machine {
     }
 
     /// Runs the function of a program, and returns its values or the description of its failure.
-    fn run(&mut self, function: Value) -> String {
+    pub(super) fn run(&mut self, function: Value) -> String {
         match self.0.call(function, &[], u64::MAX) {
             Ok(values) => {
                 let values: Vec<String> = values.iter().map(|&v| describe(&self.0.heap, v)).collect();
@@ -183,7 +188,7 @@ impl Machine {
     }
 
     /// Runs the programs, and lists those with another result than expected.
-    fn wrong<'a>(&mut self, programs: impl IntoIterator<Item = (&'a str, &'a str)>) -> String {
+    pub(super) fn wrong<'a>(&mut self, programs: impl IntoIterator<Item = (&'a str, &'a str)>) -> String {
         let (programs, results): (Vec<&str>, Vec<&str>) = programs.into_iter().unzip();
         let functions = self.load(programs.iter().copied());
         let mut wrong = String::new();

@@ -5,6 +5,7 @@ use esl_bytecode::opcode::{Instr, OPCODES};
 use esl_bytecode::operand::*;
 use esl_bytecode::symbol::Symbol;
 
+use crate::fused::FUSED;
 use crate::host::VirtualHost;
 use crate::run::RunOutcome;
 use crate::task::TaskResult;
@@ -13,6 +14,7 @@ use crate::vm::{Config, Vm};
 use crate::world::load::{Alone, load};
 
 mod arms;
+mod fused;
 
 /// Returns a machine without a library.
 fn machine(config: Config) -> Vm {
@@ -203,7 +205,9 @@ fn the_loop_has_an_arm_for_each_row_in_the_order_of_the_table() {
         .map(|name| name.trim_matches([' ', '\n', '|']))
         .collect();
     let rows: Vec<String> = OPCODES.iter().map(|row| format!("{:?}", row.opcode)).collect();
-    let (of_rows, of_stubs) = operations.split_at(rows.len());
+    let (of_rows, others) = operations.split_at(rows.len());
     assert_eq!(of_rows, rows);
+    let (of_stubs, fused) = others.split_at(3);
     assert_eq!(of_stubs, ["ErrorReturn", "InterruptReturn", "TaskExit"]);
+    assert_eq!(fused, FUSED.iter().map(|fused| fused.name).collect::<Vec<_>>());
 }

@@ -22,6 +22,7 @@ use esl_bytecode::package::PackageId;
 use esl_bytecode::symbol::{Home, Symbol};
 use esl_bytecode::verify::VerifyError;
 
+use crate::fused::fuse;
 use crate::heap::layout::CodeObject;
 use crate::heap::{AllocError, CodeParts, Heap, Kind};
 use crate::shape::{Shape, Sort, capture_word};
@@ -249,6 +250,7 @@ fn make_code(
 ) -> Result<Value, AllocError> {
     let function = parts.function;
     let mut words = function.code.clone();
+    fuse(&mut words);
     words.extend(function.captures.iter().copied().map(capture_word));
     let parameters = &function.parameters;
     let arity = if parameters.is_exact() { u32::from(parameters.required) } else { CodeObject::ANY_ARITY };
