@@ -79,6 +79,8 @@ pub(crate) struct ActiveCompilation {
     pub(crate) compilation: Box<dyn Compilation>,
     /// Objects and uninterned symbols of its data.
     pub(crate) unit: Unit,
+    /// The walk that makes a datum of the expansion with which the program has answered.
+    pub(crate) expansion: Option<DatumWalk>,
     /// A step that the program has not received yet, for lack of room.
     pub(crate) step: Option<Step>,
     /// Whether it waits for the value of a module that was to be loaded.
@@ -106,7 +108,12 @@ impl Compilations {
         self.unit.borrow().roots(visit);
         for job in self.jobs.values() {
             match job {
-                CompilerJob::Compilation(running) => running.unit.roots(visit),
+                CompilerJob::Compilation(running) => {
+                    running.unit.roots(visit);
+                    if let Some(walk) = &running.expansion {
+                        walk.roots(visit);
+                    }
+                }
                 CompilerJob::Form(form) => {
                     form.walk.roots(visit);
                     form.unit.roots(visit);
@@ -126,7 +133,10 @@ impl Compilations {
     /// Returns about how many bytes the jobs take.
     pub(crate) fn bytes(&self) -> usize {
         let of_job = |job: &CompilerJob| match job {
-            CompilerJob::Compilation(running) => running.compilation.bytes() + running.unit.bytes(),
+            CompilerJob::Compilation(running) => {
+                let expansion = running.expansion.as_ref().map_or(0, DatumWalk::bytes);
+                running.compilation.bytes() + running.unit.bytes() + expansion
+            }
             CompilerJob::Form(form) => form.walk.bytes() + form.unit.bytes(),
             CompilerJob::Text(text) => text.text.len(),
             CompilerJob::Taken => 0,

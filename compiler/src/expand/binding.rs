@@ -7,7 +7,7 @@ use esl_bytecode::symbol::Symbol;
 use super::expander::Expander;
 use super::form::{Checked, Form, check_distinct, name, on_one_line, quoted};
 use super::function::Body;
-use super::job::{Job, To};
+use super::job::{Job, LetBindings, To, VariableBinding};
 use super::origin::OriginId;
 use super::scope::{ScopeEntry, VariableMeaning};
 use super::variable::Deed;
@@ -50,12 +50,8 @@ impl Expander {
     }
 }
 
-/// A binding of a `let`: the name as written, its symbol, and the form of the value.
-struct VariableBinding {
-    datum: Datum,
-    symbol: Symbol,
-    value: Datum,
-}
+/// Bindings of a `let` that are looked at in one part.
+const BINDINGS_AT_ONCE: usize = 1000;
 
 fn bindings(
     expander: &Expander,
@@ -104,7 +100,7 @@ pub(super) fn let_in_parallel(
     form: Form,
     to: To,
 ) -> Checked {
-    expand_let(expander, environment, &form, to, false)
+    expand_let(expander, environment, form, to, false)
 }
 
 /// `(let* ({name | (name [value])}*) . body)`
@@ -114,50 +110,62 @@ pub(super) fn let_in_order(
     form: Form,
     to: To,
 ) -> Checked {
-    expand_let(expander, environment, &form, to, true)
+    expand_let(expander, environment, form, to, true)
 }
 
 fn expand_let(
     expander: &mut Expander,
     environment: &mut dyn Environment,
-    form: &Form,
+    form: Form,
     to: To,
     sequential: bool,
 ) -> Checked {
-    let found = bindings(expander, environment, form, "needs a list of bindings, such as `((x 1) (y 2))`")?;
+    let found = bindings(expander, environment, &form, "needs a list of bindings, such as `((x 1) (y 2))`")?;
     if !sequential {
-        check_distinct(found.iter().map(|binding| (&binding.symbol, binding.datum.span())), form)?;
+        check_distinct(found.iter().map(|binding| (&binding.symbol, binding.datum.span())), &form)?;
     }
-    let mut body = expander.take_body(&form.args[1..], false, form, to.origin)?;
-    let mut jobs = Vec::new();
-    let mut entries = Vec::new();
-    let mut variables = Vec::new();
-    let mut bound = Vec::new();
-    for VariableBinding { datum, symbol, value } in found {
-        let (node, job) = expander.part(value, to);
-        let (variable, entry) = expander.bound_variable(environment, &symbol, &datum, &body, form, to);
-        variables.push((variable, node));
-        bound.push(symbol);
-        jobs.push(job);
-        if sequential {
-            jobs.push(Job::Enter(vec![entry]));
-        } else {
-            entries.push(entry);
-        }
-    }
-    let mut inside = to;
-    if !variables.is_empty() {
-        inside = expander.result(to);
-        expander.fill(to, NodeKind::Let { sequential, bindings: variables, body: inside.node });
-    }
-    let free = body.free_specials(&bound);
-    let count = bound.len() + free.len();
-    entries.extend(free);
-    jobs.push(Job::Enter(entries));
-    jobs.extend(expander.body(std::mem::take(&mut body.forms), inside));
-    jobs.push(Job::Leave(count));
-    expander.schedule(jobs);
+    let body = expander.take_body(&form.args[1..], false, &form, to.origin)?;
+    let found = found.into_iter();
+    let (jobs, entries, variables, bound) = Default::default();
+    let bindings = LetBindings { form, to, sequential, found, body, jobs, entries, variables, bound };
+    expander.go_on_with_let(environment, Box::new(bindings));
     Ok(())
+}
+
+impl Expander {
+    /// Goes on with the variables of a `let`; after the last, schedules what is inside.
+    pub(super) fn go_on_with_let(&mut self, environment: &dyn Environment, mut state: Box<LetBindings>) {
+        let LetBindings { form, to, sequential, found, body, jobs, entries, variables, bound } = &mut *state;
+        let (to, sequential) = (*to, *sequential);
+        for VariableBinding { datum, symbol, value } in found.by_ref().take(BINDINGS_AT_ONCE) {
+            let (node, job) = self.part(value, to);
+            let (variable, entry) = self.bound_variable(environment, &symbol, &datum, body, form, to);
+            variables.push((variable, node));
+            bound.push(symbol);
+            jobs.push(job);
+            if sequential {
+                jobs.push(Job::Enter(vec![entry]));
+            } else {
+                entries.push(entry);
+            }
+        }
+        if found.len() > 0 {
+            return self.schedule([Job::Let(state)]);
+        }
+        let LetBindings { mut body, mut jobs, mut entries, variables, bound, .. } = *state;
+        let mut inside = to;
+        if !variables.is_empty() {
+            inside = self.result(to);
+            self.fill(to, NodeKind::Let { sequential, bindings: variables, body: inside.node });
+        }
+        let free = body.free_specials(&bound);
+        let count = bound.len() + free.len();
+        entries.extend(free);
+        jobs.push(Job::Enter(entries));
+        jobs.extend(self.body(std::mem::take(&mut body.forms), inside));
+        jobs.push(Job::Leave(count));
+        self.schedule(jobs);
+    }
 }
 
 /// `(multiple-value-bind (name*) form . body)`

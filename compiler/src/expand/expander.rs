@@ -33,6 +33,8 @@ const MAX_BYTES: usize = 64 << 20;
 const MAX_PASSED: u64 = 10_000_000;
 /// Forms after which the size of the expansion is looked at again.
 const MEASURED_EACH: u32 = 256;
+/// Names that go out of scope in one job.
+const NAMES_AT_ONCE: usize = 32;
 
 /// Expands a form of an operator into a node.
 pub(super) type Operator = fn(&mut Expander, &mut dyn Environment, Form, To) -> Checked;
@@ -228,12 +230,16 @@ impl Expander {
                 }
             }
             Job::Leave(count) => {
-                for _ in 0..count {
+                if count > NAMES_AT_ONCE {
+                    self.schedule([Job::Leave(count - NAMES_AT_ONCE)]);
+                }
+                for _ in 0..count.min(NAMES_AT_ONCE) {
                     if let Some(gone) = self.scope.leave() {
                         self.check_use(&gone);
                     }
                 }
             }
+            Job::Let(bindings) => self.go_on_with_let(environment, bindings),
             Job::Lambda(text, lambda, to) => self.expand_lambda(environment, *text, lambda, to),
             Job::Macro(form, to) => {
                 let purpose = Purpose { emit: false, load: true, keep: true };

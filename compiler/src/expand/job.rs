@@ -8,11 +8,11 @@ use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
 use super::form::{Form, is_known};
-use super::function::FunctionText;
+use super::function::{Body, FunctionText};
 use super::origin::OriginId;
 use super::scope::ScopeEntry;
 use super::setf::PlaceUse;
-use crate::core::{LambdaId, NodeId, VarId};
+use crate::core::{BoundVariable, LambdaId, NodeId, VarId};
 
 /// Destination of an expansion.
 #[derive(Clone, Copy, Debug)]
@@ -85,6 +85,35 @@ impl Top {
     }
 }
 
+/// A binding of a `let`: the name as written, its symbol, and the form of the value.
+#[derive(Debug)]
+pub(super) struct VariableBinding {
+    pub(super) datum: Datum,
+    pub(super) symbol: Symbol,
+    pub(super) value: Datum,
+}
+
+/// A `let` some of whose variables are bound.
+#[derive(Debug)]
+pub(super) struct LetBindings {
+    /// The whole form.
+    pub(super) form: Form,
+    pub(super) to: To,
+    /// Whether variables are bound one after another.
+    pub(super) sequential: bool,
+    /// Bindings that are to be looked at.
+    pub(super) found: std::vec::IntoIter<VariableBinding>,
+    pub(super) body: Body,
+    /// What is to be done when all variables are bound, so far.
+    pub(super) jobs: Vec<Job>,
+    /// Names that enter the scope of the body.
+    pub(super) entries: Vec<ScopeEntry>,
+    /// The variables, and the nodes of their values.
+    pub(super) variables: Vec<(BoundVariable, NodeId)>,
+    /// Names of the variables.
+    pub(super) bound: Vec<Symbol>,
+}
+
 /// A step of the expander.
 #[derive(Debug)]
 pub(super) enum Job {
@@ -96,6 +125,8 @@ pub(super) enum Job {
     Leave(usize),
     /// Expands the text of a function.
     Lambda(Box<FunctionText>, LambdaId, To),
+    /// Binds more variables of a `let`.
+    Let(Box<LetBindings>),
     /// Compiles the function of a local macro, given as a form.
     Macro(Datum, To),
     /// Enters local macros; their functions are the newest of the kept objects.

@@ -39,11 +39,12 @@ const MIN_WEIGHT: usize = 6;
 /// Divides the texts of `lambdas`.
 pub(super) fn split(core: &mut Core, lambdas: &[LambdaId], limits: Limits) {
     let before = core.lambdas.len();
+    let mut sizes = Vec::new();
     for &lambda in lambdas {
         let mut roots = Vec::new();
         lambda_nodes(&core.lambdas[lambda.index()], &mut |node| roots.push(node));
         for root in roots {
-            Splitter { core, lambda, limits }.split(root);
+            Splitter { core, lambda, limits }.split(root, &mut sizes);
         }
     }
     (before..core.lambdas.len()).for_each(|made| adopt(core, LambdaId(made as u32)));
@@ -63,14 +64,15 @@ struct Size {
 }
 
 impl Splitter<'_> {
-    fn split(&mut self, root: NodeId) {
+    /// Divides the form `root`. `sizes` are for use, with the sizes of other forms.
+    fn split(&mut self, root: NodeId, sizes: &mut Vec<Size>) {
         let mut order = vec![root];
         let mut next = 0;
         while let Some(&node) = order.get(next) {
             children(&self.core.nodes[node.index()].kind, &mut |child| order.push(child));
             next += 1;
         }
-        let mut sizes = vec![Size::default(); self.core.nodes.len()];
+        sizes.resize(self.core.nodes.len(), Size::default());
         // Children come behind their parents.
         for &node in order.iter().rev() {
             let mut size = Size::default();
@@ -78,9 +80,9 @@ impl Splitter<'_> {
                 size = size.with(sizes[child.index()])
             });
             if size.weight > self.limits.weight {
-                size = self.divide_forms(node, &sizes).unwrap_or(size);
+                size = self.divide_forms(node, sizes).unwrap_or(size);
             }
-            if let Some(smaller) = self.divide_bindings(node, &sizes) {
+            if let Some(smaller) = self.divide_bindings(node, sizes) {
                 size = smaller;
             }
             size.weight += 1;

@@ -68,7 +68,8 @@ const FORM_UNITS: usize = 16;
 /// Begins a compilation and returns its handle. `is_nameless` says whether its form comes from a text
 /// without a name.
 fn begin(vm: &mut Vm, compilation: Box<dyn Compilation>, unit: Unit, is_nameless: bool) -> Value {
-    let running = ActiveCompilation { compilation, unit, step: None, keeps: false, is_nameless };
+    let running =
+        ActiveCompilation { compilation, unit, expansion: None, step: None, keeps: false, is_nameless };
     let handle = vm.compiler.add(CompilerJob::Compilation(Box::new(running)));
     recount(vm);
     handle
@@ -104,34 +105,48 @@ fn go_on_with_form(vm: &mut Vm, form: &mut FormWalk) -> Result<Option<ActiveComp
     };
     let compilation = environment::with_compiler(vm, |_, compiler| compiler.compile_form(datum, None))?;
     let unit = std::mem::take(&mut form.unit);
-    Ok(Some(ActiveCompilation { compilation, unit, step: None, keeps: false, is_nameless: false }))
+    let is_nameless = false;
+    Ok(Some(ActiveCompilation { compilation, unit, expansion: None, step: None, keeps: false, is_nameless }))
 }
 
-/// Returns the outcome of the last step, as the program tells it.
+/// Returns the outcome of the last step, as the program tells it; `None` if a part of the work that makes a
+/// datum of it is done.
 fn answer(
     vm: &mut Vm,
     running: &mut ActiveCompilation,
     kind: Value,
     outcome: Value,
-) -> Result<StepOutcome, Exit> {
+) -> Result<Option<StepOutcome>, Exit> {
     let kind = designated_text(vm, kind)?;
     let unit = &mut running.unit;
-    Ok(match &*kind {
-        "START" => StepOutcome::Start,
-        "MORE" => StepOutcome::More,
-        "EXPANSION" => match unit.datum_of(&vm.heap, &vm.world, outcome, Span::default()) {
-            Ok(expansion) => StepOutcome::Expansion(expansion),
+    if &*kind == "EXPANSION" && running.expansion.is_none() {
+        running.expansion = Some(DatumWalk::new(outcome, Span::default()));
+    }
+    if let Some(walk) = &mut running.expansion {
+        let walked = walk.run(unit, &vm.heap, &vm.world, FORM_STEP);
+        let outcome = match walked {
+            Ok(Some(expansion)) => StepOutcome::Expansion(expansion),
+            Ok(None) => {
+                vm.exchange.charge(FORM_STEP * FORM_UNITS);
+                return Ok(None);
+            }
             Err(DatumError::NoRoom(bytes)) => {
                 vm.heap.check_room(bytes)?;
                 return Err(Exit::Collect);
             }
             Err(error) => StepOutcome::Failed(error.to_string().into()),
-        },
+        };
+        running.expansion = None;
+        return Ok(Some(outcome));
+    }
+    Ok(Some(match &*kind {
+        "START" => StepOutcome::Start,
+        "MORE" => StepOutcome::More,
         "LOADED" if running.keeps => StepOutcome::Object(unit.pin(outcome)),
         "LOADED" => StepOutcome::Loaded,
         "FAILED" => StepOutcome::Failed(designated_text(vm, outcome)?.into()),
         _ => return vm.exchange.program_error(format!("{kind} is no outcome of a step")),
-    })
+    }))
 }
 
 /// Tells the program what a compilation wants.
@@ -396,7 +411,7 @@ fn step(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Valu
         Some(step) => step,
         None => {
             vm.heap.check_room(0)?;
-            let answer = answer(vm, running, kind, outcome)?;
+            let Some(answer) = answer(vm, running, kind, outcome)? else { return tell_more(vm) };
             let passed = running.unit.take_work();
             vm.exchange.charge(passed as usize);
             let outer = vm.compiler.unit.replace(std::mem::take(&mut running.unit));
