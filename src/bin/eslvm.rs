@@ -9,6 +9,7 @@ use std::process::ExitCode;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use esl::Config;
 use esl::command::{self, NOT_COMPILED, ProgramFile, RightsOptions, SignalTarget, USAGE, complain};
+use esl::explore::{self, Schedule};
 use esl::host::{ProcessSignal, RealHost};
 use esl::module_path::ModulePath;
 use esl::program::{self, Ended, Modules, Program, Summary};
@@ -51,6 +52,9 @@ enum EslvmAction {
         /// Perfetto
         #[arg(long, value_name = "FILE")]
         timeline: Option<PathBuf>,
+        /// Run the program by a schedule that `eslvm explore` has written; its clock is virtual then
+        #[arg(long, value_name = "FILE")]
+        schedule: Option<PathBuf>,
         /// Trace failures, goals or tasks on standard error: a list such as failures,tasks
         #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = ["failures", "goals", "tasks"])]
         trace: Vec<String>,
@@ -89,6 +93,19 @@ enum EslvmAction {
         /// Source or bytecode files
         #[arg(required = true, value_name = "FILE")]
         sources: Vec<PathBuf>,
+    },
+    /// Run a program under all schedules
+    ///
+    /// Lets the tasks of the program take turns in every possible order, and tells of those orders that end
+    /// badly: by a deadlock, a failure of the main task, a status other than 0. Writes each as a schedule, which
+    /// `eslvm run --schedule` repeats. Exit status: 0 no schedule ends badly; 1 one does; 2 wrong usage, or a
+    /// file that cannot be read or written; 3 the program does not compile or is refused; 7 none was found, and
+    /// not all were tried.
+    Explore {
+        #[command(flatten)]
+        options: ExploreArguments,
+        /// Source or bytecode file
+        file: PathBuf,
     },
     /// Read forms, evaluate them and print their values
     Repl {
@@ -168,6 +185,42 @@ impl MachineOptions {
     }
 }
 
+#[derive(Args)]
+struct ExploreArguments {
+    /// Where a task may have to let others go first: before what others can see (changes), or also before it
+    /// looks at what others do (reads)
+    #[arg(long, value_enum, default_value = "changes")]
+    grain: GrainChoice,
+    /// Most states
+    #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..))]
+    states: u64,
+    /// Most seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 60)]
+    time: u32,
+    /// Most switches of a schedule: points at which a task that could go on lets another one go first
+    #[arg(long, value_name = "N")]
+    switches: Option<usize>,
+    /// Most times that CHOOSE takes another form than its first
+    #[arg(long, value_name = "N")]
+    faults: Option<usize>,
+    /// Write a timeline of the first finding to a file: a drawing if its name ends in `.svg`, else a trace for
+    /// Perfetto
+    #[arg(long, value_name = "FILE")]
+    timeline: Option<PathBuf>,
+    /// Print findings and figures as JSON, an object a line
+    #[arg(long)]
+    json: bool,
+}
+
+/// Where a task may have to let others go first.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum GrainChoice {
+    /// Before it changes what others can see, or begins to wait
+    Changes,
+    /// Also before it looks at what others have changed
+    Reads,
+}
+
 /// Lets the process have as many open files and connections as the system allows it.
 #[cfg(unix)]
 fn raise_limit_of_descriptors() {
@@ -182,12 +235,17 @@ fn main() -> ExitCode {
     raise_limit_of_descriptors();
     let Eslvm { action, library } = Eslvm::parse();
     let status = match action {
-        EslvmAction::Run { options, speed, stats, timeline, trace, file, arguments } => {
+        EslvmAction::Run { mut options, speed, stats, timeline, schedule, trace, file, arguments } => {
+            if schedule.is_some() {
+                options.clock = ClockChoice::Virtual;
+            }
             let path = ModulePath::new([file.as_path()], &library);
             let rights = options.rights.rights();
             rights.and_then(|rights| {
                 let host = RealHost::new(arguments).with_rights(path.with_rights(rights)).with_speed(speed);
-                run(&file, host, &options, stats, timeline.as_deref(), &trace, &path)
+                let schedule = schedule.as_deref().map(explore::read_schedule).transpose()?;
+                let reports = RunReports { stats, timeline: timeline.as_deref(), trace: &trace };
+                run(&file, host, &options, &reports, schedule.as_ref(), &path)
             })
         }
         EslvmAction::Test { filter, jobs, seed, junit, budget, memory, rights, sources } => {
@@ -204,6 +262,7 @@ fn main() -> ExitCode {
         }
         EslvmAction::Completions { shell } => Ok(command::print_completions(shell, Eslvm::command())),
         EslvmAction::Man { folder } => Ok(command::write_man_pages(Eslvm::command(), folder.as_deref())),
+        EslvmAction::Explore { options, file } => run_explore(&file, &options, &library),
         EslvmAction::Repl { options } => options.rights.rights().and_then(|rights| {
             let path = ModulePath::new([Path::new("-")], &library);
             esl::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)
@@ -253,15 +312,57 @@ fn program(
     compiled.program.ok_or(NOT_COMPILED)
 }
 
+/// Explores the schedules of a program. Returns the exit status.
+///
+/// # Errors
+/// The exit status, after a message.
+fn run_explore(file: &Path, options: &ExploreArguments, library: &[PathBuf]) -> Result<u8, u8> {
+    if let Some(timeline) = &options.timeline {
+        command::refuse_overwriting(timeline, [file])?;
+    }
+    let path = ModulePath::new([file], library);
+    let program = match command::read_program(file)? {
+        ProgramFile::Compiled(program) => program,
+        ProgramFile::Source(source) => {
+            let compiled = program::compile_with(&[source], &path, Modules::Inside);
+            let color = std::io::stderr().is_terminal();
+            command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
+            compiled.program.ok_or(NOT_COMPILED)?
+        }
+    };
+    let grain = match options.grain {
+        GrainChoice::Changes => explore::Grain::Changes,
+        GrainChoice::Reads => explore::Grain::Reads,
+    };
+    let settings = explore::Settings {
+        grain,
+        states: usize::try_from(options.states).unwrap_or(usize::MAX),
+        switches: options.switches,
+        faults: options.faults,
+        output: false,
+        ..explore::Settings::default()
+    };
+    let time = std::time::Duration::from_secs(u64::from(options.time));
+    let (timeline, json) = (options.timeline.clone(), options.json);
+    Ok(explore::run(&program, file, &path, &explore::ExplorationOptions { settings, time, timeline, json }))
+}
+
+/// What is to be seen of a run.
+struct RunReports<'a> {
+    stats: Option<Stats>,
+    timeline: Option<&'a Path>,
+    trace: &'a [String],
+}
+
 fn run(
     file: &Path,
     mut host: RealHost,
     options: &MachineOptions,
-    stats: Option<Stats>,
-    timeline: Option<&Path>,
-    trace: &[String],
+    reports: &RunReports<'_>,
+    schedule: Option<&Schedule>,
     path: &ModulePath,
 ) -> Result<u8, u8> {
+    let RunReports { stats, timeline, trace } = *reports;
     if let Some(timeline) = timeline {
         command::refuse_overwriting(timeline, [file])?;
     }
@@ -292,7 +393,17 @@ fn run(
         None => None,
     };
     let started = std::time::Instant::now();
-    let summary = program::run_in(&mut machine, &program).map_err(setup)?;
+    let summary = match schedule {
+        Some(schedule) if !schedule.is_of(&program) => {
+            complain(
+                "the schedule was found in another program, or in another version of this one: explore again",
+            );
+            return Err(USAGE);
+        }
+        Some(schedule) => program::run_by(&mut machine, &program, &schedule.settings(), schedule.choices()),
+        None => program::run_in(&mut machine, &program),
+    };
+    let summary = summary.map_err(setup)?;
     let seconds = started.elapsed().as_secs_f64();
     let mut status = command::exit_status(summary.ended);
     if let Some((timeline, path)) = timeline

@@ -4,6 +4,7 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_compiler::session::Compiler;
+use esl_vm::explore::Settings;
 use esl_vm::heap::HeapStats;
 use esl_vm::host::{Host, ProcessSignal};
 use esl_vm::run::RunOutcome;
@@ -151,8 +152,31 @@ pub(crate) fn begin_with(
 /// # Errors
 /// As [`run`].
 pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Summary, Error> {
+    run_as(machine, program, |machine| machine.run(u64::MAX))
+}
+
+/// Runs a program in a machine that has the library, by a list of choices that an exploration with these settings
+/// has found.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_by(
+    machine: &mut Vm,
+    program: &Program,
+    settings: &Settings,
+    choices: &[u32],
+) -> Result<Summary, Error> {
+    run_as(machine, program, |machine| machine.follow(settings, choices, &mut |_| {}))
+}
+
+/// Runs a program to its end as `turns` lets its tasks take turns.
+fn run_as(
+    machine: &mut Vm,
+    program: &Program,
+    turns: impl FnOnce(&mut Vm) -> RunOutcome,
+) -> Result<Summary, Error> {
     let main = begin(machine, program)?;
-    let outcome = machine.run(u64::MAX);
+    let outcome = turns(machine);
     let ended = end(machine, main, outcome);
     end_rest(machine);
     let (tasks, turns, switches) = machine.tasks_turns_and_switches();

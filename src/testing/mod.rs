@@ -182,7 +182,7 @@ fn explore(program: &Program, test: &Test, setup: &Setup) -> Result<Verdict, Err
         _ if found.endless.is_some() => {
             Verdict::Failed { why: "a schedule leads to where it never ends".into(), output: String::new() }
         }
-        _ if !found.is_complete => Verdict::Failed {
+        _ if found.limit.is_some() => Verdict::Failed {
             why: format!("after {} states there are schedules left that were not tried", found.states),
             output: String::new(),
         },

@@ -76,6 +76,14 @@ impl Timeline {
     /// If a part of the file could not be written.
     pub fn end(self, machine: &mut Vm) -> io::Result<()> {
         drop(machine.take_observers());
+        self.complete()
+    }
+
+    /// Completes the file of a machine that is gone.
+    ///
+    /// # Errors
+    /// If a part of the file could not be written.
+    pub(crate) fn complete(self) -> io::Result<()> {
         match &mut *lock(&self.0) {
             Picture::Trace(trace) => trace.end(),
             Picture::Drawing(drawing, file) => io::Write::write_all(file, drawing.draw().as_bytes()),

@@ -6,6 +6,7 @@ mod bad_input;
 mod deadlock;
 mod editors;
 mod examples;
+mod exploring;
 mod folder;
 mod http;
 #[cfg(unix)]

@@ -51,6 +51,7 @@ use crate::run::RunOutcome;
 pub use crate::schedule::Grain;
 use crate::vm::Vm;
 use fingerprint::Fingerprints;
+pub use point::{StandingTask, Switch};
 use point::{explore_by, run_by_points};
 
 /// Settings of an exploration.
@@ -62,6 +63,10 @@ pub struct Settings {
     pub turn: u32,
     /// Number of states at which the search gives up.
     pub states: usize,
+    /// Most preemptions of a schedule; more are not tried.
+    pub switches: Option<usize>,
+    /// Most choices of a schedule, by `choose`, that are not the first form; more are not tried.
+    pub faults: Option<usize>,
     /// Whether states also differ by what was written to standard output. Without this, an ending stands for
     /// all runs that passed through the same states, whatever they had written before.
     pub output: bool,
@@ -69,7 +74,14 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { grain: Grain::Changes, turn: 100_000, states: 1_000_000, output: true }
+        Settings {
+            grain: Grain::Changes,
+            turn: 100_000,
+            states: 1_000_000,
+            switches: None,
+            faults: None,
+            output: true,
+        }
     }
 }
 
@@ -98,8 +110,36 @@ pub struct Exploration<T> {
     pub endless: Option<Vec<u32>>,
     /// Whether a schedule returns to a state: then it can go on for ever, if only by treating tasks unfairly.
     pub has_cycle: bool,
-    /// Whether all states were explored; otherwise there are more than [`Settings::states`].
-    pub is_complete: bool,
+    /// What kept the search from trying everything, if anything did.
+    pub limit: Option<SearchLimit>,
+}
+
+/// What keeps a search from trying everything.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SearchLimit {
+    /// [`Settings::states`].
+    States,
+    /// [`Settings::switches`].
+    Switches,
+    /// [`Settings::faults`].
+    Faults,
+    /// The caller, who has had enough.
+    Asked,
+}
+
+/// How far a search has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SearchProgress {
+    /// Number of different states so far.
+    pub states: usize,
+    /// Number of runs so far.
+    pub runs: usize,
+    /// Number of choices that are still to be tried.
+    pub open: usize,
+    /// Number of preemptions of the schedules that are tried now.
+    pub switches: usize,
+    /// Number of different endings so far.
+    pub endings: usize,
 }
 
 /// A node in the tree of choices: its last choice, after those of its parent.
@@ -109,6 +149,8 @@ struct ChoiceNode {
     choice: u32,
     /// State in which the choice was made.
     state: u32,
+    /// Number of choices so far, by `choose`, that were not the first form.
+    faults: u32,
 }
 
 const ROOT: u32 = 0;
@@ -210,17 +252,36 @@ impl Search {
 /// Those of `begin`.
 pub fn explore<T: PartialEq, E>(
     settings: &Settings,
+    begin: impl FnMut() -> Result<Vm, E>,
+    judge: impl FnMut(&mut Vm, RunOutcome) -> T,
+) -> Result<Exploration<T>, E> {
+    explore_while(settings, begin, judge, |_| true)
+}
+
+/// As [`explore`], for as long as `goes_on`, which is asked before each run.
+///
+/// # Errors
+/// Those of `begin`.
+pub fn explore_while<T: PartialEq, E>(
+    settings: &Settings,
     mut begin: impl FnMut() -> Result<Vm, E>,
     mut judge: impl FnMut(&mut Vm, RunOutcome) -> T,
+    mut goes_on: impl FnMut(&SearchProgress) -> bool,
 ) -> Result<Exploration<T>, E> {
     let mut search = Search::default();
-    let root = search.node(ChoiceNode { parent: ROOT, choice: 0, state: 0 });
+    let root = search.node(ChoiceNode { parent: ROOT, choice: 0, state: 0, faults: 0 });
     search.open(0, root);
     let mut fingerprints = Fingerprints::default();
     let mut endings: Vec<ExploredEnding<T>> = Vec::new();
-    let (mut runs, mut is_complete) = (0, true);
+    let (mut runs, mut limit) = (0, None);
     while let Some((switches, place)) = search.next() {
-        if !is_complete {
+        if limit == Some(SearchLimit::States) {
+            break;
+        }
+        let open = search.open.iter().map(Vec::len).sum::<usize>() + 1;
+        let states = search.states.len();
+        if !goes_on(&SearchProgress { states, runs, open, switches, endings: endings.len() }) {
+            limit = Some(SearchLimit::Asked);
             break;
         }
         let mut machine = begin()?;
@@ -233,7 +294,7 @@ pub fn explore<T: PartialEq, E>(
         let mut node = place;
         let mut before = (place != ROOT).then(|| search.nodes[place as usize].state);
         let outcome = run_by_points(&mut machine, &mut |vm, runnable| {
-            if runnable.count > 1
+            if runnable.count() > 1
                 && let Some(choice) = given.next()
             {
                 return Some(choice);
@@ -254,18 +315,26 @@ pub fn explore<T: PartialEq, E>(
             }
             search.places.push(node);
             if search.places.len() >= settings.states {
-                is_complete = false;
+                limit = Some(SearchLimit::States);
                 return None;
             }
             before = Some(state);
-            if runnable.count > 1 {
+            if runnable.count() > 1 {
                 // A preemption is a switch at which the task that has just run could have continued.
                 let switches = switches + usize::from(runnable.has_last);
-                for choice in (1..runnable.count).rev() {
-                    let other = search.node(ChoiceNode { parent: node, choice, state });
-                    search.open(switches, other);
+                let before = search.nodes[node as usize].faults;
+                let faults = before + u32::from(runnable.ways.is_some());
+                if settings.switches.is_some_and(|most| switches > most) {
+                    limit = limit.or(Some(SearchLimit::Switches));
+                } else if settings.faults.is_some_and(|most| faults as usize > most) {
+                    limit = limit.or(Some(SearchLimit::Faults));
+                } else {
+                    for choice in (1..runnable.count()).rev() {
+                        let other = search.node(ChoiceNode { parent: node, choice, state, faults });
+                        search.open(switches, other);
+                    }
                 }
-                node = search.node(ChoiceNode { parent: node, choice: 0, state });
+                node = search.node(ChoiceNode { parent: node, choice: 0, state, faults: before });
             }
             Some(0)
         });
@@ -277,7 +346,7 @@ pub fn explore<T: PartialEq, E>(
             None => endings.push(ExploredEnding { what, choices: search.choices(node), runs: 1 }),
         }
     }
-    let endless = if is_complete { search.endless() } else { None };
+    let endless = if limit.is_none() { search.endless() } else { None };
     let (states, has_cycle) = (search.states.len(), search.has_cycle());
-    Ok(Exploration { states, runs, endings, endless, has_cycle, is_complete })
+    Ok(Exploration { states, runs, endings, endless, has_cycle, limit })
 }

@@ -1,29 +1,112 @@
 //! Running from point to point.
 
+use smallvec::SmallVec;
+
 use super::Settings;
+use crate::heap::Kind;
+use crate::report::{program_place, task_label};
 use crate::run::{self, RunOutcome};
 use crate::schedule::Choices;
 use crate::task::{TaskIndex, TaskNumber, TaskState};
+use crate::value::Value;
 use crate::vm::Vm;
 
-/// The tasks to choose from, or the ways in which one of them may go on.
+/// What there is to choose from at a point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Runnable {
-    /// Number of runnable tasks, or of ways.
-    pub(super) count: u32,
-    /// Whether the first of them is the task that ran last.
+pub(super) struct Runnable<'a> {
+    /// The tasks that can run; with ways, the one that asks comes first.
+    pub(super) tasks: &'a [TaskIndex],
+    /// Number of ways in which the first task may go on, if it is the one that asks, by `choose`.
+    pub(super) ways: Option<u32>,
+    /// Whether the first of the tasks is the one that ran last.
     pub(super) has_last: bool,
+}
+
+impl Runnable<'_> {
+    /// Returns the number of choices.
+    pub(super) fn count(&self) -> u32 {
+        self.ways.unwrap_or(self.tasks.len() as u32)
+    }
+}
+
+/// A choice of a schedule other than the first one that was possible.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Switch {
+    /// A task that could have gone on had to stop, and another one went on.
+    Preemption {
+        /// The task that stopped, and the place of the program before which it stood.
+        stopped: StandingTask,
+        /// The task that went on, and from where.
+        next: StandingTask,
+    },
+    /// No task was running, and another one than the oldest went on.
+    Order {
+        /// The oldest task that could have gone on.
+        oldest: StandingTask,
+        /// The task that went on.
+        next: StandingTask,
+    },
+    /// `choose` has taken another form than its first.
+    Choice {
+        /// The task that has asked.
+        task: StandingTask,
+        /// Number of the form, from 0 on.
+        form: u32,
+    },
+}
+
+/// A task at a place of the program.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StandingTask {
+    /// What reports call the task.
+    pub label: String,
+    /// Where it stands, as `file:line:column`, if it has begun.
+    pub place: Option<String>,
+}
+
+impl StandingTask {
+    fn of(vm: &Vm, index: TaskIndex) -> StandingTask {
+        let Some(task) = vm.scheduler.tasks.at(index) else {
+            return StandingTask { label: "a task".into(), place: None };
+        };
+        StandingTask { label: task_label(vm, task.object), place: program_place(vm, task) }
+    }
 }
 
 impl Vm {
     /// Runs the program from point to point along a list of choices found by [`super::explore`] with the same
-    /// settings; beyond the end of the list, the first choice is taken.
-    pub fn follow(&mut self, settings: &Settings, choices: &[u32]) -> RunOutcome {
+    /// settings; beyond the end of the list, the first choice is taken. `told` is told of the other choices.
+    pub fn follow(
+        &mut self,
+        settings: &Settings,
+        choices: &[u32],
+        told: &mut dyn FnMut(Switch),
+    ) -> RunOutcome {
         explore_by(self, settings);
         let mut choices = choices.iter().copied();
-        let mut next = |runnable: Runnable| if runnable.count > 1 { choices.next() } else { None };
-        let outcome = run_by_points(self, &mut |_, runnable| Some(next(runnable).unwrap_or(0)));
-        outcome.unwrap_or(RunOutcome::Done)
+        let mut next = |vm: &mut Vm, runnable: Runnable<'_>| {
+            let choice = if runnable.count() > 1 { choices.next().unwrap_or(0) } else { 0 };
+            if choice > 0 {
+                told(switch(vm, runnable, choice));
+            }
+            Some(choice)
+        };
+        let outcome = run_by_points(self, &mut next).unwrap_or(RunOutcome::Done);
+        self.scheduler.points.grain = None;
+        outcome
+    }
+}
+
+/// Describes a choice that is not the first.
+fn switch(vm: &Vm, runnable: Runnable<'_>, choice: u32) -> Switch {
+    let first = StandingTask::of(vm, runnable.tasks[0]);
+    if runnable.ways.is_some() {
+        return Switch::Choice { task: first, form: choice };
+    }
+    let next = StandingTask::of(vm, runnable.tasks[choice as usize % runnable.tasks.len()]);
+    match runnable.has_last {
+        true => Switch::Preemption { stopped: first, next },
+        false => Switch::Order { oldest: first, next },
     }
 }
 
@@ -39,9 +122,10 @@ pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
 /// Returns how the run has ended, unless it was given up.
 pub(super) fn run_by_points(
     vm: &mut Vm,
-    choose: &mut dyn FnMut(&mut Vm, Runnable) -> Option<u32>,
+    choose: &mut dyn FnMut(&mut Vm, Runnable<'_>) -> Option<u32>,
 ) -> Option<RunOutcome> {
     let mut last = TaskNumber(u64::MAX);
+    let checks = vm.world.intern_esl(&mut vm.heap, "*%EXPLORED-STATE*").unwrap_or(Value::NIL);
     loop {
         vm.scheduler.rounds += 1;
         if vm.outside.inbox.is_rung() && run::take_in(vm) {
@@ -53,12 +137,11 @@ pub(super) fn run_by_points(
         while !vm.scheduler.deliveries.is_empty() {
             run::deliver_some(vm);
         }
-        let mut runnable: Vec<(bool, TaskNumber, TaskIndex)> = (vm.scheduler.tasks.ids().into_iter())
-            .filter_map(|id| {
-                let task = vm.scheduler.tasks.get(id).filter(|task| task.state == TaskState::Runnable)?;
-                Some((task.number != last, task.number, id.index))
-            })
-            .collect();
+        if !check_state(vm, checks) {
+            return Some(RunOutcome::BudgetSpent);
+        }
+        let mut runnable: Vec<(bool, TaskNumber, TaskIndex)> =
+            runnable_tasks(vm).map(|(number, index)| (number != last, number, index)).collect();
         runnable.sort_unstable();
         let Some(&(is_other, ..)) = runnable.first() else {
             if vm.scheduler.counts.alive == 0 {
@@ -69,8 +152,9 @@ pub(super) fn run_by_points(
             }
             continue;
         };
+        let tasks: SmallVec<[TaskIndex; 16]> = runnable.iter().map(|&(.., index)| index).collect();
         if let Some(ways) = vm.scheduler.points.asked.take() {
-            let way = choose(vm, Runnable { count: ways as u32, has_last: false })?;
+            let way = choose(vm, Runnable { tasks: &tasks, ways: Some(ways as u32), has_last: false })?;
             vm.scheduler.points.chosen = Some(way as usize);
             if let Some(&(_, _, index)) = runnable.first().filter(|_| !is_other) {
                 if let Some(task) = vm.scheduler.tasks.at_mut(index) {
@@ -80,9 +164,8 @@ pub(super) fn run_by_points(
             }
             continue;
         }
-        let count = runnable.len() as u32;
-        let choice = choose(vm, Runnable { count, has_last: !is_other })?;
-        let (_, number, index) = runnable[(choice % count) as usize];
+        let choice = choose(vm, Runnable { tasks: &tasks, ways: None, has_last: !is_other })?;
+        let (_, number, index) = runnable[choice as usize % runnable.len()];
         last = number;
         if let Some(task) = vm.scheduler.tasks.at_mut(index) {
             vm.scheduler.points.is_open = task.flags.at_point();
@@ -90,4 +173,47 @@ pub(super) fn run_by_points(
         }
         run::give_turn(vm, index, u64::MAX);
     }
+}
+
+/// Returns the numbers and places of the tasks that can run.
+fn runnable_tasks(vm: &Vm) -> impl Iterator<Item = (TaskNumber, TaskIndex)> + '_ {
+    let ids = vm.scheduler.tasks.ids().into_iter();
+    ids.filter_map(|id| {
+        let task = vm.scheduler.tasks.get(id).filter(|task| task.state == TaskState::Runnable)?;
+        Some((task.number, id.index))
+    })
+}
+
+/// Most turns of a task that checks what always has to hold, in one state.
+const CHECK_TURNS: u32 = 1_000;
+
+/// Lets the task run that checks what always has to hold, if the program has one (`stdlib/exploration.esl`): until
+/// it waits for the event in the variable `checks`, where it stands at first, and then from each signal of that
+/// event until it waits again. It stops at no points, so that it adds no states. Returns whether its turns were
+/// enough.
+fn check_state(vm: &mut Vm, checks: Value) -> bool {
+    let awaited = vm.heap.symbol(checks).map_or(Value::NIL, |symbol| symbol.value);
+    if awaited == Value::NIL || awaited == Value::UNBOUND || vm.exit_status().is_some() {
+        return true;
+    }
+    let object = |vm: &Vm, index| vm.scheduler.tasks.at(index).map_or(Value::NIL, |task| task.object);
+    let before: Vec<TaskIndex> =
+        runnable_tasks(vm).map(|(_, index)| index).filter(|&index| object(vm, index) != awaited).collect();
+    // It has not begun yet, or there is an event; without room for a signal, the next state is checked.
+    if !vm.heap.is(awaited, Kind::Task) && run::signal(vm, awaited, Value::NIL).is_err() {
+        return true;
+    }
+    while !vm.scheduler.deliveries.is_empty() {
+        run::deliver_some(vm);
+    }
+    let grain = vm.scheduler.points.grain.take();
+    let mut turns = 0;
+    while turns < CHECK_TURNS {
+        let woken = runnable_tasks(vm).map(|(_, index)| index).find(|index| !before.contains(index));
+        let Some(index) = woken else { break };
+        run::give_turn(vm, index, u64::MAX);
+        turns += 1;
+    }
+    vm.scheduler.points.grain = grain;
+    turns < CHECK_TURNS
 }

@@ -11,7 +11,7 @@ use esl_bytecode::symbol::Symbol;
 
 use super::fingerprint::Fingerprints;
 use super::live::Live;
-use super::{Exploration, Settings, explore};
+use super::{Exploration, SearchLimit, Settings, explore};
 use crate::run::RunOutcome;
 use crate::schedule::Choices;
 use crate::value::Value;
@@ -93,12 +93,12 @@ fn all_orders_are_found() {
     values.sort_unstable();
     // Either order without interleaving, and either order with the second number written in between.
     assert_eq!(values, ["2", "20", "4", "40"]);
-    assert!(found.is_complete && !found.has_cycle && found.endless.is_none(), "{found:?}");
+    assert!(found.limit.is_none() && !found.has_cycle && found.endless.is_none(), "{found:?}");
     // The first ending is that of the schedule without preemption.
     assert!(found.endings[0].choices.iter().all(|&choice| choice == 0), "{found:?}");
     for ending in &found.endings {
         let mut vm = machine(&[&first, &second]);
-        assert_eq!(vm.follow(&Settings::default(), &ending.choices), RunOutcome::Done);
+        assert_eq!(vm.follow(&Settings::default(), &ending.choices, &mut |_| {}), RunOutcome::Done);
         let symbol = vm.world.find(&Symbol::esl("F")).unwrap();
         assert_eq!(vm.describe(vm.symbol_value(symbol).unwrap()), ending.what.1);
     }
@@ -121,7 +121,7 @@ fn it_gives_up_after_the_given_number_of_states() {
     ];
     let settings = Settings { turn: 100, states: 50, ..Settings::default() };
     let found = endings(&[&counts, &counts], &settings);
-    assert!(!found.is_complete && found.states >= 50, "{found:?}");
+    assert!(found.limit == Some(SearchLimit::States) && found.states >= 50, "{found:?}");
 }
 
 #[test]

@@ -12,5 +12,5 @@ pub(crate) use label::{
     task_label,
 };
 pub(crate) use observe::{show, tell_of_failure, tell_of_signal, tell_of_waking};
-pub(crate) use tasks::{number_of_owner, operations_left, place_in_program, tasks_left};
+pub(crate) use tasks::{number_of_owner, operations_left, place_in_program, program_place, tasks_left};
 pub(crate) use trace::{Happening, note, trace_end};

@@ -153,7 +153,7 @@ pub(crate) fn operations_left(vm: &Vm) -> Vec<String> {
 }
 
 /// Returns the text of the innermost place of the program at which a parked task stands.
-fn program_place(vm: &Vm, task: &Task) -> Option<String> {
+pub(crate) fn program_place(vm: &Vm, task: &Task) -> Option<String> {
     let place = place_in_program(vm, task, Frames::of_task(task))?;
     Some(format!("{}:{}:{}", place.source, place.line, place.column))
 }

@@ -41,7 +41,7 @@ pub use call::{CallError, FailureArguments};
 pub(crate) use limit::{admit, expire_limit, go_on, open_limit, stand_still};
 pub(crate) use pending::interrupt_by;
 pub(crate) use rest::{begin_rest, can_rest, end_rest, resume_from_rest};
-pub(crate) use signal::{deliver_some, show_kept};
+pub(crate) use signal::{deliver_some, show_kept, signal};
 pub(crate) use spawn::{SpawnOptions, make_task};
 pub(crate) use timers::idle;
 pub(crate) use turn::give_turn;

@@ -19,12 +19,23 @@
 //! # Ok::<(), esl::Error>(())
 //! ```
 
+#[cfg(feature = "cli")]
+mod command;
+#[cfg(feature = "cli")]
+mod schedule;
+
 use std::cell::RefCell;
 
-pub use esl_vm::explore::{Exploration, ExploredEnding, Grain, Settings};
+#[cfg(feature = "cli")]
+pub use command::{ExplorationOptions, read_schedule, run};
+pub use esl_vm::explore::{
+    Exploration, ExploredEnding, Grain, SearchLimit, SearchProgress, Settings, StandingTask, Switch,
+};
 use esl_vm::host::{Captured, VirtualHost};
 use esl_vm::task::TaskId;
 use esl_vm::vm::Vm;
+#[cfg(feature = "cli")]
+pub use schedule::{Schedule, ScheduleError};
 
 use crate::error::Error;
 use crate::program::{self, Ended, Program};
@@ -70,17 +81,31 @@ pub fn explore_with(
     settings: &Settings,
     prepare: Prepare<'_>,
 ) -> Result<Exploration<Behaviour>, Error> {
+    explore_while(program, settings, prepare, |_| true)
+}
+
+/// As [`explore_with`], for as long as `goes_on`, which is asked before each run.
+///
+/// # Errors
+/// As [`explore_with`].
+pub fn explore_while(
+    program: &Program,
+    settings: &Settings,
+    prepare: Prepare<'_>,
+    goes_on: impl FnMut(&SearchProgress) -> bool,
+) -> Result<Exploration<Behaviour>, Error> {
     let present = RefCell::new(None);
     let begin = || {
         let (machine, main, captured) = begin(program, prepare)?;
         present.replace(Some((main, captured)));
         Ok(machine)
     };
-    esl_vm::explore::explore(settings, begin, |machine, outcome| {
+    let judge = |machine: &mut Vm, outcome| {
         let (main, captured) = present.take().expect("a machine that has run was begun");
         let ended = program::end(machine, main, outcome);
         Behaviour { ended, output: captured.output(), errors: captured.error() }
-    })
+    };
+    esl_vm::explore::explore_while(settings, begin, judge, goes_on)
 }
 
 /// Runs a program by a list of choices that [`explore`] has found with the same settings.
@@ -88,8 +113,23 @@ pub fn explore_with(
 /// # Errors
 /// As [`program::run`].
 pub fn follow(program: &Program, settings: &Settings, choices: &[u32]) -> Result<Behaviour, Error> {
-    let (mut machine, main, captured) = begin(program, &|_| Ok(()))?;
-    let outcome = machine.follow(settings, choices);
+    follow_with(program, settings, choices, &|_| Ok(()), &mut |_| {})
+}
+
+/// As [`follow`], on a machine that `prepare` has changed. `told` is told of each choice that is not the first
+/// one, just before it is made.
+///
+/// # Errors
+/// As [`program::run`], and the errors of `prepare`.
+pub fn follow_with(
+    program: &Program,
+    settings: &Settings,
+    choices: &[u32],
+    prepare: Prepare<'_>,
+    told: &mut dyn FnMut(Switch),
+) -> Result<Behaviour, Error> {
+    let (mut machine, main, captured) = begin(program, prepare)?;
+    let outcome = machine.follow(settings, choices, told);
     let ended = program::end(&mut machine, main, outcome);
     Ok(Behaviour { ended, output: captured.output(), errors: captured.error() })
 }

@@ -1,0 +1,286 @@
+//! `eslvm explore`: runs a program under all schedules, and tells of those that end badly.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "commands print")]
+
+use std::collections::HashMap;
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use esl_vm::vm::Vm;
+use serde_json::json;
+
+use super::{
+    Behaviour, Exploration, Schedule, SearchLimit, SearchProgress, Settings, StandingTask, Switch,
+    explore_while, follow_with,
+};
+use crate::command::{self, FAILED, NOT_PROVED, SUCCESS, USAGE, complain};
+use crate::error::Error;
+use crate::module_path::ModulePath;
+use crate::program::{Ended, Program};
+use crate::timeline::Timeline;
+
+/// How to explore, and what to say of it.
+#[derive(Clone, Debug)]
+pub struct ExplorationOptions {
+    /// What is explored.
+    pub settings: Settings,
+    /// Time after which the search gives up.
+    pub time: Duration,
+    /// File for a timeline of the first finding.
+    pub timeline: Option<PathBuf>,
+    /// Whether findings are written as JSON, one object a line.
+    pub json: bool,
+}
+
+/// A way in which the program ends badly.
+struct Finding {
+    /// In a few words.
+    what: String,
+    choices: Vec<u32>,
+    /// What is told of the end: the report of a deadlock or of a failure.
+    errors: String,
+}
+
+/// The lines of the sources that places lie in.
+#[derive(Default)]
+struct PlaceTexts(HashMap<String, Vec<String>>);
+
+impl PlaceTexts {
+    /// Returns a place with the text of its line, if its source can still be read.
+    fn describe(&mut self, place: &str) -> String {
+        let mut parts = place.rsplitn(3, ':');
+        let (_, line, source) = (parts.next(), parts.next(), parts.next());
+        let (Some(line), Some(source)) = (line.and_then(|line| line.parse::<usize>().ok()), source) else {
+            return place.into();
+        };
+        let lines = self.0.entry(source.into()).or_insert_with(|| {
+            let text = std::fs::read_to_string(source).unwrap_or_default();
+            text.lines().map(|line| line.trim().to_string()).collect()
+        });
+        match lines.get(line.saturating_sub(1)) {
+            Some(text) if !text.is_empty() => format!("{place}: {text}"),
+            _ => place.into(),
+        }
+    }
+}
+
+/// Explores a program, and prints what was found. Returns the exit status: 0 if no schedule ends badly, 1 if one
+/// does, 7 if none was found and not all were tried.
+pub fn run(program: &Program, file: &Path, path: &ModulePath, options: &ExplorationOptions) -> u8 {
+    let prepare = |machine: &mut Vm| crate::program::set_module_path(machine, path);
+    let started = Instant::now();
+    let mut status_line = StatusLine::new(started);
+    let found = explore_while(program, &options.settings, &prepare, |progress| {
+        status_line.show(progress);
+        started.elapsed() < options.time
+    });
+    status_line.clear();
+    let found = match found {
+        Ok(found) => found,
+        Err(error) => {
+            complain(error);
+            return USAGE;
+        }
+    };
+    let findings = findings(&found);
+    let mut lines = PlaceTexts::default();
+    for (finding, number) in findings.iter().zip(1..) {
+        if let Err(error) = tell(program, file, &prepare, options, finding, number, &mut lines) {
+            complain(error);
+            return USAGE;
+        }
+    }
+    let seconds = started.elapsed().as_secs_f64();
+    if options.json {
+        let limit = found.limit.map(|limit| format!("{limit:?}").to_lowercase());
+        let (states, runs, count) = (found.states, found.runs, findings.len());
+        println!(
+            "{}",
+            json!({ "states": states, "runs": runs, "findings": count, "limit": limit, "seconds": seconds })
+        );
+    } else {
+        print_summary(&found, findings.len());
+    }
+    match (findings.is_empty(), found.limit) {
+        (false, _) => FAILED,
+        (true, None) => SUCCESS,
+        (true, Some(_)) => NOT_PROVED,
+    }
+}
+
+/// Returns the ways in which runs end badly, the one with the fewest switches first.
+fn findings(found: &Exploration<Behaviour>) -> Vec<Finding> {
+    let mut findings: Vec<Finding> = Vec::new();
+    for ending in &found.endings {
+        let Behaviour { ended, errors, .. } = &ending.what;
+        let what = match ended {
+            Ended::Normally(0) => continue,
+            Ended::Normally(status) => format!("the program ends with status {status}"),
+            Ended::Failed => "a failure leaves the main task".into(),
+            Ended::Deadlocked => "no task can ever run again".into(),
+            Ended::BudgetSpent => "the budget is spent".into(),
+            Ended::HeapExhausted => "the memory is exhausted".into(),
+            Ended::Signalled(signal) => format!("the signal {} ends the program", signal.number()),
+        };
+        // Runs that differ only in what they had printed before are one finding.
+        if !findings.iter().any(|known| known.what == what && known.errors == *errors) {
+            findings.push(Finding { what, choices: ending.choices.clone(), errors: errors.clone() });
+        }
+    }
+    if let Some(choices) = &found.endless {
+        let what = "from here on, the program never ends".into();
+        findings.push(Finding { what, choices: choices.clone(), errors: String::new() });
+    }
+    findings
+}
+
+/// Returns the name of the file for the schedule of a finding.
+fn schedule_name(file: &Path, number: usize) -> String {
+    let stem = file.file_stem().map_or("program".into(), |stem| stem.to_string_lossy());
+    format!("{}-{number}.schedule", if stem == "-" { "program".into() } else { stem })
+}
+
+/// Writes the schedule of a finding, and prints the finding.
+///
+/// # Errors
+/// A message, if a file cannot be written or the program cannot be begun.
+fn tell(
+    program: &Program,
+    file: &Path,
+    prepare: super::Prepare<'_>,
+    options: &ExplorationOptions,
+    finding: &Finding,
+    number: usize,
+    lines: &mut PlaceTexts,
+) -> Result<(), String> {
+    let name = schedule_name(file, number);
+    let schedule = Schedule::new(program, &options.settings, finding.choices.clone());
+    std::fs::write(&name, schedule.to_string())
+        .map_err(|error| format!("{name} cannot be written: {error}"))?;
+    let timeline = options.timeline.as_ref().filter(|_| number == 1);
+    let pictured = std::cell::RefCell::new(None);
+    let prepare = |machine: &mut Vm| {
+        prepare(machine)?;
+        if let Some(path) = timeline {
+            pictured.replace(Some(Timeline::begin(path, machine)));
+        }
+        Ok::<(), Error>(())
+    };
+    let mut switches = Vec::new();
+    let mut told = |switch| switches.push(switch);
+    follow_with(program, &options.settings, &finding.choices, &prepare, &mut told)
+        .map_err(|error| error.to_string())?;
+    if let Some(timeline) = pictured.into_inner() {
+        let told = timeline.and_then(Timeline::complete);
+        told.map_err(|error| format!("the timeline cannot be written: {error}"))?;
+    }
+    if options.json {
+        let switches: Vec<_> = switches.iter().map(|switch| text(switch, lines)).collect();
+        let (what, errors) = (&finding.what, &finding.errors);
+        println!("{}", json!({ "finding": what, "switches": switches, "report": errors, "schedule": name }));
+        return Ok(());
+    }
+    println!("finding {number}: {}", finding.what);
+    for (switch, number) in switches.iter().zip(1..) {
+        println!("  {number}. {}", text(switch, lines).replace('\n', "\n     "));
+    }
+    finding.errors.lines().for_each(|line| println!("  {line}"));
+    println!("  again: eslvm run --schedule {name} {}\n", file.display());
+    Ok(())
+}
+
+/// Returns a choice in words.
+fn text(switch: &Switch, lines: &mut PlaceTexts) -> String {
+    let mut place = |task: &StandingTask, word: &str| {
+        task.place.as_ref().map_or(String::new(), |place| format!(" {word} {}", lines.describe(place)))
+    };
+    match switch {
+        Switch::Preemption { stopped, next } => format!(
+            "{} stops{}\n{} goes on{}",
+            stopped.label,
+            place(stopped, "before"),
+            next.label,
+            place(next, "at")
+        ),
+        Switch::Order { oldest, next } => {
+            format!("{} goes on{}\nbefore {} does", next.label, place(next, "at"), oldest.label)
+        }
+        Switch::Choice { task, form } => {
+            format!("{} chooses form {}{}", task.label, form + 1, place(task, "at"))
+        }
+    }
+}
+
+fn print_summary(found: &Exploration<Behaviour>, findings: usize) {
+    let figures = format!("{} states, {} runs", found.states, found.runs);
+    let why = match found.limit {
+        None => None,
+        Some(SearchLimit::States) => Some("the limit of states is reached"),
+        Some(SearchLimit::Switches) => Some("schedules with more switches were not tried"),
+        Some(SearchLimit::Faults) => Some("more choices that are not the first were not tried"),
+        Some(SearchLimit::Asked) => Some("the time is over"),
+    };
+    match (findings, why) {
+        (0, None) => println!("complete: no schedule ends badly ({figures})"),
+        (0, Some(why)) => println!("bounded, not proved: {why}; no schedule so far ends badly ({figures})"),
+        (_, None) => println!("complete: findings: {findings} ({figures})"),
+        (_, Some(why)) => println!("bounded: {why}; findings: {findings} ({figures})"),
+    }
+    if found.has_cycle {
+        println!(
+            "Some schedules return to where they were: they can go on for ever, if they are unfair to a task."
+        );
+    }
+    println!(
+        "Not seen: changes of variables, slots and tables by tasks that are outside of critical sections; \
+         timers that end before others have done their work."
+    );
+}
+
+/// A line at the terminal that says how far the search has come.
+struct StatusLine {
+    started: Instant,
+    shown: Option<Instant>,
+}
+
+impl StatusLine {
+    fn new(started: Instant) -> StatusLine {
+        StatusLine { started, shown: None }
+    }
+
+    /// Shows the progress, once a second, at a terminal.
+    fn show(&mut self, progress: &SearchProgress) {
+        let since = self.shown.unwrap_or(self.started).elapsed();
+        if since < Duration::from_secs(1) || !std::io::stderr().is_terminal() {
+            return;
+        }
+        let SearchProgress { states, open, switches, endings, .. } = *progress;
+        let rate = states as f64 / self.started.elapsed().as_secs_f64();
+        eprint!(
+            "\r\x1b[K{states} states, {rate:.0} a second; {open} choices open, {switches} switches, \
+             {endings} endings"
+        );
+        // A terminal that does not take the line is no reason to stop.
+        _ = std::io::stderr().flush();
+        self.shown = Some(Instant::now());
+    }
+
+    fn clear(&self) {
+        if self.shown.is_some() {
+            eprint!("\r\x1b[K");
+        }
+    }
+}
+
+/// Reads a schedule from a file.
+///
+/// # Errors
+/// The exit status, after a message.
+pub fn read_schedule(path: &Path) -> Result<Schedule, u8> {
+    let text = std::fs::read_to_string(path).map_err(|error| error.to_string());
+    let schedule = text.and_then(|text| Schedule::parse(&text).map_err(|error| error.to_string()));
+    schedule.map_err(|error| {
+        complain(format_args!("{} is no schedule: {error}", path.display()));
+        command::USAGE
+    })
+}

@@ -1,0 +1,138 @@
+//! `eslvm explore`: findings, their schedules, what is said of limits, exit statuses.
+
+use esl_conformance::process;
+
+use crate::eslvm;
+use crate::folder::Folder;
+
+/// The radio may begin to wait after the camera has signalled.
+const LOST_SIGNAL: &str = "(defvar *picture* nil)
+(defvar *taken* (make-event 'taken))
+(task-net
+  (camera (setq *picture* t)
+          (signal *taken*))
+  (radio (unless *picture*
+           (wait-for-event *taken*))))
+";
+
+/// Runs `eslvm` in a folder of its own, and returns its status and both outputs.
+fn run(folder: &Folder, arguments: &[&str]) -> (Option<i32>, String, String) {
+    let finished = process::run(eslvm(arguments).current_dir(folder.path()), "");
+    (finished.status, finished.output, finished.errors)
+}
+
+#[test]
+fn a_finding_is_told_by_its_switches_and_repeated_by_its_schedule() {
+    let folder = Folder::new("exploring-lost-signal");
+    folder.file("lost.esl", LOST_SIGNAL);
+    let (status, output, errors) = run(&folder, &["explore", "--timeline", "lost.svg", "lost.esl"]);
+    assert_eq!((status, errors.as_str()), (Some(1), ""), "{output}");
+    assert!(output.starts_with("finding 1: no task can ever run again\n  1. task "), "{output}");
+    assert!(
+        output.contains("task RADIO stops before lost.esl:7:12: (wait-for-event *taken*))))\n"),
+        "{output}"
+    );
+    assert!(output.contains("\n  again: eslvm run --schedule lost-1.schedule lost.esl\n"), "{output}");
+    assert!(output.contains("\ncomplete: findings: 1 ("), "{output}");
+    let picture = std::fs::read_to_string(folder.path().join("lost.svg")).expect("the timeline is drawn");
+    assert!(picture.contains("task RADIO"), "{picture}");
+    let (status, _, errors) = run(&folder, &["run", "--schedule", "lost-1.schedule", "lost.esl"]);
+    assert_eq!(status, Some(4), "{errors}");
+    assert!(errors.contains("task RADIO waits for event TAKEN, lost.esl:7:12"), "{errors}");
+    // Without the schedule, the program ends well.
+    assert_eq!(run(&folder, &["run", "--clock", "virtual", "lost.esl"]).0, Some(0));
+}
+
+#[test]
+fn a_schedule_is_of_one_program() {
+    let folder = Folder::new("exploring-another");
+    folder.file("lost.esl", LOST_SIGNAL);
+    folder.file("other.esl", "(print 1)");
+    folder.file("no.schedule", "choices 1 2 3");
+    assert_eq!(run(&folder, &["explore", "lost.esl"]).0, Some(1));
+    let (status, output, errors) = run(&folder, &["run", "--schedule", "lost-1.schedule", "other.esl"]);
+    assert_eq!((status, output.as_str()), (Some(2), ""));
+    assert!(errors.contains("explore again"), "{errors}");
+    let (status, _, errors) = run(&folder, &["run", "--schedule", "no.schedule", "lost.esl"]);
+    assert_eq!(status, Some(2));
+    assert!(
+        errors.contains("no.schedule is no schedule: its first line is not `esl-schedule 1`"),
+        "{errors}"
+    );
+}
+
+#[test]
+fn what_was_not_tried_is_no_proof() {
+    let folder = Folder::new("exploring-bounded");
+    folder.file("lost.esl", LOST_SIGNAL);
+    let said = |option: &str, value: &str| {
+        let (status, output, errors) = run(&folder, &["explore", option, value, "lost.esl"]);
+        assert_eq!(status, Some(7), "{output}{errors}");
+        output.lines().next().unwrap_or_default().to_string()
+    };
+    assert!(said("--switches", "0").starts_with("bounded, not proved: schedules with more switches"));
+    assert!(said("--states", "2").starts_with("bounded, not proved: the limit of states"));
+    assert!(said("--time", "0").starts_with("bounded, not proved: the time is over"));
+}
+
+#[test]
+fn choices_are_tried_and_bounded() {
+    let folder = Folder::new("exploring-choices");
+    folder.file("choice.esl", "(when (and (choose nil t) (choose nil t))\n  (exit 9))\n");
+    let (status, output, _) = run(&folder, &["explore", "choice.esl"]);
+    assert_eq!(status, Some(1), "{output}");
+    assert!(output.starts_with("finding 1: the program ends with status 9\n"), "{output}");
+    assert!(output.contains("1. the main task chooses form 2 at choice.esl:1:12"), "{output}");
+    assert!(output.contains("2. the main task chooses form 2 at choice.esl:1:27"), "{output}");
+    let (status, output, _) = run(&folder, &["explore", "--faults", "1", "choice.esl"]);
+    assert_eq!(status, Some(7), "{output}");
+}
+
+#[test]
+fn what_always_has_to_hold_is_checked_in_every_state() {
+    let folder = Folder::new("exploring-always");
+    let valves = "(define-property valve (name))
+(assert '(valve a :closed))
+(assert '(valve b :closed))
+(always never-both-open (not (and (valve 'a :open) (valve 'b :open))))
+(task-net
+  (one (when (valve 'b :closed) (assert '(valve a :open))))
+  (two (when (valve 'a :closed) (assert '(valve b :open)))))
+";
+    folder.file("valves.esl", valves);
+    let (status, output, _) = run(&folder, &["explore", "valves.esl"]);
+    assert_eq!(status, Some(1), "{output}");
+    assert!(output.contains("NEVER-BOTH-OPEN, which always has to hold, is false."), "{output}");
+    // In a critical section nobody comes in between.
+    let mended = valves
+        .replace("(one (when", "(one (without-interrupts (when")
+        .replace("(two (when", "(two (without-interrupts (when");
+    let mended =
+        mended.replace("a :open))))\n", "a :open)))))\n").replace("b :open)))))\n", "b :open))))))\n");
+    folder.file("mended.esl", &mended);
+    let (status, output, errors) = run(&folder, &["explore", "mended.esl"]);
+    assert_eq!(status, Some(0), "{output}{errors}");
+    assert!(output.starts_with("complete: no schedule ends badly ("), "{output}");
+}
+
+#[test]
+fn figures_and_findings_are_json_on_request() {
+    let folder = Folder::new("exploring-json");
+    folder.file("lost.esl", LOST_SIGNAL);
+    let (status, output, _) = run(&folder, &["explore", "--json", "lost.esl"]);
+    assert_eq!(status, Some(1));
+    let lines: Vec<serde_json::Value> =
+        output.lines().map(|line| serde_json::from_str(line).expect("each line is JSON")).collect();
+    assert_eq!(lines.len(), 2);
+    assert_eq!(lines[0]["schedule"], "lost-1.schedule");
+    assert_eq!(lines[0]["switches"].as_array().map(Vec::len), Some(2), "{output}");
+    assert_eq!((&lines[1]["findings"], &lines[1]["limit"]), (&1.into(), &serde_json::Value::Null));
+}
+
+#[test]
+fn what_does_not_compile_is_not_explored() {
+    let folder = Folder::new("exploring-errors");
+    folder.file("open.esl", "(print 1");
+    assert_eq!(run(&folder, &["explore", "open.esl"]).0, Some(3));
+    assert_eq!(run(&folder, &["explore", "missing.esl"]).0, Some(2));
+}
