@@ -12,15 +12,19 @@
 #[cfg(feature = "serde")]
 mod structure;
 
+mod opaque;
+
 use std::fmt;
 
 use esl_bytecode::BigInt;
-use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::datum::{Datum, DatumKind, OpaqueDatum};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
 #[cfg(feature = "serde")]
 pub use structure::{Structure, StructureError};
+
+pub use opaque::{HostType, Opaque};
 
 /// A value from a program, or for one.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,6 +55,8 @@ pub enum Data {
     DottedList(Vec<Data>, Box<Data>),
     /// A vector.
     Vector(Vec<Data>),
+    /// Something of the embedder's: an [`Opaque`] makes it, and is made of it.
+    Opaque(OpaqueDatum),
 }
 
 impl Data {
@@ -125,6 +131,7 @@ impl Data {
             Data::Vector(items) => {
                 DatumKind::Vector(items.iter().map(|item| item.to_datum(package)).collect())
             }
+            Data::Opaque(opaque) => DatumKind::Opaque(opaque.clone()),
         };
         Datum::new(kind, span)
     }
@@ -146,6 +153,7 @@ impl Data {
             DatumKind::Vector(items) | DatumKind::Array(_, items) => {
                 Data::Vector(items.iter().map(Data::from_datum).collect())
             }
+            DatumKind::Opaque(opaque) => Data::Opaque(opaque.clone()),
             DatumKind::Object(_) | DatumKind::Call(_) => Data::String(datum.to_string()),
             DatumKind::Cons(..) => {
                 let mut elements = datum.elements();
@@ -271,6 +279,7 @@ impl fmt::Display for Data {
             Data::String(value) => write!(f, "\"{}\"", value.replace('\\', "\\\\").replace('"', "\\\"")),
             Data::Keyword(name) => write!(f, ":{name}"),
             Data::Symbol(name) => f.write_str(name),
+            Data::Opaque(opaque) => opaque.fmt(f),
             Data::List(items) => {
                 f.write_str("(")?;
                 sequence(f, items)?;

@@ -7,6 +7,7 @@
 //! Guarantees: dropping a datum takes no native stack in proportion to its depth.
 //! Not here: reading text (the compiler's `reader`), objects of a running program (the virtual machine).
 
+use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
 
@@ -46,9 +47,67 @@ pub enum DatumKind {
     Array(Arc<[u32]>, Arc<[Datum]>),
     /// Some object of the running program.
     Object(ObjectId),
+    /// Something of the embedder's.
+    Opaque(OpaqueDatum),
     /// What a call gives that is made when the text has been read, such as `#.form`: a list of the name of a
     /// macro of the library and its arguments. The macro returns `(quote datum)`.
     Call(Datum),
+}
+
+/// Something of the embedder's that programs hold, hand on and compare without looking into it: the name of
+/// its type, how it is told from others of that type when it is printed, and itself. Two are equal if they are
+/// the same thing.
+#[derive(Clone)]
+pub struct OpaqueDatum {
+    kind: Arc<str>,
+    text: Arc<str>,
+    value: Arc<dyn Any + Send + Sync>,
+}
+
+impl OpaqueDatum {
+    /// Creates a datum for a value.
+    pub fn new(kind: &str, text: &str, value: Arc<dyn Any + Send + Sync>) -> OpaqueDatum {
+        OpaqueDatum { kind: kind.into(), text: text.into(), value }
+    }
+
+    /// Returns the name of its type.
+    pub fn kind(&self) -> &str {
+        &self.kind
+    }
+
+    /// Returns what tells it from others of its type, for people; may be empty.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Returns the value.
+    pub fn value(&self) -> &Arc<dyn Any + Send + Sync> {
+        &self.value
+    }
+
+    /// Returns a number that tells the value from all others alive.
+    pub fn identity(&self) -> usize {
+        Arc::as_ptr(&self.value).cast::<()>().addr()
+    }
+}
+
+impl PartialEq for OpaqueDatum {
+    fn eq(&self, other: &OpaqueDatum) -> bool {
+        self.identity() == other.identity()
+    }
+}
+
+impl fmt::Debug for OpaqueDatum {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+impl fmt::Display for OpaqueDatum {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let space = if self.text.is_empty() { "" } else { " " };
+        write!(f, "#<{}{space}{}>", self.kind, self.text)
+    }
 }
 
 #[derive(Debug)]
@@ -282,6 +341,7 @@ fn display(datum: &Datum, f: &mut fmt::Formatter<'_>, depth: u32) -> fmt::Result
         DatumKind::Character(c) => write!(f, "#\\{c}"),
         DatumKind::String(value) => write!(f, "{value:?}"),
         DatumKind::Object(ObjectId(id)) => write!(f, "#<object {id}>"),
+        DatumKind::Opaque(opaque) => write!(f, "{opaque}"),
         DatumKind::Call(call) => {
             f.write_str("#.")?;
             display(call, f, depth + 1)

@@ -33,7 +33,7 @@ use crate::task::{Control, Extra, RunningCleanup, Task};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::Deliveries;
-use crate::world::{GivenMap, World};
+use crate::world::{GivenMap, Opaques, World};
 
 /// What those who visit content do with the course: the fields that tell themselves.
 pub(crate) trait VisitCourse {
@@ -144,6 +144,7 @@ state! {
             is_open,
             images,
             undefined_yet by tell_symbols,
+            opaques by tell_opaques,
         }
         transient { is_defining }
         derived { known, names, homes, runner, streams, nil, t, rights, undefined }
@@ -192,6 +193,10 @@ fn tell_count(classes: &GivenMap<u64, Value>, sink: &mut dyn StateSink) {
 
 fn tell_symbols(symbols: &[Symbol], sink: &mut dyn StateSink) {
     symbols.iter().for_each(|symbol| symbol.name().as_bytes().tell(sink));
+}
+
+fn tell_opaques(opaques: &Opaques, sink: &mut dyn StateSink) {
+    (opaques.made, opaques.len()).tell(sink);
 }
 
 fn tell_place(place: &Option<SourcePlace>, sink: &mut dyn StateSink) {

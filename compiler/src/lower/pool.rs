@@ -123,8 +123,8 @@ impl Pool {
             DatumKind::Character(c) => Constant::Character(*c),
             DatumKind::String(text) => Constant::String(text.clone()),
             DatumKind::Object(id) => Constant::Object(*id),
-            // Calls have been made before a form is compiled.
-            DatumKind::Call(_) => Constant::Nil,
+            // Calls have been made before a form is compiled; what is the embedder's is in no form.
+            DatumKind::Call(_) | DatumKind::Opaque(_) => Constant::Nil,
             DatumKind::Cons(..) | DatumKind::Vector(_) | DatumKind::Array(..) => {
                 unreachable!("compound data are handled by the caller")
             }
@@ -161,6 +161,7 @@ fn key(datum: &Datum) -> LiteralKey {
         | DatumKind::Cons(..)
         | DatumKind::Vector(_)
         | DatumKind::Array(..)
+        | DatumKind::Opaque(_)
         | DatumKind::Call(_) => LiteralKey::Node(datum.identity()),
     }
 }

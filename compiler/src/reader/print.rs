@@ -86,6 +86,7 @@ fn print_one<'a>(
         DatumKind::Float(value) if value.is_finite() => write!(out, "{value:?}"),
         DatumKind::Float(value) => write!(out, "#<float {value}>"),
         DatumKind::Object(ObjectId(id)) => write!(out, "#<object {id}>"),
+        DatumKind::Opaque(opaque) => write!(out, "{opaque}"),
         DatumKind::Call(call) => {
             out.push_str("#.");
             work.push(PrintStep::Datum(call, level, true));

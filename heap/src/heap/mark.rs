@@ -378,6 +378,20 @@ impl Heap {
     /// # Safety
     /// The contract of [`Heap::end_marking`], for what `mark_roots` marks.
     pub unsafe fn collect_fully(&mut self, mark_roots: impl FnOnce(&mut Heap)) {
+        // SAFETY: by the contract `mark_roots` marks what somebody will use.
+        unsafe { self.collect_fully_and_tell(mark_roots, |_| {}) }
+    }
+
+    /// As [`Heap::collect_fully`]; `tell` is called when [`Heap::is_marked`] says what goes on living, before
+    /// the rest is freed.
+    ///
+    /// # Safety
+    /// The contract of [`Heap::end_marking`], for what `mark_roots` marks.
+    pub unsafe fn collect_fully_and_tell(
+        &mut self,
+        mark_roots: impl FnOnce(&mut Heap),
+        tell: impl FnOnce(&Heap),
+    ) {
         match self.phase {
             Phase::Marking => self.abandon_marking(),
             Phase::Sweeping => self.finish_sweep(),
@@ -386,6 +400,7 @@ impl Heap {
         self.start_marking();
         mark_roots(self);
         while let SliceOutcome::More = self.follow(&mut i64::from(u32::MAX)) {}
+        tell(self);
         // SAFETY: by the contract, `mark_roots` has marked what somebody will use, and all that it leads to
         // was followed.
         unsafe { self.end_marking() };

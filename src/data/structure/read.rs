@@ -78,6 +78,7 @@ impl<'de> de::Deserializer<'de> for Reading<'_> {
             }
             Data::List(items) | Data::Vector(items) => visitor.visit_seq(Sequence(items.iter())),
             Data::Ratio(..) | Data::DottedList(..) => self.is_not("a number or a list"),
+            Data::Opaque(_) => self.is_not("data"),
         }
     }
 

@@ -82,6 +82,8 @@ pub(crate) struct Unit {
     calls: Vec<Value>,
     /// Nodes visited since the last call of [`Unit::take_work`].
     work: u64,
+    /// Whether the data are for the embedder, who knows its own.
+    is_for_embedder: bool,
 }
 
 impl SharedObjects for Unit {
@@ -227,6 +229,7 @@ impl Unit {
                 value
             }
             DatumKind::Object(id) => self.pinned(*id).unwrap_or(Value::NIL),
+            DatumKind::Opaque(opaque) => world.opaque_object(heap, opaque)?,
             DatumKind::Nil
             | DatumKind::Cons(..)
             | DatumKind::Vector(_)
@@ -358,6 +361,11 @@ impl Unit {
         if let Some(code) = object.as_character() {
             return Some(DatumKind::Character(char::from_u32(code)?));
         }
+        if self.is_for_embedder
+            && let Some(opaque) = world.opaque_of(heap, object)
+        {
+            return Some(DatumKind::Opaque(opaque.clone()));
+        }
         let text: Option<String> = heap.string(object)?.iter().map(|&code| char::from_u32(code)).collect();
         Some(DatumKind::String(Arc::from(text?)))
     }
@@ -415,6 +423,7 @@ fn is_equivalent(a: &Datum, b: &Datum) -> bool {
             (DatumKind::Float(a), DatumKind::Float(b)) => a.to_bits() == b.to_bits(),
             (DatumKind::Character(a), DatumKind::Character(b)) => a == b,
             (DatumKind::Object(a), DatumKind::Object(b)) => a == b,
+            (DatumKind::Opaque(a), DatumKind::Opaque(b)) => a == b,
             _ => false,
         }
 }
@@ -424,7 +433,7 @@ fn is_equivalent(a: &Datum, b: &Datum) -> bool {
 /// # Errors
 /// [`DatumError`].
 pub(crate) fn export(heap: &Heap, world: &World, value: Value) -> Result<(Datum, usize), DatumError> {
-    let mut unit = Unit::default();
+    let mut unit = Unit { is_for_embedder: true, ..Unit::default() };
     let datum = unit.datum_of(heap, world, value, Span::default())?;
     Ok((datum, unit.take_work() as usize))
 }

@@ -35,7 +35,7 @@ pub use inbox::{Inbox, Incoming};
 pub(crate) use operation::Canceller;
 pub use operation::{HostFailure, HostOperation, News};
 pub use question::{Answer, FunctionRef, Kept, Pending, Question, TaskInfo};
-pub use real::{RealHost, Screen};
+pub use real::{RealHost, Screen, request_of_files};
 pub use record::{Record, Recording, RecordingHost, ReplayHost};
 pub use rights::{Permit, Right, Rights};
 pub use signal::ProcessSignal;

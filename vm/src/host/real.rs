@@ -418,27 +418,35 @@ impl Host for RealHost {
     }
 
     fn request_of_files(&mut self, request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
-        let answer = match request {
-            FileRequest::List(folder) => names_in(folder).map(FileAnswer::Names),
-            FileRequest::Rename(from, to) => std::fs::rename(from, to).map(|()| FileAnswer::Done(true)),
-            FileRequest::Date(path) => {
-                std::fs::metadata(path).and_then(|metadata| metadata.modified()).map(|time| {
-                    let seconds = |duration: Duration| i64::try_from(duration.as_secs()).unwrap_or(i64::MAX);
-                    let since = time.duration_since(UNIX_EPOCH);
-                    FileAnswer::Date(since.map_or_else(|before| -seconds(before.duration()), seconds))
-                })
-            }
-            FileRequest::MakeFolders(path) => {
-                let is_there = std::path::Path::new(path).is_dir();
-                std::fs::create_dir_all(path).map(|()| FileAnswer::Done(!is_there))
-            }
-        };
-        answer.map_err(|error| error_of(&error))
+        request_of_files(request)
     }
 
     fn inbox(&self) -> Inbox {
         self.inbox.clone()
     }
+}
+
+/// Does something with files of the system, which may take its time.
+///
+/// # Errors
+/// [`HostError`].
+pub fn request_of_files(request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
+    let answer = match request {
+        FileRequest::List(folder) => names_in(folder).map(FileAnswer::Names),
+        FileRequest::Rename(from, to) => std::fs::rename(from, to).map(|()| FileAnswer::Done(true)),
+        FileRequest::Date(path) => {
+            std::fs::metadata(path).and_then(|metadata| metadata.modified()).map(|time| {
+                let seconds = |duration: Duration| i64::try_from(duration.as_secs()).unwrap_or(i64::MAX);
+                let since = time.duration_since(UNIX_EPOCH);
+                FileAnswer::Date(since.map_or_else(|before| -seconds(before.duration()), seconds))
+            })
+        }
+        FileRequest::MakeFolders(path) => {
+            let is_there = std::path::Path::new(path).is_dir();
+            std::fs::create_dir_all(path).map(|()| FileAnswer::Done(!is_there))
+        }
+    };
+    answer.map_err(|error| error_of(&error))
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use crate::schedule::{Scheduler, TurnEnd};
 use crate::task::{Control, Task, Tasks};
 use crate::vm::Vm;
 use crate::wait::Deliveries;
-use crate::world::World;
+use crate::world::{Opaques, World};
 
 /// Offset of the first word above the frame with the given base.
 ///
@@ -142,7 +142,7 @@ fn mark_roots(
 }
 
 /// Marks more: a slice of what is known to be reachable, then the tasks whose stacks have yet to be scanned.
-fn mark_more(heap: &mut Heap, tasks: &mut Tasks) {
+fn mark_more(heap: &mut Heap, tasks: &mut Tasks, opaques: &mut Opaques) {
     let SliceOutcome::Drained { left } = heap.slice(SLICE_VISITS) else { return };
     let (mut left, mut has_scanned) = (left as usize, false);
     let cycle = heap.cycle_id();
@@ -166,6 +166,7 @@ fn mark_more(heap: &mut Heap, tasks: &mut Tasks) {
         }
     }
     if !has_scanned {
+        opaques.note_unreachable(heap);
         // SAFETY: the roots were marked when the cycle began, and so was the running task, or it has not run
         // since; and every other task since, before it ran.
         unsafe { heap.end_marking() };
@@ -271,14 +272,20 @@ impl Vm {
         // SAFETY: all roots and all tasks are marked; `begin_pause` has noted the running frame of the
         // running task, those of the others were noted at the switch.
         unsafe {
-            heap.collect_fully(|heap| {
-                mark_roots(heap, world, compiler, exchange, embedder, deliveries, outside);
-                for task in running.as_deref_mut().into_iter().chain(tasks.iter_mut()) {
-                    scan(heap, task);
-                }
-            });
+            let mut opaques = std::mem::take(&mut world.opaques);
+            heap.collect_fully_and_tell(
+                |heap| {
+                    mark_roots(heap, world, compiler, exchange, embedder, deliveries, outside);
+                    for task in running.as_deref_mut().into_iter().chain(tasks.iter_mut()) {
+                        scan(heap, task);
+                    }
+                },
+                |heap| opaques.note_unreachable(heap),
+            );
+            world.opaques = opaques;
         }
         self.end_pause(pause);
+        self.world.opaques.let_go();
     }
 
     /// The collector's turn.
@@ -287,7 +294,7 @@ impl Vm {
         let Vm { heap, world, compiler, scheduler, outside, exchange, embedder, .. } = self;
         let Scheduler { running, tasks, deliveries, .. } = scheduler;
         match heap.phase() {
-            Phase::Marking => mark_more(heap, tasks),
+            Phase::Marking => mark_more(heap, tasks, &mut world.opaques),
             Phase::Sweeping => _ = heap.slice(SLICE_VISITS),
             Phase::Idle => {
                 heap.begin_cycle();
@@ -303,6 +310,7 @@ impl Vm {
             }
         }
         self.end_pause(pause);
+        self.world.opaques.let_go();
     }
 
     /// Begins a turn of the collector: notes where the running task stands, and tells whoever watches.

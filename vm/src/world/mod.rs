@@ -32,10 +32,12 @@ pub(crate) mod class;
 mod defined;
 mod known;
 pub mod load;
+mod opaque;
 mod package;
 pub(crate) mod stream;
 
 pub(crate) use known::Known;
+pub(crate) use opaque::Opaques;
 
 /// Hasher of keys that are good hashes already: symbols, and addresses of objects.
 #[derive(Default)]
@@ -109,6 +111,8 @@ pub(crate) struct World {
     pub(crate) is_defining: bool,
     /// Modules that are loaded piece by piece.
     pub(crate) images: Images,
+    /// Things of the embedder's that the program holds.
+    pub(crate) opaques: Opaques,
     /// Classes of structures and conditions, by the address of their names.
     pub(crate) classes: GivenMap<u64, Value>,
 }
@@ -139,6 +143,7 @@ impl World {
             undefined_yet: Vec::new(),
             is_defining: false,
             images: Images::default(),
+            opaques: Opaques::default(),
             classes: GivenMap::default(),
         };
         world.nil = world.make_constant(heap, &Symbol::cl("NIL"), Value::NIL)?;
