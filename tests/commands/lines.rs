@@ -73,7 +73,7 @@ while True:
 ";
 
 /// Makes an authority and the certificate of a server. Returns false if there is nothing to make them with.
-fn make_certificates(folder: &Folder) -> bool {
+pub(crate) fn make_certificates(folder: &Folder) -> bool {
     folder.file("names", "subjectAltName = DNS:localhost, IP:127.0.0.1\n");
     let key = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes"];
     let authority =
@@ -135,4 +135,68 @@ fn a_secured_connection_needs_a_server_that_proves_who_it_is() {
     assert_eq!(lines, [&first[..], &["(\"hello\" 200)", refused, refused]].concat());
     let said: Vec<String> = said.lines().map_while(Result::ok).collect();
     assert_eq!(said[..4], ["end", "end", "refused", "refused"], "a connection that is closed has an end");
+}
+
+#[test]
+fn a_listener_proves_who_it_is_and_drops_whom_it_cannot_talk_to() {
+    let folder = Folder::with("tls-server", &[]);
+    if !make_certificates(&folder) {
+        crate::say_left_out("it needs `openssl`");
+        return;
+    }
+    let server = "(require :sockets)
+(defmacro cause (form) `(print (handler-case ,form (failure (f) (failure-cause f)) (error () 'wrong))))
+(cause (sockets:listen \"127.0.0.1\" 0 :certificate \"server.pem\"))
+(cause (sockets:listen \"127.0.0.1\" 0 :certificate \"server.key\" :key \"server.key\"))
+(cause (sockets:listen \"127.0.0.1\" 0 :certificate \"server.pem\" :key \"ca.key\"))
+(cause (sockets:listen \"127.0.0.1\" 0 :certificate \"none.pem\" :key \"server.key\"))
+(cause (sockets:listen \"127.0.0.1\" 0 :certificate \"/etc/x.pem\" :key \"server.key\"))
+(sockets:with-socket (listener (sockets:listen \"127.0.0.1\" 0 :certificate \"server.pem\" :key \"server.key\"))
+  (format t \"~&port ~d~%\" (sockets:local-port listener))
+  (finish-output)
+  (dotimes (i 2)
+    (sockets:with-socket (c (sockets:accept listener))
+      (format t \"~&heard ~a~%\" (read-line c))
+      (finish-output)
+      (format c \"good day~%\"))))";
+    let client = "(require :sockets)
+(defmacro cause (form) `(print (handler-case ,form (failure (f) (failure-cause f)))))
+(defvar *port* (parse-integer (first (command-line-arguments))))
+(defun talk (&rest options)
+  (sockets:with-socket (c (apply #'sockets:connect \"127.0.0.1\" *port* options))
+    (format c \"hello~%\")
+    (list (read-line c) (read-line c nil 'end))))
+(sockets:with-socket (silent (sockets:connect \"127.0.0.1\" *port*))
+  (cause (talk :tls t :ca-file \"ca.pem\"))
+  (cause (talk :tls t))
+  (sockets:with-socket (c (sockets:connect \"127.0.0.1\" *port*))
+    (format c \"no TLS~%\")
+    (cause (progn (loop while (read-char c nil nil)) 'dropped)))
+  (cause (talk :tls \"localhost\" :ca-file \"ca.pem\")))";
+    folder.file("server.esl", server);
+    folder.file("client.esl", client);
+    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "server.esl"]);
+    command.current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::inherit());
+    let mut server = command.spawn().expect("the command is there");
+    let mut said = BufReader::new(server.stdout.take().expect("its output is a pipe"));
+    let mut next = || {
+        let mut line = String::new();
+        while line.trim().is_empty() && said.read_line(&mut line).expect("it is text") > 0 {}
+        line.trim().to_owned()
+    };
+    let (refused, denied) = (":TLS-ERROR", ":PERMISSION-DENIED");
+    assert_eq!([next(), next(), next(), next(), next()], ["WRONG", refused, refused, refused, denied]);
+    let port = next();
+    let port = port.strip_prefix("port ").expect("it says its port");
+    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "client.esl", port]);
+    let output = process::run(command.current_dir(folder.path()), "").quiet_output();
+    let heard = [next(), next()];
+    server.kill().and_then(|()| server.wait()).expect("it is our child");
+    let output = output.expect("nothing is wrong");
+    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let talk = "(\"good day\" END)";
+    // What is no TLS is answered by an alarm, or by the end.
+    assert!(matches!(lines[2], "DROPPED" | ":CONNECTION-LOST"), "{lines:?}");
+    assert_eq!((lines[0], lines[1], lines[3]), (talk, refused, talk));
+    assert_eq!(heard, ["heard hello", "heard hello"]);
 }

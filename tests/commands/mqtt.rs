@@ -26,12 +26,12 @@ fn broker_program() -> Option<&'static str> {
 }
 
 /// Starts a broker on a free port of the loopback, and waits until it listens.
-fn start_broker(program: &str, folder: &Folder) -> (Broker, u16) {
+fn start_broker(program: &str, folder: &Folder, more: &str) -> (Broker, u16) {
     for _ in 0..20 {
         // The port is free until somebody else takes it, which the broker says by ending.
         let port = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr());
         let port = port.expect("there is a free port").port();
-        let settings = format!("listener {port} 127.0.0.1\nallow_anonymous true\npersistence false\n");
+        let settings = format!("listener {port} 127.0.0.1\nallow_anonymous true\npersistence false\n{more}");
         let settings = folder.file("broker.conf", settings);
         let child = Command::new(program)
             .args(["-c", &settings])
@@ -59,7 +59,7 @@ fn messages_go_through_a_broker() {
         return;
     };
     let folder = Folder::new("mqtt");
-    let (_broker, port) = start_broker(program, &folder);
+    let (_broker, port) = start_broker(program, &folder, "");
     let text = "(require :mqtt)
 (defmacro cause (form) `(print (handler-case ,form (failure (f) (failure-cause f)))))
 (defvar *port* (parse-integer (first (command-line-arguments))))
@@ -116,7 +116,7 @@ fn a_connection_that_is_lost_is_made_again() {
         return;
     };
     let folder = Folder::new("mqtt-lost");
-    let (mut broker, port) = start_broker(program, &folder);
+    let (mut broker, port) = start_broker(program, &folder, "");
     let text = "(require :mqtt)
 (defun mark (name) (with-open-file (s name :direction :output) (write-line name s)))
 (mqtt:with-client (c \"127.0.0.1\" (parse-integer (first (command-line-arguments))))
@@ -149,4 +149,36 @@ fn a_connection_that_is_lost_is_made_again() {
     broker.0 = again.expect("the broker can be started");
     let output = process::finish(child).quiet_output().expect("nothing is wrong");
     assert_eq!(output.split_whitespace().collect::<Vec<_>>(), [":CONNECTION-LOST", "AGAIN"]);
+}
+
+#[test]
+fn a_secured_broker_acknowledges_what_is_published() {
+    let folder = Folder::new("mqtt-tls");
+    let (Some(program), true) = (broker_program(), crate::lines::make_certificates(&folder)) else {
+        crate::say_left_out("it needs `mosquitto` and `openssl`");
+        return;
+    };
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let more = format!("certfile {}\nkeyfile {}\n", path("server.pem"), path("server.key"));
+    // The broker may give up the rights of root, and has to read its key still.
+    let more = if rustix::process::getuid().is_root() { format!("{more}user root\n") } else { more };
+    let (_broker, port) = start_broker(program, &folder, &more);
+    let text = "(require :mqtt)
+(defmacro cause (form) `(print (handler-case ,form (failure (f) (failure-cause f)))))
+(defvar *port* (parse-integer (first (command-line-arguments))))
+(mqtt:with-client (c \"127.0.0.1\" *port* :tls t :ca-file \"ca.pem\")
+  (dotimes (i 150)
+    (mqtt:publish c \"kept/x\" (princ-to-string i) :qos (+ 1 (mod i 2)) :retain t))
+  ;; What is acknowledged is there, whoever asks next.
+  (mqtt:with-client (d \"127.0.0.1\" *port* :tls t :ca-file \"ca.pem\")
+    (print (multiple-value-list (wait-for-event (mqtt:subscribe d \"kept/#\"))))))
+(cause (mqtt:with-client (c \"127.0.0.1\" *port* :tls t) c))
+(cause (mqtt:with-client (c \"127.0.0.1\" *port* :tls t :ca-file \"/none.pem\") c))";
+    folder.file("main.esl", text);
+    let port = port.to_string();
+    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "main.esl", &port]);
+    let output =
+        process::run(command.current_dir(folder.path()), "").quiet_output().expect("nothing is wrong");
+    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    assert_eq!(lines, ["(\"kept/x\" \"149\" T)", ":TLS-ERROR", ":PERMISSION-DENIED"]);
 }

@@ -84,6 +84,40 @@ fn every_signal_ends_a_run_with_its_cleanups_newest_first() {
 }
 
 #[test]
+fn every_other_way_out_ends_with_the_cleanups_too() {
+    let ways = [
+        ("(sleep 1)", &[][..]),
+        ("(exit 9)", &[]),
+        ("(fail :lost)", &[]),
+        ("(wait-for-event (make-event))", &[]),
+        ("(loop)", &["--budget", "200000"]),
+        ("(let ((all nil)) (loop (push (make-array 1000) all)))", &["--memory", "16M"]),
+        ("(labels ((deep (n) (+ 1 (deep n)))) (deep 0))", &["--memory", "16M"]),
+        ("(without-interrupts (loop))", &[]),
+        ("(progn (spawn (fail :lost)) (sleep 1) (abort-task (current-task)))", &[]),
+    ];
+    let folder = Folder::new("ways");
+    for (way, options) in ways {
+        // Where every task waits for what cannot come, the motors are no reason to go on.
+        let motor =
+            "(unwind-protect (wait-for-event (make-event)) (sleep 0.01) (format t \"~a is off~%\" name))";
+        let program = format!(
+            "(defun run-motor (name) {motor})
+             (spawn (:name 'left :daemon t) (run-motor 'left))
+             (spawn (:name 'right :daemon t) (run-motor 'right))
+             (sleep 0.01)
+             (unwind-protect {way} (format t \"the main task leaves~%\"))"
+        );
+        let path = folder.file("program.esl", program);
+        let arguments = [&["run", "--clock", "virtual"], options, &[&*path]].concat();
+        let run = process::run(&mut eslvm(&arguments), "");
+        let off = ["LEFT is off", "RIGHT is off", "the main task leaves"];
+        let said = |line: &&str| run.output.lines().filter(|said| said == line).count() == 1;
+        assert!(off.iter().all(said), "{way}: {} {}", run.output, run.errors);
+    }
+}
+
+#[test]
 fn a_second_interrupt_cuts_the_end_short_and_names_what_is_left() {
     let text = "(spawn (:name 'arm)
                   (unwind-protect (loop (sleep 1))

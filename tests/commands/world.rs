@@ -248,6 +248,41 @@ fn datagrams_come_whole() {
 
 #[cfg(unix)]
 #[test]
+fn two_programs_talk_by_datagrams_and_over_a_unix_socket() {
+    let server = "(require :sockets)
+(sockets:with-socket (s (sockets:udp-open \"127.0.0.1\"))
+  (sockets:with-socket (l (sockets:listen-unix \"talk\"))
+    (format t \"~d~%\" (sockets:local-port s))
+    (finish-output)
+    (multiple-value-bind (bytes host port) (sockets:udp-receive s)
+      (sockets:udp-send s host port (reverse bytes)))
+    (sockets:with-socket (c (sockets:accept l))
+      (loop for line = (read-line c nil nil)
+            while line do (format c \"~a!~%\" line)))))";
+    let client = "(require :sockets)
+(defvar *port* (parse-integer (first (command-line-arguments))))
+(sockets:with-socket (s (sockets:udp-open \"127.0.0.1\"))
+  (sockets:udp-send s \"127.0.0.1\" *port* #(1 2 255))
+  (print (sockets:udp-receive s)))
+(sockets:with-socket (c (sockets:connect-unix \"talk\"))
+  (dotimes (i 3) (format c \"zeile ~d ü~%\" i) (print (read-line c))))";
+    let folder = Folder::with("sockets-two", &[("server.esl", server), ("client.esl", client)]);
+    let mut server =
+        process::start(eslvm(&["run", "--allow-net=127.0.0.1", "server.esl"]).current_dir(folder.path()));
+    let mut port = String::new();
+    let output = server.stdout.take().expect("it is a pipe");
+    BufReader::new(output).read_line(&mut port).expect("the port is printed");
+    let mut client = eslvm(&["run", "--allow-net=127.0.0.1", "client.esl", port.trim()]);
+    let done = process::run(client.current_dir(folder.path()), "");
+    let ended = process::finish(server);
+    let lines: Vec<&str> = done.output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let expected = ["#(255 2 1)", "\"zeile 0 ü!\"", "\"zeile 1 ü!\"", "\"zeile 2 ü!\""];
+    assert_eq!((lines, &*done.errors), (expected.to_vec(), ""));
+    assert_eq!((ended.status, &*ended.errors), (Some(0), ""));
+}
+
+#[cfg(unix)]
+#[test]
 fn a_thousand_connections_are_served_by_one_program() {
     // All are open before the first is answered. They come in at most fifty at a time, since the system drops
     // some where more wait than it has room for.

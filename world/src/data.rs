@@ -3,8 +3,9 @@
 //! Bytes pass as strings of the characters 0 to 255, since data have no vectors of bytes.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
-use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::datum::{Datum, DatumKind, OpaqueDatum};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_vm::host::HostFailure;
@@ -52,6 +53,26 @@ pub(crate) fn failure(cause: &str, reason: impl ToString) -> HostFailure {
     HostFailure { cause: cause.into(), arguments: vec![text(&reason.to_string())] }
 }
 
+/// What a program holds of something that is open, beside its number: when the program cannot reach it any more, it
+/// is closed.
+struct Guard {
+    number: i64,
+    close: Box<dyn Fn(i64) + Send + Sync>,
+}
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        (self.close)(self.number);
+    }
+}
+
+/// Returns the handle of something that is open, which is closed by `close` when the program has lost it.
+pub(crate) fn handle(kind: &str, number: i64, close: impl Fn(i64) + Send + Sync + 'static) -> Datum {
+    let guard = Guard { number, close: Box::new(close) };
+    let opaque = OpaqueDatum::new(kind, &number.to_string(), Arc::new(guard));
+    Datum::new(DatumKind::Opaque(opaque), Span::default())
+}
+
 /// Things that a program knows by numbers: the greatest number so far, and the things; `None` for one that is
 /// still being opened.
 pub(crate) type Numbered<T> = (i64, HashMap<i64, Option<T>>);
@@ -73,6 +94,16 @@ impl CallArguments {
     /// Returns an argument that is a string or `NIL`.
     pub(crate) fn text_if_any(&self, index: usize) -> Result<Option<String>, HostFailure> {
         if self.is_true(index) { self.text(index).map(Some) } else { Ok(None) }
+    }
+
+    /// Returns the number that an argument stands for, which is a handle.
+    pub(crate) fn number(&self, index: usize) -> Result<i64, HostFailure> {
+        let datum = self.get(index, "INTEGER")?;
+        match datum.kind() {
+            DatumKind::Opaque(opaque) => opaque.value().downcast_ref::<Guard>().map(|guard| guard.number),
+            _ => None,
+        }
+        .map_or_else(|| self.integer(index), Ok)
     }
 
     /// Returns an argument that is an integer.

@@ -1,7 +1,9 @@
 //! The event loop: one thread that does what all machines of the process ask of the system.
 
 use std::future::Future;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::OnceLock;
+use std::task::{Context, Poll, Waker};
 
 use tokio::runtime::{Builder, Handle};
 
@@ -20,6 +22,25 @@ pub(crate) fn spawn(future: impl Future<Output = ()> + Send + 'static) -> Result
         }
         Err(reason) => Err(reason.clone()),
     }
+}
+
+/// Begins a future here, and runs the rest of it on the event loop, if there is any. So what is over at once takes no
+/// way through another thread. The future must not wait but for others to wake it. If it panics, it is dropped.
+///
+/// # Errors
+/// As [`spawn`].
+pub(crate) fn begin(future: impl Future<Output = ()> + Send + 'static) -> Result<(), String> {
+    let handle = LOOP.get_or_init(start).as_ref().map_err(String::clone)?;
+    let mut future = Box::pin(future);
+    let first = {
+        let _inside = handle.enter();
+        // Whoever it waits for is told of the event loop when that polls it.
+        catch_unwind(AssertUnwindSafe(|| future.as_mut().poll(&mut Context::from_waker(Waker::noop()))))
+    };
+    if matches!(first, Ok(Poll::Pending)) {
+        handle.spawn(future);
+    }
+    Ok(())
 }
 
 fn start() -> Result<Handle, String> {

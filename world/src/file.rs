@@ -14,13 +14,14 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use esl_bytecode::datum::Datum;
+use esl_bytecode::span::Span;
 use esl_vm::embed::{HostFunction, Need};
-use esl_vm::host::{HostError, HostFailure, Right};
+use esl_vm::host::{FileAnswer, FileRequest, HostError, HostFailure, Right, request_of_files};
 use esl_vm::vm::Vm;
 use tokio::sync::watch;
 
 use crate::arrived::Arrived;
-use crate::data::{CallArguments, Numbered, boolean, bytes_of, failure, integer, nil, text};
+use crate::data::{CallArguments, Numbered, boolean, bytes_of, failure, handle, integer, nil, text};
 use crate::operation::{Completion, define, define_with_end};
 
 /// Most bytes that are read at a time.
@@ -248,6 +249,7 @@ fn answer(result: Result<Datum, Error>) -> Completion {
 pub(crate) fn install(machine: &mut Vm) {
     let files = Files::default();
     define_immediate(machine, &files);
+    define_requests(machine);
     let known = files.clone();
     let read = [Need { right: Right::Read, argument: 1 }];
     define(machine, "%FILE-OPEN-INPUT", &read, move |arguments| open_input(arguments, known.clone()));
@@ -256,7 +258,7 @@ pub(crate) fn install(machine: &mut Vm) {
     define(machine, "%FILE-OPEN-OUTPUT", &write, move |arguments| open_output(arguments, known.clone()));
     let known = files.clone();
     define(machine, "%FILE-AWAIT", &[], move |arguments| {
-        let open = arguments.integer(0).and_then(|number| known.get(number));
+        let open = arguments.number(0).and_then(|number| known.get(number));
         async move {
             let open = open?;
             answer(open.clone().unless_closed(open.fill()).await.map(|()| nil()))
@@ -266,7 +268,7 @@ pub(crate) fn install(machine: &mut Vm) {
     define_with_end(machine, "%FILE-WRITE", &[], move |arguments, mut cancelled| {
         let known = known.clone();
         async move {
-            let (open, text) = (known.get(arguments.integer(0)?)?, arguments.text(1)?);
+            let (open, text) = (known.get(arguments.number(0)?)?, arguments.text(1)?);
             let bytes = if arguments.is_true(2) { bytes_of(&text) } else { text.into_bytes() };
             // A disk is waited for: what is left half-written would come later, among other things.
             let is_disk = matches!(open.access, FileAccess::Appended(_));
@@ -283,7 +285,7 @@ pub(crate) fn install(machine: &mut Vm) {
     define(machine, "%FILE-SEEK", &[], move |arguments| {
         let known = known.clone();
         async move {
-            let open = known.get(arguments.integer(0)?)?;
+            let open = known.get(arguments.number(0)?)?;
             let position = u64::try_from(arguments.integer(1)?).unwrap_or(0);
             let _turn = open.turn.lock().await;
             let seeking = open.clone();
@@ -298,6 +300,50 @@ pub(crate) fn install(machine: &mut Vm) {
     });
 }
 
+/// Gives a machine the operations on files as wholes.
+fn define_requests(machine: &mut Vm) {
+    let read = [Need { right: Right::Read, argument: 0 }];
+    let write = [Need { right: Right::Write, argument: 0 }];
+    let both = [write[0], Need { right: Right::Write, argument: 1 }];
+    define(machine, "%FILE-PROBE", &read, |arguments| async move {
+        let path = arguments.text(0)?;
+        answer(in_thread(move || Ok(Path::new(&path).is_file())).await.map(boolean))
+    });
+    define(machine, "%FILE-DELETE", &write, |arguments| async move {
+        let path = arguments.text(0)?;
+        answer(in_thread(move || std::fs::remove_file(path)).await.map(|()| boolean(true)))
+    });
+    define(machine, "%FILE-LIST", &read, |arguments| async move {
+        let path = arguments.text(0)?;
+        requested(move || request_of_files(FileRequest::List(&path))).await
+    });
+    define(machine, "%FILE-DATE", &read, |arguments| async move {
+        let path = arguments.text(0)?;
+        requested(move || request_of_files(FileRequest::Date(&path))).await
+    });
+    define(machine, "%FILE-MAKE-FOLDERS", &write, |arguments| async move {
+        let path = arguments.text(0)?;
+        requested(move || request_of_files(FileRequest::MakeFolders(&path))).await
+    });
+    define(machine, "%FILE-RENAME", &both, |arguments| async move {
+        let (from, to) = (arguments.text(0)?, arguments.text(1)?);
+        requested(move || request_of_files(FileRequest::Rename(&from, &to))).await
+    });
+}
+
+/// Returns the values of an operation that a thread performs.
+async fn requested(request: impl FnOnce() -> Result<FileAnswer, HostError> + Send + 'static) -> Completion {
+    let result = in_thread(move || Ok(request())).await.unwrap_or_else(|error| Err(HostError::from(&error)));
+    Ok(match result {
+        Ok(FileAnswer::Names(names)) => {
+            vec![Datum::list(names.iter().map(|name| text(name)).collect::<Vec<_>>(), Span::default())]
+        }
+        Ok(FileAnswer::Date(seconds)) => vec![integer(seconds)],
+        Ok(FileAnswer::Done(is_done)) => vec![boolean(is_done)],
+        Err(error) => vec![nil(), text(&error.to_string())],
+    })
+}
+
 /// Gives a machine the functions that do not wait.
 fn define_immediate(machine: &mut Vm, files: &Files) {
     let mut define = |name: &str, function: fn(CallArguments, &Files) -> Result<Datum, HostFailure>| {
@@ -305,10 +351,13 @@ fn define_immediate(machine: &mut Vm, files: &Files) {
         let function = move |arguments: &[Datum]| function(CallArguments(arguments.to_vec()), &files);
         machine.add_host_function(name, HostFunction::AtOnce(Box::new(function)));
     };
-    define("%FILE-NEW", |_, files| Ok(integer(files.add())));
-    define("%FILE-TAKE", |arguments, files| Ok(files.get(arguments.integer(0)?)?.take(arguments.is_true(1))));
+    define("%FILE-NEW", |_, files| {
+        let known = files.clone();
+        Ok(handle("FILE", files.add(), move |number| known.close(number)))
+    });
+    define("%FILE-TAKE", |arguments, files| Ok(files.get(arguments.number(0)?)?.take(arguments.is_true(1))));
     define("%FILE-CLOSE", |arguments, files| {
-        files.close(arguments.integer(0)?);
+        files.close(arguments.number(0)?);
         Ok(nil())
     });
 }
@@ -341,7 +390,7 @@ fn polled(file: &File, interest: tokio::io::Interest) -> Option<FileAccess> {
 
 /// `%FILE-OPEN-INPUT`: number, path, whether it is read as text.
 async fn open_input(arguments: CallArguments, files: Files) -> Completion {
-    let (number, path) = (arguments.integer(0)?, arguments.text(1)?);
+    let (number, path) = (arguments.number(0)?, arguments.text(1)?);
     let open = move || {
         let file = at_once(OpenOptions::new().read(true)).open(&path)?;
         if file.metadata()?.is_dir() { Err(Error::other("it is a directory")) } else { Ok(file) }
@@ -367,7 +416,7 @@ async fn open_input(arguments: CallArguments, files: Files) -> Completion {
 /// `%FILE-OPEN-OUTPUT`: number, path, mode: 0 replaces the file, 1 appends to it, 2 fails if there is one.
 async fn open_output(arguments: CallArguments, files: Files) -> Completion {
     let (number, path, mode) =
-        (arguments.integer(0)?, PathBuf::from(arguments.text(1)?), arguments.integer(2)?);
+        (arguments.number(0)?, PathBuf::from(arguments.text(1)?), arguments.integer(2)?);
     #[cfg(unix)]
     {
         let looked_at = path.clone();

@@ -15,7 +15,7 @@ use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
 use rumqttc::{
     AsyncClient, ConnectionError, Event, EventLoop, LastWill, MqttOptions, Outgoing, Packet, QoS,
-    SubscribeReasonCode,
+    SubscribeReasonCode, TlsConfiguration, Transport,
 };
 use tokio::sync::{Notify, oneshot, watch};
 
@@ -47,6 +47,11 @@ struct State {
     filters: HashMap<String, QoS>,
     /// Who waits for the answers to subscriptions, in their order; nobody for one that is made again.
     subscribing: VecDeque<Option<Subscribed>>,
+    /// Who waits for the acknowledgements of messages that have yet to be sent, in the order of the requests, with
+    /// numbers of their own.
+    publishing: VecDeque<(u64, oneshot::Sender<()>)>,
+    /// Who waits for those of messages that were sent, by the protocol's numbers.
+    sent: HashMap<u16, oneshot::Sender<()>>,
     /// Why there is no connection.
     problem: Option<String>,
 }
@@ -57,6 +62,8 @@ struct ClientState {
     came: Notify,
     /// Notified when messages were taken.
     taken: Notify,
+    /// Held by who hands over a message that is acknowledged, so that the order of the requests is known.
+    turn: tokio::sync::Mutex<u64>,
 }
 
 impl ClientState {
@@ -141,8 +148,8 @@ pub(crate) fn install(machine: &mut Vm) {
     };
     machine.add_host_function("%MQTT-PROBLEM", HostFunction::AtOnce(Box::new(problem)));
     let known = clients.clone();
-    let net = [Need { right: Right::Net, argument: 1 }];
-    define(machine, "%MQTT-OPEN", &net, move |arguments| open(arguments, known.clone()));
+    let needs = [Need { right: Right::Net, argument: 1 }, Need { right: Right::Read, argument: 11 }];
+    define(machine, "%MQTT-OPEN", &needs, move |arguments| open(arguments, known.clone()));
     let known = clients.clone();
     define(machine, "%MQTT-AWAIT", &[], move |arguments| {
         let client = arguments.integer(0).and_then(|number| known.get(number));
@@ -181,7 +188,7 @@ pub(crate) fn install(machine: &mut Vm) {
 }
 
 /// `%MQTT-OPEN`: number, address, name of the client, seconds between signs of life, user and password, topic,
-/// payload, level and retention of the last will.
+/// payload, level and retention of the last will, whether the connection is secured, file of what is trusted.
 async fn open(arguments: CallArguments, clients: Clients) -> Completion {
     let (number, address) = (arguments.integer(0)?, arguments.text(1)?);
     let (host, port) = address.rsplit_once(':').unwrap_or((&address, "1883"));
@@ -202,6 +209,10 @@ async fn open(arguments: CallArguments, clients: Clients) -> Completion {
             arguments.is_true(9),
         ));
     }
+    if arguments.is_true(10) {
+        let config = crate::tls::client_config(arguments.text_if_any(11)?).await?;
+        options.set_transport(Transport::tls_with_config(TlsConfiguration::Rustls(config)));
+    }
     let (client, mut events) = AsyncClient::new(options, MOST_REQUESTS);
     match events.poll().await {
         Ok(_) => {}
@@ -211,10 +222,16 @@ async fn open(arguments: CallArguments, clients: Clients) -> Completion {
         messages: VecDeque::new(),
         filters: HashMap::new(),
         subscribing: VecDeque::new(),
+        publishing: VecDeque::new(),
+        sent: HashMap::new(),
         problem: None,
     };
-    let shared =
-        Arc::new(ClientState { state: Mutex::new(state), came: Notify::new(), taken: Notify::new() });
+    let shared = Arc::new(ClientState {
+        state: Mutex::new(state),
+        came: Notify::new(),
+        taken: Notify::new(),
+        turn: tokio::sync::Mutex::default(),
+    });
     let (closing, close) = watch::channel(false);
     let (end, ended) = watch::channel(false);
     let driver = Driver { client: client.clone(), events, shared: shared.clone(), close };
@@ -236,6 +253,7 @@ fn connection_failure(error: &ConnectionError) -> HostFailure {
         ConnectionError::Io(error) if error.kind() == std::io::ErrorKind::ConnectionRefused => {
             "CONNECTION-REFUSED"
         }
+        ConnectionError::Tls(_) => "TLS-ERROR",
         ConnectionError::NetworkTimeout | ConnectionError::FlushTimeout => "TIMEOUT",
         _ => "MQTT-ERROR",
     };
@@ -249,8 +267,39 @@ async fn publish(arguments: CallArguments, clients: Clients) -> Completion {
     let (topic, bytes) = (arguments.text(1)?, bytes_of(&arguments.text(2)?));
     let level = qos(arguments.integer(3)?);
     let refused = |_| mqtt_failure(format!("`{topic}` is no topic, or the client is closed"));
-    client.client.publish(topic.clone(), level, arguments.is_true(4), bytes).await.map_err(refused)?;
+    let is_kept = arguments.is_true(4);
+    if level == QoS::AtMostOnce {
+        client.client.publish(topic.clone(), level, is_kept, bytes).await.map_err(refused)?;
+        return Ok(Vec::new());
+    }
+    let acknowledged = {
+        let mut turn = client.shared.turn.lock().await;
+        *turn += 1;
+        let (sender, acknowledged) = oneshot::channel();
+        client.shared.state().publishing.push_back((*turn, sender));
+        let mut request = PublishRequest { shared: &client.shared, number: *turn, is_made: false };
+        client.client.publish(topic.clone(), level, is_kept, bytes).await.map_err(refused)?;
+        request.is_made = true;
+        acknowledged
+    };
+    let lost = |_| failure("CONNECTION-LOST", "the connection was lost before the message was acknowledged");
+    acknowledged.await.map_err(lost)?;
     Ok(Vec::new())
+}
+
+/// A message that is being handed over. If that is left, there is nothing to be acknowledged.
+struct PublishRequest<'a> {
+    shared: &'a ClientState,
+    number: u64,
+    is_made: bool,
+}
+
+impl Drop for PublishRequest<'_> {
+    fn drop(&mut self) {
+        if !self.is_made {
+            self.shared.state().publishing.retain(|&(number, _)| number != self.number);
+        }
+    }
 }
 
 /// `%MQTT-SUBSCRIBE`: number, filter, level.
@@ -305,6 +354,14 @@ impl Driver {
                     pause = PAUSES.0;
                     self.take_in(packet);
                 }
+                Ok(Event::Outgoing(Outgoing::Publish(number))) if number > 0 => {
+                    let mut state = self.shared.state();
+                    if !state.sent.contains_key(&number)
+                        && let Some((_, waiting)) = state.publishing.pop_front()
+                    {
+                        state.sent.insert(number, waiting);
+                    }
+                }
                 Ok(Event::Outgoing(_)) => {}
                 Err(error) => {
                     {
@@ -312,6 +369,8 @@ impl Driver {
                         state.problem = Some(error.to_string());
                         // Who waits for an answer hears that there will be none.
                         state.subscribing.clear();
+                        state.publishing.clear();
+                        state.sent.clear();
                     }
                     tokio::select! {
                         _ = self.close.wait_for(|&is_closing| is_closing) => return,
@@ -340,6 +399,12 @@ impl Driver {
                 if let Some(Some(waiting)) = state.subscribing.pop_front() {
                     // The call may have been left.
                     _ = waiting.send(is_granted);
+                }
+            }
+            Packet::PubAck(rumqttc::PubAck { pkid }) | Packet::PubComp(rumqttc::PubComp { pkid }) => {
+                if let Some(waiting) = state.sent.remove(&pkid) {
+                    // The call may have been left.
+                    _ = waiting.send(());
                 }
             }
             Packet::Publish(message) => {

@@ -28,12 +28,30 @@ impl Cancelled {
 }
 
 /// Gives a machine an operation. A call that is left drops the future, and is over then.
-pub(crate) fn define<F, R>(machine: &mut Vm, name: &str, needs: &[Need], mut function: F)
+pub(crate) fn define<F, R>(machine: &mut Vm, name: &str, needs: &[Need], function: F)
 where
     F: FnMut(CallArguments) -> R + Send + 'static,
     R: Future<Output = Completion> + Send + 'static,
 {
-    define_with_end(machine, name, needs, move |arguments, mut cancelled| {
+    define_cancellable(machine, name, needs, false, function);
+}
+
+/// As [`define`], of an operation that is often over at once, and no part of which the system may delay. It is begun by
+/// the thread of the machine, so that what is there takes no way through another thread.
+pub(crate) fn define_ready<F, R>(machine: &mut Vm, name: &str, needs: &[Need], function: F)
+where
+    F: FnMut(CallArguments) -> R + Send + 'static,
+    R: Future<Output = Completion> + Send + 'static,
+{
+    define_cancellable(machine, name, needs, true, function);
+}
+
+fn define_cancellable<F, R>(machine: &mut Vm, name: &str, needs: &[Need], begins_here: bool, mut function: F)
+where
+    F: FnMut(CallArguments) -> R + Send + 'static,
+    R: Future<Output = Completion> + Send + 'static,
+{
+    add(machine, name, needs, begins_here, move |arguments, mut cancelled| {
         let future = function(arguments);
         async move {
             tokio::select! {
@@ -46,7 +64,15 @@ where
 }
 
 /// Gives a machine an operation that itself sees to its end when it is cancelled.
-pub(crate) fn define_with_end<F, R>(machine: &mut Vm, name: &str, needs: &[Need], mut function: F)
+pub(crate) fn define_with_end<F, R>(machine: &mut Vm, name: &str, needs: &[Need], function: F)
+where
+    F: FnMut(CallArguments, Cancelled) -> R + Send + 'static,
+    R: Future<Output = Completion> + Send + 'static,
+{
+    add(machine, name, needs, false, function);
+}
+
+fn add<F, R>(machine: &mut Vm, name: &str, needs: &[Need], begins_here: bool, mut function: F)
 where
     F: FnMut(CallArguments, Cancelled) -> R + Send + 'static,
     R: Future<Output = Completion> + Send + 'static,
@@ -62,7 +88,7 @@ where
             }
         };
         // Without the event loop the operation is dropped, which is how the program hears of it.
-        drop(event_loop::spawn(run));
+        drop(if begins_here { event_loop::begin(run) } else { event_loop::spawn(run) });
     };
     machine.add_guarded_function(name, HostFunction::Operation(Box::new(begin)), needs);
 }

@@ -221,7 +221,7 @@ fn terminate(child: &mut Child) {
 /// Where the output of a launched program goes: to the connection of a number, nowhere for `NIL`, and for
 /// anything else to where that of this process goes.
 fn output_of(arguments: &CallArguments, index: usize) -> (Stdio, Option<i64>) {
-    match arguments.integer(index) {
+    match arguments.number(index) {
         Ok(number) => (Stdio::piped(), Some(number)),
         Err(_) if arguments.is_true(index) => (Stdio::inherit(), None),
         Err(_) => (Stdio::null(), None),
@@ -233,7 +233,7 @@ fn output_of(arguments: &CallArguments, index: usize) -> (Stdio, Option<i64>) {
 async fn launch(arguments: CallArguments, programs: Programs, sockets: Sockets) -> Completion {
     let name = arguments.text(0)?;
     let mut command = command(&arguments, 5)?;
-    let input = if arguments.is_true(2) { Some(arguments.integer(2)?) } else { None };
+    let input = if arguments.is_true(2) { Some(arguments.number(2)?) } else { None };
     let ((output, output_number), (errors, errors_number)) =
         (output_of(&arguments, 3), output_of(&arguments, 4));
     command.stdin(pipe_if(input.is_some())).stdout(output).stderr(errors);

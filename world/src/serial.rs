@@ -13,7 +13,7 @@ fn serial_failure(reason: impl ToString) -> HostFailure {
 
 /// `%SERIAL-OPEN`: number, path, baud, data bits, parity, stop bits, flow control.
 pub(crate) async fn open(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let (number, path) = (arguments.integer(0)?, arguments.text(1)?);
+    let (number, path) = (arguments.number(0)?, arguments.text(1)?);
     let baud = u32::try_from(arguments.integer(2)?).map_err(serial_failure)?;
     let data_bits = match arguments.integer(3)? {
         5 => DataBits::Five,

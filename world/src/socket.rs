@@ -9,6 +9,7 @@
 use std::collections::{HashMap, VecDeque};
 use std::io::{Error, ErrorKind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Waker};
 use std::time::Duration;
 
 use esl_bytecode::datum::Datum;
@@ -21,12 +22,20 @@ use tokio::net::{TcpListener, TcpStream, UdpSocket};
 use tokio::sync::watch;
 
 use crate::arrived::{Arrived, whole_characters};
-use crate::data::{CallArguments, bytes_of, failure, integer, nil, text, text_of_bytes};
+use crate::data::{CallArguments, bytes_of, failure, handle, integer, nil, text, text_of_bytes};
 use crate::event_loop;
-use crate::operation::{Completion, define};
+#[cfg(feature = "serial")]
+use crate::operation::define;
+use crate::operation::{Completion, define_ready};
 
 /// Most bytes that are read at a time.
 const CHUNK: usize = 1 << 16;
+/// Time that a peer has to prove who it is, and to be shown who we are.
+#[cfg(feature = "tls")]
+const GREETING: Duration = Duration::from_secs(10);
+/// Most peers that are greeted at a time; more wait in the system's queue.
+#[cfg(feature = "tls")]
+const MOST_GREETED: usize = 256;
 /// Time that a peer has to take the end of a connection.
 const GOODBYE: Duration = Duration::from_secs(1);
 
@@ -45,6 +54,8 @@ pub(crate) struct Connection {
 /// A socket that waits for connections.
 pub(crate) enum Listener {
     Tcp(TcpListener),
+    #[cfg(feature = "tls")]
+    Secured(TcpListener, tokio_rustls::TlsAcceptor, Greetings),
     #[cfg(unix)]
     Unix(tokio::net::UnixListener, std::path::PathBuf),
 }
@@ -58,6 +69,13 @@ impl Drop for Listener {
         }
     }
 }
+
+/// Connections over which TLS is being begun.
+#[cfg(feature = "tls")]
+pub(crate) type Greetings = tokio::sync::Mutex<tokio::task::JoinSet<Option<NewConnection>>>;
+
+/// A connection, its port here, and the address there.
+type NewConnection = (SocketKind, i64, String);
 
 /// A datagram, and the address of its sender.
 pub(crate) type Datagram = (Vec<u8>, String);
@@ -123,6 +141,12 @@ impl Sockets {
         number
     }
 
+    /// Returns what the program holds of a socket: if it is lost, the socket is closed.
+    fn handle(&self, number: i64) -> Datum {
+        let known = self.clone();
+        handle("SOCKET", number, move |number| known.close(number))
+    }
+
     fn get(&self, number: i64) -> Result<Socket, HostFailure> {
         lock(&self.0).1.get(&number).cloned().ok_or_else(closed)
     }
@@ -143,10 +167,12 @@ impl Sockets {
             if let SocketKind::Connection(connection) = socket.kind
                 && connection.says_goodbye
             {
-                // Without the event loop there is nobody to be told.
-                _ = event_loop::spawn(
-                    async move { drop(tokio::time::timeout(GOODBYE, connection.end()).await) },
-                );
+                let mut end = Box::pin(async move { connection.end().await });
+                // Mostly it is said at once, which is as well if the process ends now.
+                if end.as_mut().poll(&mut Context::from_waker(Waker::noop())).is_pending() {
+                    // Without the event loop there is nobody to be told.
+                    _ = event_loop::spawn(async move { drop(tokio::time::timeout(GOODBYE, end).await) });
+                }
             }
         }
     }
@@ -250,16 +276,27 @@ pub(crate) fn install(machine: &mut Vm, sockets: &Sockets) {
     define_immediate(machine, sockets);
     let net = [Need { right: Right::Net, argument: 1 }];
     let path = [Need { right: Right::Read, argument: 1 }, Need { right: Right::Write, argument: 1 }];
+    #[cfg(feature = "serial")]
+    {
+        let serial = [Need { right: Right::Serial, argument: 1 }];
+        let sockets = sockets.clone();
+        // A port may take its time.
+        define(machine, "%SERIAL-OPEN", &serial, move |arguments| {
+            crate::serial::open(arguments, sockets.clone())
+        });
+    }
     let mut operation = {
         let sockets = sockets.clone();
         move |name: &str, needs: &[Need], function: SocketFunction| {
             let sockets = sockets.clone();
-            define(machine, name, needs, move |arguments| function(arguments, sockets.clone()));
+            define_ready(machine, name, needs, move |arguments| function(arguments, sockets.clone()));
         }
     };
     let connect_needs = [net[0], Need { right: Right::Read, argument: 4 }];
     operation("%SOCKET-CONNECT", &connect_needs, |arguments, sockets| Box::pin(connect(arguments, sockets)));
-    operation("%SOCKET-LISTEN", &net, |arguments, sockets| Box::pin(listen(arguments, sockets)));
+    let listen_needs =
+        [net[0], Need { right: Right::Read, argument: 2 }, Need { right: Right::Read, argument: 3 }];
+    operation("%SOCKET-LISTEN", &listen_needs, |arguments, sockets| Box::pin(listen(arguments, sockets)));
     #[cfg(unix)]
     {
         operation("%SOCKET-CONNECT-UNIX", &path, |arguments, sockets| {
@@ -267,13 +304,6 @@ pub(crate) fn install(machine: &mut Vm, sockets: &Sockets) {
         });
         operation("%SOCKET-LISTEN-UNIX", &path, |arguments, sockets| {
             Box::pin(listen_unix(arguments, sockets))
-        });
-    }
-    #[cfg(feature = "serial")]
-    {
-        let serial = [Need { right: Right::Serial, argument: 1 }];
-        operation("%SERIAL-OPEN", &serial, |arguments, sockets| {
-            Box::pin(crate::serial::open(arguments, sockets))
         });
     }
     operation("%SOCKET-ACCEPT", &[], |arguments, sockets| Box::pin(accept(arguments, sockets)));
@@ -294,27 +324,29 @@ fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
         let function = move |arguments: &[Datum]| function(CallArguments(arguments.to_vec()), &sockets);
         machine.add_host_function(name, HostFunction::AtOnce(Box::new(function)));
     };
-    define("%SOCKET-NEW", |_, sockets| Ok(integer(sockets.add(SocketKind::New, 0, String::new()))));
+    define("%SOCKET-NEW", |_, sockets| Ok(sockets.handle(sockets.add(SocketKind::New, 0, String::new()))));
     define("%SOCKET-CLOSE", |arguments, sockets| {
-        sockets.close(arguments.integer(0)?);
+        sockets.close(arguments.number(0)?);
         Ok(nil())
     });
-    define("%SOCKET-PORT", |arguments, sockets| Ok(integer(sockets.get(arguments.integer(0)?)?.port)));
-    define("%SOCKET-PEER", |arguments, sockets| Ok(text(&sockets.get(arguments.integer(0)?)?.peer)));
+    define("%SOCKET-PORT", |arguments, sockets| Ok(integer(sockets.get(arguments.number(0)?)?.port)));
+    define("%SOCKET-PEER", |arguments, sockets| Ok(text(&sockets.get(arguments.number(0)?)?.peer)));
     define("%SOCKET-TAKE", |arguments, sockets| {
-        let connection = sockets.get(arguments.integer(0)?)?.connection()?;
+        let connection = sockets.get(arguments.number(0)?)?.connection()?;
         // Lines are taken one by one, so that bytes may follow a line of text.
         Ok(connection.take(|arrived| {
             if arguments.is_true(1) { arrived.take_text(true) } else { arrived.take_bytes(CHUNK) }
         }))
     });
     define("%SOCKET-TAKE-BYTES", |arguments, sockets| {
-        let connection = sockets.get(arguments.integer(0)?)?.connection()?;
+        let connection = sockets.get(arguments.number(0)?)?.connection()?;
         let limit = usize::try_from(arguments.integer(1)?).unwrap_or(0);
         Ok(connection.take(|arrived| arrived.take_bytes(limit)))
     });
-    define("%SOCKET-ACCEPTED", |arguments, sockets| match sockets.get(arguments.integer(0)?)?.kind {
-        SocketKind::Listener(_, accepted) => Ok(lock(&accepted).pop_front().map_or_else(nil, integer)),
+    define("%SOCKET-ACCEPTED", |arguments, sockets| match sockets.get(arguments.number(0)?)?.kind {
+        SocketKind::Listener(_, accepted) => {
+            Ok(lock(&accepted).pop_front().map_or_else(nil, |number| sockets.handle(number)))
+        }
         _ => Err(failure("SOCKET-ERROR", "it is no listener")),
     });
     define("%BYTES-OF-TEXT", |arguments, _| Ok(text_of_bytes(arguments.text(0)?.as_bytes())));
@@ -325,7 +357,7 @@ fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
         Ok(Datum::list([decoded, integer(used as i64)], Span::default()))
     });
     define("%UDP-TAKE", |arguments, sockets| {
-        let (_, datagrams) = sockets.get(arguments.integer(0)?)?.datagrams()?;
+        let (_, datagrams) = sockets.get(arguments.number(0)?)?.datagrams()?;
         let next = lock(&datagrams).pop_front();
         Ok(next.map_or_else(nil, |(bytes, address)| {
             Datum::list([text_of_bytes(&bytes), text(&address)], Span::default())
@@ -336,7 +368,7 @@ fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
 /// `%SOCKET-CONNECT`: number, address, milliseconds, and for TLS the name of the server and a file of
 /// certificates.
 async fn connect(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let (number, address) = (arguments.integer(0)?, arguments.text(1)?);
+    let (number, address) = (arguments.number(0)?, arguments.text(1)?);
     let server_name = arguments.text_if_any(3)?;
     let ca_file = arguments.text_if_any(4)?;
     let connect = async {
@@ -386,12 +418,60 @@ async fn secured(
     }
 }
 
-/// `%SOCKET-LISTEN`: number, address.
+/// `%SOCKET-LISTEN`: number, address, files of certificate and key if it is secured.
 async fn listen(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let listener = TcpListener::bind(arguments.text(1)?).await.map_err(|error| bind_failure(&error))?;
+    let secured = match (arguments.text_if_any(2)?, arguments.text_if_any(3)?) {
+        (Some(certificate), Some(key)) => Some((certificate, key)),
+        _ => None,
+    };
+    let bind = TcpListener::bind(arguments.text(1)?);
+    let listener = bind.await.map_err(|error| bind_failure(&error))?;
     let port = listener.local_addr().map_or(0, |address| address.port().into());
-    let kind = SocketKind::Listener(Arc::new(Listener::Tcp(listener)), Arc::default());
-    sockets.set(arguments.integer(0)?, kind, port, String::new())
+    let listener = match secured {
+        None => Listener::Tcp(listener),
+        #[cfg(feature = "tls")]
+        Some((certificate, key)) => {
+            Listener::Secured(listener, crate::tls::acceptor(certificate, key).await?, Greetings::default())
+        }
+        #[cfg(not(feature = "tls"))]
+        Some(_) => return Err(failure("TLS-ERROR", "this program was built without TLS")),
+    };
+    sockets.set(
+        arguments.number(0)?,
+        SocketKind::Listener(Arc::new(listener), Arc::default()),
+        port,
+        String::new(),
+    )
+}
+
+/// Returns the next connection over which TLS has begun. A peer with which it does not is dropped, and one that takes
+/// its time delays no other.
+#[cfg(feature = "tls")]
+async fn accept_secured(
+    listener: &TcpListener,
+    acceptor: &tokio_rustls::TlsAcceptor,
+    greetings: &Greetings,
+) -> Result<NewConnection, HostFailure> {
+    let mut greetings = greetings.lock().await;
+    loop {
+        let has_room = greetings.len() < MOST_GREETED;
+        tokio::select! {
+            Some(greeted) = greetings.join_next() => {
+                if let Ok(Some(connection)) = greeted {
+                    return Ok(connection);
+                }
+            }
+            accepted = listener.accept(), if has_room => {
+                let (stream, _) = accepted.map_err(|error| socket_failure(&error))?;
+                let acceptor = acceptor.clone();
+                greetings.spawn(async move {
+                    let (port, peer) = Connection::ends_of(&stream);
+                    let stream = tokio::time::timeout(GREETING, acceptor.accept(stream)).await.ok()?.ok()?;
+                    Some((Connection::secured(stream), port, peer))
+                });
+            }
+        }
+    }
 }
 
 /// Returns the failure for an address that cannot be used here.
@@ -402,7 +482,7 @@ fn bind_failure(error: &Error) -> HostFailure {
 
 #[cfg(unix)]
 async fn connect_unix(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let (number, path) = (arguments.integer(0)?, arguments.text(1)?);
+    let (number, path) = (arguments.number(0)?, arguments.text(1)?);
     let stream = tokio::net::UnixStream::connect(&path).await.map_err(|error| socket_failure(&error))?;
     let (reader, writer) = stream.into_split();
     sockets.set(number, Connection::over(reader, writer), 0, path)
@@ -410,7 +490,7 @@ async fn connect_unix(arguments: CallArguments, sockets: Sockets) -> Completion 
 
 #[cfg(unix)]
 async fn listen_unix(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let (number, path) = (arguments.integer(0)?, arguments.text(1)?);
+    let (number, path) = (arguments.number(0)?, arguments.text(1)?);
     let listener = tokio::net::UnixListener::bind(&path).map_err(|error| socket_failure(&error))?;
     let kind = SocketKind::Listener(Arc::new(Listener::Unix(listener, path.into())), Arc::default());
     sockets.set(number, kind, 0, String::new())
@@ -418,7 +498,7 @@ async fn listen_unix(arguments: CallArguments, sockets: Sockets) -> Completion {
 
 /// `%SOCKET-ACCEPT`: waits until a connection is there to be taken.
 async fn accept(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let socket = sockets.get(arguments.integer(0)?)?;
+    let socket = sockets.get(arguments.number(0)?)?;
     let SocketKind::Listener(listener, accepted) = &socket.kind else {
         return Err(failure("SOCKET-ERROR", "it is no listener"));
     };
@@ -430,6 +510,10 @@ async fn accept(arguments: CallArguments, sockets: Sockets) -> Completion {
             Listener::Tcp(listener) => {
                 let (stream, _) = listener.accept().await.map_err(|error| socket_failure(&error))?;
                 Ok(Connection::of_tcp(stream))
+            }
+            #[cfg(feature = "tls")]
+            Listener::Secured(listener, acceptor, greetings) => {
+                accept_secured(listener, acceptor, greetings).await
             }
             #[cfg(unix)]
             Listener::Unix(listener, _) => {
@@ -447,7 +531,7 @@ async fn accept(arguments: CallArguments, sockets: Sockets) -> Completion {
 
 /// `%SOCKET-AWAIT`: waits until there is something to be taken.
 async fn wait(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let socket = sockets.get(arguments.integer(0)?)?;
+    let socket = sockets.get(arguments.number(0)?)?;
     let connection = socket.connection()?;
     socket.unless_closed(connection.wait()).await?;
     Ok(Vec::new())
@@ -455,7 +539,7 @@ async fn wait(arguments: CallArguments, sockets: Sockets) -> Completion {
 
 /// `%SOCKET-WRITE`: number, text, whether its characters are bytes.
 async fn write(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let socket = sockets.get(arguments.integer(0)?)?;
+    let socket = sockets.get(arguments.number(0)?)?;
     let connection = socket.connection()?;
     let text = arguments.text(1)?;
     let bytes = if arguments.is_true(2) { bytes_of(&text) } else { text.into_bytes() };
@@ -475,12 +559,12 @@ async fn write(arguments: CallArguments, sockets: Sockets) -> Completion {
 async fn open_udp(arguments: CallArguments, sockets: Sockets) -> Completion {
     let socket = UdpSocket::bind(arguments.text(1)?).await.map_err(|error| bind_failure(&error))?;
     let port = socket.local_addr().map_or(0, |address| address.port().into());
-    sockets.set(arguments.integer(0)?, SocketKind::Udp(Arc::new(socket), Arc::default()), port, String::new())
+    sockets.set(arguments.number(0)?, SocketKind::Udp(Arc::new(socket), Arc::default()), port, String::new())
 }
 
 /// `%UDP-SEND`: number, address, text, whether its characters are bytes.
 async fn send(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let (socket, _) = sockets.get(arguments.integer(0)?)?.datagrams()?;
+    let (socket, _) = sockets.get(arguments.number(0)?)?.datagrams()?;
     let (address, text) = (arguments.text(1)?, arguments.text(2)?);
     let bytes = if arguments.is_true(3) { bytes_of(&text) } else { text.into_bytes() };
     socket.send_to(&bytes, address).await.map_err(|error| bind_failure(&error))?;
@@ -489,7 +573,7 @@ async fn send(arguments: CallArguments, sockets: Sockets) -> Completion {
 
 /// `%UDP-AWAIT`: waits until there is a datagram to be taken.
 async fn wait_for_datagram(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let socket = sockets.get(arguments.integer(0)?)?;
+    let socket = sockets.get(arguments.number(0)?)?;
     let (udp, datagrams) = socket.datagrams()?;
     if !lock(&datagrams).is_empty() {
         return Ok(Vec::new());

@@ -1,16 +1,17 @@
-//! TLS for connections: rustls, with the certificates that the system trusts or those of a file.
+//! TLS for connections: rustls, with the certificates that the system trusts or those of a file; for listeners, with
+//! one of their own.
 
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use esl_vm::host::HostFailure;
 use tokio::net::TcpStream;
-use tokio_rustls::TlsConnector;
 use tokio_rustls::client::TlsStream;
 use tokio_rustls::rustls::crypto::ring;
 use tokio_rustls::rustls::pki_types::pem::PemObject;
-use tokio_rustls::rustls::pki_types::{CertificateDer, ServerName};
-use tokio_rustls::rustls::{ClientConfig, RootCertStore};
+use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
+use tokio_rustls::rustls::{ClientConfig, RootCertStore, ServerConfig};
+use tokio_rustls::{TlsAcceptor, TlsConnector};
 
 use crate::data::failure;
 
@@ -54,17 +55,43 @@ fn config_of_file(path: &Path) -> Result<Arc<ClientConfig>, String> {
     config_with(roots)
 }
 
+/// Returns what clients need that trust what the system trusts, or the certificates of a file.
+pub(crate) async fn client_config(ca_file: Option<String>) -> Result<Arc<ClientConfig>, HostFailure> {
+    let load = move || match ca_file {
+        Some(path) => config_of_file(Path::new(&path)),
+        None => config_of_system(),
+    };
+    tokio::task::spawn_blocking(load).await.map_err(tls_failure)?.map_err(tls_failure)
+}
+
+/// Returns what a listener needs that proves by the certificates of one file, in PEM, and the key of another, who
+/// it is.
+pub(crate) async fn acceptor(certificate: String, key: String) -> Result<TlsAcceptor, HostFailure> {
+    let load = move || {
+        let unread = |path: &str, error: &dyn std::fmt::Display| format!("`{path}`: {error}");
+        let chain =
+            CertificateDer::pem_file_iter(&certificate).map_err(|error| unread(&certificate, &error))?;
+        let chain = chain.collect::<Result<Vec<_>, _>>().map_err(|error| unread(&certificate, &error))?;
+        if chain.is_empty() {
+            return Err(unread(&certificate, &"there is no certificate in it"));
+        }
+        let private = PrivateKeyDer::from_pem_file(&key).map_err(|error| unread(&key, &error))?;
+        let builder = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()));
+        let builder = builder.with_safe_default_protocol_versions().map_err(|error| error.to_string())?;
+        let builder = builder.with_no_client_auth();
+        builder.with_single_cert(chain, private).map_err(|error| unread(&key, &error))
+    };
+    let config = tokio::task::spawn_blocking(load).await.map_err(tls_failure)?.map_err(tls_failure)?;
+    Ok(TlsAcceptor::from(Arc::new(config)))
+}
+
 /// Begins TLS over a connection to the server of this name, which has to prove that it is that.
 pub(crate) async fn begin(
     stream: TcpStream,
     name: &str,
     ca_file: Option<String>,
 ) -> Result<TlsStream<TcpStream>, HostFailure> {
-    let load = move || match ca_file {
-        Some(path) => config_of_file(Path::new(&path)),
-        None => config_of_system(),
-    };
-    let config = tokio::task::spawn_blocking(load).await.map_err(tls_failure)?.map_err(tls_failure)?;
+    let config = client_config(ca_file).await?;
     let name = name.trim_matches(['[', ']']).to_owned();
     let name = ServerName::try_from(name).map_err(tls_failure)?;
     TlsConnector::from(config).connect(name, stream).await.map_err(tls_failure)
