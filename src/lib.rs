@@ -40,6 +40,7 @@ pub mod new;
 pub mod program;
 #[cfg(feature = "cli")]
 pub mod repl;
+pub mod replay;
 pub mod syntax;
 pub mod testing;
 pub mod timeline;

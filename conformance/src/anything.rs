@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use esl::Config;
 use esl::host::{Rights, VirtualHost};
 use esl::program;
+use esl::replay::{self, Recorded};
 use esl_bytecode::compile::{Compile, drive};
 use esl_bytecode::module::Module;
 use esl_bytecode::span::SourceId;
@@ -83,6 +84,44 @@ pub fn run_file(bytes: &[u8]) -> bool {
             false
         }
     }
+}
+
+/// Reads bytes as a recorded run, as they are and with corrected checksums. Returns how often they were one.
+pub fn read_recording(bytes: &[u8]) -> usize {
+    let corrected = with_checksums_of_frames(bytes);
+    let read = |bytes: &[u8]| match Recorded::read(bytes) {
+        Ok(recorded) => usize::from(recorded.last_check().is_none_or(|check| check.round < u64::MAX)),
+        Err(error) => {
+            drop(error.to_string());
+            0
+        }
+    };
+    hasten("reading", || read(bytes) + read(&corrected))
+}
+
+/// Returns the bytes as a recorded run with corrected checksums, as far as its frames can be found.
+fn with_checksums_of_frames(bytes: &[u8]) -> Vec<u8> {
+    const BEFORE: usize = 12;
+    const FRAME: usize = 11;
+    let mut file = bytes.to_vec();
+    if file.len() < BEFORE {
+        return file;
+    }
+    file[..8].copy_from_slice(&replay::MAGIC);
+    file[8..BEFORE].copy_from_slice(&replay::FORMAT.to_le_bytes());
+    let mut at = BEFORE;
+    while file.len() >= at + FRAME {
+        let length = u32::from_le_bytes([file[at], file[at + 1], file[at + 2], file[at + 3]]) as usize;
+        // A length of its own would end the walk at the first frame.
+        let length = length.min(file.len() - at - FRAME);
+        file[at..at + 4].copy_from_slice(&(length as u32).to_le_bytes());
+        let checksum = crc32fast::hash(&file[at + FRAME..at + FRAME + length]);
+        file[at + 4..at + 8].copy_from_slice(&checksum.to_le_bytes());
+        let checksum = crc32fast::hash(&file[at..at + 9]) as u16;
+        file[at + 9..at + FRAME].copy_from_slice(&checksum.to_le_bytes());
+        at += FRAME + length;
+    }
+    file
 }
 
 /// Returns the bytes as a file with corrected checksums, as far as its sections can be found: fuzzing looks

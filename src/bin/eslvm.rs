@@ -10,9 +10,10 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use esl::Config;
 use esl::command::{self, NOT_COMPILED, ProgramFile, RightsOptions, SignalTarget, USAGE, complain};
 use esl::explore::{self, Schedule};
-use esl::host::{ProcessSignal, RealHost};
+use esl::host::{Host, ProcessSignal, RealHost, RecordingHost};
 use esl::module_path::ModulePath;
 use esl::program::{self, Ended, Modules, Program, Summary};
+use esl::replay::{self, FileRecorder, ReplayOptions, RunSetup};
 use esl::testing;
 use esl::timeline::Timeline;
 use esl_compiler::diagnostic::{Format, Renderer};
@@ -55,6 +56,9 @@ enum EslvmAction {
         /// Run the program by a schedule that `eslvm explore` has written; its clock is virtual then
         #[arg(long, value_name = "FILE")]
         schedule: Option<PathBuf>,
+        /// Record the run in a file, for `eslvm replay`: the program, and everything that reaches it
+        #[arg(long, value_name = "FILE", conflicts_with = "schedule")]
+        record: Option<PathBuf>,
         /// Trace failures, goals or tasks on standard error: a list such as failures,tasks
         #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = ["failures", "goals", "tasks"])]
         trace: Vec<String>,
@@ -63,6 +67,16 @@ enum EslvmAction {
         /// Arguments of the program
         #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARG")]
         arguments: Vec<String>,
+    },
+    /// Run a recorded run again, forwards and backwards
+    ///
+    /// Needs neither the sources nor the world of the program, and waits for nothing. With --until or --break
+    /// the replay stops there and takes commands from standard input: `help` lists them. Exit status: that of
+    /// the recorded run; 0 if the recording ends before the run, or after commands; 2 wrong usage, or a
+    /// file that cannot be read; 3 the recording is damaged or of another version; 6 the replay has diverged.
+    Replay {
+        #[command(flatten)]
+        options: ReplayOptions,
     },
     /// Run the tests of programs
     ///
@@ -235,7 +249,17 @@ fn main() -> ExitCode {
     raise_limit_of_descriptors();
     let Eslvm { action, library } = Eslvm::parse();
     let status = match action {
-        EslvmAction::Run { mut options, speed, stats, timeline, schedule, trace, file, arguments } => {
+        EslvmAction::Run {
+            mut options,
+            speed,
+            stats,
+            timeline,
+            schedule,
+            record,
+            trace,
+            file,
+            arguments,
+        } => {
             if schedule.is_some() {
                 options.clock = ClockChoice::Virtual;
             }
@@ -244,10 +268,12 @@ fn main() -> ExitCode {
             rights.and_then(|rights| {
                 let host = RealHost::new(arguments).with_rights(path.with_rights(rights)).with_speed(speed);
                 let schedule = schedule.as_deref().map(explore::read_schedule).transpose()?;
-                let reports = RunReports { stats, timeline: timeline.as_deref(), trace: &trace };
+                let (timeline, record) = (timeline.as_deref(), record.as_deref());
+                let reports = RunReports { stats, timeline, record, trace: &trace };
                 run(&file, host, &options, &reports, schedule.as_ref(), &path)
             })
         }
+        EslvmAction::Replay { options } => replay::run_command(&options),
         EslvmAction::Test { filter, jobs, seed, junit, budget, memory, rights, sources } => {
             rights.rights().map(|rights| {
                 let processors = || std::thread::available_parallelism().map_or(1, usize::from);
@@ -351,6 +377,7 @@ fn run_explore(file: &Path, options: &ExploreArguments, library: &[PathBuf]) -> 
 struct RunReports<'a> {
     stats: Option<Stats>,
     timeline: Option<&'a Path>,
+    record: Option<&'a Path>,
     trace: &'a [String],
 }
 
@@ -362,9 +389,9 @@ fn run(
     schedule: Option<&Schedule>,
     path: &ModulePath,
 ) -> Result<u8, u8> {
-    let RunReports { stats, timeline, trace } = *reports;
-    if let Some(timeline) = timeline {
-        command::refuse_overwriting(timeline, [file])?;
+    let RunReports { stats, timeline, record, trace } = *reports;
+    for output in [timeline, record].into_iter().flatten() {
+        command::refuse_overwriting(output, [file])?;
     }
     let signals = SignalTarget::default();
     command::end_on_signal(signals.clone());
@@ -376,9 +403,26 @@ fn run(
     if options.clock == ClockChoice::Virtual {
         host = host.with_virtual_time();
     }
-    let mut machine = program::machine(options.config(), Box::new(host)).map_err(setup)?;
+    let recording = match record {
+        Some(path) => Some((FileRecorder::create(path).map_err(|error| not_written(path, &error))?, path)),
+        None => None,
+    };
+    let host: Box<dyn Host + Send> = match &recording {
+        Some((recorder, _)) => Box::new(RecordingHost::with_recorder(host, recorder.clone())),
+        None => Box::new(host),
+    };
+    let mut machine = program::machine(options.config(), host).map_err(setup)?;
     if options.clock == ClockChoice::Real {
         esl_world::install_operations(&mut machine);
+    }
+    if let Some((recorder, path_of_record)) = &recording {
+        let folders = path.folders().iter().map(|folder| folder.to_string_lossy().into_owned()).collect();
+        let setup = RunSetup { config: options.config(), traces: trace.to_vec(), folders };
+        let beginning = replay::beginning(&program, &setup, &machine).map_err(|error| {
+            complain(format_args!("{} cannot be recorded: {error}", path_of_record.display()));
+            USAGE
+        })?;
+        recorder.begin(&beginning);
     }
     signals.set(machine.inbox());
     program::set_module_path(&mut machine, path).map_err(setup)?;
@@ -406,6 +450,11 @@ fn run(
     let summary = summary.map_err(setup)?;
     let seconds = started.elapsed().as_secs_f64();
     let mut status = command::exit_status(summary.ended);
+    if let Some((recorder, path)) = recording
+        && let Err(error) = recorder.end(&machine, status)
+    {
+        status = not_written(path, &error);
+    }
     if let Some((timeline, path)) = timeline
         && let Err(error) = timeline.end(&mut machine)
     {

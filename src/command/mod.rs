@@ -47,6 +47,8 @@ pub const NOT_COMPILED: u8 = 3;
 pub const DEADLOCKED: u8 = 4;
 /// Exit status of a run that has spent its budget, or needs more memory than it may have.
 pub const BUDGET_OR_MEMORY_SPENT: u8 = 5;
+/// Exit status of a replay that has taken another course than the recorded run.
+pub const DIVERGED: u8 = 6;
 /// Exit status of an exploration that has found nothing, and has not tried everything.
 pub const NOT_PROVED: u8 = 7;
 /// Exit status of a run that a signal has ended, less the number of the signal, as shells report it.

@@ -33,7 +33,7 @@ pub use compile::{Compiled, Modules, compile, compile_for_run, compile_with, exp
 pub use identity::{EXECUTION_EPOCH, ExecutionIdentity};
 pub(crate) use run::end;
 pub use run::{Ended, Summary, begin, machine, run, run_by, run_in, set_module_path, set_traces};
-pub(crate) use run::{begin_with, end_rest, load};
+pub(crate) use run::{begin_with, end_rest, load, set_module_folders};
 
 /// A source text and its name in diagnostics and backtraces.
 #[derive(Clone, Debug)]

@@ -87,8 +87,18 @@ pub fn set_traces(machine: &mut Vm, traces: &[String]) -> Result<(), Error> {
 /// # Errors
 /// [`Error::NoMemory`].
 pub fn set_module_path(machine: &mut Vm, path: &ModulePath) -> Result<(), Error> {
-    let folders = path.folders().iter().map(|folder| folder.to_string_lossy());
-    call_with_list(machine, "%SET-MODULE-PATH", folders.map(|folder| Datum::string(&folder, Span::default())))
+    let folders: Vec<String> =
+        path.folders().iter().map(|folder| folder.to_string_lossy().into_owned()).collect();
+    set_module_folders(machine, &folders)
+}
+
+/// Has `require` search these folders.
+///
+/// # Errors
+/// [`Error::NoMemory`].
+pub(crate) fn set_module_folders(machine: &mut Vm, folders: &[String]) -> Result<(), Error> {
+    let folders = folders.iter().map(|folder| Datum::string(folder, Span::default()));
+    call_with_list(machine, "%SET-MODULE-PATH", folders)
 }
 
 /// Calls a function of the library with a list of `items`.

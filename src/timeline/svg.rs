@@ -167,7 +167,7 @@ impl Observer for Drawing {
                     self.items += 1;
                 }
             }
-            Seen::PauseBegins | Seen::PauseEnds => {}
+            Seen::PauseBegins | Seen::PauseEnds | Seen::Changes { .. } => {}
         }
     }
 }

@@ -167,6 +167,7 @@ impl<W: Write + Send> Observer for Trace<W> {
             Seen::CollectionBegins => self.begin_on_collector("collection"),
             Seen::PauseBegins => self.begin_on_collector("pause"),
             Seen::PauseEnds => self.end_on_collector("pause"),
+            Seen::Changes { .. } => {}
             Seen::CollectionEnds => self.end_on_collector("collection"),
         }
     }

@@ -12,7 +12,7 @@ use crate::folder::Folder;
 use crate::{eslc, eslvm};
 
 /// Longest time that a flight may take on a machine that is busy with others.
-const PATIENCE: Duration = Duration::from_secs(600);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(600);
 
 pub(crate) fn example(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name)

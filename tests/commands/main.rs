@@ -20,6 +20,7 @@ mod modules;
 mod mqtt;
 mod real_time;
 mod recording;
+mod replay;
 mod rights;
 #[cfg(unix)]
 mod streams;

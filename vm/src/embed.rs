@@ -98,9 +98,7 @@ impl Vm {
     /// Returns the canary of the run so far: a hash of the turns of its tasks and of the questions to its
     /// host, with which runs are compared. It does not depend on addresses, nor on the portions of the run.
     pub fn canary(&self) -> u64 {
-        let mut canary = self.scheduler.canary;
-        canary.mix(self.outside.host.canary().value());
-        canary.value()
+        self.check().canary
     }
 
     /// Returns the status that the program has asked to end with.
@@ -164,6 +162,14 @@ impl Vm {
     /// As [`Vm::add_host_function`]; a call fails unless the program has the rights that the function needs.
     pub fn add_guarded_function(&mut self, name: &str, function: HostFunction, needs: &[Need]) {
         self.outside.functions.insert(name.into(), Given { function, needs: needs.to_vec() });
+    }
+
+    /// Returns the functions of the embedder's: their names, whether they begin operations, and what they need.
+    pub fn host_functions(&self) -> impl Iterator<Item = (&str, bool, &[Need])> {
+        self.outside.functions.iter().map(|(name, given)| {
+            let is_operation = matches!(given.function, HostFunction::Operation(_));
+            (name.as_str(), is_operation, given.needs.as_slice())
+        })
     }
 
     /// Returns a value as data. Objects that no data stands for, such as functions and hash tables, become a

@@ -4,6 +4,7 @@
 use crate::database::{FormulaError, Progress, QueryError};
 use crate::heap::AllocError;
 use crate::raise::{Exit, Outcome, Raised};
+use crate::report;
 use crate::table::Table;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -51,7 +52,11 @@ pub(super) fn assert_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut work = 0;
     let outcome = vm.database.assert(&mut vm.heap, fact, &mut work);
     vm.exchange.charge(4 * work);
-    checked(vm, outcome)
+    let changed = checked(vm, outcome)?;
+    if vm.watch.is_watched && changed.is_true() {
+        report::tell_of_change(vm, fact, true);
+    }
+    Ok(changed)
 }
 
 pub(super) fn make_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -94,7 +99,13 @@ pub(super) fn retract_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.exchange.charge(4 * work);
     match outcome {
         Err(FormulaError::Variable(_)) => Ok(Value::small(0)),
-        outcome => Ok(checked(vm, outcome)?.into()),
+        outcome => {
+            let changed: Value = checked(vm, outcome)?.into();
+            if vm.watch.is_watched && changed != Value::small(0) {
+                report::tell_of_change(vm, fact, false);
+            }
+            Ok(changed)
+        }
     }
 }
 
@@ -237,7 +248,11 @@ pub(super) fn retract_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut work = 0;
     let fact = vm.database.retract_next(&mut vm.heap, key, &mut work);
     vm.exchange.charge(4 * work);
-    Ok(open(vm, fact)??)
+    let fact = open(vm, fact)??;
+    if vm.watch.is_watched && fact.is_true() {
+        report::tell_of_change(vm, fact, false);
+    }
+    Ok(fact)
 }
 
 pub(super) fn close_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -193,7 +193,7 @@ const CHECK_TURNS: u32 = 1_000;
 /// enough.
 fn check_state(vm: &mut Vm, checks: Value) -> bool {
     let awaited = vm.heap.symbol(checks).map_or(Value::NIL, |symbol| symbol.value);
-    if awaited == Value::NIL || awaited == Value::UNBOUND || vm.exit_status().is_some() {
+    if awaited == Value::NIL || awaited == Value::UNBOUND || vm.outside.exit_status.is_some() {
         return true;
     }
     let object = |vm: &Vm, index| vm.scheduler.tasks.at(index).map_or(Value::NIL, |task| task.object);

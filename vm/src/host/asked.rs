@@ -5,7 +5,7 @@ use esl_bytecode::datum::Datum;
 
 use super::{
     Awaited, FileAnswer, FileRequest, Host, HostError, HostFailure, Inbox, Incoming, Input, Output, Permit,
-    Right, Rights, Wake, WriteMode,
+    Right, Rights, RunCheck, Wake, WriteMode,
 };
 use crate::canary::Canary;
 
@@ -196,6 +196,11 @@ impl Host for Asked {
 
     fn broken_output_status(&self) -> u8 {
         self.host.broken_output_status()
+    }
+
+    fn check(&mut self, check: RunCheck) {
+        // No question of the run's.
+        self.host.check(check);
     }
 }
 

@@ -24,6 +24,7 @@ mod operation;
 mod question;
 mod real;
 mod record;
+mod replay;
 mod rights;
 mod signal;
 mod virtual_host;
@@ -36,7 +37,8 @@ pub(crate) use operation::Canceller;
 pub use operation::{HostFailure, HostOperation, News};
 pub use question::{Answer, FunctionRef, Kept, Pending, Question, TaskInfo};
 pub use real::{RealHost, Screen, request_of_files};
-pub use record::{Record, Recording, RecordingHost, ReplayHost};
+pub use record::{NotedRecord, QuestionHash, Record, Recorder, Recording, RecordingHost};
+pub use replay::{Divergence, ReplayHost};
 pub use rights::{Permit, Right, Rights};
 pub use signal::ProcessSignal;
 pub use virtual_host::{Captured, VirtualHost};
@@ -164,6 +166,17 @@ pub enum Wake {
     Arrival,
     /// Nothing can ever arrive: there is no deadline, no input, and nobody from whom to expect anything.
     Never,
+}
+
+/// How far a run is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RunCheck {
+    /// Round of the machine.
+    pub round: u64,
+    /// Ticks of all tasks.
+    pub ticks: u64,
+    /// Canary of the run.
+    pub canary: u64,
 }
 
 /// The source of everything that the virtual machine learns from outside.
@@ -294,5 +307,10 @@ pub trait Host {
     /// program's fault.
     fn broken_output_status(&self) -> u8 {
         0
+    }
+
+    /// Is told how far the run is, now and then: always in the same rounds.
+    fn check(&mut self, check: RunCheck) {
+        let _ = check;
     }
 }

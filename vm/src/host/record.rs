@@ -1,23 +1,73 @@
-//! Recording the answers of a host, and replaying them.
+//! Recording the answers of a host.
 //!
-//! There are two sorts of records: answers, in the order of the questions, and what comes when it comes: the
-//! contents of the inbox, by rounds of the machine, and timers that are due, by the number of questions.
+//! There are three sorts of records: answers, in the order of the questions; what comes when it comes, which
+//! is the contents of the inbox, by rounds of the machine, and timers that are due, by the number of
+//! questions; and checks, which say how far the run was, by which a replay is compared.
 //!
-//! Guarantees: a program that is deterministic but for its host does the same under a [`ReplayHost`] as it
-//! did under the [`RecordingHost`], without touching anything outside. When it makes a different request than
-//! it did then, the replay has diverged: this is recorded, and further answers are those of a host without
-//! anything.
+//! Guarantees: a program that is deterministic but for its host does the same under a
+//! [`ReplayHost`](super::ReplayHost) as it did under the [`RecordingHost`]. Before the machine waits, all
+//! records are handed on.
 
-use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use esl_bytecode::datum::Datum;
-use esl_bytecode::span::Span;
 
 use super::{
-    Awaited, Captured, FileAnswer, FileRequest, Host, HostError, HostFailure, Inbox, Incoming, Input, Output,
-    Permit, Right, Rights, Wake, WriteMode,
+    Awaited, FileAnswer, FileRequest, Host, HostError, HostFailure, Inbox, Incoming, Input, Output, Permit,
+    Right, Rights, RunCheck, Wake, WriteMode,
 };
+use crate::canary::Canary;
+
+/// Rounds of the machine after which there is a check.
+const CHECK_ROUNDS: u64 = 4096;
+/// Nanoseconds after which there is one.
+const CHECK_TIME: u64 = 1_000_000_000;
+
+/// Hash of the arguments of a question to a host; 0 if it has none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct QuestionHash(pub u32);
+
+impl QuestionHash {
+    /// Returns the hash of these arguments.
+    pub(super) fn of(arguments: &[&[u8]]) -> QuestionHash {
+        let mut canary = Canary::default();
+        arguments.iter().for_each(|argument| canary.mix_bytes(argument));
+        QuestionHash((canary.value() ^ canary.value() >> 32) as u32)
+    }
+
+    pub(super) fn of_wait(deadline: Option<u64>, awaited: Awaited) -> QuestionHash {
+        let flags = [awaited.input, awaited.output, awaited.news].map(u8::from);
+        QuestionHash::of(&[&deadline.unwrap_or(u64::MAX).to_le_bytes(), &flags])
+    }
+
+    pub(super) fn of_write(output: Output, bytes: &[u8]) -> QuestionHash {
+        QuestionHash::of(&[&[output as u8], bytes])
+    }
+
+    pub(super) fn of_permit(right: Right, object: &str) -> QuestionHash {
+        QuestionHash::of(&[&[right as u8], object.as_bytes()])
+    }
+
+    pub(super) fn of_write_file(path: &str, bytes: &[u8], mode: WriteMode) -> QuestionHash {
+        QuestionHash::of(&[path.as_bytes(), bytes, &[mode as u8]])
+    }
+
+    pub(super) fn of_call(name: &str, arguments: &[Datum]) -> QuestionHash {
+        let texts: Vec<String> = arguments.iter().map(Datum::to_string).collect();
+        let mut parts = vec![name.as_bytes()];
+        parts.extend(texts.iter().map(String::as_bytes));
+        QuestionHash::of(&parts)
+    }
+}
+
+/// A record, and the question that it answers.
+#[derive(Clone, Debug)]
+pub struct NotedRecord {
+    /// Hash of the arguments of the question.
+    pub question: QuestionHash,
+    /// The record.
+    pub record: Record,
+}
 
 /// Defines [`Record`] and, for each kind of answer, how it is recorded and replayed.
 macro_rules! define_records {
@@ -29,24 +79,24 @@ macro_rules! define_records {
         }
 
         /// A kind of answer.
-        trait RecordedAnswer: Sized + Clone {
+        pub(super) trait RecordedAnswer: Sized + Clone {
             fn into_record(self) -> Record;
-            fn from_record(record: Record) -> Option<Self>;
+            fn from_record(record: &Record) -> Option<Self>;
         }
 
         $(
             /// Wraps the answers of this kind, since some kinds have the same type.
             #[derive(Clone)]
-            struct $variant($ty);
+            pub(super) struct $variant(pub(super) $ty);
 
             impl RecordedAnswer for $variant {
                 fn into_record(self) -> Record {
                     Record::$variant(self.0)
                 }
 
-                fn from_record(record: Record) -> Option<$variant> {
+                fn from_record(record: &Record) -> Option<$variant> {
                     match record {
-                        Record::$variant(answer) => Some($variant(answer)),
+                        Record::$variant(answer) => Some($variant(answer.clone())),
                         _ => None,
                     }
                 }
@@ -86,67 +136,128 @@ define_records! {
     Exists(bool);
     /// Result of a function of the embedder's.
     Called(Result<Datum, HostFailure>);
+    /// Exit status of a program whose output nobody reads.
+    BrokenOutput(u8);
     /// How many questions before it were answered no, and the time, for a timer that is due.
     Due((u64, u64));
     /// Round of the machine, and the contents of the inbox then.
     Received((u64, Vec<Incoming>));
+    /// How far the run was.
+    Checked(RunCheck);
 }
 
-/// The answers of a host in order, while they are being recorded.
+impl Record {
+    /// Returns what was asked when this was recorded.
+    pub fn subject(&self) -> &'static str {
+        match self {
+            Record::Monotonic(_) => "the time",
+            Record::WallClock(_) => "the time of day",
+            Record::Waited(_) => "a wait",
+            Record::Virtual(_) => "whether time is virtual",
+            Record::Seed(_) => "the seed",
+            Record::Arguments(_) => "the arguments",
+            Record::Written(_) => "a write to a stream or a file, or a removal",
+            Record::PassedOn(_) => "a write to a stream",
+            Record::Read(_) => "standard input",
+            Record::Interactive(_) => "whether a person watches",
+            Record::Filed(_) => "a request of files",
+            Record::Permitted(_) => "a right",
+            Record::FileRead(_) => "the contents of a file",
+            Record::Exists(_) => "whether there is a file",
+            Record::Called(_) => "a call of the host",
+            Record::BrokenOutput(_) => "the status of an output that nobody reads",
+            Record::Due(_) => "a time that has come",
+            Record::Received(_) => "something that came into the inbox",
+            Record::Checked(_) => "a check",
+        }
+    }
+}
+
+/// Somebody who keeps records.
+pub trait Recorder: Send {
+    /// Is given the next record.
+    fn note(&self, noted: NotedRecord);
+
+    /// Is told that nothing may come for a while: what was given so far should be safe.
+    fn flush(&self) {}
+}
+
+/// The records of a run, kept in memory while they are made.
 #[derive(Clone, Default)]
-pub struct Recording(Arc<Mutex<Vec<Record>>>);
+pub struct Recording(Arc<Mutex<Vec<NotedRecord>>>);
 
 impl Recording {
-    fn records(&self) -> MutexGuard<'_, Vec<Record>> {
+    fn records(&self) -> MutexGuard<'_, Vec<NotedRecord>> {
         // Each record is pushed whole, so a panic elsewhere does not corrupt the list.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Returns everything recorded so far.
-    pub fn to_records(&self) -> Vec<Record> {
+    pub fn to_records(&self) -> Vec<NotedRecord> {
         self.records().clone()
     }
 }
 
+impl Recorder for Recording {
+    fn note(&self, noted: NotedRecord) {
+        self.records().push(noted);
+    }
+}
+
 /// A host that records the answers of another one.
-pub struct RecordingHost<H> {
+pub struct RecordingHost<H, R = Recording> {
     host: H,
-    recording: Recording,
+    recorder: R,
     /// Number of questions whether a timer is due that were answered no.
     not_due: u64,
+    /// Round of the last check, and its time by the stopwatch.
+    checked: Option<(u64, u64)>,
 }
 
 impl<H: Host> RecordingHost<H> {
-    /// Records the answers of `host`.
+    /// Records the answers of `host` in memory.
     pub fn new(host: H) -> RecordingHost<H> {
-        RecordingHost { host, recording: Recording::default(), not_due: 0 }
+        RecordingHost::with_recorder(host, Recording::default())
     }
 
     /// Returns the recording, which grows with each request.
     pub fn recording(&self) -> Recording {
-        self.recording.clone()
-    }
-
-    fn note<A: RecordedAnswer>(&mut self, answer: A) -> A {
-        self.recording.records().push(answer.clone().into_record());
-        answer
+        self.recorder.clone()
     }
 }
 
-impl<H: Host> Host for RecordingHost<H> {
+impl<H: Host, R: Recorder> RecordingHost<H, R> {
+    /// Records the answers of `host` with `recorder`.
+    pub fn with_recorder(host: H, recorder: R) -> RecordingHost<H, R> {
+        RecordingHost { host, recorder, not_due: 0, checked: None }
+    }
+
+    fn note<A: RecordedAnswer>(&self, question: QuestionHash, answer: A) -> A {
+        self.recorder.note(NotedRecord { question, record: answer.clone().into_record() });
+        answer
+    }
+
+    /// Records the answer to a question without arguments.
+    fn note_plain<A: RecordedAnswer>(&self, answer: A) -> A {
+        self.note(QuestionHash::default(), answer)
+    }
+}
+
+impl<H: Host, R: Recorder> Host for RecordingHost<H, R> {
     fn monotonic(&mut self) -> u64 {
         let answer = Monotonic(self.host.monotonic());
-        self.note(answer).0
+        self.note_plain(answer).0
     }
 
     fn wall_clock(&mut self) -> i64 {
         let answer = WallClock(self.host.wall_clock());
-        self.note(answer).0
+        self.note_plain(answer).0
     }
 
     fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
+        self.recorder.flush();
         let answer = Waited(self.host.wait(deadline, awaited));
-        self.note(answer).0
+        self.note(QuestionHash::of_wait(deadline, awaited), answer).0
     }
 
     fn stopwatch(&mut self) -> u64 {
@@ -155,9 +266,7 @@ impl<H: Host> Host for RecordingHost<H> {
     }
 
     fn is_virtual(&self) -> bool {
-        let answer = self.host.is_virtual();
-        self.recording.records().push(Record::Virtual(answer));
-        answer
+        self.note_plain(Virtual(self.host.is_virtual())).0
     }
 
     fn advance(&mut self, nanoseconds: u64) {
@@ -166,62 +275,62 @@ impl<H: Host> Host for RecordingHost<H> {
 
     fn seed(&mut self) -> u64 {
         let answer = Seed(self.host.seed());
-        self.note(answer).0
+        self.note_plain(answer).0
     }
 
     fn arguments(&mut self) -> Vec<String> {
         let answer = Arguments(self.host.arguments());
-        self.note(answer).0
+        self.note_plain(answer).0
     }
 
     fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError> {
         let answer = Written(self.host.write(output, bytes));
-        self.note(answer).0
+        self.note(QuestionHash::of_write(output, bytes), answer).0
     }
 
     fn write_ready(&mut self, output: Output, bytes: &[u8]) -> Result<usize, HostError> {
         let answer = PassedOn(self.host.write_ready(output, bytes));
-        self.note(answer).0
+        self.note(QuestionHash::of_write(output, bytes), answer).0
     }
 
     fn read_input(&mut self) -> Input {
         let answer = Read(self.host.read_input());
-        self.note(answer).0
+        self.note_plain(answer).0
     }
 
     fn is_interactive(&mut self) -> bool {
         let answer = Interactive(self.host.is_interactive());
-        self.note(answer).0
+        self.note_plain(answer).0
     }
 
     fn request_of_files(&mut self, request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
         let answer = Filed(self.host.request_of_files(request));
-        self.note(answer).0
+        self.note(QuestionHash::of(&[format!("{request:?}").as_bytes()]), answer).0
     }
 
     fn permit(&mut self, right: Right, object: &str, narrowed: &[Rights]) -> Permit {
         let answer = Permitted(self.host.permit(right, object, narrowed));
-        self.note(answer).0
+        self.note(QuestionHash::of_permit(right, object), answer).0
     }
 
     fn read_file(&mut self, path: &str) -> Result<Vec<u8>, HostError> {
         let answer = FileRead(self.host.read_file(path));
-        self.note(answer).0
+        self.note(QuestionHash::of(&[path.as_bytes()]), answer).0
     }
 
     fn write_file(&mut self, path: &str, bytes: &[u8], mode: WriteMode) -> Result<(), HostError> {
         let answer = Written(self.host.write_file(path, bytes, mode));
-        self.note(answer).0
+        self.note(QuestionHash::of_write_file(path, bytes, mode), answer).0
     }
 
     fn file_exists(&mut self, path: &str) -> bool {
         let answer = Exists(self.host.file_exists(path));
-        self.note(answer).0
+        self.note(QuestionHash::of(&[path.as_bytes()]), answer).0
     }
 
     fn delete_file(&mut self, path: &str) -> Result<(), HostError> {
         let answer = Written(self.host.delete_file(path));
-        self.note(answer).0
+        self.note(QuestionHash::of(&[path.as_bytes()]), answer).0
     }
 
     fn due(&mut self, deadline: u64) -> Option<u64> {
@@ -229,7 +338,7 @@ impl<H: Host> Host for RecordingHost<H> {
             self.not_due += 1;
             return None;
         };
-        Some(self.note(Due((self.not_due, now))).0.1)
+        Some(self.note(QuestionHash::of(&[&deadline.to_le_bytes()]), Due((self.not_due, now))).0.1)
     }
 
     fn call(
@@ -239,7 +348,7 @@ impl<H: Host> Host for RecordingHost<H> {
         function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
     ) -> Result<Datum, HostFailure> {
         let answer = Called(self.host.call(name, arguments, function));
-        self.note(answer).0
+        self.note(QuestionHash::of_call(name, arguments), answer).0
     }
 
     fn begin(&mut self, name: &str, arguments: &[Datum], function: &mut dyn FnMut(&[Datum])) {
@@ -252,248 +361,22 @@ impl<H: Host> Host for RecordingHost<H> {
 
     fn poll(&mut self, round: u64) -> Vec<Incoming> {
         let contents = self.host.poll(round);
-        if contents.is_empty() { contents } else { self.note(Received((round, contents))).0.1 }
-    }
-}
-
-/// The answers yet to be replayed.
-#[derive(Default)]
-struct Remaining {
-    records: VecDeque<Record>,
-    diverged: bool,
-    /// Number of questions whether a timer is due that were answered no.
-    not_due: u64,
-}
-
-/// A host that replays recorded answers. It captures what the program writes.
-#[derive(Clone)]
-pub struct ReplayHost {
-    remaining: Arc<Mutex<Remaining>>,
-    captured: Captured,
-    inbox: Inbox,
-}
-
-impl ReplayHost {
-    /// Creates a host that replays these answers.
-    pub fn new(records: Vec<Record>) -> ReplayHost {
-        let remaining = Remaining { records: records.into(), ..Remaining::default() };
-        let replay = ReplayHost {
-            remaining: Arc::new(Mutex::new(remaining)),
-            captured: Captured::default(),
-            inbox: Inbox::new(),
-        };
-        replay.ring_if_needed();
-        replay
+        if contents.is_empty() { contents } else { self.note_plain(Received((round, contents))).0.1 }
     }
 
-    fn remaining(&self) -> MutexGuard<'_, Remaining> {
-        // Each record is popped whole, so a panic elsewhere does not corrupt the list.
-        self.remaining.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Returns whether the program has made a different request than it did during recording.
-    pub fn has_diverged(&self) -> bool {
-        self.remaining().diverged
-    }
-
-    /// Returns whether all answers were replayed.
-    pub fn is_at_end(&self) -> bool {
-        self.remaining().records.is_empty()
-    }
-
-    /// Returns what the program writes to the standard streams.
-    pub fn captured(&self) -> Captured {
-        self.captured.clone()
-    }
-
-    fn next<A: RecordedAnswer>(&self) -> Option<A> {
-        let mut remaining = self.remaining();
-        if remaining.diverged {
-            return None;
-        }
-        let answer = remaining.records.pop_front().and_then(A::from_record);
-        remaining.diverged = answer.is_none();
-        drop(remaining);
-        self.ring_if_needed();
-        answer
-    }
-
-    /// Has the machine look into the inbox in each round until the next record, if that is of the inbox.
-    fn ring_if_needed(&self) {
-        if matches!(self.remaining().records.front(), Some(Record::Received(_))) {
-            self.inbox.ring();
+    fn check(&mut self, check: RunCheck) {
+        let now = self.host.stopwatch();
+        let is_time = self.checked.is_none_or(|(round, time)| {
+            check.round.saturating_sub(round) >= CHECK_ROUNDS || now.saturating_sub(time) >= CHECK_TIME
+        });
+        if is_time {
+            self.checked = Some((check.round, now));
+            self.note_plain(Checked(check));
+            self.recorder.flush();
         }
     }
-}
 
-impl Host for ReplayHost {
-    fn monotonic(&mut self) -> u64 {
-        self.next::<Monotonic>().map_or(0, |answer| answer.0)
-    }
-
-    fn wall_clock(&mut self) -> i64 {
-        self.next::<WallClock>().map_or(0, |answer| answer.0)
-    }
-
-    fn wait(&mut self, _deadline: Option<u64>, _awaited: Awaited) -> Wake {
-        self.next::<Waited>().map_or(Wake::Never, |answer| answer.0)
-    }
-
-    fn is_virtual(&self) -> bool {
-        self.next::<Virtual>().is_some_and(|answer| answer.0)
-    }
-
-    fn seed(&mut self) -> u64 {
-        self.next::<Seed>().map_or(0, |answer| answer.0)
-    }
-
-    fn arguments(&mut self) -> Vec<String> {
-        self.next::<Arguments>().map_or(Vec::new(), |answer| answer.0)
-    }
-
-    fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError> {
-        // Output is captured even if the recorded write failed, as it is what the program wanted to write.
-        self.captured.append(output, bytes);
-        self.next::<Written>().map_or(Err(HostError::BrokenPipe), |answer| answer.0)
-    }
-
-    fn write_ready(&mut self, output: Output, bytes: &[u8]) -> Result<usize, HostError> {
-        let passed_on = self.next::<PassedOn>().map_or(Err(HostError::BrokenPipe), |answer| answer.0);
-        let count = passed_on.as_ref().map_or(bytes.len(), |&count| count.min(bytes.len()));
-        self.captured.append(output, &bytes[..count]);
-        passed_on
-    }
-
-    fn read_input(&mut self) -> Input {
-        self.next::<Read>().map_or(Input::End, |answer| answer.0)
-    }
-
-    fn is_interactive(&mut self) -> bool {
-        self.next::<Interactive>().is_some_and(|answer| answer.0)
-    }
-
-    fn request_of_files(&mut self, _request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
-        self.next::<Filed>().map_or(Err(HostError::Refused), |answer| answer.0)
-    }
-
-    fn permit(&mut self, _right: Right, _object: &str, _narrowed: &[Rights]) -> Permit {
-        self.next::<Permitted>().map_or(Permit::NotGranted, |answer| answer.0)
-    }
-
-    fn read_file(&mut self, _path: &str) -> Result<Vec<u8>, HostError> {
-        self.next::<FileRead>().map_or(Err(HostError::Refused), |answer| answer.0)
-    }
-
-    fn write_file(&mut self, _path: &str, _bytes: &[u8], _mode: WriteMode) -> Result<(), HostError> {
-        self.next::<Written>().map_or(Err(HostError::Refused), |answer| answer.0)
-    }
-
-    fn file_exists(&mut self, _path: &str) -> bool {
-        self.next::<Exists>().is_some_and(|answer| answer.0)
-    }
-
-    fn delete_file(&mut self, _path: &str) -> Result<(), HostError> {
-        self.next::<Written>().map_or(Err(HostError::Refused), |answer| answer.0)
-    }
-
-    fn due(&mut self, _deadline: u64) -> Option<u64> {
-        let mut remaining = self.remaining();
-        let is_due =
-            matches!(remaining.records.front(), Some(&Record::Due((n, _))) if n == remaining.not_due);
-        if !is_due {
-            remaining.not_due += 1;
-            return None;
-        }
-        drop(remaining);
-        self.next::<Due>().map(|answer| answer.0.1)
-    }
-
-    fn call(
-        &mut self,
-        name: &str,
-        _arguments: &[Datum],
-        _function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
-    ) -> Result<Datum, HostFailure> {
-        let is_missing = || HostFailure {
-            cause: "NOT-IN-THIS-WORLD".into(),
-            arguments: vec![Datum::string(name, Span::default())],
-        };
-        self.next::<Called>().map_or_else(|| Err(is_missing()), |answer| answer.0)
-    }
-
-    /// Nothing is begun; what was heard then is heard again.
-    fn begin(&mut self, _name: &str, _arguments: &[Datum], _function: &mut dyn FnMut(&[Datum])) {}
-
-    fn inbox(&self) -> Inbox {
-        self.inbox.clone()
-    }
-
-    fn poll(&mut self, round: u64) -> Vec<Incoming> {
-        self.inbox.take();
-        let is_now =
-            matches!(self.remaining().records.front(), Some(&Record::Received((n, _))) if n == round);
-        let contents = if is_now { self.next::<Received>() } else { None };
-        self.ring_if_needed();
-        contents.map_or(Vec::new(), |answer| answer.0.1)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::host::VirtualHost;
-
-    /// A stand-in for a program: describes what it learns from `host`.
-    fn run(host: &mut dyn Host) -> String {
-        let mut log = format!("{} {:?} ", host.seed(), host.arguments());
-        log += &format!("{:?} {} ", host.wait(Some(30), Awaited::default()), host.monotonic());
-        log += &format!("{:?} {:?} ", host.read_input(), host.read_file("f"));
-        log += &format!("{:?} {}", host.write(Output::Standard, b"hello"), host.file_exists("g"));
-        log
-    }
-
-    #[test]
-    fn a_replay_gives_the_recorded_answers() {
-        let host = VirtualHost::new().with_seed(7).with_input("in").with_file("f", "1").with_output_limit(2);
-        let mut recording_host = RecordingHost::new(host.with_arguments(vec!["x".into()]));
-        let recording = recording_host.recording();
-        let first = run(&mut recording_host);
-        let mut replay = ReplayHost::new(recording.to_records());
-        assert_eq!(run(&mut replay), first);
-        assert!(replay.is_at_end() && !replay.has_diverged());
-        assert_eq!(replay.captured().output(), "hello");
-    }
-
-    #[test]
-    fn what_came_comes_again_in_the_same_round_and_at_the_same_question() {
-        let host = VirtualHost::new().with_arrival(0, Incoming::Stop).with_arrival(20, Incoming::Input);
-        let mut recording_host = RecordingHost::new(host);
-        let recording = recording_host.recording();
-        let rounds = |host: &mut dyn Host| {
-            let look = |host: &mut dyn Host, round| {
-                if host.inbox().is_rung() { host.poll(round) } else { Vec::new() }
-            };
-            let mut log = String::new();
-            for round in 1..5 {
-                log += &format!("{:?} {:?}; ", look(host, round), host.due(15));
-                host.advance(10);
-            }
-            log
-        };
-        let first = rounds(&mut recording_host);
-        assert_eq!(first, "[Stop] None; [] None; [Input] Some(20); [] Some(30); ");
-        assert_eq!(recording.to_records().len(), 4);
-        let mut replay = ReplayHost::new(recording.to_records());
-        assert_eq!(rounds(&mut replay), first);
-        assert!(replay.is_at_end() && !replay.has_diverged());
-    }
-
-    #[test]
-    fn another_question_is_a_divergence() {
-        let mut replay = ReplayHost::new(vec![Record::Seed(3), Record::Monotonic(9)]);
-        assert_eq!(replay.seed(), 3);
-        assert_eq!(replay.wall_clock(), 0);
-        assert!(replay.has_diverged());
-        assert_eq!(replay.monotonic(), 0);
+    fn broken_output_status(&self) -> u8 {
+        self.note_plain(BrokenOutput(self.host.broken_output_status())).0
     }
 }

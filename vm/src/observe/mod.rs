@@ -11,9 +11,20 @@ pub use figures::{Pauses, TaskFigures};
 pub(crate) use observer::Observers;
 pub use observer::{Coming, Observer, Seen};
 
+use esl_bytecode::compile::SourcePlace;
+
 use crate::host::Host;
 use crate::schedule::Scheduler;
 use crate::task::TaskNumber;
+
+/// A frame of a task that does not run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StandingFrame {
+    /// Name of the function.
+    pub function: String,
+    /// Where in its source it stands.
+    pub place: Option<SourcePlace>,
+}
 
 /// Everything that is kept for those who watch a run.
 #[derive(Default)]

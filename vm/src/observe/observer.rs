@@ -50,6 +50,13 @@ pub enum Seen<'a> {
     Fails(&'a str),
     /// A recovery procedure begins to deal with a failure of this cause.
     Recovers(&'a str),
+    /// A fact was asserted or retracted.
+    Changes {
+        /// The fact, as a short text.
+        fact: &'a str,
+        /// Whether it is in the database now.
+        is_there: bool,
+    },
     /// The collector begins a cycle. The task is [`TaskNumber::NONE`], as for all that the collector does.
     CollectionBegins,
     /// The collector begins a turn, in which no task runs.

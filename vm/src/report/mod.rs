@@ -3,6 +3,7 @@
 mod figures;
 mod label;
 mod observe;
+mod stand;
 mod tasks;
 mod trace;
 
@@ -11,6 +12,6 @@ pub(crate) use label::{
     cause_label, end_label, event_label, failure_arguments, label_of, lack_of, reason_of, report_in_short,
     task_label,
 };
-pub(crate) use observe::{show, tell_of_failure, tell_of_signal, tell_of_waking};
+pub(crate) use observe::{show, tell_of_change, tell_of_failure, tell_of_signal, tell_of_waking};
 pub(crate) use tasks::{number_of_owner, operations_left, place_in_program, program_place, tasks_left};
 pub(crate) use trace::{Happening, note, trace_end};

@@ -76,3 +76,11 @@ pub(crate) fn tell_of_failure(vm: &mut Vm, condition: Value, recovers: bool) {
     let cause = cause_label(&vm.heap, condition);
     show(vm, number, if recovers { Seen::Recovers(&cause) } else { Seen::Fails(&cause) });
 }
+
+/// Tells observers that the running task has asserted or retracted a fact.
+#[cold]
+pub(crate) fn tell_of_change(vm: &mut Vm, fact: Value, is_there: bool) {
+    let number = vm.scheduler.running_number();
+    let fact = vm.describe(fact);
+    show(vm, number, Seen::Changes { fact: &fact, is_there });
+}

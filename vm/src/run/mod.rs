@@ -50,7 +50,7 @@ use abort::abort_more;
 use timers::{go_on_in_time, look_at_clock};
 use turn::go_on_with_turn;
 
-use crate::host::{Awaited, Host};
+use crate::host::{Awaited, Host, RunCheck};
 use crate::task::{TaskId, TaskIndex, TaskState};
 use crate::vm::Vm;
 
@@ -108,12 +108,34 @@ impl Vm {
             || self.outside.expects_news()
     }
 
+    /// Returns how far the run is.
+    pub fn check(&self) -> RunCheck {
+        let mut canary = self.scheduler.canary;
+        canary.mix(self.outside.host.canary().value());
+        RunCheck { round: self.scheduler.rounds, ticks: self.scheduler.spent, canary: canary.value() }
+    }
+
+    /// Returns the time of the program's clock when it was read last, in nanoseconds.
+    pub fn last_time(&self) -> u64 {
+        self.scheduler.clock.now
+    }
+
     /// Returns the time that is left to the first timer, in nanoseconds.
     pub fn time_to_next_timer(&mut self) -> Option<u64> {
         let first = self.scheduler.first_timer()?;
         let now = self.scheduler.clock.read(&mut self.outside.host);
         Some(first.saturating_sub(now))
     }
+}
+
+/// Rounds after which the host is told how far the run is.
+const CHECK_ROUNDS: u64 = 4096;
+
+/// Tells the host how far the run is.
+#[cold]
+fn tell_how_far(vm: &mut Vm) {
+    let check = vm.check();
+    vm.outside.host.check(check);
 }
 
 /// Runs tasks in turn, at most for `ticks`, until the named one has ended. `may_wait` says whether to sleep
@@ -137,6 +159,9 @@ fn run_tasks(vm: &mut Vm, id: Option<TaskId>, ticks: u64, may_wait: bool) -> Run
             continue;
         }
         vm.scheduler.rounds += 1;
+        if vm.scheduler.rounds.is_multiple_of(CHECK_ROUNDS) {
+            tell_how_far(vm);
+        }
         if vm.outside.inbox.is_rung() && take_in(vm) {
             return RunOutcome::Stopped;
         }

@@ -5,6 +5,7 @@
 
 use super::arrival::wake_readers;
 use super::limit::expire_in_time;
+use super::tell_how_far;
 use super::wake::{call_attention, make_runnable};
 use crate::host::{Awaited, Host};
 use crate::schedule::Due;
@@ -117,6 +118,7 @@ pub(crate) fn idle(vm: &mut Vm) -> bool {
     if deadline.is_none() && awaited == Awaited::default() {
         return false;
     }
+    tell_how_far(vm);
     let host = &mut vm.outside.host;
     let begun = vm.scheduler.clock.read(host);
     host.wait(deadline, awaited);

@@ -1,0 +1,554 @@
+//! Replaying recorded answers.
+//!
+//! Guarantees: nothing outside is touched, and nothing is waited for. When the program asks something else
+//! than it did, or a check differs, the replay has diverged: it says where, and has the machine come back. So
+//! it does when the program asks something after the last record: a replay never goes on by itself.
+
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use esl_bytecode::datum::Datum;
+use esl_bytecode::span::Span;
+
+use super::record::{
+    Arguments, BrokenOutput, Called, Due, Exists, FileRead, Filed, Interactive, Monotonic, NotedRecord,
+    PassedOn, Permitted, QuestionHash, Read, Received, Record, RecordedAnswer, Seed, Virtual, Waited,
+    WallClock, Written,
+};
+use super::{
+    Awaited, Captured, FileAnswer, FileRequest, Host, HostError, HostFailure, Inbox, Incoming, Input, Output,
+    Permit, ProcessSignal, Right, Rights, RunCheck, Wake, WriteMode,
+};
+
+/// Where a replay is not the recorded run, and in what.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Divergence {
+    /// Number of the record, from 1 on.
+    pub record: usize,
+    /// What the program asks.
+    pub asked: String,
+    /// What it asked when it was recorded.
+    pub recorded: String,
+    /// The last check in which both were equal.
+    pub equal: Option<RunCheck>,
+}
+
+impl fmt::Display for Divergence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Divergence { record, asked, recorded, equal } = self;
+        write!(
+            f,
+            "the replay has diverged at record {record}: the program asks {asked}; recorded is {recorded}"
+        )?;
+        match equal {
+            Some(check) => write!(f, "; the last equal check is at tick {}", check.ticks),
+            None => write!(f, "; there is no equal check before it"),
+        }
+    }
+}
+
+/// What answers are taken from. Without records there is a world without anything, whose time passes when
+/// somebody waits.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+enum AnswerSource {
+    /// The records.
+    #[default]
+    Records,
+    /// Nothing, as the replay has diverged.
+    Diverged(Divergence),
+    /// Nothing, as this was asked after the last record.
+    Over(String),
+    /// Nothing, as the replay was given up.
+    Nothing,
+}
+
+/// The records, and how far they were replayed.
+struct ReplayProgress {
+    records: Arc<[NotedRecord]>,
+    /// Number of the records that were replayed.
+    replayed: usize,
+    source: AnswerSource,
+    /// Number of questions whether a timer is due that were answered no.
+    not_due: u64,
+    /// The latest time that was answered.
+    time: u64,
+    /// The last equal check.
+    equal: Option<RunCheck>,
+    /// Number of checks so far.
+    checks: u64,
+    /// Whether the machine is to come back.
+    comes_back: bool,
+}
+
+/// What is done with the output of a replay: called with each piece.
+type OutputScreen = Box<dyn FnMut(Output, &[u8]) + Send>;
+
+/// A host that replays recorded answers. It captures what the program writes.
+#[derive(Clone)]
+pub struct ReplayHost {
+    progress: Arc<Mutex<ReplayProgress>>,
+    captured: Captured,
+    screen: Arc<Mutex<Option<OutputScreen>>>,
+    inbox: Inbox,
+}
+
+impl ReplayHost {
+    /// Creates a host that replays these records.
+    pub fn new(records: impl Into<Arc<[NotedRecord]>>) -> ReplayHost {
+        let progress = ReplayProgress {
+            records: records.into(),
+            replayed: 0,
+            source: AnswerSource::Records,
+            not_due: 0,
+            time: 0,
+            equal: None,
+            checks: 0,
+            comes_back: false,
+        };
+        let replay = ReplayHost {
+            progress: Arc::new(Mutex::new(progress)),
+            captured: Captured::default(),
+            screen: Arc::default(),
+            inbox: Inbox::new(),
+        };
+        replay.ring_if_needed(&replay.progress());
+        replay
+    }
+
+    /// Has output passed to `screen` instead of being captured.
+    #[must_use]
+    pub fn with_screen(self, screen: impl FnMut(Output, &[u8]) + Send + 'static) -> ReplayHost {
+        *self.screen.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(screen));
+        self
+    }
+
+    fn progress(&self) -> MutexGuard<'_, ReplayProgress> {
+        // Each record is taken whole, so a panic elsewhere does not corrupt the progress.
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns whether the program has made a different request than it did during recording, or one more.
+    pub fn has_diverged(&self) -> bool {
+        matches!(self.progress().source, AnswerSource::Diverged(_) | AnswerSource::Over(_))
+    }
+
+    /// Returns where the replay has diverged.
+    pub fn divergence(&self) -> Option<Divergence> {
+        match &self.progress().source {
+            AnswerSource::Diverged(divergence) => Some(divergence.clone()),
+            _ => None,
+        }
+    }
+
+    /// Returns what the program has asked after the last record.
+    pub fn asked_at_end(&self) -> Option<String> {
+        match &self.progress().source {
+            AnswerSource::Over(asked) => Some(asked.clone()),
+            _ => None,
+        }
+    }
+
+    /// Returns whether all records were replayed.
+    pub fn is_at_end(&self) -> bool {
+        let progress = self.progress();
+        progress.replayed == progress.records.len()
+    }
+
+    /// Returns how many records were replayed.
+    pub fn replayed(&self) -> usize {
+        self.progress().replayed
+    }
+
+    /// Returns how many checks were equal, and the last of them.
+    pub fn checks(&self) -> (u64, Option<RunCheck>) {
+        let progress = self.progress();
+        (progress.checks, progress.equal)
+    }
+
+    /// Returns what the program writes to the standard streams.
+    pub fn captured(&self) -> Captured {
+        self.captured.clone()
+    }
+
+    /// Gives up the replay: from here on the program has a world without anything, in which time passes when
+    /// somebody waits. So a form can be evaluated in the middle of it. What it writes is captured.
+    pub fn detach(&self) {
+        self.progress().source = AnswerSource::Nothing;
+        *self.screen.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    /// Returns the next record if it answers this question.
+    fn next<A: RecordedAnswer>(&self, question: QuestionHash, asked: &dyn Fn() -> String) -> Option<A> {
+        let mut progress = self.progress();
+        if progress.source != AnswerSource::Records {
+            return None;
+        }
+        let Some(noted) = progress.records.get(progress.replayed) else {
+            progress.source = AnswerSource::Over(asked());
+            self.come_back(&mut progress);
+            return None;
+        };
+        let Some(answer) = A::from_record(&noted.record).filter(|_| noted.question == question) else {
+            let recorded = match A::from_record(&noted.record) {
+                Some(_) => format!("{}, with other arguments", noted.record.subject()),
+                None => noted.record.subject().into(),
+            };
+            self.diverge(&mut progress, asked(), recorded);
+            return None;
+        };
+        match noted.record {
+            Record::Monotonic(time) | Record::Due((_, time)) => progress.time = time,
+            _ => {}
+        }
+        progress.replayed += 1;
+        self.ring_if_needed(&progress);
+        Some(answer)
+    }
+
+    /// Returns the next record if it answers this question without arguments.
+    fn next_plain<A: RecordedAnswer>(&self, asked: &str) -> Option<A> {
+        self.next(QuestionHash::default(), &|| asked.into())
+    }
+
+    fn diverge(&self, progress: &mut ReplayProgress, asked: String, recorded: String) {
+        let (record, equal) = (progress.replayed + 1, progress.equal);
+        progress.source = AnswerSource::Diverged(Divergence { record, asked, recorded, equal });
+        self.come_back(progress);
+    }
+
+    /// Has the machine come back to the embedder.
+    fn come_back(&self, progress: &mut ReplayProgress) {
+        progress.comes_back = true;
+        self.inbox.ring();
+    }
+
+    /// Has the machine look into the inbox in each round until the next record, if that is of the inbox.
+    fn ring_if_needed(&self, progress: &ReplayProgress) {
+        let next = progress.records.get(progress.replayed);
+        if matches!(next, Some(NotedRecord { record: Record::Received(_), .. })) {
+            self.inbox.ring();
+        }
+    }
+
+    fn show(&self, output: Output, bytes: &[u8]) {
+        if matches!(self.progress().source, AnswerSource::Diverged(_) | AnswerSource::Over(_)) {
+            return;
+        }
+        match &mut *self.screen.lock().unwrap_or_else(PoisonError::into_inner) {
+            Some(screen) => screen(output, bytes),
+            None => self.captured.append(output, bytes),
+        }
+    }
+
+    /// Returns what is answered in place of a record: `there` in a world without anything.
+    fn without<T>(&self, there: T, after: T) -> T {
+        if self.progress().source == AnswerSource::Nothing { there } else { after }
+    }
+}
+
+impl Host for ReplayHost {
+    fn monotonic(&mut self) -> u64 {
+        self.next_plain::<Monotonic>("the time").map_or_else(|| self.progress().time, |answer| answer.0)
+    }
+
+    fn wall_clock(&mut self) -> i64 {
+        self.next_plain::<WallClock>("the time of day").map_or(0, |answer| answer.0)
+    }
+
+    fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
+        let asked = || "to wait".to_string();
+        if let Some(answer) = self.next::<Waited>(QuestionHash::of_wait(deadline, awaited), &asked) {
+            return answer.0;
+        }
+        let mut progress = self.progress();
+        match deadline {
+            Some(deadline) => {
+                progress.time = progress.time.max(deadline);
+                Wake::Time
+            }
+            None => {
+                // Nothing will ever come: the machine comes back instead of asking again.
+                self.come_back(&mut progress);
+                Wake::Never
+            }
+        }
+    }
+
+    /// The time that the program knows.
+    fn stopwatch(&mut self) -> u64 {
+        self.progress().time
+    }
+
+    fn is_virtual(&self) -> bool {
+        self.next_plain::<Virtual>("whether time is virtual").is_some_and(|answer| answer.0)
+    }
+
+    fn seed(&mut self) -> u64 {
+        self.next_plain::<Seed>("the seed").map_or(0, |answer| answer.0)
+    }
+
+    fn arguments(&mut self) -> Vec<String> {
+        self.next_plain::<Arguments>("the arguments").map_or(Vec::new(), |answer| answer.0)
+    }
+
+    fn write(&mut self, output: Output, bytes: &[u8]) -> Result<(), HostError> {
+        let asked = || format!("to write {} to {}", quoted(bytes), stream(output));
+        let answer = self.next::<Written>(QuestionHash::of_write(output, bytes), &asked);
+        // Output is shown even if the recorded write failed, as it is what the program wanted to write.
+        self.show(output, bytes);
+        answer.map_or_else(|| self.without(Ok(()), Err(HostError::BrokenPipe)), |answer| answer.0)
+    }
+
+    fn write_ready(&mut self, output: Output, bytes: &[u8]) -> Result<usize, HostError> {
+        let asked = || format!("to write {} to {}", quoted(bytes), stream(output));
+        let answer = self.next::<PassedOn>(QuestionHash::of_write(output, bytes), &asked);
+        let missing = || self.without(Ok(bytes.len()), Err(HostError::BrokenPipe));
+        let passed_on = answer.map_or_else(missing, |answer| answer.0);
+        let count = passed_on.as_ref().map_or(bytes.len(), |&count| count.min(bytes.len()));
+        self.show(output, &bytes[..count]);
+        passed_on
+    }
+
+    fn read_input(&mut self) -> Input {
+        self.next_plain::<Read>("for standard input").map_or(Input::End, |answer| answer.0)
+    }
+
+    fn is_interactive(&mut self) -> bool {
+        self.next_plain::<Interactive>("whether a person watches").is_some_and(|answer| answer.0)
+    }
+
+    fn request_of_files(&mut self, request: FileRequest<'_>) -> Result<FileAnswer, HostError> {
+        let text = format!("{request:?}");
+        let asked = || format!("of files: {text}");
+        let answer = self.next::<Filed>(QuestionHash::of(&[text.as_bytes()]), &asked);
+        answer.map_or(Err(HostError::Refused), |answer| answer.0)
+    }
+
+    fn permit(&mut self, right: Right, object: &str, _narrowed: &[Rights]) -> Permit {
+        let asked = || format!("for the right {}", right.flag(object));
+        let answer = self.next::<Permitted>(QuestionHash::of_permit(right, object), &asked);
+        answer.map_or(Permit::NotGranted, |answer| answer.0)
+    }
+
+    fn read_file(&mut self, path: &str) -> Result<Vec<u8>, HostError> {
+        let asked = || format!("for the contents of `{path}`");
+        let answer = self.next::<FileRead>(QuestionHash::of(&[path.as_bytes()]), &asked);
+        answer.map_or(Err(HostError::Refused), |answer| answer.0)
+    }
+
+    fn write_file(&mut self, path: &str, bytes: &[u8], mode: WriteMode) -> Result<(), HostError> {
+        let asked = || format!("to write {} to `{path}`", quoted(bytes));
+        let answer = self.next::<Written>(QuestionHash::of_write_file(path, bytes, mode), &asked);
+        answer.map_or(Err(HostError::Refused), |answer| answer.0)
+    }
+
+    fn file_exists(&mut self, path: &str) -> bool {
+        let asked = || format!("whether there is `{path}`");
+        self.next::<Exists>(QuestionHash::of(&[path.as_bytes()]), &asked).is_some_and(|answer| answer.0)
+    }
+
+    fn delete_file(&mut self, path: &str) -> Result<(), HostError> {
+        let asked = || format!("to delete `{path}`");
+        let answer = self.next::<Written>(QuestionHash::of(&[path.as_bytes()]), &asked);
+        answer.map_or(Err(HostError::Refused), |answer| answer.0)
+    }
+
+    fn due(&mut self, deadline: u64) -> Option<u64> {
+        {
+            let mut progress = self.progress();
+            if progress.source != AnswerSource::Records {
+                return Some(progress.time).filter(|&now| now >= deadline);
+            }
+            let next = progress.records.get(progress.replayed).map(|noted| &noted.record);
+            let is_due = matches!(next, Some(&Record::Due((n, _))) if n == progress.not_due);
+            if !is_due {
+                progress.not_due += 1;
+                return None;
+            }
+        }
+        let asked = || "whether a time has come".to_string();
+        let answer = self.next::<Due>(QuestionHash::of(&[&deadline.to_le_bytes()]), &asked);
+        answer.map(|answer| answer.0.1)
+    }
+
+    fn call(
+        &mut self,
+        name: &str,
+        arguments: &[Datum],
+        _function: &mut dyn FnMut(&[Datum]) -> Result<Datum, HostFailure>,
+    ) -> Result<Datum, HostFailure> {
+        let is_missing = || HostFailure {
+            cause: "NOT-IN-THIS-WORLD".into(),
+            arguments: vec![Datum::string(name, Span::default())],
+        };
+        let asked = || {
+            let arguments: String = arguments.iter().map(|argument| format!(" {argument}")).collect();
+            format!("for a call of the host: ({name}{})", quoted(arguments.as_bytes()).trim_matches('"'))
+        };
+        let answer = self.next::<Called>(QuestionHash::of_call(name, arguments), &asked);
+        answer.map_or_else(|| Err(is_missing()), |answer| answer.0)
+    }
+
+    /// Nothing is begun; what was heard then is heard again.
+    fn begin(&mut self, _name: &str, _arguments: &[Datum], _function: &mut dyn FnMut(&[Datum])) {}
+
+    fn inbox(&self) -> Inbox {
+        self.inbox.clone()
+    }
+
+    fn poll(&mut self, round: u64) -> Vec<Incoming> {
+        self.inbox.take();
+        {
+            let mut progress = self.progress();
+            if progress.source != AnswerSource::Records {
+                let comes_back = std::mem::take(&mut progress.comes_back);
+                return match progress.source {
+                    _ if !comes_back => Vec::new(),
+                    AnswerSource::Nothing => vec![Incoming::Stop],
+                    // The signal cuts the end of the run short, if that is where it is.
+                    _ => vec![Incoming::Signal(ProcessSignal::Interrupt), Incoming::Stop],
+                };
+            }
+            let next = progress.records.get(progress.replayed).map(|noted| &noted.record);
+            if !matches!(next, Some(&Record::Received((n, _))) if n == round) {
+                self.ring_if_needed(&progress);
+                return Vec::new();
+            }
+        }
+        self.next_plain::<Received>("what has come").map_or(Vec::new(), |answer| answer.0.1)
+    }
+
+    fn check(&mut self, check: RunCheck) {
+        let mut progress = self.progress();
+        if progress.source != AnswerSource::Records {
+            return;
+        }
+        let next = progress.records.get(progress.replayed).map(|noted| &noted.record);
+        let Some(&Record::Checked(recorded)) = next else { return };
+        if recorded.round > check.round {
+            return;
+        }
+        if recorded != check {
+            let say = |check: RunCheck| {
+                format!("round {}, tick {}, canary {:016x}", check.round, check.ticks, check.canary)
+            };
+            return self.diverge(&mut progress, format!("nothing, but is at {}", say(check)), say(recorded));
+        }
+        progress.equal = Some(check);
+        progress.checks += 1;
+        progress.replayed += 1;
+        self.ring_if_needed(&progress);
+    }
+
+    fn broken_output_status(&self) -> u8 {
+        let answer = self.next_plain::<BrokenOutput>("for the status of an output that nobody reads");
+        answer.map_or(0, |answer| answer.0)
+    }
+}
+
+/// Returns the beginning of a text in quotes, for a message.
+fn quoted(bytes: &[u8]) -> String {
+    const SHOWN: usize = 40;
+    let text = String::from_utf8_lossy(bytes);
+    let more = if text.chars().nth(SHOWN).is_some() { "…" } else { "" };
+    format!("{:?}", format!("{}{more}", text.chars().take(SHOWN).collect::<String>()))
+}
+
+fn stream(output: Output) -> &'static str {
+    match output {
+        Output::Standard => "standard output",
+        Output::Error => "standard error",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::host::{RecordingHost, VirtualHost};
+
+    /// A stand-in for a program: describes what it learns from `host`.
+    fn run(host: &mut dyn Host) -> String {
+        let mut log = format!("{} {:?} ", host.seed(), host.arguments());
+        log += &format!("{:?} {} ", host.wait(Some(30), Awaited::default()), host.monotonic());
+        log += &format!("{:?} {:?} ", host.read_input(), host.read_file("f"));
+        log += &format!("{:?} {}", host.write(Output::Standard, b"hello"), host.file_exists("g"));
+        log
+    }
+
+    #[test]
+    fn a_replay_gives_the_recorded_answers() {
+        let host = VirtualHost::new().with_seed(7).with_input("in").with_file("f", "1").with_output_limit(2);
+        let mut recording_host = RecordingHost::new(host.with_arguments(vec!["x".into()]));
+        let recording = recording_host.recording();
+        let first = run(&mut recording_host);
+        let mut replay = ReplayHost::new(recording.to_records());
+        assert_eq!(run(&mut replay), first);
+        assert!(replay.is_at_end() && !replay.has_diverged());
+        assert_eq!(replay.captured().output(), "hello");
+    }
+
+    #[test]
+    fn what_came_comes_again_in_the_same_round_and_at_the_same_question() {
+        let host = VirtualHost::new().with_arrival(0, Incoming::Stop).with_arrival(20, Incoming::Input);
+        let mut recording_host = RecordingHost::new(host);
+        let recording = recording_host.recording();
+        let rounds = |host: &mut dyn Host| {
+            let look = |host: &mut dyn Host, round| {
+                if host.inbox().is_rung() { host.poll(round) } else { Vec::new() }
+            };
+            let mut log = String::new();
+            for round in 1..5 {
+                log += &format!("{:?} {:?}; ", look(host, round), host.due(15));
+                host.advance(10);
+            }
+            log
+        };
+        let first = rounds(&mut recording_host);
+        assert_eq!(first, "[Stop] None; [] None; [Input] Some(20); [] Some(30); ");
+        assert_eq!(recording.to_records().len(), 4);
+        let mut replay = ReplayHost::new(recording.to_records());
+        assert_eq!(rounds(&mut replay), first);
+        assert!(replay.is_at_end() && !replay.has_diverged());
+    }
+
+    #[test]
+    fn another_question_is_a_divergence() {
+        let mut replay = ReplayHost::new([Record::Seed(3), Record::Monotonic(9)].map(plain));
+        assert_eq!(replay.seed(), 3);
+        assert_eq!(replay.wall_clock(), 0);
+        assert!(replay.has_diverged());
+        assert_eq!(replay.monotonic(), 0);
+        let divergence = replay.divergence().expect("it has diverged").to_string();
+        assert!(divergence.contains("record 2: the program asks the time of day; recorded is the time"));
+    }
+
+    fn plain(record: Record) -> NotedRecord {
+        NotedRecord { question: QuestionHash::default(), record }
+    }
+
+    #[test]
+    fn other_arguments_and_another_course_are_divergences() {
+        let mut recording_host = RecordingHost::new(VirtualHost::new());
+        let recording = recording_host.recording();
+        assert!(!recording_host.file_exists("a"));
+        let check = RunCheck { round: 5000, ticks: 7, canary: 1 };
+        recording_host.check(check);
+        let replay = || ReplayHost::new(recording.to_records());
+        let mut other = replay();
+        other.file_exists("b");
+        let text = other.divergence().expect("it has diverged").to_string();
+        assert!(text.contains("whether there is `b`") && text.contains("other arguments"), "{text}");
+        let mut other = replay();
+        other.file_exists("a");
+        other.check(RunCheck { round: 4096, ..check });
+        other.check(RunCheck { canary: 2, ..check });
+        assert!(other.has_diverged());
+        let mut equal = replay();
+        equal.file_exists("a");
+        equal.check(check);
+        assert!(equal.is_at_end() && !equal.has_diverged() && equal.checks() == (1, Some(check)));
+        assert_eq!(equal.wait(None, Awaited::default()), Wake::Never);
+        assert_eq!(equal.asked_at_end().as_deref(), Some("to wait"));
+        assert_eq!(equal.poll(9).len(), 2, "the machine comes back");
+    }
+}

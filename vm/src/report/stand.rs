@@ -1,0 +1,104 @@
+//! Where tasks stand between two portions of a run: their frames, and what they are about to call.
+//!
+//! For debuggers: nothing here changes the run, save [`Vm::set_tasks_aside`], after which it is over.
+
+use esl_bytecode::builtin::BUILTINS;
+use esl_bytecode::opcode::{CallTarget, Instr};
+
+use super::task_label;
+use crate::describe::{describe, function_name};
+use crate::heap::Kind;
+use crate::interp::frames::{Frame, Frames};
+use crate::observe::StandingFrame;
+use crate::schedule::{RunQueues, Timers};
+use crate::task::{Task, TaskNumber, TaskState};
+use crate::vm::Vm;
+
+impl Vm {
+    /// Returns the task into whose turn the end of the last portion has fallen.
+    pub fn open_task(&self) -> Option<TaskNumber> {
+        let open = self.scheduler.open_turn.as_ref()?;
+        self.scheduler.tasks.get(open.task).map(|task| task.number)
+    }
+
+    /// Returns the task that has this number, or that reports call so, in any case and without the word
+    /// `task`.
+    pub fn find_task(&self, name: &str) -> Option<TaskNumber> {
+        let tasks = self.scheduler.tasks.iter().filter(|task| task.state != TaskState::Ended);
+        let is_it = |task: &&Task| {
+            let label = task_label(self, task.object);
+            let bare = label.strip_prefix("task ").unwrap_or(&label);
+            let bare = bare.trim_matches('"');
+            task.number.to_string() == name
+                || label.eq_ignore_ascii_case(name)
+                || bare.eq_ignore_ascii_case(name)
+        };
+        tasks.filter(is_it).map(|task| task.number).min()
+    }
+
+    fn standing(&self, number: TaskNumber) -> Option<&Task> {
+        self.scheduler.tasks.iter().find(|task| task.number == number && task.state != TaskState::Ended)
+    }
+
+    /// Returns what reports call a task that has not ended.
+    pub fn task_name(&self, number: TaskNumber) -> Option<String> {
+        self.standing(number).map(|task| task_label(self, task.object))
+    }
+
+    /// Returns the first `limit` frames of a task that has not ended, the innermost first.
+    pub fn frames_of(&self, number: TaskNumber, limit: usize) -> Vec<StandingFrame> {
+        let Some(task) = self.standing(number) else { return Vec::new() };
+        let row = |frame: Frame<'_>| {
+            let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
+            let code = self.heap.function_code(frame.function);
+            let place = code.and_then(|code| self.world.source_place(&self.heap, code, word as u32));
+            StandingFrame { function: function_name(&self.heap, frame.function), place }
+        };
+        Frames::of_task(task).take(limit).map(row).collect()
+    }
+
+    /// Returns the name of the function that a task is about to call, if it stands before a call.
+    pub fn next_call(&self, number: TaskNumber) -> Option<String> {
+        let frame = Frames::of_task(self.standing(number)?).next()?;
+        let code = self.heap.function_code(frame.function)?;
+        let instruction = Instr::decode(self.heap.code_words(code)?, frame.word)?;
+        let call = instruction.call()?;
+        match (call.callee, instruction) {
+            (CallTarget::Running, _) => Some(function_name(&self.heap, frame.function)),
+            (CallTarget::Global, Instr::CallGlobal { symbol, .. } | Instr::TailCallGlobal { symbol, .. }) => {
+                let symbol = self.heap.code_constants(code)?.get(symbol.0 as usize)?;
+                Some(describe(&self.heap, *symbol))
+            }
+            (
+                CallTarget::Builtin,
+                Instr::CallBuiltin { builtin, .. } | Instr::TailCallBuiltin { builtin, .. },
+            ) => BUILTINS.get(builtin.0 as usize).map(|builtin| builtin.name.to_string()),
+            (CallTarget::Given | CallTarget::Applied, _) => {
+                let callee = *frame.registers().get(usize::from(call.window.0))?;
+                let is_function = self.heap.is(callee, Kind::Function);
+                Some(if is_function {
+                    function_name(&self.heap, callee)
+                } else {
+                    describe(&self.heap, callee)
+                })
+            }
+            _ => None,
+        }
+    }
+
+    /// Lets no task have a turn any more, so that what is called from now on runs alone. The run itself is
+    /// over.
+    pub fn set_tasks_aside(&mut self) {
+        let scheduler = &mut self.scheduler;
+        scheduler.open_turn = None;
+        scheduler.queues = RunQueues::default();
+        scheduler.timers = Timers::default();
+        scheduler.readers.clear();
+        scheduler.writers.clear();
+        scheduler.end_of_all = None;
+        scheduler.main = None;
+        scheduler.is_paused = false;
+        scheduler.clock.more_is_due = false;
+        self.config.budget = None;
+    }
+}
