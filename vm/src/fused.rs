@@ -107,6 +107,22 @@ macro_rules! for_each_fused {
             CarCdr = 0xEB, [Car Cdr], fits_always;
             /// An item compared as a number.
             CarJumpNumEq = 0xEC, [Car JumpNumEq], fits_always;
+            /// An item, and a sum.
+            CarAdd = 0xED, [Car Add], fits_always;
+            /// An item, and a difference.
+            CarSub = 0xEE, [Car Sub], fits_always;
+            /// The items behind one, and a number counted up or down.
+            CdrAddInt = 0xEF, [Cdr AddInt], fits_always;
+
+            // ---- calls, which take their tick after the first part, and returns
+            /// An argument, and a call.
+            MoveCallGlobal = 0xF0, [Move CallGlobal], fits_always;
+            /// An argument, and a call of the running function.
+            MoveCallSelf = 0xF1, [Move CallSelf], fits_always;
+            /// A number counted up or down, and a call of the running function.
+            AddIntCallSelf = 0xF2, [AddInt CallSelf], fits_always;
+            /// A sum that is returned.
+            AddReturn = 0xF3, [Add Return], fits_always;
         }
     };
 }

@@ -625,7 +625,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 ($value:expr) => {{
                     let value = $value;
                     let return_to = pc_from_value(*base.sub(1));
-                    // Calls are no parts of fused instructions.
+                    // No fused instruction begins with a call.
                     let call = loaded_word_at(return_to.sub(2));
                     if call.c() != 0 {
                         vm.exchange.values.clear();
@@ -868,6 +868,28 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     set!(word.a(), $value);
                     next_part!();
                     part!($second)
+                }};
+            }
+            macro_rules! call_global {
+                () => {{
+                    tick!();
+                    // SAFETY: V4: the constant is a symbol, and the function of a symbol is a Function.
+                    let symbol = (*k.add(aux!() as usize)).object_ptr().cast::<SymbolObject>();
+                    let function = (*symbol).function;
+                    let code = code_of(function);
+                    if (*code).arity == word.b() as u32 {
+                        enter!(base.add(word.a()), function, code, pc.add(2));
+                    }
+                    enter_arranged!(base.add(word.a()), function, code, pc.add(2));
+                    break Signal::Call;
+                }};
+            }
+            macro_rules! call_self {
+                () => {{
+                    tick!();
+                    // SAFETY: V5: the running function takes exactly these arguments.
+                    let code = k.byte_sub(CodeObject::CONSTANTS_OFFSET).cast::<CodeObject>().cast_mut();
+                    enter!(base.add(word.a()), *base.sub(2), code, pc.add(2));
                 }};
             }
             macro_rules! car {
@@ -1360,24 +1382,8 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     }
                     break Signal::Call;
                 }
-                LoopOperation::CallGlobal => {
-                    tick!();
-                    // SAFETY: V4: the constant is a symbol, and the function of a symbol is a Function.
-                    let symbol = (*k.add(aux!() as usize)).object_ptr().cast::<SymbolObject>();
-                    let function = (*symbol).function;
-                    let code = code_of(function);
-                    if (*code).arity == word.b() as u32 {
-                        enter!(base.add(word.a()), function, code, pc.add(2));
-                    }
-                    enter_arranged!(base.add(word.a()), function, code, pc.add(2));
-                    break Signal::Call;
-                }
-                LoopOperation::CallSelf => {
-                    tick!();
-                    // SAFETY: V5: the running function takes exactly these arguments.
-                    let code = k.byte_sub(CodeObject::CONSTANTS_OFFSET).cast::<CodeObject>().cast_mut();
-                    enter!(base.add(word.a()), *base.sub(2), code, pc.add(2));
-                }
+                LoopOperation::CallGlobal => call_global!(),
+                LoopOperation::CallSelf => call_self!(),
                 LoopOperation::CallBuiltin => {
                     tick!();
                     let window = base.add(word.a());
@@ -1564,6 +1570,47 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     car!();
                     next_part!();
                     jump_compare!(JumpNumEq, ==)
+                }
+                LoopOperation::CarAdd => {
+                    car!();
+                    next_part!();
+                    part!(Add)
+                }
+                LoopOperation::CarSub => {
+                    car!();
+                    next_part!();
+                    part!(Sub)
+                }
+                LoopOperation::CdrAddInt => {
+                    cdr!();
+                    next_part!();
+                    add_int!(next!(1))
+                }
+                LoopOperation::MoveCallGlobal => {
+                    set!(word.a(), get!(word.b()));
+                    next_part!();
+                    call_global!()
+                }
+                LoopOperation::MoveCallSelf => {
+                    set!(word.a(), get!(word.b()));
+                    next_part!();
+                    call_self!()
+                }
+                LoopOperation::AddIntCallSelf => add_int!({
+                    next_part!();
+                    call_self!()
+                }),
+                LoopOperation::AddReturn => {
+                    let (x, y) = (get!(word.b()), get!(word.c()));
+                    if Value::both_fixnums(x, y) {
+                        let (sum, overflow) = on_fixnums!(Add, x, y);
+                        if !overflow {
+                            set!(word.a(), Value::from_bits(sum as u64));
+                            next_part!();
+                            return_value!(get!(word.a()))
+                        }
+                    }
+                    first_part!()
                 }
             }
         }

@@ -42,12 +42,13 @@ fn constants() -> Vec<Constant> {
         Constant::Vector(vec![PoolIdx(0)]),
         // k13: a class
         Constant::Class(Symbol::esl("POINT")),
-        // k14 to k18: the shared functions
+        // k14 to k19: the shared functions
         Constant::Function(FunctionNumber(0)),
         Constant::Function(FunctionNumber(1)),
         Constant::Function(FunctionNumber(2)),
         Constant::Function(FunctionNumber(3)),
         Constant::Function(FunctionNumber(4)),
+        Constant::Function(FunctionNumber(5)),
     ]
 }
 
@@ -112,11 +113,19 @@ fn shared_functions() -> Vec<ModuleFunction> {
             "jump-greater-int r0 0 L \n return r0 \n L: add-int r3 r0 -1 \n call-self r1.. 1 want 1
              add r4 r0 r1 \n return r4",
         ),
+        // Adds the integers up to its first argument to its second.
+        function(
+            Parameters::exactly(2),
+            8,
+            vec![],
+            "jump-greater-int r0 0 L \n return r1 \n L: add r6 r1 r0 \n add-int r4 r0 -1 \n load-nil r7.. 1
+             move r5 r6 \n call-self r2.. 2 want 1 \n return r2",
+        ),
     ]
 }
 
 /// Returns the shared functions, then a function for each program.
-fn functions<'a>(programs: impl IntoIterator<Item = &'a str>) -> Vec<ModuleFunction> {
+pub(super) fn functions<'a>(programs: impl IntoIterator<Item = &'a str>) -> Vec<ModuleFunction> {
     let mains = programs.into_iter().map(|text| function(Parameters::default(), 16, vec![], text));
     shared_functions().into_iter().chain(mains).collect()
 }

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use esl_bytecode::assembler::assemble;
 use esl_bytecode::word::Word;
 
-use super::arms::Machine;
+use super::arms::{Machine, functions};
 use crate::fused::{FUSED, fuse, original};
 use crate::vm::Config;
 
@@ -85,7 +85,10 @@ fn program(numbers: &mut Numbers) -> Vec<String> {
 
 /// Returns the numbers of the fused instructions in a program.
 fn fused_in(program: &str) -> BTreeSet<u8> {
-    let code = assemble(program).unwrap();
+    fused_in_code(assemble(program).unwrap())
+}
+
+fn fused_in_code(code: Vec<u32>) -> BTreeSet<u8> {
     let mut words = code.clone();
     fuse(&mut words);
     let changed = code.into_iter().zip(words).filter(|(before, after)| before != after);
@@ -106,8 +109,11 @@ fn fused_instructions_do_what_their_parts_do() {
     let apart: Vec<String> = programs.iter().map(|lines| lines.join("\njump +0\n")).collect();
     let found: BTreeSet<u8> = fused.iter().flat_map(|program| fused_in(program)).collect();
     assert!(apart.iter().all(|program| fused_in(program).is_empty()));
-    // The two with jumps have programs of their own.
-    assert!(cfg!(miri) || found.len() == FUSED.len() - 2, "{found:x?}");
+    // Those with jumps and calls have programs of their own.
+    let of_others = functions(PROGRAMS.iter().map(|(program, _)| *program));
+    let of_others = of_others.into_iter().flat_map(|function| fused_in_code(function.code));
+    let found: BTreeSet<u8> = found.into_iter().chain(of_others).collect();
+    assert!(cfg!(miri) || found.len() == FUSED.len(), "{found:x?}");
     let mut machine = Machine::new();
     let (of_fused, of_apart) =
         (machine.load(fused.iter().map(String::as_str)), machine.load(apart.iter().map(String::as_str)));
@@ -141,6 +147,9 @@ const PROGRAMS: &[(&str, &str)] = &[
          add-int r1 r1 1 \n load-int r3 2 \n loop-less r1 r3 L \n return r2",
         "3.75",
     ),
+    ("load-int r0 5 \n move r4 r0 \n call-global r2.. 1 want 1 k1 \n return r2", "6"),
+    ("make-closure r0 k18 \n load-int r2 4 \n call r0.. 1 want 1 \n return r0", "10"),
+    ("make-closure r0 k19 \n load-int r2 4 \n load-int r3 1 \n call r0.. 2 want 1 \n return r0", "11"),
 ];
 
 #[test]
