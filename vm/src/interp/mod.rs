@@ -29,9 +29,9 @@
 //!
 //! Only this module and its children write the fields behind F1, F3 and F5.
 //!
-//! The loop reads words as they were loaded, with fused instructions (`crate::fused`); all other code asks
-//! [`word_at`], which gives the instructions that the verifier has seen. The arm of a fused instruction leaves
-//! `pc` at the part that could not be done.
+//! The loop reads words as they were loaded, with fused instructions (`crate::fused`). All other code asks
+//! [`word_at`], which gives the instructions that the verifier has seen. The arm of a fused instruction
+//! leaves `pc` at the part that could not be done.
 #![allow(unsafe_code)]
 
 pub(crate) mod arguments;
