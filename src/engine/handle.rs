@@ -9,7 +9,7 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::USER_PACKAGE;
 use esl_vm::embed::ExportError;
 use esl_vm::host::{
-    Answer, FunctionRef, Incoming, Pending, ProcessSignal, Question, SendError, Sender, TaskInfo,
+    Answer, FunctionRef, Incoming, Look, Pending, ProcessSignal, Question, SendError, Sender, TaskInfo,
 };
 use esl_vm::observe::{Coming, Observer};
 use esl_vm::vm::Vm;
@@ -152,7 +152,7 @@ impl Handle {
     /// Has an observer watch the run from the next turn on.
     pub fn subscribe(&self, observer: impl Observer + 'static) {
         self.coming.add(Box::new(observer));
-        self.sender.inbox().put(Incoming::Watch);
+        self.sender.inbox().look(Look::Watch);
     }
 
     fn ask<T: FromData>(

@@ -26,7 +26,7 @@ use esl_heap::state::{StateSink, Stated};
 use crate::compiler::Compilations;
 use crate::embedder::Embedder;
 use crate::exchange::Exchange;
-use crate::observe::{Figures, Observers, Watch};
+use crate::observe::{Figures, Journal, Observers, Watch};
 use crate::outside::{Operations, Outside};
 use crate::schedule::{Accounts, Clock, Counts, EndOfAll, Points, RunQueues, Scheduler, Timers, Turn};
 use crate::task::{Control, Extra, RunningCleanup, Task};
@@ -246,7 +246,23 @@ list_state! { Embedder {
     last_words: Run,
     last_place: Run by tell_place,
 } }
-list_state! { Watch { is_watched: Derived, observers: Process, coming: Process, figures: Process, traces_tasks: Process } }
+list_state! { Watch {
+    is_watched: Derived,
+    observers: Process,
+    coming: Process,
+    figures: Process,
+    journal: Process,
+    traces_tasks: Process,
+} }
+list_state! { Journal {
+    is_kept: Process,
+    causes: Process,
+    failed: Process,
+    noted: Process,
+    recent: Process,
+    recoveries: Process,
+    lateness: Process,
+} }
 list_state! { Observers {
     list: Process,
     start: Process,

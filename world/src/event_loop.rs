@@ -14,7 +14,7 @@ static LOOP: OnceLock<Result<Handle, String>> = OnceLock::new();
 ///
 /// # Errors
 /// The reason, if the system gives no thread or no descriptors for it.
-pub(crate) fn spawn(future: impl Future<Output = ()> + Send + 'static) -> Result<(), String> {
+pub fn spawn(future: impl Future<Output = ()> + Send + 'static) -> Result<(), String> {
     match LOOP.get_or_init(start) {
         Ok(handle) => {
             handle.spawn(future);

@@ -39,6 +39,7 @@ mod watch;
 
 use esl_vm::vm::Vm;
 
+pub use event_loop::spawn;
 pub use modules::module;
 
 /// Gives a machine the modules, for `require`, and what they need of the process itself.

@@ -28,6 +28,7 @@ mod relation;
 mod rule;
 mod scan;
 mod solver;
+mod survey;
 mod term;
 mod tuple;
 

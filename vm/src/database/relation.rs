@@ -194,6 +194,11 @@ impl Relation {
         self.set.find(hash_cells(cells), is_it)
     }
 
+    /// Returns the number of current facts.
+    pub(super) fn count(&self) -> usize {
+        self.live
+    }
+
     /// Returns the rows of all current facts.
     pub(super) fn live_rows(&self) -> impl Iterator<Item = u32> {
         (0..self.spans.len() as u32).filter(|&row| self.is_live(row))

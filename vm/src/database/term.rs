@@ -10,6 +10,7 @@
 //! A function that makes a term returns it held; the caller keeps it until [`Terms::release`].
 
 use super::bucket::{Buckets, finish, mix};
+use crate::describe::describe;
 use crate::equality::{self, KeyTest};
 use crate::heap::{AllocError, Heap};
 use crate::table::{KeyComparison, Table};
@@ -38,6 +39,11 @@ impl Term {
     #[inline]
     pub(super) fn as_variable(self) -> Option<usize> {
         self.0.as_variable().map(|number| number as usize)
+    }
+
+    /// Returns the object that the term is the same word as.
+    pub(super) fn as_atom(self) -> Option<Value> {
+        self.0.as_term().is_none().then_some(self.0)
     }
 
     #[inline]
@@ -177,6 +183,73 @@ impl Terms {
                 TermData::Float(bits) => [6, *bits].into_iter().for_each(|word| visit(Ok(word))),
                 TermData::Object(v) => visit(Err(*v)),
                 TermData::Free => visit(Ok(7)),
+            }
+        }
+    }
+
+    /// Writes a term as a text, of which no more is written once it has so many characters.
+    pub(super) fn write(&self, heap: &Heap, term: Term, most: usize, text: &mut String) {
+        enum TermPiece {
+            Term(Term),
+            Rest(Term),
+            Word(&'static str),
+        }
+        let mut open = vec![TermPiece::Term(term)];
+        while let Some(piece) = open.pop() {
+            if text.len() > most {
+                text.push('…');
+                return;
+            }
+            let term = match piece {
+                TermPiece::Word(word) => {
+                    text.push_str(word);
+                    continue;
+                }
+                TermPiece::Rest(rest) if rest == Term::NIL => {
+                    text.push(')');
+                    continue;
+                }
+                TermPiece::Rest(rest) => match self.as_pair(rest) {
+                    Some((car, cdr)) => {
+                        text.push(' ');
+                        open.extend([TermPiece::Rest(cdr), TermPiece::Term(car)]);
+                        continue;
+                    }
+                    None => {
+                        text.push_str(" . ");
+                        open.push(TermPiece::Word(")"));
+                        rest
+                    }
+                },
+                TermPiece::Term(term) => term,
+            };
+            let Some(index) = term.0.as_term() else {
+                text.push_str(&describe(heap, term.0));
+                continue;
+            };
+            match &self.nodes[index as usize].data {
+                TermData::Pair { car, cdr, .. } => {
+                    text.push('(');
+                    open.extend([TermPiece::Rest(*cdr), TermPiece::Term(*car)]);
+                }
+                TermData::Text(characters) => {
+                    let shown = characters.iter().take(most);
+                    let shown: String = shown
+                        .map(|&code| char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER))
+                        .collect();
+                    text.push_str(&format!("{shown:?}"));
+                }
+                TermData::Float(bits) => text.push_str(&format!("{:?}", f64::from_bits(*bits))),
+                TermData::Ratio(numerator, denominator) => {
+                    open.extend([
+                        TermPiece::Term(*denominator),
+                        TermPiece::Word("/"),
+                        TermPiece::Term(*numerator),
+                    ]);
+                }
+                TermData::Big(..) => text.push_str("a large integer"),
+                TermData::Object(v) => text.push_str(&describe(heap, *v)),
+                TermData::Free => {}
             }
         }
     }

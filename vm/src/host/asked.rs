@@ -88,8 +88,12 @@ impl Host for Asked {
     }
 
     fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
-        self.note_word(AskedQuestion::Wait, deadline.unwrap_or(u64::MAX));
-        self.host.wait(deadline, awaited)
+        let wake = self.host.wait(deadline, awaited);
+        // The run has not asked for looks at it; it will wait on.
+        if wake != Wake::Look {
+            self.note_word(AskedQuestion::Wait, deadline.unwrap_or(u64::MAX));
+        }
+        wake
     }
 
     fn stopwatch(&mut self) -> u64 {

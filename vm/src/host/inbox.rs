@@ -15,8 +15,9 @@ use std::time::{Duration, Instant};
 use esl_bytecode::datum::Datum;
 
 use super::door::Doors;
+use super::look::Looks;
 use super::question::{Asking, Question};
-use super::{News, ProcessSignal};
+use super::{News, ProcessSignal, Wake};
 
 /// Something that reaches a run from outside.
 #[derive(Clone, Debug)]
@@ -75,6 +76,8 @@ struct InboxState {
     contents: Mutex<Vec<Incoming>>,
     /// Notified, under the lock of `contents`, when `is_rung` is set.
     bell: Condvar,
+    /// Looks, which come beside the contents.
+    looks: Mutex<Looks>,
     doors: Doors,
     asking: Asking,
     /// A bit for each signal of the process that the program handles, by number.
@@ -96,6 +99,11 @@ impl Inbox {
     fn contents(&self) -> MutexGuard<'_, Vec<Incoming>> {
         // The contents are whole at every moment, so a panic elsewhere does not corrupt them.
         self.0.contents.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn looks(&self) -> MutexGuard<'_, Looks> {
+        // The list is whole at every moment, so a panic elsewhere does not corrupt it.
+        self.0.looks.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(super) fn doors(&self) -> &Doors {
@@ -153,6 +161,20 @@ impl Inbox {
     #[inline]
     pub fn is_rung(&self) -> bool {
         self.0.is_rung.load(Ordering::Relaxed)
+    }
+
+    /// Returns why the inbox is rung, for a host whose wait that ends.
+    pub fn why_rung(&self) -> Wake {
+        let contents = self.contents();
+        if contents.is_empty() && !self.looks().list.is_empty() { Wake::Look } else { Wake::Arrival }
+    }
+
+    /// Ends the ringing if nothing is there but looks, which are about to be taken.
+    pub(crate) fn quieten(&self) {
+        let contents = self.contents();
+        if contents.is_empty() {
+            self.0.is_rung.store(false, Ordering::Relaxed);
+        }
     }
 
     /// Takes everything out.

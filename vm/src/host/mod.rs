@@ -20,6 +20,7 @@ mod asked;
 mod console;
 mod door;
 mod inbox;
+mod look;
 mod operation;
 mod question;
 mod real;
@@ -33,6 +34,10 @@ pub(crate) use asked::Asked;
 pub(crate) use console::{Console, Taken, column_after, encode};
 pub use door::{SendError, Sender};
 pub use inbox::{Inbox, Incoming};
+pub use look::{
+    FailureRow, FrameRow, InputRow, Lateness, LockRow, Look, RelationRow, RunFigures, Survey, SurveyRequest,
+    SurveyedTask, TaskStanding,
+};
 pub(crate) use operation::Canceller;
 pub use operation::{HostFailure, HostOperation, News};
 pub use question::{Answer, FunctionRef, Kept, Pending, Question, TaskInfo};
@@ -164,6 +169,8 @@ pub enum Wake {
     Time,
     /// Something has come into the inbox, or standard input has data.
     Arrival,
+    /// Somebody wants to look at the run, and nothing else has come: the machine answers, and waits on.
+    Look,
     /// Nothing can ever arrive: there is no deadline, no input, and nobody from whom to expect anything.
     Never,
 }

@@ -290,8 +290,11 @@ impl Host for RealHost {
         if awaited.input {
             self.ask_for_input();
         }
-        if self.inbox.is_rung() || awaited.input && self.input.lock().is_some() {
+        if awaited.input && self.input.lock().is_some() {
             return Wake::Arrival;
+        }
+        if self.inbox.is_rung() {
+            return self.inbox.why_rung();
         }
         let deadline = match (self.virtual_time, deadline) {
             // Input takes no virtual time, so that it arrives at the same time in each run; nothing else is
@@ -311,7 +314,10 @@ impl Host for RealHost {
                 Some(scaled(left, self.speed.recip()))
             }
         };
-        if self.inbox.wait(time) { Wake::Arrival } else { Wake::Time }
+        if !self.inbox.wait(time) {
+            return Wake::Time;
+        }
+        if awaited.input && self.input.lock().is_some() { Wake::Arrival } else { self.inbox.why_rung() }
     }
 
     fn seed(&mut self) -> u64 {

@@ -256,8 +256,11 @@ impl<H: Host, R: Recorder> Host for RecordingHost<H, R> {
 
     fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
         self.recorder.flush();
-        let answer = Waited(self.host.wait(deadline, awaited));
-        self.note(QuestionHash::of_wait(deadline, awaited), answer).0
+        let wake = self.host.wait(deadline, awaited);
+        if wake == Wake::Look {
+            return wake;
+        }
+        self.note(QuestionHash::of_wait(deadline, awaited), Waited(wake)).0
     }
 
     fn stopwatch(&mut self) -> u64 {

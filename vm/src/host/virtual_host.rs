@@ -178,9 +178,12 @@ impl Host for VirtualHost {
     }
 
     fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {
-        if awaited.input || self.inbox.is_rung() {
+        if awaited.input {
             // Input is available or has ended; there is nothing to wait for.
             return Wake::Arrival;
+        }
+        if self.inbox.is_rung() {
+            return self.inbox.why_rung();
         }
         match (deadline, self.arrivals.front()) {
             (deadline, Some(&(arrival, _))) if deadline.is_none_or(|deadline| arrival <= deadline) => {
@@ -192,7 +195,7 @@ impl Host for VirtualHost {
                 Wake::Time
             }
             // Operations take no virtual time: those that another thread performs are waited for.
-            (None, _) if awaited.news && self.inbox.wait(None) => Wake::Arrival,
+            (None, _) if awaited.news && self.inbox.wait(None) => self.inbox.why_rung(),
             (None, _) => Wake::Never,
         }
     }

@@ -4,10 +4,12 @@
 //! spoken of (`report`).
 
 mod figures;
+mod journal;
 mod observer;
 
 pub(crate) use figures::Figures;
 pub use figures::{Pauses, TaskFigures};
+pub(crate) use journal::Journal;
 pub(crate) use observer::Observers;
 pub use observer::{Coming, Observer, Seen};
 
@@ -37,6 +39,8 @@ pub(crate) struct Watch {
     pub(crate) coming: Coming,
     /// The figures.
     pub(crate) figures: Figures,
+    /// What has happened, for those who look at the run.
+    pub(crate) journal: Journal,
     /// Whether what happens to tasks is written to the stream for reports.
     pub(crate) traces_tasks: bool,
 }
@@ -44,7 +48,10 @@ pub(crate) struct Watch {
 impl Watch {
     /// Updates `is_watched`.
     pub(crate) fn update_is_watched(&mut self) {
-        self.is_watched = self.traces_tasks || !self.observers.list.is_empty() || self.figures.are_wanted;
+        self.is_watched = self.traces_tasks
+            || !self.observers.list.is_empty()
+            || self.figures.are_wanted
+            || self.journal.is_kept;
     }
 
     /// Tells observers of something, if there are any.

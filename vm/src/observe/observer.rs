@@ -89,7 +89,7 @@ impl Coming {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Adds an observer. The machine learns of it by [`Incoming::Watch`](crate::host::Incoming::Watch).
+    /// Adds an observer. The machine learns of it by [`Look::Watch`](crate::host::Look::Watch).
     pub fn add(&self, observer: Box<dyn Observer>) {
         self.list().push(observer);
     }

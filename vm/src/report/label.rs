@@ -173,19 +173,19 @@ fn resource_label(vm: &Vm, resource: Value) -> String {
 }
 
 /// Field of a claim with its request.
-const REQUEST: usize = 4;
+pub(super) const REQUEST: usize = 4;
 
 /// Fields of a supervisor's child with its task, and with the time of its restart.
-const CHILD_TASK: usize = 6;
+pub(super) const CHILD_TASK: usize = 6;
 const CHILD_DUE: usize = 8;
 
 /// Returns a field of a record of the library; `NIL` if there is none.
-fn field_of(vm: &Vm, record: Value, index: usize) -> Value {
+pub(super) fn field_of(vm: &Vm, record: Value, index: usize) -> Value {
     vm.heap.vector(record).and_then(|fields| fields.get(index).copied()).unwrap_or(Value::NIL)
 }
 
 /// Returns the first records of a ring, each of which has the next one in its first field.
-fn ring(vm: &Vm, first: Value) -> impl Iterator<Item = Value> {
+pub(super) fn ring(vm: &Vm, first: Value) -> impl Iterator<Item = Value> {
     let mut next = first;
     let step = move || {
         let record = next;
@@ -199,7 +199,7 @@ fn ring(vm: &Vm, first: Value) -> impl Iterator<Item = Value> {
 }
 
 /// Returns the first items of a list.
-fn items(vm: &Vm, list: Value) -> impl Iterator<Item = Value> {
+pub(super) fn items(vm: &Vm, list: Value) -> impl Iterator<Item = Value> {
     let mut rest = list;
     let next = move || {
         let pair = vm.heap.as_cons(rest)?;

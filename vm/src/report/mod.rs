@@ -1,9 +1,11 @@
 //! What is said of tasks: to observers, in traces, in reports, and in figures.
 
 mod figures;
+mod holders;
 mod label;
 mod observe;
 mod stand;
+mod survey;
 mod tasks;
 mod trace;
 
@@ -12,6 +14,8 @@ pub(crate) use label::{
     cause_label, end_label, event_label, failure_arguments, label_of, lack_of, reason_of, report_in_short,
     task_label,
 };
-pub(crate) use observe::{show, tell_of_change, tell_of_failure, tell_of_signal, tell_of_waking};
+pub(crate) use observe::{
+    note_end_by_failure, show, tell_of_change, tell_of_failure, tell_of_signal, tell_of_waking,
+};
 pub(crate) use tasks::{number_of_owner, operations_left, place_in_program, program_place, tasks_left};
 pub(crate) use trace::{Happening, note, trace_end};

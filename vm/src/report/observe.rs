@@ -1,10 +1,12 @@
 //! Telling observers what happens.
 
-use super::{cause_label, event_label, reason_of, task_label};
+use super::{cause_label, event_label, label_of, place_in_program, reason_of, report_in_short, task_label};
+use crate::host::FailureRow;
 use crate::observe::{Coming, Observer, Seen};
 use crate::task::{Flags, TaskIndex, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::wait::event;
 
 impl Vm {
     /// Lets an observer watch the run from now on. It learns of the tasks that are there.
@@ -37,6 +39,12 @@ impl Vm {
         }
     }
 
+    /// Has a journal kept of failures and late timers from now on, for surveys.
+    pub fn keep_journal(&mut self) {
+        self.watch.journal.is_kept = true;
+        self.watch.update_is_watched();
+    }
+
     /// Returns the place where other threads leave observers.
     pub fn coming_observers(&self) -> Coming {
         self.watch.coming.clone()
@@ -65,15 +73,45 @@ pub(crate) fn tell_of_waking(vm: &mut Vm, event: Value, by: TaskNumber, index: T
 
 /// Tells observers that the running task has signalled `event`.
 pub(crate) fn tell_of_signal(vm: &mut Vm, event: Value) {
+    if vm.watch.observers.list.is_empty() {
+        return;
+    }
     let number = vm.scheduler.running_number();
     let event = event_label(vm, event);
     show(vm, number, Seen::Signals(&event));
+}
+
+/// Notes in the journal that the running task fails.
+fn note_failure(vm: &mut Vm, cause: &str) {
+    let task = vm.scheduler.task();
+    let place = place_in_program(vm, task, vm.frames());
+    let row = FailureRow {
+        number: 0,
+        time: vm.scheduler.clock.now,
+        task: task.number.0,
+        name: label_of(vm, vm.heap.slot_or_nil(task.object, event::NAME), task.number),
+        cause: cause.into(),
+        place: place.map(|place| format!("{}:{}:{}", place.source, place.line, place.column)),
+        report: None,
+    };
+    vm.watch.journal.note_failure(row);
+}
+
+/// Notes in the journal that a failure has ended the running task, with its report.
+pub(crate) fn note_end_by_failure(vm: &mut Vm, condition: Value) {
+    let task = vm.scheduler.task();
+    let report = task.extra.as_ref().and_then(|extra| extra.report.as_ref());
+    let text = report.map_or_else(|| report_in_short(&vm.heap, condition), |report| report.text());
+    vm.watch.journal.note_end(task.number.0, text);
 }
 
 /// Tells observers that the running task fails, or recovers.
 pub(crate) fn tell_of_failure(vm: &mut Vm, condition: Value, recovers: bool) {
     let number = vm.scheduler.task().number;
     let cause = cause_label(&vm.heap, condition);
+    if vm.watch.journal.is_kept {
+        if recovers { vm.watch.journal.recoveries += 1 } else { note_failure(vm, &cause) }
+    }
     show(vm, number, if recovers { Seen::Recovers(&cause) } else { Seen::Fails(&cause) });
 }
 

@@ -5,8 +5,10 @@ use std::collections::BTreeMap;
 use esl_bytecode::compile::SourcePlace;
 use esl_bytecode::word::Word;
 
-use super::{event_label, lack_of, reason_of, task_label};
+use super::survey::{lock_owners, maker_of, row_of};
+use super::{event_label, lack_of, task_label};
 use crate::fused::original;
+use crate::host::{Survey, SurveyedTask};
 use crate::interp::frames::{Frame, Frames};
 use crate::interp::start::first_code_of;
 use crate::task::{Task, TaskState};
@@ -22,7 +24,7 @@ const SHOWN_IN_TREE: usize = 1000;
 const FRAMES: usize = 50;
 
 /// Returns whether a source belongs to the library, by the name that its build gives it.
-fn is_of_library(source: &str) -> bool {
+pub(super) fn is_of_library(source: &str) -> bool {
     source.starts_with("stdlib/") && source.ends_with(".esl")
 }
 
@@ -85,12 +87,14 @@ impl Vm {
             })
             .collect();
         tasks.sort_unstable_by_key(|task| task.number);
+        let owners = lock_owners(self);
         let mut text = String::from("Deadlock: no task can ever run again.\n");
         for task in tasks.iter().take(SHOWN) {
-            let label = task_label(self, task.object);
-            let place = program_place(self, task).map_or(String::new(), |place| format!(", {place}"));
-            let (reason, lack) = (reason_of(self, task), lack_of(self, task));
-            text.push_str(&format!("  {label} waits for {reason}{lack}{place}\n"));
+            let SurveyedTask { name, waits_for, place, .. } = row_of(self, task, &owners);
+            let reason = waits_for.unwrap_or_default();
+            let place = place.map_or(String::new(), |place| format!(", {place}"));
+            let lack = lack_of(self, task);
+            text.push_str(&format!("  {name} waits for {reason}{lack}{place}\n"));
         }
         if tasks.len() > SHOWN {
             text.push_str(&format!("  and {} more\n", tasks.len() - SHOWN));
@@ -108,19 +112,11 @@ impl Vm {
             .filter(|task| task.state != TaskState::Ended && !task.flags.hidden() && !task.flags.kept())
             .collect();
         tasks.sort_unstable_by_key(|task| task.number);
-        let maker = |task: &Task| number_of_owner(self, task.object);
-        let depths = depths(tasks.iter().map(|task| (task.number.0, maker(task))));
+        let owners = lock_owners(self);
+        let depths = depths(tasks.iter().map(|task| (task.number.0, maker_of(self, task))));
         let mut text = String::new();
         for (position, depth) in depths.iter().take(SHOWN_IN_TREE) {
-            let task = tasks[*position];
-            let label = task_label(self, task.object);
-            let state = match task.state {
-                TaskState::Runnable => "can run".to_string(),
-                _ => format!("waits for {}", reason_of(self, task)),
-            };
-            let place = program_place(self, task).map_or(String::new(), |place| format!(", {place}"));
-            let indent = "  ".repeat((*depth).min(20));
-            text.push_str(&format!("{indent}{label} {state}{place}, {} ticks\n", task.ticks));
+            text.push_str(&task_line(&row_of(self, tasks[*position], &owners), *depth));
         }
         if tasks.is_empty() {
             text.push_str("There are no tasks.\n");
@@ -128,6 +124,32 @@ impl Vm {
             text.push_str(&format!("and {} more\n", tasks.len() - SHOWN_IN_TREE));
         }
         text
+    }
+}
+
+/// Returns the line for a task in a tree of tasks, at some depth.
+fn task_line(row: &SurveyedTask, depth: usize) -> String {
+    let state = match &row.waits_for {
+        None => "can run".to_string(),
+        Some(reason) => format!("waits for {reason}"),
+    };
+    let place = row.place.as_ref().map_or(String::new(), |place| format!(", {place}"));
+    format!("{}{} {state}{place}, {} ticks\n", "  ".repeat(depth.min(20)), row.name, row.ticks)
+}
+
+impl Survey {
+    /// Returns the order in which its tasks are shown, each after its maker, with their depths in the tree.
+    pub fn tree(&self) -> Vec<(usize, usize)> {
+        depths(self.tasks.iter().map(|row| (row.number, row.maker)))
+    }
+
+    /// Returns a text that shows its tasks as a tree, each line with the number of the task.
+    pub fn tree_text(&self) -> String {
+        let line = |(position, depth): (usize, usize)| {
+            let row = &self.tasks[position];
+            format!("{:>6}  {}", row.number, task_line(row, depth))
+        };
+        self.tree().into_iter().map(line).collect()
     }
 }
 

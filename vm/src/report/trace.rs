@@ -43,6 +43,9 @@ fn note_for_watchers(vm: &mut Vm, index: TaskIndex, happening: Happening) {
         write_trace(vm, index, happening);
     }
     let Some(task) = vm.scheduler.tasks.at(index) else { return };
+    if vm.watch.observers.list.is_empty() {
+        return;
+    }
     let number = task.number;
     match happening {
         Happening::Begins => {

@@ -8,7 +8,7 @@ use super::question::{abort_call, abort_task, release, take_question};
 use super::signal::signal;
 use super::spawn::{SpawnOptions, make_task};
 use super::wake::make_runnable;
-use crate::host::{Host, Incoming, ProcessSignal};
+use crate::host::{Awaited, Host, Incoming, Look, ProcessSignal, Wake};
 use crate::task::{TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -31,11 +31,7 @@ pub(crate) fn take_in(vm: &mut Vm) -> bool {
             Incoming::AbortCall(number) => abort_call(vm, number),
             Incoming::Pause(pauses) => vm.scheduler.is_paused = pauses && !vm.embedder.is_ending,
             Incoming::Release(number) => release(vm, number),
-            Incoming::Watch => {
-                for observer in vm.watch.coming.take() {
-                    vm.add_observer(observer);
-                }
-            }
+            Incoming::Watch => admit_observers(vm),
             Incoming::SenderCame => vm.outside.senders += 1,
             Incoming::SenderLeft => {
                 vm.outside.senders = vm.outside.senders.saturating_sub(1);
@@ -44,7 +40,37 @@ pub(crate) fn take_in(vm: &mut Vm) -> bool {
             }
         }
     }
+    serve_looks(vm);
     stops
+}
+
+/// Waits in the host, and answers those who look at the run meanwhile.
+pub(crate) fn wait_in_host(vm: &mut Vm, deadline: Option<u64>, awaited: Awaited) -> Wake {
+    loop {
+        let wake = vm.outside.host.wait(deadline, awaited);
+        if wake != Wake::Look {
+            return wake;
+        }
+        vm.outside.inbox.quieten();
+        serve_looks(vm);
+    }
+}
+
+/// Answers those who look at the run, which changes nothing in it.
+pub(super) fn serve_looks(vm: &mut Vm) {
+    for look in vm.outside.inbox.take_looks() {
+        match look {
+            Look::Survey(request, tell) => tell(vm.survey(&request)),
+            Look::Watch => admit_observers(vm),
+        }
+    }
+}
+
+/// Has the observers watch the run who have come.
+fn admit_observers(vm: &mut Vm) {
+    for observer in vm.watch.coming.take() {
+        vm.add_observer(observer);
+    }
 }
 
 /// Ends the run because of a signal, or the task that was named; a signal that no task is named for waits for

@@ -97,6 +97,11 @@ pub(super) fn allocate_without_retry(
 
 /// Reports the failure that has ended the running task, unless a task waits for it or the embedder wants to.
 fn report_end(vm: &mut Vm, end: TaskEnd, is_awaited: bool) {
+    if vm.watch.journal.is_kept
+        && let TaskEnd::Failed(condition) = end
+    {
+        report::note_end_by_failure(vm, condition);
+    }
     let task = vm.scheduler.task_mut();
     if task.flags.kept() || is_awaited {
         return;

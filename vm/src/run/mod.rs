@@ -36,7 +36,7 @@ mod turn;
 mod wake;
 
 pub(crate) use abort::abort_others;
-pub(crate) use arrival::take_in;
+pub(crate) use arrival::{take_in, wait_in_host};
 pub use call::{CallError, FailureArguments};
 pub(crate) use limit::{admit, expire_limit, go_on, open_limit, stand_still};
 pub(crate) use pending::interrupt_by;
@@ -170,7 +170,7 @@ fn run_tasks(vm: &mut Vm, id: Option<TaskId>, ticks: u64, may_wait: bool) -> Run
                 return RunOutcome::Waiting;
             }
             vm.outside.pass_on();
-            vm.outside.host.wait(None, Awaited { news: true, ..Awaited::default() });
+            wait_in_host(vm, None, Awaited { news: true, ..Awaited::default() });
             continue;
         }
         look_at_clock(vm);

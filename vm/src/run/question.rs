@@ -11,6 +11,8 @@ use crate::task::{Task, TaskEnd, TaskId, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 
+/// Beginning of the names of the library's own functions. A call of one is no task of the program.
+const LIBRARY: &str = "ESL::%";
 /// Most tasks that an answer names.
 const SHOWN: usize = 10_000;
 
@@ -90,8 +92,8 @@ fn import_datum(vm: &mut Vm, datum: &Datum) -> Option<Value> {
 }
 
 /// Makes the task that calls a function for somebody outside; `None` if there is no room for it.
-fn begin_call(vm: &mut Vm, function: &FunctionRef, arguments: &[Datum]) -> Option<TaskId> {
-    let function = vm.callee(function)?;
+fn begin_call(vm: &mut Vm, callee: &FunctionRef, arguments: &[Datum]) -> Option<TaskId> {
+    let function = vm.callee(callee)?;
     vm.embedder.pin(&mut vm.heap, function);
     let mut values = vec![function];
     for argument in arguments {
@@ -100,7 +102,13 @@ fn begin_call(vm: &mut Vm, function: &FunctionRef, arguments: &[Datum]) -> Optio
         vm.embedder.pin(&mut vm.heap, value);
         values.push(value);
     }
-    let id = if values.len() > arguments.len() { vm.spawn(values[0], &values[1..]).ok() } else { None };
+    let id = if values.len() <= arguments.len() {
+        None
+    } else if matches!(callee, FunctionRef::Named(name) if name.starts_with(LIBRARY)) {
+        vm.spawn_hidden(values[0], &values[1..]).ok()
+    } else {
+        vm.spawn(values[0], &values[1..]).ok()
+    };
     values.into_iter().for_each(|value| vm.embedder.unpin(value));
     id
 }

@@ -54,20 +54,16 @@ impl Vm {
     /// # Errors
     /// [`Exit::Collect`] if there is no room for it.
     pub fn spawn(&mut self, function: Value, arguments: &[Value]) -> Result<TaskId, Exit> {
-        let id = match try_spawn(self, function, arguments) {
-            Err(Exit::Collect) => {
-                self.embedder.pinned.extend_from_slice(arguments);
-                self.embedder.pinned.push(function);
-                self.collect_fully();
-                self.embedder.pinned.truncate(self.embedder.pinned.len() - arguments.len() - 1);
-                try_spawn(self, function, arguments)?
-            }
-            result => result?,
-        };
-        if let Some(task) = self.scheduler.tasks.get_mut(id) {
-            task.flags.set_kept(true);
-        }
-        Ok(id)
+        spawn_kept(self, function, arguments, SpawnOptions::default())
+    }
+
+    /// Makes a task as [`Vm::spawn`] does, but one of the library, without which the run may end.
+    ///
+    /// # Errors
+    /// As [`Vm::spawn`].
+    pub(crate) fn spawn_hidden(&mut self, function: Value, arguments: &[Value]) -> Result<TaskId, Exit> {
+        let options = SpawnOptions { daemon: true, hidden: true, ..SpawnOptions::default() };
+        spawn_kept(self, function, arguments, options)
     }
 
     /// Forgets a task that has ended; one that has not is dropped as it stands, without its cleanups.
@@ -94,9 +90,37 @@ impl Vm {
     }
 }
 
-fn try_spawn(vm: &mut Vm, function: Value, arguments: &[Value]) -> Result<TaskId, Exit> {
+/// Makes a task that is kept, with a collection before if there is no room for it.
+fn spawn_kept(
+    vm: &mut Vm,
+    function: Value,
+    arguments: &[Value],
+    options: SpawnOptions,
+) -> Result<TaskId, Exit> {
+    let id = match try_spawn(vm, function, arguments, options) {
+        Err(Exit::Collect) => {
+            vm.embedder.pinned.extend_from_slice(arguments);
+            vm.embedder.pinned.push(function);
+            vm.collect_fully();
+            vm.embedder.pinned.truncate(vm.embedder.pinned.len() - arguments.len() - 1);
+            try_spawn(vm, function, arguments, options)?
+        }
+        result => result?,
+    };
+    if let Some(task) = vm.scheduler.tasks.get_mut(id) {
+        task.flags.set_kept(true);
+    }
+    Ok(id)
+}
+
+fn try_spawn(
+    vm: &mut Vm,
+    function: Value,
+    arguments: &[Value],
+    options: SpawnOptions,
+) -> Result<TaskId, Exit> {
     let list = vm.heap.list(arguments)?;
-    make_task(vm, function, list, SpawnOptions::default())
+    make_task(vm, function, list, options)
 }
 
 /// Makes a task that will call `function` with a list of arguments. It has copies of the bindings of the

@@ -3,11 +3,11 @@
 //! Virtual time stands still while tasks run. It moves when all of them wait, to the first time for which one
 //! does, and when so many ticks have run that something else must be meant to happen.
 
-use super::arrival::wake_readers;
+use super::arrival::{serve_looks, wait_in_host, wake_readers};
 use super::limit::expire_in_time;
 use super::tell_how_far;
 use super::wake::{call_attention, make_runnable};
-use crate::host::{Awaited, Host};
+use crate::host::{Awaited, Host, Wake};
 use crate::schedule::Due;
 use crate::task::Task;
 use crate::vm::Vm;
@@ -60,6 +60,7 @@ fn fire_timers(vm: &mut Vm) {
         match timer.due {
             Due::Wait(serial) => {
                 if task.is_some_and(|task| task.is_waiting_since(serial)) {
+                    vm.watch.journal.note_timer(now.saturating_sub(timer.time));
                     make_runnable(vm, timer.index, false);
                 }
             }
@@ -89,12 +90,16 @@ pub(super) fn go_on_in_time(vm: &mut Vm) -> bool {
     let first = vm.scheduler.first_timer();
     let is_virtual = vm.scheduler.clock.is_virtual;
     if vm.outside.inbox.is_rung() {
-        return true;
+        if vm.outside.inbox.why_rung() != Wake::Look {
+            return true;
+        }
+        vm.outside.inbox.quieten();
+        serve_looks(vm);
     }
     let now = vm.scheduler.clock.read(&mut vm.outside.host);
     if input || is_virtual && first.is_some() {
         let deadline = first.filter(|_| is_virtual).unwrap_or(now);
-        vm.outside.host.wait(Some(deadline), Awaited { input, ..Awaited::default() });
+        wait_in_host(vm, Some(deadline), Awaited { input, ..Awaited::default() });
         if input && is_virtual {
             wake_readers(vm);
         }
@@ -121,8 +126,8 @@ pub(crate) fn idle(vm: &mut Vm) -> bool {
     tell_how_far(vm);
     let host = &mut vm.outside.host;
     let begun = vm.scheduler.clock.read(host);
-    host.wait(deadline, awaited);
-    vm.scheduler.clock.idled += vm.scheduler.clock.read(host) - begun;
+    wait_in_host(vm, deadline, awaited);
+    vm.scheduler.clock.idled += vm.scheduler.clock.read(&mut vm.outside.host) - begun;
     if awaited.input && vm.scheduler.clock.is_virtual {
         wake_readers(vm);
     }

@@ -108,6 +108,11 @@ pub(crate) fn is_empty(heap: &Heap, input: Value) -> bool {
     size(heap, input) == 0
 }
 
+/// Returns how many signals there is room for.
+pub(crate) fn capacity(heap: &Heap, input: Value) -> usize {
+    number(heap, input, CAPACITY)
+}
+
 fn is_full(heap: &Heap, input: Value) -> bool {
     size(heap, input) >= number(heap, input, CAPACITY)
 }

@@ -1,0 +1,242 @@
+//! Surveys: what there is to see of a run between two turns, as data.
+//!
+//! A survey reads the machine and changes nothing. Its cost is bounded by what it tells of, but for one pass
+//! over the records of the tasks.
+
+use std::collections::BTreeMap;
+
+use esl_bytecode::symbol::Symbol;
+
+use super::holders::{holders_of, number_of};
+use super::label::{field_of, items};
+use super::tasks::{is_of_library, number_of_owner, program_place};
+use super::{reason_of, task_label};
+use crate::describe::{describe, function_name};
+use crate::host::{
+    FrameRow, InputRow, LockRow, RunFigures, Survey, SurveyRequest, SurveyedTask, TaskStanding,
+};
+use crate::interp::frames::Frames;
+use crate::table::Table;
+use crate::task::{Task, TaskState};
+use crate::value::Value;
+use crate::vm::Vm;
+use crate::wait::{event, input};
+
+/// Most frames of a task, locks, and inputs that are told of.
+const FRAMES: usize = 200;
+const LOCKS: usize = 500;
+const INPUTS: usize = 500;
+/// Facts on a page.
+const FACTS: usize = 500;
+
+/// Fields of a lock of a property, and of a subscription to one. `locks.esl` says what they are.
+const LOCK_KEY: usize = 0;
+const LOCK_VALUE: usize = 1;
+const LOCK_STATE: usize = 2;
+const LOCK_EVENT: usize = 4;
+const LOCK_SUBSCRIPTIONS: usize = 5;
+const SUBSCRIBER: usize = 0;
+
+impl Vm {
+    /// Returns what there is to see of the run, while no task runs.
+    pub fn survey(&self, request: &SurveyRequest) -> Survey {
+        let owners = lock_owners(self);
+        let (mut chosen, mut named): (Vec<&Task>, Vec<&Task>) = (Vec::new(), Vec::new());
+        let mut counts = [0; 4];
+        for task in self.scheduler.tasks.iter().filter(|task| is_of_program(self, task)) {
+            counts[standing_of(task) as usize] += 1;
+            if request.tasks > 0 && task.number.0 > request.after {
+                chosen.push(task);
+            } else if request.named.contains(&task.number.0) {
+                named.push(task);
+            }
+        }
+        let has_more_tasks = chosen.len() > request.tasks;
+        if has_more_tasks {
+            chosen.select_nth_unstable_by_key(request.tasks, |task| task.number);
+            let rest = chosen.split_off(request.tasks);
+            named.extend(rest.into_iter().filter(|task| request.named.contains(&task.number.0)));
+        }
+        chosen.append(&mut named);
+        chosen.sort_unstable_by_key(|task| task.number);
+        let mut survey = Survey {
+            figures: figures(self, counts),
+            tasks: chosen.iter().map(|task| row_of(self, task, &owners)).collect(),
+            has_more_tasks,
+            ..Survey::default()
+        };
+        if let Some(number) = request.frames_of {
+            let task = self.scheduler.tasks.iter().find(|task| task.number.0 == number);
+            survey.frames = task.map_or(Vec::new(), |task| frames(self, task));
+        }
+        if request.data {
+            survey.relations = self.database.relation_rows(&self.heap);
+            survey.locks = locks(self).take(LOCKS).map(|lock| lock_row(self, lock)).collect();
+            survey.inputs = inputs(self);
+        }
+        if let Some((relation, from)) = &request.facts {
+            survey.facts = self.database.fact_texts(&self.heap, relation, *from, FACTS);
+        }
+        if let Some(after) = request.failures_after {
+            let recent = self.watch.journal.recent.iter();
+            survey.failures = recent.filter(|row| row.number > after).cloned().collect();
+        }
+        survey
+    }
+}
+
+/// Returns whether a task is one of the program that has not ended, and not one that answers a question from
+/// outside.
+fn is_of_program(vm: &Vm, task: &Task) -> bool {
+    let is_call = || {
+        let index = event::task_index(&vm.heap, task.object);
+        index.is_some_and(|index| vm.embedder.calls.contains_key(&index))
+    };
+    task.state != TaskState::Ended && !task.flags.hidden() && !(task.flags.kept() && is_call())
+}
+
+fn standing_of(task: &Task) -> TaskStanding {
+    match task.state {
+        _ if task.flags.suspended() => TaskStanding::Suspended,
+        TaskState::Runnable | TaskState::Ended => TaskStanding::Ready,
+        TaskState::Waiting => TaskStanding::Waits,
+        TaskState::Reading | TaskState::Writing => TaskStanding::WaitsForStream,
+    }
+}
+
+/// Returns the number of the task that has made a task; 0 if the embedder has.
+pub(super) fn maker_of(vm: &Vm, task: &Task) -> u64 {
+    number_of_owner(vm, task.object)
+}
+
+/// Returns what there is to say of a task that does not run now.
+pub(super) fn row_of(vm: &Vm, task: &Task, owners: &BTreeMap<u64, u64>) -> SurveyedTask {
+    SurveyedTask {
+        number: task.number.0,
+        maker: maker_of(vm, task),
+        name: task_label(vm, task.object),
+        standing: standing_of(task),
+        waits_for: (task.state != TaskState::Runnable).then(|| reason_of(vm, task)),
+        held_by: holders_of(vm, task, owners),
+        place: program_place(vm, task),
+        ticks: task.ticks,
+        is_daemon: task.flags.daemon(),
+        runs_cleanup: task.runs_cleanup(),
+    }
+}
+
+/// Returns the frames of a parked task that do not belong to the library.
+fn frames(vm: &Vm, task: &Task) -> Vec<FrameRow> {
+    let row = |frame: crate::interp::frames::Frame<'_>| {
+        let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
+        let code = vm.heap.function_code(frame.function)?;
+        let place = vm.world.source_place(&vm.heap, code, word as u32)?;
+        (!is_of_library(&place.source)).then(|| FrameRow {
+            function: function_name(&vm.heap, frame.function),
+            place: Some(format!("{}:{}:{}", place.source, place.line, place.column)),
+        })
+    };
+    let mut rows: Vec<FrameRow> =
+        Frames::of_task(task).take(10 * FRAMES).filter_map(row).take(FRAMES).collect();
+    if rows.is_empty()
+        && let Some(place) = program_place(vm, task)
+    {
+        // The last call of a function leaves no frame of it.
+        rows.push(FrameRow { function: "a function that this call has left".into(), place: Some(place) });
+    }
+    rows
+}
+
+fn figures(vm: &Vm, tasks: [u64; 4]) -> RunFigures {
+    let (scheduler, heap, watch) = (&vm.scheduler, vm.heap.stats(), &vm.watch);
+    let pauses = watch.figures.pauses;
+    RunFigures {
+        tasks,
+        made: scheduler.counts.made,
+        ticks: scheduler.spent,
+        turns: scheduler.counts.turns,
+        rounds: scheduler.rounds,
+        time: scheduler.clock.now,
+        idled: scheduler.clock.idled,
+        is_paused: scheduler.is_paused,
+        facts: vm.database.fact_count() as u64,
+        live: heap.live,
+        allocated: heap.allocated,
+        committed: heap.committed,
+        limit: vm.config.memory as u64,
+        collections: heap.cycles,
+        pauses: [pauses.count, pauses.total, pauses.longest],
+        failures: watch.journal.causes.iter().map(|(cause, &count)| (cause.clone(), count)).collect(),
+        failed: watch.journal.failed,
+        recoveries: watch.journal.recoveries,
+        restarts: variable(vm, "*%RESTARTS*").as_index().unwrap_or(0) as u64,
+        lateness: watch.journal.lateness,
+    }
+}
+
+/// Returns the value of a variable of the library outside of all bindings; `NIL` if it has none.
+fn variable(vm: &Vm, name: &str) -> Value {
+    let symbol = vm.world.find(&Symbol::esl(name)).and_then(|symbol| vm.heap.symbol(symbol));
+    symbol.map_or(Value::NIL, |symbol| symbol.value)
+}
+
+/// Returns the locks of properties.
+fn locks(vm: &Vm) -> impl Iterator<Item = Value> {
+    let table = Table::of(&vm.heap, variable(vm, "*%LOCKS*"));
+    let entries = table.map_or(0, |table| table.used(&vm.heap));
+    (0..entries).filter_map(move |entry| table?.entry(&vm.heap, entry)).map(|(_, lock)| lock)
+}
+
+/// Returns the owner of each lock that others may wait for, by the lock's event.
+pub(super) fn lock_owners(vm: &Vm) -> BTreeMap<u64, u64> {
+    let owner = |lock: Value| {
+        let owner = items(vm, field_of(vm, lock, LOCK_SUBSCRIPTIONS)).next()?;
+        let number = number_of(vm, field_of(vm, owner, SUBSCRIBER))?;
+        Some((field_of(vm, lock, LOCK_EVENT).bits(), number))
+    };
+    locks(vm).take(LOCKS).filter_map(owner).collect()
+}
+
+fn lock_row(vm: &Vm, lock: Value) -> LockRow {
+    let field = |index| field_of(vm, lock, index);
+    let subscriptions = items(vm, field(LOCK_SUBSCRIPTIONS));
+    let key = describe(&vm.heap, field(LOCK_KEY));
+    let value = describe(&vm.heap, field(LOCK_VALUE));
+    LockRow {
+        property: format!("{} {value})", key.strip_suffix(')').unwrap_or(&key)),
+        state: describe(&vm.heap, field(LOCK_STATE)).trim_start_matches(':').to_lowercase(),
+        subscribers: subscriptions.filter_map(|one| number_of(vm, field_of(vm, one, SUBSCRIBER))).collect(),
+    }
+}
+
+fn inputs(vm: &Vm) -> Vec<InputRow> {
+    let row = |(name, &object): (&String, &Value)| InputRow {
+        name: name.clone(),
+        kept: input::size(&vm.heap, object),
+        capacity: input::capacity(&vm.heap, object),
+        signals: event::count(&vm.heap, object).max(0) as u64,
+        dropped: input::dropped(&vm.heap, object) as u64,
+    };
+    vm.outside.inputs.iter().take(INPUTS).map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_machine_without_a_library_can_be_surveyed() {
+        let vm = Vm::for_tests();
+        let canary = vm.canary();
+        let survey = vm.survey(&SurveyRequest {
+            tasks: 10,
+            frames_of: Some(3),
+            data: true,
+            facts: Some((String::new(), 0)),
+            failures_after: Some(0),
+            ..SurveyRequest::default()
+        });
+        assert!(survey.tasks.is_empty() && survey.relations.is_empty() && survey.locks.is_empty());
+        assert_eq!(vm.canary(), canary);
+    }
+}
