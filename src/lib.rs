@@ -37,6 +37,8 @@ pub mod lsp;
 pub mod module_path;
 #[cfg(feature = "cli")]
 pub mod new;
+#[cfg(feature = "cli")]
+pub mod operate;
 pub mod program;
 #[cfg(feature = "cli")]
 pub mod repl;

@@ -12,6 +12,7 @@ use esl::command::{self, NOT_COMPILED, ProgramFile, RightsOptions, SignalTarget,
 use esl::explore::{self, Schedule};
 use esl::host::{Host, ProcessSignal, RealHost, RecordingHost};
 use esl::module_path::ModulePath;
+use esl::operate::OperateOptions;
 use esl::program::{self, Ended, Modules, Program, Summary};
 use esl::replay::{self, FileRecorder, ReplayOptions, RunSetup};
 use esl::testing;
@@ -62,6 +63,8 @@ enum EslvmAction {
         /// Trace failures, goals or tasks on standard error: a list such as failures,tasks
         #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = ["failures", "goals", "tasks"])]
         trace: Vec<String>,
+        #[command(flatten)]
+        operate: OperateOptions,
         /// Source or bytecode file; `-` is a source from standard input
         file: PathBuf,
         /// Arguments of the program
@@ -120,6 +123,20 @@ enum EslvmAction {
         options: ExploreArguments,
         /// Source or bytecode file
         file: PathBuf,
+    },
+    /// Attach to a run that was begun with --listen
+    ///
+    /// Lines are typed here as in the REPL, and evaluated in the run, which goes on meanwhile and afterwards;
+    /// `:help` lists commands. Exit status: 0 the session has ended; 1 the run has; 2 no run can be reached, or
+    /// it refuses the secret; 3 the last form is incomplete.
+    Attach {
+        /// File with the secret that a port asks for; otherwise it is that of the environment variable
+        /// ESL_SECRET
+        #[arg(long, value_name = "FILE")]
+        secret_file: Option<PathBuf>,
+        /// Path or port that was given to --listen
+        #[arg(value_name = "PATH|PORT")]
+        address: String,
     },
     /// Read forms, evaluate them and print their values
     Repl {
@@ -257,6 +274,7 @@ fn main() -> ExitCode {
             schedule,
             record,
             trace,
+            operate,
             file,
             arguments,
         } => {
@@ -269,7 +287,7 @@ fn main() -> ExitCode {
                 let host = RealHost::new(arguments).with_rights(path.with_rights(rights)).with_speed(speed);
                 let schedule = schedule.as_deref().map(explore::read_schedule).transpose()?;
                 let (timeline, record) = (timeline.as_deref(), record.as_deref());
-                let reports = RunReports { stats, timeline, record, trace: &trace };
+                let reports = RunReports { stats, timeline, record, trace: &trace, operate: &operate };
                 run(&file, host, &options, &reports, schedule.as_ref(), &path)
             })
         }
@@ -289,6 +307,7 @@ fn main() -> ExitCode {
         EslvmAction::Completions { shell } => Ok(command::print_completions(shell, Eslvm::command())),
         EslvmAction::Man { folder } => Ok(command::write_man_pages(Eslvm::command(), folder.as_deref())),
         EslvmAction::Explore { options, file } => run_explore(&file, &options, &library),
+        EslvmAction::Attach { secret_file, address } => esl::repl::attach(&address, secret_file.as_deref()),
         EslvmAction::Repl { options } => options.rights.rights().and_then(|rights| {
             let path = ModulePath::new([Path::new("-")], &library);
             esl::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)
@@ -379,6 +398,7 @@ struct RunReports<'a> {
     timeline: Option<&'a Path>,
     record: Option<&'a Path>,
     trace: &'a [String],
+    operate: &'a OperateOptions,
 }
 
 fn run(
@@ -389,7 +409,7 @@ fn run(
     schedule: Option<&Schedule>,
     path: &ModulePath,
 ) -> Result<u8, u8> {
-    let RunReports { stats, timeline, record, trace } = *reports;
+    let RunReports { stats, timeline, record, trace, operate } = *reports;
     for output in [timeline, record].into_iter().flatten() {
         command::refuse_overwriting(output, [file])?;
     }
@@ -436,6 +456,7 @@ fn run(
         }
         None => None,
     };
+    let served = operate.begin(&mut machine)?;
     let started = std::time::Instant::now();
     let summary = match schedule {
         Some(schedule) if !schedule.is_of(&program) => {
@@ -449,6 +470,7 @@ fn run(
     };
     let summary = summary.map_err(setup)?;
     let seconds = started.elapsed().as_secs_f64();
+    drop(served);
     let mut status = command::exit_status(summary.ended);
     if let Some((recorder, path)) = recording
         && let Err(error) = recorder.end(&machine, status)

@@ -63,6 +63,8 @@ pub fn machine(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, Error> 
     esl_stdlib::load(&mut machine).map_err(|_| Error::NoMemory("the library"))?;
     #[cfg(feature = "world")]
     esl_world::install_modules(&mut machine);
+    #[cfg(feature = "cli")]
+    crate::operate::attach::install_nobody(&mut machine);
     machine.begin_program(config);
     Ok(machine)
 }
@@ -232,7 +234,11 @@ pub(crate) fn end(machine: &mut Vm, main: TaskId, outcome: RunOutcome) -> Ended 
 
 #[cfg(test)]
 mod tests {
-    use esl_vm::host::VirtualHost;
+    use std::sync::{Arc, Mutex};
+
+    use esl_vm::host::{Inbox, Look, Survey, SurveyRequest, VirtualHost};
+    use esl_vm::observe::{Observer, Seen};
+    use esl_vm::task::TaskNumber;
 
     use super::*;
     use crate::program::{Source, compile};
@@ -251,6 +257,71 @@ mod tests {
             let summary = run(&program, config, Box::new(VirtualHost::new())).expect("it runs");
             assert_eq!(summary.ended, Ended::Failed, "{pause}");
         }
+    }
+
+    /// Looks at the machine whenever something happens.
+    struct Onlooker {
+        inbox: Inbox,
+        seen: Arc<Mutex<Vec<Survey>>>,
+        looks: u64,
+    }
+
+    impl Observer for Onlooker {
+        fn see(&mut self, _: u64, _: TaskNumber, _: Seen<'_>) {
+            self.looks += 1;
+            let request = SurveyRequest {
+                tasks: 100,
+                data: true,
+                facts: Some((String::new(), 0)),
+                frames_of: Some(self.looks % 9),
+                failures_after: Some(0),
+                ..SurveyRequest::default()
+            };
+            let seen = self.seen.clone();
+            let tell = Box::new(move |survey| seen.lock().expect("nobody panics").push(survey));
+            self.inbox.look(Look::Survey(request, tell));
+        }
+    }
+
+    #[test]
+    fn who_looks_on_changes_nothing() {
+        let text = "(define-property mode ())
+            (define-input news :capacity 2)
+            (define-resource arm)
+            (assert '(mode calm))
+            (spawn (:name 'worker) (with-resource (arm) (sleep 2) (ignore-errors (fail :slip 7))))
+            (spawn (:name 'rival) (sleep 1) (with-resource (arm) (assert '(mode busy))))
+            (dotimes (i 30) (signal news i) (sleep 0.1) (princ (random 10)) (dotimes (j 3000)))";
+        let program = compile(&[Source::new("looked-at.esl", text)]).program.expect("it compiles");
+        let canary = |is_watched: bool| {
+            let host = VirtualHost::new();
+            let captured = host.captured();
+            let mut machine = machine(Config::DEFAULT, Box::new(host)).expect("there is room");
+            let seen = Arc::default();
+            if is_watched {
+                machine.keep_journal();
+                machine.gather_figures(true);
+                let onlooker = Onlooker { inbox: machine.inbox(), seen: Arc::clone(&seen), looks: 0 };
+                machine.coming_observers().add(Box::new(onlooker));
+                machine.inbox().look(Look::Watch);
+            }
+            let summary = run_in(&mut machine, &program).expect("it runs");
+            assert_eq!(summary.ended, Ended::Normally(0), "{}", captured.error());
+            let seen = std::mem::take(&mut *seen.lock().expect("nobody panics"));
+            (machine.canary(), captured.output(), seen)
+        };
+        let (alone, output, _) = canary(false);
+        let (watched, same, seen) = canary(true);
+        assert_eq!((alone, output), (watched, same));
+        let rival = seen
+            .iter()
+            .flat_map(|survey| &survey.tasks)
+            .find(|row| row.waits_for.as_deref() == Some("resource ARM, held by task WORKER"));
+        let worker = seen.iter().flat_map(|survey| &survey.tasks).find(|row| row.name == "task WORKER");
+        assert_eq!(rival.map(|row| row.held_by.clone()), worker.map(|row| vec![row.number]));
+        let last = seen.last().expect("it was looked at");
+        assert_eq!((last.inputs[0].name.as_str(), last.inputs[0].kept), ("NEWS", 2));
+        assert!(seen.iter().any(|survey| survey.facts == ["(MODE CALM)"]), "{seen:?}");
     }
 
     #[test]

@@ -18,6 +18,7 @@
 //! ```
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "the REPL talks with people")]
 
+mod attached;
 mod editor;
 mod lines;
 mod screen;
@@ -37,6 +38,7 @@ use esl_vm::vm::{Config, Vm};
 use crate::command::{Interrupts, NOT_COMPILED, SIGNALLED, SUCCESS, USAGE, complain, interrupt_on_signal};
 use crate::module_path::ModulePath;
 use crate::program;
+pub use attached::attach;
 use lines::Line;
 use screen::PromptScreen;
 use typing::Typing;

@@ -86,7 +86,8 @@ pub(super) fn write(out: &mut ByteWriter, noted: &NotedRecord, before: &mut Befo
             begin(out, tag::WAITED);
             out.byte(match wake {
                 Wake::Time => 0,
-                Wake::Arrival => 1,
+                // Nobody records that the run was looked at.
+                Wake::Arrival | Wake::Look => 1,
                 Wake::Never => 2,
             });
         }

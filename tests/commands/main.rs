@@ -1,8 +1,12 @@
 //! The commands `eslc` and `eslvm`, run as processes: exit statuses, outputs, and what they do to files.
 
+#[cfg(unix)]
+mod attach;
 mod author;
 mod background;
 mod bad_input;
+#[cfg(unix)]
+mod browser;
 mod deadlock;
 mod editors;
 mod examples;
@@ -16,8 +20,10 @@ mod lsp;
 mod memory;
 mod missions;
 mod modules;
+mod monitor;
 #[cfg(unix)]
 mod mqtt;
+mod operate;
 mod real_time;
 mod recording;
 mod replay;

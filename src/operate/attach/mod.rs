@@ -1,0 +1,274 @@
+//! Sessions of operators who are attached to a run: the server.
+//!
+//! The wire protocol is that of SLIME's server, SWANK: packets of forms, each request with a number, each
+//! answer with that of its request. A request says what it needs by its role; one that only looks is answered
+//! by a survey, all others come through the inbox of the machine as calls, aborts and signals.
+//!
+//! Guarantees: a connection over TCP says its secret before anything else is parsed; a packet is bounded
+//! before it is read; a session has a bounded number of requests under way, and they end with it.
+
+mod form;
+mod packet;
+mod request;
+mod session;
+
+use std::collections::HashMap;
+use std::io;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use esl_bytecode::datum::DatumKind;
+use esl_vm::embed::HostFunction;
+use esl_vm::vm::Vm;
+use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
+use tokio::sync::{Semaphore, mpsc};
+
+pub(crate) use form::WireForm;
+pub(crate) use packet::{read, write};
+pub(super) use session::codes_of;
+
+use super::scope::RunScope;
+use super::secrets::{OperatorRole, Secrets};
+use packet::LARGEST;
+use session::OperatorSession;
+
+/// Most sessions at a time.
+const SESSIONS: usize = 32;
+/// Most requests of a session under way.
+const UNDER_WAY: usize = 16;
+/// Most bytes of the packet with a secret.
+const SECRET: usize = 1000;
+/// Time that a peer has to say its secret, and to take a packet.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// Packets on their way to a peer.
+const WAITING: usize = 256;
+
+/// Where the output of sessions goes, by their numbers.
+#[derive(Clone, Default)]
+struct SessionOutputs(Arc<Mutex<HashMap<u64, mpsc::Sender<WireForm>>>>);
+
+impl SessionOutputs {
+    fn table(&self) -> MutexGuard<'_, HashMap<u64, mpsc::Sender<WireForm>>> {
+        // The table is whole at every moment, so a panic elsewhere does not corrupt it.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Where operators connect.
+pub(super) enum Entrance {
+    /// At a port, with a secret.
+    Tcp(std::net::TcpListener, Secrets),
+    /// At a path that only the owner of the process can open.
+    #[cfg(unix)]
+    Unix(std::os::unix::net::UnixListener),
+}
+
+/// Lets operators connect to the run of a machine.
+///
+/// # Errors
+/// The reason, if there is no event loop.
+pub(super) fn serve(machine: &mut Vm, door: Entrance, scope: RunScope) -> Result<(), String> {
+    let outputs = SessionOutputs::default();
+    let told = outputs.clone();
+    let tell = move |arguments: &[esl_bytecode::datum::Datum]| {
+        if let [number, text] = arguments
+            && let (DatumKind::Integer(number), DatumKind::String(text)) = (number.kind(), text.kind())
+            && let Ok(number) = u64::try_from(number.clone())
+            && let Some(output) = told.table().get(&number)
+        {
+            // Who does not read loses what is written.
+            drop(output.try_send(written(text)));
+        }
+        Ok(esl_bytecode::datum::Datum::nil(Default::default()))
+    };
+    machine.add_host_function(TELL, HostFunction::AtOnce(Box::new(tell)));
+    esl_world::spawn(accept(door, Arc::new(Attendance { scope, outputs, sessions: AtomicU64::new(0) })))
+}
+
+/// Name of the function by which the library tells operators what was written.
+const TELL: &str = "%TELL-OPERATOR";
+
+/// Gives a machine that nobody attends the function by which the library tells operators something.
+pub(crate) fn install_nobody(machine: &mut Vm) {
+    let ignore = |_: &[esl_bytecode::datum::Datum]| Ok(esl_bytecode::datum::Datum::nil(Default::default()));
+    machine.add_host_function(TELL, HostFunction::AtOnce(Box::new(ignore)));
+}
+
+/// Returns the form that tells what was written.
+fn written(text: &str) -> WireForm {
+    // A form has a quotation mark or a backslash for each of its characters at worst.
+    let end = text.char_indices().map(|(at, _)| at).find(|&at| at > LARGEST / 2 - 1000);
+    let text = match end {
+        Some(end) => format!("{}…\n", &text[..end]),
+        None => text.to_string(),
+    };
+    WireForm::list([WireForm::symbol(":write-string"), WireForm::Text(text)])
+}
+
+/// What all sessions of a run share.
+struct Attendance {
+    scope: RunScope,
+    outputs: SessionOutputs,
+    /// Number of sessions so far.
+    sessions: AtomicU64,
+}
+
+async fn accept(door: Entrance, attendance: Arc<Attendance>) {
+    let room = Arc::new(Semaphore::new(SESSIONS));
+    // They have been made for this, so the event loop takes them.
+    match door {
+        Entrance::Tcp(listener, secrets) => {
+            let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
+            loop {
+                let Ok(permit) = room.clone().acquire_owned().await else { return };
+                match listener.accept().await {
+                    Ok((stream, _)) => {
+                        let (attendance, secrets) = (attendance.clone(), secrets.clone());
+                        drop(stream.set_nodelay(true));
+                        let (reader, writer) = stream.into_split();
+                        tokio::spawn(async move {
+                            drop(attend(reader, writer, Some(secrets), &attendance).await);
+                            drop(permit);
+                        });
+                    }
+                    Err(_) => tokio::time::sleep(Duration::from_millis(100)).await,
+                }
+            }
+        }
+        #[cfg(unix)]
+        Entrance::Unix(listener) => {
+            let Ok(listener) = tokio::net::UnixListener::from_std(listener) else { return };
+            loop {
+                let Ok(permit) = room.clone().acquire_owned().await else { return };
+                match listener.accept().await {
+                    Ok((stream, _)) => {
+                        let attendance = attendance.clone();
+                        let (reader, writer) = stream.into_split();
+                        tokio::spawn(async move {
+                            drop(attend(reader, writer, None, &attendance).await);
+                            drop(permit);
+                        });
+                    }
+                    Err(_) => tokio::time::sleep(Duration::from_millis(100)).await,
+                }
+            }
+        }
+    }
+}
+
+/// Serves one connection to its end. With `secrets`, the peer says one of them first.
+///
+/// # Errors
+/// What ends the connection.
+async fn attend(
+    mut reader: impl AsyncRead + Unpin,
+    mut writer: impl AsyncWrite + Unpin + Send + 'static,
+    secrets: Option<Secrets>,
+    attendance: &Attendance,
+) -> io::Result<()> {
+    let role = match secrets {
+        None => OperatorRole::Patch,
+        Some(secrets) => {
+            let said = tokio::time::timeout(PATIENCE, packet::read_async(&mut reader, SECRET)).await??;
+            let form = WireForm::parse(&said).ok();
+            let role =
+                form.as_ref().and_then(WireForm::as_text).and_then(|text| secrets.role_of(text.as_bytes()));
+            let Some(role) = role else { return Err(io::ErrorKind::PermissionDenied.into()) };
+            role
+        }
+    };
+    let (answers, mut waiting) = mpsc::channel::<WireForm>(WAITING);
+    let number = attendance.sessions.fetch_add(1, Ordering::Relaxed) + 1;
+    attendance.outputs.table().insert(number, answers.clone());
+    let write = tokio::spawn(async move {
+        while let Some(form) = waiting.recv().await {
+            let too_large = || {
+                WireForm::list([
+                    WireForm::symbol(":write-string"),
+                    WireForm::text("; the answer is too large\n"),
+                ])
+            };
+            let packet = packet::packet(&form).or_else(|| packet::packet(&too_large())).unwrap_or_default();
+            // Who takes nothing is let go.
+            match tokio::time::timeout(PATIENCE, writer.write_all(&packet)).await {
+                Ok(Ok(())) => {}
+                _ => break,
+            }
+        }
+        drop(writer.shutdown().await);
+    });
+    let session = Arc::new(OperatorSession::new(number, role, attendance.scope.clone()));
+    let ended = take_requests(&mut reader, &session, &answers).await;
+    attendance.outputs.table().remove(&number);
+    session.end();
+    drop(answers);
+    // What is under way ends with the session, and then there is nothing more to write.
+    drop(tokio::time::timeout(PATIENCE, write).await);
+    ended
+}
+
+/// Takes requests until the connection ends.
+///
+/// # Errors
+/// What ends it.
+async fn take_requests(
+    reader: &mut (impl AsyncRead + Unpin),
+    session: &Arc<OperatorSession>,
+    answers: &mpsc::Sender<WireForm>,
+) -> io::Result<()> {
+    let room = Arc::new(Semaphore::new(UNDER_WAY));
+    loop {
+        let text = tokio::select! {
+            text = packet::read_async(reader, LARGEST) => text?,
+            // Nobody takes the answers any more.
+            () = answers.closed() => return Ok(()),
+        };
+        let request = match WireForm::parse(&text) {
+            Ok(request) => request,
+            Err(reason) => {
+                let reason = WireForm::list([WireForm::symbol(":invalid"), WireForm::text(reason)]);
+                _ = answers.send(reason).await;
+                continue;
+            }
+        };
+        let items = request.items().unwrap_or_default();
+        match items.first().and_then(WireForm::name).as_deref() {
+            Some(":emacs-rex") if items.len() >= 5 => {
+                let (form, number) = (items[1].clone(), items[4].clone());
+                let Ok(permit) = room.clone().try_acquire_owned() else {
+                    let refusal = answer(Err("too many requests are under way".into()), number);
+                    _ = answers.send(refusal).await;
+                    continue;
+                };
+                let (session, answers) = (session.clone(), answers.clone());
+                tokio::spawn(async move {
+                    let result = session.perform(&form).await;
+                    _ = answers.send(answer(result, number)).await;
+                    drop(permit);
+                });
+            }
+            Some(":emacs-interrupt") => session.interrupt(),
+            Some(":ping") => {
+                let pong = items.iter().skip(1).cloned();
+                _ = answers
+                    .send(WireForm::list([WireForm::symbol(":emacs-pong")].into_iter().chain(pong)))
+                    .await;
+            }
+            _ => {
+                let reason =
+                    WireForm::list([WireForm::symbol(":invalid"), WireForm::text("it is no request")]);
+                _ = answers.send(reason).await;
+            }
+        }
+    }
+}
+
+/// Returns the answer to the request with this number.
+fn answer(result: Result<WireForm, String>, number: WireForm) -> WireForm {
+    let result = match result {
+        Ok(value) => WireForm::list([WireForm::symbol(":ok"), value]),
+        Err(reason) => WireForm::list([WireForm::symbol(":abort"), WireForm::Text(reason)]),
+    };
+    WireForm::list([WireForm::symbol(":return"), result, number])
+}

@@ -1,0 +1,85 @@
+//! Packets: six hexadecimal digits with the length in bytes of the form that follows.
+//!
+//! Source: the protocol of SLIME's server, SWANK.
+
+use std::io::{self, Error, ErrorKind, Read, Write};
+
+use tokio::io::{AsyncRead, AsyncReadExt};
+
+use super::form::WireForm;
+
+/// Most bytes of a packet.
+pub(crate) const LARGEST: usize = 1 << 20;
+
+fn length(head: [u8; 6]) -> io::Result<usize> {
+    let text = std::str::from_utf8(&head).ok().filter(|text| text.bytes().all(|b| b.is_ascii_hexdigit()));
+    let length = text.and_then(|text| usize::from_str_radix(text, 16).ok());
+    length.filter(|&length| length <= LARGEST).ok_or(Error::from(ErrorKind::InvalidData))
+}
+
+/// Reads a packet, on the event loop.
+///
+/// # Errors
+/// If the connection ends, or it is not a packet of at most `most` bytes of text.
+pub(super) async fn read_async(from: &mut (impl AsyncRead + Unpin), most: usize) -> io::Result<String> {
+    let mut head = [0; 6];
+    from.read_exact(&mut head).await?;
+    let length = length(head)?;
+    if length > most {
+        return Err(ErrorKind::InvalidData.into());
+    }
+    // Room is made for what has come, not for what was announced.
+    let mut bytes = Vec::new();
+    from.take(length as u64).read_to_end(&mut bytes).await?;
+    if bytes.len() < length {
+        return Err(ErrorKind::UnexpectedEof.into());
+    }
+    String::from_utf8(bytes).map_err(|_| ErrorKind::InvalidData.into())
+}
+
+/// Reads a packet.
+///
+/// # Errors
+/// If the connection ends, or it is not a packet.
+pub(crate) fn read(from: &mut impl Read) -> io::Result<WireForm> {
+    let mut head = [0; 6];
+    from.read_exact(&mut head)?;
+    let mut bytes = vec![0; length(head)?];
+    from.read_exact(&mut bytes)?;
+    let text = String::from_utf8(bytes).map_err(|_| Error::from(ErrorKind::InvalidData))?;
+    WireForm::parse(&text).map_err(|_| ErrorKind::InvalidData.into())
+}
+
+/// Writes a packet.
+///
+/// # Errors
+/// If the connection has ended, or the form is too large.
+pub(crate) fn write(to: &mut impl Write, form: &WireForm) -> io::Result<()> {
+    let packet = packet(form).ok_or(Error::from(ErrorKind::InvalidData))?;
+    to.write_all(&packet)?;
+    to.flush()
+}
+
+/// Returns the packet of a form; `None` if it would be too large.
+pub(super) fn packet(form: &WireForm) -> Option<Vec<u8>> {
+    let text = format!("{form}\n");
+    (text.len() <= LARGEST).then(|| format!("{:06x}{text}", text.len()).into_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_packet_is_read_as_it_was_written() {
+        let form =
+            WireForm::list([WireForm::symbol(":return"), WireForm::text("ü\n"), WireForm::Integer(-3)]);
+        let mut bytes = Vec::new();
+        write(&mut bytes, &form).expect("there is room");
+        assert_eq!(bytes[..6], *b"000013");
+        assert_eq!(read(&mut &bytes[..]).ok(), Some(form));
+        for wrong in ["", "00000", "00000g(a)", "-00001a", "ffffff", "000002a", "000001("] {
+            assert!(read(&mut wrong.as_bytes()).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! HTTP for the servers of a run: connections, and answers.
+//!
+//! Guarantees: at most [`CONNECTIONS`] at a time; heads are bounded, in size and in the time that they take;
+//! a request must name the server by an address or as `localhost`, so that no page of another site reaches
+//! it by a name of its own.
+
+use std::convert::Infallible;
+use std::net::{IpAddr, TcpListener};
+use std::sync::Arc;
+use std::time::Duration;
+
+use bytes::Bytes;
+use http_body_util::combinators::BoxBody;
+use http_body_util::{BodyExt, Full};
+use hyper::body::Incoming;
+use hyper::header::{CACHE_CONTROL, CONTENT_TYPE, HOST, HeaderValue, X_CONTENT_TYPE_OPTIONS};
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper::{Request, Response, StatusCode};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use tokio::sync::{Notify, Semaphore};
+
+/// Most connections at a time.
+const CONNECTIONS: usize = 64;
+/// Most bytes of the head of a request.
+const HEAD: usize = 16 << 10;
+/// Time that a peer has for the head of a request.
+const HEAD_TIME: Duration = Duration::from_secs(10);
+
+/// HttpBody of an answer.
+pub(super) type HttpBody = BoxBody<Bytes, Infallible>;
+
+/// Ends the connection of a request, whatever is on its way.
+#[derive(Clone, Default)]
+pub(super) struct Hangup(Arc<Notify>);
+
+impl Hangup {
+    /// Ends the connection.
+    pub(super) fn hang_up(&self) {
+        self.0.notify_one();
+    }
+}
+
+/// Serves requests at a listener, on the event loop.
+///
+/// # Errors
+/// The reason, if there is no event loop.
+pub(super) fn serve<F, R>(listener: TcpListener, handler: F) -> Result<(), String>
+where
+    F: Fn(Request<Incoming>, Hangup) -> R + Clone + Send + Sync + 'static,
+    R: Future<Output = Response<HttpBody>> + Send + 'static,
+{
+    esl_world::spawn(async move {
+        // It has been made for this, so the event loop takes it.
+        let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
+        let room = Arc::new(Semaphore::new(CONNECTIONS));
+        loop {
+            let Ok(permit) = room.clone().acquire_owned().await else { return };
+            let Ok((stream, _)) = listener.accept().await else {
+                // The system lacks something, such as descriptors; others may give it back.
+                tokio::time::sleep(Duration::from_millis(100)).await;
+                continue;
+            };
+            let handler = handler.clone();
+            tokio::spawn(async move {
+                let hangup = Hangup::default();
+                let end = hangup.clone();
+                let service = service_fn(move |request| {
+                    let answer = answer(request, hangup.clone(), handler.clone());
+                    async move { Ok::<_, Infallible>(answer.await) }
+                });
+                let connection = http1::Builder::new()
+                    .timer(TokioTimer::new())
+                    .header_read_timeout(HEAD_TIME)
+                    .max_buf_size(HEAD)
+                    .serve_connection(TokioIo::new(stream), service);
+                tokio::select! {
+                    // What the peer does wrong ends its connection.
+                    _ = connection => {}
+                    () = end.0.notified() => {}
+                }
+                drop(permit);
+            });
+        }
+    })
+}
+
+async fn answer<F, R>(request: Request<Incoming>, hangup: Hangup, handler: F) -> Response<HttpBody>
+where
+    F: Fn(Request<Incoming>, Hangup) -> R,
+    R: Future<Output = Response<HttpBody>>,
+{
+    if !request.headers().get(HOST).is_some_and(is_own_name) {
+        return plain(StatusCode::MISDIRECTED_REQUEST, "this server is reached by its address only\n");
+    }
+    handler(request, hangup).await
+}
+
+/// Returns whether a `Host` header names a server by its address, or as `localhost`.
+fn is_own_name(host: &HeaderValue) -> bool {
+    let Ok(host) = host.to_str() else { return false };
+    let name = match host.rsplit_once(':') {
+        Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
+        _ => host,
+    };
+    let name = name.strip_prefix('[').and_then(|name| name.strip_suffix(']')).unwrap_or(name);
+    name == "localhost" || name.parse::<IpAddr>().is_ok()
+}
+
+/// Returns an answer with a text.
+pub(super) fn plain(status: StatusCode, text: &'static str) -> Response<HttpBody> {
+    with(status, "text/plain; charset=utf-8", text)
+}
+
+/// Returns an answer with contents of some type, which nobody keeps.
+pub(super) fn with(
+    status: StatusCode,
+    content_type: &'static str,
+    contents: impl Into<Bytes>,
+) -> Response<HttpBody> {
+    let mut response = Response::new(Full::new(contents.into()).boxed());
+    *response.status_mut() = status;
+    let headers = response.headers_mut();
+    headers.insert(CONTENT_TYPE, HeaderValue::from_static(content_type));
+    headers.insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    headers.insert(X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_other_sites_are_not_ones_own() {
+        let is_own = |host: &str| HeaderValue::from_str(host).is_ok_and(|host| is_own_name(&host));
+        for host in ["127.0.0.1:8080", "localhost", "localhost:1", "[::1]:80", "10.0.0.7"] {
+            assert!(is_own(host), "{host}");
+        }
+        for host in ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "", "localhost.evil:1"] {
+            assert!(!is_own(host), "{host}");
+        }
+    }
+}

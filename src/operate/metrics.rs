@@ -1,0 +1,162 @@
+//! Figures of a run in the text format of Prometheus.
+
+use std::fmt::{Display, Write};
+use std::net::TcpListener;
+
+use esl_vm::host::{Survey, SurveyRequest, TaskStanding};
+use hyper::{Method, StatusCode};
+
+use super::http::{self, plain, with};
+use super::scope::RunScope;
+
+/// Serves the figures at `/metrics`.
+///
+/// # Errors
+/// The reason, if there is no event loop.
+pub(super) fn serve(listener: TcpListener, scope: RunScope) -> Result<(), String> {
+    http::serve(listener, move |request, _| {
+        let scope = scope.clone();
+        async move {
+            if request.uri().path() != "/metrics" {
+                return plain(StatusCode::NOT_FOUND, "the figures are at /metrics\n");
+            }
+            if !matches!(*request.method(), Method::GET | Method::HEAD) {
+                return plain(StatusCode::METHOD_NOT_ALLOWED, "figures are only read\n");
+            }
+            match scope.survey(SurveyRequest { data: true, ..SurveyRequest::default() }).await {
+                Some(survey) => {
+                    with(StatusCode::OK, "text/plain; version=0.0.4; charset=utf-8", text_of(&survey))
+                }
+                None => plain(StatusCode::SERVICE_UNAVAILABLE, "the machine does not answer\n"),
+            }
+        }
+    })
+}
+
+/// A text in the format of Prometheus.
+#[derive(Default)]
+struct Exposition(String);
+
+impl Exposition {
+    /// Begins the samples of a metric.
+    fn begin(&mut self, name: &str, kind: &str, help: &str) {
+        // Writing to a string does not fail.
+        _ = write!(self.0, "# HELP {name} {help}\n# TYPE {name} {kind}\n");
+    }
+
+    fn sample(&mut self, name: &str, label: Option<(&str, &str)>, value: impl Display) {
+        _ = match label {
+            None => writeln!(self.0, "{name} {value}"),
+            Some((label, text)) => writeln!(self.0, "{name}{{{label}=\"{}\"}} {value}", escaped(text)),
+        };
+    }
+
+    fn single(&mut self, name: &str, kind: &str, help: &str, value: impl Display) {
+        self.begin(name, kind, help);
+        self.sample(name, None, value);
+    }
+}
+
+/// Returns the value of a label as the format has it.
+fn escaped(text: &str) -> String {
+    text.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n")
+}
+
+fn seconds(nanoseconds: u64) -> f64 {
+    nanoseconds as f64 / 1e9
+}
+
+/// Returns the figures as a text.
+fn text_of(survey: &Survey) -> String {
+    let figures = &survey.figures;
+    let mut text = Exposition::default();
+    text.begin("esl_tasks", "gauge", "Tasks of the program that have not ended, by what they do.");
+    for (standing, count) in TaskStanding::ALL.into_iter().zip(figures.tasks) {
+        text.sample("esl_tasks", Some(("state", standing.name())), count);
+    }
+    let counters = [
+        ("esl_tasks_made_total", "Tasks made, those of the library included.", figures.made),
+        ("esl_ticks_total", "Ticks of all tasks.", figures.ticks),
+        ("esl_turns_total", "Turns of tasks.", figures.turns),
+        ("esl_recoveries_total", "Recovery procedures that have begun.", figures.recoveries),
+        ("esl_restarts_total", "Restarts of children by supervisors.", figures.restarts),
+        ("esl_collections_total", "Collections that are complete.", figures.collections),
+        ("esl_allocated_bytes_total", "Bytes of objects made.", figures.allocated),
+    ];
+    for (name, help, value) in counters {
+        text.single(name, "counter", help, value);
+    }
+    text.begin(
+        "esl_failures_total",
+        "counter",
+        "Failures by cause, those included that were recovered from.",
+    );
+    for (cause, count) in &figures.failures {
+        text.sample("esl_failures_total", Some(("cause", cause)), count);
+    }
+    let gauges = [
+        ("esl_memory_live_bytes", "Bytes of objects that the last collection has left.", figures.live),
+        ("esl_memory_committed_bytes", "Bytes taken from the system for objects.", figures.committed),
+        ("esl_memory_limit_bytes", "Most bytes that objects may take.", figures.limit),
+        ("esl_facts", "Facts in the database.", figures.facts),
+        ("esl_paused", "1 while the run is paused from outside.", figures.is_paused.into()),
+    ];
+    for (name, help, value) in gauges {
+        text.single(name, "gauge", help, value);
+    }
+    let [count, total, longest] = figures.pauses;
+    text.begin("esl_pause_seconds", "summary", "Pauses for the collector.");
+    text.sample("esl_pause_seconds_count", None, count);
+    text.sample("esl_pause_seconds_sum", None, seconds(total));
+    text.single("esl_pause_longest_seconds", "gauge", "The longest pause.", seconds(longest));
+    let late = figures.lateness;
+    text.begin("esl_timer_lateness_seconds", "summary", "How late sleeps and timeouts of waits ended.");
+    text.sample("esl_timer_lateness_seconds_count", None, late.count);
+    text.sample("esl_timer_lateness_seconds_sum", None, seconds(late.total));
+    text.single("esl_timer_lateness_longest_seconds", "gauge", "The latest timer.", seconds(late.longest));
+    text.single(
+        "esl_idle_seconds_total",
+        "counter",
+        "Seconds of the program's clock in which all tasks waited.",
+        seconds(figures.idled),
+    );
+    let kept = |row: &esl_vm::host::InputRow| row.kept as u64;
+    let inputs: [(&str, &str, &str, fn(&esl_vm::host::InputRow) -> u64); 3] = [
+        ("esl_input_signals_total", "counter", "Signals of an input.", |row| row.signals),
+        ("esl_input_dropped_total", "counter", "Signals of an input that were dropped.", |row| row.dropped),
+        ("esl_input_waiting", "gauge", "Signals of an input that nobody has taken yet.", kept),
+    ];
+    for (name, kind, help, value) in inputs {
+        text.begin(name, kind, help);
+        for row in &survey.inputs {
+            text.sample(name, Some(("input", &row.name)), value(row));
+        }
+    }
+    text.0
+}
+
+#[cfg(test)]
+mod tests {
+    use esl_vm::host::RunFigures;
+
+    use super::*;
+
+    #[test]
+    fn figures_become_samples() {
+        let figures = RunFigures {
+            tasks: [1, 2, 0, 0],
+            failures: vec![(":A \"B\\".into(), 3)],
+            pauses: [2, 1_500_000_000, 1_000_000_000],
+            ..RunFigures::default()
+        };
+        let text = text_of(&Survey { figures, ..Survey::default() });
+        for line in [
+            "esl_tasks{state=\"waits\"} 2",
+            "esl_failures_total{cause=\":A \\\"B\\\\\"} 3",
+            "esl_pause_seconds_sum 1.5",
+            "# TYPE esl_ticks_total counter",
+        ] {
+            assert!(text.lines().any(|found| found == line), "{line}\n{text}");
+        }
+    }
+}

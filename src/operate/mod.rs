@@ -1,0 +1,229 @@
+//! Operating a run from outside: metrics, the monitor, and sessions of operators.
+//!
+//! Servers live on the event loop of `world/`. What they only look at they see by surveys, which change
+//! nothing in the run; what they do comes through the machine's inbox. Without an option nothing here runs.
+//!
+//! Guarantees: other machines reach nothing without having been told to by an address; what may do anything
+//! asks for a secret, which is compared in constant time; what is asked is bounded before it is parsed.
+#![allow(clippy::print_stderr, reason = "commands say where they can be reached")]
+
+pub(crate) mod attach;
+mod http;
+mod metrics;
+mod monitor;
+mod scope;
+mod secrets;
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use esl_vm::vm::Vm;
+
+use crate::command::{USAGE, complain};
+use attach::Entrance;
+use scope::RunScope;
+use secrets::{OperatorRole, Secrets};
+
+/// Options by which a run can be operated from outside.
+#[derive(Args, Clone, Debug, Default)]
+pub struct OperateOptions {
+    /// Serve figures of the run to Prometheus at this port, of 127.0.0.1 unless an address comes before it
+    #[arg(long, value_name = "[ADDRESS:]PORT", value_parser = parse_address)]
+    metrics: Option<SocketAddr>,
+    /// Let operators attach to the run, by `eslvm attach`, at the path of a socket that only its owner can
+    /// open, or at a port of 127.0.0.1, which asks for a secret
+    #[arg(long, value_name = "PATH|PORT")]
+    listen: Option<String>,
+    /// Show the run in a browser, at a port of 127.0.0.1; any free one without a number
+    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0",
+          value_parser = parse_address)]
+    monitor: Option<SocketAddr>,
+    /// File with the secrets of the roles: lines such as `observe SECRET`, `command SECRET` and `patch SECRET`;
+    /// without it they are made anew for each run, and printed
+    #[arg(long, value_name = "FILE")]
+    secrets: Option<PathBuf>,
+}
+
+/// What is to be undone when a run is over.
+#[derive(Debug, Default)]
+pub struct ServedRun {
+    socket: Option<PathBuf>,
+}
+
+impl Drop for ServedRun {
+    fn drop(&mut self) {
+        if let Some(path) = &self.socket {
+            // It may be gone.
+            drop(std::fs::remove_file(path));
+        }
+    }
+}
+
+/// Parses a port, of the loopback unless an address comes before it.
+fn parse_address(text: &str) -> Result<SocketAddr, &'static str> {
+    match text.parse() {
+        Ok(port) => Ok(SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), port)),
+        Err(_) => {
+            text.parse().map_err(|_| "expected a port such as 9464, or an address such as 10.0.0.7:9464")
+        }
+    }
+}
+
+impl OperateOptions {
+    /// Begins to serve what was asked for, before the machine runs. Returns what is to be dropped after the
+    /// run.
+    ///
+    /// # Errors
+    /// The exit status, after a message.
+    pub fn begin(&self, machine: &mut Vm) -> Result<ServedRun, u8> {
+        let scope = RunScope::new(machine.inbox());
+        let mut served = ServedRun::default();
+        if self.metrics.is_some() || self.listen.is_some() || self.monitor.is_some() {
+            watch_closely(machine);
+        }
+        if let Some(address) = self.metrics {
+            let (listener, address) = listen(address)?;
+            eprintln!("; metrics at http://{address}/metrics");
+            serve(metrics::serve(listener, scope.clone()))?;
+        }
+        if let Some(address) = self.monitor {
+            only_loopback(address)?;
+            let secrets = self.secrets()?;
+            let (listener, address) = listen(address)?;
+            for role in [OperatorRole::Observe, OperatorRole::Command] {
+                if let (Some(secret), None) = (secrets.of(role), &self.secrets) {
+                    eprintln!("; monitor, to {role}: http://{address}/#token={secret}");
+                }
+            }
+            if self.secrets.is_some() {
+                eprintln!("; monitor at http://{address}/#token=SECRET");
+            }
+            serve(monitor::serve(listener, scope.clone(), secrets))?;
+        }
+        if let Some(place) = &self.listen {
+            let door = match parse_address(place) {
+                Ok(address) => {
+                    only_loopback(address)?;
+                    let secrets = self.secrets()?;
+                    let (listener, address) = listen(address)?;
+                    eprintln!("; operators attach with eslvm attach {address}");
+                    self.print_secrets(&secrets);
+                    Entrance::Tcp(listener, secrets)
+                }
+                Err(_) => {
+                    let path = PathBuf::from(place);
+                    let door = listen_at_path(&path)?;
+                    eprintln!("; operators attach with eslvm attach {place}");
+                    served.socket = Some(path);
+                    door
+                }
+            };
+            serve(attach::serve(machine, door, scope))?;
+        }
+        Ok(served)
+    }
+
+    fn secrets(&self) -> Result<Secrets, u8> {
+        let secrets = match &self.secrets {
+            None => Secrets::random(),
+            Some(path) => Secrets::read(path).map_err(|reason| format!("{}: {reason}", path.display())),
+        };
+        secrets.map_err(|reason| {
+            complain(reason);
+            USAGE
+        })
+    }
+
+    /// Prints secrets that were made for this run.
+    fn print_secrets(&self, secrets: &Secrets) {
+        if self.secrets.is_none() {
+            for role in OperatorRole::ALL {
+                eprintln!(";   to {role}: ESL_SECRET={}", secrets.of(role).unwrap_or_default());
+            }
+        }
+    }
+}
+
+/// Refuses an address that other machines reach: what is said there would not be secret.
+fn only_loopback(address: SocketAddr) -> Result<(), u8> {
+    if address.ip().is_loopback() {
+        return Ok(());
+    }
+    complain(format_args!(
+        "others could hear what is said at {address}: use a port of 127.0.0.1, and reach it by ssh -L"
+    ));
+    Err(USAGE)
+}
+
+/// Listens at the path of a socket that only the owner of the process can open.
+#[cfg(unix)]
+fn listen_at_path(path: &Path) -> Result<Entrance, u8> {
+    use rustix::fs::Mode;
+    use std::os::unix::net::{UnixListener, UnixStream};
+    let bind = || {
+        let mask = rustix::process::umask(Mode::from_raw_mode(0o177));
+        let listener = UnixListener::bind(path);
+        rustix::process::umask(mask);
+        let listener = listener?;
+        listener.set_nonblocking(true)?;
+        Ok::<_, std::io::Error>(listener)
+    };
+    let mut listener = bind();
+    let is_left = |error: &std::io::Error| {
+        let refused = |error: std::io::Error| error.kind() == std::io::ErrorKind::ConnectionRefused;
+        error.kind() == std::io::ErrorKind::AddrInUse && UnixStream::connect(path).is_err_and(refused)
+    };
+    if listener.as_ref().is_err_and(is_left) {
+        // A run that was killed has left it.
+        listener = std::fs::remove_file(path).and_then(|()| bind());
+    }
+    listener.map(Entrance::Unix).map_err(|error| {
+        complain(format_args!("nobody can attach at {}: {error}", path.display()));
+        USAGE
+    })
+}
+
+#[cfg(not(unix))]
+fn listen_at_path(path: &Path) -> Result<Entrance, u8> {
+    complain(format_args!("nobody can attach at {}: expected a port such as 4005", path.display()));
+    Err(USAGE)
+}
+
+/// Has figures gathered and a journal kept.
+fn watch_closely(machine: &mut Vm) {
+    machine.gather_figures(false);
+    machine.keep_journal();
+}
+
+/// Listens at an address, and returns the one that the system has given.
+fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr), u8> {
+    let listener = TcpListener::bind(address).and_then(|listener| {
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        Ok((listener, address))
+    });
+    listener.map_err(|error| {
+        complain(format_args!("nobody can connect at {address}: {error}"));
+        USAGE
+    })
+}
+
+fn serve(served: Result<(), String>) -> Result<(), u8> {
+    served.map_err(|error| {
+        complain(format_args!("the event loop cannot be started: {error}"));
+        USAGE
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_port_is_one_of_the_loopback() {
+        assert_eq!(parse_address("9464").map(|address| address.to_string()), Ok("127.0.0.1:9464".into()));
+        assert_eq!(parse_address("[::]:80").map(|address| address.to_string()), Ok("[::]:80".into()));
+        assert!(parse_address("host:80").is_err() && parse_address("70000").is_err());
+    }
+}

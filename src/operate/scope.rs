@@ -1,0 +1,35 @@
+//! A scope: the view of a run that servers have.
+
+use std::time::Duration;
+
+use esl_vm::host::{Inbox, Look, Sender, Survey, SurveyRequest};
+use tokio::sync::oneshot;
+
+/// Longest time that a survey is waited for. A machine that runs a critical section answers late.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// The view of one run.
+#[derive(Clone)]
+pub(super) struct RunScope {
+    inbox: Inbox,
+}
+
+impl RunScope {
+    /// Creates a view of the run with this inbox.
+    pub(super) fn new(inbox: Inbox) -> RunScope {
+        RunScope { inbox }
+    }
+
+    /// Returns one who may signal and ask something.
+    pub(super) fn sender(&self) -> Sender {
+        Sender::new(&self.inbox)
+    }
+
+    /// Returns what there is to see; `None` if the machine is gone, or does not answer.
+    pub(super) async fn survey(&self, request: SurveyRequest) -> Option<Survey> {
+        let (tell, told) = oneshot::channel();
+        // Nobody may wait for it any more.
+        self.inbox.look(Look::Survey(request, Box::new(move |survey| drop(tell.send(survey)))));
+        tokio::time::timeout(PATIENCE, told).await.ok()?.ok()
+    }
+}

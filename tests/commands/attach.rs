@@ -1,0 +1,275 @@
+//! Operators who are attached to a run.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+
+use esl_conformance::process::{self, PATIENCE};
+
+use crate::eslvm;
+use crate::folder::Folder;
+use crate::operate::Operated;
+
+/// A program that holds something, and waits for the end of its input.
+const PROGRAM: &str = "
+(define-property mode ())
+(define-input news :capacity 2)
+(defvar *speed* 3)
+(defun drive (n) (* n *speed*))
+(assert '(mode calm))
+(spawn (:name 'waiter :daemon t) (wait-for-event news) (assert '(mode awake)) (loop (sleep 1000)))
+(read-line *standard-input* nil)
+(format t \"~s~%\" (list *speed* (mode) (fboundp 'fresh)))";
+
+/// Runs a session at a socket, and returns what it writes, and the exit status.
+fn session(place: &str, input: &str) -> (String, Option<i32>) {
+    let finished = process::run(&mut eslvm(&["attach", place]), input);
+    (finished.output + &finished.errors, finished.status)
+}
+
+#[test]
+fn a_session_evaluates_and_patches_a_run_that_goes_on() {
+    let folder = Folder::new("attach_session");
+    let patch = folder
+        .file("patch.esl", "(defun drive (n) (list :fast n)) (defparameter *speed* 7) (defun fresh () 1)");
+    let wrong = folder.file("wrong.esl", "(defun drive (n) 1) (defparameter *speed* (error \"no speed\"))");
+    let (incomplete, other) =
+        (folder.file("incomplete.esl", "(defun f ("), folder.file("other.esl", "(print 1)"));
+    let socket = folder.join("s");
+    let mut run = Operated::start(&folder, PROGRAM, &["--listen", &socket]);
+    run.said("; operators attach with eslvm attach ");
+    let (output, status) = session(
+        &socket,
+        &format!(
+            "(+ 1 2)\n(list *\n (drive 5))\n:facts\n(fail :oops 1)\n:bt\n:patch {patch}\n(list (drive 1) *speed* (fresh))\n\
+             :undo-patch\n(list (drive 1) *speed* (fboundp 'fresh))\n:undo-patch\n:patch {wrong}\n:patch {incomplete}\n\
+             :patch {other}\n(drive 1)\n(list * **)\n:patch /no/such/file\n:abort 9999\n:abort\n(format t \"half\")\n"
+        ),
+    );
+    let expected = format!(
+        "3\n(3 15)\n(MODE CALM)\nFailure :OOPS, no recovery available.\nAborted\nA failure of cause :OOPS with 1.\n  \
+         in top level\nFailure :OOPS, no recovery available.\nAborted\n; 3 definitions are changed\n((:FAST 1) 7 1)\n\
+         ; 3 definitions are as before\n(3 3 NIL)\n; there is no patch to be undone\nno speed\n\
+         Failure :SIMPLE-ERROR, no recovery available.\nAborted\nThe last form of {incomplete} is incomplete.\n\
+         Failure :PROGRAM-ERROR, no recovery available.\nAborted\n\
+         A patch consists of DEFUN, DEFVAR, DEFPARAMETER and SETQ of a variable, not of (PRINT 1).\n\
+         Failure :PROGRAM-ERROR, no recovery available.\nAborted\n3\n(3 (3 3 NIL))\n\
+         ; /no/such/file cannot be read: No such file or directory (os error 2)\n; there is no task 9999\n\
+         ; `esl:abort` needs the number of a task\nhalf\nNIL\n"
+    );
+    assert_eq!((output, status), (expected, Some(0)));
+    // Another session has a history of its own, and sees what the first has changed.
+    let (output, _) = session(&socket, "*\n(setq *speed* 8)\n(setq + 1)\n:signal news 1 (2)\n:quit\n");
+    assert_eq!(output, "NIL\n8\n1\n");
+    // The run ends with all that was done to it, and takes its socket away.
+    let finished = run.finish();
+    assert_eq!(
+        (finished.output.as_str(), finished.status),
+        ("(8 AWAKE NIL)\n", Some(0)),
+        "{}",
+        finished.errors
+    );
+    assert!(!std::path::Path::new(&socket).exists());
+    let (output, status) = session(&socket, "");
+    assert!(output.starts_with(&format!("eslvm: no run can be reached at {socket}")), "{output}");
+    assert_eq!(status, Some(2));
+}
+
+#[test]
+fn who_leaves_takes_what_it_evaluates_with_it() {
+    let folder = Folder::new("attach_leaves");
+    let socket = folder.join("s");
+    let program = "(defvar *ended* (make-event)) (defvar *begun* nil)
+        (spawn (:daemon t) (loop (sleep 1000)))
+        (wait-for-event *ended*) (princ 'ended)";
+    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
+    run.said("; operators attach with eslvm attach ");
+    // Its task is aborted while it waits, and its cleanup ends the run.
+    let mut stream = std::os::unix::net::UnixStream::connect(&socket).expect("the run listens");
+    let form =
+        "(unwind-protect (progn (format t \\\"waits\\\") (setq *begun* t) (sleep 1000)) (signal *ended*))";
+    stream
+        .write_all(&packet(&format!("(:emacs-rex (esl:evaluate \"{form}\") nil t 1)")))
+        .expect("it is taken");
+    let (output, _) = session(&socket, "(loop until *begun* do (sleep 0.01))\n:seen\n");
+    assert_eq!(output, "NIL\n:SEEN\n");
+    drop(stream);
+    assert_eq!(run.finish().output, "ENDED");
+}
+
+fn packet(text: &str) -> Vec<u8> {
+    format!("{:06x}{text}", text.len()).into_bytes()
+}
+
+/// Connects, says a secret, and sends packets; returns the texts of so many answers.
+fn ask(address: &str, secret: &str, requests: &[String]) -> Vec<String> {
+    let mut stream = TcpStream::connect(address).expect("the run listens");
+    stream.set_read_timeout(Some(PATIENCE)).expect("it can be set");
+    let mut bytes = packet(&format!("\"{secret}\""));
+    requests.iter().for_each(|request| bytes.extend(packet(request)));
+    drop(stream.write_all(&bytes));
+    let mut answers = Vec::new();
+    while answers.len() < requests.len() {
+        let mut head = [0; 6];
+        if stream.read_exact(&mut head).is_err() {
+            break;
+        }
+        let length = usize::from_str_radix(&String::from_utf8_lossy(&head), 16).expect("it is a packet");
+        let mut body = vec![0; length];
+        stream.read_exact(&mut body).expect("the packet is complete");
+        answers.push(String::from_utf8(body).expect("it is text").trim_end().to_string());
+    }
+    answers
+}
+
+/// Starts the program with a listener at a port, and secrets for the three roles.
+fn start_with_secrets(folder: &Folder) -> (Operated, String) {
+    let secrets = folder
+        .file("secrets", "observe observe-0123456789\ncommand command-0123456789\npatch patch-0123456789\n");
+    use std::os::unix::fs::PermissionsExt;
+    std::fs::set_permissions(&secrets, std::fs::Permissions::from_mode(0o600)).expect("it can be set");
+    let mut run = Operated::start(folder, PROGRAM, &["--listen", "0", "--secrets", &secrets]);
+    let address = run.said("; operators attach with eslvm attach ");
+    (run, address)
+}
+
+#[test]
+fn each_role_may_do_what_its_secret_says() {
+    let folder = Folder::new("attach_roles");
+    let (run, address) = start_with_secrets(&folder);
+    let requests = [
+        ("swank:connection-info", 0),
+        ("esl:tasks", 0),
+        ("esl:backtrace", 0),
+        ("esl:facts", 0),
+        ("esl:data", 0),
+        ("esl:failures", 0),
+        ("esl:abort", 1),
+        ("esl:suspend", 1),
+        ("esl:resume", 1),
+        ("esl:pause", 1),
+        ("esl:continue", 1),
+        ("esl:signal", 1),
+        ("esl:evaluate", 2),
+        ("esl:watch", 2),
+        ("esl:complete", 2),
+        ("esl:patch", 2),
+        ("esl:undo-patch", 2),
+    ];
+    for (role, name) in ["observe", "command", "patch"].into_iter().enumerate() {
+        for (request, needed) in requests {
+            let text = format!("(:emacs-rex ({request}) nil t 7)");
+            let answers = ask(&address, &format!("{name}-0123456789"), &[text]);
+            let is_refused = answers[0].contains("needs the role");
+            assert_eq!(is_refused, role < needed, "{name} {request}: {answers:?}");
+            assert!(answers[0].starts_with("(:return (:") && answers[0].ends_with(" 7)"), "{answers:?}");
+        }
+    }
+    let facts = "(:emacs-rex (esl:facts \"mode\") nil t 1)".to_string();
+    assert_eq!(ask(&address, "observe-0123456789", &[facts]), ["(:return (:ok \"(MODE CALM)\n\") 1)"]);
+    for wrong in ["", "observe", "observe-01234567890", "OBSERVE-0123456789", "x\\\" (quit) \\\""] {
+        let answers = ask(&address, wrong, &["(:emacs-rex (esl:tasks) nil t 1)".into()]);
+        assert!(answers.is_empty(), "{wrong}: {answers:?}");
+    }
+    assert_eq!(run.finish().output, "(3 CALM NIL)\n");
+}
+
+/// Random numbers that are the same in each run.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as usize % n
+    }
+}
+
+/// Returns bytes that look like the packets of a session, more or less.
+fn noise(dice: &mut Dice) -> Vec<u8> {
+    let words = [
+        "(",
+        ")",
+        "\"",
+        "'",
+        "\\",
+        ":emacs-rex",
+        "esl:tasks",
+        "esl:facts",
+        "esl:evaluate",
+        "esl:abort",
+        "nil",
+        "t",
+        "1",
+        "-99999999999999999999",
+        "99999",
+        "\"x\"",
+        "ü",
+        " ",
+        "\n",
+        ".",
+        "#.",
+        "(:emacs-rex (esl:tasks) nil t 1)",
+        "(:emacs-interrupt t)",
+        "(:ping 1 2)",
+        "\0",
+        ":x",
+        "(esl:evaluate \"(setq *speed* 0)\")",
+    ];
+    let mut bytes = Vec::new();
+    for _ in 0..dice.below(6) {
+        let text: String =
+            (0..dice.below(12)).map(|_| words[dice.below(words.len())].to_string() + " ").collect();
+        let mut one = packet(&text);
+        for _ in 0..dice.below(3).saturating_sub(1) {
+            let at = dice.below(one.len());
+            one[at] = dice.below(256) as u8;
+        }
+        bytes.extend(one);
+    }
+    bytes.truncate(bytes.len() - dice.below(bytes.len() / 4 + 1));
+    bytes
+}
+
+/// Number of connections with noise; `ESL_NOISE` sets another one, for longer runs by hand.
+fn connections() -> usize {
+    std::env::var("ESL_NOISE").ok().and_then(|count| count.parse().ok()).unwrap_or(300)
+}
+
+#[test]
+fn noise_has_no_effect() {
+    let folder = Folder::new("attach_noise");
+    let (run, address) = start_with_secrets(&folder);
+    let mut dice = Dice(15);
+    for round in 0..connections() {
+        let mut stream = TcpStream::connect(&address).expect("the run listens");
+        // Some who send it may look; nobody may do anything.
+        let mut bytes = if dice.below(3) > 0 { packet("\"observe-0123456789\"") } else { Vec::new() };
+        bytes.extend(noise(&mut dice));
+        drop(stream.write_all(&bytes));
+        if round % 16 == 0 {
+            // Some wait for what is said to it.
+            drop(stream.shutdown(std::net::Shutdown::Write));
+            drop(stream.set_read_timeout(Some(PATIENCE)));
+            drop(stream.read_to_end(&mut Vec::new()));
+        }
+    }
+    let facts = "(:emacs-rex (esl:facts \"mode\") nil t 1)".to_string();
+    assert_eq!(ask(&address, "observe-0123456789", &[facts]), ["(:return (:ok \"(MODE CALM)\n\") 1)"]);
+    assert_eq!(run.finish().output, "(3 CALM NIL)\n");
+}
+
+#[test]
+fn bad_options_are_refused() {
+    let folder = Folder::new("attach_options");
+    let open = folder.file("open", "observe observe-0123456789\n");
+    use std::os::unix::fs::PermissionsExt;
+    std::fs::set_permissions(&open, std::fs::Permissions::from_mode(0o644)).expect("it can be set");
+    for (options, said) in [
+        (&["--listen", "0.0.0.0:0"][..], "eslvm: others could hear what is said at 0.0.0.0:0"),
+        (&["--listen", "0", "--secrets", &open], &format!("eslvm: {open}: others may read or write it")),
+        (&["--listen", "/no/such/folder/s"], "eslvm: nobody can attach at /no/such/folder/s"),
+    ] {
+        let mut run = Operated::start(&folder, "(print 1)", options);
+        run.said(said);
+        assert_eq!(run.end(), Some(2), "{options:?}");
+    }
+}
