@@ -104,6 +104,10 @@ pub trait Environment {
     fn read_base(&self) -> u32 {
         10
     }
+    /// Returns whether `*readtable*` is not the standard one, so that the program itself reads its forms.
+    fn has_own_syntax(&self) -> bool {
+        false
+    }
     /// Returns whether `*features*` has the feature `name`, in upper case; `None` if the program does not
     /// say.
     fn has_feature(&self, _name: &str) -> Option<bool> {

@@ -138,6 +138,12 @@ impl Lambda {
         }
     }
 
+    /// Returns the number of its parameters; flags that say whether an argument was given are not counted.
+    pub fn parameters(&self) -> usize {
+        let keys = self.keys.as_ref().map_or(0, Vec::len);
+        self.required.len() + self.optional.len() + usize::from(self.rest.is_some()) + keys
+    }
+
     /// Whether it takes required parameters only.
     pub fn is_exact(&self) -> bool {
         self.optional.is_empty() && self.rest.is_none() && self.keys.is_none()

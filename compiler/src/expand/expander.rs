@@ -247,7 +247,7 @@ impl Expander {
                 self.schedule([Job::Expand(form, inside), Job::FinishChunk]);
             }
             Job::CheckClause(to, is_empty) => self.check_clause(to, is_empty),
-            Job::CheckReturn(function, lambda) => self.check_return(function, lambda),
+            Job::CheckReturns(functions) => self.check_returns(&functions),
             Job::EnterMacros(names) => self.enter_macros(names),
             Job::TopLevel(form, top) => {
                 let top = top.at(&form);

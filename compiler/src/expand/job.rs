@@ -133,8 +133,8 @@ pub(super) enum Job {
     EnterMacros(Vec<Symbol>),
     /// Checks the expanded body of a recovery clause; the flag says whether the body is empty.
     CheckClause(To, bool),
-    /// Checks whether a local function, whose text is expanded, can return.
-    CheckReturn(VarId, LambdaId),
+    /// Checks which local functions, whose texts are expanded, can return.
+    CheckReturns(Vec<(VarId, LambdaId)>),
     /// Processes a top-level form.
     TopLevel(Datum, Top),
     /// Finishes the innermost chunk.

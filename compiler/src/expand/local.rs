@@ -109,7 +109,11 @@ fn local_functions(
         entries.push(ScopeEntry::Function(name.cell, FunctionMeaning::Local(variable, text.arity())));
         let lambda = expander.lambda(to);
         functions.push((variable, lambda));
-        lambdas.extend([Job::Lambda(Box::new(text), lambda, to), Job::CheckReturn(variable, lambda)]);
+        lambdas
+            .extend([Job::Lambda(Box::new(text), lambda, to), Job::CheckReturns(vec![(variable, lambda)])]);
+    }
+    if recursive && functions.len() > 1 {
+        lambdas.push(Job::CheckReturns(functions.clone()));
     }
     let inside = expander.child(to);
     expander.fill(to, NodeKind::Functions { definitions: functions, body: inside.node });

@@ -82,6 +82,7 @@ mod chunk;
 mod control;
 mod define;
 mod destructure;
+mod ending;
 mod expander;
 mod failure;
 mod form;

@@ -1,20 +1,18 @@
 //! `%with-recovery` and its relatives, on which the library builds `with-recovery-procedures` and
 //! `with-cleanup-procedure`; and the checks of recovery clauses.
 
-use esl_bytecode::compile::Environment;
-use esl_bytecode::symbol::Symbol;
-use rustc_hash::FxHashSet;
-
+use super::ending::{EndQuestion, ends};
 use super::expander::Expander;
 use super::form::{Checked, Form, Make, is_esl, name, operator, with_namesake};
 use super::job::{Job, To};
 use super::scope::Visible;
 use crate::core::*;
 use crate::diagnostic::code;
+use esl_bytecode::compile::Environment;
+use esl_bytecode::symbol::Symbol;
 
-/// Functions and operators that do not return.
-const LEAVING: &[&str] = &["FAIL", "%FAIL-FOR", "%NO-CASE", "NEXT-BINDINGS", "EXIT"];
-const LEAVING_STANDARD: &[&str] = &["ERROR", "INVOKE-RESTART", "ABORT"];
+/// How often functions that call each other are looked at to find out which of them return.
+const MOST_ROUNDS: usize = 10;
 
 /// `(%with-recovery table (%named-lambda …) . body)`: see [`NodeKind::Recovery`].
 pub(super) fn with_recovery(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
@@ -132,166 +130,27 @@ impl Expander {
         }
     }
 
-    /// Notes whether a local function, whose text is expanded, never returns.
-    pub(super) fn check_return(&mut self, function: VarId, lambda: LambdaId) {
+    /// Notes which local functions, whose texts are expanded, never return. They may call each other.
+    pub(super) fn check_returns(&mut self, functions: &[(VarId, LambdaId)]) {
         let core = self.core();
-        let body = core.lambdas[lambda.index()].body;
-        core.variables[function.index()].never_returns = ends(core, body, EndQuestion::Leaves(function));
-    }
-}
-
-/// A question about the end of a form.
-#[derive(Clone, Copy)]
-enum EndQuestion {
-    /// Whether control never reaches it, or the form says that its value is meant.
-    LeavesOrResumes,
-    /// Whether control never reaches it; the form is the body of this function.
-    Leaves(VarId),
-}
-
-/// Returns whether the global function of this name never returns.
-fn is_leaving(function: &Symbol) -> bool {
-    LEAVING.iter().any(|name| is_esl(function, name))
-        || LEAVING_STANDARD.iter().any(|name| function.is_cl(name))
-}
-
-/// Returns whether a form itself leaves, and what is around it too. `inside` are blocks around it that would
-/// not be left.
-fn exits(core: &Core, node: NodeId, inside: &FxHashSet<BlockId>) -> bool {
-    match &core.nodes[node.index()].kind {
-        NodeKind::Throw(..) | NodeKind::Go(..) => true,
-        NodeKind::ReturnFrom(block, _) => !inside.contains(block),
-        NodeKind::Call(Callee::Global(function), _) => is_leaving(function),
-        NodeKind::Call(Callee::Local(function), _) => core.variables[function.index()].never_returns,
-        _ => false,
-    }
-}
-
-/// Returns whether the value of a form is true, if that is written there.
-fn truth(core: &Core, node: NodeId) -> Option<bool> {
-    match &core.nodes[node.index()].kind {
-        NodeKind::Constant(constant) => Some(!constant.is_nil()),
-        _ => None,
-    }
-}
-
-/// Returns parts of a form that are evaluated whenever the form is, before it ends.
-fn evaluated_first(kind: &NodeKind) -> impl Iterator<Item = NodeId> {
-    let bindings = match kind {
-        NodeKind::Let { bindings, .. } => &bindings[..],
-        _ => &[],
-    };
-    let (one, list): (Option<NodeId>, &[NodeId]) = match kind {
-        NodeKind::SetLocal(_, value) | NodeKind::SetSpecial(_, value) => (Some(*value), &[]),
-        NodeKind::If(test, ..) => (Some(*test), &[]),
-        NodeKind::And(forms) | NodeKind::Or(forms) => (forms.first().copied(), &[]),
-        NodeKind::Progn(forms) | NodeKind::Values(forms) => (None, forms),
-        NodeKind::UnwindProtect(_, cleanup) => (Some(*cleanup), &[]),
-        NodeKind::BindValues(_, form, _) | NodeKind::FirstValues(form, _) => (Some(*form), &[]),
-        NodeKind::Call(_, arguments) | NodeKind::Apply(_, arguments) => (None, arguments),
-        NodeKind::CallValues(_, forms) => (None, forms),
-        _ => (None, &[]),
-    };
-    one.into_iter().chain(list.iter().copied()).chain(bindings.iter().map(|(_, value)| *value))
-}
-
-/// Answers a question about the end of a form. A `NIL` that a macro has put at the end of its expansion, as
-/// `dolist` does, does not say that it is meant. A function that calls itself at its end does not return
-/// there.
-fn ends(core: &Core, node: NodeId, end: EndQuestion) -> bool {
-    let leaves = matches!(end, EndQuestion::Leaves(_));
-    let mut inside: FxHashSet<BlockId> = FxHashSet::default();
-    let mut pending = vec![(node, None)];
-    while let Some((node, around)) = pending.pop() {
-        let span = core.nodes[node.index()].span;
-        let inside_it = |node: NodeId| (node, Some(span));
-        let kind = &core.nodes[node.index()].kind;
-        if evaluated_first(kind).any(|part| exits(core, part, &inside)) {
-            continue;
+        for (function, _) in functions {
+            core.variables[function.index()].never_returns = true;
         }
-        match kind {
-            NodeKind::Constant(constant) if constant.is_nil() && around == Some(span) => return false,
-            NodeKind::Constant(_) | NodeKind::Values(_) if leaves => return false,
-            NodeKind::Constant(_) | NodeKind::Values(_) | NodeKind::Throw(..) | NodeKind::Go(..) => {}
-            // Control may leave it from anywhere inside.
-            NodeKind::Block(block, _) if leaves && core.blocks[block.index()].is_used => return false,
-            NodeKind::ReturnFrom(block, value) => {
-                if inside.contains(block) {
-                    pending.push(inside_it(*value));
+        for _ in 0..MOST_ROUNDS {
+            let mut has_changed = false;
+            for (function, lambda) in functions {
+                let body = core.lambdas[lambda.index()].body;
+                if core.variables[function.index()].never_returns && !ends(core, body, EndQuestion::Leaves) {
+                    core.variables[function.index()].never_returns = false;
+                    has_changed = true;
                 }
             }
-            NodeKind::Block(block, body) => {
-                inside.insert(*block);
-                pending.push(inside_it(*body));
+            if !has_changed {
+                return;
             }
-            NodeKind::If(test, consequent, alternative) if truth(core, *test).is_some() => {
-                let holds = truth(core, *test) == Some(true);
-                pending.push(inside_it(if holds { *consequent } else { *alternative }));
-            }
-            NodeKind::And(forms) | NodeKind::Or(forms) => {
-                let goes_on = matches!(kind, NodeKind::And(_));
-                let Some((last, before)) = forms.split_last() else { return false };
-                if !before.iter().all(|&form| truth(core, form) == Some(goes_on)) {
-                    return false;
-                }
-                pending.push(inside_it(*last));
-            }
-            NodeKind::If(_, consequent, alternative) => {
-                // A branch that `when` or `cond` leaves out does not say that its value is meant.
-                let is_left_out = |node: &NodeId| match &core.nodes[node.index()].kind {
-                    NodeKind::Constant(constant) => constant.is_nil(),
-                    _ => false,
-                };
-                if is_left_out(consequent) || is_left_out(alternative) {
-                    return false;
-                }
-                pending.extend([*consequent, *alternative].map(inside_it));
-            }
-            NodeKind::Progn(forms) => match forms.last() {
-                Some(last) => pending.push(inside_it(*last)),
-                None => return false,
-            },
-            NodeKind::Let { body, .. }
-            | NodeKind::Functions { body, .. }
-            | NodeKind::BindValues(_, _, body)
-            | NodeKind::Progv(_, _, body)
-            | NodeKind::Handlers(_, body)
-            | NodeKind::Mask(_, body)
-            | NodeKind::FirstValues(body, _)
-            | NodeKind::UnwindProtect(body, _)
-            | NodeKind::FailureCleanup(body, _)
-            | NodeKind::Recovery { body, .. } => pending.push(inside_it(*body)),
-            NodeKind::HandlerCase(body, clauses) => {
-                pending.push(inside_it(*body));
-                pending.extend(clauses.iter().map(|clause| inside_it(clause.body)));
-            }
-            NodeKind::Tagbody(_, items) => match items.last() {
-                Some(TagbodyItem::Form(last)) => {
-                    if !exits(core, *last, &inside) {
-                        return false;
-                    }
-                }
-                _ => return false,
-            },
-            NodeKind::Call(Callee::Global(function), _) => {
-                if !is_leaving(function) {
-                    return false;
-                }
-            }
-            NodeKind::Call(Callee::Local(function), _) | NodeKind::Apply(Callee::Local(function), _) => {
-                let is_itself = matches!(end, EndQuestion::Leaves(own) if own == *function);
-                if !is_itself && !core.variables[function.index()].never_returns {
-                    return false;
-                }
-            }
-            NodeKind::Call(Callee::Value(function), _) | NodeKind::Apply(Callee::Value(function), _) => {
-                match core.nodes[function.index()].kind {
-                    NodeKind::Lambda(lambda) => pending.push(inside_it(core.lambdas[lambda.index()].body)),
-                    _ => return false,
-                }
-            }
-            _ => return false,
+        }
+        for (function, _) in functions {
+            core.variables[function.index()].never_returns = false;
         }
     }
-    true
 }

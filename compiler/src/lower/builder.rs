@@ -19,6 +19,8 @@ use crate::resolve::Resolution;
 /// A function that does not fit the format.
 pub(super) struct OversizedFunction {
     pub(super) lambda: LambdaId,
+    /// Whether it would be too large without a body.
+    pub(super) has_too_many_parameters: bool,
     pub(super) diagnostic: Diagnostic,
 }
 

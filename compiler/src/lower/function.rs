@@ -2,6 +2,7 @@
 
 use esl_bytecode::compile::Work;
 use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::module::{ModuleFunction, Parameters, PoolIdx};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::{ConstIdx, Count, Reg};
@@ -19,6 +20,9 @@ use crate::diagnostic::code;
 const RED_ZONE: usize = 96 * 1024;
 /// Native stack that is added when less than that is left, in bytes.
 const STACK: usize = 1024 * 1024;
+
+/// Largest number of parameters: each needs a register when the function begins.
+const MAX_PARAMETERS: usize = 255;
 
 /// Words of code that count as a unit of work.
 const WORDS_PER_UNIT: u64 = 2;
@@ -47,6 +51,13 @@ impl ModuleBuilder<'_> {
     /// Lowers the function of a lambda. Its captures are left open.
     fn function(&mut self, lambda: LambdaId) -> ModuleFunction {
         let text = &self.core.lambdas[lambda.index()];
+        let has_too_many_parameters = text.parameters() > MAX_PARAMETERS;
+        if has_too_many_parameters {
+            let diagnostic =
+                too_large(text, "parameters").help("take the rest of them as a list, with `&rest`");
+            self.oversized.push(OversizedFunction { lambda, has_too_many_parameters, diagnostic });
+            return ModuleFunction::default();
+        }
         let mut builder = FunctionBuilder::new(self, lambda);
         let parameters = builder.parameters(text);
         builder.form_inside(text.body, Dest::Tail, 0);
@@ -64,11 +75,8 @@ impl ModuleBuilder<'_> {
         });
         let (registers, constants, excess) = (builder.registers.used(), builder.constants, builder.excess);
         if let Some(excess) = excess {
-            let diagnostic = code::FUNCTION_TOO_LARGE
-                .at(text.span, "this function is too large")
-                .label(format!("has too many {}", excess.what()))
-                .help("divide it into several functions");
-            self.oversized.push(OversizedFunction { lambda, diagnostic });
+            let diagnostic = too_large(text, excess.what()).help("divide it into several functions");
+            self.oversized.push(OversizedFunction { lambda, has_too_many_parameters, diagnostic });
         }
         let mut datum = |datum: &Option<Datum>| datum.as_ref().map(|datum| self.pool.datum(datum));
         ModuleFunction {
@@ -83,6 +91,11 @@ impl ModuleBuilder<'_> {
             lines,
         }
     }
+}
+
+/// Returns the diagnostic for a function that has too much of something.
+fn too_large(text: &Lambda, what: &str) -> Diagnostic {
+    code::FUNCTION_TOO_LARGE.at(text.span, "this function is too large").label(format!("has too many {what}"))
 }
 
 impl<'a> FunctionBuilder<'_, 'a> {

@@ -51,7 +51,7 @@ use esl_bytecode::module::{Module, ModuleFunction};
 
 use crate::core::{Core, LambdaId};
 use crate::resolve::ResolveWalk;
-use builder::{ModuleBuilder, SuspendedBuilder};
+use builder::{ModuleBuilder, OversizedFunction, SuspendedBuilder};
 pub use lines::SourceLines;
 
 /// Lowers a top-level form to a module whose only top-level function it is.
@@ -75,6 +75,8 @@ const SPILLS_FROM: u8 = 80;
 pub struct Lowering {
     core: Core,
     stage: LoweringStage,
+    /// Whether functions have been divided that are too large to be lowered in one part.
+    is_in_parts: bool,
     /// What is wrong with the functions that did not fit as they were, once that was tried.
     oversized: Option<Vec<Diagnostic>>,
     /// Limits that are left for dividing functions.
@@ -91,7 +93,8 @@ enum LoweringStage {
 impl Lowering {
     /// Begins to lower a top-level form.
     pub fn new(core: Core) -> Lowering {
-        Lowering { core, stage: LoweringStage::Begin, oversized: None, limits: split::LIMITS.iter() }
+        let limits = split::LIMITS.iter();
+        Lowering { core, stage: LoweringStage::Begin, is_in_parts: false, oversized: None, limits }
     }
 
     /// Returns about how many bytes it takes.
@@ -107,6 +110,10 @@ impl Lowering {
             match std::mem::replace(&mut self.stage, LoweringStage::Begin) {
                 LoweringStage::Begin => {
                     work.add(self.core.nodes.len() as u64 / NODES_PER_UNIT);
+                    if !std::mem::replace(&mut self.is_in_parts, true) {
+                        let large = split::larger_than(&self.core, LARGE_FUNCTION);
+                        split::split(&mut self.core, &large, split::LIMITS[0]);
+                    }
                     self.stage = LoweringStage::Resolve(Box::new(ResolveWalk::new(&self.core)));
                 }
                 LoweringStage::Resolve(mut walk) => {
@@ -126,6 +133,13 @@ impl Lowering {
                     }
                     if builder.oversized.is_empty() {
                         return Some(Ok(builder.module(functions)));
+                    }
+                    // To divide the texts of functions does not give them fewer parameters.
+                    let parameters = |function: &&OversizedFunction| function.has_too_many_parameters;
+                    let hopeless = builder.oversized.iter().filter(parameters);
+                    let hopeless: Vec<_> = hopeless.map(|function| function.diagnostic.clone()).collect();
+                    if !hopeless.is_empty() {
+                        return Some(Err(hopeless));
                     }
                     let Some(diagnostics) = self.oversized.take() else {
                         let found = builder.oversized.iter().map(|function| function.diagnostic.clone());
@@ -149,6 +163,9 @@ impl Lowering {
         }
     }
 }
+
+/// Number of nodes above which a function is divided before it is lowered, since that is done in one part.
+const LARGE_FUNCTION: usize = 12_000;
 
 /// Nodes that count as a unit of work where the whole form is looked at.
 const NODES_PER_UNIT: u64 = 8;

@@ -36,6 +36,27 @@ pub(super) const TINY: Limits = Limits { weight: 12, height: 5, bindings: 2 };
 /// Weight below which a part is not worth a call.
 const MIN_WEIGHT: usize = 6;
 
+/// Returns the lambdas whose texts have more than `limit` nodes, those of lambdas inside them not counted.
+pub(super) fn larger_than(core: &Core, limit: usize) -> Vec<LambdaId> {
+    if core.nodes.len() <= limit {
+        return Vec::new();
+    }
+    let is_large = |lambda: &LambdaId| {
+        let mut pending = Vec::new();
+        lambda_nodes(&core.lambdas[lambda.index()], &mut |node| pending.push(node));
+        let mut count = 0;
+        while let Some(node) = pending.pop() {
+            count += 1;
+            if count > limit {
+                return true;
+            }
+            children(&core.nodes[node.index()].kind, &mut |child| pending.push(child));
+        }
+        false
+    };
+    (0..core.lambdas.len()).map(|index| LambdaId(index as u32)).filter(is_large).collect()
+}
+
 /// Divides the texts of `lambdas`.
 pub(super) fn split(core: &mut Core, lambdas: &[LambdaId], limits: Limits) {
     let before = core.lambdas.len();

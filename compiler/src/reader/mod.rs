@@ -76,6 +76,37 @@ impl Reader {
         Reader { text, position, scanner: Scanner::new(source), room: MAX_FILL, waiting, errors: 0 }
     }
 
+    /// Returns whether no diagnostics about what was read are left.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.waiting.is_empty()
+    }
+
+    /// Returns whether all of the text has been read.
+    pub(crate) fn is_at_end(&self) -> bool {
+        self.position >= self.text.len()
+    }
+
+    /// Returns up to `size` bytes of the text that has not been read yet, and whether these are all.
+    pub(crate) fn part(&self, size: usize) -> (&str, bool) {
+        let rest = &self.text[self.position..];
+        let end = rest.floor_char_boundary(size);
+        (&rest[..end], end == rest.len())
+    }
+
+    /// Returns the place of the first character of the text that has not been read yet and is not blank.
+    pub(crate) fn next_span(&self) -> Span {
+        let rest = &self.text[self.position..];
+        let start = self.position + rest.find(|c: char| !c.is_whitespace()).unwrap_or(0);
+        let end = self.text.ceil_char_boundary(start + 1);
+        Span::new(self.scanner.source(), start as u32, end as u32)
+    }
+
+    /// Leaves out `count` characters of the text, which something else has read.
+    pub(crate) fn skip(&mut self, count: usize) {
+        let rest = &self.text[self.position..];
+        self.position += rest.char_indices().nth(count).map_or(rest.len(), |(at, _)| at);
+    }
+
     /// Returns the byte from which the next datum is read.
     pub fn position(&self) -> usize {
         self.position

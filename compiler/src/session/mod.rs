@@ -92,6 +92,7 @@ impl Compiler {
             apart: self.apart,
             asked: None,
             loading: None,
+            is_reading: false,
             calls: None,
             lines,
             expander: Expander::new(),
@@ -157,6 +158,8 @@ struct CompilationState {
     asked: Option<(String, Span)>,
     /// Place of the form that requires the compiled module that is being loaded.
     loading: Option<Span>,
+    /// Whether the program reads a form.
+    is_reading: bool,
     /// Form that has been read and whose calls are being made.
     calls: Option<FormCalls>,
     lines: SourceLines,
@@ -220,6 +223,8 @@ impl Compilation for CompilationState {
                 let message = format!("the module failed at compile time: {}", failure.report);
                 self.diagnostics.push(code::COMPILE_TIME_FAILURE.at(span, message));
             }
+        } else if std::mem::take(&mut self.is_reading) {
+            self.take_read(answer);
         } else if let Some(calls) = self.calls.take() {
             if let Some(step) = self.take_call(calls, answer) {
                 return step;
@@ -253,6 +258,10 @@ impl Compilation for CompilationState {
                             if let Some(step) = self.make_calls(FormCalls::new(form)) {
                                 return step;
                             }
+                        }
+                        Next::Read(call) => {
+                            self.is_reading = true;
+                            return Step::Expand(call);
                         }
                         Next::Require(name, span) => {
                             self.asked = Some((name.clone(), span));
@@ -327,6 +336,21 @@ impl CompilationState {
                 None
             }
             _ => None,
+        }
+    }
+
+    /// Takes what the program has read of a text.
+    fn take_read(&mut self, answer: StepOutcome) {
+        let FormSource::Texts(queue) = &mut self.input else { return };
+        match answer {
+            StepOutcome::Expansion(read) => queue.take_read(&read),
+            StepOutcome::Failed(failure) => {
+                let message = format!("this cannot be read as `*readtable*` says: {}", failure.report);
+                let help = "what follows is not compiled";
+                self.diagnostics
+                    .push(code::READ_TIME_FAILURE.at(queue.give_up_reading(), message).help(help));
+            }
+            _ => _ = queue.give_up_reading(),
         }
     }
 

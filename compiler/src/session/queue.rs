@@ -7,6 +7,9 @@
 //! present. Modules that it requires itself are put in likewise. Each module is put in once, wherever it is
 //! required.
 //!
+//! Where a form that is run at compile time has set `*readtable*`, the program reads the forms after it, up to
+//! the end of the text ([`Next::Read`]).
+//!
 //! Only a form that stands by itself at top level counts, with a literal name. All others are calls of the
 //! function, which finds modules at run time.
 
@@ -14,7 +17,7 @@ use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
 
-use esl_bytecode::compile::Environment;
+use esl_bytecode::compile::{Environment, MacroCall, MacroRef};
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::module::{Constant, Module};
@@ -33,6 +36,8 @@ pub(super) enum Next {
     Form,
     /// A form with calls that are to be made first.
     Calls(Datum),
+    /// The program reads the next form itself, by this call.
+    Read(MacroCall),
     /// A module that the form at this place requires.
     Require(String, Span),
     /// A compiled module, which the form at this place requires.
@@ -48,6 +53,8 @@ enum QueueItem {
     Text(Box<Reader>),
     /// A form that no text contains.
     Form(Datum),
+    /// The form after which data are read in the standard syntax again, if they are not.
+    StandardSyntax,
     /// A form of the text after it, whose calls have been made.
     Read(Datum),
     /// A module that a compiled one requires; the form at this place requires that one.
@@ -72,12 +79,21 @@ pub(super) struct FormQueue {
     apart: Vec<String>,
     /// Number of errors before the current form, if that makes or enters a package.
     errors_before_package: Option<usize>,
+    /// Bytes of the text that the program is given to read one form; 0 for [`READ_PART`].
+    read_part: usize,
 }
+
+/// Bytes of a text that the program is given to read one form from, at first; twice as many whenever the form
+/// may go on after them. So reading a text takes time in proportion to the number of its forms.
+const READ_PART: usize = 1 << 16;
 
 impl FormQueue {
     /// Adds the text called `name` at the end.
     pub(super) fn add(&mut self, name: &str, source: SourceId, text: Arc<str>) {
         let package = if is_common_lisp(name) { CL_USER_PACKAGE } else { USER_PACKAGE };
+        if !self.row.is_empty() {
+            self.row.push_back(QueueItem::StandardSyntax);
+        }
         if !self.row.is_empty() || package != USER_PACKAGE {
             self.row.push_back(QueueItem::Form(call(Symbol::cl("IN-PACKAGE"), package, Span::default())));
         }
@@ -116,6 +132,45 @@ impl FormQueue {
     /// Puts a form whose calls have been made at the front.
     pub(super) fn put_back(&mut self, form: Datum) {
         self.row.push_front(QueueItem::Read(form));
+    }
+
+    /// Returns the call by which the program reads the next form of a text itself, of which `reader` has read
+    /// what is before: `(%read-form part is-all)`.
+    fn reading(reader: &Reader, size: usize) -> MacroCall {
+        let (part, is_all) = reader.part(size.max(READ_PART));
+        let span = reader.next_span();
+        let operator = Symbol::esl("%READ-FORM");
+        let is_all = if is_all { Datum::symbol(Symbol::cl("T"), span) } else { Datum::nil(span) };
+        let form = [Datum::symbol(operator.clone(), span), Datum::string(part, span), is_all];
+        MacroCall { function: MacroRef::Global(operator), form: Datum::list(form, span), locals: [].into() }
+    }
+
+    /// Takes what the program has read: `(:form datum end)`, where END counts characters, `(:end)`, or
+    /// `(:more)` if the part was too small.
+    pub(super) fn take_read(&mut self, read: &Datum) {
+        let Some(QueueItem::Text(reader)) = self.row.front_mut() else { return };
+        let size = std::mem::take(&mut self.read_part).max(READ_PART);
+        let items = read.as_list().unwrap_or_default();
+        match (items.first().and_then(|kind| kind.as_symbol()).map(Symbol::name), &items[..]) {
+            (Some("FORM"), [_, form, end]) => {
+                reader.skip(match end.kind() {
+                    DatumKind::Integer(end) => usize::try_from(end).unwrap_or(usize::MAX),
+                    _ => usize::MAX,
+                });
+                let form = (*form).clone();
+                self.row.push_front(QueueItem::Read(form));
+            }
+            (Some("MORE"), _) => self.read_part = size * 2,
+            _ => reader.skip(usize::MAX),
+        }
+    }
+
+    /// Leaves out the rest of a text that the program has failed to read. Returns where that begins.
+    pub(super) fn give_up_reading(&mut self) -> Span {
+        let Some(QueueItem::Text(reader)) = self.row.front_mut() else { return Span::default() };
+        let span = reader.next_span();
+        reader.skip(usize::MAX);
+        span
     }
 
     /// Takes the modules that the texts themselves require.
@@ -157,6 +212,13 @@ impl FormQueue {
                     expander.begin_file_form(form);
                     return Next::Form;
                 }
+                QueueItem::StandardSyntax => {
+                    self.row.pop_front();
+                    if environment.has_own_syntax() {
+                        expander.begin_file_form(standard_syntax());
+                        return Next::Form;
+                    }
+                }
                 QueueItem::Require(name, span) => {
                     let (name, span) = (std::mem::take(name), *span);
                     self.row.pop_front();
@@ -175,6 +237,12 @@ impl FormQueue {
                     if let Some(next) = self.begin(form, expander, diagnostics) {
                         return next;
                     }
+                }
+                QueueItem::Text(reader) if reader.is_sound() && environment.has_own_syntax() => {
+                    if !reader.is_at_end() {
+                        return Next::Read(FormQueue::reading(reader, self.read_part));
+                    }
+                    self.row.pop_front();
                 }
                 QueueItem::Text(reader) => match reader.next(environment) {
                     None => {
@@ -265,6 +333,16 @@ fn circular(modules: &[String], span: Span) -> Box<Diagnostic> {
 /// Returns a call with a name as its argument.
 fn call(operator: Symbol, name: &str, span: Span) -> Datum {
     Datum::list([Datum::symbol(operator, span), Datum::string(name, span)], span)
+}
+
+/// Returns the form after which data are read in the standard syntax again.
+fn standard_syntax() -> Datum {
+    let span = Span::default();
+    let symbol = |name| Datum::symbol(Symbol::cl(name), span);
+    let times = ["COMPILE-TOPLEVEL", "LOAD-TOPLEVEL", "EXECUTE"];
+    let times = Datum::list(times.map(|time| Datum::symbol(Symbol::keyword(time), span)), span);
+    let set = Datum::list([symbol("SETQ"), symbol("*READTABLE*"), Datum::nil(span)], span);
+    Datum::list([symbol("EVAL-WHEN"), times, set], span)
 }
 
 /// Gives the uninterned symbols of a module numbers that are unique in the compilation.

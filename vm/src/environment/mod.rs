@@ -83,6 +83,10 @@ impl Environment for Vm {
         base.and_then(|base| u32::try_from(base).ok()).filter(|base| (2..=36).contains(base)).unwrap_or(10)
     }
 
+    fn has_own_syntax(&self) -> bool {
+        self.symbol_value(self.world.known.readtable).is_some_and(|readtable| !readtable.is_nil())
+    }
+
     fn has_feature(&self, name: &str) -> Option<bool> {
         let mut rest = self.symbol_value(self.world.known.features)?;
         for _ in 0..MAX_FEATURES {

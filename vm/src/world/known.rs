@@ -48,6 +48,7 @@ define_known! {
     package = cl "*PACKAGE*";
     gensym_counter = cl "*GENSYM-COUNTER*";
     read_base = cl "*READ-BASE*";
+    readtable = cl "*READTABLE*";
     features = cl "*FEATURES*";
     quote = cl "QUOTE";
     standard_input = cl "*STANDARD-INPUT*";
