@@ -33,6 +33,7 @@ struct Eslvm {
 }
 
 #[derive(Subcommand)]
+#[allow(clippy::large_enum_variant, reason = "there is one, which is made once")]
 enum EslvmAction {
     /// Run a program
     ///

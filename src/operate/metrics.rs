@@ -66,6 +66,9 @@ fn seconds(nanoseconds: u64) -> f64 {
     nanoseconds as f64 / 1e9
 }
 
+/// A figure of an input.
+type InputFigure = fn(&esl_vm::host::InputRow) -> u64;
+
 /// Returns the figures as a text.
 fn text_of(survey: &Survey) -> String {
     let figures = &survey.figures;
@@ -121,7 +124,7 @@ fn text_of(survey: &Survey) -> String {
         seconds(figures.idled),
     );
     let kept = |row: &esl_vm::host::InputRow| row.kept as u64;
-    let inputs: [(&str, &str, &str, fn(&esl_vm::host::InputRow) -> u64); 3] = [
+    let inputs: [(&str, &str, &str, InputFigure); 3] = [
         ("esl_input_signals_total", "counter", "Signals of an input.", |row| row.signals),
         ("esl_input_dropped_total", "counter", "Signals of an input that were dropped.", |row| row.dropped),
         ("esl_input_waiting", "gauge", "Signals of an input that nobody has taken yet.", kept),
