@@ -39,6 +39,8 @@ pub mod module_path;
 pub mod new;
 #[cfg(feature = "cli")]
 pub mod operate;
+#[cfg(feature = "cli")]
+pub mod profile;
 pub mod program;
 #[cfg(feature = "cli")]
 pub mod repl;

@@ -11,6 +11,7 @@
 ;;; Code:
 
 (require 'lisp-mode)
+(require 'cl-indent)
 
 (defgroup esl nil
   "The Execution Support Language."
@@ -44,8 +45,8 @@
                 (supervise . 1) (partial-order . 1) (task-net . 0) (or-parallel . 0) (try-all . 0)
                 (pursue . 0) (try-in-order . 0) (spawn . 0) (without-interrupts . 0)
                 (with-automatic-recoveries . 0) (fails . 1) (signals . 1)))
-  (unless (get (car form) 'lisp-indent-function)
-    (put (car form) 'lisp-indent-function (cdr form))))
+  (unless (get (car form) 'common-lisp-indent-function)
+    (put (car form) 'common-lisp-indent-function (cdr form))))
 
 (defun esl-expand ()
   "Show the top-level form at point with its macros expanded."
@@ -73,7 +74,7 @@
 (define-derived-mode esl-mode lisp-mode "ESL"
   "Major mode for programs in ESL, the Execution Support Language."
   (setq-local indent-tabs-mode nil)
-  (setq-local lisp-indent-function #'lisp-indent-function)
+  (setq-local lisp-indent-function #'common-lisp-indent-function)
   (setq-local inferior-lisp-program "eslvm repl")
   (font-lock-add-keywords nil esl-mode-font-lock-keywords))
 

@@ -13,6 +13,7 @@ use esl::explore::{self, Schedule};
 use esl::host::{Host, ProcessSignal, RealHost, RecordingHost};
 use esl::module_path::ModulePath;
 use esl::operate::OperateOptions;
+use esl::profile::{INTERVAL, Profile};
 use esl::program::{self, Ended, Modules, Program, Summary};
 use esl::replay::{self, FileRecorder, ReplayOptions, RunSetup};
 use esl::testing;
@@ -20,6 +21,9 @@ use esl::timeline::Timeline;
 use esl_compiler::diagnostic::{Format, Renderer};
 use esl_vm::value::Value;
 use esl_vm::vm::Vm;
+
+/// Functions whose figures are printed, at most.
+const SHOWN_FUNCTIONS: usize = 40;
 
 /// The virtual machine of ESL, the Execution Support Language.
 #[derive(Parser)]
@@ -47,8 +51,8 @@ enum EslvmAction {
         /// Seconds of the program's clock in a second of real time: for a program whose outside is a simulator
         #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = parse_speed)]
         speed: f64,
-        /// Print figures of the run to standard error at its end; with `=tasks`, also of the tasks with most
-        /// ticks
+        /// Print figures of the run to standard error at its end; with `=tasks` or `=functions`, also of those
+        /// with most ticks
         #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "run")]
         stats: Option<Stats>,
         /// Write a timeline of the tasks to a file: a drawing if its name ends in `.svg`, else a trace for
@@ -61,6 +65,10 @@ enum EslvmAction {
         /// Record the run in a file, for `eslvm replay`: the program, and everything that reaches it
         #[arg(long, value_name = "FILE", conflicts_with = "schedule")]
         record: Option<PathBuf>,
+        /// Write to a file which calls and lines have used the ticks: a flame graph if its name ends in `.svg`,
+        /// for speedscope if it ends in `.json`, else a line for each stack
+        #[arg(long, value_name = "FILE", conflicts_with = "schedule")]
+        profile: Option<PathBuf>,
         /// Trace failures, goals or tasks on standard error: a list such as failures,tasks
         #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = ["failures", "goals", "tasks"])]
         trace: Vec<String>,
@@ -165,6 +173,8 @@ enum Stats {
     Run,
     /// The run and its tasks
     Tasks,
+    /// The run and its functions
+    Functions,
 }
 
 /// Clock of a program.
@@ -272,6 +282,7 @@ fn main() -> ExitCode {
             speed,
             stats,
             timeline,
+            profile,
             schedule,
             record,
             trace,
@@ -287,8 +298,10 @@ fn main() -> ExitCode {
             rights.and_then(|rights| {
                 let host = RealHost::new(arguments).with_rights(path.with_rights(rights)).with_speed(speed);
                 let schedule = schedule.as_deref().map(explore::read_schedule).transpose()?;
-                let (timeline, record) = (timeline.as_deref(), record.as_deref());
-                let reports = RunReports { stats, timeline, record, trace: &trace, operate: &operate };
+                let (timeline, profile, record) =
+                    (timeline.as_deref(), profile.as_deref(), record.as_deref());
+                let reports =
+                    RunReports { stats, timeline, profile, record, trace: &trace, operate: &operate };
                 run(&file, host, &options, &reports, schedule.as_ref(), &path)
             })
         }
@@ -398,6 +411,7 @@ struct RunReports<'a> {
     stats: Option<Stats>,
     timeline: Option<&'a Path>,
     record: Option<&'a Path>,
+    profile: Option<&'a Path>,
     trace: &'a [String],
     operate: &'a OperateOptions,
 }
@@ -410,8 +424,8 @@ fn run(
     schedule: Option<&Schedule>,
     path: &ModulePath,
 ) -> Result<u8, u8> {
-    let RunReports { stats, timeline, record, trace, operate } = *reports;
-    for output in [timeline, record].into_iter().flatten() {
+    let RunReports { stats, timeline, profile, record, trace, operate } = *reports;
+    for output in [timeline, profile, record].into_iter().flatten() {
         command::refuse_overwriting(output, [file])?;
     }
     let signals = SignalTarget::default();
@@ -459,6 +473,8 @@ fn run(
     };
     let served = operate.begin(&mut machine)?;
     let started = std::time::Instant::now();
+    let is_profiled = profile.is_some() || stats == Some(Stats::Functions);
+    let mut found = Profile::new();
     let summary = match schedule {
         Some(schedule) if !schedule.is_of(&program) => {
             complain(
@@ -467,6 +483,9 @@ fn run(
             return Err(USAGE);
         }
         Some(schedule) => program::run_by(&mut machine, &program, &schedule.settings(), schedule.choices()),
+        None if is_profiled => {
+            program::run_in_portions(&mut machine, &program, INTERVAL, &mut |machine| found.look(machine))
+        }
         None => program::run_in(&mut machine, &program),
     };
     let summary = summary.map_err(setup)?;
@@ -483,6 +502,11 @@ fn run(
     {
         status = not_written(path, &error);
     }
+    if let Some(path) = profile
+        && let Err(error) = found.write(path)
+    {
+        status = not_written(path, &error);
+    }
     match summary.ended {
         Ended::BudgetSpent => {
             let budget = options.budget.unwrap_or(summary.ticks);
@@ -495,6 +519,9 @@ fn run(
         print_stats(&machine, &summary, seconds);
         if stats == Stats::Tasks {
             print_tasks(&machine);
+        }
+        if stats == Stats::Functions {
+            print_functions(&found);
         }
     }
     // The process ends here: giving the memory back piece by piece would only take time.
@@ -532,6 +559,14 @@ fn print_stats(machine: &Vm, summary: &Summary, seconds: f64) {
     eprintln!("  all         {:>14.3} ms", milliseconds(pauses.total));
     eprintln!("  longest     {:>14.3} ms", milliseconds(pauses.longest));
     eprintln!("longest slice {:>14} objects", heap.longest_slice);
+}
+
+/// Prints the functions that have used most ticks.
+fn print_functions(profile: &Profile) {
+    eprintln!("\n{:>14} {:>14}  function", "own ticks", "with calls");
+    for function in profile.functions().iter().take(SHOWN_FUNCTIONS) {
+        eprintln!("{:>14} {:>14}  {}", function.own, function.total, function.name);
+    }
 }
 
 fn print_tasks(machine: &Vm) {

@@ -181,6 +181,28 @@ pub fn run_by(
     run_as(machine, program, |machine| machine.follow(settings, choices, &mut |_| {}))
 }
 
+/// Runs a program as [`run_in`] does, in portions of so many ticks, which changes nothing in the run, and calls
+/// `look` after each.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_in_portions(
+    machine: &mut Vm,
+    program: &Program,
+    ticks: u64,
+    look: &mut dyn FnMut(&Vm),
+) -> Result<Summary, Error> {
+    run_as(machine, program, |machine| {
+        loop {
+            let outcome = machine.run(ticks);
+            look(machine);
+            if outcome != RunOutcome::TicksUsed {
+                return outcome;
+            }
+        }
+    })
+}
+
 /// Runs a program to its end as `turns` lets its tasks take turns.
 fn run_as(
     machine: &mut Vm,

@@ -24,6 +24,7 @@ mod monitor;
 #[cfg(unix)]
 mod mqtt;
 mod operate;
+mod profile;
 mod real_time;
 mod recording;
 mod replay;

@@ -1,5 +1,6 @@
 //! What is said of tasks: to observers, in traces, in reports, and in figures.
 
+mod calls;
 mod figures;
 mod holders;
 mod label;
