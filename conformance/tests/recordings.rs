@@ -1,9 +1,7 @@
 //! Runs of conformance programs in real time, interrupted somewhere, are recorded and replayed: the replay is
 //! the same run to the tick, by all checks and by the end.
 //!
-//! Programs sleep in real time here, a million times faster, so this takes minutes and is left out of the gate:
-//! `cargo test -p esl-conformance --test recordings -- --ignored` takes a part of them, and all with
-//! `ESL_ALL_RECORDINGS=1`.
+//! Programs sleep in real time here, a million times faster.
 
 use std::path::PathBuf;
 use std::thread;
@@ -14,9 +12,6 @@ use esl::host::{Incoming, ProcessSignal, RealHost, Rights};
 use esl::program::{Source, compile};
 use esl::replay::{Recorded, Replayed, Rerun, RunSetup, record};
 use esl_conformance::{Expectations, programs};
-
-/// One of so many programs is run without the variable.
-const PART: usize = 20;
 
 /// A file that is removed when the test is over.
 struct Removed(PathBuf);
@@ -29,16 +24,11 @@ impl Drop for Removed {
 }
 
 #[test]
-#[ignore = "programs sleep in real time"]
 fn programs_take_the_same_course_when_they_are_replayed() {
-    let takes_all = std::env::var_os("ESL_ALL_RECORDINGS").is_some();
     let file = std::env::temp_dir().join(format!("esl-conformance-{}.eslj", std::process::id()));
     let file = Removed(file);
     let (mut run, mut checks, mut interrupted) = (0, 0, 0);
     for (index, path) in programs::paths("").into_iter().enumerate() {
-        if !takes_all && index % PART != 0 {
-            continue;
-        }
         let text = std::fs::read_to_string(&path).expect("a program can be read");
         let expected = Expectations::parse(&text).expect("it is right");
         // Nobody types anything to a test.
@@ -75,5 +65,5 @@ fn programs_take_the_same_course_when_they_are_replayed() {
         checks += u64::from(recorded.last_check().is_some());
         interrupted += u64::from(matches!(summary.ended, esl::program::Ended::Signalled(_)));
     }
-    assert!(run > 20 && checks > 0, "{run} programs, {checks} with checks, {interrupted} interrupted");
+    assert!(run > 300 && checks > 0, "{run} programs, {checks} with checks, {interrupted} interrupted");
 }

@@ -410,15 +410,15 @@ fn a_place_is_the_same_whatever_way_leads_there() {
         debugger.step(41).expect("there is room");
     }
     assert!(forward.len() > 50, "only {} places", forward.len());
-    let backs = std::env::var("ESL_REPLAY_BACKS").ok().and_then(|backs| backs.parse().ok()).unwrap_or(60);
     let mut random = 12345_u64;
-    for _ in 0..backs {
+    for _ in 0..1000 {
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         let (ticks, expected) = &forward[(random >> 33) as usize % forward.len()];
         if random & 1 << 32 != 0 {
             let value =
                 debugger.evaluate("(list (setq *n* -1) (retract '(done ?i ?j)))").expect("there is room");
-            assert!(value.starts_with("(-1 "), "{value}");
+            // An answer begins on a line of its own, wherever the program has stopped in one.
+            assert!(value.trim_start().starts_with("(-1 "), "{value}");
         }
         debugger.go_to(*ticks).expect("there is room");
         assert_eq!(&state(&mut debugger), expected);
