@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::{
     Behaviour, Exploration, Schedule, SearchLimit, SearchProgress, Settings, StandingTask, Switch,
-    explore_while, follow_with,
+    explore_while, tell_switches,
 };
 use crate::command::{self, FAILED, NOT_PROVED, SUCCESS, USAGE, complain};
 use crate::error::Error;
@@ -37,6 +37,8 @@ struct Finding {
     /// In a few words.
     what: String,
     choices: Vec<u32>,
+    /// Whether the schedule comes to an end.
+    ends: bool,
     /// What is told of the end: the report of a deadlock or of a failure.
     errors: String,
 }
@@ -64,8 +66,8 @@ impl PlaceTexts {
     }
 }
 
-/// Explores a program, and prints what was found. Returns the exit status: 0 if no schedule ends badly, 1 if one
-/// does, 7 if none was found and not all were tried.
+/// Explores a program, and prints what was found. Returns the exit status: 0 if no schedule ends badly, 1 if
+/// one does, 7 if none was found and not all were tried.
 pub fn run(program: &Program, file: &Path, path: &ModulePath, options: &ExplorationOptions) -> u8 {
     let prepare = |machine: &mut Vm| crate::program::set_module_path(machine, path);
     let started = Instant::now();
@@ -124,12 +126,17 @@ fn findings(found: &Exploration<Behaviour>) -> Vec<Finding> {
         };
         // Runs that differ only in what they had printed before are one finding.
         if !findings.iter().any(|known| known.what == what && known.errors == *errors) {
-            findings.push(Finding { what, choices: ending.choices.clone(), errors: errors.clone() });
+            findings.push(Finding {
+                what,
+                choices: ending.choices.clone(),
+                ends: true,
+                errors: errors.clone(),
+            });
         }
     }
     if let Some(choices) = &found.endless {
         let what = "from here on, the program never ends".into();
-        findings.push(Finding { what, choices: choices.clone(), errors: String::new() });
+        findings.push(Finding { what, choices: choices.clone(), ends: false, errors: String::new() });
     }
     findings
 }
@@ -168,7 +175,7 @@ fn tell(
     };
     let mut switches = Vec::new();
     let mut told = |switch| switches.push(switch);
-    follow_with(program, &options.settings, &finding.choices, &prepare, &mut told)
+    tell_switches(program, &options.settings, &finding.choices, finding.ends, &prepare, &mut told)
         .map_err(|error| error.to_string())?;
     if let Some(timeline) = pictured.into_inner() {
         let told = timeline.and_then(Timeline::complete);

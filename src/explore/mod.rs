@@ -84,7 +84,7 @@ pub fn explore_with(
     explore_while(program, settings, prepare, |_| true)
 }
 
-/// As [`explore_with`], for as long as `goes_on`, which is asked before each run.
+/// As [`explore_with`], for as long as `goes_on`, which is asked before each run and in each new state.
 ///
 /// # Errors
 /// As [`explore_with`].
@@ -113,23 +113,31 @@ pub fn explore_while(
 /// # Errors
 /// As [`program::run`].
 pub fn follow(program: &Program, settings: &Settings, choices: &[u32]) -> Result<Behaviour, Error> {
-    follow_with(program, settings, choices, &|_| Ok(()), &mut |_| {})
+    let (mut machine, main, captured) = begin(program, &|_| Ok(()))?;
+    let outcome = machine.follow(settings, choices, &mut |_| {});
+    let ended = program::end(&mut machine, main, outcome);
+    Ok(Behaviour { ended, output: captured.output(), errors: captured.error() })
 }
 
-/// As [`follow`], on a machine that `prepare` has changed. `told` is told of each choice that is not the first
-/// one, just before it is made.
+/// Follows a list of choices, on a machine that `prepare` has changed, to the end of the run if `ends`, else
+/// to the last of them. `told` is told of each choice that is not the first one, just before it is made.
 ///
 /// # Errors
 /// As [`program::run`], and the errors of `prepare`.
-pub fn follow_with(
+#[cfg(feature = "cli")]
+fn tell_switches(
     program: &Program,
     settings: &Settings,
     choices: &[u32],
+    ends: bool,
     prepare: Prepare<'_>,
     told: &mut dyn FnMut(Switch),
-) -> Result<Behaviour, Error> {
-    let (mut machine, main, captured) = begin(program, prepare)?;
-    let outcome = machine.follow(settings, choices, told);
-    let ended = program::end(&mut machine, main, outcome);
-    Ok(Behaviour { ended, output: captured.output(), errors: captured.error() })
+) -> Result<(), Error> {
+    let (mut machine, ..) = begin(program, prepare)?;
+    if ends {
+        machine.follow(settings, choices, told);
+    } else {
+        machine.follow_to(settings, choices, told);
+    }
+    Ok(())
 }

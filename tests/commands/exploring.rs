@@ -136,3 +136,20 @@ fn what_does_not_compile_is_not_explored() {
     assert_eq!(run(&folder, &["explore", "open.esl"]).0, Some(3));
     assert_eq!(run(&folder, &["explore", "missing.esl"]).0, Some(2));
 }
+
+/// A schedule that does not end is told up to where it is known not to, and a run that comes to new states
+/// for ever is given up when the time is over.
+#[test]
+fn what_never_ends_is_told_or_given_up() {
+    let folder = Folder::new("exploring-endless");
+    folder.file("endless.esl", "(loop)");
+    let (status, output, errors) = run(&folder, &["explore", "endless.esl"]);
+    assert_eq!((status, errors.as_str()), (Some(1), ""), "{output}");
+    assert!(output.starts_with("finding 1: from here on, the program never ends\n"), "{output}");
+    folder.file("counts.esl", "(let ((i 0)) (loop (incf i)))");
+    let (status, output, _) = run(&folder, &["explore", "--time", "1", "counts.esl"]);
+    assert_eq!(status, Some(7), "{output}");
+    // The condition itself may not end.
+    folder.file("check.esl", "(always never-told (loop))");
+    assert_eq!(run(&folder, &["explore", "check.esl"]).0, Some(1));
+}

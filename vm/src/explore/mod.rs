@@ -189,6 +189,12 @@ impl Search {
         self.open.iter_mut().enumerate().find_map(|(switches, nodes)| Some((switches, nodes.pop()?)))
     }
 
+    /// Returns how far the search has come.
+    fn progress(&self, runs: usize, switches: usize, endings: usize) -> SearchProgress {
+        let open = self.open.iter().map(Vec::len).sum::<usize>() + 1;
+        SearchProgress { states: self.states.len(), runs, open, switches, endings }
+    }
+
     /// Returns the choices that lead to a node.
     fn choices(&self, node: u32) -> Vec<u32> {
         let mut choices = Vec::new();
@@ -258,7 +264,7 @@ pub fn explore<T: PartialEq, E>(
     explore_while(settings, begin, judge, |_| true)
 }
 
-/// As [`explore`], for as long as `goes_on`, which is asked before each run.
+/// As [`explore`], for as long as `goes_on`, which is asked before each run and in each new state.
 ///
 /// # Errors
 /// Those of `begin`.
@@ -278,10 +284,10 @@ pub fn explore_while<T: PartialEq, E>(
         if limit == Some(SearchLimit::States) {
             break;
         }
-        let open = search.open.iter().map(Vec::len).sum::<usize>() + 1;
-        let states = search.states.len();
-        if !goes_on(&SearchProgress { states, runs, open, switches, endings: endings.len() }) {
+        if !goes_on(&search.progress(runs, switches, endings.len())) {
             limit = Some(SearchLimit::Asked);
+        }
+        if limit == Some(SearchLimit::Asked) {
             break;
         }
         let mut machine = begin()?;
@@ -316,6 +322,11 @@ pub fn explore_while<T: PartialEq, E>(
             search.places.push(node);
             if search.places.len() >= settings.states {
                 limit = Some(SearchLimit::States);
+                return None;
+            }
+            // A run may come to new states for ever.
+            if !goes_on(&search.progress(runs, switches, endings.len())) {
+                limit = Some(SearchLimit::Asked);
                 return None;
             }
             before = Some(state);

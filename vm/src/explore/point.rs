@@ -82,19 +82,38 @@ impl Vm {
         choices: &[u32],
         told: &mut dyn FnMut(Switch),
     ) -> RunOutcome {
-        explore_by(self, settings);
-        let mut choices = choices.iter().copied();
-        let mut next = |vm: &mut Vm, runnable: Runnable<'_>| {
-            let choice = if runnable.count() > 1 { choices.next().unwrap_or(0) } else { 0 };
-            if choice > 0 {
-                told(switch(vm, runnable, choice));
-            }
-            Some(choice)
-        };
-        let outcome = run_by_points(self, &mut next).unwrap_or(RunOutcome::Done);
-        self.scheduler.points.grain = None;
-        outcome
+        follow(self, settings, choices, true, told).unwrap_or(RunOutcome::Done)
     }
+
+    /// As [`Vm::follow`], no further than the last of the choices: for a schedule that does not end.
+    pub fn follow_to(&mut self, settings: &Settings, choices: &[u32], told: &mut dyn FnMut(Switch)) {
+        follow(self, settings, choices, false, told);
+    }
+}
+
+/// Runs along choices, and further if `goes_beyond`; returns how the run has ended, if it has.
+fn follow(
+    vm: &mut Vm,
+    settings: &Settings,
+    choices: &[u32],
+    goes_beyond: bool,
+    told: &mut dyn FnMut(Switch),
+) -> Option<RunOutcome> {
+    explore_by(vm, settings);
+    let mut choices = choices.iter().copied();
+    let mut next = |vm: &mut Vm, runnable: Runnable<'_>| {
+        if !goes_beyond && choices.len() == 0 {
+            return None;
+        }
+        let choice = if runnable.count() > 1 { choices.next().unwrap_or(0) } else { 0 };
+        if choice > 0 {
+            told(switch(vm, runnable, choice));
+        }
+        Some(choice)
+    };
+    let outcome = run_by_points(vm, &mut next);
+    vm.scheduler.points.grain = None;
+    outcome
 }
 
 /// Describes a choice that is not the first.
@@ -187,10 +206,10 @@ fn runnable_tasks(vm: &Vm) -> impl Iterator<Item = (TaskNumber, TaskIndex)> + '_
 /// Most turns of a task that checks what always has to hold, in one state.
 const CHECK_TURNS: u32 = 1_000;
 
-/// Lets the task run that checks what always has to hold, if the program has one (`stdlib/exploration.esl`): until
-/// it waits for the event in the variable `checks`, where it stands at first, and then from each signal of that
-/// event until it waits again. It stops at no points, so that it adds no states. Returns whether its turns were
-/// enough.
+/// Lets the task run that checks what always has to hold, if the program has one (`stdlib/exploration.esl`):
+/// until it waits for the event in the variable `checks`, where it stands at first, and then from each signal
+/// of that event until it waits again. It stops at no points, so that it adds no states. Returns whether its
+/// turns were enough.
 fn check_state(vm: &mut Vm, checks: Value) -> bool {
     let awaited = vm.heap.symbol(checks).map_or(Value::NIL, |symbol| symbol.value);
     if awaited == Value::NIL || awaited == Value::UNBOUND || vm.outside.exit_status.is_some() {
