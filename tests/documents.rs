@@ -1,5 +1,5 @@
-//! The documents hang together: each link among them leads to a file and a heading that exist, and the contents of
-//! the site, `docs/SUMMARY.md`, have every page.
+//! The documents hang together: each link among them leads to a file and a heading that exist, and the
+//! contents of the site, `docs/SUMMARY.md`, have every page.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

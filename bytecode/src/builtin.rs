@@ -1240,8 +1240,8 @@ macro_rules! for_each_builtin {
             MakeCustomStream = stream::make_custom_stream, internal "%MAKE-CUSTOM-STREAM" ("data");
             /// The data of such a stream; `NIL` for any other object.
             CustomStreamData = stream::custom_stream_data, internal "%CUSTOM-STREAM-DATA" ("stream");
-            /// A stream whose characters come from and go to what `handler` says: to be read if `direction` is
-            /// 1, to be written if it is 2, otherwise both. `file` is the name of the file, or `NIL`.
+            /// A stream whose characters come from and go to what `handler` says: to be read if `direction`
+            /// is 1, to be written if it is 2, otherwise both. `file` is the name of the file, or `NIL`.
             MakeChannel = stream::make_channel, internal "%MAKE-CHANNEL" ("handler file direction");
             /// The handler of a channel; `NIL` for any other object.
             ChannelHandler = stream::channel_handler, internal "%CHANNEL-HANDLER" ("object");
@@ -1426,8 +1426,8 @@ macro_rules! for_each_builtin {
             Taskp = task::taskp, internal "%TASKP" ("object");
             /// `:running`, `:waiting`, `:succeeded`, `:failed` or `:aborted`.
             TaskStatus = task::task_status, esl "TASK-STATUS" ("task");
-            /// The number of a task, and that of the task that it belongs to: the one that made it, or, where that
-            /// has ended, the one that that belonged to. `NIL` when it has ended.
+            /// The number of a task, and that of the task that it belongs to: the one that made it, or, where
+            /// that has ended, the one that that belonged to. `NIL` when it has ended.
             TaskNumber = task::task_number, internal "%TASK-NUMBER" ("task");
             /// The ticks that a task has used; `NIL` when it has ended.
             TaskTicks = task::task_ticks, internal "%TASK-TICKS" ("task");
@@ -1466,15 +1466,15 @@ macro_rules! for_each_builtin {
             /// The number of tasks made so far, and one above all places of those that there are.
             TasksMade = suspension::tasks_made, internal "%TASKS-MADE" ("");
             /// Adds to the lists in `generations`, by depth, the tasks of a part of the tree of `root`, those
-            /// whose numbers are above `above` and not above `below`, from the places below `end`. Returns the
-            /// `end` of the next part, `NIL` if the root has ended, and the largest depth. `depths` is a
+            /// whose numbers are above `above` and not above `below`, from the places below `end`. Returns
+            /// the `end` of the next part, `NIL` if the root has ended, and the largest depth. `depths` is a
             /// vector of what is known.
             TreePart = suspension::tree_part, internal "%TREE-PART" ("root above below end depths generations");
             /// Has those of the first of `tasks` stand still that can do so where they wait, with the clock
             /// stopped if it is to. Returns a list of the others, and the tasks that are left.
             BeginRest = suspension::begin_rest, internal "%BEGIN-REST" ("tasks stops-clock");
-            /// Resumes the first of `tasks`, up to the cell `end`, that stand still by `%BEGIN-REST`. Returns the
-            /// tasks that are left, and a list of those that do not.
+            /// Resumes the first of `tasks`, up to the cell `end`, that stand still by `%BEGIN-REST`. Returns
+            /// the tasks that are left, and a list of those that do not.
             ResumeFromRest = suspension::resume_from_rest, internal "%RESUME-FROM-REST" ("tasks end");
             /// Has a task stand still by `%BEGIN-REST` no more. Returns how often it did.
             EndRest = suspension::end_rest, internal "%END-REST" ("task");

@@ -55,8 +55,8 @@ pub enum DatumKind {
 }
 
 /// Something of the embedder's that programs hold, hand on and compare without looking into it: the name of
-/// its type, how it is told from others of that type when it is printed, and itself. Two are equal if they are
-/// the same thing.
+/// its type, how it is told from others of that type when it is printed, and itself. Two are equal if they
+/// are the same thing.
 #[derive(Clone)]
 pub struct OpaqueDatum {
     kind: Arc<str>,

@@ -1,8 +1,8 @@
 //! Canaries of forty programs, as they were when the epoch of the machine's behaviour was counted last.
 //!
 //! Records of runs hold answers by the order of questions and by rounds, so a machine that takes other turns
-//! cannot replay them. Its tables and library say themselves that they have changed. Of the rest, ticks, paces
-//! and orders, the canaries say it: when they change, `EXECUTION_EPOCH` has to.
+//! cannot replay them. Its tables and library say themselves that they have changed. Of the rest, ticks,
+//! paces and orders, the canaries say it: when they change, `EXECUTION_EPOCH` has to.
 
 use std::fmt::Write as _;
 use std::io::Write as _;

@@ -60,7 +60,8 @@ fn course(program: &Program, config: &Config, mut next: impl FnMut() -> Option<u
             outcome => break outcome,
         }
     };
-    // Where a budget ends a turn, how the scheduler notes that may depend on the portion; what follows does not.
+    // Where a budget ends a turn, how the scheduler notes that may
+    // depend on the portion; what follows does not.
     let fingerprint = (outcome != RunOutcome::BudgetSpent).then(|| machine.fingerprint());
     machine.end_run();
     machine.flush();

@@ -178,7 +178,8 @@ pub const fn parts_of<Owner, Part: Listed>(_field: fn(&Owner) -> &Part) -> Field
     FieldRole::Parts(Part::FIELDS)
 }
 
-/// Lists the fields of a struct: `list_state! { Pacing { floor: Run, threshold: Run, since_cycle: Visited } }`.
+/// Lists the fields of a struct:
+/// `list_state! { Pacing { floor: Run, threshold: Run, since_cycle: Visited } }`.
 ///
 /// The words are those of [`FieldRole`](crate::state::FieldRole), and two more for what is state of the run:
 /// `Address`, an address in the heap, and `Visited`, which is told by other code, since it takes the machine

@@ -48,11 +48,12 @@ enum EslvmAction {
     Run {
         #[command(flatten)]
         options: MachineOptions,
-        /// Seconds of the program's clock in a second of real time: for a program whose outside is a simulator
+        /// Seconds of the program's clock in a second of real time:
+        /// for a program whose outside is a simulator
         #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = parse_speed)]
         speed: f64,
-        /// Print figures of the run to standard error at its end; with `=tasks` or `=functions`, also of those
-        /// with most ticks
+        /// Print figures of the run to standard error at its end; with `=tasks` or `=functions`, also of
+        /// those with most ticks
         #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "run")]
         stats: Option<Stats>,
         /// Write a timeline of the tasks to a file: a drawing if its name ends in `.svg`, else a trace for
@@ -65,8 +66,8 @@ enum EslvmAction {
         /// Record the run in a file, for `eslvm replay`: the program, and everything that reaches it
         #[arg(long, value_name = "FILE", conflicts_with = "schedule")]
         record: Option<PathBuf>,
-        /// Write to a file which calls and lines have used the ticks: a flame graph if its name ends in `.svg`,
-        /// for speedscope if it ends in `.json`, else a line for each stack
+        /// Write to a file which calls and lines have used the ticks: a flame graph if its name ends in
+        /// `.svg`, for speedscope if it ends in `.json`, else a line for each stack
         #[arg(long, value_name = "FILE", conflicts_with = "schedule")]
         profile: Option<PathBuf>,
         /// Trace failures, goals or tasks on standard error: a list such as failures,tasks
@@ -125,8 +126,8 @@ enum EslvmAction {
     /// Lets the tasks of the program take turns in every possible order, and tells of those orders that end
     /// badly: by a deadlock, a failure of the main task, a status other than 0. Writes each as a schedule, which
     /// `eslvm run --schedule` repeats. Exit status: 0 no schedule ends badly; 1 one does; 2 wrong usage, or a
-    /// file that cannot be read or written; 3 the program does not compile or is refused; 7 none was found, and
-    /// not all were tried.
+    /// file that cannot be read or written; 3 the program does not compile or is refused; 7 none was found,
+    /// and not all were tried.
     Explore {
         #[command(flatten)]
         options: ExploreArguments,
@@ -245,8 +246,8 @@ struct ExploreArguments {
     /// Most times that CHOOSE takes another form than its first
     #[arg(long, value_name = "N")]
     faults: Option<usize>,
-    /// Write a timeline of the first finding to a file: a drawing if its name ends in `.svg`, else a trace for
-    /// Perfetto
+    /// Write a timeline of the first finding to a file: a drawing if its name ends in `.svg`, else a trace
+    /// for Perfetto
     #[arg(long, value_name = "FILE")]
     timeline: Option<PathBuf>,
     /// Print findings and figures as JSON, an object a line

@@ -15,8 +15,8 @@ pub fn print_completions(shell: Shell, mut command: Command) -> u8 {
     print_all(&script)
 }
 
-/// Writes the manual pages of a command, one for each subcommand, to a folder; without one, prints the page of
-/// the command itself. Returns the exit status.
+/// Writes the manual pages of a command, one for each subcommand, to a folder; without one, prints the page
+/// of the command itself. Returns the exit status.
 pub fn write_man_pages(command: Command, folder: Option<&Path>) -> u8 {
     let Some(folder) = folder else {
         let mut page = Vec::new();

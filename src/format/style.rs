@@ -192,7 +192,8 @@ fn of_lambda_list(tree: &SyntaxTree, list: NodeId) -> Option<Indentation> {
             Some(word) if word.starts_with('&') => return None,
             Some(_) => heads.push(Indentation::Form),
             None if is_optional => heads.push(Indentation::Form),
-            // Nested lambda lists are as deep as the text nests, so only this level and the next are looked at.
+            // Nested lambda lists are as deep as the text nests, so
+            // only this level and the next are looked at.
             None => heads.push(of_nested(tree, item)),
         }
     }

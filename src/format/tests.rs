@@ -1,5 +1,5 @@
-//! The rules, one by one; then that formatting changes nothing but blanks, over all programs of the project and
-//! random edits of them.
+//! The rules, one by one; then that formatting changes nothing but blanks, over all programs of the project
+//! and random edits of them.
 
 use std::path::{Path, PathBuf};
 

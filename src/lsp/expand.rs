@@ -6,7 +6,8 @@ use super::project::Project;
 use crate::program::{Source, expand};
 use crate::syntax::SyntaxTree;
 
-/// Name of the command. Its argument is a text and a position, as those of requests; its result the expansion.
+/// Name of the command. Its argument is a text and a position,
+/// as those of requests; its result the expansion.
 pub(super) const COMMAND: &str = "esl.expand";
 
 /// Stands before the form whose expansion is wanted.

@@ -1,5 +1,5 @@
-//! What the language itself defines, for hover, completion and the way to its source: the library, the modules
-//! over the operating system as they are required, the builtins and the compiler's own operators.
+//! What the language itself defines, for hover, completion and the way to its source: the library, the
+//! modules over the operating system as they are required, the builtins and the compiler's own operators.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -91,7 +91,8 @@ fn written_in_rust(
     LanguageName { definition, source: None, is_public }
 }
 
-/// Returns the texts of the compiler's own operators, which the library has for `help`: pairs `(name . "text")`.
+/// Returns the texts of the compiler's own operators, which the
+/// library has for `help`: pairs `(name . "text")`.
 fn operator_texts(tree: &SyntaxTree) -> Vec<(String, String)> {
     let is_table = |&form: &u32| {
         let name = tree.data(form).nth(1).and_then(|name| tree.name(name));

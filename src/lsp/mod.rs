@@ -1,9 +1,14 @@
 //! `eslc lsp`: a language server over standard input and output, for editors.
 //!
 //! Guarantees: a request is answered from the texts as the editor has them; what is asked of a name works on
-//! the lossless tree, so also in a file that does not compile. Diagnostics are those of the compiler, found on
-//! a thread of its own once the typing pauses. Not here: the protocol (`lsp-server`, `lsp-types`), formatting
-//! ([`crate::format`]).
+//! the lossless tree, so also in a file that does not compile. Diagnostics are those of the compiler, found
+//! on a thread of its own once the typing pauses. Not here: the protocol (`lsp-server`, `lsp-types`),
+//! formatting ([`crate::format`]).
+//!
+//! ```
+//! // Standard input ends at once here: no client has said hello, which is an error.
+//! assert_eq!(esl::lsp::serve(Vec::new()), 2);
+//! ```
 
 mod answer;
 mod check;

@@ -89,7 +89,8 @@ pub(super) fn workspace_symbols(
     Some(WorkspaceSymbolResponse::Nested(symbols))
 }
 
-/// Answers what can be folded: lists and comments of several lines, of those that begin on one line the outermost.
+/// Answers what can be folded: lists and comments of several
+/// lines, of those that begin on one line the outermost.
 pub(super) fn folds(project: &Project, parameters: &FoldingRangeParams) -> Option<Vec<FoldingRange>> {
     let text = project.text(&parameters.text_document.uri)?;
     let tree = &text.tree;

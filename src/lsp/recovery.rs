@@ -1,8 +1,8 @@
 //! Inlay hints: which recovery clause handles which failure, as far as the text shows it.
 //!
-//! A clause is taken to handle the failures of its cause, or of a cause below it, that `(fail :cause …)` raises
-//! in the body of its form, or in functions of the file that are called from there, unless a clause further in
-//! handles them.
+//! A clause is taken to handle the failures of its cause, or of a cause below it, that `(fail :cause …)`
+//! raises in the body of its form, or in functions of the file that are called from there, unless a clause
+//! further in handles them.
 
 use std::collections::{HashMap, HashSet};
 

@@ -1,6 +1,17 @@
 //! `eslc new`: a project to begin with, which runs and whose tests pass.
 //!
 //! The files are in `template/`, as they are written but for the name of the project.
+//!
+//! ```
+//! let folder = std::env::temp_dir().join(format!("esl-new-{}", std::process::id()));
+//! assert_eq!(esl::new::new_project(&folder), 0);
+//! assert!(std::fs::read_to_string(folder.join("main.esl"))?.contains("(require \"plan\")"));
+//!
+//! // What is there already is left alone.
+//! assert_eq!(esl::new::new_project(&folder), 2);
+//! std::fs::remove_dir_all(&folder)?;
+//! # Ok::<(), std::io::Error>(())
+//! ```
 
 use std::io::ErrorKind;
 use std::path::Path;

@@ -5,6 +5,30 @@
 //!
 //! Guarantees: other machines reach nothing without having been told to by an address; what may do anything
 //! asks for a secret, which is compared in constant time; what is asked is bounded before it is parsed.
+//!
+//! ```
+//! use clap::Parser;
+//! use esl::Config;
+//! use esl::host::VirtualHost;
+//! use esl::operate::OperateOptions;
+//! use esl::program::{Source, begin, compile, machine};
+//!
+//! #[derive(Parser)]
+//! struct Options {
+//!     #[command(flatten)]
+//!     operate: OperateOptions,
+//! }
+//!
+//! let options = Options::parse_from(["rover", "--metrics", "0"]);
+//! let mut machine = machine(Config::default(), Box::new(VirtualHost::new()))?;
+//! // Prints the address at which the figures are. They are served until this is dropped.
+//! let served = options.operate.begin(&mut machine).expect("any port will do");
+//! let program = compile(&[Source::new("rover.esl", "(sleep 60)")]).program.expect("there are no errors");
+//! begin(&mut machine, &program)?;
+//! machine.run(u64::MAX);
+//! drop(served);
+//! # Ok::<(), esl::Error>(())
+//! ```
 #![allow(clippy::print_stderr, reason = "commands say where they can be reached")]
 
 pub(crate) mod attach;
@@ -39,8 +63,8 @@ pub struct OperateOptions {
     #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0",
           value_parser = parse_address)]
     monitor: Option<SocketAddr>,
-    /// File with the secrets of the roles: lines such as `observe SECRET`, `command SECRET` and `patch SECRET`;
-    /// without it they are made anew for each run, and printed
+    /// File with the secrets of the roles: lines such as `observe SECRET`, `command SECRET` and `patch
+    /// SECRET`; without it they are made anew for each run, and printed
     #[arg(long, value_name = "FILE")]
     secrets: Option<PathBuf>,
 }

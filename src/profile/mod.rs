@@ -3,6 +3,21 @@
 //! The run is divided into portions of a prime number of ticks, which changes nothing in it. The ticks of a
 //! portion count for the calls in which the task stands that runs at its end. So the sum is exact, and a part
 //! of it the more so the larger it is.
+//!
+//! ```
+//! use esl::Config;
+//! use esl::host::VirtualHost;
+//! use esl::profile::{INTERVAL, Profile};
+//! use esl::program::{Source, compile, machine, run_in_portions};
+//!
+//! let text = "(defun busy (n) (loop for i below n sum (* i i))) (busy 100000)";
+//! let program = compile(&[Source::new("busy.esl", text)]).program.expect("there are no errors");
+//! let mut machine = machine(Config::default(), Box::new(VirtualHost::new()))?;
+//! let mut profile = Profile::new();
+//! run_in_portions(&mut machine, &program, INTERVAL, &mut |machine| profile.look(machine))?;
+//! assert_eq!(profile.functions()[0].name, "BUSY");
+//! # Ok::<(), esl::Error>(())
+//! ```
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::io;

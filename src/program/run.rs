@@ -167,8 +167,8 @@ pub fn run_in(machine: &mut Vm, program: &Program) -> Result<Summary, Error> {
     run_as(machine, program, |machine| machine.run(u64::MAX))
 }
 
-/// Runs a program in a machine that has the library, by a list of choices that an exploration with these settings
-/// has found.
+/// Runs a program in a machine that has the library, by a list of choices that an exploration with these
+/// settings has found.
 ///
 /// # Errors
 /// As [`run`].
@@ -181,8 +181,8 @@ pub fn run_by(
     run_as(machine, program, |machine| machine.follow(settings, choices, &mut |_| {}))
 }
 
-/// Runs a program as [`run_in`] does, in portions of so many ticks, which changes nothing in the run, and calls
-/// `look` after each.
+/// Runs a program as [`run_in`] does, in portions of so many ticks, which changes nothing in the run, and
+/// calls `look` after each.
 ///
 /// # Errors
 /// As [`run`].

@@ -27,7 +27,8 @@ impl LineStarts {
         self.starts.partition_point(|&start| start as usize <= offset) - 1
     }
 
-    /// Returns the place of a line, with its newline; an empty place behind the text for one that is not there.
+    /// Returns the place of a line, with its newline; an empty
+    /// place behind the text for one that is not there.
     pub fn range(&self, line: usize) -> Range<usize> {
         let start = |line: usize| self.starts.get(line).map_or(self.length, |&start| start as usize);
         start(line)..start(line + 1)

@@ -1,8 +1,8 @@
 //! The lossless syntax tree: every list, mark, token and comment of a text, with its place.
 //!
 //! Guarantees: any text has a tree, also one that cannot be read: a list without an end reaches to the end of
-//! the text, and a `)` too many is a node of its own. What lies between nodes is blank. Building takes time in
-//! proportion to the text, without native recursion. Not here: what names mean (the compiler), the data of
+//! the text, and a `)` too many is a node of its own. What lies between nodes is blank. Building takes time
+//! in proportion to the text, without native recursion. Not here: what names mean (the compiler), the data of
 //! the text (its reader, whose lexer finds the tokens here too).
 //!
 //! ```

@@ -1,4 +1,5 @@
-//! The page of the monitor in a browser: Chromium, driven by its own protocol over pipes. Left out without it.
+//! The page of the monitor in a browser: Chromium, driven by its
+//! own protocol over pipes. Left out without it.
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};

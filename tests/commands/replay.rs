@@ -60,8 +60,8 @@ fn only_its_owner_can_read_a_recording() {
     assert_eq!(mode & 0o777, 0o600);
 }
 
-/// A run that a signal ends, and one that is killed: the first is recorded with its cleanups, the second up to
-/// a place from which on nothing is known.
+/// A run that a signal ends, and one that is killed: the first is recorded with its cleanups, the second up
+/// to a place from which on nothing is known.
 #[cfg(unix)]
 #[test]
 fn signals_are_recorded_and_a_killed_run_is_replayed_as_far_as_it_is_known() {

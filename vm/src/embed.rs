@@ -164,7 +164,8 @@ impl Vm {
         self.outside.functions.insert(name.into(), Given { function, needs: needs.to_vec() });
     }
 
-    /// Returns the functions of the embedder's: their names, whether they begin operations, and what they need.
+    /// Returns the functions of the embedder's: their names,
+    /// whether they begin operations, and what they need.
     pub fn host_functions(&self) -> impl Iterator<Item = (&str, bool, &[Need])> {
         self.outside.functions.iter().map(|(name, given)| {
             let is_operation = matches!(given.function, HostFunction::Operation(_));

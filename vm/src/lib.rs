@@ -20,8 +20,9 @@ pub mod vm;
 pub use world::load;
 
 /// Number of the machine's behaviour, as far as a run can tell: what work costs how many ticks, when slices
-/// end, when the collector runs, in which order tasks have their turns. A change of any of that is a new epoch,
-/// since records of runs do not replay across it; `conformance/golden/canaries.txt` shows that one is due.
+/// end, when the collector runs, in which order tasks have their turns. A change of any of that is a new
+/// epoch, since records of runs do not replay across it; `conformance/golden/canaries.txt` shows that one is
+/// due.
 pub const EXECUTION_EPOCH: u32 = 1;
 
 mod canary;

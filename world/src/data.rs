@@ -53,8 +53,8 @@ pub(crate) fn failure(cause: &str, reason: impl ToString) -> HostFailure {
     HostFailure { cause: cause.into(), arguments: vec![text(&reason.to_string())] }
 }
 
-/// What a program holds of something that is open, beside its number: when the program cannot reach it any more, it
-/// is closed.
+/// What a program holds of something that is open, beside its number: when the program cannot reach it any
+/// more, it is closed.
 struct Guard {
     number: i64,
     close: Box<dyn Fn(i64) + Send + Sync>,

@@ -24,8 +24,9 @@ pub fn spawn(future: impl Future<Output = ()> + Send + 'static) -> Result<(), St
     }
 }
 
-/// Begins a future here, and runs the rest of it on the event loop, if there is any. So what is over at once takes no
-/// way through another thread. The future must not wait but for others to wake it. If it panics, it is dropped.
+/// Begins a future here, and runs the rest of it on the event loop, if there is any. So what is over at once
+/// takes no way through another thread. The future must not wait but for others to wake it. If it panics, it
+/// is dropped.
 ///
 /// # Errors
 /// As [`spawn`].

@@ -47,8 +47,8 @@ struct State {
     filters: HashMap<String, QoS>,
     /// Who waits for the answers to subscriptions, in their order; nobody for one that is made again.
     subscribing: VecDeque<Option<Subscribed>>,
-    /// Who waits for the acknowledgements of messages that have yet to be sent, in the order of the requests, with
-    /// numbers of their own.
+    /// Who waits for the acknowledgements of messages that have yet to be sent, in the order of the requests,
+    /// with numbers of their own.
     publishing: VecDeque<(u64, oneshot::Sender<()>)>,
     /// Who waits for those of messages that were sent, by the protocol's numbers.
     sent: HashMap<u16, oneshot::Sender<()>>,

@@ -36,8 +36,8 @@ where
     define_cancellable(machine, name, needs, false, function);
 }
 
-/// As [`define`], of an operation that is often over at once, and no part of which the system may delay. It is begun by
-/// the thread of the machine, so that what is there takes no way through another thread.
+/// As [`define`], of an operation that is often over at once, and no part of which the system may delay. It
+/// is begun by the thread of the machine, so that what is there takes no way through another thread.
 pub(crate) fn define_ready<F, R>(machine: &mut Vm, name: &str, needs: &[Need], function: F)
 where
     F: FnMut(CallArguments) -> R + Send + 'static,

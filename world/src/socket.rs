@@ -444,8 +444,8 @@ async fn listen(arguments: CallArguments, sockets: Sockets) -> Completion {
     )
 }
 
-/// Returns the next connection over which TLS has begun. A peer with which it does not is dropped, and one that takes
-/// its time delays no other.
+/// Returns the next connection over which TLS has begun. A peer with which it does not is dropped, and one
+/// that takes its time delays no other.
 #[cfg(feature = "tls")]
 async fn accept_secured(
     listener: &TcpListener,

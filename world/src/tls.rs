@@ -1,5 +1,5 @@
-//! TLS for connections: rustls, with the certificates that the system trusts or those of a file; for listeners, with
-//! one of their own.
+//! TLS for connections: rustls, with the certificates that the system trusts or those of a file; for
+//! listeners, with one of their own.
 
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -64,8 +64,8 @@ pub(crate) async fn client_config(ca_file: Option<String>) -> Result<Arc<ClientC
     tokio::task::spawn_blocking(load).await.map_err(tls_failure)?.map_err(tls_failure)
 }
 
-/// Returns what a listener needs that proves by the certificates of one file, in PEM, and the key of another, who
-/// it is.
+/// Returns what a listener needs that proves by the certificates of one file, in PEM, and the key of another,
+/// who it is.
 pub(crate) async fn acceptor(certificate: String, key: String) -> Result<TlsAcceptor, HostFailure> {
     let load = move || {
         let unread = |path: &str, error: &dyn std::fmt::Display| format!("`{path}`: {error}");

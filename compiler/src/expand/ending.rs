@@ -1,5 +1,5 @@
-//! Whether control reaches the end of a form, as far as its text shows: for the warning about recovery clauses
-//! that fall off their end, and for local functions that never return.
+//! Whether control reaches the end of a form, as far as its text shows: for the warning about recovery
+//! clauses that fall off their end, and for local functions that never return.
 //!
 //! Which forms are reached inside a tagbody follows from the `go`s in it. Conditions that are constants are
 //! taken into account, as in `(loop while t do …)`. The answer may be wrong on the side of no warning only: a

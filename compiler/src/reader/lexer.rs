@@ -208,8 +208,8 @@ fn unfinished_escape(_: &mut Lexer<'_, Token>) -> Result<(), LexError> {
     Err(LexError::UnfinishedEscape)
 }
 
-/// Returns the tokens of a text with their places in bytes, from byte `start` on. Behind an error, tokens go on
-/// where its own text ends.
+/// Returns the tokens of a text with their places in bytes, from byte `start` on. Behind an error, tokens go
+/// on where its own text ends.
 pub fn tokens(
     text: &str,
     start: usize,

@@ -171,8 +171,8 @@ pub fn read_datum(
     }
 }
 
-/// Returns the faults of a text that keep its forms from being told apart: lists, strings and comments without
-/// an end, marks out of place. Other faults, such as those of names, are not looked for.
+/// Returns the faults of a text that keep its forms from being told apart: lists, strings and comments
+/// without an end, marks out of place. Other faults, such as those of names, are not looked for.
 pub fn structure_faults(source: SourceId, text: &str) -> Vec<Diagnostic> {
     if !is_readable(text) {
         return vec![too_large(source)];

@@ -7,8 +7,8 @@
 //! present. Modules that it requires itself are put in likewise. Each module is put in once, wherever it is
 //! required.
 //!
-//! Where a form that is run at compile time has set `*readtable*`, the program reads the forms after it, up to
-//! the end of the text ([`Next::Read`]).
+//! Where a form that is run at compile time has set `*readtable*`, the program reads the forms after it, up
+//! to the end of the text ([`Next::Read`]).
 //!
 //! Only a form that stands by itself at top level counts, with a literal name. All others are calls of the
 //! function, which finds modules at run time.

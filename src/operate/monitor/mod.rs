@@ -1,8 +1,8 @@
 //! The monitor: one page, which shows a run as it goes on.
 //!
-//! The page asks for nothing but itself and what this server sends. What it shows comes as server-sent events;
-//! what is done goes the other way as posts. The token is in the fragment of the address of the page, which
-//! no browser sends; the page puts it into its requests.
+//! The page asks for nothing but itself and what this server sends. What it shows comes as server-sent
+//! events; what is done goes the other way as posts. The token is in the fragment of the address of the page,
+//! which no browser sends; the page puts it into its requests.
 //!
 //! Nothing is looked at while nobody watches. Each step looks at a bounded number of tasks; a viewer who does
 //! not take what is sent is let go.
@@ -186,8 +186,8 @@ fn page() -> Response<HttpBody> {
     response
 }
 
-/// Returns whether a request comes from a page of this server. Browsers leave the origin out where a page only
-/// reads from its own server.
+/// Returns whether a request comes from a page of this server. Browsers leave the origin out where a page
+/// only reads from its own server.
 fn is_from_here(request: &Request<hyper::body::Incoming>, must_say: bool) -> bool {
     let header = |name| request.headers().get(name).and_then(|value: &HeaderValue| value.to_str().ok());
     match (header(ORIGIN), header(HOST)) {

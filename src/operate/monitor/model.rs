@@ -213,8 +213,8 @@ fn failure(row: &FailureRow) -> Value {
     })
 }
 
-/// Returns the tasks that wait for each other, in circles: what is left when those have been taken away, again
-/// and again, that wait for none of the others, and those for which none of the others waits.
+/// Returns the tasks that wait for each other, in circles: what is left when those have been taken away,
+/// again and again, that wait for none of the others, and those for which none of the others waits.
 fn cycles(tasks: &BTreeMap<u64, SurveyedTask>) -> BTreeSet<u64> {
     let mut waits: BTreeMap<u64, BTreeSet<u64>> = BTreeMap::new();
     let mut awaited: BTreeMap<u64, BTreeSet<u64>> = BTreeMap::new();

@@ -9,9 +9,9 @@ use crate::task::TaskState;
 use crate::vm::Vm;
 
 impl Vm {
-    /// Returns the calls in which the task stands whose turn it is, or was last: the innermost `limit` of them,
-    /// innermost first, with the names of the functions and where they stand, as far as that is known. Last
-    /// comes the task itself, as reports call it. `None` if it has ended.
+    /// Returns the calls in which the task stands whose turn it is, or was last: the innermost `limit` of
+    /// them, innermost first, with the names of the functions and where they stand, as far as that is known.
+    /// Last comes the task itself, as reports call it. `None` if it has ended.
     pub fn open_calls(&self, limit: usize) -> Option<Vec<(String, Option<SourcePlace>)>> {
         let task = self.scheduler.tasks.at(self.scheduler.turn.index)?;
         if task.state == TaskState::Ended {

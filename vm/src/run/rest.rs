@@ -1,9 +1,9 @@
 //! Tasks at rest: suspended ones that stand still just where they wait.
 //!
 //! A task that is suspended is interrupted, and a function of the library in it does what there is to do
-//! around a suspension, and waits for the end of it. Most tasks of a large tree only wait, and have nothing to
-//! do: for these it is enough that no wake-up reaches them. What comes meanwhile is noted, and they go on with
-//! it later.
+//! around a suspension, and waits for the end of it. Most tasks of a large tree only wait, and have nothing
+//! to do: for these it is enough that no wake-up reaches them. What comes meanwhile is noted, and they go on
+//! with it later.
 
 use super::wake::make_runnable;
 use crate::report::{self, Happening};

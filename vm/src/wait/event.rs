@@ -17,8 +17,8 @@ pub(crate) const FIRST: usize = 2;
 pub(crate) const LAST: usize = 3;
 /// Slot of a task: its index in the table while it lives, then its status.
 pub(crate) const STATE: usize = 4;
-/// Slot of a task: its node in the tree, or that of its maker, while it lives: see [`super::lineage`]. Then its
-/// value or values, or the condition.
+/// Slot of a task: its node in the tree, or that of its maker, while it lives: see [`super::lineage`]. Then
+/// its value or values, or the condition.
 pub(crate) const RESULT: usize = 5;
 /// Slot of a task: checkpoints that it has passed.
 pub(crate) const CHECKPOINTS: usize = 6;

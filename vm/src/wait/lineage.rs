@@ -4,9 +4,10 @@
 //! so on. So those that an ended task has made are still of the tree of its maker.
 //!
 //! A task that has made others has a *node*: a cons of its index and the node of its maker. When it ends, the
-//! index gives way to `NIL`, and the node, which the tasks that it has made know it by, is all that is kept of
-//! it. Nodes of ended tasks are skipped for good when they are met, so endless chains of tasks each of which
-//! makes the next one take no room: what is left of the ended ones is no more than there were alive at a time.
+//! index gives way to `NIL`, and the node, which the tasks that it has made know it by, is all that is kept
+//! of it. Nodes of ended tasks are skipped for good when they are met, so endless chains of tasks each of
+//! which makes the next one take no room: what is left of the ended ones is no more than there were alive at
+//! a time.
 
 use super::event;
 use crate::heap::{AllocError, Heap};
