@@ -29,6 +29,7 @@ mod rule;
 mod scan;
 mod solver;
 mod survey;
+mod tabling;
 mod term;
 mod tuple;
 

@@ -6,18 +6,14 @@
 //! that never grow, so that the millionth character takes as long as the first. Every output stream knows its
 //! column.
 
-use smallvec::SmallVec;
-
+use crate::builtins::COPY_LIMIT;
 use crate::builtins::array::{ArrayElements, vector_elements};
 use crate::builtins::expect::optional;
-use crate::builtins::list::list_items;
-use crate::builtins::rights::demand;
 use crate::builtins::symbol::{text_between, text_of};
-use crate::builtins::{COPY_LIMIT, LIMIT};
 use crate::equality::characters_of;
 use crate::exchange::Exchange;
 use crate::heap::{Heap, Kind};
-use crate::host::{Host, HostError, Output, Right, Taken, WriteMode, column_after, encode};
+use crate::host::{Host, Output, Taken, column_after, encode};
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::run;
 use crate::schedule::Parking;
@@ -29,13 +25,23 @@ use crate::world::stream::{StreamKind, make_stream, slot};
 use super::expect::exactly;
 
 mod channel;
+mod file;
 mod read;
+mod text;
 mod write;
 
 pub(super) use channel::{
     channel_handler, channel_output, channel_piece, channel_state, make_channel, supply_channel,
 };
+pub(super) use file::{
+    delete_file, file_bytes, file_error, file_exists_p, file_text, open_input, open_output, right_to,
+    write_bytes,
+};
 pub(super) use read::{listen, peek_char, read_char, read_char_no_hang, read_line, unread_char};
+pub(super) use text::{
+    gathered_length, get_output_stream_string, make_string_input, make_string_output, read_from_copy,
+    string_input_position, take_gathered,
+};
 pub(super) use write::{finish_output, fresh_line, terpri, write_char, write_string};
 
 /// Characters that a file's stream gathers before it writes them.
@@ -253,7 +259,7 @@ fn write_out(vm: &mut Vm, stream: Value) -> Result<(), Exit> {
     let buffer = stream_slot(&vm.heap, stream, slot::BUFFER);
     let mut bytes = Vec::new();
     encode(vm.heap.string(buffer).map_or(&[], |all| &all[..position]), &mut bytes);
-    let mode = write_mode(stream_index(&vm.heap, stream, slot::MODE));
+    let mode = file::write_mode(stream_index(&vm.heap, stream, slot::MODE));
     let path = text_of(&vm.heap, stream_slot(&vm.heap, stream, slot::PATH)).unwrap_or_default();
     // What cannot be written is not tried again: the next block would fail too, and closing has to
     // succeed.
@@ -399,142 +405,11 @@ pub(crate) fn more_input(vm: &mut Vm) -> Result<(), Exit> {
     input_of(vm, taken).map(|_| ())
 }
 
-pub(super) fn file_error<T>(
-    exchange: &mut Exchange,
-    what: &str,
-    path: &str,
-    error: &HostError,
-) -> Result<T, Exit> {
-    exchange.raise(Raised::File(path.into(), format!("it cannot be {what}: {error}")))
-}
-
 // ---- making and closing
 
 pub(super) fn standard_stream(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let index = vm.exchange.index_below(arguments[0], 3)?;
     Ok(vm.world.streams[index])
-}
-
-pub(super) fn make_string_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [string, start, end] = exactly(arguments);
-    let characters = few_characters(vm, string, start, end)?;
-    vm.exchange.charge_elements(characters.len());
-    let buffer = vm.heap.alloc_string(&characters)?;
-    Ok(make_stream(&mut vm.heap, StreamKind::StringInput, buffer, 0, characters.len())?)
-}
-
-pub(super) fn read_from_copy(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(length) = vm.heap.string(arguments[0]).map(<[u32]>::len) else {
-        return vm.exchange.type_error(arguments[0], "SIMPLE-STRING");
-    };
-    Ok(make_stream(&mut vm.heap, StreamKind::StringInput, arguments[0], 0, length)?)
-}
-
-pub(super) fn string_input_position(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let (stream, kind) = designated_stream(vm, arguments[0], true)?;
-    let position = stream_index(&vm.heap, stream, slot::POSITION);
-    let before = match kind {
-        StreamKind::Channel => stream_index(&vm.heap, stream, slot::BEFORE),
-        _ => 0,
-    };
-    Ok(Value::index(before + position))
-}
-
-pub(super) fn make_string_output(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
-    let buffer = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
-    Ok(make_stream(&mut vm.heap, StreamKind::StringOutput, buffer, 0, 0)?)
-}
-
-pub(super) fn get_output_stream_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let stream = arguments[0];
-    if StreamKind::of(&vm.heap, stream) != Some(StreamKind::StringOutput) {
-        return vm.exchange.type_error(stream, "STRING-STREAM");
-    }
-    let position = stream_index(&vm.heap, stream, slot::POSITION);
-    let length = stream_index(&vm.heap, stream, slot::BEFORE) + position;
-    if length > COPY_LIMIT {
-        return Err(Exit::Slowly);
-    }
-    let full = list_items(vm, stream_slot(&vm.heap, stream, slot::FULL), LIMIT)?;
-    let mut gathered: SmallVec<[u32; 64]> = SmallVec::with_capacity(length);
-    for &string in full.iter().rev() {
-        gathered.extend_from_slice(vm.heap.string(string).unwrap_or_default());
-    }
-    let buffer = stream_slot(&vm.heap, stream, slot::BUFFER);
-    gathered.extend_from_slice(vm.heap.string(buffer).map_or(&[], |all| &all[..position]));
-    vm.exchange.charge_elements(length);
-    let text = vm.heap.alloc_string(&gathered)?;
-    set_stream_slot(&mut vm.heap, stream, slot::POSITION, Value::small(0));
-    set_stream_slot(&mut vm.heap, stream, slot::FULL, Value::NIL);
-    set_stream_slot(&mut vm.heap, stream, slot::BEFORE, Value::small(0));
-    Ok(text)
-}
-
-pub(super) fn gathered_length(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let stream = arguments[0];
-    if StreamKind::of(&vm.heap, stream) != Some(StreamKind::StringOutput) {
-        return vm.exchange.type_error(stream, "STRING-STREAM");
-    }
-    Ok(Value::index(
-        stream_index(&vm.heap, stream, slot::BEFORE) + stream_index(&vm.heap, stream, slot::POSITION),
-    ))
-}
-
-pub(super) fn take_gathered(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let stream = arguments[0];
-    if gathered_length(vm, arguments)? != arguments[1] {
-        return Ok(Value::NIL);
-    }
-    let fresh = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
-    let last = stream_slot(&vm.heap, stream, slot::BUFFER);
-    let strings = vm.heap.cons(last, stream_slot(&vm.heap, stream, slot::FULL))?;
-    set_stream_slot(&mut vm.heap, stream, slot::BUFFER, fresh);
-    set_stream_slot(&mut vm.heap, stream, slot::POSITION, Value::small(0));
-    set_stream_slot(&mut vm.heap, stream, slot::FULL, Value::NIL);
-    set_stream_slot(&mut vm.heap, stream, slot::BEFORE, Value::small(0));
-    Ok(strings)
-}
-
-pub(super) fn open_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = text_of(&vm.heap, arguments[0]) else {
-        return vm.exchange.type_error(arguments[0], "STRING");
-    };
-    let buffer = file_text(vm, &arguments[..1])?;
-    let length = vm.heap.string(buffer).map_or(0, <[u32]>::len);
-    let stream = make_stream(&mut vm.heap, StreamKind::StringInput, buffer, 0, length)?;
-    let name = vm.heap.alloc_str(&path)?;
-    set_stream_slot(&mut vm.heap, stream, slot::NAME, name);
-    Ok(stream)
-}
-
-pub(super) fn open_output(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [path, mode] = exactly(arguments);
-    let Some(path) = text_of(&vm.heap, path) else { return vm.exchange.type_error(path, "STRING") };
-    let mode = vm.exchange.index_below(mode, 3)?;
-    let buffer = vm.heap.alloc_string_filled(FIRST_BUFFER, 0)?;
-    let stream = make_stream(&mut vm.heap, StreamKind::FileOutput, buffer, 0, 0)?;
-    let name = vm.heap.alloc_str(&path)?;
-    set_stream_slot(&mut vm.heap, stream, slot::NAME, name);
-    let permitted = demand(vm, Right::Write, &path)?;
-    let target = vm.heap.alloc_str(&permitted)?;
-    set_stream_slot(&mut vm.heap, stream, slot::PATH, target);
-    // Nothing is written at once, so that a file that cannot be made fails here.
-    match vm.outside.host.write_file(&permitted, &[], write_mode(mode)) {
-        Ok(()) => {
-            set_stream_slot(&mut vm.heap, stream, slot::MODE, Value::small(1));
-            Ok(stream)
-        }
-        Err(error) => file_error(&mut vm.exchange, "written", &path, &error),
-    }
-}
-
-/// What the mode of a stream says of the file.
-fn write_mode(mode: usize) -> WriteMode {
-    match mode {
-        0 => WriteMode::Replace,
-        1 => WriteMode::Append,
-        _ => WriteMode::Create,
-    }
 }
 
 pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -557,61 +432,6 @@ pub(super) fn close(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         _ => set_stream_slot(&mut vm.heap, stream, slot::OPEN, Value::NIL),
     }
     Ok(Value::T)
-}
-
-/// Returns the right that is needed for the file of the first argument: to read it, as a module if the second
-/// one is `T`, to write it if it is anything else.
-pub(super) fn right_to(arguments: &[Value]) -> Right {
-    match optional(arguments, 1) {
-        Value::NIL => Right::Read,
-        Value::T => Right::Module,
-        _ => Right::Write,
-    }
-}
-
-pub(super) fn file_text(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = text_of(&vm.heap, arguments[0]) else {
-        return vm.exchange.type_error(arguments[0], "STRING");
-    };
-    let permitted = demand(vm, right_to(arguments), &path)?;
-    match vm.outside.host.read_file(&permitted) {
-        Ok(bytes) => {
-            vm.exchange.charge_elements(bytes.len());
-            Ok(vm.heap.alloc_str(&String::from_utf8_lossy(&bytes))?)
-        }
-        Err(error) => file_error(&mut vm.exchange, "read", &path, &error),
-    }
-}
-
-pub(super) fn file_bytes(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = text_of(&vm.heap, arguments[0]) else {
-        return vm.exchange.type_error(arguments[0], "STRING");
-    };
-    let permitted = demand(vm, Right::Read, &path)?;
-    match vm.outside.host.read_file(&permitted) {
-        Ok(bytes) => {
-            vm.exchange.charge_elements(bytes.len());
-            Ok(vm.heap.alloc_bytes(&bytes)?)
-        }
-        Err(error) => file_error(&mut vm.exchange, "read", &path, &error),
-    }
-}
-
-pub(super) fn write_bytes(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let [path, vector, mode] = exactly(arguments);
-    let Some(path) = text_of(&vm.heap, path) else { return vm.exchange.type_error(path, "STRING") };
-    let mode = vm.exchange.index_below(mode, 3)?;
-    let permitted = demand(vm, Right::Write, &path)?;
-    let Some(ArrayElements::Bytes(bytes)) = vector_elements(&vm.heap, vector) else {
-        return vm.exchange.not_written(vector, "(VECTOR (UNSIGNED-BYTE 8))");
-    };
-    let length = bytes.len();
-    let written = vm.outside.host.write_file(&permitted, bytes, write_mode(mode));
-    vm.exchange.charge_elements(length);
-    match written {
-        Ok(()) => Ok(Value::NIL),
-        Err(error) => file_error(&mut vm.exchange, "written", &path, &error),
-    }
 }
 
 pub(super) fn bytes_of_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
@@ -641,25 +461,6 @@ pub(super) fn custom_stream_data(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         Some(StreamKind::Custom) => stream_slot(&vm.heap, arguments[0], slot::BUFFER),
         _ => Value::NIL,
     })
-}
-
-pub(super) fn file_exists_p(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = text_of(&vm.heap, arguments[0]) else {
-        return vm.exchange.type_error(arguments[0], "STRING");
-    };
-    let permitted = demand(vm, right_to(arguments), &path)?;
-    Ok(Value::boolean(vm.outside.host.file_exists(&permitted)))
-}
-
-pub(super) fn delete_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(path) = text_of(&vm.heap, arguments[0]) else {
-        return vm.exchange.type_error(arguments[0], "STRING");
-    };
-    let permitted = demand(vm, Right::Write, &path)?;
-    match vm.outside.host.delete_file(&permitted) {
-        Ok(()) => Ok(Value::T),
-        Err(error) => file_error(&mut vm.exchange, "deleted", &path, &error),
-    }
 }
 
 // ---- asking
