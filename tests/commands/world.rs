@@ -284,8 +284,7 @@ fn two_programs_talk_by_datagrams_and_over_a_unix_socket() {
 #[cfg(unix)]
 #[test]
 fn a_thousand_connections_are_served_by_one_program() {
-    // All are open before the first is answered. They come in at most fifty at a time, since the system drops
-    // some where more wait than it has room for.
+    // They come at one moment, and all are open before the first is answered.
     let server = "(require :sockets)
 (let ((listener (sockets:listen \"127.0.0.1\" 0)) (served 0) (all (make-event 'all)))
   (format t \"~a~%\" (sockets:local-port listener))
@@ -308,14 +307,9 @@ fn a_thousand_connections_are_served_by_one_program() {
     BufReader::new(output).read_line(&mut port).expect("the port is printed");
     let client = format!(
         "(require :sockets)
-(define-resource door :capacity 50)
-(defun enter ()
-  (with-resource (door)
-    (let ((c (sockets:connect \"127.0.0.1\" {})))
-      (read-line c)
-      c)))
 (defun ask (number)
-  (sockets:with-socket (c (enter))
+  (sockets:with-socket (c (sockets:connect \"127.0.0.1\" {}))
+    (read-line c)
     (format c \"~a~%\" number)
     (if (equal (read-line c) (format nil \"~a\" number)) 1 0)))
 (print (let ((tasks (loop for i below 1000 collect (let ((i i)) (spawn (ask i))))))
@@ -355,6 +349,40 @@ fn a_peer_that_closes_half_way_can_be_answered() {
     );
     check("sockets-half", &text, &["--allow-net"], &["(\"question\" (\"hal\" T) END)"]);
     peer.join().expect("the peer has its answer");
+}
+
+#[test]
+fn connections_that_nobody_takes_end_with_their_listener() {
+    let text = "(require :sockets)
+(let ((listener (sockets:listen \"127.0.0.1\" 0)))
+  (format t \"~a~%\" (sockets:local-port listener))
+  (finish-output)
+  (let ((first (sockets:accept listener)))
+    (read-line first)
+    ;; As by a call that is left at the moment at which the second one comes.
+    (sockets::%socket-accept (sockets::number-of listener))
+    (close listener)
+    (write-line \"closed\" first)
+    (finish-output first)
+    (read-line first nil nil)))";
+    let folder = Folder::with("sockets-untaken", &[("main.esl", text)]);
+    let mut child = process::start(eslvm(&["run", "--allow-net", "main.esl"]).current_dir(folder.path()));
+    let mut port = String::new();
+    let output = child.stdout.take().expect("it is a pipe");
+    BufReader::new(output).read_line(&mut port).expect("the port is printed");
+    let port: u16 = port.trim().parse().expect("it is a port");
+    let mut first = TcpStream::connect(("127.0.0.1", port)).expect("it listens");
+    let mut second = TcpStream::connect(("127.0.0.1", port)).expect("it listens");
+    let (sender, receiver) = std::sync::mpsc::channel();
+    std::thread::spawn(move || sender.send(second.read(&mut [0; 8]).unwrap_or(0)));
+    first.write_all(b"go\n").expect("it is read");
+    let mut line = String::new();
+    BufReader::new(&first).read_line(&mut line).expect("it answers");
+    let left = receiver.recv_timeout(std::time::Duration::from_secs(60));
+    assert_eq!((&*line, left), ("closed\n", Ok(0)), "the second one is closed while the program goes on");
+    drop(first);
+    let done = process::finish_within(child, std::time::Duration::from_secs(60));
+    assert_eq!((done.status, &*done.errors), (Some(0), ""));
 }
 
 #[test]

@@ -18,7 +18,7 @@ use esl_vm::embed::{HostFunction, Need};
 use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
-use tokio::net::{TcpListener, TcpStream, UdpSocket};
+use tokio::net::{TcpListener, TcpSocket, TcpStream, UdpSocket};
 use tokio::sync::watch;
 
 use crate::arrived::{Arrived, whole_characters};
@@ -36,6 +36,9 @@ const GREETING: Duration = Duration::from_secs(10);
 /// Most peers that are greeted at a time; more wait in the system's queue.
 #[cfg(feature = "tls")]
 const MOST_GREETED: usize = 256;
+/// Most connections that wait in the system until the program accepts them; the system may allow fewer. More
+/// than that at one moment are told to come again, which takes them seconds.
+const BACKLOG: u32 = 4096;
 /// Time that a peer has to take the end of a connection.
 const GOODBYE: Duration = Duration::from_secs(1);
 
@@ -164,6 +167,11 @@ impl Sockets {
         if let Some(socket) = socket {
             // Nobody may wait for it.
             _ = socket.closer.send(true);
+            if let SocketKind::Listener(_, accepted) = &socket.kind {
+                // Nobody can take them any more.
+                let untaken = std::mem::take(&mut *lock(accepted));
+                untaken.into_iter().for_each(|number| self.close(number));
+            }
             if let SocketKind::Connection(connection) = socket.kind
                 && connection.says_goodbye
             {
@@ -424,8 +432,7 @@ async fn listen(arguments: CallArguments, sockets: Sockets) -> Completion {
         (Some(certificate), Some(key)) => Some((certificate, key)),
         _ => None,
     };
-    let bind = TcpListener::bind(arguments.text(1)?);
-    let listener = bind.await.map_err(|error| bind_failure(&error))?;
+    let listener = bind(&arguments.text(1)?).await.map_err(|error| bind_failure(&error))?;
     let port = listener.local_addr().map_or(0, |address| address.port().into());
     let listener = match secured {
         None => Listener::Tcp(listener),
@@ -442,6 +449,28 @@ async fn listen(arguments: CallArguments, sockets: Sockets) -> Completion {
         port,
         String::new(),
     )
+}
+
+/// Returns a listener on the first of an address' meanings that can be had.
+async fn bind(address: &str) -> std::io::Result<TcpListener> {
+    let mut last = None;
+    for address in tokio::net::lookup_host(address).await? {
+        match bind_to(address) {
+            Ok(listener) => return Ok(listener),
+            Err(error) => last = Some(error),
+        }
+    }
+    Err(last.unwrap_or_else(|| Error::new(ErrorKind::InvalidInput, "the name has no address")))
+}
+
+fn bind_to(address: std::net::SocketAddr) -> std::io::Result<TcpListener> {
+    let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
+    // A program that is started again has its port, though connections of before linger. Elsewhere this would
+    // take the port from another program.
+    #[cfg(unix)]
+    socket.set_reuseaddr(true)?;
+    socket.bind(address)?;
+    socket.listen(BACKLOG)
 }
 
 /// Returns the next connection over which TLS has begun. A peer with which it does not is dropped, and one
@@ -491,7 +520,12 @@ async fn connect_unix(arguments: CallArguments, sockets: Sockets) -> Completion 
 #[cfg(unix)]
 async fn listen_unix(arguments: CallArguments, sockets: Sockets) -> Completion {
     let (number, path) = (arguments.number(0)?, arguments.text(1)?);
-    let listener = tokio::net::UnixListener::bind(&path).map_err(|error| socket_failure(&error))?;
+    let bind = || {
+        let socket = tokio::net::UnixSocket::new_stream()?;
+        socket.bind(&path)?;
+        socket.listen(BACKLOG)
+    };
+    let listener = bind().map_err(|error| socket_failure(&error))?;
     let kind = SocketKind::Listener(Arc::new(Listener::Unix(listener, path.into())), Arc::default());
     sockets.set(number, kind, 0, String::new())
 }
