@@ -9,8 +9,10 @@ use std::time::{Duration, Instant};
 
 use esl::data::{HostType, Opaque};
 use esl::engine::{Ending, Failure, Operation, Poll};
-use esl::host::{RealHost, RecordingHost, ReplayHost, SendError, VirtualHost};
+use esl::host::{Host, Incoming, News, RealHost, RecordingHost, ReplayHost, SendError, VirtualHost};
 use esl::{Config, Data, Engine, Error};
+use esl_bytecode::datum::Datum;
+use esl_bytecode::span::Span;
 use esl_vm::observe::{Observer, Seen};
 use esl_vm::task::TaskNumber;
 
@@ -254,6 +256,29 @@ fn code_of_the_host_that_misbehaves_is_a_failure() {
     }
     // A second time: the engine's thread is still there.
     check(&mut engine, &cause("(explode)"), ":HOST-PANIC");
+}
+
+#[test]
+fn of_several_ends_of_an_operation_the_first_counts() {
+    let host = RealHost::new(Vec::new()).with_screen(Box::new(|_| Ok(())));
+    let inbox = host.inbox();
+    let mut engine = Engine::with(Config::default(), Box::new(host)).expect("there is room for the library");
+    // The type allows one end only; a host of somebody's own may put more into the inbox.
+    let begin = move |operation: Operation| {
+        let end = |number, text: &str| {
+            let values = vec![Datum::string(text, Span::default())];
+            inbox.put(Incoming::Operation { number, news: News::Completed(values) });
+        };
+        end(1_000_000, "of none");
+        for text in ["first", "second"] {
+            end(1, text);
+        }
+        operation.complete("third");
+    };
+    engine.define_operation("TWICE", "()", "", begin).expect("it compiles");
+    let results = "(let ((h (start (twice)))) (list (operation-result h) (operation-result h)))";
+    check(&mut engine, results, "(\"first\" \"first\")");
+    check(&mut engine, "(list (twice) (sleep 0.001))", "(\"third\" NIL)");
 }
 
 #[test]

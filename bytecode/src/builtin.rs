@@ -1159,8 +1159,9 @@ macro_rules! for_each_builtin {
             BeginCompilation = eval::begin_compilation, internal "%BEGIN-COMPILATION" ("form");
             /// A handle of the compilation of a whole text, called `name` in what is said about it.
             BeginFile = eval::begin_file, internal "%BEGIN-FILE" ("name text");
-            /// The functions that run the top-level forms of a compiled file, in order.
-            CompiledFile = eval::compiled_file, internal "%COMPILED-FILE" ("path &optional is-module");
+            /// The functions that run the top-level forms of a compiled file, in order. With a vector of its bytes, the
+            /// file is not read.
+            CompiledFile = eval::compiled_file, internal "%COMPILED-FILE" ("path &optional is-module bytes");
             /// A handle of a text that is compiled form by form. Functions of a text with a name know where
             /// they stand in it.
             OpenText = eval::open_text, internal "%OPEN-TEXT" ("text &optional name");

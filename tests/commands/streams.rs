@@ -122,6 +122,31 @@ fn a_fifo_whose_writer_comes_late_delays_only_its_reader() {
 }
 
 #[test]
+fn programs_that_are_loaded_from_slow_files_delay_only_their_task() {
+    // What is loaded, and then a module, come from FIFOs whose writers come late; a load can be left.
+    let text = "(spawn (:name 'other :daemon t) (dotimes (i 50) (sleep 0.001)) (mark \"ticked\") (loop (sleep 0.001)))
+(load \"in\")
+(mark \"loaded\")
+(require :part \"out\")
+(print *modules*)
+(let ((task (spawn (load \"in\"))))
+  (sleep 0.05)
+  (abort-task task)
+  (print (wait-for-task task)))
+(dolist (path '(\"none.esl\" \"none.eslb\"))
+  (print (handler-case (load path) (file-error (e) (file-error-pathname e)))))";
+    let mut running = Running::start("late-program", &format!("{MARK}{text}"));
+    running.await_file("ticked");
+    std::fs::write(running.path("in"), "(print \"loäded\")").expect("it is read");
+    running.await_file("loaded");
+    std::fs::write(running.path("out"), "(defun part () 1) (print (part))").expect("it is read");
+    let output = running.output();
+    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let expected = ["\"loäded\"", "1", "(\"part\")", ":ABORTED", "\"none.esl\"", "\"none.eslb\""];
+    assert_eq!(lines, expected);
+}
+
+#[test]
 fn a_fifo_that_nobody_reads_yet_delays_only_its_writer() {
     let text = "(spawn (:name 'other :daemon t) (dotimes (i 50) (sleep 0.001)) (mark \"ticked\") (loop (sleep 0.001)))
 (with-open-file (s \"out\" :direction :output)

@@ -254,6 +254,11 @@ pub(crate) fn install(machine: &mut Vm) {
     let read = [Need { right: Right::Read, argument: 1 }];
     define(machine, "%FILE-OPEN-INPUT", &read, move |arguments| open_input(arguments, known.clone()));
     let known = files.clone();
+    let read_module = [Need { right: Right::Module, argument: 1 }];
+    define(machine, "%MODULE-OPEN-INPUT", &read_module, move |arguments| {
+        open_input(arguments, known.clone())
+    });
+    let known = files.clone();
     let write = [Need { right: Right::Write, argument: 1 }];
     define(machine, "%FILE-OPEN-OUTPUT", &write, move |arguments| open_output(arguments, known.clone()));
     let known = files.clone();
@@ -305,10 +310,14 @@ fn define_requests(machine: &mut Vm) {
     let read = [Need { right: Right::Read, argument: 0 }];
     let write = [Need { right: Right::Write, argument: 0 }];
     let both = [write[0], Need { right: Right::Write, argument: 1 }];
-    define(machine, "%FILE-PROBE", &read, |arguments| async move {
-        let path = arguments.text(0)?;
-        answer(in_thread(move || Ok(Path::new(&path).is_file())).await.map(boolean))
-    });
+    let read_module = [Need { right: Right::Module, argument: 0 }];
+    let probes = [("%FILE-PROBE", read), ("%FILE-PROBE-OUTPUT", write), ("%MODULE-PROBE", read_module)];
+    for (name, need) in probes {
+        define(machine, name, &need, |arguments| async move {
+            let path = arguments.text(0)?;
+            answer(in_thread(move || Ok(Path::new(&path).is_file())).await.map(boolean))
+        });
+    }
     define(machine, "%FILE-DELETE", &write, |arguments| async move {
         let path = arguments.text(0)?;
         answer(in_thread(move || std::fs::remove_file(path)).await.map(|()| boolean(true)))

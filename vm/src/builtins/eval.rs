@@ -28,6 +28,7 @@ use esl_bytecode::file;
 use esl_bytecode::span::Span;
 use esl_bytecode::verify::verify;
 
+use crate::builtins::array::{ArrayElements, vector_elements};
 use crate::builtins::expect::optional;
 use crate::builtins::rights::demand;
 use crate::builtins::stream::{Then, file_error, more_input, right_to, skip_source, source};
@@ -305,10 +306,15 @@ pub(super) fn compiled_file(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(path) = text_of(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "STRING");
     };
-    let permitted = demand(vm, right_to(arguments), &path)?;
-    let bytes = match vm.outside.host.read_file(&permitted) {
-        Ok(bytes) => bytes,
-        Err(error) => return file_error(&mut vm.exchange, "read", &path, &error),
+    let bytes = match vector_elements(&vm.heap, optional(arguments, 2)) {
+        Some(ArrayElements::Bytes(bytes)) => bytes.to_vec(),
+        _ => {
+            let permitted = demand(vm, right_to(arguments), &path)?;
+            match vm.outside.host.read_file(&permitted) {
+                Ok(bytes) => bytes,
+                Err(error) => return file_error(&mut vm.exchange, "read", &path, &error),
+            }
+        }
     };
     vm.exchange.charge(bytes.len() * 4);
     let sound = file::read(&bytes).map_err(|error| error.to_string());
