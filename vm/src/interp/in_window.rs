@@ -20,8 +20,8 @@ const MOST_KEYS: usize = 23;
 /// parameters; `None` if the call has to take the slow way.
 ///
 /// # Safety
-/// `code` is the Code of a function with bytecode; `registers` lie behind the window of a call in the running frame, which
-/// holds `count` arguments.
+/// `code` is the Code of a function with bytecode; `registers` lie behind the window of a call in the running
+/// frame, which holds `count` arguments.
 #[cold]
 #[inline(never)]
 pub(super) unsafe fn arrange(
