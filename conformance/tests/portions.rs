@@ -39,12 +39,17 @@ const PROGRAMS: [&str; 7] = [
        (let ((i i)) (spawn (dotimes (j 30) (reverse (make-list 4000)) (fill (make-array 4000) j) (princ i)))))",
 ];
 
+/// Ticks after which a run is looked at, in the middle of its turns.
+const MIDDLE: u64 = 5_003;
+
 struct Course {
+    /// Strict fingerprint after [`MIDDLE`] ticks.
+    middle: u128,
     outcome: RunOutcome,
     output: String,
     ticks: u64,
     canary: u64,
-    fingerprint: Option<u128>,
+    fingerprint: u128,
 }
 
 /// Runs a program in portions as `next` says, then to its end.
@@ -54,19 +59,24 @@ fn course(program: &Program, config: &Config, mut next: impl FnMut() -> Option<u
     let mut machine =
         program::machine(config.clone(), Box::new(host)).expect("there is room for the library");
     program::begin(&mut machine, program).expect("it can start");
+    while machine.ticks() < MIDDLE {
+        let portion = next().unwrap_or(u64::MAX).min(MIDDLE - machine.ticks());
+        if machine.run(portion) != RunOutcome::TicksUsed {
+            break;
+        }
+    }
+    let middle = machine.fingerprint();
     let outcome = loop {
         match machine.run(next().unwrap_or(u64::MAX)) {
             RunOutcome::TicksUsed => {}
             outcome => break outcome,
         }
     };
-    // Where a budget ends a turn, how the scheduler notes that may
-    // depend on the portion; what follows does not.
-    let fingerprint = (outcome != RunOutcome::BudgetSpent).then(|| machine.fingerprint());
+    let fingerprint = machine.fingerprint();
     machine.end_run();
     machine.flush();
     let (ticks, canary) = (machine.ticks(), machine.canary());
-    Course { outcome, output: captured.output(), ticks, canary, fingerprint }
+    Course { middle, outcome, output: captured.output(), ticks, canary, fingerprint }
 }
 
 fn check(text: &str, config: &Config, portions: &[u64]) {
@@ -77,6 +87,7 @@ fn check(text: &str, config: &Config, portions: &[u64]) {
     assert_eq!(parts.output, whole.output, "portions {portions:?} of {text}");
     assert_eq!((parts.outcome, parts.ticks), (whole.outcome, whole.ticks), "portions {portions:?} of {text}");
     assert_eq!(parts.canary, whole.canary, "portions {portions:?} of {text}");
+    assert_eq!(parts.middle, whole.middle, "portions {portions:?} of {text}");
     assert_eq!(parts.fingerprint, whole.fingerprint, "portions {portions:?} of {text}");
 }
 

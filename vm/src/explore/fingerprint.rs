@@ -12,7 +12,7 @@
 //! at a point, the state equals no other.
 //!
 //! A *strict* fingerprint is of all that the list calls state of the run: ticks, numbers, the order of
-//! queues, times as they are, all registers, the collector's state, and where objects lie. Two runs that
+//! queues, times as they are, all objects in registers, the collector's state, and where objects lie. Two runs that
 //! agree in it go on alike to the tick, and it says so of a run and its replay, in other processes too.
 
 use std::collections::HashMap;
@@ -218,7 +218,9 @@ impl Walk<'_> {
             }
             is_innermost = false;
             for (register, &v) in frame.registers().iter().enumerate() {
-                if registers.contains(register) || self.is_strict {
+                // What is kept alive matters to the collector, even if nothing will read it. Other words that
+                // nothing will read do not, and may be the return addresses of calls that are over.
+                if registers.contains(register) || self.is_strict && v.is_address() {
                     self.word(register as u64);
                     self.value(v);
                 }

@@ -74,8 +74,11 @@ struct InboxState {
     /// Whether something was put in, or the bell rung, since the contents were taken last.
     is_rung: AtomicBool,
     contents: Mutex<Vec<Incoming>>,
-    /// Notified, under the lock of `contents`, when `is_rung` is set.
+    /// Notified, under the lock of `contents`, when `is_rung` is set and somebody waits.
     bell: Condvar,
+    /// How many wait for the bell; read and written under the lock of `contents`. To notify nobody takes a call of the
+    /// system too, and most messages come while the machine runs.
+    waiting: AtomicU32,
     /// Looks, which come beside the contents.
     looks: Mutex<Looks>,
     doors: Doors,
@@ -116,15 +119,25 @@ impl Inbox {
 
     /// Puts something in, from any thread, and ends the host's wait.
     pub fn put(&self, incoming: Incoming) {
-        self.contents().push(incoming);
-        self.ring();
+        let mut contents = self.contents();
+        contents.push(incoming);
+        self.ring_under(&contents);
     }
 
     /// Ends the host's wait, or the next one, and has the machine look.
     pub fn ring(&self) {
-        let _contents = self.contents();
-        self.0.is_rung.store(true, Ordering::Relaxed);
-        self.0.bell.notify_all();
+        self.ring_under(&self.contents());
+    }
+
+    /// As [`Inbox::ring`], under the lock of the contents.
+    fn ring_under(&self, _contents: &MutexGuard<'_, Vec<Incoming>>) {
+        if self.0.is_rung.swap(true, Ordering::Relaxed) {
+            // Whoever waits has been told, and who is to be woken is when they say so.
+            return;
+        }
+        if self.0.waiting.load(Ordering::Relaxed) > 0 {
+            self.0.bell.notify_all();
+        }
         if let Some(waker) = self.waker().take() {
             waker.wake();
         }
@@ -188,12 +201,14 @@ impl Inbox {
     pub fn wait(&self, time: Option<Duration>) -> bool {
         let deadline = time.and_then(|time| Instant::now().checked_add(time));
         let mut contents = self.contents();
+        self.0.waiting.fetch_add(1, Ordering::Relaxed);
         while !self.is_rung() {
             contents = match deadline {
                 None => self.0.bell.wait(contents).unwrap_or_else(PoisonError::into_inner),
                 Some(deadline) => {
                     let left = deadline.saturating_duration_since(Instant::now());
                     if left.is_zero() {
+                        self.0.waiting.fetch_sub(1, Ordering::Relaxed);
                         return false;
                     }
                     let waited = self.0.bell.wait_timeout(contents, left);
@@ -201,6 +216,7 @@ impl Inbox {
                 }
             };
         }
+        self.0.waiting.fetch_sub(1, Ordering::Relaxed);
         true
     }
 }
