@@ -5,7 +5,7 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::Symbol;
 
 use super::expander::Expander;
-use super::form::{Checked, Form, check_distinct, name, on_one_line, quoted};
+use super::form::{Checked, Form, Make, check_distinct, name, on_one_line, quoted};
 use super::function::Body;
 use super::job::{Job, LetBindings, To, VariableBinding};
 use super::origin::OriginId;
@@ -186,6 +186,12 @@ pub(super) fn multiple_value_bind(
         names.push((expander.variable_name(environment, item, &form, Deed::Bind)?, item.clone()));
     }
     check_distinct(names.iter().map(|(symbol, datum)| (symbol, datum.span())), &form)?;
+    if names.len() > MOST_VALUES {
+        let names = names.into_iter().map(|(_, datum)| datum);
+        let whole = bind_list_of_values(environment, &form, names);
+        expander.schedule([Job::Expand(whole, to)]);
+        return Ok(());
+    }
     let mut body = expander.take_body(&form.args[2..], false, &form, to.origin)?;
     let (values, job) = expander.part(form.args[1].clone(), to);
     let mut variables = Vec::new();
@@ -205,6 +211,29 @@ pub(super) fn multiple_value_bind(
     jobs.push(Job::Leave(count));
     expander.schedule(jobs);
     Ok(())
+}
+
+/// Number of values that may get registers. More are made a list.
+const MOST_VALUES: usize = 128;
+
+/// Returns the form that binds variables to the values of a list.
+fn bind_list_of_values(
+    environment: &mut dyn Environment,
+    form: &Form,
+    names: impl Iterator<Item = Datum>,
+) -> Datum {
+    let make = Make(form.datum.span());
+    let mut rest = make.fresh(environment, "VALUES");
+    let list = make.cl("FUNCTION", [make.symbol(&Symbol::cl("LIST"))]);
+    let mut bindings = vec![(rest.clone(), make.cl("MULTIPLE-VALUE-CALL", [list, form.args[1].clone()]))];
+    for name in names {
+        let next = make.fresh(environment, "VALUES");
+        bindings.push((name, make.call_cl("CAR", [rest.clone()])));
+        bindings.push((next.clone(), make.call_cl("CDR", [rest])));
+        rest = next;
+    }
+    bindings.pop();
+    make.let_in_order(bindings, form.args[2..].to_vec())
 }
 
 /// `(progv symbols values . body)`

@@ -159,6 +159,34 @@ pub(super) fn destructuring_bind(
     Ok(())
 }
 
+/// Takes the parameters of a function from one list of arguments if they are too many for registers: the
+/// function `shown` has a rest parameter only, and its body binds the variables.
+pub(super) fn gather_parameters(
+    environment: &mut dyn Environment,
+    text: FunctionText,
+    form: &Form,
+) -> Checked<FunctionText> {
+    let FunctionText { name, shown, list, mut body, block, form: span } = text;
+    let make = Make(span);
+    let arguments = make.fresh(environment, "ARGUMENTS");
+    let context = make.quote(name.clone().unwrap_or_else(|| make.symbol(&Symbol::cl("LAMBDA"))));
+    let mut row = Row { make, environment, context, bindings: Vec::new() };
+    row.pattern(&list, &arguments, &arguments);
+    let bindings = row.finish(form)?;
+    let forms = match &block {
+        Some(block) => {
+            vec![make.cl("BLOCK", std::iter::once(make.symbol(block)).chain(std::mem::take(&mut body.forms)))]
+        }
+        None => std::mem::take(&mut body.forms),
+    };
+    let inner = std::mem::take(&mut body.declarations).into_iter().chain(forms).collect();
+    let documentation = body.documentation;
+    let forms = vec![make.let_in_order(bindings, inner)];
+    let body = Body { documentation, forms, ..Body::default() };
+    let list = LambdaList { rest: Some(arguments), ..LambdaList::default() };
+    Ok(FunctionText { name, shown, list, body, block: None, form: span })
+}
+
 /// `(%macro-lambda shown name lambda-list . body)`: the function of the macro `name`, which takes a form and
 /// an environment and is shown to people as `shown`.
 pub(super) fn macro_lambda(

@@ -7,6 +7,7 @@ use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 
+use super::destructure::gather_parameters;
 use super::expander::Expander;
 use super::form::{Checked, Form, check_distinct, is_cl_form, is_esl, operator, plain, span_of};
 use super::function::{Body, FunctionParts, FunctionText, WrittenName};
@@ -20,11 +21,14 @@ use crate::core::{
 };
 use crate::diagnostic::code;
 
+/// Number of parameters that may have registers. With more, they come as a list.
+const MOST_PARAMETERS: usize = 128;
+
 impl Expander {
     /// Checks the lambda list of a function and takes its body apart.
     pub(super) fn lambda_text(
         &mut self,
-        environment: &dyn Environment,
+        environment: &mut dyn Environment,
         parts: FunctionParts<'_>,
         form: &Form,
         origin: Option<OriginId>,
@@ -42,7 +46,11 @@ impl Expander {
             self.variable_name(environment, datum, form, Deed::Bind)?;
         }
         let body = self.take_body(body, true, form, origin)?;
-        Ok(FunctionText { name, shown, list, body, block, form: form.datum.span() })
+        let text = FunctionText { name, shown, list, body, block, form: form.datum.span() };
+        if names.len() > MOST_PARAMETERS {
+            return gather_parameters(environment, text, form);
+        }
+        Ok(text)
     }
 
     /// Adds a lambda within that of `to`, to be filled by [`Job::Lambda`].

@@ -27,6 +27,7 @@ mod dynamic;
 mod exit;
 mod function;
 mod fuse;
+mod gather;
 mod graph;
 mod lines;
 mod literals;
@@ -50,7 +51,7 @@ use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::module::{Module, ModuleFunction};
 
 use crate::core::{Core, LambdaId};
-use crate::resolve::ResolveWalk;
+use crate::resolve::{InlineDecision, ResolveWalk};
 use builder::{ModuleBuilder, OversizedFunction, SuspendedBuilder};
 pub use lines::SourceLines;
 
@@ -70,8 +71,8 @@ pub fn lower(core: &Core, lines: &SourceLines) -> Result<Module, Vec<Diagnostic>
 /// Number of registers in use from which on variables go to the heap, in forms that do not fit otherwise.
 const SPILLS_FROM: u8 = 80;
 
-/// The lowering of a top-level form in parts. A part ends between two steps of the walk that resolves it, or
-/// between two functions.
+/// The lowering of a top-level form in parts. A part ends between two steps of a walk over the form, or between
+/// two functions.
 pub struct Lowering {
     core: Core,
     stage: LoweringStage,
@@ -86,6 +87,8 @@ pub struct Lowering {
 /// What a [`Lowering`] does next.
 enum LoweringStage {
     Begin,
+    Divide(Box<split::Division>),
+    Inline(Box<InlineDecision>),
     Resolve(Box<ResolveWalk>),
     Functions(Box<SuspendedBuilder>, Vec<ModuleFunction>),
 }
@@ -103,18 +106,41 @@ impl Lowering {
         self.core.bytes() * 2
     }
 
+    /// Has functions divided next.
+    fn divide(&mut self, lambdas: Vec<LambdaId>, limits: split::Limits) {
+        let division = split::Division::new(&self.core, lambdas, limits);
+        self.stage = LoweringStage::Divide(Box::new(division));
+    }
+
     /// Goes on with the work. Returns the module, or what is wrong with the form; `None` if the work that is
     /// allowed is done before.
     pub fn run(&mut self, lines: &SourceLines, work: &mut Work) -> Option<Result<Module, Vec<Diagnostic>>> {
         loop {
             match std::mem::replace(&mut self.stage, LoweringStage::Begin) {
                 LoweringStage::Begin => {
-                    work.add(self.core.nodes.len() as u64 / NODES_PER_UNIT);
                     if !std::mem::replace(&mut self.is_in_parts, true) {
+                        work.add(self.core.nodes.len() as u64 / NODES_PER_UNIT);
                         let large = split::larger_than(&self.core, LARGE_FUNCTION);
-                        split::split(&mut self.core, &large, split::LIMITS[0]);
+                        if !large.is_empty() {
+                            self.divide(large, split::LIMITS[0]);
+                            continue;
+                        }
                     }
-                    self.stage = LoweringStage::Resolve(Box::new(ResolveWalk::new(&self.core)));
+                    self.stage = LoweringStage::Inline(Box::new(InlineDecision::new(&self.core)));
+                }
+                LoweringStage::Divide(mut division) => {
+                    if !division.run(&mut self.core, work) {
+                        self.stage = LoweringStage::Divide(division);
+                        return None;
+                    }
+                }
+                LoweringStage::Inline(mut decision) => {
+                    if !decision.run(&self.core, work) {
+                        self.stage = LoweringStage::Inline(decision);
+                        return None;
+                    }
+                    let walk = ResolveWalk::new(&self.core, *decision);
+                    self.stage = LoweringStage::Resolve(Box::new(walk));
                 }
                 LoweringStage::Resolve(mut walk) => {
                     if !walk.run(&self.core, work) {
@@ -157,7 +183,7 @@ impl Lowering {
                         })
                         .collect();
                     drop(builder);
-                    split::split(&mut self.core, &too_large, limits);
+                    self.divide(too_large, limits);
                 }
             }
         }

@@ -5,8 +5,10 @@
 //! variables get boxes, exits become throws. The parts are slower, which is the price of a function with
 //! thousands of forms, hundreds of variables, or expressions a hundred levels deep.
 
+use esl_bytecode::compile::Work;
 use esl_bytecode::span::Span;
 
+use super::gather::GatheredVariables;
 use crate::core::*;
 use crate::resolve::{children, lambda_nodes};
 
@@ -57,19 +59,81 @@ pub(super) fn larger_than(core: &Core, limit: usize) -> Vec<LambdaId> {
     (0..core.lambdas.len()).map(|index| LambdaId(index as u32)).filter(is_large).collect()
 }
 
-/// Divides the texts of `lambdas`.
-pub(super) fn split(core: &mut Core, lambdas: &[LambdaId], limits: Limits) {
-    let before = core.lambdas.len();
-    let mut sizes = Vec::new();
-    for &lambda in lambdas {
-        let mut roots = Vec::new();
-        lambda_nodes(&core.lambdas[lambda.index()], &mut |node| roots.push(node));
-        for root in roots {
-            Splitter { core, lambda, limits }.split(root, &mut sizes);
-        }
-    }
-    (before..core.lambdas.len()).for_each(|made| adopt(core, LambdaId(made as u32)));
+/// The division of the texts of functions. It is done in parts; each is given the same form.
+pub(super) struct Division {
+    limits: Limits,
+    variables: GatheredVariables,
+    /// Roots that are still to be divided, and the lambdas that they belong to.
+    roots: Vec<(NodeId, LambdaId)>,
+    lambdas: Vec<LambdaId>,
+    /// Root that is being divided.
+    current: Option<CurrentRoot>,
+    /// Sizes of nodes.
+    sizes: Vec<Size>,
+    /// Lambdas from here on are new, and do not own what they bind yet.
+    unsettled: Option<usize>,
 }
+
+/// A root that is being divided.
+struct CurrentRoot {
+    root: NodeId,
+    lambda: LambdaId,
+    /// Its nodes, children behind their parents.
+    order: Vec<NodeId>,
+    /// How many of them have their children in the order.
+    opened: usize,
+}
+
+impl Division {
+    /// Begins to divide the texts of `lambdas`.
+    pub(super) fn new(core: &Core, lambdas: Vec<LambdaId>, limits: Limits) -> Division {
+        let variables = GatheredVariables::new(core, &lambdas, limits.bindings);
+        let roots = Vec::new();
+        Division { limits, variables, roots, lambdas, current: None, sizes: Vec::new(), unsettled: None }
+    }
+
+    /// Goes on. Returns whether all is done; otherwise the work that is allowed is done.
+    pub(super) fn run(&mut self, core: &mut Core, work: &mut Work) -> bool {
+        if !self.variables.run(core, work) {
+            return false;
+        }
+        if self.unsettled.is_none() {
+            self.unsettled = Some(core.lambdas.len());
+            for &lambda in &self.lambdas {
+                lambda_nodes(&core.lambdas[lambda.index()], &mut |node| self.roots.push((node, lambda)));
+            }
+            self.roots.reverse();
+        }
+        loop {
+            if let Some(current) = &mut self.current {
+                let mut splitter = Splitter { core, lambda: current.lambda, limits: self.limits };
+                if !splitter.go_on(current, &mut self.sizes, work) {
+                    return false;
+                }
+            }
+            let Some((root, lambda)) = self.roots.pop() else { break };
+            self.current = Some(CurrentRoot { root, lambda, order: vec![root], opened: 0 });
+        }
+        self.current = None;
+        while let Some(made) = self.unsettled.filter(|&made| made < core.lambdas.len()) {
+            if work.is_done() {
+                return false;
+            }
+            work.add(adopt(core, LambdaId(made as u32)) / NODES_PER_UNIT);
+            self.unsettled = Some(made + 1);
+        }
+        true
+    }
+}
+
+/// Divides the texts of `lambdas`.
+#[cfg(test)]
+pub(super) fn split(core: &mut Core, lambdas: &[LambdaId], limits: Limits) {
+    Division::new(core, lambdas.to_vec(), limits).run(core, &mut Work::unbounded());
+}
+
+/// Nodes that count as a unit of work.
+const NODES_PER_UNIT: u64 = 8;
 
 struct Splitter<'a> {
     core: &'a mut Core,
@@ -85,17 +149,34 @@ struct Size {
 }
 
 impl Splitter<'_> {
-    /// Divides the form `root`. `sizes` are for use, with the sizes of other forms.
-    fn split(&mut self, root: NodeId, sizes: &mut Vec<Size>) {
-        let mut order = vec![root];
-        let mut next = 0;
-        while let Some(&node) = order.get(next) {
+    /// Goes on to divide a form. `sizes` are for use, with the sizes of other forms. Returns whether it is
+    /// divided.
+    fn go_on(&mut self, current: &mut CurrentRoot, sizes: &mut Vec<Size>, work: &mut Work) -> bool {
+        let CurrentRoot { root, order, opened, .. } = current;
+        while let Some(&node) = order.get(*opened) {
+            if (*opened as u64).is_multiple_of(NODES_PER_UNIT) {
+                if work.is_done() {
+                    return false;
+                }
+                work.add(1);
+            }
             children(&self.core.nodes[node.index()].kind, &mut |child| order.push(child));
-            next += 1;
+            *opened += 1;
+            if *opened == order.len() {
+                sizes.resize(self.core.nodes.len(), Size::default());
+                // Nothing is left to be opened from here on, though the order gets shorter.
+                *opened = usize::MAX;
+            }
         }
-        sizes.resize(self.core.nodes.len(), Size::default());
         // Children come behind their parents.
-        for &node in order.iter().rev() {
+        while let Some(&node) = order.last() {
+            if (order.len() as u64).is_multiple_of(NODES_PER_UNIT) {
+                if work.is_done() {
+                    return false;
+                }
+                work.add(1);
+            }
+            order.pop();
             let mut size = Size::default();
             children(&self.core.nodes[node.index()].kind, &mut |child| {
                 size = size.with(sizes[child.index()])
@@ -109,12 +190,13 @@ impl Splitter<'_> {
             size.weight += 1;
             size.height += 1;
             let is_large = size.weight > self.limits.weight || size.height > self.limits.height;
-            if is_large && node != root && size.weight >= MIN_WEIGHT {
+            if is_large && node != *root && size.weight >= MIN_WEIGHT {
                 self.take_out(node);
                 size = Size { weight: 3, height: 1 };
             }
             sizes[node.index()] = size;
         }
+        true
     }
 
     fn node(&mut self, kind: NodeKind, span: Span) -> NodeId {
@@ -235,8 +317,9 @@ impl Size {
     }
 }
 
-/// Makes `lambda` the owner of everything that its text binds.
-fn adopt(core: &mut Core, lambda: LambdaId) {
+/// Makes `lambda` the owner of everything that its text binds. Returns the number of its nodes.
+fn adopt(core: &mut Core, lambda: LambdaId) -> u64 {
+    let mut nodes = 0;
     let mut pending = vec![core.lambdas[lambda.index()].body];
     while let Some(node) = pending.pop() {
         let kind = &core.nodes[node.index()].kind;
@@ -258,5 +341,7 @@ fn adopt(core: &mut Core, lambda: LambdaId) {
             _ => {}
         }
         children(kind, &mut |child| pending.push(child));
+        nodes += 1;
     }
+    nodes
 }

@@ -5,8 +5,10 @@
 //! outside enters the loop. `((lambda (x) …) 1)` is the case without jumps; a named loop is the case with
 //! them. Functions that tail-call each other become one loop if each but one is called from one place only.
 
+use esl_bytecode::compile::Work;
 use rustc_hash::FxHashMap;
 
+use super::STEPS_PER_UNIT;
 use super::children::{children, lambda_nodes};
 use crate::core::*;
 
@@ -47,33 +49,85 @@ struct InlineSurvey {
 /// Repetitions of the decision, since inlining one function may make another one inlinable.
 const ROUNDS: usize = 8;
 
-/// Decides in which frame each lambda runs.
-pub(super) fn decide(core: &Core) -> Inlining {
-    // Whether a form is in tail position depends on the blocks that escape.
-    let escaping = survey(core, &vec![false; core.blocks.len()]).escaping;
-    let survey = survey(core, &escaping);
-    let mut hosts = survey.hosts;
-    for _ in 0..ROUNDS {
-        let mut changed = false;
-        for &name in survey.order.iter().rev() {
-            let lambda = survey.functions[&name];
-            let text = &core.lambdas[lambda.index()];
-            let is_plain = text.is_exact() && text.required.iter().all(|parameter| !parameter.is_special);
-            if hosts[lambda.index()].is_some() || survey.values[name.index()] || !is_plain {
-                continue;
+/// The decision in which frame each lambda runs. It is made in parts; each is given the same form.
+pub(crate) struct InlineDecision {
+    survey: InlineSurvey,
+    /// Whether control leaves each block from another lambda or across a cleanup, once the first survey has
+    /// found that: whether a form is in tail position depends on it.
+    escaping: Option<Vec<bool>>,
+    blocks: Vec<Visit>,
+    pending: Vec<(NodeId, Visit)>,
+    steps: u32,
+}
+
+impl InlineDecision {
+    /// Begins the decision.
+    pub(crate) fn new(core: &Core) -> InlineDecision {
+        let mut decision = InlineDecision {
+            survey: InlineSurvey::new(core),
+            escaping: None,
+            blocks: Vec::new(),
+            pending: Vec::new(),
+            steps: 0,
+        };
+        decision.begin(core);
+        decision
+    }
+
+    fn begin(&mut self, core: &Core) {
+        self.survey = InlineSurvey::new(core);
+        self.blocks = vec![Visit::TOP; core.blocks.len()];
+        enter_lambda(core, LambdaId(0), &mut self.pending);
+    }
+
+    /// Goes on. Returns whether all is known; otherwise the work that is allowed is done.
+    pub(crate) fn run(&mut self, core: &Core, work: &mut Work) -> bool {
+        loop {
+            while let Some((node, at)) = self.pending.pop() {
+                if self.steps.is_multiple_of(STEPS_PER_UNIT) {
+                    work.add(1);
+                    if work.is_done() {
+                        self.pending.push((node, at));
+                        return false;
+                    }
+                }
+                self.steps = self.steps.wrapping_add(1);
+                self.visit(core, node, at);
             }
-            if let Some(host) = only_caller(lambda, &survey.sites[name.index()], &hosts) {
-                hosts[lambda.index()] = Some(host);
-                changed = true;
+            if self.escaping.is_some() {
+                return true;
             }
-        }
-        if !changed {
-            break;
+            self.escaping = Some(std::mem::take(&mut self.survey.escaping));
+            self.begin(core);
         }
     }
-    let frames =
-        (0..core.lambdas.len()).map(|index| settle(LambdaId(index as u32), true, &hosts).0).collect();
-    Inlining { frames, functions: survey.functions }
+
+    /// Returns the frames, once all is known.
+    pub(super) fn finish(self, core: &Core) -> Inlining {
+        let survey = self.survey;
+        let mut hosts = survey.hosts;
+        for _ in 0..ROUNDS {
+            let mut changed = false;
+            for &name in survey.order.iter().rev() {
+                let lambda = survey.functions[&name];
+                let text = &core.lambdas[lambda.index()];
+                let is_plain = text.is_exact() && text.required.iter().all(|parameter| !parameter.is_special);
+                if hosts[lambda.index()].is_some() || survey.values[name.index()] || !is_plain {
+                    continue;
+                }
+                if let Some(host) = only_caller(lambda, &survey.sites[name.index()], &hosts) {
+                    hosts[lambda.index()] = Some(host);
+                    changed = true;
+                }
+            }
+            if !changed {
+                break;
+            }
+        }
+        let frames =
+            (0..core.lambdas.len()).map(|index| settle(LambdaId(index as u32), true, &hosts).0).collect();
+        Inlining { frames, functions: survey.functions }
+    }
 }
 
 /// Returns the lambda in whose frame `lambda` runs, and whether a tail position of `lambda` is one of that
@@ -123,6 +177,8 @@ struct Visit {
 }
 
 impl Visit {
+    const TOP: Visit = Visit { lambda: LambdaId(0), tail: true, extents: 0, cleanups: 0 };
+
     fn no_tail(self) -> Visit {
         Visit { tail: false, ..self }
     }
@@ -132,30 +188,34 @@ impl Visit {
     }
 }
 
-fn survey(core: &Core, escaping: &[bool]) -> InlineSurvey {
-    let mut survey = InlineSurvey {
-        functions: FxHashMap::default(),
-        order: Vec::new(),
-        sites: vec![Vec::new(); core.variables.len()],
-        values: vec![false; core.variables.len()],
-        escaping: vec![false; core.blocks.len()],
-        hosts: vec![None; core.lambdas.len()],
-    };
-    let top = Visit { lambda: LambdaId(0), tail: true, extents: 0, cleanups: 0 };
-    let mut blocks = vec![top; core.blocks.len()];
-    let mut pending = Vec::new();
-    enter_lambda(core, LambdaId(0), &mut pending);
-    while let Some((node, at)) = pending.pop() {
+impl InlineSurvey {
+    fn new(core: &Core) -> InlineSurvey {
+        InlineSurvey {
+            functions: FxHashMap::default(),
+            order: Vec::new(),
+            sites: vec![Vec::new(); core.variables.len()],
+            values: vec![false; core.variables.len()],
+            escaping: vec![false; core.blocks.len()],
+            hosts: vec![None; core.lambdas.len()],
+        }
+    }
+}
+
+impl InlineDecision {
+    /// Notes what a node tells, and schedules the nodes inside it.
+    fn visit(&mut self, core: &Core, node: NodeId, at: Visit) {
+        let InlineDecision { survey, escaping, blocks, pending, .. } = self;
+        let escapes = |block: BlockId| escaping.as_ref().is_some_and(|all| all[block.index()]);
         let kind = &core.nodes[node.index()].kind;
         // Circumstances of the last child, and of the others.
         let mut last = at.no_tail();
         let mut rest = at.no_tail();
         match kind {
             NodeKind::Local(variable) => survey.values[variable.index()] = true,
-            NodeKind::Lambda(lambda) => enter_lambda(core, *lambda, &mut pending),
+            NodeKind::Lambda(lambda) => enter_lambda(core, *lambda, pending),
             NodeKind::If(test, consequent, alternative) => {
                 pending.extend([(*test, rest), (*consequent, at), (*alternative, at)]);
-                continue;
+                return;
             }
             NodeKind::Progn(_) | NodeKind::And(_) | NodeKind::Or(_) => last = at,
             NodeKind::Let { bindings, .. } => {
@@ -171,13 +231,13 @@ fn survey(core: &Core, escaping: &[bool]) -> InlineSurvey {
                     if survey.functions.insert(name, lambda).is_none() {
                         survey.order.push(name);
                     }
-                    enter_lambda(core, lambda, &mut pending);
+                    enter_lambda(core, lambda, pending);
                 }
                 pending.push((*body, at));
-                continue;
+                return;
             }
             NodeKind::Block(block, _) => {
-                last = if escaping[block.index()] { at.inside() } else { at };
+                last = if escapes(*block) { at.inside() } else { at };
                 blocks[block.index()] = last;
             }
             NodeKind::ReturnFrom(block, _) => {
@@ -202,7 +262,7 @@ fn survey(core: &Core, escaping: &[bool]) -> InlineSurvey {
             NodeKind::FailureCleanup(body, cleanup) => {
                 pending.push((*body, at.inside()));
                 pending.push((*cleanup, Visit { cleanups: at.cleanups + 1, ..at.inside() }));
-                continue;
+                return;
             }
             NodeKind::Tagbody(..) => {
                 // Its tags may need a control entry while the forms run.
@@ -212,16 +272,16 @@ fn survey(core: &Core, escaping: &[bool]) -> InlineSurvey {
             NodeKind::HandlerCase(body, clauses) => {
                 pending.push((*body, at.inside()));
                 pending.extend(clauses.iter().map(|clause| (clause.body, at)));
-                continue;
+                return;
             }
             NodeKind::Call(Callee::Value(function), arguments) => {
                 if let NodeKind::Lambda(lambda) = core.nodes[function.index()].kind
                     && core.lambdas[lambda.index()].takes_exactly(arguments.len())
                 {
                     survey.hosts[lambda.index()] = Some((at.lambda, at.tail));
-                    enter_lambda(core, lambda, &mut pending);
+                    enter_lambda(core, lambda, pending);
                     pending.extend(arguments.iter().map(|&argument| (argument, rest)));
-                    continue;
+                    return;
                 }
             }
             NodeKind::Call(Callee::Local(name), arguments) => {
@@ -242,7 +302,6 @@ fn survey(core: &Core, escaping: &[bool]) -> InlineSurvey {
             end.1 = last;
         }
     }
-    survey
 }
 
 fn is_special(target: &BoundVariable) -> bool {

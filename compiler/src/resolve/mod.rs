@@ -26,6 +26,7 @@ use crate::core::*;
 use capture::Captures;
 pub(crate) use capture::Lexical;
 pub(crate) use children::{children, lambda_nodes};
+pub(crate) use inline::InlineDecision;
 
 /// Representation of a local function in the code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -159,7 +160,9 @@ impl Resolution {
 /// Resolves `core`.
 #[cfg(test)]
 pub(crate) fn resolve(core: &Core) -> Resolution {
-    let mut walk = ResolveWalk::new(core);
+    let mut decision = InlineDecision::new(core);
+    decision.run(core, &mut Work::unbounded());
+    let mut walk = ResolveWalk::new(core, decision);
     walk.run(core, &mut Work::unbounded());
     walk.finish(core)
 }
@@ -206,9 +209,9 @@ enum WalkStep {
 }
 
 impl ResolveWalk {
-    /// Begins the walk over `core`.
-    pub(crate) fn new(core: &Core) -> ResolveWalk {
-        let inlining = inline::decide(core);
+    /// Begins the walk over `core`, for which is known which functions are inlined.
+    pub(crate) fn new(core: &Core, decision: InlineDecision) -> ResolveWalk {
+        let inlining = decision.finish(core);
         let root = Site { frame: LambdaId(0), cleanups: 0 };
         let mut used = vec![false; core.lambdas.len()];
         if let Some(first) = used.first_mut() {

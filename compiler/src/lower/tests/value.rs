@@ -164,10 +164,27 @@ impl<F> Value<F> {
                 Ok(Value::list(items))
             }
             (B::MakeVector, 2) => int(0).map(|size| Value::list(vec![arguments[1].clone(); size as usize])),
+            (B::Svref, 2) => element(&arguments[0], &arguments[1]).map(|pair| pair.0.borrow().clone()),
+            (B::SetSvref, 3) => element(&arguments[0], &arguments[1]).map(|pair| {
+                *pair.0.borrow_mut() = arguments[2].clone();
+                arguments[2].clone()
+            }),
             (B::Identity, 1) => Ok(arguments[0].clone()),
             _ => return None,
         })
     }
+}
+
+/// Returns the pair of an element of a vector, which is a list here.
+fn element<F>(vector: &Value<F>, index: &Value<F>) -> Result<Pair<F>, &'static str> {
+    let Value::Int(index) = index else { return Err("TYPE-ERROR") };
+    let mut rest = vector.clone();
+    for _ in 0..*index {
+        let Value::Cons(pair) = rest else { return Err("INDEX-ERROR") };
+        rest = pair.1.borrow().clone();
+    }
+    let Value::Cons(pair) = rest else { return Err("INDEX-ERROR") };
+    Ok(pair)
 }
 
 impl<F> fmt::Display for Value<F> {
