@@ -27,6 +27,7 @@
 struct Embedding;
 
 pub mod command;
+pub mod coverage;
 pub mod data;
 pub mod engine;
 pub mod error;

@@ -324,6 +324,10 @@ macro_rules! for_each_opcode {
             /// unwound, when there is none; `kind` says which form it was: 0 `throw`, 1 `return-from`, 2
             /// `go`. Then the value list is what a recovery gave.
             Throw = 0x82, "throw", effect { tag: Reg, kind: ThrowKind };
+
+            // ---- counting
+            /// Counts that control passes the place with this number, if the machine is asked to. Not a tick.
+            Pass = 0x86, "pass", silent { place: PassIdx };
         }
     };
 }

@@ -121,6 +121,8 @@ operands! {
     ThrowKind(u8), 8, |n| Role::Number(i32::from(n)), "{}";
     /// Index of a slot or a capture.
     Index(u8), 8, |n| Role::Number(i32::from(n)), "#{}";
+    /// Number of a place whose passages are counted.
+    PassIdx(u32), 24, |n| Role::Number(n as i32), "#{}";
     /// A small integer.
     Int8(i8), 8, |n| Role::Number(i32::from(n)), "{}";
     /// An integer of 16 bits.

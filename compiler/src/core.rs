@@ -350,6 +350,8 @@ pub enum NodeKind {
     SetSlot(Symbol, u16, NodeId, NodeId),
     /// Tests whether a form's value is an instance of a structure class.
     IsInstance(Symbol, NodeId),
+    /// Counts that control passes the place with this number; the value is `NIL`. Made by `cover` only.
+    Pass(u32),
 }
 
 /// An item of a tagbody.

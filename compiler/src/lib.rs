@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod core;
+pub mod cover;
 pub mod diagnostic;
 pub mod expand;
 pub mod lower;

@@ -9,6 +9,7 @@ use std::process::ExitCode;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use esl::Config;
 use esl::command::{self, NOT_COMPILED, ProgramFile, RightsOptions, SignalTarget, USAGE, complain};
+use esl::coverage::{self, Coverage};
 use esl::explore::{self, Schedule};
 use esl::host::{Host, ProcessSignal, RealHost, RecordingHost};
 use esl::module_path::ModulePath;
@@ -31,7 +32,8 @@ const SHOWN_FUNCTIONS: usize = 40;
 struct Eslvm {
     #[command(subcommand)]
     action: EslvmAction,
-    /// Folder to search for required modules, after the folder of the program and before those of ESL_LIBRARY
+    /// Folder to search for required modules, after the folder of the program and before those of
+    /// ESL_LIBRARY
     #[arg(long, value_name = "FOLDER", global = true)]
     library: Vec<PathBuf>,
 }
@@ -42,9 +44,9 @@ enum EslvmAction {
     /// Run a program
     ///
     /// Exit status: 0 success, or the status that the program asks for; 1 a failure left the main task; 2
-    /// wrong usage, or a file that cannot be read or written; 3 the program does not compile or is refused; 4
-    /// no task can ever run again; 5 the budget or the memory is spent; 129, 130, 143 ended by SIGHUP, SIGINT
-    /// or SIGTERM. However the run ends, the cleanups of its tasks are run.
+    /// wrong usage, or a file that cannot be read or written; 3 the program does not compile or is refused;
+    /// 4 no task can ever run again; 5 the budget or the memory is spent; 129, 130, 143 ended by SIGHUP,
+    /// SIGINT or SIGTERM. However the run ends, the cleanups of its tasks are run.
     Run {
         #[command(flatten)]
         options: MachineOptions,
@@ -53,7 +55,7 @@ enum EslvmAction {
         #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = parse_speed)]
         speed: f64,
         /// Print figures of the run to standard error at its end; with `=tasks` or `=functions`, also of
-        /// those with most ticks
+        /// those with most ticks; with `=coverage`, also what was not run
         #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "run")]
         stats: Option<Stats>,
         /// Write a timeline of the tasks to a file: a drawing if its name ends in `.svg`, else a trace for
@@ -70,6 +72,9 @@ enum EslvmAction {
         /// `.svg`, for speedscope if it ends in `.json`, else a line for each stack
         #[arg(long, value_name = "FILE", conflicts_with = "schedule")]
         profile: Option<PathBuf>,
+        /// Write to a file, in the form of lcov, how often each line, function and arm was run
+        #[arg(long, value_name = "FILE", conflicts_with_all = ["schedule", "record"])]
+        coverage: Option<PathBuf>,
         /// Trace failures, goals or tasks on standard error: a list such as failures,tasks
         #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = ["failures", "goals", "tasks"])]
         trace: Vec<String>,
@@ -83,19 +88,20 @@ enum EslvmAction {
     },
     /// Run a recorded run again, forwards and backwards
     ///
-    /// Needs neither the sources nor the world of the program, and waits for nothing. With --until or --break
-    /// the replay stops there and takes commands from standard input: `help` lists them. Exit status: that of
-    /// the recorded run; 0 if the recording ends before the run, or after commands; 2 wrong usage, or a
-    /// file that cannot be read; 3 the recording is damaged or of another version; 6 the replay has diverged.
+    /// Needs neither the sources nor the world of the program, and waits for nothing. With --until or
+    /// --break the replay stops there and takes commands from standard input: `help` lists them. Exit
+    /// status: that of the recorded run; 0 if the recording ends before the run, or after commands; 2 wrong
+    /// usage, or a file that cannot be read; 3 the recording is damaged or of another version; 6 the replay
+    /// has diverged.
     Replay {
         #[command(flatten)]
         options: ReplayOptions,
     },
     /// Run the tests of programs
     ///
-    /// Each test (`deftest`) runs in a machine of its own, whose clock is virtual. Exit status: 0 all passed;
-    /// 1 a test failed; 2 wrong usage, or a file that cannot be read or written; 3 a file does not compile or
-    /// is refused.
+    /// Each test (`deftest`) runs in a machine of its own, whose clock is virtual. Exit status: 0 all
+    /// passed; 1 a test failed; 2 wrong usage, or a file that cannot be read or written; 3 a file does not
+    /// compile or is refused.
     Test {
         /// Only tests whose names contain this word, in any case
         #[arg(long, value_name = "WORD")]
@@ -109,6 +115,10 @@ enum EslvmAction {
         /// Write a report in the form of JUnit to a file
         #[arg(long, value_name = "FILE")]
         junit: Option<PathBuf>,
+        /// Write to a file, in the form of lcov, how often each line, function and arm was run, and print
+        /// what was not
+        #[arg(long, value_name = "FILE")]
+        coverage: Option<PathBuf>,
         /// Most ticks of a run of a test
         #[arg(long, value_name = "TICKS", default_value_t = 1_000_000_000)]
         budget: u64,
@@ -124,10 +134,10 @@ enum EslvmAction {
     /// Run a program under all schedules
     ///
     /// Lets the tasks of the program take turns in every possible order, and tells of those orders that end
-    /// badly: by a deadlock, a failure of the main task, a status other than 0. Writes each as a schedule, which
-    /// `eslvm run --schedule` repeats. Exit status: 0 no schedule ends badly; 1 one does; 2 wrong usage, or a
-    /// file that cannot be read or written; 3 the program does not compile or is refused; 7 none was found,
-    /// and not all were tried.
+    /// badly: by a deadlock, a failure of the main task, a status other than 0. Writes each as a schedule,
+    /// which `eslvm run --schedule` repeats. Exit status: 0 no schedule ends badly; 1 one does; 2 wrong
+    /// usage, or a file that cannot be read or written; 3 the program does not compile or is refused; 7
+    /// none was found, and not all were tried.
     Explore {
         #[command(flatten)]
         options: ExploreArguments,
@@ -136,9 +146,9 @@ enum EslvmAction {
     },
     /// Attach to a run that was begun with --listen
     ///
-    /// Lines are typed here as in the REPL, and evaluated in the run, which goes on meanwhile and afterwards;
-    /// `:help` lists commands. Exit status: 0 the session has ended; 1 the run has; 2 no run can be reached, or
-    /// it refuses the secret; 3 the last form is incomplete.
+    /// Lines are typed here as in the REPL, and evaluated in the run, which goes on meanwhile and
+    /// afterwards; `:help` lists commands. Exit status: 0 the session has ended; 1 the run has; 2 no run
+    /// can be reached, or it refuses the secret; 3 the last form is incomplete.
     Attach {
         /// File with the secret that a port asks for; otherwise it is that of the environment variable
         /// ESL_SECRET
@@ -176,6 +186,8 @@ enum Stats {
     Tasks,
     /// The run and its functions
     Functions,
+    /// The run, and which lines and arms of the program it has not reached
+    Coverage,
 }
 
 /// Clock of a program.
@@ -230,8 +242,8 @@ impl MachineOptions {
 
 #[derive(Args)]
 struct ExploreArguments {
-    /// Where a task may have to let others go first: before what others can see (changes), or also before it
-    /// looks at what others do (reads)
+    /// Where a task may have to let others go first: before what others can see (changes), or also before
+    /// it looks at what others do (reads)
     #[arg(long, value_enum, default_value = "changes")]
     grain: GrainChoice,
     /// Most states
@@ -284,6 +296,7 @@ fn main() -> ExitCode {
             stats,
             timeline,
             profile,
+            coverage,
             schedule,
             record,
             trace,
@@ -299,15 +312,20 @@ fn main() -> ExitCode {
             rights.and_then(|rights| {
                 let host = RealHost::new(arguments).with_rights(path.with_rights(rights)).with_speed(speed);
                 let schedule = schedule.as_deref().map(explore::read_schedule).transpose()?;
-                let (timeline, profile, record) =
-                    (timeline.as_deref(), profile.as_deref(), record.as_deref());
-                let reports =
-                    RunReports { stats, timeline, profile, record, trace: &trace, operate: &operate };
+                let reports = RunReports {
+                    stats,
+                    timeline: timeline.as_deref(),
+                    profile: profile.as_deref(),
+                    coverage: coverage.as_deref(),
+                    record: record.as_deref(),
+                    trace: &trace,
+                    operate: &operate,
+                };
                 run(&file, host, &options, &reports, schedule.as_ref(), &path)
             })
         }
         EslvmAction::Replay { options } => replay::run_command(&options),
-        EslvmAction::Test { filter, jobs, seed, junit, budget, memory, rights, sources } => {
+        EslvmAction::Test { filter, jobs, seed, junit, coverage, budget, memory, rights, sources } => {
             rights.rights().map(|rights| {
                 let processors = || std::thread::available_parallelism().map_or(1, usize::from);
                 let config = Config { budget: Some(budget), memory, ..Config::default() };
@@ -315,7 +333,7 @@ fn main() -> ExitCode {
                 testing::run(
                     &sources,
                     &library,
-                    &testing::Options { filter, jobs, seed, junit, config, rights },
+                    &testing::Options { filter, jobs, seed, junit, coverage, config, rights },
                 )
             })
         }
@@ -339,7 +357,8 @@ fn parse_speed(text: &str) -> Result<f64, &'static str> {
     }
 }
 
-/// Reads the program in a file, and compiles it if it is a source, within the limits of its run.
+/// Reads the program in a file, and compiles it if it is a source, within the limits of its run. Returns
+/// its coverage too, if that `is_covered`.
 ///
 /// # Errors
 /// The exit status, after a message.
@@ -347,15 +366,17 @@ fn program(
     file: &Path,
     path: &ModulePath,
     options: &MachineOptions,
+    is_covered: bool,
     signals: &SignalTarget,
-) -> Result<Program, u8> {
+) -> Result<(Program, Option<Coverage>), u8> {
     let source = match command::read_program(file)? {
-        ProgramFile::Compiled(program) => return Ok(program),
+        ProgramFile::Compiled(_) if is_covered => return Err(coverage::refuse_compiled(file)),
+        ProgramFile::Compiled(program) => return Ok((program, None)),
         ProgramFile::Source(source) => source,
     };
     let mut watch = |inbox| signals.set(inbox);
     let config = options.config();
-    let compiled = program::compile_for_run(&[source], path, Modules::Inside, &config, &mut watch);
+    let compiled = program::compile_for_run(&[source], path, is_covered, &config, &mut watch);
     if let Some(ended) = compiled.stopped {
         match ended {
             Ended::BudgetSpent => complain("compiling the program takes more than the budget"),
@@ -369,7 +390,8 @@ fn program(
     }
     let color = std::io::stderr().is_terminal();
     command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
-    compiled.program.ok_or(NOT_COMPILED)
+    let coverage = is_covered.then(|| Coverage::new(&compiled));
+    Ok((compiled.program.ok_or(NOT_COMPILED)?, coverage))
 }
 
 /// Explores the schedules of a program. Returns the exit status.
@@ -413,6 +435,7 @@ struct RunReports<'a> {
     timeline: Option<&'a Path>,
     record: Option<&'a Path>,
     profile: Option<&'a Path>,
+    coverage: Option<&'a Path>,
     trace: &'a [String],
     operate: &'a OperateOptions,
 }
@@ -425,13 +448,14 @@ fn run(
     schedule: Option<&Schedule>,
     path: &ModulePath,
 ) -> Result<u8, u8> {
-    let RunReports { stats, timeline, profile, record, trace, operate } = *reports;
-    for output in [timeline, profile, record].into_iter().flatten() {
+    let RunReports { stats, timeline, profile, coverage, record, trace, operate } = *reports;
+    for output in [timeline, profile, coverage, record].into_iter().flatten() {
         command::refuse_overwriting(output, [file])?;
     }
     let signals = SignalTarget::default();
     command::end_on_signal(signals.clone());
-    let program = program(file, path, options, &signals)?;
+    let is_covered = coverage.is_some() || stats == Some(Stats::Coverage);
+    let (program, mut covered) = program(file, path, options, is_covered, &signals)?;
     let setup = |error| {
         complain(error);
         USAGE
@@ -472,6 +496,9 @@ fn run(
         }
         None => None,
     };
+    if is_covered {
+        machine.count_passages();
+    }
     let served = operate.begin(&mut machine)?;
     let started = std::time::Instant::now();
     let is_profiled = profile.is_some() || stats == Some(Stats::Functions);
@@ -508,6 +535,15 @@ fn run(
     {
         status = not_written(path, &error);
     }
+    if let Some(covered) = &mut covered {
+        covered.add(&machine.take_passages());
+    }
+    let covered = covered.map(|covered| covered.report());
+    if let (Some(path), Some(report)) = (coverage, &covered)
+        && let Err(error) = std::fs::write(path, report.lcov())
+    {
+        status = not_written(path, &error);
+    }
     match summary.ended {
         Ended::BudgetSpent => {
             let budget = options.budget.unwrap_or(summary.ticks);
@@ -523,6 +559,9 @@ fn run(
         }
         if stats == Stats::Functions {
             print_functions(&found);
+        }
+        if let (Stats::Coverage, Some(report)) = (stats, &covered) {
+            eprint!("\n{}", report.table());
         }
     }
     // The process ends here: giving the memory back piece by piece would only take time.

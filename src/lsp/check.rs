@@ -17,7 +17,7 @@ use lsp_types::{
 use super::document::{ColumnUnit, OpenText, path_of, uri_of};
 use super::project::Project;
 use crate::module_path::ModulePath;
-use crate::program::{Compiled, Modules, Source, compile_for_run};
+use crate::program::{Compiled, Source, compile_for_run};
 
 /// Time without a change after which a text is looked at.
 const PAUSE: Duration = Duration::from_millis(150);
@@ -129,7 +129,7 @@ fn look_at(checked: &CheckedText) -> HashMap<String, Vec<ShownDiagnostic>> {
     let name = path_of(&checked.uri).display().to_string();
     let source = Source::new(name.clone(), checked.text.as_str());
     let config = Config { budget: Some(BUDGET), ..Config::DEFAULT };
-    let compiled = compile_for_run(&[source], &checked.path, Modules::Inside, &config, &mut |_| {});
+    let compiled = compile_for_run(&[source], &checked.path, false, &config, &mut |_| {});
     let mut texts = ShownTexts { checked, name, compiled: &compiled, known: HashMap::new() };
     let mut found: HashMap<String, Vec<ShownDiagnostic>> = HashMap::new();
     found.insert(checked.uri.as_str().to_owned(), Vec::new());

@@ -3,6 +3,7 @@
 use esl_bytecode::compile::{Halt, drive_with};
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::span::Span;
+use esl_compiler::cover::CountedPlace;
 use esl_compiler::diagnostic::{Sources, code};
 use esl_compiler::session::{Compiler, Texts};
 use esl_vm::host::{Inbox, ProcessSignal, RealHost, Rights};
@@ -24,6 +25,10 @@ pub struct Compiled {
     /// Way in which the compilation ended before its end, if a limit or a signal has stopped it: as a run
     /// that does.
     pub stopped: Option<Ended>,
+    /// Places whose passages a machine can count in the program, if it was compiled for that.
+    pub places: Vec<CountedPlace>,
+    /// How often control has passed each of them in the machine in which macros run.
+    pub passages: Vec<u64>,
 }
 
 impl Compiled {
@@ -42,29 +47,34 @@ pub enum Modules {
     Apart,
 }
 
-/// Compiles sources to one program that runs them in order. They are one unit: functions may be called before
-/// the source that defines them, and macros used after it. Each begins in the package `ESL-USER`, or in
-/// `COMMON-LISP-USER` if its name ends in `.lisp`.
+/// Compiles sources to one program that runs them in order. They are one unit: functions may be called
+/// before the source that defines them, and macros used after it. Each begins in the package `ESL-USER`, or
+/// in `COMMON-LISP-USER` if its name ends in `.lisp`.
 ///
-/// Macros run in a machine of their own, whose definitions are gone when the compilation is over. The sources
-/// cannot require modules.
+/// Macros run in a machine of their own, whose definitions are gone when the compilation is over. The
+/// sources cannot require modules.
 pub fn compile(sources: &[Source]) -> Compiled {
     compile_with(sources, &ModulePath::none(), Modules::Inside)
 }
 
 /// Compiles sources as [`compile`] does, with the modules found in `path`.
 pub fn compile_with(sources: &[Source], path: &ModulePath, modules: Modules) -> Compiled {
-    compile_in(sources, path, modules, Config::DEFAULT, &mut |_| {})
+    compile_in(Compiler::default(), sources, path, modules, Config::DEFAULT, &mut |_| {})
+}
+
+/// Compiles sources and their modules to one program whose passages a machine can count.
+pub fn compile_covered(sources: &[Source], path: &ModulePath) -> Compiled {
+    compile_in(Compiler::default().covered(), sources, path, Modules::Inside, Config::DEFAULT, &mut |_| {})
 }
 
 fn compile_in(
+    mut compiler: Compiler,
     sources: &[Source],
     path: &ModulePath,
     modules: Modules,
     config: Config,
     watch: &mut dyn FnMut(Inbox),
 ) -> Compiled {
-    let mut compiler = Compiler::default();
     if modules == Modules::Apart {
         compiler = compiler.apart();
     }
@@ -77,13 +87,14 @@ const LEAST_MEMORY: usize = 32 << 20;
 /// Least budget of a compilation: a fraction of a second.
 const LEAST_BUDGET: u64 = 20_000_000;
 
-/// Compiles sources as [`compile_with`] does, for a run with the settings `config`: the compilation has the
-/// same memory and the same budget, or 32 MiB and 20 million ticks if these are more. `watch` receives the
-/// inbox into which a signal is put that is to stop it.
+/// Compiles sources and their modules to one program, for a run with the settings `config`: the compilation
+/// has the same memory and the same budget, or 32 MiB and 20 million ticks if these are more. `watch`
+/// receives the inbox into which a signal is put that is to stop it. If `is_covered`, a machine can count
+/// the passages of the program.
 pub fn compile_for_run(
     sources: &[Source],
     path: &ModulePath,
-    modules: Modules,
+    is_covered: bool,
     config: &Config,
     watch: &mut dyn FnMut(Inbox),
 ) -> Compiled {
@@ -92,11 +103,12 @@ pub fn compile_for_run(
         budget: config.budget.map(|budget| budget.max(LEAST_BUDGET)),
         ..Config::DEFAULT
     };
-    compile_in(sources, path, modules, config, watch)
+    let compiler = if is_covered { Compiler::default().covered() } else { Compiler::default() };
+    compile_in(compiler, sources, path, Modules::Inside, config, watch)
 }
 
-/// Expands the macros of a source. Returns its text after that, and the diagnostics. Modules that it requires
-/// are left out.
+/// Expands the macros of a source. Returns its text after that, and the diagnostics. Modules that it
+/// requires are left out.
 pub fn expand(source: &Source, path: &ModulePath) -> (String, Compiled) {
     let mut expansion = Compiler::default().apart().expand_text(&source.name, &source.text);
     let compiled = compile_texts(&mut expansion, path, Config::DEFAULT, &mut |_| {});
@@ -110,11 +122,13 @@ fn compile_texts(
     watch: &mut dyn FnMut(Inbox),
 ) -> Compiled {
     let mut find = |name: &str| path.find(name).map_err(|error| error.to_string());
-    let mut stopped = None;
+    let (mut stopped, mut passages) = (None, Vec::new());
     let (module, diagnostics) = match compile_time_machine(path, config) {
         Ok(mut machine) => {
             watch(machine.inbox());
+            machine.count_passages();
             let driven = drive_with(texts, &mut machine, &mut find);
+            passages = machine.take_passages();
             driven.unwrap_or_else(|halt| {
                 // What cleanups of macros have said on the way out.
                 machine.flush();
@@ -130,7 +144,8 @@ fn compile_texts(
         Err(error) => (None, vec![code::COMPILE_TIME_FAILURE.at(Span::default(), error.to_string())]),
     };
     let program = module.map(|module| Program { module });
-    Compiled { program, diagnostics, sources: texts.sources().clone(), stopped }
+    let (sources, places) = (texts.sources().clone(), texts.places().to_vec());
+    Compiled { program, diagnostics, sources, stopped, places, passages }
 }
 
 /// Returns the machine in which macros run. It may read the modules of `path`, and nothing else.

@@ -29,7 +29,7 @@ use esl_bytecode::verify::verify;
 use esl_bytecode::{disasm, file};
 use esl_vm::load::LoadError;
 
-pub use compile::{Compiled, Modules, compile, compile_for_run, compile_with, expand};
+pub use compile::{Compiled, Modules, compile, compile_covered, compile_for_run, compile_with, expand};
 pub use identity::{EXECUTION_EPOCH, ExecutionIdentity};
 pub(crate) use run::end;
 pub use run::{

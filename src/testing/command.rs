@@ -4,7 +4,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use esl_compiler::diagnostic::{Format, Renderer};
@@ -13,6 +13,7 @@ use esl_vm::vm::Config;
 
 use super::{Setup, Test, Verdict, junit, list, run_test};
 use crate::command::{self, FAILED, NOT_COMPILED, ProgramFile, SUCCESS, USAGE, complain};
+use crate::coverage::{Coverage, CoverageReport, refuse_compiled};
 use crate::module_path::ModulePath;
 use crate::program::{self, Modules, Program};
 
@@ -27,6 +28,8 @@ pub struct Options {
     pub seed: Option<u64>,
     /// File for a report in JUnit's form.
     pub junit: Option<PathBuf>,
+    /// File for the coverage of the tests, in lcov's form.
+    pub coverage: Option<PathBuf>,
     /// Limits of each test.
     pub config: Config,
     /// What of the outside a test may reach.
@@ -107,6 +110,17 @@ pub fn run(files: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
         complain(format_args!("{} cannot be written: {error}", path.display()));
         return USAGE;
     }
+    if let Some(path) = &options.coverage {
+        let mut report = CoverageReport::default();
+        for coverage in suites.iter().filter_map(|suite| suite.setup.coverage.as_ref()) {
+            report.merge(coverage.lock().unwrap_or_else(PoisonError::into_inner).report());
+        }
+        print!("\n{}", report.table());
+        if let Err(error) = std::fs::write(path, report.lcov()) {
+            complain(format_args!("{} cannot be written: {error}", path.display()));
+            return USAGE;
+        }
+    }
     if failed > 0 { FAILED } else { SUCCESS }
 }
 
@@ -116,16 +130,23 @@ pub fn run(files: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
 /// The exit status, after a message.
 fn suite<'a>(file: &'a Path, library: &[PathBuf], options: &Options) -> Result<Suite<'a>, u8> {
     let path = ModulePath::new([file], library);
+    let mut coverage = None;
     let program = match command::read_program(file)? {
+        ProgramFile::Compiled(_) if options.coverage.is_some() => return Err(refuse_compiled(file)),
         ProgramFile::Compiled(program) => program,
         ProgramFile::Source(source) => {
-            let compiled = program::compile_with(&[source], &path, Modules::Inside);
+            let compiled = match &options.coverage {
+                Some(_) => program::compile_covered(&[source], &path),
+                None => program::compile_with(&[source], &path, Modules::Inside),
+            };
             let color = std::io::IsTerminal::is_terminal(&std::io::stderr());
             command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
+            coverage = options.coverage.is_some().then(|| Arc::new(Mutex::new(Coverage::new(&compiled))));
             compiled.program.ok_or(NOT_COMPILED)?
         }
     };
-    let setup = Setup { config: options.config.clone(), path, rights: options.rights.clone() };
+    let (config, rights) = (options.config.clone(), options.rights.clone());
+    let setup = Setup { config, path, rights, coverage };
     Ok(Suite { file, program, setup })
 }
 

@@ -37,6 +37,7 @@ use esl_vm::vm::{Config, Vm};
 #[cfg(feature = "cli")]
 pub use command::{Options, run};
 
+use crate::coverage::Coverage;
 use crate::data::Data;
 use crate::error::Error;
 use crate::module_path::ModulePath;
@@ -56,6 +57,18 @@ pub struct Setup {
     pub path: ModulePath,
     /// What of the outside a test may reach.
     pub rights: Rights,
+    /// Coverage of the program, which was compiled for it, if tests are to add to it.
+    pub coverage: Option<Arc<Mutex<Coverage>>>,
+}
+
+impl Setup {
+    /// Adds what a machine has run to the coverage, if that is wanted.
+    fn note_passages(&self, machine: &mut Vm) {
+        if let Some(coverage) = &self.coverage {
+            let passages = machine.take_passages();
+            coverage.lock().unwrap_or_else(PoisonError::into_inner).add(&passages);
+        }
+    }
 }
 
 /// A test of a program.
@@ -140,6 +153,9 @@ fn begin(
     program::set_module_path(&mut machine, &setup.path)?;
     let name = Datum::string(&test.name, Default::default());
     let main = program::begin_with(&mut machine, program, "%RUN-TEST", &[name])?;
+    if setup.coverage.is_some() {
+        machine.count_passages();
+    }
     Ok((machine, main))
 }
 
@@ -156,6 +172,7 @@ pub fn run_test(program: &Program, test: &Test, seed: u64, setup: &Setup) -> Res
     let outcome = machine.run(u64::MAX);
     let ended = program::end(&mut machine, main, outcome);
     program::end_rest(&mut machine);
+    setup.note_passages(&mut machine);
     Ok(verdict(ended, || written.text()))
 }
 
@@ -172,6 +189,7 @@ fn explore(program: &Program, test: &Test, setup: &Setup) -> Result<Verdict, Err
     let found = esl_vm::explore::explore(&Settings::default(), begin, |machine, outcome| {
         let (main, captured) = present.take().expect("a machine that has run was begun");
         let ended = program::end(machine, main, outcome);
+        setup.note_passages(machine);
         verdict(ended, || captured.output() + &captured.error())
     })?;
     let failed = found.endings.into_iter().find(|ending| ending.what != Verdict::Passed);

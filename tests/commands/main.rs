@@ -7,6 +7,7 @@ mod background;
 mod bad_input;
 #[cfg(unix)]
 mod browser;
+mod coverage;
 mod deadlock;
 mod editors;
 mod examples;

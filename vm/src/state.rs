@@ -253,6 +253,7 @@ list_state! { Watch {
     figures: Process,
     journal: Process,
     traces_tasks: Process,
+    passages: Process,
 } }
 list_state! { Journal {
     is_kept: Process,

@@ -126,6 +126,7 @@ impl Printer<'_> {
                 });
                 MAKE.cl("TAGBODY", items.collect::<Vec<_>>())
             }
+            NodeKind::Pass(place) => MAKE.esl("%PASS", [Datum::integer(*place, MAKE.0)]),
             NodeKind::Go(tagbody, number) => MAKE.cl("GO", [tag(*tagbody, *number)]),
             NodeKind::Catch(tag, body) => MAKE.cl("CATCH", [at(tag), at(body)]),
             NodeKind::Throw(tag, value) => MAKE.cl("THROW", [at(tag), at(value)]),

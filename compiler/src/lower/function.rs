@@ -5,7 +5,7 @@ use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
 use esl_bytecode::module::{ModuleFunction, Parameters, PoolIdx};
 use esl_bytecode::opcode::Instr;
-use esl_bytecode::operand::{ConstIdx, Count, Reg};
+use esl_bytecode::operand::{ConstIdx, Count, PassIdx, Reg};
 
 use super::arithmetic::small_integer;
 use super::assemble::assemble;
@@ -186,6 +186,10 @@ impl<'a> FunctionBuilder<'_, 'a> {
                 self.set_slot(class, *slot, *instance, *value, dest)
             }
             NodeKind::IsInstance(class, object) => self.is_instance(class, *object, dest),
+            NodeKind::Pass(place) => {
+                self.emit(Instr::Pass { place: PassIdx(*place) });
+                self.deliver_nil(dest);
+            }
         }
     }
 

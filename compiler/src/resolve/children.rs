@@ -13,7 +13,8 @@ pub(crate) fn children(kind: &NodeKind, visit: &mut dyn FnMut(NodeId)) {
         | NodeKind::FunctionRef(_)
         | NodeKind::BuiltinRef(_)
         | NodeKind::Lambda(_)
-        | NodeKind::Go(..) => {}
+        | NodeKind::Go(..)
+        | NodeKind::Pass(_) => {}
         NodeKind::SetLocal(_, node)
         | NodeKind::SetSpecial(_, node)
         | NodeKind::Block(_, node)

@@ -1,9 +1,9 @@
 //! Compilations: from a text, or from a form, to a module.
 //!
 //! A compilation takes one top-level form after another through the reader, the expander and the lowering.
-//! Each becomes one or more chunks, small modules. Chunks that are needed at compile time are loaded at once
-//! ([`Step::Load`]), and all chunks of the program are joined at the end. All findings are reported together,
-//! in the order of the text; an error in one form does not keep the others from being checked.
+//! Each becomes one or more chunks, small modules. Chunks that are needed at compile time are loaded at
+//! once ([`Step::Load`]), and all chunks of the program are joined at the end. All findings are reported
+//! together, in the order of the text; an error in one form does not keep the others from being checked.
 //!
 //! A form `(require "name")` of a text stops the compilation ([`Step::Require`]). The forms of the module
 //! come in its place, or at least their definitions at compile time; see `queue`.
@@ -25,6 +25,7 @@ use esl_bytecode::link::join;
 use esl_bytecode::module::{Constant, Module};
 use esl_bytecode::span::{SourceId, Span};
 
+use crate::cover::{CountedPlace, cover};
 use crate::diagnostic::{Renderer, Sources, code};
 use crate::expand::print::print;
 use crate::expand::{Chunk, Expander, FailurePlace, MacroFailure, Purpose, Stop};
@@ -41,6 +42,8 @@ pub struct Compiler {
     source: SourceId,
     /// Whether modules stay outside of the program, which finds them at run time.
     apart: bool,
+    /// Whether passages of places are counted.
+    covered: bool,
 }
 
 impl Compiler {
@@ -56,6 +59,13 @@ impl Compiler {
         self
     }
 
+    /// Has texts compiled so that a machine can count how often control passes their places.
+    #[must_use]
+    pub fn covered(mut self) -> Compiler {
+        self.covered = true;
+        self
+    }
+
     /// Begins to compile a whole text for the sake of its expansion.
     pub fn expand_text(&self, name: &str, text: &str) -> Texts {
         Texts(CompilationState { listing: Some(String::new()), ..self.texts(&[(name, text)]) })
@@ -63,8 +73,8 @@ impl Compiler {
 
     /// Begins to compile texts, each with its name, to one module that runs them in order. They see each
     /// other's definitions like parts of one text, but each is read, and runs, in the package `ESL-USER`
-    /// until it says otherwise, or in `COMMON-LISP-USER` if its name ends in `.lisp`. Diagnostics number them
-    /// from the compiler's source number on.
+    /// until it says otherwise, or in `COMMON-LISP-USER` if its name ends in `.lisp`. Diagnostics number
+    /// them from the compiler's source number on.
     pub fn compile_texts(&self, texts: &[(&str, &str)]) -> Texts {
         Texts(self.texts(texts))
     }
@@ -81,7 +91,8 @@ impl Compiler {
             sources.add(name, Some(text.clone()));
             queue.add(name, lines.add(name, text.clone()), text);
         }
-        self.session(FormSource::Texts(queue), lines, sources)
+        let places = self.covered.then(Vec::new);
+        CompilationState { places, ..self.session(FormSource::Texts(queue), lines, sources) }
     }
 
     fn session(&self, input: FormSource, lines: SourceLines, sources: Sources) -> CompilationState {
@@ -101,6 +112,7 @@ impl Compiler {
             chunk_bytes: 0,
             diagnostics: Vec::new(),
             listing: None,
+            places: None,
         }
     }
 }
@@ -173,6 +185,8 @@ struct CompilationState {
     diagnostics: Vec<Diagnostic>,
     /// Expansion of the forms, if that is wanted.
     listing: Option<String>,
+    /// Places whose passages are counted, if they are.
+    places: Option<Vec<CountedPlace>>,
 }
 
 /// A chunk that is being lowered.
@@ -190,6 +204,11 @@ impl Texts {
     /// Returns the texts, those of required modules included.
     pub fn sources(&self) -> &Sources {
         &self.0.sources
+    }
+
+    /// Returns the places whose passages are counted, by their numbers.
+    pub fn places(&self) -> &[CountedPlace] {
+        self.0.places.as_deref().unwrap_or_default()
     }
 
     /// Returns the expansion so far, form by form, if the text is compiled for the sake of that.
@@ -402,12 +421,15 @@ impl CompilationState {
 
     /// Begins to lower a chunk.
     fn begin_lowering(&mut self, chunk: Chunk) {
-        let Chunk { core, mut purpose } = chunk;
+        let Chunk { mut core, mut purpose } = chunk;
         purpose.emit &= !self.is_outside();
         let span = core.nodes.first().map(|node| node.span).unwrap_or_default();
         if let (Some(listing), true) = (&mut self.listing, purpose.emit) {
             listing.push_str(&print(&core));
             listing.push_str("\n\n");
+        }
+        if let Some(places) = &mut self.places {
+            cover(&mut core, &self.lines, places);
         }
         self.lowering = Some(Box::new(ChunkLowering { lowering: Lowering::new(core), purpose, span }));
     }
@@ -505,8 +527,8 @@ impl CompilationState {
         Step::Done(module, diagnostics)
     }
 
-    /// Numbers the sources of a diagnostic from the compiler's source number on. Within the compilation they
-    /// begin at 0.
+    /// Numbers the sources of a diagnostic from the compiler's source number on. Within the compilation
+    /// they begin at 0.
     fn renumber(&self, diagnostic: &mut Diagnostic) {
         diagnostic.primary.span.source.0 += self.source.0;
         for label in &mut diagnostic.secondary {

@@ -380,6 +380,17 @@ pub(super) unsafe fn get_values(vm: &mut Vm, pc: *const u32, base: *mut Value) -
     Signal::Next
 }
 
+/// `pass`.
+#[inline(never)]
+pub(super) unsafe fn pass(vm: &mut Vm, pc: *const u32) {
+    // SAFETY: by the contract there is an instruction at `pc`.
+    let place = unsafe { word_at(pc) }.signed_e();
+    vm.watch.note_passage(usize::try_from(place & PLACES).unwrap_or_default());
+}
+
+/// The bits of the operand of `pass`.
+const PLACES: i32 = 0xFF_FFFF;
+
 /// `values-to-list`.
 #[inline(never)]
 pub(super) unsafe fn values_to_list(vm: &mut Vm, pc: *const u32, base: *mut Value) -> Signal {

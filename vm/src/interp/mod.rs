@@ -1479,6 +1479,12 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     signal => break signal,
                 },
 
+                // ---- counting
+                LoopOperation::Pass => {
+                    cold::pass(vm, pc);
+                    next!(1)
+                }
+
                 // ---- stubs
                 LoopOperation::ErrorReturn | LoopOperation::InterruptReturn => {
                     let signal = if word.number() == stubs::ERROR_RETURN {

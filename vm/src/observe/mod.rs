@@ -43,6 +43,8 @@ pub(crate) struct Watch {
     pub(crate) journal: Journal,
     /// Whether what happens to tasks is written to the stream for reports.
     pub(crate) traces_tasks: bool,
+    /// How often control has passed each place that is counted; `None` if nobody wants to know.
+    pub(crate) passages: Option<Vec<u64>>,
 }
 
 impl Watch {
@@ -52,6 +54,15 @@ impl Watch {
             || !self.observers.list.is_empty()
             || self.figures.are_wanted
             || self.journal.is_kept;
+    }
+
+    /// Counts that control passes a place, if that is wanted.
+    pub(crate) fn note_passage(&mut self, place: usize) {
+        let Some(passages) = &mut self.passages else { return };
+        if place >= passages.len() {
+            passages.resize(place + 1, 0);
+        }
+        passages[place] += 1;
     }
 
     /// Tells observers of something, if there are any.

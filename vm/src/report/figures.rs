@@ -14,6 +14,17 @@ impl Vm {
         self.watch.update_is_watched();
     }
 
+    /// Has the passages of places counted from now on, in programs that were compiled to be counted.
+    pub fn count_passages(&mut self) {
+        self.watch.passages.get_or_insert_default();
+    }
+
+    /// Returns how often control has passed each place since the last call. What has no place here was not
+    /// passed.
+    pub fn take_passages(&mut self) -> Vec<u64> {
+        self.watch.passages.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
     /// Returns how long the collector's turns took since they are timed.
     pub fn pauses(&self) -> Pauses {
         self.watch.figures.pauses
