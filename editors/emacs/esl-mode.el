@@ -1,7 +1,7 @@
 ;;; esl-mode.el --- Major mode for ESL, the Execution Support Language  -*- lexical-binding: t; -*-
 
 ;; Version: 0.1.0
-;; Package-Requires: ((emacs "29.1"))
+;; Package-Requires: ((emacs "28.1"))
 ;; Keywords: languages, lisp
 
 ;;; Commentary:
@@ -37,8 +37,18 @@
      (1 font-lock-keyword-face) (2 font-lock-function-name-face))
     ("#\\?\\(?:\\sw\\|\\s_\\)+" . font-lock-variable-name-face)))
 
+(defun esl-mode--indent-recovery (path state indent-point sexp-column normal-indent)
+  "Indent a part of a form with recovery clauses, whose bodies stand two columns in.
+The arguments are those of `common-lisp-indent-function'."
+  (if (and (eql (car path) 1) (= (length path) 3))
+      (save-excursion
+        (goto-char (elt state 1))
+        (list (+ 2 (current-column)) (point)))
+    (lisp-indent-259 '((&whole 4 &rest 1) &body) path state indent-point sexp-column normal-indent)))
+
 ;; As `eslc format' indents.
-(dolist (form '((with-recovery-procedures . 1) (with-cleanup-procedure . 1) (with-timeout . 1)
+(dolist (form '((with-recovery-procedures . esl-mode--indent-recovery)
+                (with-cleanup-procedure . 1) (with-timeout . 1)
                 (with-budget . 1) (with-quota . 1) (with-guardian . 2) (with-resource . 1)
                 (with-resources . 1) (with-maintained-property . 1) (with-maintained-properties . 1)
                 (with-world . 1) (with-query-bindings . 1) (to-achieve . 1) (whenever . 1) (do-every . 1)
@@ -65,10 +75,12 @@
       (view-mode 1)
       (display-buffer (current-buffer)))))
 
-(defvar-keymap esl-mode-map
-  :doc "Keys of `esl-mode'."
-  :parent lisp-mode-shared-map
-  "C-c C-e" #'esl-expand)
+(defvar esl-mode-map
+  (let ((map (make-sparse-keymap)))
+    (set-keymap-parent map lisp-mode-shared-map)
+    (define-key map (kbd "C-c C-e") #'esl-expand)
+    map)
+  "Keys of `esl-mode'.")
 
 ;;;###autoload
 (define-derived-mode esl-mode lisp-mode "ESL"

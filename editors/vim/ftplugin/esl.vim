@@ -24,6 +24,15 @@ let b:undo_ftplugin = "setlocal lisp< expandtab< shiftwidth< softtabstop< iskeyw
       \ . " commentstring< define< formatprg< lispwords<"
 
 " Neovim has a client of its own.
-if has("nvim-0.8") && executable("eslc")
-  lua vim.lsp.start({ name = "eslc", cmd = { "eslc", "lsp" }, root_dir = vim.fn.expand("%:p:h") })
+if has("nvim-0.7") && executable("eslc")
+lua << END
+  local server = { name = "eslc", cmd = { "eslc", "lsp" }, root_dir = vim.fn.expand("%:p:h") }
+  if vim.lsp.start then
+    vim.lsp.start(server)
+  else
+    -- Before 0.8 one server is started here, and each file given to it.
+    ESL_client = ESL_client or vim.lsp.start_client(server)
+    vim.lsp.buf_attach_client(0, ESL_client)
+  end
+END
 endif
