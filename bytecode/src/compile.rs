@@ -211,6 +211,8 @@ pub struct CompileTimeFailure {
     pub place: Option<SourcePlace>,
     /// Objects that the failure is about, the likeliest culprit last. Parts of a form keep their places.
     pub culprits: Vec<Datum>,
+    /// How a call of the macro that failed is written, such as `(when test &body body)`, if that is known.
+    pub usage: Option<String>,
 }
 
 impl From<String> for CompileTimeFailure {

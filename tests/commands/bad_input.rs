@@ -37,6 +37,16 @@ fn unbalanced_sources() {
 }
 
 #[test]
+fn wrong_uses_of_macros_show_the_right_one() {
+    check_source(
+        "told-usage",
+        "(dolist x (print x))",
+        "= help: it is written `(dolist (variable list [result]) . body)`",
+    );
+    check_source("parameters", "(when)", "= help: it is written `(when test &body body)`");
+}
+
+#[test]
 fn tokens_of_a_megabyte() {
     let size = 1 << 20;
     check_source("name", format!("(print '{})", "a".repeat(size)), "error[token-too-long]");

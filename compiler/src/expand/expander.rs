@@ -484,7 +484,11 @@ impl Expander {
         // A macro of the language fails only on a form that it cannot take.
         let diagnostic = if is_standard {
             let part = call.and_then(|call| failure.faulty_part(&call));
-            code::MALFORMED_FORM.at(part.unwrap_or(head), format!("{failed} {report}"))
+            let diagnostic = code::MALFORMED_FORM.at(part.unwrap_or(head), format!("{failed} {report}"));
+            match &failure.usage {
+                Some(usage) => diagnostic.help(format!("it is written `{usage}`")),
+                None => diagnostic,
+            }
         } else {
             let message = format!("{failed} failed while it was expanded: {report}");
             failure.located(code::MACRO_FAILED.at(head, message))

@@ -28,12 +28,14 @@ pub struct MacroFailure {
     pub place: FailurePlace,
     /// Objects that the failure is about, the likeliest culprit last.
     pub culprits: Vec<Datum>,
+    /// How a call of the macro that failed is written, if that is known.
+    pub usage: Option<String>,
 }
 
 impl From<CompileTimeFailure> for MacroFailure {
     fn from(failure: CompileTimeFailure) -> MacroFailure {
         let place = failure.place.map_or(FailurePlace::Unknown, FailurePlace::Elsewhere);
-        MacroFailure { report: failure.report, place, culprits: failure.culprits }
+        MacroFailure { report: failure.report, place, culprits: failure.culprits, usage: failure.usage }
     }
 }
 

@@ -211,7 +211,7 @@ impl FakeHost {
     /// The failure of a macro: at `failing_place`, and about the first argument.
     fn failure(&self, report: String, args: &[Datum]) -> CompileTimeFailure {
         let culprits = args.get(1).cloned().into_iter().collect();
-        CompileTimeFailure { report, place: self.failing_place.clone(), culprits }
+        CompileTimeFailure { report, place: self.failing_place.clone(), culprits, usage: None }
     }
 }
 

@@ -249,7 +249,8 @@ impl CompileTimeHost for Vm {
                 let culprits = self.culprits(condition);
                 let place = self.embedder.last_place.take();
                 let report = self.expander_text(condition).unwrap_or_else(|| error.to_string());
-                return Err(CompileTimeFailure { report, place, culprits });
+                let usage = self.usage_of(&call.function);
+                return Err(CompileTimeFailure { report, place, culprits, usage });
             }
         };
         let expansion = values.first().copied().unwrap_or(Value::NIL);
@@ -274,7 +275,7 @@ impl CompileTimeHost for Vm {
             Ok(value) => Ok(keep.then(|| self.compiler.unit.borrow_mut().pin(value))),
             Err(error) => {
                 let place = self.embedder.last_place.take();
-                Err(CompileTimeFailure { report: error.to_string(), place, culprits: Vec::new() })
+                Err(CompileTimeFailure { place, ..error.to_string().into() })
             }
         }
     }
@@ -292,6 +293,22 @@ impl Vm {
         let text = self.call(writer, &[condition], MACRO_TICKS);
         self.embedder.unpin(condition);
         self.heap.string_text(*text.ok()?.first()?)
+    }
+
+    /// Returns how a call of a global macro is written, by the library. It is not known while the library is
+    /// being built.
+    fn usage_of(&mut self, function: &MacroRef) -> Option<String> {
+        let writer = self.world.known.macro_usage;
+        let MacroRef::Global(symbol) = function else { return None };
+        if !self.world.is_defined(&self.heap, writer) {
+            return None;
+        }
+        let mut unit = self.compiler.unit.take();
+        let name = unit.symbol_object(&mut self.heap, &mut self.world, symbol);
+        self.compiler.unit.replace(unit);
+        let name = name.ok()?;
+        let usage = self.call(writer, &[name], MACRO_TICKS);
+        self.heap.string_text(*usage.ok()?.first()?)
     }
 
     /// Returns the objects that a condition is about, as data of the unit: the values of its slots, and the

@@ -60,6 +60,7 @@ define_known! {
     raise = esl "%RAISE";
     reserve = esl "%RESERVE";
     expander_text = esl "%EXPANDER-TEXT";
+    macro_usage = esl "%MACRO-USAGE";
     release_held = esl "%RELEASE-HELD";
     allow_other_keys = keyword "ALLOW-OTHER-KEYS";
     stack_exhausted = keyword "STACK-EXHAUSTED";
