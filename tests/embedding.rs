@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use esl::data::{HostType, Opaque};
-use esl::engine::{Ending, Failure, Operation, Poll};
+use esl::engine::{Call, Ending, Failure, Operation, Poll};
 use esl::host::{Host, Incoming, News, RealHost, RecordingHost, ReplayHost, SendError, VirtualHost};
 use esl::{Config, Data, Engine, Error};
 use esl_bytecode::datum::Datum;
@@ -529,6 +529,54 @@ fn senders_wait_while_an_input_is_full() {
     assert_eq!(full, Some(Err(SendError::Full("COMMANDS".into()))));
     drop(engine);
     assert_eq!(handle.signal("commands", []), Err(SendError::Ended));
+}
+
+#[test]
+fn motors_are_off_however_a_run_of_the_embedders_ends() {
+    type End = fn(Engine);
+    let ways: [(&str, End); 9] = [
+        ("dropped", drop),
+        ("deadlock", |mut engine| assert!(engine.eval("(wait-for-event (make-event))").is_err())),
+        ("failure", |mut engine| assert!(engine.eval("(fail :lost)").is_err())),
+        ("exit", |mut engine| assert!(engine.eval("(exit 3)").is_err())),
+        ("budget", |mut engine| assert!(engine.eval("(loop)").is_err())),
+        ("memory", |mut engine| assert!(engine.eval("(let ((l nil)) (loop (push (list 1 2) l)))").is_err())),
+        ("panic of a function", |mut engine| assert!(engine.eval("(crash)").is_err())),
+        ("stop", |mut engine| {
+            drop(engine.begin("(loop)"));
+            engine.handle().stop();
+            assert_eq!(engine.run(), Ending::Stopped);
+        }),
+        ("panic of the embedder", |engine| {
+            let thread = std::thread::spawn(move || {
+                let _engine = engine;
+                panic!("the embedder's code is wrong");
+            });
+            assert!(thread.join().is_err());
+        }),
+    ];
+    for (way, end) in ways {
+        let config = Config { budget: Some(3_000_000), memory: 16 << 20, ..Config::default() };
+        let mut engine = Engine::with(config, Box::new(VirtualHost::new())).expect("there is room");
+        let off: Arc<Mutex<Vec<String>>> = Arc::default();
+        let noted = off.clone();
+        let note = move |call: Call| {
+            noted.lock().expect("nobody panics with it").push(call.get::<String>("name")?);
+            Ok::<(), Failure>(())
+        };
+        engine.define("OFF", "(name)", "Switches a motor off.", note).expect("it compiles");
+        engine
+            .define("CRASH", "()", "", |_| if true { panic!("broken") } else { Ok(()) })
+            .expect("it compiles");
+        let motors = "(progn (dolist (name '(\"left\" \"right\"))
+                                (let ((name name))
+                                  (spawn (:daemon t)
+                                    (unwind-protect (wait-for-event (make-event)) (sleep 0.1) (off name)))))
+                              (sleep 1))";
+        check(&mut engine, motors, "NIL");
+        end(engine);
+        assert_eq!(*off.lock().expect("nobody panics with it"), ["right", "left"], "{way}");
+    }
 }
 
 #[test]

@@ -59,6 +59,24 @@ fn the_spacecraft_survives_its_faults() {
     assert!(safe_modes > 5 && violations > 5, "{safe_modes} safe modes, {violations} violations");
 }
 
+/// Wherever a flight is cut off, the spacecraft points at the sun in the end.
+#[test]
+fn the_spacecraft_is_left_in_order_wherever_its_budget_ends() {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/spacecraft/scripted.esl");
+    let folder = Folder::new("spacecraft-budget");
+    let program = folder.join("scripted.eslb");
+    let compiled = process::run(eslc(&["compile", "-o", &program]).arg(source), "");
+    assert_eq!(compiled.status, Some(0), "{}", compiled.errors);
+    for budget in (1000..11_000).step_by(487) {
+        let (seed, budget) = ((budget % 7).to_string(), budget.to_string());
+        let options = ["run", "--clock", "virtual", "--seed", &seed, "--budget", &budget, &program];
+        let run = process::run(&mut eslvm(&options), "");
+        assert_eq!(run.status, Some(5), "seed {seed}, budget {budget}: {}{}", run.output, run.errors);
+        let is_in_order = run.output.ends_with("pointing at SUN, no rule broken\n");
+        assert!(is_in_order, "seed {seed}, budget {budget}: {}", run.output);
+    }
+}
+
 /// Starts a simulator, which prints its port, and returns it with its output and the port.
 pub(crate) fn start_simulator(
     command: &mut Command,

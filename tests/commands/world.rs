@@ -281,6 +281,31 @@ fn two_programs_talk_by_datagrams_and_over_a_unix_socket() {
     assert_eq!((ended.status, &*ended.errors), (Some(0), ""));
 }
 
+#[test]
+fn a_server_serves_no_more_at_a_time_than_it_is_told_to() {
+    let text = "(require :sockets)
+(define-fluent *served* 0)
+(define-fluent *goes-on* nil)
+(let ((listener (sockets:listen \"127.0.0.1\" 0)) (answers 0))
+  (spawn (:daemon t)
+    (sockets::serve listener 2 (lambda (c)
+                                 (incf *served*)
+                                 (wait-until *goes-on*)
+                                 (write-line (read-line c) c))))
+  (let ((asking (loop repeat 5
+                      collect (spawn (sockets:with-socket (c (sockets:connect \"127.0.0.1\" (sockets:local-port listener)))
+                                       (write-line \"hello\" c)
+                                       (when (equal (read-line c) \"hello\") (incf answers)))))))
+    (wait-until (= *served* 2))
+    ;; Time for those that should not be served.
+    (sleep 0.05)
+    (print *served*)
+    (setq *goes-on* t)
+    (mapc #'wait-for-task asking)
+    (print (list *served* answers))))";
+    check("sockets-limit", text, &["--allow-net"], &["2", "(5 5)"]);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_thousand_connections_are_served_by_one_program() {

@@ -2,6 +2,7 @@
 
 use std::future::Future;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::pin::Pin;
 use std::sync::OnceLock;
 use std::task::{Context, Poll, Waker};
 
@@ -30,13 +31,13 @@ pub fn spawn(future: impl Future<Output = ()> + Send + 'static) -> Result<(), St
 ///
 /// # Errors
 /// As [`spawn`].
-pub(crate) fn begin(future: impl Future<Output = ()> + Send + 'static) -> Result<(), String> {
+pub(crate) fn begin(mut future: impl Future<Output = ()> + Send + Unpin + 'static) -> Result<(), String> {
     let handle = LOOP.get_or_init(start).as_ref().map_err(String::clone)?;
-    let mut future = Box::pin(future);
     let first = {
         let _inside = handle.enter();
         // Whoever it waits for is told of the event loop when that polls it.
-        catch_unwind(AssertUnwindSafe(|| future.as_mut().poll(&mut Context::from_waker(Waker::noop()))))
+        let poll = || Pin::new(&mut future).poll(&mut Context::from_waker(Waker::noop()));
+        catch_unwind(AssertUnwindSafe(poll))
     };
     if matches!(first, Ok(Poll::Pending)) {
         handle.spawn(future);

@@ -6,10 +6,13 @@
 //!
 //! A connection reads ahead at most [`CHUNK`] bytes; a peer that sends more waits.
 
+use std::cell::RefCell;
 use std::collections::{HashMap, VecDeque};
+use std::future::poll_fn;
 use std::io::{Error, ErrorKind};
+use std::pin::{Pin, pin};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::task::{Context, Waker};
+use std::task::{Context, Poll, Waker, ready};
 use std::time::Duration;
 
 use esl_bytecode::datum::Datum;
@@ -17,7 +20,7 @@ use esl_bytecode::span::Span;
 use esl_vm::embed::{HostFunction, Need};
 use esl_vm::host::{HostFailure, Right};
 use esl_vm::vm::Vm;
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt, ReadBuf};
 use tokio::net::{TcpListener, TcpSocket, TcpStream, UdpSocket};
 use tokio::sync::watch;
 
@@ -26,7 +29,7 @@ use crate::data::{CallArguments, bytes_of, failure, handle, integer, nil, text, 
 use crate::event_loop;
 #[cfg(feature = "serial")]
 use crate::operation::define;
-use crate::operation::{Completion, define_ready};
+use crate::operation::{Completion, OperationFuture, define_ready};
 
 /// Most bytes that are read at a time.
 const CHUNK: usize = 1 << 16;
@@ -97,19 +100,20 @@ pub(crate) enum SocketKind {
     Udp(Arc<UdpSocket>, Datagrams),
 }
 
-#[derive(Clone)]
 struct Socket {
     kind: SocketKind,
     port: i64,
     peer: String,
-    /// Changes when the socket is closed.
-    closing: watch::Receiver<bool>,
-    closer: Arc<watch::Sender<bool>>,
+    /// Becomes true when the socket is closed.
+    closing: Arc<watch::Sender<bool>>,
 }
+
+/// The greatest number so far, and the sockets by number.
+type SocketTable = (i64, HashMap<i64, Arc<Socket>>);
 
 /// The sockets of a machine, by number.
 #[derive(Clone, Default)]
-pub(crate) struct Sockets(Arc<Mutex<(i64, HashMap<i64, Socket>)>>);
+pub(crate) struct Sockets(Arc<Mutex<SocketTable>>);
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // What it guards is whole at every moment, so a panic elsewhere does not corrupt it.
@@ -136,11 +140,11 @@ fn socket_failure(error: &Error) -> HostFailure {
 
 impl Sockets {
     fn add(&self, kind: SocketKind, port: i64, peer: String) -> i64 {
-        let (closer, closing) = watch::channel(false);
+        let closing = Arc::new(watch::Sender::new(false));
         let mut sockets = lock(&self.0);
         sockets.0 += 1;
         let number = sockets.0;
-        sockets.1.insert(number, Socket { kind, port, peer, closing, closer: Arc::new(closer) });
+        sockets.1.insert(number, Arc::new(Socket { kind, port, peer, closing }));
         number
     }
 
@@ -150,7 +154,7 @@ impl Sockets {
         handle("SOCKET", number, move |number| known.close(number))
     }
 
-    fn get(&self, number: i64) -> Result<Socket, HostFailure> {
+    fn get(&self, number: i64) -> Result<Arc<Socket>, HostFailure> {
         lock(&self.0).1.get(&number).cloned().ok_or_else(closed)
     }
 
@@ -158,7 +162,7 @@ impl Sockets {
     pub(crate) fn set(&self, number: i64, kind: SocketKind, port: i64, peer: String) -> Completion {
         let mut sockets = lock(&self.0);
         let socket = sockets.1.get_mut(&number).ok_or_else(closed)?;
-        (socket.kind, socket.port, socket.peer) = (kind, port, peer);
+        *socket = Arc::new(Socket { kind, port, peer, closing: socket.closing.clone() });
         Ok(vec![integer(number)])
     }
 
@@ -166,15 +170,14 @@ impl Sockets {
         let socket = lock(&self.0).1.remove(&number);
         if let Some(socket) = socket {
             // Nobody may wait for it.
-            _ = socket.closer.send(true);
+            socket.closing.send_replace(true);
             if let SocketKind::Listener(_, accepted) = &socket.kind {
-                // Nobody can take them any more.
-                let untaken = std::mem::take(&mut *lock(accepted));
-                untaken.into_iter().for_each(|number| self.close(number));
+                self.close_untaken(accepted);
             }
-            if let SocketKind::Connection(connection) = socket.kind
+            if let SocketKind::Connection(connection) = &socket.kind
                 && connection.says_goodbye
             {
+                let connection = connection.clone();
                 let mut end = Box::pin(async move { connection.end().await });
                 // Mostly it is said at once, which is as well if the process ends now.
                 if end.as_mut().poll(&mut Context::from_waker(Waker::noop())).is_pending() {
@@ -183,6 +186,12 @@ impl Sockets {
                 }
             }
         }
+    }
+
+    /// Closes the connections of a listener that is closed, which nobody can take any more.
+    fn close_untaken(&self, accepted: &Mutex<VecDeque<i64>>) {
+        let untaken = std::mem::take(&mut *lock(accepted));
+        untaken.into_iter().for_each(|number| self.close(number));
     }
 }
 
@@ -200,19 +209,24 @@ impl Socket {
             _ => Err(failure("SOCKET-ERROR", "it is not a UDP socket")),
         }
     }
+}
 
-    /// Returns what a future comes to, unless the socket is closed before.
-    async fn unless_closed<T>(
-        &self,
-        future: impl Future<Output = Result<T, HostFailure>>,
-    ) -> Result<T, HostFailure> {
-        let mut closing = self.closing.clone();
-        tokio::select! {
-            biased;
-            _ = closing.wait_for(|&is_closed| is_closed) => Err(closed()),
-            result = future => result,
-        }
+/// Returns what a future comes to, unless the socket is closed before. It is not moved here, which would double
+/// the size of whoever waits.
+async fn unless_closed<T>(
+    mut closing: watch::Receiver<bool>,
+    future: Pin<&mut impl Future<Output = Result<T, HostFailure>>>,
+) -> Result<T, HostFailure> {
+    tokio::select! {
+        biased;
+        _ = closing.wait_for(|&is_closed| is_closed) => Err(closed()),
+        result = future => result,
     }
+}
+
+thread_local! {
+    /// Where what is read is put first, so that a connection that waits has no such room of its own.
+    static READ: RefCell<Vec<u8>> = RefCell::new(vec![0; CHUNK]);
 }
 
 impl Connection {
@@ -261,10 +275,15 @@ impl Connection {
         if lock(&self.arrived).is_something() {
             return Ok(());
         }
-        let mut bytes = Vec::with_capacity(CHUNK);
-        reader.read_buf(&mut bytes).await.map_err(|error| socket_failure(&error))?;
-        lock(&self.arrived).add(&bytes);
-        Ok(())
+        let read = poll_fn(|context| {
+            READ.with_borrow_mut(|bytes| {
+                let mut bytes = ReadBuf::new(bytes);
+                ready!(Pin::new(&mut *reader).poll_read(context, &mut bytes))?;
+                lock(&self.arrived).add(bytes.filled());
+                Poll::Ready(Ok(()))
+            })
+        });
+        read.await.map_err(|error| socket_failure(&error))
     }
 
     /// Tells the peer that nothing more comes.
@@ -315,15 +334,14 @@ pub(crate) fn install(machine: &mut Vm, sockets: &Sockets) {
         });
     }
     operation("%SOCKET-ACCEPT", &[], |arguments, sockets| Box::pin(accept(arguments, sockets)));
-    operation("%SOCKET-AWAIT", &[], |arguments, sockets| Box::pin(wait(arguments, sockets)));
+    operation("%SOCKET-AWAIT", &[], |arguments, sockets| wait(&arguments, &sockets));
     operation("%SOCKET-WRITE", &[], |arguments, sockets| Box::pin(write(arguments, sockets)));
     operation("%UDP-OPEN", &net, |arguments, sockets| Box::pin(open_udp(arguments, sockets)));
     operation("%UDP-SEND", &net, |arguments, sockets| Box::pin(send(arguments, sockets)));
     operation("%UDP-AWAIT", &[], |arguments, sockets| Box::pin(wait_for_datagram(arguments, sockets)));
 }
 
-type SocketFunction =
-    fn(CallArguments, Sockets) -> std::pin::Pin<Box<dyn Future<Output = Completion> + Send>>;
+type SocketFunction = fn(CallArguments, Sockets) -> OperationFuture;
 
 /// Gives a machine the functions that do not wait.
 fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
@@ -351,9 +369,9 @@ fn define_immediate(machine: &mut Vm, sockets: &Sockets) {
         let limit = usize::try_from(arguments.integer(1)?).unwrap_or(0);
         Ok(connection.take(|arrived| arrived.take_bytes(limit)))
     });
-    define("%SOCKET-ACCEPTED", |arguments, sockets| match sockets.get(arguments.number(0)?)?.kind {
+    define("%SOCKET-ACCEPTED", |arguments, sockets| match &sockets.get(arguments.number(0)?)?.kind {
         SocketKind::Listener(_, accepted) => {
-            Ok(lock(&accepted).pop_front().map_or_else(nil, |number| sockets.handle(number)))
+            Ok(lock(accepted).pop_front().map_or_else(nil, |number| sockets.handle(number)))
         }
         _ => Err(failure("SOCKET-ERROR", "it is no listener")),
     });
@@ -539,7 +557,7 @@ async fn accept(arguments: CallArguments, sockets: Sockets) -> Completion {
     if !lock(accepted).is_empty() {
         return Ok(Vec::new());
     }
-    let next = async {
+    let mut next = pin!(async {
         match &**listener {
             Listener::Tcp(listener) => {
                 let (stream, _) = listener.accept().await.map_err(|error| socket_failure(&error))?;
@@ -556,19 +574,27 @@ async fn accept(arguments: CallArguments, sockets: Sockets) -> Completion {
                 Ok((Connection::over(reader, writer), 0, String::new()))
             }
         }
-    };
-    let (kind, port, peer) = socket.unless_closed(next).await?;
+    });
+    let (kind, port, peer) = unless_closed(socket.closing.subscribe(), next.as_mut()).await?;
     let number = sockets.add(kind, port, peer);
     lock(accepted).push_back(number);
+    if *socket.closing.borrow() {
+        // The listener was closed at this moment, and may not have seen it.
+        sockets.close_untaken(accepted);
+    }
     Ok(Vec::new())
 }
 
 /// `%SOCKET-AWAIT`: waits until there is something to be taken.
-async fn wait(arguments: CallArguments, sockets: Sockets) -> Completion {
-    let socket = sockets.get(arguments.number(0)?)?;
-    let connection = socket.connection()?;
-    socket.unless_closed(connection.wait()).await?;
-    Ok(Vec::new())
+fn wait(arguments: &CallArguments, sockets: &Sockets) -> OperationFuture {
+    let socket = arguments.number(0).and_then(|number| sockets.get(number));
+    let found = socket.and_then(|socket| Ok((socket.connection()?, socket.closing.subscribe())));
+    // Of all operations most are of this kind, so it holds only what it needs.
+    Box::pin(async move {
+        let (connection, closing) = found?;
+        unless_closed(closing, pin!(connection.wait())).await?;
+        Ok(Vec::new())
+    })
 }
 
 /// `%SOCKET-WRITE`: number, text, whether its characters are bytes.
@@ -577,15 +603,15 @@ async fn write(arguments: CallArguments, sockets: Sockets) -> Completion {
     let connection = socket.connection()?;
     let text = arguments.text(1)?;
     let bytes = if arguments.is_true(2) { bytes_of(&text) } else { text.into_bytes() };
-    let write = async {
+    let mut write = pin!(async {
         let mut writer = connection.writer.lock().await;
         let written = async {
             writer.write_all(&bytes).await?;
             writer.flush().await
         };
         written.await.map_err(|error| socket_failure(&error))
-    };
-    socket.unless_closed(write).await?;
+    });
+    unless_closed(socket.closing.subscribe(), write.as_mut()).await?;
     Ok(Vec::new())
 }
 
@@ -614,7 +640,7 @@ async fn wait_for_datagram(arguments: CallArguments, sockets: Sockets) -> Comple
     }
     let mut bytes = vec![0; CHUNK];
     let receive = async { udp.recv_from(&mut bytes).await.map_err(|error| socket_failure(&error)) };
-    let (count, address) = socket.unless_closed(receive).await?;
+    let (count, address) = unless_closed(socket.closing.subscribe(), pin!(receive)).await?;
     bytes.truncate(count);
     lock(&datagrams).push_back((bytes, address.to_string()));
     Ok(Vec::new())
