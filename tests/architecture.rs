@@ -128,6 +128,23 @@ fn each_type_name_means_one_thing() {
 }
 
 #[test]
+fn the_compiler_and_the_machine_ask_a_host_for_all_that_a_browser_lacks() {
+    let lacking = ["thread", "fs", "net", "process", "env", "time", "os"].map(|name| format!("std::{name}"));
+    let host = root().join("vm/src/host");
+    for folder in ["bytecode/src", "compiler/src", "heap/src", "vm/src"] {
+        for path in product_sources(root().join(folder)) {
+            if path.starts_with(&host) {
+                continue;
+            }
+            let text = fs::read_to_string(&path).expect("a source can be read");
+            let product = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+            let used: Vec<&String> = lacking.iter().filter(|name| product.contains(*name)).collect();
+            assert!(used.is_empty(), "{} uses {used:?}", path.display());
+        }
+    }
+}
+
+#[test]
 fn each_type_in_the_glossary_exists() {
     let document = read("ARCHITECTURE.md");
     let (_, glossary) = document.split_once("## 7. Glossary").expect("there is a glossary");

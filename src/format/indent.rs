@@ -76,7 +76,7 @@ impl<'a> Indenter<'a> {
                     shapes[node as usize] = data.clone();
                 } else if *shapes[node as usize] == Indentation::Form {
                     shapes[node as usize] = Arc::new(form_shape(tree, styles, node));
-                } else if matches!(*shapes[node as usize], Indentation::Column(..))
+                } else if matches!(*shapes[node as usize], Indentation::Column(..) | Indentation::Clause(..))
                     && tree.operator(node).is_some_and(|word| word.starts_with(':'))
                 {
                     // An option such as `(:report …)`.
@@ -169,6 +169,7 @@ impl<'a> Indenter<'a> {
         match &*shape {
             _ if index == 0 => inner,
             Indentation::Form | Indentation::Data | Indentation::Column(..) => inner,
+            Indentation::Clause(..) => self.beside_key(list, index).unwrap_or(inner),
             Indentation::Parameters => self.parameter(list, index).unwrap_or(inner),
             Indentation::Call(_) => self.argument(list, index, node).unwrap_or(inner),
             Indentation::Body(heads, columns, _) if index <= heads.len() => start + columns,
@@ -179,6 +180,13 @@ impl<'a> Indenter<'a> {
             Indentation::Body(..) | Indentation::Sequence(_) => start + 2,
             Indentation::Loop => self.in_loop(list, index, node, start),
         }
+    }
+
+    /// Returns the column of a clause's second datum if it is beside the first, which is an atom.
+    fn beside_key(&mut self, list: NodeId, index: usize) -> Option<usize> {
+        let key = self.tree.data(list).next()?;
+        let is_atom = matches!(self.tree.kind(key), SyntaxKind::Leaf(_));
+        (is_atom && index > 1).then(|| self.first_argument(list)).flatten()
     }
 
     /// Returns the column of a list's first argument, if that is on the line of the operator.
@@ -194,7 +202,15 @@ impl<'a> Indenter<'a> {
     fn argument(&mut self, list: NodeId, index: usize, node: Option<NodeId>) -> Option<usize> {
         let tree = self.tree;
         let is_keyword = |node: NodeId| tree.name(node).is_some_and(|name| name.starts_with(':'));
+        // A comment stands where that stands which it is about.
+        let is_comment = node.is_some_and(|node| tree.is_comment(node));
+        let node = if is_comment { tree.data(list).nth(index) } else { node };
         if node.is_some_and(is_keyword) {
+            let mut data = tree.data(list);
+            let is_plist = data.next().is_some_and(is_keyword) && !data.next().is_some_and(is_keyword);
+            if is_plist && index % 2 == 0 {
+                return None;
+            }
             let first = tree.data(list).take(index).skip(1).find(|&before| is_keyword(before));
             if let Some(first) = first {
                 return Some(self.column(tree.range(first).start));
@@ -282,7 +298,7 @@ fn form_shape(tree: &SyntaxTree, styles: &Styles, list: NodeId) -> Indentation {
 fn element(list: &Arc<Indentation>, index: usize, form: &Arc<Indentation>) -> Arc<Indentation> {
     match &**list {
         Indentation::Data | Indentation::Parameters => list.clone(),
-        Indentation::Column(first, rest) => {
+        Indentation::Column(first, rest) | Indentation::Clause(first, rest) => {
             if index == 0 {
                 first.clone()
             } else {

@@ -16,6 +16,9 @@ pub(super) enum Indentation {
     Parameters,
     /// Elements under each other: the first, and the others.
     Column(Arc<Indentation>, Arc<Indentation>),
+    /// As [`Indentation::Column`]; but if the first is a name or a number and the second one beside it, the
+    /// others stand under the second.
+    Clause(Arc<Indentation>, Arc<Indentation>),
     /// A call: arguments under the first one, if that is on the line of the operator.
     Call(Arc<Indentation>),
     /// Elements that stand out, so many columns further in than the list, then a body.
@@ -45,6 +48,10 @@ fn column(first: Indentation, rest: Indentation) -> Indentation {
     Indentation::Column(Arc::new(first), Arc::new(rest))
 }
 
+fn keyed(first: Indentation, rest: Indentation) -> Indentation {
+    Indentation::Clause(Arc::new(first), Arc::new(rest))
+}
+
 fn each(shape: Indentation) -> Indentation {
     column(shape.clone(), shape)
 }
@@ -66,18 +73,18 @@ impl Styles {
         let clause = || body([], Form);
         let function = || body([Parameters], Form);
         let bindings = || each(sequence(Form));
-        let keys = || body([Form], column(Data, Form));
+        let keys = || body([Form], keyed(Data, Form));
         let handlers = || body([Form], function());
         let forms = |heads: usize| body(vec![Form; heads], Form);
-        let rows: [(&str, Indentation); 25] = [
+        let rows: [(&str, Indentation); 27] = [
             ("block catch eval-when unless when return-from prog1 the-environment", forms(1)),
             ("multiple-value-call multiple-value-prog1 multiple-value-setq", forms(1)),
             ("progn locally", sequence(Form)),
             ("prog2 progv", forms(2)),
             ("unwind-protect", Indentation::Body([Form].into(), 5, Arc::new(Form))),
-            ("cond", Indentation::Call(Arc::new(column(Form, Form)))),
+            ("cond", Indentation::Call(Arc::new(keyed(Form, Form)))),
             ("case ccase ecase typecase ctypecase etypecase", keys()),
-            ("handler-case restart-case", handlers()),
+            ("handler-case %handler-case restart-case", handlers()),
             ("let let* symbol-macrolet handler-bind restart-bind", body([bindings()], Form)),
             ("flet labels macrolet", body([each(function())], Form)),
             ("lambda", function()),
@@ -95,7 +102,9 @@ impl Styles {
             ("defclass define-condition", body([Data, Data], each(header()))),
             ("with-recovery-procedures", body([each(clause())], Form)),
             ("task-net or-parallel try-all pursue try-in-order", sequence(sequence(Form))),
-            ("supervise", body([header()], sequence(Form))),
+            ("spawn", body([], Form)),
+            ("with-server", body([header()], clause())),
+            ("supervise", body([header()], clause())),
             ("partial-order with-world", body([each(clause())], Form)),
             ("with-resources with-maintained-properties", body([each(header())], Form)),
         ];
@@ -139,6 +148,10 @@ impl Styles {
             }
             Some(Indentation::Sequence(_)) if is_definer => {}
             Some(shape) => _ = self.shapes.insert(name, shape),
+            // Rows of a table, which begin with what they define.
+            None if is_definer && is_rest_only(tree, lambda_list) => {
+                self.shapes.insert(name, body([], body([], Indentation::Form)));
+            }
             // It has no body: it is indented as a function is, unless more is known.
             None => {}
         }
@@ -150,9 +163,6 @@ impl Styles {
             return shape.clone();
         }
         let name = operator.trim_start_matches('%');
-        if let Some(shape) = self.shapes.get(name) {
-            return shape.clone();
-        }
         if name.starts_with("def") {
             body([], Indentation::Form)
         } else if name.starts_with("with-") {
@@ -173,6 +183,12 @@ fn declared(tree: &SyntaxTree, form: NodeId) -> Option<Indentation> {
     let specifier = tree.data(form).skip(1).find(|&item| tree.operator(item).as_deref() == Some("indent"))?;
     let heads: usize = tree.data(specifier).nth(1).map(|count| tree.text(count))?.parse().ok()?;
     (heads < 100).then(|| body(vec![Indentation::Form; heads], Indentation::Form))
+}
+
+/// Whether a lambda list has nothing but a rest parameter.
+fn is_rest_only(tree: &SyntaxTree, list: NodeId) -> bool {
+    let first = tree.data(list).next().and_then(|item| tree.name(item)).map(bare_name);
+    tree.kind(list) == SyntaxKind::List && first.as_deref() == Some("&rest")
 }
 
 /// Returns the style that a macro's lambda list implies; `None` without `&body`.

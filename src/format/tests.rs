@@ -42,6 +42,11 @@ fn bodies_are_two_columns_in_and_distinguished_arguments_four() {
 #[test]
 fn clauses_are_indented_by_their_operators() {
     check("(cond ((ready-p)\n       (go-on))\n      (t\n       (stop)))\n");
+    check("(cond ((ready-p) (go-on)\n       (rest))\n      (t (stop)\n         (rest)))\n");
+    check("(spawn (:name 'a)\n  (work)\n  (rest))\n");
+    check("(defmacro define-rows (&rest rows))\n(define-rows\n  (a (b)\n    c))\n");
+    check("(f a :b c\n     ;; D\n     :d e)\n");
+    check("(f '(:a (b)\n     :c d))\n(f (:a (b)\n    :c d))\n");
     check("(case key\n  ((a b)\n   (list a\n         b))\n  (t\n   nil))\n");
     check("(handler-case (work)\n  (error (problem)\n    (report problem)))\n");
     check("(let ((a 1)\n      (b\n        2))\n  (+ a b))\n");

@@ -81,3 +81,17 @@ fn a_new_project_runs_and_its_tests_pass() {
     assert!(readme.starts_with("# rover\n"), "{readme}");
     assert_eq!(run(&mut eslc(&["new", &project]), "").status, Some(2), "it is there already");
 }
+
+#[test]
+fn the_projects_own_files_are_formatted() {
+    // The library has tables, and the conformance programs odd forms, that are laid out by hand.
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folders = ["world/modules", "examples", "benches", "src/new/template"];
+    let folders = folders.map(|folder| root.join(folder).display().to_string());
+    let arguments: Vec<&str> = std::iter::once("--check").chain(folders.iter().map(|path| &**path)).collect();
+    let (status, output, errors) = format(&arguments, "");
+    assert_eq!(
+        status, 0,
+        "run `eslc format world/modules examples benches src/new/template`\n{output}{errors}"
+    );
+}
