@@ -1048,6 +1048,8 @@ macro_rules! for_each_builtin {
             /// The documentation string of a function, or `NIL`.
             FunctionDocumentation = symbol::function_documentation, internal "%FUNCTION-DOCUMENTATION"
                 ("function");
+            /// Where a function stands: a list of source, line and column; `NIL` if that is unknown.
+            FunctionPlace = symbol::function_place, internal "%FUNCTION-PLACE" ("function");
             /// The least and the greatest number of arguments of a function; `NIL` in place of the second
             /// without a limit.
             FunctionArity = symbol::function_arity, internal "%FUNCTION-ARITY" ("function");
@@ -1494,6 +1496,8 @@ macro_rules! for_each_builtin {
             Point = task::point, internal "%POINT" ("");
             /// Begins a critical section: no other task runs.
             BeginCritical = task::begin_critical, internal "%BEGIN-CRITICAL" ("");
+            /// Whether a critical section is open in the running task.
+            InCriticalSection = task::in_critical_section, internal "%IN-CRITICAL-SECTION" ("") -> one;
             /// Ends a critical section.
             EndCritical = task::end_critical, internal "%END-CRITICAL" ("");
         }

@@ -37,6 +37,7 @@ mod metrics;
 mod monitor;
 mod scope;
 mod secrets;
+mod slime;
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};

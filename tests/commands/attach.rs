@@ -51,7 +51,8 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
          ; 3 definitions are as before\n(3 3 NIL)\n; there is no patch to be undone\nno speed\n\
          Failure :SIMPLE-ERROR, no recovery available.\nAborted\nThe last form of {incomplete} is incomplete.\n\
          Failure :PROGRAM-ERROR, no recovery available.\nAborted\n\
-         A patch consists of DEFUN, DEFVAR, DEFPARAMETER and SETQ of a variable, not of (PRINT 1).\n\
+         A patch consists of DEFUN, DEFMACRO, DEFMETHOD, DEFGENERIC, DEFVAR, DEFPARAMETER, SETQ, DEFTYPE, \
+         DEFINE-CAUSE, DEFINE-MODIFY-MACRO, DEFINE-COMPILER-MACRO and TO-ACHIEVE, not of (PRINT 1).\n\
          Failure :PROGRAM-ERROR, no recovery available.\nAborted\n3\n(3 (3 3 NIL))\n\
          ; /no/such/file cannot be read: No such file or directory (os error 2)\n; there is no task 9999\n\
          ; `esl:abort` needs the number of a task\nhalf\nNIL\n"
@@ -72,6 +73,62 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
     let (output, status) = session(&socket, "");
     assert!(output.starts_with(&format!("eslvm: no run can be reached at {socket}")), "{output}");
     assert_eq!(status, Some(2));
+}
+
+#[test]
+fn a_patch_of_other_definitions_is_undone_as_a_whole() {
+    let folder = Folder::new("attach_patches");
+    let program = "
+        (defmacro twice (form) `(list ,form ,form))
+        (defgeneric weight (thing))
+        (defmethod weight ((thing integer)) thing)
+        (defvar *done* nil)
+        (to-achieve (donep what) (t (setq *done* (list what))))
+        (defun donep (what) (equal *done* (list what)))
+        (defun both (n) (twice n))
+        (deftype small () '(integer 0 9))
+        (read-line *standard-input* nil)";
+    let patch = folder.file(
+        "patch.esl",
+        "(progn (defmacro twice (form) `(vector ,form)) (defmacro thrice (form) `(list 3 ,form)))
+         (defun both (n) (list (twice n) (thrice n)))
+         (defmethod weight ((thing integer)) (* 2 thing))
+         (defmethod weight ((thing string)) (length thing))
+         (defmethod size (thing) (list :size thing))
+         (deftype small () '(integer 0 99))
+         (define-cause :tired ())
+         (to-achieve (donep what) (t (setq *done* (list what)) (print :patched)))",
+    );
+    let wrong = folder.file(
+        "wrong.esl",
+        "(defmacro twice (form) `(quote ,form)) (defmethod weight ((thing symbol)) 0) (defparameter *done* (car 1))",
+    );
+    let socket = folder.join("s");
+    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
+    run.said("; operators attach with eslvm attach ");
+    let look = "(list (both 1) (twice 2) (weight 4) (typep 50 'small) (fboundp 'size) (fboundp 'thrice))\n";
+    let (output, status) = session(
+        &socket,
+        &format!(
+            "{look}:patch {patch}\n{look}(list (weight \"abc\") (size 1))\n(achieve (donep 1))\n:patch {wrong}\n{look}\
+             (weight 'x)\n:undo-patch\n{look}(weight \"abc\")\n(achieve (donep 2))\n:undo-patch\n"
+        ),
+    );
+    let before = "((1 1) (2 2) 4 NIL NIL NIL)\n";
+    let after = "((#(1) (3 1)) #(2) 8 T T T)\n";
+    let lines: Vec<&str> = output.lines().collect();
+    assert_eq!(status, Some(0), "{output}");
+    assert!(
+        output.starts_with(&format!("{before}; 9 definitions are changed\n{after}(3 (:SIZE 1))\n")),
+        "{output}"
+    );
+    assert!(output.contains("\n:PATCHED"), "{output}");
+    // What fails half-way has changed nothing.
+    assert_eq!(output.matches(after).count(), 2, "{output}");
+    assert_eq!(output.matches(before).count(), 2, "{output}");
+    assert_eq!(lines.iter().filter(|line| line.contains(":NO-APPLICABLE-METHOD")).count(), 2, "{output}");
+    assert!(output.ends_with("T\n; there is no patch to be undone\n"), "{output}");
+    assert_eq!(run.end(), Some(0));
 }
 
 #[test]
@@ -154,6 +211,80 @@ fn each_role_may_do_what_its_secret_says() {
         ("esl:complete", 2),
         ("esl:patch", 2),
         ("esl:undo-patch", 2),
+        ("swank:swank-require", 0),
+        ("swank:init-presentations", 0),
+        ("swank:buffer-first-change", 0),
+        ("swank:update-indentation-information", 0),
+        ("swank-repl:redirect-trace-output", 0),
+        ("swank:clear-repl-results", 0),
+        ("swank:fuzzy-completion-selected", 0),
+        ("swank:default-directory", 0),
+        ("swank:xref", 0),
+        ("swank:xrefs", 0),
+        ("swank-repl:create-repl", 2),
+        ("swank:set-package", 2),
+        ("swank:list-all-package-names", 2),
+        ("swank-repl:listener-eval", 2),
+        ("swank-repl:clear-repl-variables", 2),
+        ("swank:interactive-eval", 2),
+        ("swank:interactive-eval-region", 2),
+        ("swank:pprint-eval", 2),
+        ("swank:eval-and-grab-output", 2),
+        ("swank:re-evaluate-defvar", 2),
+        ("swank:compile-string-for-emacs", 2),
+        ("swank:compile-file-for-emacs", 2),
+        ("swank:load-file", 2),
+        ("swank:swank-macroexpand-1", 2),
+        ("swank:swank-expand-1", 2),
+        ("swank:swank-macroexpand", 2),
+        ("swank:swank-expand", 2),
+        ("swank:simple-completions", 2),
+        ("swank:completions", 2),
+        ("swank:fuzzy-completions", 2),
+        ("swank:completions-for-keyword", 2),
+        ("swank:completions-for-character", 2),
+        ("swank:operator-arglist", 2),
+        ("swank:autodoc", 2),
+        ("swank:describe-symbol", 2),
+        ("swank:describe-function", 2),
+        ("swank:describe-definition-for-emacs", 2),
+        ("swank:documentation-symbol", 2),
+        ("swank:apropos-list-for-emacs", 2),
+        ("swank:find-definitions-for-emacs", 2),
+        ("swank:undefine-function", 2),
+        ("swank:swank-toggle-trace", 2),
+        ("swank:untrace-all", 2),
+        ("swank:list-threads", 0),
+        ("swank:quit-thread-browser", 0),
+        ("swank:kill-nth-thread", 1),
+        ("cl:mapc", 1),
+        ("swank:debug-nth-thread", 2),
+        ("swank:debugger-info-for-emacs", 2),
+        ("swank:backtrace", 2),
+        ("swank:frame-source-location", 2),
+        ("swank:frame-locals-and-catch-tags", 2),
+        ("swank:invoke-nth-restart-for-emacs", 2),
+        ("swank:sldb-abort", 2),
+        ("swank:throw-to-toplevel", 2),
+        ("swank:sldb-continue", 2),
+        ("swank:sldb-return-from-frame", 2),
+        ("swank:eval-string-in-frame", 2),
+        ("swank:pprint-eval-string-in-frame", 2),
+        ("swank:init-inspector", 2),
+        ("swank:inspect-nth-part", 2),
+        ("swank:inspector-pop", 2),
+        ("swank:inspector-next", 2),
+        ("swank:inspector-reinspect", 2),
+        ("swank:inspector-toggle-verbose", 2),
+        ("swank:inspector-range", 2),
+        ("swank:inspector-call-nth-action", 2),
+        ("swank:inspector-eval", 2),
+        ("swank:describe-inspectee", 2),
+        ("swank:pprint-inspector-part", 2),
+        ("swank:quit-inspector", 2),
+        ("swank:inspect-current-condition", 2),
+        ("swank:inspect-frame-var", 2),
+        ("swank:inspect-in-frame", 2),
     ];
     for (role, name) in ["observe", "command", "patch"].into_iter().enumerate() {
         for (request, needed) in requests {

@@ -31,6 +31,7 @@ mod recording;
 mod replay;
 mod rights;
 #[cfg(unix)]
+mod slime;
 mod streams;
 mod terminal;
 mod testing;

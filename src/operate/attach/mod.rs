@@ -7,6 +7,7 @@
 //! Guarantees: a connection over TCP says its secret before anything else is parsed; a packet is bounded
 //! before it is read; a session has a bounded number of requests under way, and they end with it.
 
+pub(super) mod datum;
 mod form;
 mod packet;
 mod request;
@@ -24,9 +25,9 @@ use esl_vm::vm::Vm;
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
 use tokio::sync::{Semaphore, mpsc};
 
+pub(super) use datum::codes_of;
 pub(crate) use form::WireForm;
 pub(crate) use packet::{read, write};
-pub(super) use session::codes_of;
 
 use super::scope::RunScope;
 use super::secrets::{OperatorRole, Secrets};
@@ -72,13 +73,17 @@ pub(super) fn serve(machine: &mut Vm, door: Entrance, scope: RunScope) -> Result
     let outputs = SessionOutputs::default();
     let told = outputs.clone();
     let tell = move |arguments: &[esl_bytecode::datum::Datum]| {
-        if let [number, text] = arguments
-            && let (DatumKind::Integer(number), DatumKind::String(text)) = (number.kind(), text.kind())
+        if let [number, said] = arguments
+            && let DatumKind::Integer(number) = number.kind()
             && let Ok(number) = u64::try_from(number.clone())
             && let Some(output) = told.table().get(&number)
         {
+            let packet = match said.kind() {
+                DatumKind::String(text) => written(text),
+                _ => datum::form_of(said),
+            };
             // Who does not read loses what is written.
-            drop(output.try_send(written(text)));
+            drop(output.try_send(packet));
         }
         Ok(esl_bytecode::datum::Datum::nil(Default::default()))
     };
@@ -104,6 +109,16 @@ fn written(text: &str) -> WireForm {
         None => text.to_string(),
     };
     WireForm::list([WireForm::symbol(":write-string"), WireForm::Text(text)])
+}
+
+/// Returns what is said in place of a form that no packet has room for.
+fn too_large(form: &WireForm) -> WireForm {
+    match form.items() {
+        Some([kind, _, number]) if kind.name().as_deref() == Some(":return") => {
+            answer(Err("the answer is too large".into()), number.clone())
+        }
+        _ => written("; what was to be told is too large\n"),
+    }
 }
 
 /// What all sessions of a run share.
@@ -171,9 +186,10 @@ async fn attend(
         None => OperatorRole::Patch,
         Some(secrets) => {
             let said = tokio::time::timeout(PATIENCE, packet::read_async(&mut reader, SECRET)).await??;
+            // SLIME sends it as it is, others as a string.
             let form = WireForm::parse(&said).ok();
-            let role =
-                form.as_ref().and_then(WireForm::as_text).and_then(|text| secrets.role_of(text.as_bytes()));
+            let text = form.as_ref().and_then(WireForm::as_text).unwrap_or(said.trim_end());
+            let role = secrets.role_of(text.as_bytes());
             let Some(role) = role else { return Err(io::ErrorKind::PermissionDenied.into()) };
             role
         }
@@ -183,13 +199,8 @@ async fn attend(
     attendance.outputs.table().insert(number, answers.clone());
     let write = tokio::spawn(async move {
         while let Some(form) = waiting.recv().await {
-            let too_large = || {
-                WireForm::list([
-                    WireForm::symbol(":write-string"),
-                    WireForm::text("; the answer is too large\n"),
-                ])
-            };
-            let packet = packet::packet(&form).or_else(|| packet::packet(&too_large())).unwrap_or_default();
+            let packet = packet::packet(&form).or_else(|| packet::packet(&too_large(&form)));
+            let packet = packet.unwrap_or_default();
             // Who takes nothing is let go.
             match tokio::time::timeout(PATIENCE, writer.write_all(&packet)).await {
                 Ok(Ok(())) => {}
@@ -235,7 +246,7 @@ async fn take_requests(
         let items = request.items().unwrap_or_default();
         match items.first().and_then(WireForm::name).as_deref() {
             Some(":emacs-rex") if items.len() >= 5 => {
-                let (form, number) = (items[1].clone(), items[4].clone());
+                let [form, package, thread, number] = [1, 2, 3, 4].map(|index| items[index].clone());
                 let Ok(permit) = room.clone().try_acquire_owned() else {
                     let refusal = answer(Err("too many requests are under way".into()), number);
                     _ = answers.send(refusal).await;
@@ -243,12 +254,19 @@ async fn take_requests(
                 };
                 let (session, answers) = (session.clone(), answers.clone());
                 tokio::spawn(async move {
-                    let result = session.perform(&form).await;
+                    let result = session.perform(&form, &package, &thread).await;
                     _ = answers.send(answer(result, number)).await;
                     drop(permit);
                 });
             }
             Some(":emacs-interrupt") => session.interrupt(),
+            Some(":emacs-return" | ":emacs-return-string") => {
+                if let [_, thread, _, WireForm::Text(text)] = items {
+                    session.typed(thread, text);
+                }
+            }
+            // Nothing here waits for these.
+            Some(":emacs-pong" | ":emacs-channel-send") => {}
             Some(":ping") => {
                 let pong = items.iter().skip(1).cloned();
                 _ = answers

@@ -4,14 +4,17 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use esl_bytecode::datum::{Datum, DatumKind};
+use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
+use esl_bytecode::symbol::Symbol;
 use esl_vm::host::{Answer, FunctionRef, Incoming, Question, Sender, SurveyRequest, SurveyedTask};
 
+use super::datum::{boolean, codes_of, form_of, integer, list, string};
 use super::form::WireForm;
 use super::request::SessionRequest;
 use crate::operate::scope::RunScope;
 use crate::operate::secrets::OperatorRole;
+use crate::operate::slime::{self, SlimeCall, SlimeStep};
 
 /// Ticks that an evaluation may use.
 const TICKS: i64 = 100_000_000;
@@ -27,12 +30,14 @@ pub(super) struct OperatorSession {
     sender: Option<Sender>,
     /// Numbers of the questions that the machine has yet to answer.
     open: Mutex<BTreeSet<u64>>,
+    /// Numbers of the tasks in the table that SLIME was given last.
+    table: Mutex<Vec<u64>>,
 }
 
 impl OperatorSession {
     pub(super) fn new(number: u64, role: OperatorRole, scope: RunScope) -> OperatorSession {
         let sender = (role >= OperatorRole::Command).then(|| scope.sender());
-        OperatorSession { number, role, scope, sender, open: Mutex::default() }
+        OperatorSession { number, role, scope, sender, open: Mutex::default(), table: Mutex::default() }
     }
 
     fn open(&self) -> MutexGuard<'_, BTreeSet<u64>> {
@@ -58,24 +63,27 @@ impl OperatorSession {
         }
     }
 
-    /// Does what a form asks for.
+    /// Does what a form asks for, in a package, about a task.
     ///
     /// # Errors
     /// Why it was not done.
-    pub(super) async fn perform(&self, form: &WireForm) -> Result<WireForm, String> {
+    pub(super) async fn perform(
+        &self,
+        form: &WireForm,
+        package: &WireForm,
+        thread: &WireForm,
+    ) -> Result<WireForm, String> {
         let items = form.items().unwrap_or_default();
         let name = items.first().and_then(WireForm::name).unwrap_or_default();
+        let arguments = items.get(1..).unwrap_or_default();
         let Some(request) = SessionRequest::named(&name) else {
-            return Err(format!("`{name}` is no request of a session"));
+            let Some((role, step)) = slime::step(&name, arguments) else {
+                return Err(format!("`{name}` is no request of a session"));
+            };
+            self.check(&name, role)?;
+            return self.take_step(step?, package, thread).await;
         };
-        if self.role < request.role() {
-            return Err(format!(
-                "`{name}` needs the role {}, and this session has {}",
-                request.role(),
-                self.role
-            ));
-        }
-        let arguments = &items[1..];
+        self.check(&name, request.role())?;
         let number = || {
             let number = arguments.first().and_then(WireForm::as_integer).and_then(|n| u64::try_from(n).ok());
             number.filter(|&number| number > 0).ok_or_else(|| format!("`{name}` needs the number of a task"))
@@ -129,17 +137,123 @@ impl OperatorSession {
         }
     }
 
+    /// Refuses a request for which the role of this session is not enough.
+    fn check(&self, name: &str, role: OperatorRole) -> Result<(), String> {
+        if self.role >= role {
+            return Ok(());
+        }
+        Err(format!("`{name}` needs the role {role}, and this session has {}", self.role))
+    }
+
+    /// Does what SLIME has asked for.
+    async fn take_step(
+        &self,
+        step: SlimeStep,
+        package: &WireForm,
+        thread: &WireForm,
+    ) -> Result<WireForm, String> {
+        match step {
+            SlimeStep::Answer(answer) => Ok(answer),
+            SlimeStep::Tasks => {
+                let survey = self.look(SurveyRequest { tasks: TASKS, ..SurveyRequest::default() }).await?;
+                *self.table() = survey.tasks.iter().map(|task| task.number).collect();
+                Ok(slime::table(&survey.tasks))
+            }
+            SlimeStep::AbortTasks(rows) => {
+                for row in rows {
+                    let number = self.task_in_row(row)?;
+                    self.task(number).await?;
+                    self.sender()?.inbox().put(Incoming::Abort(number));
+                }
+                Ok(WireForm::symbol("t"))
+            }
+            SlimeStep::Call(call) => self.call_for_slime(call, package, thread).await,
+        }
+    }
+
+    fn table(&self) -> MutexGuard<'_, Vec<u64>> {
+        // The table is whole at every moment, so a panic elsewhere does not corrupt it.
+        self.table.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn task_in_row(&self, row: usize) -> Result<u64, String> {
+        self.table().get(row).copied().ok_or_else(|| format!("there is no row {row} in the table of tasks"))
+    }
+
+    /// Calls a function of the library for SLIME. A failure is an error: what it says first.
+    async fn call_for_slime(
+        &self,
+        call: SlimeCall,
+        package: &WireForm,
+        thread: &WireForm,
+    ) -> Result<WireForm, String> {
+        let arguments = match call.task {
+            Some(row) => vec![integer(self.task_in_row(row)? as i64)],
+            None => call.arguments,
+        };
+        let arguments = vec![
+            integer(self.number as i64),
+            string(package.as_text().unwrap_or_default()),
+            slime::thread_of(thread),
+            integer(TICKS),
+            boolean(call.is_evaluation),
+            Datum::symbol(Symbol::esl(call.function), Span::default()),
+            list(arguments),
+        ];
+        let mut answer = self.call("%SLIME-REQUEST", arguments).await?;
+        if answer.name().as_deref() == Some(":left") {
+            return Err("the task has left".into());
+        }
+        if let Some([kind, WireForm::Text(report)]) = answer.items()
+            && kind.name().as_deref() == Some(":failed")
+        {
+            return Err(report.lines().next().unwrap_or_default().to_string());
+        }
+        slime::settle(&mut answer);
+        Ok(answer)
+    }
+
+    /// Hands a text to the task that has asked for it.
+    pub(super) fn typed(&self, thread: &WireForm, text: &str) {
+        if self.role >= OperatorRole::Patch
+            && let Some(sender) = &self.sender
+        {
+            let arguments = vec![integer(self.number as i64), slime::thread_of(thread), string(text)];
+            // Nobody waits for the answer.
+            drop(sender.ask(call("%SLIME-TYPED", arguments)));
+        }
+    }
+
+    /// What SLIME wants to know of the machine, and the role of who asks.
     fn description(&self) -> WireForm {
+        let plist = |rows: &[(&str, &str)]| {
+            WireForm::list(rows.iter().flat_map(|(key, text)| [WireForm::symbol(key), WireForm::text(*text)]))
+        };
+        let version = env!("CARGO_PKG_VERSION");
+        let codings = WireForm::list([WireForm::text("utf-8-unix"), WireForm::text("iso-latin-1-unix")]);
         WireForm::list([
+            WireForm::symbol(":pid"),
+            WireForm::Integer(std::process::id().into()),
+            WireForm::symbol(":style"),
+            WireForm::symbol(":spawn"),
+            WireForm::symbol(":encoding"),
+            WireForm::list([WireForm::symbol(":coding-systems"), codings]),
             WireForm::symbol(":lisp-implementation"),
-            WireForm::list([
-                WireForm::symbol(":type"),
-                WireForm::text("ESL"),
-                WireForm::symbol(":name"),
-                WireForm::text("esl"),
+            plist(&[(":type", "ESL"), (":name", "esl"), (":version", version), (":program", "eslvm")]),
+            WireForm::symbol(":machine"),
+            plist(&[
+                (":instance", "esl"),
+                (":type", std::env::consts::ARCH),
+                (":version", std::env::consts::OS),
             ]),
+            WireForm::symbol(":features"),
+            WireForm::list([WireForm::symbol(":esl")]),
+            WireForm::symbol(":modules"),
+            WireForm::nil(),
+            WireForm::symbol(":package"),
+            plist(&[(":name", "ESL-USER"), (":prompt", "ESL-USER")]),
             WireForm::symbol(":version"),
-            WireForm::text(env!("CARGO_PKG_VERSION")),
+            WireForm::text(slime::VERSION),
             WireForm::symbol(":role"),
             WireForm::text(self.role.name()),
         ])
@@ -256,67 +370,4 @@ impl OperatorSession {
 fn call(function: &str, arguments: Vec<Datum>) -> Question {
     let function = FunctionRef::Named(format!("ESL::{function}"));
     Question::Call { function, arguments, is_urgent: false }
-}
-
-/// Returns what stands for the data of a text: as `sessions.esl` says, so that their symbols are not made.
-///
-/// # Errors
-/// Why it is no data.
-pub(in crate::operate) fn codes_of(text: &str) -> Result<Datum, String> {
-    let form =
-        WireForm::parse(&format!("({text})")).map_err(|reason| format!("`{text}` is no data: {reason}"))?;
-    Ok(list(form.items().unwrap_or_default().iter().map(code_of)))
-}
-
-// The depth of a form is bounded.
-fn code_of(form: &WireForm) -> Datum {
-    match form {
-        WireForm::Integer(n) => integer(*n),
-        WireForm::Text(text) => list([integer(0), string(text)]),
-        WireForm::List(items) => list([integer(1)].into_iter().chain(items.iter().map(code_of))),
-        WireForm::Symbol(name) => match name.parse::<f64>() {
-            Ok(number) if number.is_finite() && name.contains(|c: char| c.is_ascii_digit()) => {
-                Datum::new(DatumKind::Float(number), Span::default())
-            }
-            _ => string(&name.to_uppercase()),
-        },
-    }
-}
-
-fn list(items: impl IntoIterator<Item = Datum>) -> Datum {
-    Datum::list(items.into_iter().collect::<Vec<_>>(), Span::default())
-}
-
-fn integer(n: i64) -> Datum {
-    Datum::integer(n, Span::default())
-}
-
-fn string(text: &str) -> Datum {
-    Datum::string(text, Span::default())
-}
-
-fn boolean(is_true: bool) -> Datum {
-    if is_true {
-        Datum::symbol(esl_bytecode::symbol::Symbol::cl("T"), Span::default())
-    } else {
-        Datum::nil(Span::default())
-    }
-}
-
-/// Returns a value of the library's as a form: strings, integers and symbols, and lists of them.
-fn form_of(datum: &Datum) -> WireForm {
-    let Some(items) = datum.as_list() else { return atom_of(datum) };
-    WireForm::List(items.iter().map(|item| atom_of(item)).collect())
-}
-
-fn atom_of(datum: &Datum) -> WireForm {
-    match datum.kind() {
-        DatumKind::String(text) => WireForm::text(&**text),
-        DatumKind::Symbol(symbol) if symbol.is_keyword() => {
-            WireForm::Symbol(format!(":{}", symbol.name().to_lowercase()))
-        }
-        DatumKind::Symbol(symbol) if symbol.is_cl("NIL") => WireForm::nil(),
-        DatumKind::Symbol(symbol) => WireForm::Symbol(symbol.name().to_lowercase()),
-        _ => datum.to_string().parse().map_or_else(|_| WireForm::text(datum.to_string()), WireForm::Integer),
-    }
 }

@@ -71,12 +71,18 @@ pub(super) fn begin_recovery(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn stand_in(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [index, values] = exactly(arguments);
-    let index = index.as_index().unwrap_or(usize::MAX);
     let control = &vm.scheduler.task().control;
-    let Some(handler) = control.entries.get(index) else { return Ok(Value::NIL) };
+    let handler = match index.as_index() {
+        // Nothing handles it, and somebody outside gives the values.
+        None => 0,
+        Some(index) => match control.entries.get(index) {
+            Some(handler) => handler.base,
+            None => return Ok(Value::NIL),
+        },
+    };
     // A cleanup of the library goes on to its end, and so does what it has interrupted.
     let cleanup = control.innermost_cleanup().and_then(|index| control.entries.get(index));
-    let around = cleanup.map_or(handler.base, |cleanup| cleanup.base.max(handler.base));
+    let around = cleanup.map_or(handler, |cleanup| cleanup.base.max(handler));
     let mut items = Vec::new();
     let mut rest = values;
     while let Some(pair) = vm.heap.as_cons(rest) {

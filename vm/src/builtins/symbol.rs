@@ -254,6 +254,15 @@ pub(super) fn function_documentation(vm: &mut Vm, arguments: &[Value]) -> Outcom
     Ok(texts(vm, arguments[0])?.1)
 }
 
+pub(super) fn function_place(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let Some(code) = vm.heap.function_code(arguments[0]) else {
+        return vm.exchange.type_error(arguments[0], "FUNCTION");
+    };
+    let Some(place) = vm.world.source_place(&vm.heap, code, 0) else { return Ok(Value::NIL) };
+    let source = vm.heap.alloc_str(&place.source)?;
+    Ok(vm.heap.list(&[source, Value::index(place.line as usize), Value::index(place.column as usize)])?)
+}
+
 /// Returns the lambda list and the documentation of a function.
 fn texts(vm: &mut Vm, function: Value) -> Result<(Value, Value), Exit> {
     let texts = vm.world.texts_of_function(&mut vm.heap, function);

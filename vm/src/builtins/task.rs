@@ -363,6 +363,10 @@ pub(super) fn point(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     Ok(Value::NIL)
 }
 
+pub(super) fn in_critical_section(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
+    Ok(Value::boolean(vm.scheduler.task().critical > 0))
+}
+
 pub(super) fn begin_critical(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
     let ticks = i64::from(vm.config.critical_ticks);
