@@ -11,6 +11,7 @@
 //! | [`equality`] | `eq`, `eql`, `equal`, `equalp`, and hashes that agree with them |
 //! | [`table`] | hash tables that keep the order of insertion |
 //! | [`state`] | the list of all state, and the macro that makes it |
+//! | [`allocator`] | a setting of the C library's allocator, for commands |
 //! | [`character`] | case, classes and names of characters |
 //!
 //! Guarantees: safe code cannot break memory safety through this crate, however odd the caller, once the two
@@ -19,6 +20,7 @@
 //!
 //! Not here: roots, the time at which to collect, and everything that a program does with its data.
 
+pub mod allocator;
 pub mod array;
 pub mod character;
 pub mod equality;

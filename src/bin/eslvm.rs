@@ -288,6 +288,7 @@ fn raise_limit_of_descriptors() {
 fn main() -> ExitCode {
     #[cfg(unix)]
     raise_limit_of_descriptors();
+    esl_vm::allocator::return_large_blocks();
     let Eslvm { action, library } = Eslvm::parse();
     let status = match action {
         EslvmAction::Run {

@@ -34,10 +34,10 @@ fn peak_of(child: &Child) -> Option<usize> {
 }
 
 /// Runs a program. Returns its exit status, and its most resident memory in mebibytes.
-fn run(folder: &Path, name: &str, text: &str, options: &[&str]) -> (Option<i32>, usize) {
+fn run(folder: &Path, name: &str, text: &str, limit: usize, options: &[&str]) -> (Option<i32>, usize) {
     let path = folder.join(format!("{}.esl", name.replace(' ', "-")));
     std::fs::write(&path, text).expect("the program can be written");
-    let memory = format!("{LIMIT}M");
+    let memory = format!("{limit}M");
     let mut command = eslvm(&["run", "--clock", "virtual", "--memory", &memory]);
     command.args(options).arg(&path);
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
@@ -75,7 +75,7 @@ fn run_all(
     let work = || {
         let mut faults = Vec::new();
         while let Some((name, text)) = programs.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let (status, peak) = run(folder.path(), name, text, options);
+            let (status, peak) = run(folder.path(), name, text, LIMIT, options);
             if std::env::var_os("ESL_SHOW_PEAKS").is_some() {
                 eprintln!("{name:45} {peak:4} MiB, status {status:?}");
             }
@@ -115,4 +115,13 @@ fn what_is_given_back_is_used_again() {
         (!matches!(status, Some(0) | None)).then(|| "it failed".into())
     });
     assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+#[test]
+fn stacks_that_grow_side_by_side_leave_no_holes() {
+    let text = "(dotimes (i 100) (spawn (labels ((down (n) (1+ (down (1+ n))))) (down 0))))\n(sleep 1)";
+    let folder = super::folder::Folder::new("stacks");
+    let (status, peak) = run(folder.path(), "stacks", text, 64, &["--budget", "10000000"]);
+    assert!(peak <= 64 + SLACK, "{peak} MiB at most");
+    assert!(matches!(status, Some(0 | 1 | 5) | None), "{status:?}");
 }
