@@ -1386,8 +1386,9 @@ macro_rules! for_each_builtin {
             /// A wait that keeps all signals of `events` until it is closed, and lasts for `seconds` if they
             /// are not `NIL`; `NIL` if `count` is not `NIL` and no longer the sum of their counts.
             OpenWait = event::open_wait, internal "%OPEN-WAIT" ("events seconds count what");
-            /// Waits for a signal that a wait has kept: the list of its arguments, or `:timeout`.
-            TakeSignal = event::take_signal, internal "%TAKE-SIGNAL" ("wait");
+            /// Waits for a signal that a wait has kept: the list of its arguments, or `:timeout`; at the latest
+            /// until a time in nanoseconds, if one is given.
+            TakeSignal = event::take_signal, internal "%TAKE-SIGNAL" ("wait &optional deadline");
             /// Ends a wait.
             CloseWait = event::close_wait, internal "%CLOSE-WAIT" ("wait");
             /// The input that the outside knows by a name, a symbol or string: a new one, or one that is
@@ -1409,6 +1410,28 @@ macro_rules! for_each_builtin {
             Choose = event::choose, internal "%CHOOSE" ("count");
             /// Lets other tasks have their turns.
             PassTurn = event::pass_turn, internal "%PASS-TURN" ("");
+
+            // ---- fluents and resources
+            /// Sets the value of a fluent, and signals its event unless the value is `EQUAL` to the one before.
+            SetFluent = coordination::set_fluent, internal "%SET-FLUENT" ("fluent value")
+                slowly "%SLOW-SET-FLUENT";
+            /// A new record of what this task reads, for a watch or `NIL`.
+            NewReads = coordination::new_reads, internal "%NEW-READS" ("watch");
+            /// Notes that a source is read, with the count of its event; whether it was not noted yet.
+            NoteSource = coordination::note_read, internal "%NOTE-SOURCE" ("source reads");
+            /// The value of a fluent, of which it is noted that it is read if the reads are those of this task.
+            NotedValue = coordination::noted_value, internal "%NOTED-VALUE" ("fluent reads")
+                slowly "%SLOW-NOTED-VALUE";
+            /// Waits for the next signal of what a form has read, or of any event if that is nothing or too
+            /// much; returns at once if there was one since it was read. `what` is for reports.
+            WaitForReads = coordination::wait_for_reads, internal "%WAIT-FOR-READS" ("reads what");
+            /// Grants a request, for a claim of one resource alone, if nobody waits for that and there is
+            /// enough. Whether it has.
+            GrantAtOnce = coordination::grant_at_once, internal "%GRANT-AT-ONCE" ("request claim resource");
+            /// Takes from a request what it holds, a claim of one resource alone, if nobody waits for that.
+            /// Whether the request holds nothing now.
+            GiveBackAtOnce = coordination::give_back_at_once, internal "%GIVE-BACK-AT-ONCE"
+                ("request claim resource");
 
             // ---- tasks
             /// A new task that calls a function. `daemon` may be `:internal` for one that is not listed, or
@@ -1492,8 +1515,6 @@ macro_rules! for_each_builtin {
             IsOverQuota = task::is_over_quota, internal "%IS-OVER-QUOTA" ("task");
             /// Makes the limit for `tag` of `task` expire with `cause`, a keyword, unless it is closed.
             ExpireLimit = task::expire_limit, internal "%EXPIRE-LIMIT" ("task tag cause");
-            /// Lets other tasks go first while schedules are explored, before a change that they can see.
-            Point = task::point, internal "%POINT" ("");
             /// Begins a critical section: no other task runs.
             BeginCritical = task::begin_critical, internal "%BEGIN-CRITICAL" ("");
             /// Whether a critical section is open in the running task.

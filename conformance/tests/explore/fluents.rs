@@ -60,3 +60,14 @@ fn an_abort_at_any_point_leaves_no_source() {
         &["(NIL 0)"],
     );
 }
+
+#[test]
+fn a_change_may_come_between_reading_a_fluent_and_setting_it() {
+    check(
+        "(define-fluent count 0)
+         (task-net (a (setf count (+ count 1))) (b (setf count (+ count 1))))
+         (princ count)",
+        Grain::Changes,
+        &["1", "2"],
+    );
+}

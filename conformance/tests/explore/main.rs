@@ -2,6 +2,7 @@
 
 mod composition;
 mod defects;
+mod everywhere;
 mod fluents;
 mod keeping;
 mod putting_back;

@@ -80,3 +80,27 @@ fn preemption_abort_and_request_come_in_any_order() {
         &["(2 2)"],
     );
 }
+
+#[test]
+fn two_requests_that_preempt_and_an_abort_come_in_any_order() {
+    // Who is aborted wants something, holds it, or has been preempted.
+    check_resources(
+        "(define-resource seat :capacity 2)
+         (defvar *inside* 0)
+         (defun sit (priority)
+           (handler-case
+               (with-resource (seat :priority priority :preemptible t)
+                 (incf *inside*)
+                 (when (> *inside* 2) (print 'too-many))
+                 (unwind-protect (go-on)
+                   (decf *inside*)))
+             (failure () nil)))
+         (let ((tasks (list (spawn (sit 1)) (spawn (sit 5)) (spawn (sit 5)))))
+           (abort-task (second tasks))
+           (dolist (task tasks) (wait-for-task task))
+           (let ((seat (get 'seat 'esl::%resource)))
+             (print (list *inside* (resource-holders 'seat) (resource-waiters 'seat) (svref seat 7) (svref seat 8)
+                          (svref (svref seat 11) 8) (svref (svref seat 12) 8) (reduce #'+ (svref seat 13))))))",
+        &["(0 NIL NIL 0 0 0 0 0)"],
+    );
+}

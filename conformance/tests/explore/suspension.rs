@@ -132,3 +132,45 @@ fn a_task_that_waits_goes_on_where_it_was() {
         &["(ENDED 1 0)"],
     );
 }
+
+#[test]
+fn nothing_is_left_when_those_are_aborted_who_suspend_and_are_suspended() {
+    // The abort of either comes before the other's, after the note of the suspension, or later.
+    check_suspension(
+        "(let* ((task (spawn (go-on)))
+                (operator (spawn (suspend-task task))))
+           (spawn (abort-task operator))
+           (abort-task task)
+           (loop (unless (cdr (list-tasks)) (return)) (sleep 1))
+           (princ (left)))",
+        &["0"],
+    );
+}
+
+#[test]
+fn a_task_that_was_resumed_before_it_stood_still_can_be_suspended_again() {
+    check_suspension(
+        "(let* ((task (spawn (go-on)))
+                (operator (spawn (suspend-task task) (resume-task task))))
+           (abort-task operator)
+           ;; The operator may not have come to resume it.
+           (suspend-task task)
+           (resume-task task)
+           (resume-task task)
+           (wait-for-task task)
+           (princ (left)))",
+        &["0"],
+    );
+}
+
+#[test]
+fn a_task_that_suspends_itself_is_aborted_wherever_it_is() {
+    check_suspension(
+        "(let* ((count 0)
+                (task (spawn (spawn (go-on) (incf count)) (suspend-task (current-task)))))
+           (abort-task task)
+           (loop (unless (cdr (list-tasks)) (return)) (sleep 1))
+           (princ (list count (left))))",
+        &["(0 0)", "(1 0)"],
+    );
+}

@@ -13,7 +13,7 @@ use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{WaitOptions, event, input, link};
 
-use super::expect::exactly;
+use super::expect::{exactly, optional};
 
 /// The latest time, in nanoseconds: far beyond the life of a machine, and a fixnum.
 const LATEST: u64 = 1 << 60;
@@ -334,7 +334,8 @@ pub(super) fn take_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     }
     // A signal that is on its way comes before a timeout.
     vm.scheduler.wait_for_deliveries()?;
-    match link::deadline(&vm.heap, wait) {
+    let latest = optional(arguments, 1).as_fixnum().map(|time| time.max(0) as u64);
+    match latest.or_else(|| link::deadline(&vm.heap, wait)) {
         Some(deadline) if time_of_task(vm) >= deadline => Ok(vm.world.known.timeout),
         deadline => {
             let deadline = deadline.map(|time| vm.scheduler.task().when(time));

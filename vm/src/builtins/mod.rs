@@ -57,6 +57,7 @@ pub(crate) mod array;
 mod call;
 mod character;
 mod class;
+mod coordination;
 mod database;
 mod define;
 mod equality;

@@ -1,5 +1,7 @@
 //! Suspension of trees of tasks: finding their members, and those that stand still where they wait.
 
+use smallvec::SmallVec;
+
 use crate::builtins::LIMIT;
 use crate::builtins::expect::exactly;
 use crate::builtins::task::expect_task;
@@ -23,7 +25,7 @@ fn index_argument(vm: &mut Vm, v: Value) -> Result<usize, Exit> {
 /// `depths` is a vector of those that are known, by the places of the tasks. Adds the number of steps to
 /// `work`.
 fn depth_of(vm: &mut Vm, root: usize, place: usize, depths: Value, work: &mut usize) -> usize {
-    let mut path = Vec::new();
+    let mut path: SmallVec<[usize; 16]> = SmallVec::new();
     let mut at = place;
     let mut depth = loop {
         if at == root {

@@ -358,11 +358,6 @@ pub(super) fn expire_limit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(Value::NIL)
 }
 
-pub(super) fn point(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
-    vm.scheduler.point()?;
-    Ok(Value::NIL)
-}
-
 pub(super) fn in_critical_section(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
     Ok(Value::boolean(vm.scheduler.task().critical > 0))
 }

@@ -77,9 +77,11 @@ define_known! {
     restarts = esl "*RESTARTS*";
     recoveries = esl "*RECOVERIES*";
     suspension_procedures = esl "*%SUSPENSION-PROCEDURES*";
+    watches = esl "*%WATCHES*";
     task_end = keyword "TASK-END";
     succeeded = keyword "SUCCEEDED";
     failed = keyword "FAILED";
+    granted = keyword "GRANTED";
     pending = keyword "PENDING";
     completed = keyword "COMPLETED";
     cancelled = keyword "CANCELLED";
