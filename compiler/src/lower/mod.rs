@@ -87,7 +87,7 @@ pub struct Lowering {
 /// What a [`Lowering`] does next.
 enum LoweringStage {
     Begin,
-    Divide(Box<split::Division>),
+    Divide(Box<split::FunctionDivision>),
     Inline(Box<InlineDecision>),
     Resolve(Box<ResolveWalk>),
     Functions(Box<SuspendedBuilder>, Vec<ModuleFunction>),
@@ -108,7 +108,7 @@ impl Lowering {
 
     /// Has functions divided next.
     fn divide(&mut self, lambdas: Vec<LambdaId>, limits: split::Limits) {
-        let division = split::Division::new(&self.core, lambdas, limits);
+        let division = split::FunctionDivision::new(&self.core, lambdas, limits);
         self.stage = LoweringStage::Divide(Box::new(division));
     }
 

@@ -60,7 +60,7 @@ pub(super) fn larger_than(core: &Core, limit: usize) -> Vec<LambdaId> {
 }
 
 /// The division of the texts of functions. It is done in parts; each is given the same form.
-pub(super) struct Division {
+pub(super) struct FunctionDivision {
     limits: Limits,
     variables: GatheredVariables,
     /// Roots that are still to be divided, and the lambdas that they belong to.
@@ -84,12 +84,20 @@ struct CurrentRoot {
     opened: usize,
 }
 
-impl Division {
+impl FunctionDivision {
     /// Begins to divide the texts of `lambdas`.
-    pub(super) fn new(core: &Core, lambdas: Vec<LambdaId>, limits: Limits) -> Division {
+    pub(super) fn new(core: &Core, lambdas: Vec<LambdaId>, limits: Limits) -> FunctionDivision {
         let variables = GatheredVariables::new(core, &lambdas, limits.bindings);
         let roots = Vec::new();
-        Division { limits, variables, roots, lambdas, current: None, sizes: Vec::new(), unsettled: None }
+        FunctionDivision {
+            limits,
+            variables,
+            roots,
+            lambdas,
+            current: None,
+            sizes: Vec::new(),
+            unsettled: None,
+        }
     }
 
     /// Goes on. Returns whether all is done; otherwise the work that is allowed is done.
@@ -129,7 +137,7 @@ impl Division {
 /// Divides the texts of `lambdas`.
 #[cfg(test)]
 pub(super) fn split(core: &mut Core, lambdas: &[LambdaId], limits: Limits) {
-    Division::new(core, lambdas.to_vec(), limits).run(core, &mut Work::unbounded());
+    FunctionDivision::new(core, lambdas.to_vec(), limits).run(core, &mut Work::unbounded());
 }
 
 /// Nodes that count as a unit of work.
