@@ -117,11 +117,13 @@ fn listen(operation: &HostOperation) -> oneshot::Receiver<()> {
 }
 
 /// How the future of an operation is run.
-type Run = fn(UnderWay) -> Result<(), String>;
+type OperationBody = fn(UnderWay) -> Result<(), String>;
 
 fn add<F>(machine: &mut Vm, name: &str, needs: &[Need], mut function: F)
 where
-    F: FnMut(&HostOperation) -> (OperationFuture, Option<oneshot::Receiver<()>>, Run) + Send + 'static,
+    F: FnMut(&HostOperation) -> (OperationFuture, Option<oneshot::Receiver<()>>, OperationBody)
+        + Send
+        + 'static,
 {
     let begin = move |operation: HostOperation| {
         let (future, cancelled, run) = function(&operation);
