@@ -39,18 +39,18 @@ fn start(folder: &Folder) -> (Operated, String) {
 }
 
 /// A client that knows the protocol, and nothing else.
-struct Client {
+struct SlimeClient {
     stream: TcpStream,
     asked: usize,
     /// What was said that nobody has waited for.
     heard: Vec<String>,
 }
 
-impl Client {
-    fn connect(address: &str) -> Client {
+impl SlimeClient {
+    fn connect(address: &str) -> SlimeClient {
         let stream = TcpStream::connect(address).expect("the run listens");
         stream.set_read_timeout(Some(PATIENCE)).expect("it can be set");
-        let mut client = Client { stream, asked: 0, heard: Vec::new() };
+        let mut client = SlimeClient { stream, asked: 0, heard: Vec::new() };
         client.send(&format!("\"{SECRET}\""));
         client
     }
@@ -119,7 +119,7 @@ impl Client {
 fn a_client_evaluates_looks_up_and_compiles() {
     let folder = Folder::new("slime_client");
     let (run, address) = start(&folder);
-    let mut client = Client::connect(&address);
+    let mut client = SlimeClient::connect(&address);
     let info = client.ask("(swank:connection-info)");
     assert!(info.starts_with("(:ok (:pid ") && info.contains(":version \"2.27\""), "{info}");
     for (form, answer) in [
@@ -218,7 +218,7 @@ fn a_client_evaluates_looks_up_and_compiles() {
 fn a_failure_waits_for_who_debugs_it() {
     let folder = Folder::new("slime_debugger");
     let (run, address) = start(&folder);
-    let mut client = Client::connect(&address);
+    let mut client = SlimeClient::connect(&address);
     client.ask("(swank-repl:create-repl nil)");
     // A task of the program fails: it stands there, with nothing unwound, until there is an answer.
     client.ask("(swank:interactive-eval \"(signal *go*)\")");
@@ -274,7 +274,7 @@ fn a_failure_waits_for_who_debugs_it() {
     client.ask("(swank:interactive-eval \"(signal *go*)\")");
     client.wait("(:debug ");
     drop(client);
-    let mut other = Client::connect(&address);
+    let mut other = SlimeClient::connect(&address);
     other.wait_for_end_of("worker");
     drop(other);
     let finished = run.finish();
