@@ -208,7 +208,7 @@ impl<'a> Indenter<'a> {
         if node.is_some_and(is_keyword) {
             let mut data = tree.data(list);
             let is_plist = data.next().is_some_and(is_keyword) && !data.next().is_some_and(is_keyword);
-            if is_plist && index % 2 == 0 {
+            if is_plist && index.is_multiple_of(2) {
                 return None;
             }
             let first = tree.data(list).take(index).skip(1).find(|&before| is_keyword(before));
