@@ -377,6 +377,34 @@ fn a_peer_that_closes_half_way_can_be_answered() {
 }
 
 #[test]
+fn of_many_who_wait_for_a_connection_none_is_forgotten() {
+    // Some are left, the others are told when something comes, and when the connection is closed.
+    let text = "(require :sockets)
+(defvar *told* 0)
+(defvar *closed* 0)
+(let ((listener (sockets:listen \"127.0.0.1\" 0)))
+  (sockets:with-socket (connection (sockets:connect \"127.0.0.1\" (sockets:local-port listener)))
+    (let ((peer (sockets:accept listener)) (number (sockets::number-of connection)))
+      (flet ((wait-many ()
+               (let ((waiting (loop repeat 200 collect (start (sockets::%socket-await number)))))
+                 (sleep 0.01)
+                 (loop for handle in waiting for i from 0 when (evenp i) do (cancel handle))
+                 waiting)))
+        (let ((waiting (wait-many)))
+          (write-line \"one\" peer)
+          (finish-output peer)
+          (loop for handle in (rest waiting) by #'cddr do (operation-result handle) (incf *told*)))
+        (print (list *told* (read-line connection)))
+        (let ((waiting (wait-many)))
+          (close connection)
+          (loop for handle in (rest waiting) by #'cddr
+                do (handler-case (operation-result handle)
+                     (failure (f) (when (eq (failure-cause f) :socket-closed) (incf *closed*)))))))
+      (print *closed*))))";
+    check("sockets-many-wait", text, &["--allow-net"], &["(100 \"one\")", "100"]);
+}
+
+#[test]
 fn connections_that_nobody_takes_end_with_their_listener() {
     let text = "(require :sockets)
 (let ((listener (sockets:listen \"127.0.0.1\" 0)))

@@ -7,12 +7,13 @@
 //! A connection reads ahead at most [`CHUNK`] bytes; a peer that sends more waits.
 
 use std::cell::RefCell;
-use std::collections::{HashMap, VecDeque};
-use std::future::poll_fn;
+use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::future::ready as ready_future;
 use std::io::{Error, ErrorKind};
 use std::pin::{Pin, pin};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::task::{Context, Poll, Waker, ready};
+use std::task::{Context, Poll, Wake, Waker, ready};
 use std::time::Duration;
 
 use esl_bytecode::datum::Datum;
@@ -50,7 +51,9 @@ type SocketWriter = Box<dyn AsyncWrite + Send + Unpin>;
 
 /// A connection.
 pub(crate) struct Connection {
-    reader: tokio::sync::Mutex<SocketReader>,
+    reader: Mutex<SocketReader>,
+    waiting: Arc<Waiting>,
+    is_closed: AtomicBool,
     writer: tokio::sync::Mutex<SocketWriter>,
     arrived: Mutex<Arrived>,
     /// Whether the peer is to be told that nothing more comes, beside by the end of the connection.
@@ -174,6 +177,10 @@ impl Sockets {
             if let SocketKind::Listener(_, accepted) = &socket.kind {
                 self.close_untaken(accepted);
             }
+            if let SocketKind::Connection(connection) = &socket.kind {
+                connection.is_closed.store(true, Ordering::SeqCst);
+                connection.waiting.wake_all();
+            }
             if let SocketKind::Connection(connection) = &socket.kind
                 && connection.says_goodbye
             {
@@ -229,6 +236,78 @@ thread_local! {
     static READ: RefCell<Vec<u8>> = RefCell::new(vec![0; CHUNK]);
 }
 
+/// Those who wait for a connection, in the order in which they came, and the greatest of their numbers.
+#[derive(Default)]
+struct Waiting(Mutex<(u64, BTreeMap<u64, Waker>)>);
+
+impl Waiting {
+    /// Notes who waits, and returns the number, which is the one given if there is one.
+    fn note(&self, number: Option<u64>, waker: &Waker) -> u64 {
+        let mut waiting = lock(&self.0);
+        let number = number.unwrap_or(waiting.0 + 1);
+        waiting.0 = waiting.0.max(number);
+        let before = waiting.1.insert(number, waker.clone());
+        // With a waker its task may end, which has waited here: no lock may be held then.
+        drop(waiting);
+        drop(before);
+        number
+    }
+
+    fn forget(&self, number: u64) {
+        let before = lock(&self.0).1.remove(&number);
+        drop(before);
+    }
+
+    fn wake_all(&self) {
+        let all = std::mem::take(&mut lock(&self.0).1);
+        all.into_values().for_each(Waker::wake);
+    }
+}
+
+impl Wake for Waiting {
+    fn wake(self: Arc<Waiting>) {
+        self.wake_all();
+    }
+}
+
+/// Waits until something has arrived at a connection, or it has ended. Of all operations most are of this kind,
+/// so it is small, and needs no more than a place in a table.
+struct Arrival {
+    connection: Arc<Connection>,
+    number: Option<u64>,
+}
+
+impl Future for Arrival {
+    type Output = Completion;
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Completion> {
+        let connection = self.connection.clone();
+        // Before anything is asked, so that nothing is missed. One who begins is polled again, with a waker.
+        if !context.waker().will_wake(Waker::noop()) {
+            self.number = Some(connection.waiting.note(self.number, context.waker()));
+        }
+        if connection.is_closed.load(Ordering::SeqCst) {
+            return Poll::Ready(Err(closed()));
+        }
+        if lock(&connection.arrived).is_something() {
+            return Poll::Ready(Ok(Vec::new()));
+        }
+        // The system tells one only, who tells the others.
+        let waker = Waker::from(connection.waiting.clone());
+        let arrival = ready!(connection.poll_arrival(&mut Context::from_waker(&waker)));
+        connection.waiting.wake_all();
+        Poll::Ready(arrival.map(|()| Vec::new()).map_err(|error| socket_failure(&error)))
+    }
+}
+
+impl Drop for Arrival {
+    fn drop(&mut self) {
+        if let Some(number) = self.number {
+            self.connection.waiting.forget(number);
+        }
+    }
+}
+
 impl Connection {
     /// Returns a connection that is read from one side and written to the other.
     pub(crate) fn over(
@@ -236,7 +315,9 @@ impl Connection {
         writer: impl AsyncWrite + Send + Unpin + 'static,
     ) -> SocketKind {
         SocketKind::Connection(Arc::new(Connection {
-            reader: tokio::sync::Mutex::new(Box::new(reader)),
+            reader: Mutex::new(Box::new(reader)),
+            waiting: Arc::default(),
+            is_closed: AtomicBool::new(false),
             writer: tokio::sync::Mutex::new(Box::new(writer)),
             arrived: Mutex::default(),
             says_goodbye: false,
@@ -248,7 +329,9 @@ impl Connection {
     fn secured(stream: impl AsyncRead + AsyncWrite + Send + 'static) -> SocketKind {
         let (reader, writer) = tokio::io::split(stream);
         SocketKind::Connection(Arc::new(Connection {
-            reader: tokio::sync::Mutex::new(Box::new(reader)),
+            reader: Mutex::new(Box::new(reader)),
+            waiting: Arc::default(),
+            is_closed: AtomicBool::new(false),
             writer: tokio::sync::Mutex::new(Box::new(writer)),
             arrived: Mutex::default(),
             says_goodbye: true,
@@ -269,21 +352,14 @@ impl Connection {
         (port, stream.peer_addr().map_or(String::new(), |address| address.to_string()))
     }
 
-    /// Waits until something has arrived, or the connection has ended.
-    async fn wait(&self) -> Result<(), HostFailure> {
-        let mut reader = self.reader.lock().await;
-        if lock(&self.arrived).is_something() {
-            return Ok(());
-        }
-        let read = poll_fn(|context| {
-            READ.with_borrow_mut(|bytes| {
-                let mut bytes = ReadBuf::new(bytes);
-                ready!(Pin::new(&mut *reader).poll_read(context, &mut bytes))?;
-                lock(&self.arrived).add(bytes.filled());
-                Poll::Ready(Ok(()))
-            })
-        });
-        read.await.map_err(|error| socket_failure(&error))
+    /// Reads what has arrived, or notes that the connection has ended. Of those who wait all are woken.
+    fn poll_arrival(&self, context: &mut Context<'_>) -> Poll<Result<(), Error>> {
+        READ.with_borrow_mut(|bytes| {
+            let mut bytes = ReadBuf::new(bytes);
+            ready!(Pin::new(&mut **lock(&self.reader)).poll_read(context, &mut bytes))?;
+            lock(&self.arrived).add(bytes.filled());
+            Poll::Ready(Ok(()))
+        })
     }
 
     /// Tells the peer that nothing more comes.
@@ -588,13 +664,10 @@ async fn accept(arguments: CallArguments, sockets: Sockets) -> Completion {
 /// `%SOCKET-AWAIT`: waits until there is something to be taken.
 fn wait(arguments: &CallArguments, sockets: &Sockets) -> OperationFuture {
     let socket = arguments.number(0).and_then(|number| sockets.get(number));
-    let found = socket.and_then(|socket| Ok((socket.connection()?, socket.closing.subscribe())));
-    // Of all operations most are of this kind, so it holds only what it needs.
-    Box::pin(async move {
-        let (connection, closing) = found?;
-        unless_closed(closing, pin!(connection.wait())).await?;
-        Ok(Vec::new())
-    })
+    match socket.and_then(|socket| socket.connection()) {
+        Ok(connection) => Box::pin(Arrival { connection, number: None }),
+        Err(failure) => Box::pin(ready_future(Err(failure))),
+    }
 }
 
 /// `%SOCKET-WRITE`: number, text, whether its characters are bytes.
