@@ -1,10 +1,11 @@
-//! Benchmarks of the machine: the interpreter, the collector, and start-up.
+//! Benchmarks of the machine: the interpreter, the collector, start-up, and exploration.
 #![allow(missing_docs, reason = "criterion's macros create undocumented functions")]
 
 use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
+use esl::explore::{Settings, explore};
 use esl::host::VirtualHost;
 use esl::program::{self, Program, Source};
 use esl::{Config, Engine};
@@ -158,5 +159,41 @@ fn startup(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, interpreter, collector, startup);
+/// Two tasks that want different values of a property, and a change from outside: the case model-checked in
+/// 1997.
+const TWO_TASKS: &str = "
+  (define-property power (device))
+  (to-achieve (power device value)
+    (t (assert (list 'power device value))))
+  (defun want (value)
+    (with-recovery-procedures ((:property-lock-unavailable (abort :unavailable))
+                               (:maintained-property-violation (abort :violated)))
+      (with-maintained-property (power 'camera value)
+        (sleep 0)
+        (power 'camera))))
+  (spawn (want :on))
+  (spawn (want :off))
+  (assert '(power camera :broken))";
+
+/// Explores the first states of a program, with snapshots and by a new machine for each run. The unit of
+/// throughput is a state.
+fn exploration(criterion: &mut Criterion) {
+    const STATES: usize = 3000;
+    let compiled = program::compile(&[Source::new("two-tasks.esl", TWO_TASKS)]);
+    let program = compiled.program.expect("it compiles");
+    let mut group = criterion.benchmark_group("exploration");
+    group.sample_size(10).sampling_mode(SamplingMode::Flat).throughput(Throughput::Elements(STATES as u64));
+    for (name, snapshots) in [("snapshots", true), ("new machines", false)] {
+        let settings = Settings { states: STATES, snapshots, output: false, ..Settings::default() };
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                let found = explore(&program, &settings).expect("it can start");
+                assert_eq!(found.states, STATES);
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, interpreter, collector, startup, exploration);
 criterion_main!(benches);

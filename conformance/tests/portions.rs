@@ -1,9 +1,11 @@
-//! The ticks of a run may come in any portions: the schedule is the same, to the tick.
+//! The ticks of a run may come in any portions, and between two of them the machine may return to a state of
+//! before: the schedule is the same, to the tick.
 
 use esl::Config;
-use esl::host::VirtualHost;
+use esl::host::{Captured, VirtualHost};
 use esl::program::{self, Program, Source};
 use esl_vm::run::RunOutcome;
+use esl_vm::vm::Vm;
 use proptest::prelude::*;
 
 /// Programs in which the end of a slice can be seen: by the order of output, by counts of ticks, by limits,
@@ -100,8 +102,103 @@ fn portions_of_a_fixed_length_change_nothing() {
     }
 }
 
+/// What can be told of a run between two portions.
+fn present(machine: &Vm, captured: &Captured) -> (u64, u64, u128, String) {
+    (machine.ticks(), machine.canary(), machine.fingerprint(), captured.output())
+}
+
+/// Runs a program in portions, and between them returns to states of before: with `returns`, to that of the
+/// portion with this number, in turn. Checks that it goes on from there as it did the first time.
+fn check_returns(text: &str, config: &Config, portion: u64, returns: &[usize]) {
+    let program = program::compile(&[Source::new("portions", text)]).program.expect("it compiles");
+    let host = VirtualHost::new();
+    let captured = host.captured();
+    let config = Config { snapshots: true, ..config.clone() };
+    let mut machine = program::machine(config, Box::new(host)).expect("there is room for the library");
+    program::begin(&mut machine, &program).expect("it can start");
+    let (mut course, mut snapshots) = (Vec::new(), Vec::new());
+    for _ in 0..12 {
+        let before = present(&machine, &captured);
+        // While the collector works there is none.
+        let snapshot = machine.save(snapshots.iter().flatten().last());
+        assert_eq!(present(&machine, &captured), before, "to save changes nothing: {text}");
+        course.push(before);
+        snapshots.push(snapshot);
+        if machine.run(portion) != RunOutcome::TicksUsed {
+            break;
+        }
+    }
+    assert!(snapshots[0].is_some(), "{text}");
+    let last = present(&machine, &captured);
+    for &number in returns {
+        let from = number % snapshots.len();
+        let Some(snapshot) = &snapshots[from] else { continue };
+        assert!(machine.restore(snapshot), "portion {from} of {text}");
+        for then in &course[from..] {
+            assert_eq!(present(&machine, &captured), *then, "portion {from} of {text}");
+            _ = machine.run(portion);
+        }
+        assert_eq!(present(&machine, &captured), last, "portion {from} of {text}");
+    }
+}
+
+/// Programs whose state lies in more than objects.
+const KEPT: [&str; 3] = [
+    // Facts, locks, timers and files.
+    r#"(define-property power (device))
+     (to-achieve (power device value) (t (assert (list 'power device value))))
+     (dotimes (i 3)
+       (let ((i i))
+         (spawn (dotimes (j 9)
+                  (with-recovery-procedures ((:property-lock-unavailable (abort)))
+                    (with-maintained-property (power 'camera i) (sleep 0.01) (print (power 'camera))))
+                  (assert (list 'seen i j "text" 1.5 (expt 3 (* 9 j))))
+                  (retract (list 'seen i (- j 2) "text" 1.5 (expt 3 (* 9 (- j 2)))))
+                  (with-open-file (notes "notes" :direction :output :if-exists :append
+                                       :if-does-not-exist :create)
+                    (print j notes))))))"#,
+    // Symbols, packages and classes that are made on the way, dynamic bindings, functions that are loaded late.
+    r#"(defvar *depth* 0)
+     (define-condition odd (error) ((n)))
+     (dotimes (i 3)
+       (let ((i i))
+         (spawn (dotimes (j 20)
+                  (let ((*depth* (+ *depth* j)))
+                    (setf (symbol-value (intern (format nil "N~a-~a" i j))) *depth*)
+                    (princ (sort (loop for k below (mod j 5) collect (list k (gensym))) #'> :key #'first))
+                    (princ (handler-case (error 'odd :n j) (odd (c) (type-of c)))))))))"#,
+    // Large objects, some of which grow and go, and collections.
+    r#"(dotimes (i 2)
+       (let ((i i) (table (make-hash-table)) (kept (list nil nil nil)))
+         (spawn (dotimes (j 400)
+                  (setf (nth (mod j 3) kept) (make-array (* 50 j) :initial-element j))
+                  (setf (gethash (mod (* j 7919) 1000) table) (make-string 40))
+                  (princ (+ i (length (car kept))))))))"#,
+];
+
+#[test]
+fn a_machine_returns_to_any_state_and_goes_on_as_before() {
+    for text in KEPT.iter().chain(&PROGRAMS) {
+        for portion in [700, 2001, 25_000] {
+            check_returns(text, &Config::default(), portion, &[3, 0, 7, 2, 11, 0]);
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn returns_change_nothing(
+        program in 0..PROGRAMS.len() + KEPT.len(),
+        seed in 0_u64..20,
+        slice in prop_oneof![Just(1_u32), 2..50_u32, Just(2000)],
+        portion in 1_u64..20_000,
+        returns in prop::collection::vec(0_usize..12, 1..5),
+    ) {
+        let text = PROGRAMS.iter().chain(&KEPT).nth(program).expect("it is one of them");
+        check_returns(text, &Config { seed, slice, ..Config::default() }, portion, &returns);
+    }
 
     #[test]
     fn portions_change_nothing(

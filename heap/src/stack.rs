@@ -145,6 +145,19 @@ impl Stack {
     }
 }
 
+impl Clone for Stack {
+    fn clone(&self) -> Stack {
+        let words = self.capacity();
+        if words == 0 {
+            return Stack::none();
+        }
+        let start = allocate(words);
+        // SAFETY: both segments have so many words, all initialised, and the new one is nobody else's.
+        unsafe { start.copy_from_nonoverlapping(self.start, words) };
+        Stack { start, ..*self }
+    }
+}
+
 impl Drop for Stack {
     fn drop(&mut self) {
         free(self.start, self.capacity());
@@ -209,6 +222,17 @@ mod tests {
             assert_eq!(stack.words(2), [Value::T, Value::NIL]);
             assert_eq!(stack.words(stack.capacity()).last(), Some(&Value::NIL));
         }
+    }
+
+    #[test]
+    fn a_copy_of_a_stack_has_its_words_and_its_size() {
+        let mut stack = Stack::new(20);
+        // SAFETY: the first word lies in the segment.
+        unsafe { stack.start().write(Value::T) };
+        let copy = stack.clone();
+        stack.wipe(0);
+        assert_eq!((copy.words(2), copy.capacity()), (&[Value::T, Value::NIL][..], stack.capacity()));
+        assert_eq!(Stack::none().clone().capacity(), 0);
     }
 
     #[test]

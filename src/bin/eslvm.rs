@@ -249,9 +249,15 @@ struct ExploreArguments {
     /// Most states
     #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..))]
     states: u64,
+    /// Most memory of the exploration, such as 64M or 2G, for states and for snapshots; with less it is slower
+    #[arg(long, value_name = "SIZE", default_value = "512M", value_parser = command::parse_size)]
+    memory: usize,
     /// Most seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 60)]
     time: u32,
+    /// When timers end: when all tasks wait (idle), or at any point, as if what tasks do took so long (any)
+    #[arg(long, value_enum, default_value = "idle")]
+    timers: TimersChoice,
     /// Most switches of a schedule: points at which a task that could go on lets another one go first
     #[arg(long, value_name = "N")]
     switches: Option<usize>,
@@ -274,6 +280,15 @@ enum GrainChoice {
     Changes,
     /// Also before it looks at what others have changed
     Reads,
+}
+
+/// When timers end.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum TimersChoice {
+    /// When all tasks wait
+    Idle,
+    /// At any point
+    Any,
 }
 
 /// Lets the process have as many open files and connections as the system allows it.
@@ -419,6 +434,11 @@ fn run_explore(file: &Path, options: &ExploreArguments, library: &[PathBuf]) -> 
     };
     let settings = explore::Settings {
         grain,
+        timers: match options.timers {
+            TimersChoice::Idle => explore::TimerGrain::Idle,
+            TimersChoice::Any => explore::TimerGrain::Any,
+        },
+        memory: options.memory,
         states: usize::try_from(options.states).unwrap_or(usize::MAX),
         switches: options.switches,
         faults: options.faults,
@@ -509,6 +529,10 @@ fn run(
             complain(
                 "the schedule was found in another program, or in another version of this one: explore again",
             );
+            return Err(USAGE);
+        }
+        Some(schedule) if !schedule.is_of_this_machine() => {
+            complain("the schedule was found by another version of eslvm: explore again");
             return Err(USAGE);
         }
         Some(schedule) => program::run_by(&mut machine, &program, &schedule.settings(), schedule.choices()),

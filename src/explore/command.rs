@@ -10,8 +10,8 @@ use esl_vm::vm::Vm;
 use serde_json::json;
 
 use super::{
-    Behaviour, Exploration, Schedule, SearchLimit, SearchProgress, Settings, StandingTask, Switch,
-    explore_while, tell_switches,
+    Behaviour, Exploration, Grain, Schedule, SearchLimit, SearchProgress, Settings, StandingTask, Switch,
+    TimerGrain, explore_while, tell_switches,
 };
 use crate::command::{self, FAILED, NOT_PROVED, SUCCESS, USAGE, complain};
 use crate::error::Error;
@@ -101,7 +101,7 @@ pub fn run(program: &Program, file: &Path, path: &ModulePath, options: &Explorat
             json!({ "states": states, "runs": runs, "findings": count, "limit": limit, "seconds": seconds })
         );
     } else {
-        print_summary(&found, findings.len());
+        print_summary(&found, &options.settings, findings.len());
     }
     match (findings.is_empty(), found.limit) {
         (false, _) => FAILED,
@@ -212,17 +212,24 @@ fn text(switch: &Switch, lines: &mut PlaceTexts) -> String {
         Switch::Order { oldest, next } => {
             format!("{} goes on{}\nbefore {} does", next.label, place(next, "at"), oldest.label)
         }
+        Switch::Timer { task, passed } => format!(
+            "{} s pass, and timers end,\nbefore {} goes on{}",
+            *passed as f64 / 1e9,
+            task.label,
+            place(task, "at")
+        ),
         Switch::Choice { task, form } => {
             format!("{} chooses form {}{}", task.label, form + 1, place(task, "at"))
         }
     }
 }
 
-fn print_summary(found: &Exploration<Behaviour>, findings: usize) {
+fn print_summary(found: &Exploration<Behaviour>, settings: &Settings, findings: usize) {
     let figures = format!("{} states, {} runs", found.states, found.runs);
     let why = match found.limit {
         None => None,
         Some(SearchLimit::States) => Some("the limit of states is reached"),
+        Some(SearchLimit::Memory) => Some("the limit of memory is reached"),
         Some(SearchLimit::Switches) => Some("schedules with more switches were not tried"),
         Some(SearchLimit::Faults) => Some("more choices that are not the first were not tried"),
         Some(SearchLimit::Asked) => Some("the time is over"),
@@ -238,9 +245,17 @@ fn print_summary(found: &Exploration<Behaviour>, findings: usize) {
             "Some schedules return to where they were: they can go on for ever, if they are unfair to a task."
         );
     }
+    let timers = match settings.timers {
+        TimerGrain::Idle => "; timers that end before others have done their work (--timers any)",
+        TimerGrain::Any => "",
+    };
+    let reads = match settings.grain {
+        Grain::Changes => "; switches before a task only looks at what others do (--grain reads)",
+        Grain::Reads => "",
+    };
     println!(
-        "Not seen: changes of variables, slots and tables by tasks that are outside of critical sections; \
-         timers that end before others have done their work."
+        "Not seen: changes of variables, slots and tables by tasks that are outside of critical sections\
+         {reads}{timers}."
     );
 }
 

@@ -30,10 +30,11 @@ use std::cell::RefCell;
 pub use command::{ExplorationOptions, read_schedule, run};
 pub use esl_vm::explore::{
     Exploration, ExploredEnding, Grain, SearchLimit, SearchProgress, Settings, StandingTask, Switch,
+    TimerGrain,
 };
 use esl_vm::host::{Captured, VirtualHost};
 use esl_vm::task::TaskId;
-use esl_vm::vm::Vm;
+use esl_vm::vm::{Config, Vm};
 #[cfg(feature = "cli")]
 pub use schedule::{Schedule, ScheduleError};
 
@@ -55,10 +56,10 @@ pub struct Behaviour {
 type Prepare<'a> = &'a dyn Fn(&mut Vm) -> Result<(), Error>;
 
 /// Returns a machine that is about to run a program, its main task, and its outputs.
-fn begin(program: &Program, prepare: Prepare<'_>) -> Result<(Vm, TaskId, Captured), Error> {
+fn begin(program: &Program, prepare: Prepare<'_>, snapshots: bool) -> Result<(Vm, TaskId, Captured), Error> {
     let host = VirtualHost::new();
     let captured = host.captured();
-    let mut machine = program::machine(Default::default(), Box::new(host))?;
+    let mut machine = program::machine(Config { snapshots, ..Config::default() }, Box::new(host))?;
     prepare(&mut machine)?;
     let main = program::begin(&mut machine, program)?;
     Ok((machine, main, captured))
@@ -96,13 +97,14 @@ pub fn explore_while(
 ) -> Result<Exploration<Behaviour>, Error> {
     let present = RefCell::new(None);
     let begin = || {
-        let (machine, main, captured) = begin(program, prepare)?;
+        let (machine, main, captured) = begin(program, prepare, settings.snapshots)?;
         present.replace(Some((main, captured)));
         Ok(machine)
     };
     let judge = |machine: &mut Vm, outcome| {
-        let (main, captured) = present.take().expect("a machine that has run was begun");
-        let ended = program::end(machine, main, outcome);
+        let present = present.borrow();
+        let (main, captured) = present.as_ref().expect("a machine that has run was begun");
+        let ended = program::end(machine, *main, outcome);
         Behaviour { ended, output: captured.output(), errors: captured.error() }
     };
     esl_vm::explore::explore_while(settings, begin, judge, goes_on)
@@ -113,7 +115,7 @@ pub fn explore_while(
 /// # Errors
 /// As [`program::run`].
 pub fn follow(program: &Program, settings: &Settings, choices: &[u32]) -> Result<Behaviour, Error> {
-    let (mut machine, main, captured) = begin(program, &|_| Ok(()))?;
+    let (mut machine, main, captured) = begin(program, &|_| Ok(()), false)?;
     let outcome = machine.follow(settings, choices, &mut |_| {});
     let ended = program::end(&mut machine, main, outcome);
     Ok(Behaviour { ended, output: captured.output(), errors: captured.error() })
@@ -133,7 +135,7 @@ fn tell_switches(
     prepare: Prepare<'_>,
     told: &mut dyn FnMut(Switch),
 ) -> Result<(), Error> {
-    let (mut machine, ..) = begin(program, prepare)?;
+    let (mut machine, ..) = begin(program, prepare, false)?;
     if ends {
         machine.follow(settings, choices, told);
     } else {

@@ -1,20 +1,29 @@
 //! Schedules as files: `eslvm explore` writes them, `eslvm run --schedule` runs a program by one.
 //!
 //! ```text
-//! esl-schedule 1
+//! esl-schedule 2
+//! machine 1-03a7c55e
 //! program 5d2c01ff
 //! grain changes
+//! timers idle
 //! turn 100000
 //! choices 0 1 0 0 2
+//! end
 //! ```
+//!
+//! The machine is the epoch of its behaviour and a checksum of its library: on another one, choices lead
+//! elsewhere.
 
 use std::fmt;
 
-use super::{Grain, Settings};
+use super::{Grain, Settings, TimerGrain};
 use crate::program::Program;
 
 /// First line of a file.
-const HEADER: &str = "esl-schedule 1";
+const HEADER: &str = "esl-schedule 2";
+
+/// Last line of a file, so that one that was cut off is noticed.
+const END: &str = "end";
 
 /// Most choices in a file.
 const MOST_CHOICES: usize = 10_000_000;
@@ -34,9 +43,12 @@ const MOST_CHOICES: usize = 10_000_000;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Schedule {
+    /// Epoch of the machine's behaviour, and checksum of its library.
+    machine: (u32, u32),
     /// Checksum of the program.
     program: u32,
     grain: Grain,
+    timers: TimerGrain,
     turn: u32,
     choices: Vec<u32>,
 }
@@ -46,6 +58,8 @@ pub struct Schedule {
 pub enum ScheduleError {
     /// It does not begin as a schedule does.
     Header,
+    /// It is of another version.
+    Version,
     /// A line, counted from 1, is not what is expected there.
     Line {
         /// Number of the line.
@@ -59,6 +73,7 @@ impl fmt::Display for ScheduleError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             ScheduleError::Header => write!(f, "its first line is not `{HEADER}`"),
+            ScheduleError::Version => f.write_str("another version of eslvm has written it: explore again"),
             ScheduleError::Line { line, expected } => write!(f, "line {line}: expected {expected}"),
         }
     }
@@ -69,7 +84,8 @@ impl std::error::Error for ScheduleError {}
 impl Schedule {
     /// Returns the schedule with these choices, which an exploration with these settings has found.
     pub fn new(program: &Program, settings: &Settings, choices: Vec<u32>) -> Schedule {
-        Schedule { program: checksum(program), grain: settings.grain, turn: settings.turn, choices }
+        let Settings { grain, timers, turn, .. } = *settings;
+        Schedule { machine: this_machine(), program: checksum(program), grain, timers, turn, choices }
     }
 
     /// Parses the text of a file.
@@ -78,29 +94,48 @@ impl Schedule {
     /// [`ScheduleError`], if it is no schedule.
     pub fn parse(text: &str) -> Result<Schedule, ScheduleError> {
         let mut lines = text.lines();
-        if lines.next() != Some(HEADER) {
-            return Err(ScheduleError::Header);
+        match lines.next() {
+            Some(HEADER) => {}
+            Some(line) if line.starts_with("esl-schedule ") => return Err(ScheduleError::Version),
+            _ => return Err(ScheduleError::Header),
         }
         let mut field = |line: usize, name: &str, expected: &'static str| {
             let text = lines.next().and_then(|text| text.strip_prefix(name));
             text.and_then(|text| text.strip_prefix(' ').or(text.is_empty().then_some("")))
                 .ok_or(ScheduleError::Line { line, expected })
         };
-        let program = field(2, "program", "`program` and a checksum")?;
-        let program = u32::from_str_radix(program, 16)
-            .map_err(|_| ScheduleError::Line { line: 2, expected: "a checksum in hexadecimal digits" })?;
-        let grain = match field(3, "grain", "`grain changes` or `grain reads`")? {
+        let wrong = |line, expected| ScheduleError::Line { line, expected };
+        let hexadecimal = |text| u32::from_str_radix(text, 16).ok();
+        let machine = field(2, "machine", "`machine`, a number and a checksum")?.split_once('-');
+        let machine = machine.and_then(|(epoch, sum)| Some((epoch.parse().ok()?, hexadecimal(sum)?)));
+        let machine = machine.ok_or(wrong(2, "a number, `-`, and a checksum in hexadecimal digits"))?;
+        let program = hexadecimal(field(3, "program", "`program` and a checksum")?);
+        let program = program.ok_or(wrong(3, "a checksum in hexadecimal digits"))?;
+        let grain = match field(4, "grain", "`grain changes` or `grain reads`")? {
             "changes" => Grain::Changes,
             "reads" => Grain::Reads,
-            _ => return Err(ScheduleError::Line { line: 3, expected: "`changes` or `reads`" }),
+            _ => return Err(wrong(4, "`changes` or `reads`")),
         };
-        let turn = field(4, "turn", "`turn` and a number of ticks")?;
-        let turn = turn.parse().ok().filter(|&turn| turn > 0);
-        let turn = turn.ok_or(ScheduleError::Line { line: 4, expected: "a number of ticks" })?;
-        let words = field(5, "choices", "`choices` and numbers")?.split_ascii_whitespace();
+        let timers = match field(5, "timers", "`timers idle` or `timers any`")? {
+            "idle" => TimerGrain::Idle,
+            "any" => TimerGrain::Any,
+            _ => return Err(wrong(5, "`idle` or `any`")),
+        };
+        let turn = field(6, "turn", "`turn` and a number of ticks")?;
+        let turn = turn.parse().ok().filter(|&turn| turn > 0).ok_or(wrong(6, "a number of ticks"))?;
+        let words = field(7, "choices", "`choices` and numbers")?.split_ascii_whitespace();
         let choices = words.take(MOST_CHOICES).map(str::parse).collect::<Result<Vec<u32>, _>>();
-        let choices = choices.map_err(|_| ScheduleError::Line { line: 5, expected: "numbers" })?;
-        Ok(Schedule { program, grain, turn, choices })
+        let choices = choices.map_err(|_| wrong(7, "numbers"))?;
+        let is_whole = lines.next() == Some(END) && lines.next().is_none() && text.ends_with('\n');
+        if !is_whole {
+            return Err(wrong(8, "`end`, and nothing more"));
+        }
+        Ok(Schedule { machine, program, grain, timers, turn, choices })
+    }
+
+    /// Returns whether the schedule was found by a machine that behaves as this one does.
+    pub fn is_of_this_machine(&self) -> bool {
+        self.machine == this_machine()
     }
 
     /// Returns whether the schedule was found in this very program.
@@ -110,7 +145,7 @@ impl Schedule {
 
     /// Returns the settings with which the choices lead to where they were found.
     pub fn settings(&self) -> Settings {
-        Settings { grain: self.grain, turn: self.turn, ..Settings::default() }
+        Settings { grain: self.grain, timers: self.timers, turn: self.turn, ..Settings::default() }
     }
 
     /// Returns the choices.
@@ -125,10 +160,21 @@ impl fmt::Display for Schedule {
             Grain::Changes => "changes",
             Grain::Reads => "reads",
         };
-        write!(f, "{HEADER}\nprogram {:08x}\ngrain {grain}\nturn {}\nchoices", self.program, self.turn)?;
+        let timers = match self.timers {
+            TimerGrain::Idle => "idle",
+            TimerGrain::Any => "any",
+        };
+        let (epoch, library) = self.machine;
+        write!(f, "{HEADER}\nmachine {epoch}-{library:08x}\nprogram {:08x}\n", self.program)?;
+        write!(f, "grain {grain}\ntimers {timers}\nturn {}\nchoices", self.turn)?;
         self.choices.iter().try_for_each(|choice| write!(f, " {choice}"))?;
-        writeln!(f)
+        writeln!(f, "\n{END}")
     }
+}
+
+/// Returns the epoch of this machine's behaviour, and the checksum of its library.
+fn this_machine() -> (u32, u32) {
+    (esl_vm::EXECUTION_EPOCH, crc32fast::hash(esl_stdlib::IMAGE))
 }
 
 /// Returns the checksum of a program; 0 for one that no file can hold.
@@ -142,20 +188,28 @@ mod tests {
 
     #[test]
     fn what_is_no_schedule_is_refused_with_its_line() {
-        let good = "esl-schedule 1\nprogram 00ff00ff\ngrain reads\nturn 500\nchoices 0 3\n";
+        let good = "esl-schedule 2\nmachine 1-0000000a\nprogram 00ff00ff\ngrain reads\ntimers any\nturn 500\n\
+                    choices 0 3\nend\n";
         let schedule = Schedule::parse(good).expect("it is a schedule");
         assert_eq!((schedule.to_string().as_str(), schedule.choices()), (good, &[0, 3][..]));
-        assert_eq!((schedule.settings().grain, schedule.settings().turn), (Grain::Reads, 500));
+        let Settings { grain, timers, turn, .. } = schedule.settings();
+        assert_eq!((grain, timers, turn), (Grain::Reads, TimerGrain::Any, 500));
+        assert!(!schedule.is_of_this_machine());
         let line = |text: &str| match Schedule::parse(text) {
             Err(ScheduleError::Line { line, .. }) => line,
             other => panic!("{text}: {other:?}"),
         };
         assert_eq!(Schedule::parse("(print 1)"), Err(ScheduleError::Header));
-        assert_eq!(line("esl-schedule 1\n"), 2);
-        assert_eq!(line(&good.replace("00ff00ff", "none")), 2);
-        assert_eq!(line(&good.replace("reads", "all")), 3);
-        assert_eq!(line(&good.replace("500", "0")), 4);
-        assert_eq!(line(&good.replace("3", "x")), 5);
-        assert_eq!(line(&good.replace("choices", "choice")), 5);
+        assert_eq!(Schedule::parse("esl-schedule 1\nprogram 00ff00ff\n"), Err(ScheduleError::Version));
+        assert_eq!(line("esl-schedule 2\n"), 2);
+        let wrong = [("1-", "1/", 2), ("00ff00ff", "none", 3), ("reads", "all", 4), ("any", "some", 5)];
+        let further = [("500", "0", 6), ("3", "x", 7), ("choices", "choice", 7), ("end", "", 8)];
+        for (right, wrong, number) in wrong.into_iter().chain(further) {
+            assert_eq!(line(&good.replace(right, wrong)), number, "{wrong}");
+        }
+        // Wherever it is cut off, that is noticed.
+        for end in good.find('\n').unwrap_or(0) + 1..good.len() {
+            assert!(Schedule::parse(&good[..end]).is_err(), "{}", &good[..end]);
+        }
     }
 }

@@ -218,6 +218,7 @@ fn write_config(out: &mut ByteWriter, config: &Config) {
         critical_ticks,
         cleanup_ticks,
         cleanup_time,
+        snapshots: _,
     } = config;
     let optional = |out: &mut ByteWriter, number: Option<u64>| {
         out.byte(number.is_some().into());
@@ -252,6 +253,7 @@ fn read_config(from: &mut ByteReader<'_>) -> Option<Config> {
         critical_ticks: from.small()?,
         cleanup_ticks: from.number()?,
         cleanup_time: from.number()?,
+        snapshots: false,
     })
 }
 

@@ -182,13 +182,16 @@ fn explore(program: &Program, test: &Test, setup: &Setup) -> Result<Verdict, Err
     let begin = || {
         let host = VirtualHost::new();
         let captured = host.captured();
-        let (machine, main) = begin(program, test, 0, setup, Box::new(host))?;
+        let config = Config { snapshots: true, ..setup.config.clone() };
+        let setup = Setup { config, ..setup.clone() };
+        let (machine, main) = begin(program, test, 0, &setup, Box::new(host))?;
         present.replace(Some((main, captured)));
         Ok::<Vm, Error>(machine)
     };
     let found = esl_vm::explore::explore(&Settings::default(), begin, |machine, outcome| {
-        let (main, captured) = present.take().expect("a machine that has run was begun");
-        let ended = program::end(machine, main, outcome);
+        let present = present.borrow();
+        let (main, captured) = present.as_ref().expect("a machine that has run was begun");
+        let ended = program::end(machine, *main, outcome);
         setup.note_passages(machine);
         verdict(ended, || captured.output() + &captured.error())
     })?;

@@ -56,7 +56,7 @@ fn a_schedule_is_of_one_program() {
     let (status, _, errors) = run(&folder, &["run", "--schedule", "no.schedule", "lost.esl"]);
     assert_eq!(status, Some(2));
     assert!(
-        errors.contains("no.schedule is no schedule: its first line is not `esl-schedule 1`"),
+        errors.contains("no.schedule is no schedule: its first line is not `esl-schedule 2`"),
         "{errors}"
     );
 }
@@ -152,4 +152,37 @@ fn what_never_ends_is_told_or_given_up() {
     // The condition itself may not end.
     folder.file("check.esl", "(always never-told (loop))");
     assert_eq!(run(&folder, &["explore", "check.esl"]).0, Some(1));
+}
+
+/// What takes no time never exceeds a limit of time, unless timers may end at any point.
+#[test]
+fn timers_may_end_at_any_point() {
+    let folder = Folder::new("exploring-timers");
+    let text = "(defvar *done* (make-event 'done))
+(spawn (signal *done*))
+(with-timeout 5
+  (wait-for-event *done* :unless-count 0))
+";
+    folder.file("hurry.esl", text);
+    let (status, output, errors) = run(&folder, &["explore", "hurry.esl"]);
+    assert_eq!((status, errors.as_str()), (Some(0), ""), "{output}");
+    assert!(output.contains("timers that end before others have done their work (--timers any)"), "{output}");
+    let (status, output, _) = run(&folder, &["explore", "--timers", "any", "hurry.esl"]);
+    assert_eq!(status, Some(1), "{output}");
+    assert!(output.starts_with("finding 1: a failure leaves the main task\n"), "{output}");
+    assert!(output.contains(". 5 s pass, and timers end,\n     before "), "{output}");
+    let (status, _, errors) = run(&folder, &["run", "--schedule", "hurry-1.schedule", "hurry.esl"]);
+    assert_eq!(status, Some(1), "{errors}");
+}
+
+#[test]
+fn memory_bounds_an_exploration() {
+    let folder = Folder::new("exploring-memory");
+    folder.file("lost.esl", LOST_SIGNAL);
+    let figures = |output: &str| output.lines().find(|line| line.starts_with("complete")).map(str::to_string);
+    let (_, much, _) = run(&folder, &["explore", "lost.esl"]);
+    let (status, little, errors) = run(&folder, &["explore", "--memory", "4M", "lost.esl"]);
+    assert_eq!((status, errors.as_str(), figures(&little)), (Some(1), "", figures(&much)));
+    let (status, _, errors) = run(&folder, &["explore", "--memory", "much", "lost.esl"]);
+    assert!(status == Some(2) && errors.contains("--memory <SIZE>"), "{errors}");
 }

@@ -100,6 +100,8 @@ pub(crate) struct Compilations {
     pub(crate) unit: RefCell<Unit>,
     /// Errors of the form of a nameless text that was refused last, for the embedder.
     pub(crate) refused: Vec<Diagnostic>,
+    /// Number of jobs so far.
+    pub(crate) begun: u64,
 }
 
 impl Compilations {
@@ -125,6 +127,7 @@ impl Compilations {
 
     /// Adds a job and returns its handle.
     pub(crate) fn add(&mut self, job: CompilerJob) -> Value {
+        self.begun += 1;
         let id = self.jobs.insert(job).data().as_ffi();
         // A key's version stays far below the limit: it grows by two for each reuse of a slot.
         Value::handle(id as u32, (id >> 32) as u32 % Value::GENERATION_LIMIT).unwrap_or(Value::NIL)

@@ -32,6 +32,8 @@ pub struct Config {
     pub cleanup_ticks: u64,
     /// Nanoseconds that it may take then.
     pub cleanup_time: u64,
+    /// Whether the state of the machine may be saved and restored ([`crate::vm::Vm::save`]).
+    pub snapshots: bool,
 }
 
 list_state! { Config {
@@ -44,6 +46,7 @@ list_state! { Config {
     critical_ticks: Run,
     cleanup_ticks: Run,
     cleanup_time: Run,
+    snapshots: Process,
 } }
 
 impl Config {
@@ -58,6 +61,7 @@ impl Config {
         critical_ticks: 20_000,
         cleanup_ticks: CLEANUP_TICKS,
         cleanup_time: CLEANUP_TIME,
+        snapshots: false,
     };
 
     /// Returns the limit of a task's stack in words.

@@ -57,7 +57,8 @@ impl Vm {
     /// # Errors
     /// [`AllocError`] if the limit of memory leaves no room for what every machine has.
     pub fn new(config: Config, host: Box<dyn Host + Send>) -> Result<Vm, AllocError> {
-        let heap_config = HeapConfig { limit: config.memory, ..HeapConfig::default() };
+        let heap_config =
+            HeapConfig { limit: config.memory, images: config.snapshots, ..HeapConfig::default() };
         let mut heap = trust::new_heap(heap_config);
         let world = World::new(&mut heap)?;
         let starter = make_starter(&mut heap)?;

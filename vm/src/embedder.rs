@@ -10,7 +10,7 @@ use crate::task::{TaskId, TaskIndex};
 use crate::value::Value;
 
 /// Values that the embedder holds, and its requests.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Embedder {
     /// Values that are kept from being collected.
     pub(crate) pinned: Vec<Value>,

@@ -17,6 +17,7 @@ pub mod schedule;
 pub mod task;
 pub mod vm;
 
+pub use snapshot::Snapshot;
 pub use world::load;
 
 /// Number of the machine's behaviour, as far as a run can tell: what work costs how many ticks, when slices
@@ -41,6 +42,8 @@ mod number;
 mod outside;
 mod report;
 mod shape;
+mod shared;
+mod snapshot;
 mod state;
 mod trust;
 mod types;

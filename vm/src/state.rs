@@ -156,7 +156,7 @@ state! {
     Compilations by VisitCompiler :: compiler_content {
         content { jobs }
         transient { unit, refused }
-        process { compiler }
+        process { compiler, begun }
     }
 }
 
@@ -166,7 +166,7 @@ state! {
         content { exit_status, console, operations, inputs }
         course { senders }
         transient { answer }
-        process { host, inbox, functions, complaints }
+        process { host, inbox, functions, calls, complaints }
     }
 }
 

@@ -12,7 +12,7 @@ use esl_bytecode::module::Module;
 use esl_bytecode::verify::{VerifyError, verify};
 
 use crate::heap::layout::CodeObject;
-use crate::heap::{AllocError, CodeParts, Heap, HeapConfig};
+use crate::heap::{AllocError, CodeParts, Heap, HeapConfig, HeapImage};
 use crate::shape::{Shape, Sort};
 use crate::value::Value;
 
@@ -32,6 +32,15 @@ pub(crate) fn new_heap(config: HeapConfig) -> Heap {
     // SAFETY: a machine uses the values of its heap with no other, and drops both together. The documentation
     // of `Vm` asks the same of an embedder who gets hold of values.
     unsafe { Heap::new(config) }
+}
+
+/// Makes the contents of a machine's heap those of an image of it again, since when the machine's values are
+/// restored with it. Returns whether it is one of this heap.
+#[must_use]
+pub(crate) fn restore_heap(heap: &mut Heap, image: &HeapImage) -> bool {
+    // SAFETY: `snapshot` takes the image together with all values that the machine holds, and puts these back
+    // together with it. What else holds values is asked for the same by the documentation of `Vm`.
+    unsafe { heap.restore(image) }
 }
 
 /// Creates a heap for a unit test that needs no machine.

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 /// The modules, lowest first.
 const LAYERS: &[&str] = &[
     // Below everything: hashes, settings, the outside, promises on which unsafe code relies.
+    "shared",
     "canary",
     "config",
     "fused",
@@ -35,6 +36,7 @@ const LAYERS: &[&str] = &[
     "embedder",
     "vm",
     "state",
+    "snapshot",
     // What happens to the machine as a whole.
     "number",
     "types",

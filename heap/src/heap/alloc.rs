@@ -62,7 +62,7 @@ enum Which {
 }
 
 /// Current hole of a region, and the place where it looks for the next one.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Region {
     /// Address of the next object.
     next: usize,
@@ -120,6 +120,11 @@ impl Region {
         // SAFETY: there are `bytes`, more than none, from `start` on, so there is a hole, and no hole is at
         // address zero.
         Some(unsafe { NonNull::new_unchecked(std::ptr::with_exposed_provenance_mut(start)) })
+    }
+
+    /// Returns the part of the hole that nothing was allocated in yet, as addresses.
+    pub(super) fn unused(&self) -> std::ops::Range<usize> {
+        self.next..self.hole_end
     }
 
     /// Returns the number of bytes allocated and not counted yet.
@@ -315,7 +320,7 @@ impl Heap {
     /// Takes a new arena from the system. Its number is the least free one.
     fn grow(&mut self) -> Option<usize> {
         let number = self.arenas.iter().position(Option::is_none).unwrap_or(self.arenas.len());
-        let arena = Arena::new(u32::try_from(number).ok()?)?;
+        let arena = Arena::new(u32::try_from(number).ok()?, self.has_images)?;
         if number == self.arenas.len() {
             self.arenas.push(Some(arena));
         } else {
@@ -336,7 +341,7 @@ impl Heap {
             error => error,
         })?;
         // The current epoch: marked while marking and not yet swept while sweeping; stale by the next cycle.
-        let large = LargeObject::new(bytes, self.large_number, self.large.len(), self.epoch)
+        let large = LargeObject::new(bytes, self.large_number, self.large.len(), self.epoch, self.has_images)
             .ok_or(AllocError::NeedCollection)?;
         let object = large.object();
         self.large.push(large);

@@ -10,8 +10,8 @@
 //! arena, masking leads to the header, and shifting to the byte of the granule.
 //!
 //! Unsafe invariants:
-//! 1. An arena is live, and its metadata initialised, from [`Arena::new`] until it is dropped; its provenance
-//!    is exposed.
+//! 1. An arena is live, and its metadata initialised, from [`Arena::new`] until its memory is dropped; its
+//!    provenance is exposed.
 //! 2. References to metadata are made only through a borrow of the [`Arena`], and live no longer than one
 //!    function.
 
@@ -22,6 +22,7 @@ use crate::state::StateSink;
 use std::alloc::{Layout, alloc, dealloc};
 use std::ops::Range;
 use std::ptr::NonNull;
+use std::sync::Arc;
 
 /// Bytes of a block. Blocks are smaller under Miri, which would otherwise spend its time on metadata.
 pub(super) const BLOCK: usize = if cfg!(miri) { 4 << 10 } else { 64 << 10 };
@@ -83,32 +84,78 @@ impl BlockInfo {
     }
 }
 
+/// Memory of an arena. An image of the heap shares it, so that the arena can be had again at its address.
+pub(super) struct ArenaMemory(NonNull<u8>);
+
+// SAFETY: this only frees the memory; whatever reads or writes it goes through the heap, which has the arena.
+unsafe impl Send for ArenaMemory {}
+// SAFETY: a shared reference gives no access to the memory.
+unsafe impl Sync for ArenaMemory {}
+
+impl Drop for ArenaMemory {
+    fn drop(&mut self) {
+        // SAFETY: `Arena::new` has allocated the memory with this layout; it is dropped once.
+        unsafe { dealloc(self.0.as_ptr(), LAYOUT) }
+    }
+}
+
 /// Arena of the heap, owned.
 pub(super) struct Arena {
     base: NonNull<u8>,
     blocks: [BlockInfo; BLOCKS + 1],
+    memory: Arc<ArenaMemory>,
 }
 
 // The objects and metadata behind `base` are the run's, their address is the process's.
-list_state! { Arena { base: Visited, blocks: Parts } }
+list_state! { Arena { base: Visited, blocks: Parts, memory: Process } }
 
 impl Arena {
-    /// Creates an arena with empty blocks; `None` if the system has no memory.
-    pub(super) fn new(number: u32) -> Option<Arena> {
+    /// Creates an arena with empty blocks; `None` if the system has no memory. All of it is initialised if it
+    /// `is_zeroed`.
+    pub(super) fn new(number: u32, is_zeroed: bool) -> Option<Arena> {
         // SAFETY: the size is not zero. The metadata block is zeroed and the header written before anything
         // reads them.
         unsafe {
             let base = NonNull::new(alloc(LAYOUT))?;
-            base.write_bytes(0, BLOCK);
+            base.write_bytes(0, if is_zeroed { ARENA } else { BLOCK });
             base.cast().write(ArenaHeader { number, grays: 0 });
             base.as_ptr().expose_provenance();
-            let arena = Arena { base, blocks: [BlockInfo::EMPTY; BLOCKS + 1] };
+            let memory = Arc::new(ArenaMemory(base));
+            let arena = Arena { base, blocks: [BlockInfo::EMPTY; BLOCKS + 1], memory };
             if cfg!(debug_assertions) {
                 for block in 1..=BLOCKS {
                     poison(arena.address(block), 0..BLOCK_GRANULES);
                 }
             }
             Some(arena)
+        }
+    }
+
+    /// Returns the arena with this memory, which `blocks` describes, as it was.
+    pub(super) fn again(memory: &Arc<ArenaMemory>, blocks: [BlockInfo; BLOCKS + 1]) -> Arena {
+        Arena { base: memory.0, blocks, memory: memory.clone() }
+    }
+
+    /// Returns the memory.
+    pub(super) fn memory(&self) -> &Arc<ArenaMemory> {
+        &self.memory
+    }
+
+    /// Returns the states and counts of all blocks; that at 0 means nothing.
+    pub(super) fn blocks(&self) -> [BlockInfo; BLOCKS + 1] {
+        self.blocks
+    }
+
+    /// Returns the objects of a block, as bytes.
+    ///
+    /// # Safety
+    /// The arena was made zeroed, and nobody uses an object of the block while the slice lives.
+    pub(super) unsafe fn objects_mut(&mut self, block: usize) -> &mut [u8] {
+        // SAFETY: invariant 1: the arena is live; by the contract all of it is initialised, since objects
+        // are, and nobody else refers to the block; the slice borrows the arena mutably.
+        unsafe {
+            let start: *mut u8 = std::ptr::with_exposed_provenance_mut(self.address(block));
+            std::slice::from_raw_parts_mut(start, BLOCK)
         }
     }
 
@@ -190,13 +237,6 @@ impl Arena {
     pub(super) fn header(&self) -> &ArenaHeader {
         // SAFETY: invariant 1: the arena is live and begins with its header, which is borrowed with it.
         unsafe { self.base.cast().as_ref() }
-    }
-}
-
-impl Drop for Arena {
-    fn drop(&mut self) {
-        // SAFETY: `new` has allocated the arena with this layout; it is dropped once.
-        unsafe { dealloc(self.base.as_ptr(), LAYOUT) }
     }
 }
 

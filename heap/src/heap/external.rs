@@ -28,7 +28,7 @@ pub enum Holder {
 const HOLDERS: usize = Holder::Compiler as usize + 1;
 
 /// Bytes outside of the heap, by holder.
-#[derive(Default)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct External {
     held: [usize; HOLDERS],
     /// The sum of these.

@@ -12,10 +12,12 @@ use super::arena::LARGE;
 use super::layout::{GRANULE, Header};
 use crate::list_state;
 use crate::state::{StateSink, Stated};
-use std::alloc::{Layout, alloc, dealloc, realloc};
+use std::alloc::{Layout, alloc, alloc_zeroed, dealloc, realloc};
 use std::ptr::NonNull;
+use std::sync::Arc;
 
 /// Header before a large object.
+#[derive(Clone, Copy)]
 #[repr(C, align(16))]
 pub(super) struct LargeHeader {
     /// Bytes of the whole allocation, this header included.
@@ -56,11 +58,36 @@ pub(super) const fn is_large(bytes: usize) -> bool {
     bytes > LARGE
 }
 
+/// Memory of a large object. An image of the heap shares it, so that the object can be had again at its
+/// address.
+pub(super) struct LargeMemory {
+    start: NonNull<LargeHeader>,
+    /// Bytes from the system. The header may say less, of an object that is being freed.
+    bytes: usize,
+}
+
+// SAFETY: this only frees the memory; whatever reads or writes it goes through the heap, which has the
+// object.
+unsafe impl Send for LargeMemory {}
+// SAFETY: a shared reference gives no access to the memory.
+unsafe impl Sync for LargeMemory {}
+
+impl Drop for LargeMemory {
+    fn drop(&mut self) {
+        // SAFETY: `LargeObject::new` or `shrink` has allocated the memory with this layout; it is dropped
+        // once.
+        unsafe { dealloc(self.start.as_ptr().cast(), Layout::from_size_align_unchecked(self.bytes, GRANULE)) }
+    }
+}
+
 /// Large object, owned.
-pub(super) struct LargeObject(NonNull<LargeHeader>);
+pub(super) struct LargeObject {
+    start: NonNull<LargeHeader>,
+    memory: Arc<LargeMemory>,
+}
 
 // The header and the object are the run's, their address is the process's.
-list_state! { LargeObject { 0: Parts by tell_header } }
+list_state! { LargeObject { start: Parts by tell_header, memory: Process } }
 
 fn tell_header(header: &NonNull<LargeHeader>, sink: &mut dyn StateSink) {
     // SAFETY: the header lives as long as the object that owns it, which the caller borrows.
@@ -68,23 +95,57 @@ fn tell_header(header: &NonNull<LargeHeader>, sink: &mut dyn StateSink) {
 }
 
 impl LargeObject {
-    /// Allocates memory for an object of `bytes`; `None` if the system has none.
-    pub(super) fn new(bytes: usize, number: u64, index: usize, epoch: u8) -> Option<LargeObject> {
+    /// Allocates memory for an object of `bytes`; `None` if the system has none. All of it is initialised if
+    /// it `is_zeroed`.
+    pub(super) fn new(
+        bytes: usize,
+        number: u64,
+        index: usize,
+        epoch: u8,
+        is_zeroed: bool,
+    ) -> Option<LargeObject> {
         let bytes = footprint(bytes);
         let layout = Layout::from_size_align(bytes, GRANULE).ok()?;
         // SAFETY: the size is not zero, and the header is written at once.
         unsafe {
-            let header = NonNull::new(alloc(layout))?.cast::<LargeHeader>();
-            header.write(LargeHeader { bytes, number, index, epoch, gray: false, filled: 0 });
-            header.as_ptr().expose_provenance();
-            Some(LargeObject(header))
+            let start = if is_zeroed { alloc_zeroed(layout) } else { alloc(layout) };
+            let start = NonNull::new(start)?.cast::<LargeHeader>();
+            start.write(LargeHeader { bytes, number, index, epoch, gray: false, filled: 0 });
+            start.as_ptr().expose_provenance();
+            Some(LargeObject { start, memory: Arc::new(LargeMemory { start, bytes }) })
         }
+    }
+
+    /// Returns the object with this memory, which has this header again.
+    ///
+    /// # Safety
+    /// The header is one that this object has had, and nobody borrows the object.
+    pub(super) unsafe fn again(memory: &Arc<LargeMemory>, header: LargeHeader) -> LargeObject {
+        // SAFETY: the memory is live, begins with the header, and by the contract nobody borrows it.
+        unsafe { memory.start.write(header) };
+        LargeObject { start: memory.start, memory: memory.clone() }
+    }
+
+    /// Returns the memory.
+    pub(super) fn memory(&self) -> &Arc<LargeMemory> {
+        &self.memory
+    }
+
+    /// Returns the object proper, as bytes.
+    ///
+    /// # Safety
+    /// The object was made zeroed, its header tells its bytes, and nobody uses it while the slice lives.
+    pub(super) unsafe fn bytes_mut(&mut self) -> &mut [u8] {
+        let bytes = self.header().bytes - footprint(0);
+        // SAFETY: so many bytes follow the header; by the contract they are initialised and nobody else
+        // refers to them.
+        unsafe { std::slice::from_raw_parts_mut(self.object().as_ptr(), bytes) }
     }
 
     /// Returns the address of the object proper.
     pub(super) fn object(&self) -> NonNull<u8> {
         // SAFETY: the allocation is longer than the header.
-        unsafe { self.0.add(1).cast() }
+        unsafe { self.start.add(1).cast() }
     }
 
     /// Gives about `bytes` from the end of an object that is no longer in use back to the system, and returns
@@ -94,11 +155,16 @@ impl LargeObject {
         let old = self.header().bytes;
         let bytes = bytes / GRANULE * GRANULE;
         let new = old.checked_sub(bytes).filter(|&new| bytes > 0 && new > super::arena::LARGE)?;
-        // SAFETY: this is the layout of the allocation, and `new` is a smaller size; the header is at the
-        // start, which stays.
-        unsafe {
-            let layout = Layout::from_size_align_unchecked(old, GRANULE);
-            self.0 = NonNull::new(realloc(self.0.as_ptr().cast(), layout, new))?.cast();
+        // Memory that an image shares stays; it counts as given back all the same.
+        if let Some(memory) = Arc::get_mut(&mut self.memory) {
+            // SAFETY: this is the layout of the allocation, and `new` is a smaller size; the header is at the
+            // start, which stays.
+            unsafe {
+                let layout = Layout::from_size_align_unchecked(memory.bytes, GRANULE);
+                memory.start = NonNull::new(realloc(memory.start.as_ptr().cast(), layout, new))?.cast();
+            }
+            memory.bytes = new;
+            self.start = memory.start;
         }
         self.header_mut().bytes = new;
         Some(bytes)
@@ -107,22 +173,14 @@ impl LargeObject {
     /// Returns the header.
     pub(super) fn header(&self) -> &LargeHeader {
         // SAFETY: `new` has written the header, which lives until `self` is dropped and is borrowed with it.
-        unsafe { self.0.as_ref() }
+        unsafe { self.start.as_ref() }
     }
 
     /// Returns the header, to be changed.
     pub(super) fn header_mut(&mut self) -> &mut LargeHeader {
         // SAFETY: `new` has written the header, which lives until `self` is dropped and is borrowed mutably
         // with it.
-        unsafe { self.0.as_mut() }
-    }
-}
-
-impl Drop for LargeObject {
-    fn drop(&mut self) {
-        let bytes = self.header().bytes;
-        // SAFETY: `new` or `shrink` has allocated the object with this layout; it is dropped once.
-        unsafe { dealloc(self.0.as_ptr().cast(), Layout::from_size_align_unchecked(bytes, GRANULE)) }
+        unsafe { self.start.as_mut() }
     }
 }
 

@@ -65,6 +65,13 @@ impl Marker {
         self.stack.is_empty() && self.pieces.is_empty() && self.grays == 0
     }
 
+    /// Forgets what was to be followed: no marking is under way. The last one has marked so many bytes.
+    pub(super) fn forget(&mut self, bytes: u64) {
+        self.stack.clear();
+        self.pieces.clear();
+        (self.grays, self.bytes) = (0, bytes);
+    }
+
     /// Moves gray objects of an arena to the stack, as many as there is room for.
     fn take_grays_of(&mut self, arena: &mut Arena) {
         for block in 1..=BLOCKS {

@@ -6,6 +6,7 @@
 //! mark      incremental marking                          sweep     lazy sweeping
 //! arena     1 MiB pieces of memory, in blocks            large     big objects, one by one
 //! metadata  one byte per granule                     external  memory outside that counts against the limit
+//! image     the contents at a time, to be had again
 //! ```
 //!
 //! Objects never move. A cycle of the collector marks what is reachable, in slices between which the program
@@ -54,6 +55,7 @@ mod access;
 mod alloc;
 mod arena;
 mod external;
+mod image;
 mod large;
 mod mark;
 mod metadata;
@@ -63,6 +65,7 @@ mod sweep;
 pub use access::BignumRef;
 pub use alloc::AllocError;
 pub use external::Holder;
+pub use image::HeapImage;
 pub use layout::Kind;
 pub use object::CodeParts;
 
@@ -74,6 +77,7 @@ use arena::{ARENA, Arena};
 use external::External;
 use large::LargeObject;
 use mark::Marker;
+use std::sync::Arc;
 use sweep::Sweep;
 
 /// Bytes added to the limit by [`Heap::open_reserve`]: an arena, and something for what is outside of the
@@ -97,11 +101,13 @@ pub struct HeapConfig {
     /// Capacity of the mark stack, in objects of 8 bytes each. More objects wait in the metadata, which is
     /// slower.
     pub mark_stack: usize,
+    /// Whether images may be taken of the heap ([`Heap::save`]). All memory is initialised for it.
+    pub images: bool,
 }
 
 impl Default for HeapConfig {
     fn default() -> Self {
-        HeapConfig { limit: 1 << 30, cycle_floor: 8 << 20, mark_stack: 128 << 10 }
+        HeapConfig { limit: 1 << 30, cycle_floor: 8 << 20, mark_stack: 128 << 10, images: false }
     }
 }
 
@@ -151,6 +157,7 @@ pub struct HeapStats {
 }
 
 /// Pace of the collector, in bytes allocated.
+#[derive(Clone, Copy)]
 struct Pacing {
     /// `HeapConfig::cycle_floor`.
     floor: u64,
@@ -189,6 +196,11 @@ pub struct Heap {
     limit: usize,
 
     stats: HeapStats,
+
+    /// Whether images may be taken.
+    has_images: bool,
+    /// What tells its images from those of other heaps.
+    identity: Arc<()>,
 }
 
 list_state! { Pacing { floor: Run, threshold: Run, since_cycle: Run, black: Run, owed: Run } }
@@ -225,6 +237,8 @@ list_state! {
         external: Parts,
         limit: Run,
         stats: Parts,
+        has_images: Process,
+        identity: Process,
     }
 }
 
@@ -258,6 +272,8 @@ impl Heap {
             external: External::default(),
             limit: config.limit.max(ARENA),
             stats: HeapStats::default(),
+            has_images: config.images,
+            identity: Arc::default(),
         }
     }
 

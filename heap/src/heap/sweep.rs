@@ -26,7 +26,7 @@ const FREE_PIECE: usize = 64 << 10;
 const LEAST_THRESHOLD: u64 = 256 << 10;
 
 /// Progress of the sweep.
-#[derive(Default)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct Sweep {
     /// Arena and block to sweep next.
     at: (usize, usize),

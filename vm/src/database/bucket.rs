@@ -17,7 +17,7 @@ struct BucketLink {
 }
 
 /// Buckets of numbered entries. Numbers should be small: there is a link for each number up to the largest.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Buckets {
     heads: Vec<u32>,
     links: Vec<BucketLink>,

@@ -118,6 +118,26 @@ fn name_hash(functor: Term, width: usize) -> u32 {
 }
 
 impl Database {
+    /// Returns a copy; `None` while a query is open.
+    pub(crate) fn copy(&self) -> Option<Database> {
+        self.queries.is_empty().then(|| Database {
+            terms: self.terms.clone(),
+            relations: self.relations.clone(),
+            by_name: self.by_name.clone(),
+            rules: self.rules.clone(),
+            time: self.time,
+            facts: self.facts,
+            bytes: self.bytes,
+            queries: BTreeMap::new(),
+            serial: self.serial,
+            ended: self.ended.clone(),
+            unlinked: self.unlinked.clone(),
+            released: self.released.clone(),
+            retired: self.retired.clone(),
+            cells: Vec::new(),
+        })
+    }
+
     /// Returns the number of facts.
     fn facts(&self) -> usize {
         self.facts
@@ -541,7 +561,7 @@ impl Database {
     // ---- upkeep
 
     /// Returns the bytes that the database takes, approximately.
-    fn footprint(&self) -> usize {
+    pub(crate) fn footprint(&self) -> usize {
         self.bytes + self.terms.bytes
     }
 

@@ -44,14 +44,14 @@ struct Lifespan {
     died: u64,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Group {
     ends: Ends,
     count: u32,
 }
 
 /// An index: the rows by their cells at some positions.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Index {
     mask: u64,
     keys: Buckets,
@@ -64,14 +64,14 @@ pub(super) struct Index {
     position: u32,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct WantedIndex {
     mask: u64,
     vain: usize,
 }
 
 /// The facts with one functor and width.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Relation {
     pub(super) functor: Term,
     /// Number of arguments.

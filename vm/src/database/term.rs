@@ -59,7 +59,7 @@ impl Term {
 }
 
 /// The contents of a term of more than a word.
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 enum TermData {
     Free,
     /// A pair: its halves, the number of pairs in it, and whether it is free of variables.
@@ -77,14 +77,14 @@ enum TermData {
     Object(Value),
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct TermNode {
     data: TermData,
     holders: u32,
 }
 
 /// All terms of more than a word.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Terms {
     nodes: Vec<TermNode>,
     buckets: Buckets,

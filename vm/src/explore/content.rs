@@ -221,22 +221,18 @@ impl VisitRunning for Walk<'_> {
 
 impl VisitWorld for Walk<'_> {
     /// What symbols of packages have that is not the language's from the beginning.
-    fn symbols(&mut self, world: &World) {
+    fn symbols(&mut self, _: &World) {
         let vm = self.vm;
-        let mut named = Vec::new();
-        world.each_symbol(&mut |symbol, v| {
-            let Some(object) = vm.heap.symbol(v) else { return };
+        for &(digest, v) in &*self.named() {
+            let Some(object) = vm.heap.symbol(v) else { continue };
             let has_value = object.value != Value::UNBOUND
                 && object.header.flags & (SymbolObject::CONSTANT | SymbolObject::KEYWORD) == 0;
             let has_function = image_origin(&vm.heap, object.function).is_none()
                 && sort_of(&vm.heap, object.function) == Some(Sort::Bytecode);
-            if has_value || has_function || object.plist.is_true() {
-                named.push((symbol.clone(), *object, has_value, has_function));
+            if !has_value && !has_function && !object.plist.is_true() {
+                continue;
             }
-        });
-        named.sort_unstable_by(|(a, ..), (b, ..)| (a.package(), a.name()).cmp(&(b.package(), b.name())));
-        for (symbol, object, has_value, has_function) in named {
-            self.digest.add_text(symbol.name());
+            self.digest_of(digest);
             if has_value {
                 self.value(object.value);
             }

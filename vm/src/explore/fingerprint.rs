@@ -19,20 +19,23 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::live::Live;
+use esl_bytecode::symbol::Symbol;
 use esl_heap::state::{StateSink, Stated};
 
 use crate::fused::unfused;
+use crate::heap::layout::GRANULE;
 use crate::heap::{Heap, Kind};
 use crate::interp::frames::Frames;
 use crate::shape::{Shape, Sort};
+use crate::shared::CopyOnWrite;
 use crate::state::{VisitCourse, VisitVm};
 use crate::table::Table;
 use crate::task::{Task, TaskEnd, UnwindTarget, Unwinding};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{event, link};
-use crate::world::GivenMap;
 use crate::world::load::image_origin;
+use crate::world::{GivenMap, World};
 
 /// Two hashes of 64 bits of a sequence of words, mixed apart from each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -56,45 +59,125 @@ impl Digest {
         self.add_all(text.bytes().map(u64::from));
     }
 
+    /// Returns what tells a symbol of a package from others.
+    fn of_symbol(symbol: &Symbol) -> Digest {
+        let mut digest = Digest(2, 1);
+        digest.add_text(symbol.package().map_or("", |package| package));
+        digest.add_text(symbol.name());
+        digest
+    }
+
     fn bits(self) -> u128 {
         u128::from(self.0) << 64 | u128::from(self.1)
+    }
+}
+
+/// The numbers of the objects that a walk has met.
+#[derive(Default)]
+struct ObjectNumbers {
+    /// Ordinal of the walk.
+    walk: u32,
+    /// For a place in the heap the ordinal of the walk that has met an object there last, above its number.
+    by_place: Vec<u64>,
+    /// Numbers of the objects at other places, by identity.
+    others: GivenMap<u64, u32>,
+}
+
+/// Number of places that are looked up in a table.
+const PLACES: u64 = 1 << 22;
+
+impl ObjectNumbers {
+    /// Begins another walk.
+    fn begin(&mut self) {
+        self.others.clear();
+        self.walk = self.walk.wrapping_add(1);
+        if self.walk == 0 {
+            (self.by_place, self.walk) = (Vec::new(), 1);
+        }
+    }
+
+    /// Returns the number of the object with this identity: `next`, if it is met for the first time.
+    fn of(&mut self, identity: u64, next: u32) -> u32 {
+        // No two objects share a granule.
+        let place = identity / GRANULE as u64;
+        if place >= PLACES {
+            return *self.others.entry(identity).or_insert(next);
+        }
+        let place = place as usize;
+        if place >= self.by_place.len() {
+            self.by_place.resize((place + 1).next_multiple_of(1 << 12), 0);
+        }
+        let entry = &mut self.by_place[place];
+        if (*entry >> 32) as u32 != self.walk {
+            *entry = u64::from(self.walk) << 32 | u64::from(next);
+        }
+        *entry as u32
     }
 }
 
 /// Makes fingerprints, and remembers of functions what does not change.
 #[derive(Default)]
 pub(super) struct Fingerprints {
-    /// What tells the code of a function from others, by its address in the present machine.
-    codes: GivenMap<u64, Digest>,
+    /// What tells the code of a function from others, and a symbol of a package, by its address in the
+    /// present machine.
+    codes: CopyOnWrite<GivenMap<u64, Digest>>,
+    /// The symbols of packages, by name, and what tells each from others.
+    named: Rc<Vec<(Digest, Value)>>,
     /// The collector's cycle in which the addresses are good.
     cycle: u64,
     /// Which registers are live, by what tells the code.
-    live: HashMap<Digest, Rc<Live>>,
+    live: CopyOnWrite<HashMap<Digest, Rc<Live>>>,
+    numbers: ObjectNumbers,
 }
 
 impl Fingerprints {
     /// Another machine comes, with other addresses.
     pub(super) fn begin_machine(&mut self) {
-        self.codes.clear();
+        self.codes = CopyOnWrite::default();
+        self.named = Rc::default();
+    }
+
+    /// Returns a copy of what is remembered of the present machine, as it stands.
+    pub(super) fn of_machine(&self) -> Fingerprints {
+        let (codes, named) = (self.codes.clone(), self.named.clone());
+        Fingerprints { codes, named, cycle: self.cycle, ..Fingerprints::default() }
+    }
+
+    /// Returns to what was remembered at the time of such a copy, with the machine.
+    pub(super) fn restore(&mut self, copy: &Fingerprints) {
+        (self.codes, self.named, self.cycle) = (copy.codes.clone(), copy.named.clone(), copy.cycle);
+    }
+
+    /// Returns the symbols of packages, by name, and what tells each from others.
+    pub(super) fn named(&mut self, world: &World) -> Rc<Vec<(Digest, Value)>> {
+        // A machine gets more symbols, and loses none.
+        if self.named.len() != world.symbols.len() {
+            let mut all: Vec<(&Symbol, Value)> = Vec::with_capacity(world.symbols.len());
+            all.extend(world.symbols.iter().map(|(symbol, &value)| (symbol, value)));
+            all.sort_unstable_by(|(a, _), (b, _)| (a.package(), a.name()).cmp(&(b.package(), b.name())));
+            self.named =
+                Rc::new(all.into_iter().map(|(symbol, value)| (Digest::of_symbol(symbol), value)).collect());
+        }
+        self.named.clone()
     }
 
     /// Returns the fingerprint of the state of a machine in which no task runs.
     pub(super) fn of(&mut self, vm: &mut Vm) -> u128 {
         if self.cycle != vm.heap.cycle_id() {
             self.cycle = vm.heap.cycle_id();
-            self.codes.clear();
+            self.codes = CopyOnWrite::default();
         }
         let now = vm.scheduler.clock.read(&mut vm.outside.host);
         self.walk(vm, now, false)
     }
 
     fn walk(&mut self, vm: &Vm, now: u64, is_strict: bool) -> u128 {
+        self.numbers.begin();
         let mut walk = Walk {
             vm,
             known: self,
             digest: Digest::default(),
-            numbers: GivenMap::default(),
-            met: Vec::new(),
+            met: Vec::with_capacity(1 << 10),
             next: 0,
             now,
             task: None,
@@ -128,9 +211,7 @@ pub(super) struct Walk<'a> {
     pub(super) vm: &'a Vm,
     known: &'a mut Fingerprints,
     pub(super) digest: Digest,
-    /// The numbers of the objects that were met, by address.
-    numbers: GivenMap<u64, u32>,
-    /// These objects, and how many of them were looked into.
+    /// The objects that were met, and how many of them were looked into.
     met: Vec<Value>,
     next: usize,
     /// The time to which others are relative.
@@ -179,11 +260,12 @@ impl Walk<'_> {
             return self.word(v.bits());
         }
         let next = self.met.len() as u32;
-        let number = *self.numbers.entry(v.bits()).or_insert(next);
+        let identity = self.vm.heap.identity(v);
+        let number = self.known.numbers.of(identity, next);
         if number == next {
             self.met.push(v);
             if self.is_strict {
-                self.word(self.vm.heap.identity(v));
+                self.word(identity);
             }
         }
         self.word(1);
@@ -259,11 +341,8 @@ impl Walk<'_> {
         self.word(header.kind as u64 | u64::from(header.flags) << 8 | u64::from(header.aux) << 16);
         let vm = self.vm;
         match header.kind {
-            Kind::Symbol => match vm.world.name_of(&vm.heap, v) {
-                Some(symbol) => {
-                    self.digest.add_text(symbol.package().map_or("", |package| package));
-                    self.digest.add_text(symbol.name());
-                }
+            Kind::Symbol => match self.symbol(v) {
+                Some(digest) => self.digest_of(digest),
                 None => {
                     let Some(&object) = vm.heap.symbol(v) else { return };
                     [object.name, object.value, object.plist].into_iter().for_each(|v| self.value(v));
@@ -308,6 +387,30 @@ impl Walk<'_> {
             }
             _ => self.raw(v),
         }
+    }
+
+    /// What is known by what tells it from others.
+    pub(super) fn digest_of(&mut self, digest: Digest) {
+        self.word(digest.0);
+        self.word(digest.1);
+    }
+
+    /// What tells a symbol of a package from others; `None` for another symbol.
+    fn symbol(&mut self, v: Value) -> Option<Digest> {
+        if let Some(&digest) = self.known.codes.get(&v.bits()) {
+            return Some(digest);
+        }
+        let symbol = self.vm.world.name_of(&self.vm.heap, v)?;
+        let digest = Digest::of_symbol(&symbol);
+        if self.vm.world.symbols.contains_key(&symbol) {
+            self.known.codes.insert(v.bits(), digest);
+        }
+        Some(digest)
+    }
+
+    /// What the machine knows of its symbols, by name.
+    pub(super) fn named(&mut self) -> Rc<Vec<(Digest, Value)>> {
+        self.known.named(&self.vm.world)
     }
 
     /// An object without values in it.

@@ -5,6 +5,8 @@
 //! point         where a task may have to let others go first, and running from point to point
 //! fingerprint   telling states apart           content  visiting the fields that belong to a state
 //! live          which registers of a frame belong to a state
+//! search        the tree of choices, and the states found
+//! keep          returning to places of that tree
 //! ```
 //!
 //! **Points.** A task is assumed to run undisturbed from one *point* to the next. It stands at a point just
@@ -20,13 +22,15 @@
 //! **Choices.** At each point any runnable task may continue, whatever its priority (every task has a turn at
 //! some time). The task that has just run comes first, then the others from the oldest to the newest; a
 //! choice is an index into that order, and a list of choices determines a schedule: [`Vm::follow`] runs it
-//! again. Time is virtual, and moves when all tasks wait.
+//! again. Time is virtual, and moves when all tasks wait; with [`TimerGrain::Any`], letting it move to the
+//! first timer is the last choice at each point.
 //!
-//! **Search.** Going back means starting again: a new machine follows the choices up to a point where another
-//! one was possible, takes that one, and continues until it ends or reaches a known state. So nothing has to
-//! be copied or undone, and every reported schedule has been run from its beginning. The search proceeds by
-//! the number of preemptions (points at which a task had to give way although it could have continued), so
-//! the first schedule that leads to an ending is one with the fewest preemptions.
+//! **Search.** The machine goes back to a point where another choice was possible, takes that one, and
+//! continues until it ends or reaches a known state. Going back means restoring a snapshot of that point;
+//! where memory had no room for it, or there could be none, of one before it, or of the beginning, from where
+//! the machine follows the choices. The search proceeds by the number of preemptions (points at which a task
+//! had to give way although it could have continued), so the first schedule that leads to an ending is one
+//! with the fewest preemptions.
 //!
 //! **States** are told apart by fingerprints of 128 bits (see `fingerprint`). We accept the risk of a
 //! fingerprint collision; exploring a state twice only costs time.
@@ -39,30 +43,48 @@
 
 mod content;
 mod fingerprint;
+mod keep;
 mod live;
 mod point;
+mod search;
 #[cfg(test)]
 mod tests;
 
-use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
 use crate::run::RunOutcome;
 pub use crate::schedule::Grain;
 use crate::vm::Vm;
-use fingerprint::Fingerprints;
+use keep::Keeper;
 pub use point::{StandingTask, Switch};
-use point::{explore_by, run_by_points};
+use search::{ChoiceNode, ROOT, Search};
+
+/// When timers fire in an exploration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TimerGrain {
+    /// When all tasks wait: what tasks do takes no time.
+    #[default]
+    Idle,
+    /// At any point: what tasks do may take as long as the first timer takes.
+    Any,
+}
 
 /// Settings of an exploration.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
     /// Where points are.
     pub grain: Grain,
+    /// When timers fire.
+    pub timers: TimerGrain,
     /// Ticks after which a task that reaches no point is stopped.
     pub turn: u32,
     /// Number of states at which the search gives up.
     pub states: usize,
+    /// Bytes that the search may take, beside one machine: for snapshots as long as there is room for them
+    /// beside the states. When these alone have no room, the search gives up.
+    pub memory: usize,
+    /// Whether snapshots of machines are taken. Without them, a new machine begins each run.
+    pub snapshots: bool,
     /// Most preemptions of a schedule; more are not tried.
     pub switches: Option<usize>,
     /// Most choices of a schedule, by `choose`, that are not the first form; more are not tried.
@@ -76,8 +98,11 @@ impl Default for Settings {
     fn default() -> Settings {
         Settings {
             grain: Grain::Changes,
+            timers: TimerGrain::Idle,
             turn: 100_000,
             states: 1_000_000,
+            memory: 1 << 29,
+            snapshots: true,
             switches: None,
             faults: None,
             output: true,
@@ -119,6 +144,8 @@ pub struct Exploration<T> {
 pub enum SearchLimit {
     /// [`Settings::states`].
     States,
+    /// [`Settings::memory`].
+    Memory,
     /// [`Settings::switches`].
     Switches,
     /// [`Settings::faults`].
@@ -140,113 +167,6 @@ pub struct SearchProgress {
     pub switches: usize,
     /// Number of different endings so far.
     pub endings: usize,
-}
-
-/// A node in the tree of choices: its last choice, after those of its parent.
-#[derive(Clone, Copy, Debug)]
-struct ChoiceNode {
-    parent: u32,
-    choice: u32,
-    /// State in which the choice was made.
-    state: u32,
-    /// Number of choices so far, by `choose`, that were not the first form.
-    faults: u32,
-}
-
-const ROOT: u32 = 0;
-
-/// The state of a search.
-#[derive(Default)]
-struct Search {
-    nodes: Vec<ChoiceNode>,
-    /// Nodes to continue from, by number of preemptions; the latest is last.
-    open: Vec<Vec<u32>>,
-    /// Numbers of states, by fingerprint.
-    states: HashMap<u128, u32>,
-    /// Node from which each state was reached first.
-    places: Vec<u32>,
-    /// Steps, as pairs of the states before and after.
-    steps: Vec<(u32, u32)>,
-    /// States from which a step leads to the end.
-    last: Vec<u32>,
-}
-
-impl Search {
-    fn node(&mut self, node: ChoiceNode) -> u32 {
-        self.nodes.push(node);
-        (self.nodes.len() - 1) as u32
-    }
-
-    fn open(&mut self, switches: usize, node: u32) {
-        if self.open.len() <= switches {
-            self.open.resize(switches + 1, Vec::new());
-        }
-        self.open[switches].push(node);
-    }
-
-    /// Returns the next node to continue from, one with the fewest preemptions, and that number.
-    fn next(&mut self) -> Option<(usize, u32)> {
-        self.open.iter_mut().enumerate().find_map(|(switches, nodes)| Some((switches, nodes.pop()?)))
-    }
-
-    /// Returns how far the search has come.
-    fn progress(&self, runs: usize, switches: usize, endings: usize) -> SearchProgress {
-        let open = self.open.iter().map(Vec::len).sum::<usize>() + 1;
-        SearchProgress { states: self.states.len(), runs, open, switches, endings }
-    }
-
-    /// Returns the choices that lead to a node.
-    fn choices(&self, node: u32) -> Vec<u32> {
-        let mut choices = Vec::new();
-        let mut at = node;
-        while at != ROOT {
-            choices.push(self.nodes[at as usize].choice);
-            at = self.nodes[at as usize].parent;
-        }
-        choices.reverse();
-        choices
-    }
-
-    /// Returns choices that lead to a state from which the end cannot be reached.
-    fn endless(&self) -> Option<Vec<u32>> {
-        let mut before = vec![Vec::new(); self.places.len()];
-        for &(from, to) in &self.steps {
-            before[to as usize].push(from);
-        }
-        let mut ends = vec![false; self.places.len()];
-        let mut found = self.last.clone();
-        while let Some(state) = found.pop() {
-            if !std::mem::replace(&mut ends[state as usize], true) {
-                found.extend(&before[state as usize]);
-            }
-        }
-        let stuck = ends.iter().position(|ends| !ends)?;
-        Some(self.choices(self.places[stuck]))
-    }
-
-    /// Returns whether steps lead from a state back to it: whether states remain when those without a step to
-    /// them are removed repeatedly.
-    fn has_cycle(&self) -> bool {
-        let mut after = vec![Vec::new(); self.places.len()];
-        let mut steps_to = vec![0_u32; self.places.len()];
-        for &(from, to) in &self.steps {
-            after[from as usize].push(to);
-            steps_to[to as usize] += 1;
-        }
-        let mut free: Vec<u32> =
-            (0..self.places.len() as u32).filter(|&state| steps_to[state as usize] == 0).collect();
-        let mut taken = 0;
-        while let Some(state) = free.pop() {
-            taken += 1;
-            for &next in &after[state as usize] {
-                steps_to[next as usize] -= 1;
-                if steps_to[next as usize] == 0 {
-                    free.push(next);
-                }
-            }
-        }
-        taken < self.places.len()
-    }
 }
 
 /// Runs a program under all schedules. Each machine made by `begin` is about to run it: its main task exists.
@@ -275,13 +195,13 @@ pub fn explore_while<T: PartialEq, E>(
     mut goes_on: impl FnMut(&SearchProgress) -> bool,
 ) -> Result<Exploration<T>, E> {
     let mut search = Search::default();
-    let root = search.node(ChoiceNode { parent: ROOT, choice: 0, state: 0, faults: 0 });
+    let root = search.node(ChoiceNode::new(ROOT, 0, 0, 0));
     search.open(0, root);
-    let mut fingerprints = Fingerprints::default();
+    let mut keeper = Keeper::new(settings);
     let mut endings: Vec<ExploredEnding<T>> = Vec::new();
     let (mut runs, mut limit) = (0, None);
     while let Some((switches, place)) = search.next() {
-        if limit == Some(SearchLimit::States) {
+        if matches!(limit, Some(SearchLimit::States | SearchLimit::Memory)) {
             break;
         }
         if !goes_on(&search.progress(runs, switches, endings.len())) {
@@ -290,16 +210,16 @@ pub fn explore_while<T: PartialEq, E>(
         if limit == Some(SearchLimit::Asked) {
             break;
         }
-        let mut machine = begin()?;
-        explore_by(&mut machine, settings);
-        fingerprints.begin_machine();
+        let (mut machine, run, choices) = keeper.go_to(&search, place, &mut begin)?;
         runs += 1;
-        let choices = search.choices(place);
-        let mut given = choices.iter().copied();
+        let mut given = choices.into_iter();
         // Position of the run: the choices so far, and the state in which the last step began.
         let mut node = place;
         let mut before = (place != ROOT).then(|| search.nodes[place as usize].state);
-        let outcome = run_by_points(&mut machine, &mut |vm, runnable| {
+        let outcome = run.go_on(&mut machine, &mut |vm, run, runnable| {
+            if given.len() == 1 && runnable.count() > 1 {
+                keeper.keep_on_the_way(vm, run, &search, search.nodes[place as usize].parent);
+            }
             if runnable.count() > 1
                 && let Some(choice) = given.next()
             {
@@ -309,7 +229,7 @@ pub fn explore_while<T: PartialEq, E>(
                 return Some(0);
             }
             let next = search.places.len() as u32;
-            let (state, is_new) = match search.states.entry(fingerprints.of(vm)) {
+            let (state, is_new) = match search.states.entry(keeper.fingerprints.of(vm)) {
                 Entry::Occupied(known) => (*known.get(), false),
                 Entry::Vacant(free) => (*free.insert(next), true),
             };
@@ -322,6 +242,10 @@ pub fn explore_while<T: PartialEq, E>(
             search.places.push(node);
             if search.places.len() >= settings.states {
                 limit = Some(SearchLimit::States);
+                return None;
+            }
+            if search.places.len().is_multiple_of(64) && !keeper.has_room(search.bytes()) {
+                limit = Some(SearchLimit::Memory);
                 return None;
             }
             // A run may come to new states for ever.
@@ -341,17 +265,22 @@ pub fn explore_while<T: PartialEq, E>(
                     limit = limit.or(Some(SearchLimit::Faults));
                 } else {
                     for choice in (1..runnable.count()).rev() {
-                        let other = search.node(ChoiceNode { parent: node, choice, state, faults });
+                        let other = search.node(ChoiceNode::new(node, choice, state, faults));
                         search.open(switches, other);
                     }
+                    keeper.keep(vm, run, node);
                 }
-                node = search.node(ChoiceNode { parent: node, choice: 0, state, faults: before });
+                node = search.node(ChoiceNode::new(node, 0, state, before));
             }
             Some(0)
         });
-        let Some(outcome) = outcome else { continue };
+        let Some(outcome) = outcome else {
+            keeper.take_back(machine);
+            continue;
+        };
         search.last.extend(before);
         let what = judge(&mut machine, outcome);
+        keeper.take_back(machine);
         match endings.iter_mut().find(|ending| ending.what == what) {
             Some(ending) => ending.runs += 1,
             None => endings.push(ExploredEnding { what, choices: search.choices(node), runs: 1 }),

@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use super::Settings;
+use super::{Settings, TimerGrain};
 use crate::heap::Kind;
 use crate::report::{program_place, task_label};
 use crate::run::{self, RunOutcome};
@@ -20,12 +20,14 @@ pub(super) struct Runnable<'a> {
     pub(super) ways: Option<u32>,
     /// Whether the first of the tasks is the one that ran last.
     pub(super) has_last: bool,
+    /// Whether, as the last choice, time may pass up to the first timer.
+    pub(super) has_timer: bool,
 }
 
 impl Runnable<'_> {
     /// Returns the number of choices.
     pub(super) fn count(&self) -> u32 {
-        self.ways.unwrap_or(self.tasks.len() as u32)
+        self.ways.unwrap_or(self.tasks.len() as u32 + u32::from(self.has_timer))
     }
 }
 
@@ -45,6 +47,13 @@ pub enum Switch {
         oldest: StandingTask,
         /// The task that went on.
         next: StandingTask,
+    },
+    /// Time has passed, up to the first timer, before a task went on.
+    Timer {
+        /// The task that could have gone on.
+        task: StandingTask,
+        /// Nanoseconds that have passed.
+        passed: u64,
     },
     /// `choose` has taken another form than its first.
     Choice {
@@ -111,16 +120,21 @@ fn follow(
         }
         Some(choice)
     };
-    let outcome = run_by_points(vm, &mut next);
+    let outcome = PointRun::begin(vm, settings).go_on(vm, &mut |vm, _, runnable| next(vm, runnable));
     vm.scheduler.points.grain = None;
     outcome
 }
 
 /// Describes a choice that is not the first.
-fn switch(vm: &Vm, runnable: Runnable<'_>, choice: u32) -> Switch {
+fn switch(vm: &mut Vm, runnable: Runnable<'_>, choice: u32) -> Switch {
     let first = StandingTask::of(vm, runnable.tasks[0]);
     if runnable.ways.is_some() {
         return Switch::Choice { task: first, form: choice };
+    }
+    if choice as usize == runnable.tasks.len() && runnable.has_timer {
+        let now = vm.scheduler.clock.now;
+        let passed = vm.scheduler.first_timer().map_or(0, |time| time.saturating_sub(now));
+        return Switch::Timer { task: first, passed };
     }
     let next = StandingTask::of(vm, runnable.tasks[choice as usize % runnable.tasks.len()]);
     match runnable.has_last {
@@ -137,15 +151,92 @@ pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
     vm.outside.console.note_all(settings.output);
 }
 
-/// Runs from point to point; at each, `choose` says which task continues, or `None` to give up the run.
-/// Returns how the run has ended, unless it was given up.
-pub(super) fn run_by_points(
-    vm: &mut Vm,
-    choose: &mut dyn FnMut(&mut Vm, Runnable<'_>) -> Option<u32>,
-) -> Option<RunOutcome> {
-    let mut last = TaskNumber(u64::MAX);
-    let checks = vm.world.intern_esl(&mut vm.heap, "*%EXPLORED-STATE*").unwrap_or(Value::NIL);
-    loop {
+/// A run from point to point: what has to be known of it beside the state of the machine.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PointRun {
+    /// The task that ran last.
+    last: TaskNumber,
+    /// Variable with the event for which the task waits that checks each state.
+    checks: Value,
+    /// Whether the machine stands at a point, where the next choice is made.
+    is_at_point: bool,
+    /// Whether timers may fire while tasks can run.
+    has_timers: bool,
+}
+
+/// Says which of the tasks continues at a point, or `None` to give up the run.
+pub(super) type Choose<'a> = dyn FnMut(&mut Vm, PointRun, Runnable<'_>) -> Option<u32> + 'a;
+
+impl PointRun {
+    /// Begins to run a program from its beginning.
+    pub(super) fn begin(vm: &mut Vm, settings: &Settings) -> PointRun {
+        let checks = vm.world.intern_esl(&mut vm.heap, "*%EXPLORED-STATE*").unwrap_or(Value::NIL);
+        PointRun {
+            last: TaskNumber(u64::MAX),
+            checks,
+            is_at_point: false,
+            has_timers: settings.timers == TimerGrain::Any,
+        }
+    }
+
+    /// Runs from point to point; at each, `choose` says which task continues. It is given the run as it
+    /// stands, from which [`PointRun::go_on`] comes to the same choice again. Returns how the run has ended,
+    /// unless it was given up.
+    pub(super) fn go_on(mut self, vm: &mut Vm, choose: &mut Choose<'_>) -> Option<RunOutcome> {
+        loop {
+            if !self.is_at_point
+                && let Some(outcome) = self.come_to_point(vm)
+            {
+                return Some(outcome);
+            }
+            self.is_at_point = false;
+            let mut runnable: Vec<(bool, TaskNumber, TaskIndex)> =
+                runnable_tasks(vm).map(|(number, index)| (number != self.last, number, index)).collect();
+            runnable.sort_unstable();
+            let Some(&(is_other, ..)) = runnable.first() else {
+                if vm.scheduler.counts.alive == 0 {
+                    return Some(RunOutcome::Done);
+                }
+                if !run::idle(vm) {
+                    return Some(RunOutcome::Waiting);
+                }
+                continue;
+            };
+            let tasks: SmallVec<[TaskIndex; 16]> = runnable.iter().map(|&(.., index)| index).collect();
+            let here = PointRun { is_at_point: true, ..self };
+            if let Some(ways) = vm.scheduler.points.asked {
+                let ways = Some(ways as u32);
+                let asking = Runnable { tasks: &tasks, ways, has_last: false, has_timer: false };
+                let way = choose(vm, here, asking)?;
+                vm.scheduler.points.asked = None;
+                vm.scheduler.points.chosen = Some(way as usize);
+                if let Some(&(_, _, index)) = runnable.first().filter(|_| !is_other) {
+                    if let Some(task) = vm.scheduler.tasks.at_mut(index) {
+                        task.flags.set_at_point(false);
+                    }
+                    run::give_turn(vm, index, u64::MAX);
+                }
+                continue;
+            }
+            let has_timer = self.has_timers && vm.scheduler.first_timer().is_some();
+            let choice =
+                choose(vm, here, Runnable { tasks: &tasks, ways: None, has_last: !is_other, has_timer })?;
+            if has_timer && choice as usize == tasks.len() {
+                run::idle(vm);
+                continue;
+            }
+            let (_, number, index) = runnable[choice as usize % runnable.len()];
+            self.last = number;
+            if let Some(task) = vm.scheduler.tasks.at_mut(index) {
+                vm.scheduler.points.is_open = task.flags.at_point();
+                task.flags.set_at_point(false);
+            }
+            run::give_turn(vm, index, u64::MAX);
+        }
+    }
+
+    /// Does what is to be done between two turns. Returns how the run has ended, if it has.
+    fn come_to_point(&self, vm: &mut Vm) -> Option<RunOutcome> {
         vm.scheduler.rounds += 1;
         if vm.outside.inbox.is_rung() && run::take_in(vm) {
             return Some(RunOutcome::Stopped);
@@ -156,41 +247,7 @@ pub(super) fn run_by_points(
         while !vm.scheduler.deliveries.is_empty() {
             run::deliver_some(vm);
         }
-        if !check_state(vm, checks) {
-            return Some(RunOutcome::BudgetSpent);
-        }
-        let mut runnable: Vec<(bool, TaskNumber, TaskIndex)> =
-            runnable_tasks(vm).map(|(number, index)| (number != last, number, index)).collect();
-        runnable.sort_unstable();
-        let Some(&(is_other, ..)) = runnable.first() else {
-            if vm.scheduler.counts.alive == 0 {
-                return Some(RunOutcome::Done);
-            }
-            if !run::idle(vm) {
-                return Some(RunOutcome::Waiting);
-            }
-            continue;
-        };
-        let tasks: SmallVec<[TaskIndex; 16]> = runnable.iter().map(|&(.., index)| index).collect();
-        if let Some(ways) = vm.scheduler.points.asked.take() {
-            let way = choose(vm, Runnable { tasks: &tasks, ways: Some(ways as u32), has_last: false })?;
-            vm.scheduler.points.chosen = Some(way as usize);
-            if let Some(&(_, _, index)) = runnable.first().filter(|_| !is_other) {
-                if let Some(task) = vm.scheduler.tasks.at_mut(index) {
-                    task.flags.set_at_point(false);
-                }
-                run::give_turn(vm, index, u64::MAX);
-            }
-            continue;
-        }
-        let choice = choose(vm, Runnable { tasks: &tasks, ways: None, has_last: !is_other })?;
-        let (_, number, index) = runnable[choice as usize % runnable.len()];
-        last = number;
-        if let Some(task) = vm.scheduler.tasks.at_mut(index) {
-            vm.scheduler.points.is_open = task.flags.at_point();
-            task.flags.set_at_point(false);
-        }
-        run::give_turn(vm, index, u64::MAX);
+        (!check_state(vm, self.checks)).then_some(RunOutcome::BudgetSpent)
     }
 }
 

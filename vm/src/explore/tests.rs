@@ -112,7 +112,7 @@ fn what_never_ends_is_found() {
 }
 
 #[test]
-fn it_gives_up_after_the_given_number_of_states() {
+fn it_gives_up_after_the_given_number_of_states_or_bytes() {
     // A counter makes each state different.
     let counts = [
         Instr::LoadInt { dst: Dst(0), value: Int16(0) },
@@ -122,6 +122,9 @@ fn it_gives_up_after_the_given_number_of_states() {
     let settings = Settings { turn: 100, states: 50, ..Settings::default() };
     let found = endings(&[&counts, &counts], &settings);
     assert!(found.limit == Some(SearchLimit::States) && found.states >= 50, "{found:?}");
+    let settings = Settings { turn: 100, memory: 20_000, ..Settings::default() };
+    let found = endings(&[&counts, &counts], &settings);
+    assert!(found.limit == Some(SearchLimit::Memory) && found.states < 2_000, "{found:?}");
 }
 
 #[test]

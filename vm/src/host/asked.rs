@@ -4,8 +4,8 @@
 use esl_bytecode::datum::Datum;
 
 use super::{
-    Awaited, FileAnswer, FileRequest, Host, HostError, HostFailure, Inbox, Incoming, Input, Output, Permit,
-    Right, Rights, RunCheck, Wake, WriteMode,
+    Awaited, FileAnswer, FileRequest, Host, HostError, HostFailure, HostState, Inbox, Incoming, Input,
+    Output, Permit, Right, Rights, RunCheck, Wake, WriteMode,
 };
 use crate::canary::Canary;
 
@@ -42,6 +42,17 @@ impl Asked {
     /// Counts the questions to `host` from here on.
     pub(crate) fn new(host: Box<dyn Host + Send>) -> Asked {
         Asked { host, canary: Canary::default() }
+    }
+
+    /// Returns a state, with the canary, for [`Asked::restore_all`]; `None` if the host has none.
+    pub(crate) fn save_all(&self) -> Option<(HostState, Canary)> {
+        Some((self.host.save()?, self.canary))
+    }
+
+    /// Returns to a state. Returns whether the host did.
+    pub(crate) fn restore_all(&mut self, (state, canary): &(HostState, Canary)) -> bool {
+        self.canary = *canary;
+        self.host.restore(state)
     }
 
     /// Returns the canary of the questions so far.

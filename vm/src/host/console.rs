@@ -20,7 +20,7 @@ use super::{Host, HostError, Input, Output};
 const BLOCK: usize = 1 << 14;
 
 /// The standard streams.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Console {
     output: Vec<u8>,
     /// What there was no room for on standard error. While there is anything, no more is written to standard

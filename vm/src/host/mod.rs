@@ -12,6 +12,7 @@
 //! for a permit before each request that needs a right, and the host carries out what it is asked for then.
 //! [`VirtualHost`] has only the files that it was given.
 
+use std::any::Any;
 use std::fmt;
 
 use esl_bytecode::datum::Datum;
@@ -175,6 +176,9 @@ pub enum Wake {
     Never,
 }
 
+/// State of a host, as it sees fit.
+pub struct HostState(pub Box<dyn Any + Send>);
+
 /// How far a run is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunCheck {
@@ -202,6 +206,18 @@ pub trait Host {
     /// Waits until the monotonic clock shows `deadline` nanoseconds, something comes into the inbox or, if
     /// `awaited` says so, standard input has data or ends. May wake too early.
     fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake;
+
+    /// Returns the state of a host whose whole outside is in memory, for [`Host::restore`]. `None` for others:
+    /// what has happened outside cannot be taken back.
+    fn save(&self) -> Option<HostState> {
+        None
+    }
+
+    /// Returns to a state of this host, the inbox excepted. Returns whether it did.
+    fn restore(&mut self, state: &HostState) -> bool {
+        _ = state;
+        false
+    }
 
     /// Returns nanoseconds of real time, for figures and timelines of a run, on which nothing in the run
     /// depends. 0 if there is no real time.

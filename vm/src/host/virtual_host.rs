@@ -3,21 +3,32 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use crate::shared::CopyOnWrite;
+
 use super::rights::{permit, resolve_as_text};
 use super::{
-    Awaited, FileAnswer, FileRequest, Host, HostError, Inbox, Incoming, Input, Output, Permit, Right, Rights,
-    VIRTUAL_BEGINNING, Wake, WriteMode,
+    Awaited, FileAnswer, FileRequest, Host, HostError, HostState, Inbox, Incoming, Input, Output, Permit,
+    Right, Rights, VIRTUAL_BEGINNING, Wake, WriteMode,
 };
 
 /// The output of a program and its files, shared between a [`VirtualHost`] and its observers.
 #[derive(Clone, Default)]
 pub struct Captured(Arc<Mutex<Contents>>);
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Contents {
-    output: Vec<u8>,
-    error: Vec<u8>,
-    files: BTreeMap<String, Vec<u8>>,
+    output: CopyOnWrite<Vec<u8>>,
+    error: CopyOnWrite<Vec<u8>>,
+    files: CopyOnWrite<BTreeMap<String, Vec<u8>>>,
+}
+
+/// State of a [`VirtualHost`], but for what never changes.
+struct VirtualState {
+    now: u64,
+    input: VecDeque<Vec<u8>>,
+    arrivals: VecDeque<(u64, Incoming)>,
+    contents: Contents,
+    output_limit: Option<usize>,
 }
 
 impl Captured {
@@ -295,6 +306,27 @@ impl Host for VirtualHost {
 
     fn inbox(&self) -> Inbox {
         self.inbox.clone()
+    }
+
+    fn save(&self) -> Option<HostState> {
+        Some(HostState(Box::new(VirtualState {
+            now: self.now,
+            input: self.input.clone(),
+            arrivals: self.arrivals.clone(),
+            contents: self.captured.contents().clone(),
+            output_limit: self.output_limit,
+        })))
+    }
+
+    fn restore(&mut self, HostState(state): &HostState) -> bool {
+        let Some(state) = state.downcast_ref::<VirtualState>() else { return false };
+        let VirtualState { now, input, arrivals, contents, output_limit } = state;
+        self.now = *now;
+        self.input.clone_from(input);
+        self.arrivals.clone_from(arrivals);
+        *self.captured.contents() = contents.clone();
+        self.output_limit = *output_limit;
+        true
     }
 }
 

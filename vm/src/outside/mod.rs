@@ -49,6 +49,8 @@ pub(crate) struct Outside {
     pub(crate) console: Console,
     /// The embedder's functions, by name.
     pub(crate) functions: BTreeMap<String, Given>,
+    /// Number of calls of these.
+    pub(crate) calls: u64,
     /// Answer of one of them, while there is no room for it in the heap.
     pub(crate) answer: Option<Result<Datum, HostFailure>>,
     /// The operations under way.
@@ -71,6 +73,7 @@ impl Outside {
             host: Asked::new(host),
             console: Console::default(),
             functions: BTreeMap::new(),
+            calls: 0,
             answer: None,
             operations: Operations::default(),
             inputs: BTreeMap::new(),
@@ -82,6 +85,7 @@ impl Outside {
 
     /// Calls a function of the embedder's that returns at once; `None` if there is none of this name.
     pub(crate) fn call(&mut self, name: &str, arguments: &[Datum]) -> Option<Result<Datum, HostFailure>> {
+        self.calls += 1;
         match &mut self.functions.get_mut(name)?.function {
             HostFunction::AtOnce(function) => Some(self.host.call(name, arguments, function)),
             HostFunction::Operation(_) => None,
@@ -109,6 +113,7 @@ impl Outside {
     ) {
         let Some(given) = self.functions.get_mut(name) else { return };
         let HostFunction::Operation(function) = &mut given.function else { return };
+        self.calls += 1;
         let canceller = Canceller::default();
         self.operations.begin(handle, canceller.clone(), is_detached, begun_by);
         let number = self.operations.begun;

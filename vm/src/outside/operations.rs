@@ -23,7 +23,7 @@ pub(crate) struct OpenOperation {
 }
 
 /// The operations under way, by number.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Operations {
     pub(crate) open: BTreeMap<u64, OpenOperation>,
     /// Number of operations begun so far.

@@ -113,7 +113,7 @@ impl Account {
 }
 
 /// The accounts of a machine.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Accounts {
     pub(crate) accounts: Vec<Account>,
     /// Indices of accounts that are gone.

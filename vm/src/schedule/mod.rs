@@ -65,6 +65,7 @@ pub(crate) struct Counts {
 }
 
 /// The scheduler of a machine.
+#[derive(Clone)]
 pub(crate) struct Scheduler {
     /// The tasks; the record of the running one is in `running`.
     pub(crate) tasks: Tasks,

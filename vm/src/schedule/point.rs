@@ -20,7 +20,7 @@ pub enum Grain {
 }
 
 /// Where tasks stop while schedules are explored.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Points {
     /// Operations before which they stop; `None` unless schedules are explored.
     pub(crate) grain: Option<Grain>,

@@ -28,7 +28,7 @@ pub(crate) struct Queued {
 }
 
 /// The runnable tasks.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct RunQueues {
     /// Queues by priority.
     pub(crate) queues: [VecDeque<Queued>; PRIORITIES],

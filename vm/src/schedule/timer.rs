@@ -36,7 +36,7 @@ pub(crate) struct Timer {
 }
 
 /// The timers of a machine.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Timers {
     pub(crate) heap: BinaryHeap<Reverse<Timer>>,
     /// Number of timers set so far.

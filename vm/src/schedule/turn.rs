@@ -30,6 +30,7 @@ pub(crate) enum TurnEnd {
 }
 
 /// State of the running task that is over with its turn.
+#[derive(Clone)]
 pub(crate) struct Turn {
     /// Index of the task.
     pub(crate) index: TaskIndex,

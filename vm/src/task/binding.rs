@@ -8,6 +8,7 @@
 //! Invariant: `table.newest` has, for each symbol bound among the first `table.previous.len()` bindings, the
 //! index of the newest of these; `table.previous[i]` is what it had before binding `i`, plus one, or 0.
 
+use super::copy_with_room;
 use crate::value::Value;
 use crate::world::GivenMap;
 
@@ -36,10 +37,16 @@ pub(crate) struct Bindings {
 }
 
 /// Table of the older bindings.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct BindingTable {
     newest: GivenMap<u64, u32>,
     previous: Vec<u32>,
+}
+
+impl Clone for Bindings {
+    fn clone(&self) -> Bindings {
+        Bindings { all: copy_with_room(&self.all), table: self.table.clone() }
+    }
 }
 
 impl BindingTable {

@@ -12,6 +12,7 @@ use esl_heap::state::{StateSink, Stated};
 use std::cell::OnceCell;
 use std::ops::{Deref, DerefMut, Range};
 
+use super::copy_with_room;
 use crate::saved_pc::SavedPc;
 use crate::task::Allowance;
 use crate::task::Bindings;
@@ -204,8 +205,19 @@ pub(crate) struct Control {
     pub unwinding: Option<Unwinding>,
 }
 
+impl Clone for Control {
+    fn clone(&self) -> Control {
+        Control {
+            entries: copy_with_room(&self.entries),
+            running: copy_with_room(&self.running),
+            bindings: self.bindings.clone(),
+            unwinding: self.unwinding.clone(),
+        }
+    }
+}
+
 /// Control stack that is made when it is first used: many tasks never use one.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct LazyControl(OnceCell<Box<Control>>);
 
 impl LazyControl {

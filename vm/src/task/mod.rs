@@ -48,6 +48,7 @@ pub(crate) enum TaskState {
 
 /// Record of a task. There may be a million of them, so rarely used parts are behind pointers: [`Extra`] and
 /// [`LazyControl`].
+#[derive(Clone)]
 pub(crate) struct Task {
     /// Registers of its frames.
     pub stack: Stack,
@@ -207,6 +208,30 @@ impl Extra {
         self.interrupts.iter().chain(&self.values).chain(&self.suspended_by).copied().for_each(&mut *visit);
         if let Some(TaskEnd::Failed(condition)) = self.end {
             visit(condition);
+        }
+    }
+}
+
+/// Returns a copy with the same room, since the room counts as memory.
+fn copy_with_room<T: Clone>(list: &Vec<T>) -> Vec<T> {
+    let mut copy = Vec::with_capacity(list.capacity());
+    copy.extend_from_slice(list);
+    copy
+}
+
+impl Clone for Extra {
+    fn clone(&self) -> Extra {
+        Extra {
+            report: self.report.clone(),
+            end: self.end,
+            values: self.values.clone(),
+            limits: copy_with_room(&self.limits),
+            fund: self.fund,
+            interrupts: self.interrupts.clone(),
+            clock_behind: self.clock_behind,
+            clock_stopped: self.clock_stopped,
+            rests: self.rests,
+            suspended_by: self.suspended_by,
         }
     }
 }

@@ -20,7 +20,7 @@ const SPARE: usize = 64;
 /// Maximal number of words of stack that a record is kept with.
 const SPARE_WORDS: usize = 64;
 /// Place of a task in the table.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct TaskPlace {
     /// Task; `None` while it runs, and when the place is free.
     task: Option<Box<Task>>,
@@ -31,7 +31,7 @@ struct TaskPlace {
 }
 
 /// Table of a machine's tasks. The record of the running task is out of its place.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Tasks {
     places: Vec<TaskPlace>,
     free: Vec<u32>,
@@ -71,6 +71,16 @@ impl Tasks {
     /// Takes the large stack of a task that has ended, to free it piece by piece.
     pub(crate) fn discard(&mut self, stack: Stack) {
         self.discarded.push(stack);
+    }
+
+    /// Returns the bytes that all tasks take.
+    pub(crate) fn bytes(&self) -> usize {
+        self.iter().map(Task::bytes).sum()
+    }
+
+    /// Returns whether nothing is left to be freed.
+    pub(crate) fn has_freed_all(&self) -> bool {
+        self.discarded.is_empty()
     }
 
     /// Frees a piece of a stack that was discarded. Returns whether there was one.

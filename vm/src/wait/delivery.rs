@@ -26,7 +26,7 @@ pub(crate) struct Delivery {
 }
 
 /// Signals under delivery, and the tasks that are held back until all of them are delivered.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Deliveries {
     /// Signals, in the order in which they were given.
     pub(crate) signals: VecDeque<Delivery>,

@@ -24,6 +24,7 @@ use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
 use crate::heap::layout::SymbolObject;
 use crate::heap::{AllocError, Heap, Holder, Kind};
 use crate::shape::{Shape, Sort};
+use crate::shared::CopyOnWrite;
 use crate::trust;
 use crate::value::Value;
 use load::Images;
@@ -76,23 +77,24 @@ const OBJECT_BYTES: usize = 2 * size_of::<(Arc<str>, PackageId, Value)>();
 const CLASS_BYTES: usize = size_of::<(u64, Value)>() + 1;
 
 /// Names, and the objects that they stand for.
+#[derive(Clone)]
 pub(crate) struct World {
     /// Symbols that the machine uses.
     pub(crate) known: Known,
     /// Whether names of the language may be defined: only while the library is being loaded.
     pub(crate) is_open: bool,
     /// Objects of symbols with a package.
-    pub(crate) symbols: GivenMap<Symbol, Value>,
+    pub(crate) symbols: CopyOnWrite<GivenMap<Symbol, Value>>,
     /// Names of symbol objects by address, filled on demand.
-    pub(crate) names: RefCell<GivenMap<u64, Symbol>>,
+    pub(crate) names: RefCell<CopyOnWrite<GivenMap<u64, Symbol>>>,
     /// Number of the compiler's next uninterned symbol.
     pub(crate) fresh: Cell<u32>,
     /// The rules of packages.
-    pub(crate) packages: Packages,
+    pub(crate) packages: CopyOnWrite<Packages>,
     /// The objects of packages.
-    pub(crate) package_objects: BTreeMap<PackageId, Value>,
+    pub(crate) package_objects: CopyOnWrite<BTreeMap<PackageId, Value>>,
     /// Home packages of symbols, by name.
-    pub(crate) homes: BTreeMap<Arc<str>, (PackageId, Value)>,
+    pub(crate) homes: CopyOnWrite<BTreeMap<Arc<str>, (PackageId, Value)>>,
     /// Function that runs the top-level functions of a module; `NIL` until it is first needed.
     pub(crate) runner: Value,
     /// Standard input, output and error.
@@ -110,11 +112,11 @@ pub(crate) struct World {
     /// Whether symbols are being defined.
     pub(crate) is_defining: bool,
     /// Modules that are loaded piece by piece.
-    pub(crate) images: Images,
+    pub(crate) images: CopyOnWrite<Images>,
     /// Things of the embedder's that the program holds.
-    pub(crate) opaques: Opaques,
+    pub(crate) opaques: CopyOnWrite<Opaques>,
     /// Classes of structures and conditions, by the address of their names.
-    pub(crate) classes: GivenMap<u64, Value>,
+    pub(crate) classes: CopyOnWrite<GivenMap<u64, Value>>,
 }
 
 impl World {
@@ -128,12 +130,12 @@ impl World {
         let mut world = World {
             known: Known::NONE,
             is_open: true,
-            symbols: GivenMap::default(),
+            symbols: CopyOnWrite::default(),
             names: RefCell::default(),
             fresh: Cell::new(0),
-            packages: Packages::standard(),
-            package_objects: BTreeMap::new(),
-            homes: BTreeMap::new(),
+            packages: CopyOnWrite::new(Packages::standard()),
+            package_objects: CopyOnWrite::default(),
+            homes: CopyOnWrite::default(),
             runner: Value::NIL,
             streams: [Value::NIL; 3],
             nil: Value::NIL,
@@ -142,9 +144,9 @@ impl World {
             undefined,
             undefined_yet: Vec::new(),
             is_defining: false,
-            images: Images::default(),
-            opaques: Opaques::default(),
-            classes: GivenMap::default(),
+            images: CopyOnWrite::default(),
+            opaques: CopyOnWrite::default(),
+            classes: CopyOnWrite::default(),
         };
         world.nil = world.make_constant(heap, &Symbol::cl("NIL"), Value::NIL)?;
         world.t = world.make_constant(heap, &Symbol::cl("T"), Value::T)?;

@@ -15,7 +15,7 @@ use crate::value::Value;
 use crate::world::World;
 
 /// The things that the program holds.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Opaques {
     /// Objects, which this does not keep alive, and their things, by the number in the object.
     held: BTreeMap<u64, (Value, OpaqueDatum)>,

@@ -68,6 +68,7 @@ pub(crate) struct ImageClass {
 }
 
 /// The table of an image. Decoding a vector visits each of its items, so the result is kept.
+#[derive(Clone)]
 pub(super) struct Definitions {
     exports: Option<PoolIdx>,
     /// The rows in sequence: none, or a power of two of them.

@@ -27,10 +27,11 @@ use crate::value::Value;
 use crate::world::World;
 
 /// The images that a machine runs from.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Images(Vec<Image>);
 
 /// An image, and the objects made of it.
+#[derive(Clone)]
 struct Image {
     module: Arc<ModuleImage>,
     packages: Vec<Arc<str>>,

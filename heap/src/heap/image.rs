@@ -1,0 +1,357 @@
+//! Images: the contents of a heap at a time, to be had again at the same addresses.
+//!
+//! An image consists of pages. A page that is as it was in another image is shared with that one, so an image
+//! of a heap in which little has changed since takes little memory; to find out, the pages are compared. The
+//! memory of arenas and large objects lives as long as an image needs it, even if the heap has given it up.
+//!
+//! Guarantees: after [`Heap::restore`] the heap goes on as after [`Heap::save`], to the byte: the same
+//! allocations return the same addresses and ask for slices at the same points.
+//!
+//! Not here: values outside of the heap, of which those that came into being since are of no use any more.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::alloc::Region;
+use super::arena::{Arena, ArenaMemory, BLOCK, BLOCKS, BlockInfo};
+use super::external::External;
+use super::large::{LargeHeader, LargeMemory, LargeObject};
+use super::sweep::Sweep;
+use super::{Heap, HeapStats, Pacing, Phase};
+
+/// Bytes of a page.
+const PAGE: usize = 1024;
+/// Number of pages of a block.
+const BLOCK_PAGES: usize = BLOCK / PAGE;
+
+/// Part of the contents, and a count of the bytes that all pages of one heap take.
+struct Page {
+    bytes: Box<[u8]>,
+    count: Arc<AtomicUsize>,
+}
+
+/// Bytes of a page beside its contents.
+const PAGE_BYTES: usize = size_of::<Page>() + 32;
+
+impl Page {
+    fn of(bytes: &[u8], count: &Arc<AtomicUsize>) -> Arc<Page> {
+        count.fetch_add(bytes.len() + PAGE_BYTES, Ordering::Relaxed);
+        Arc::new(Page { bytes: bytes.into(), count: count.clone() })
+    }
+
+    /// Returns the page with these contents: `old`, if it has them.
+    fn like(old: Option<&Arc<Page>>, bytes: &[u8], count: &Arc<AtomicUsize>) -> Arc<Page> {
+        match old {
+            Some(old) if *old.bytes == *bytes => old.clone(),
+            _ => Page::of(bytes, count),
+        }
+    }
+
+    /// Writes the contents to where they come from.
+    fn put(&self, bytes: &mut [u8]) {
+        if *self.bytes != *bytes {
+            bytes.copy_from_slice(&self.bytes);
+        }
+    }
+}
+
+impl Drop for Page {
+    fn drop(&mut self) {
+        self.count.fetch_sub(self.bytes.len() + PAGE_BYTES, Ordering::Relaxed);
+    }
+}
+
+/// Contents of a block in which something lives.
+#[derive(Clone)]
+struct BlockImage {
+    metadata: Arc<Page>,
+    /// Pages; `None` where there is nothing but room.
+    pages: [Option<Arc<Page>>; BLOCK_PAGES],
+}
+
+/// An arena: its memory, and what was in its blocks.
+struct ArenaImage {
+    memory: Arc<ArenaMemory>,
+    blocks: [BlockInfo; BLOCKS + 1],
+    contents: [Option<Arc<BlockImage>>; BLOCKS + 1],
+}
+
+/// A large object: its memory, and what was in it.
+struct LargeImage {
+    memory: Arc<LargeMemory>,
+    header: LargeHeader,
+    contents: Arc<Page>,
+}
+
+/// The contents of a heap at a time.
+pub struct HeapImage {
+    identity: Arc<()>,
+    count: Arc<AtomicUsize>,
+    arenas: Vec<Option<ArenaImage>>,
+    large: Vec<LargeImage>,
+    first: Region,
+    second: Region,
+    due: bool,
+    reserve_open: bool,
+    epoch: u8,
+    cycle_id: u64,
+    pacing: Pacing,
+    marked: u64,
+    sweep: Sweep,
+    large_number: u64,
+    committed: usize,
+    external: External,
+    stats: HeapStats,
+}
+
+impl HeapImage {
+    /// Returns the bytes that all images of this heap take, about, which exist now.
+    pub fn bytes_of_all(&self) -> usize {
+        self.count.load(Ordering::Relaxed)
+    }
+}
+
+impl Heap {
+    /// Takes an image of the contents, which shares with `base` what has not changed since. `None` while the
+    /// collector works, and if the heap was not made for images.
+    pub fn save(&mut self, base: Option<&HeapImage>) -> Option<HeapImage> {
+        if self.phase != Phase::Idle || !self.has_images {
+            return None;
+        }
+        let base = base.filter(|base| Arc::ptr_eq(&base.identity, &self.identity));
+        let count = base.map_or_else(Arc::default, |base| base.count.clone());
+        let unused = [self.first.unused(), self.second.unused()];
+        let arenas = self.arenas.iter_mut().enumerate().map(|(number, arena)| {
+            let arena = arena.as_mut()?;
+            let old = base.and_then(|base| base.arenas.get(number)?.as_ref());
+            let old = old.filter(|old| Arc::ptr_eq(&old.memory, arena.memory()));
+            let contents = std::array::from_fn(|block| {
+                if block == 0 || arena.block(block).is_empty() {
+                    return None;
+                }
+                let old = old.and_then(|old| old.contents[block].as_ref());
+                Some(block_image(arena, block, &unused, old, &count))
+            });
+            Some(ArenaImage { memory: arena.memory().clone(), blocks: arena.blocks(), contents })
+        });
+        let arenas = arenas.collect();
+        let large = self.large.iter_mut().enumerate().map(|(index, object)| {
+            let old = base.and_then(|base| base.large.get(index));
+            let old = old.filter(|old| Arc::ptr_eq(&old.memory, object.memory()));
+            let header = *object.header();
+            // SAFETY: the heap has images, so the object was made zeroed; its header is its own, and nobody
+            // else has the heap.
+            let bytes = unsafe { object.bytes_mut() };
+            let contents = Page::like(old.map(|old| &old.contents), bytes, &count);
+            LargeImage { memory: object.memory().clone(), header, contents }
+        });
+        Some(HeapImage {
+            large: large.collect(),
+            arenas,
+            identity: self.identity.clone(),
+            count,
+            first: self.first.clone(),
+            second: self.second.clone(),
+            due: self.due,
+            reserve_open: self.reserve_open,
+            epoch: self.epoch,
+            cycle_id: self.cycle_id,
+            pacing: self.pacing,
+            marked: self.marker.bytes,
+            sweep: self.sweep,
+            large_number: self.large_number,
+            committed: self.committed,
+            external: self.external,
+            stats: self.stats,
+        })
+    }
+
+    /// Makes the contents those of an image again. Returns whether it is one of this heap; if not, nothing
+    /// happens.
+    ///
+    /// # Safety
+    /// From now on nobody uses a value that has come into being since the image was taken.
+    #[must_use]
+    pub unsafe fn restore(&mut self, image: &HeapImage) -> bool {
+        if !Arc::ptr_eq(&image.identity, &self.identity) {
+            return false;
+        }
+        let mut present = std::mem::take(&mut self.arenas);
+        let arenas = image.arenas.iter().enumerate().map(|(number, arena)| {
+            let now = present.get_mut(number).and_then(Option::take);
+            Some(restore_arena(now, arena.as_ref()?))
+        });
+        self.arenas = arenas.collect();
+        let large = image.large.iter().map(|object| {
+            // SAFETY: the header is that of the time of the image, and the heap, which has the object, is
+            // borrowed mutably.
+            let mut again = unsafe { LargeObject::again(&object.memory, object.header) };
+            // SAFETY: the heap has images, so the object was made zeroed; its header is its own.
+            object.contents.put(unsafe { again.bytes_mut() });
+            again
+        });
+        self.large = large.collect();
+        self.marker.forget(image.marked);
+        self.phase = Phase::Idle;
+        self.marking = false;
+        (self.first, self.second) = (image.first.clone(), image.second.clone());
+        (self.due, self.reserve_open) = (image.due, image.reserve_open);
+        (self.epoch, self.cycle_id) = (image.epoch, image.cycle_id);
+        (self.pacing, self.sweep) = (image.pacing, image.sweep);
+        (self.large_number, self.committed) = (image.large_number, image.committed);
+        (self.external, self.stats) = (image.external, image.stats);
+        true
+    }
+}
+
+/// Returns the contents of a block: those of `old`, where they are the same.
+fn block_image(
+    arena: &mut Arena,
+    block: usize,
+    unused: &[std::ops::Range<usize>; 2],
+    old: Option<&Arc<BlockImage>>,
+    count: &Arc<AtomicUsize>,
+) -> Arc<BlockImage> {
+    let metadata = Page::like(old.map(|old| &old.metadata), arena.metadata(block), count);
+    let address = arena.address(block);
+    // SAFETY: the heap has images, so the arena was made zeroed, and nobody else has the heap.
+    let bytes = unsafe { arena.objects_mut(block) };
+    let pages: [Option<Arc<Page>>; BLOCK_PAGES] = std::array::from_fn(|page| {
+        let (from, to) = (page * PAGE, (page + 1) * PAGE);
+        let is_room =
+            |range: &std::ops::Range<usize>| range.start <= address + from && address + to <= range.end;
+        if unused.iter().any(is_room) {
+            return None;
+        }
+        Some(Page::like(old.and_then(|old| old.pages[page].as_ref()), &bytes[from..to], count))
+    });
+    let is_same = |old: &Arc<BlockImage>| {
+        let same = |(old, new): (&Option<Arc<Page>>, &Option<Arc<Page>>)| match (old, new) {
+            (Some(old), Some(new)) => Arc::ptr_eq(old, new),
+            (None, None) => true,
+            _ => false,
+        };
+        Arc::ptr_eq(&old.metadata, &metadata) && old.pages.iter().zip(&pages).all(same)
+    };
+    match old {
+        Some(old) if is_same(old) => old.clone(),
+        _ => Arc::new(BlockImage { metadata, pages }),
+    }
+}
+
+/// Returns an arena as it was. `now` is what has its number at present.
+fn restore_arena(now: Option<Arena>, image: &ArenaImage) -> Arena {
+    let now = now.filter(|now| Arc::ptr_eq(now.memory(), &image.memory));
+    let mut arena = Arena::again(&image.memory, image.blocks);
+    arena.header_mut().grays = 0;
+    for block in 1..=BLOCKS {
+        let Some(contents) = &image.contents[block] else {
+            // Nothing lived there, so the block was canonical.
+            if now.as_ref().is_none_or(|now| !now.block(block).is_empty()) {
+                arena.metadata_mut(block).fill(0);
+            }
+            continue;
+        };
+        contents.metadata.put(arena.metadata_mut(block));
+        // SAFETY: the heap has images, so the arena was made zeroed, and nobody else has the heap.
+        let bytes = unsafe { arena.objects_mut(block) };
+        for (page, bytes) in contents.pages.iter().zip(bytes.chunks_exact_mut(PAGE)) {
+            if let Some(page) = page {
+                page.put(bytes);
+            }
+        }
+    }
+    arena
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::heap::HeapConfig;
+    use crate::value::Value;
+
+    fn heap() -> Heap {
+        // SAFETY: H1: a test uses the values of one heap, while it has it.
+        unsafe { Heap::new(HeapConfig { images: true, cycle_floor: 64 << 10, ..HeapConfig::default() }) }
+    }
+
+    /// Makes a list of vectors of all sizes, large ones among them, and drops some of them.
+    fn work(heap: &mut Heap, mut list: Value, rounds: usize) -> Value {
+        for round in 0..rounds {
+            let size = if round % 40 == 7 { BLOCK / 8 } else { round % 50 };
+            let vector = heap.alloc_vector_filled(size, Value::index(round)).expect("there is room");
+            let rest = if round % 64 == 63 { Value::NIL } else { list };
+            list = heap.cons(vector, rest).expect("there is room");
+            if heap.gc_due() {
+                // SAFETY: H2: the list is all that is used.
+                unsafe { heap.collect_fully(|heap| heap.mark(list)) };
+            }
+        }
+        list
+    }
+
+    fn read(heap: &Heap, mut list: Value) -> Vec<u64> {
+        let mut read = Vec::new();
+        while let Some(pair) = heap.as_cons(list) {
+            read.push(heap.identity(pair.car));
+            read.extend(heap.vector(pair.car).unwrap_or_default().iter().map(|v| v.bits()));
+            list = pair.cdr;
+        }
+        read
+    }
+
+    #[test]
+    fn a_heap_goes_on_from_an_image_as_it_did_before() {
+        let rounds = if cfg!(miri) { 70 } else { 1500 };
+        let mut heap = heap();
+        let first_list = work(&mut heap, Value::NIL, rounds);
+        let first = heap.save(None).expect("the collector rests");
+        let first_read = read(&heap, first_list);
+        let second_list = work(&mut heap, first_list, rounds);
+        let second = heap.save(Some(&first)).expect("the collector rests");
+        let second_read = read(&heap, second_list);
+        let third_list = work(&mut heap, second_list, 2 * rounds);
+        let (third_read, stats) = (read(&heap, third_list), heap.stats());
+        for _ in 0..2 {
+            // SAFETY: the lists that are read are those of the image.
+            assert!(unsafe { heap.restore(&first) });
+            heap.check().expect("it is whole");
+            assert_eq!(read(&heap, first_list), first_read);
+            assert_eq!(work(&mut heap, first_list, rounds), second_list);
+            assert_eq!(read(&heap, second_list), second_read);
+            // SAFETY: the lists that are read are those of this image.
+            assert!(unsafe { heap.restore(&second) });
+            assert_eq!(read(&heap, second_list), second_read);
+            assert_eq!(work(&mut heap, second_list, 2 * rounds), third_list);
+            assert_eq!((read(&heap, third_list), heap.stats()), (third_read.clone(), stats));
+        }
+        let taken = second.bytes_of_all();
+        drop(first);
+        assert!(second.bytes_of_all() < taken);
+    }
+
+    #[test]
+    fn an_image_shares_what_has_not_changed() {
+        let mut heap = heap();
+        work(&mut heap, Value::NIL, 60);
+        let first = heap.save(None).expect("the collector rests");
+        let taken = first.bytes_of_all();
+        heap.cons(Value::T, Value::NIL).expect("there is room");
+        let _second = heap.save(Some(&first)).expect("the collector rests");
+        assert!(first.bytes_of_all() - taken <= 2 * (PAGE + PAGE_BYTES));
+    }
+
+    #[test]
+    fn a_heap_takes_images_if_it_was_made_for_that_and_the_collector_rests() {
+        assert!(Heap::for_tests().save(None).is_none());
+        let (mut one, mut other) = (heap(), heap());
+        let image = one.save(None).expect("the collector rests");
+        // SAFETY: no value is used.
+        assert!(!unsafe { other.restore(&image) });
+        one.begin_cycle();
+        assert!(one.save(None).is_none());
+        // SAFETY: no value is used.
+        assert!(unsafe { one.restore(&image) });
+        assert!(one.save(None).is_some());
+    }
+}
