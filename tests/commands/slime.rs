@@ -30,7 +30,7 @@ const SECRET: &str = "patch-0123456789";
 
 /// Starts the program with a listener at a port. Returns the address, too.
 fn start(folder: &Folder) -> (Operated, String) {
-    let secrets = folder.file("secrets", &format!("command command-0123456789\npatch {SECRET}\n"));
+    let secrets = folder.file("secrets", format!("command command-0123456789\npatch {SECRET}\n"));
     use std::os::unix::fs::PermissionsExt;
     std::fs::set_permissions(&secrets, std::fs::Permissions::from_mode(0o600)).expect("it can be set");
     let mut run = Operated::start(folder, PROGRAM, &["--listen", "0", "--secrets", &secrets]);
@@ -299,7 +299,7 @@ fn emacs_drives_a_session() {
         return;
     }
     let folder = Folder::new("slime_emacs");
-    folder.file(".slime-secret", &format!("{SECRET}\n"));
+    folder.file(".slime-secret", format!("{SECRET}\n"));
     let (run, address) = start(&folder);
     let port = address.rsplit(':').next().unwrap_or_default();
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/commands/slime.el");
