@@ -114,9 +114,8 @@ fn the_tutorial_shows_what_a_reader_sees() {
     // The picture of the page is that of the run.
     let drawn = fs::read_to_string(folder.join("mission.svg")).expect("the timeline is drawn");
     let shown = fs::read_to_string(pages[0].with_file_name("mission.svg")).expect("the picture is there");
-    assert_eq!(
-        drawn,
-        shown,
+    assert!(
+        drawn == shown,
         "docs/tutorial/mission.svg is not that of the run: copy it from {}",
         folder.display()
     );

@@ -21,7 +21,7 @@
 //! coverage.add(&machine.take_passages());
 //! let report = coverage.report();
 //! assert!(report.lcov().contains("DA:3,2\nDA:4,0\n"));
-//! assert!(report.table().contains("<sign>:2: `if`: - is never taken"));
+//! assert!(report.table().contains("<sign>:4: `if`: - is never taken"));
 //! # Ok::<(), esl::Error>(())
 //! ```
 
