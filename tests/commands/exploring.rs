@@ -173,6 +173,22 @@ fn timers_may_end_at_any_point() {
     assert!(output.contains(". 5 s pass, and timers end,\n     before "), "{output}");
     let (status, _, errors) = run(&folder, &["run", "--schedule", "hurry-1.schedule", "hurry.esl"]);
     assert_eq!(status, Some(1), "{errors}");
+    // The time that a cleanup may take does not end at any point.
+    let text = "(defvar *begun* (make-event 'begun))
+(defvar *done* (make-event 'done))
+(defvar *is-tidy* nil)
+(defvar *task* (spawn (unwind-protect (progn (signal *begun*) (sleep 9))
+                        (wait-for-event *done* :unless-count 0)
+                        (setq *is-tidy* t))))
+(wait-for-event *begun* :unless-count 0)
+(spawn (signal *done*))
+(abort-task *task*)
+(wait-for-task *task*)
+(unless *is-tidy* (fail :untidy))
+";
+    folder.file("tidy.esl", text);
+    let (status, output, errors) = run(&folder, &["explore", "--timers", "any", "tidy.esl"]);
+    assert_eq!((status, errors.as_str()), (Some(0), ""), "{output}");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::{Settings, TimerGrain};
 use crate::heap::Kind;
 use crate::report::{program_place, task_label};
 use crate::run::{self, RunOutcome};
-use crate::schedule::Choices;
+use crate::schedule::{Choices, Due};
 use crate::task::{TaskIndex, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -218,7 +218,7 @@ impl PointRun {
                 }
                 continue;
             }
-            let has_timer = self.has_timers && vm.scheduler.first_timer().is_some();
+            let has_timer = self.has_timers && time_may_pass(vm);
             let choice =
                 choose(vm, here, Runnable { tasks: &tasks, ways: None, has_last: !is_other, has_timer })?;
             if has_timer && choice as usize == tasks.len() {
@@ -249,6 +249,13 @@ impl PointRun {
         }
         (!check_state(vm, self.checks)).then_some(RunOutcome::BudgetSpent)
     }
+}
+
+/// Returns whether time may pass while tasks can run. A cleanup takes no longer than it may: otherwise each that
+/// waits would be found to be cut off somewhere.
+fn time_may_pass(vm: &mut Vm) -> bool {
+    vm.scheduler.first_timer().is_some()
+        && vm.scheduler.timers.first().is_some_and(|timer| timer.due != Due::Cleanup)
 }
 
 /// Returns the numbers and places of the tasks that can run.
