@@ -1,6 +1,6 @@
 //! Places whose passages are counted, for reports of what a program has run.
 //!
-//! [`cover`] puts a [`NodeKind::Pass`] in front of the forms of a top-level form: before each that may be
+//! `cover` puts a [`NodeKind::Pass`] in front of the forms of a top-level form: before each that may be
 //! evaluated more or less often than what is around it, as the arms of an `if`, and before each that begins
 //! a line of the source. What a macro makes has the place of the macro's call and is not counted apart.
 //!
