@@ -108,6 +108,29 @@ fn declared_type(line: &str) -> Option<&str> {
     name.split(|c: char| !c.is_alphanumeric() && c != '_').next()
 }
 
+/// Most columns of a comment; the formatter keeps code within as many.
+const COLUMNS: usize = 110;
+
+#[test]
+fn comments_are_as_narrow_as_code() {
+    let mut wide = Vec::new();
+    for (_, folder) in SECTIONS {
+        for path in product_sources(root().join(folder)) {
+            let text = fs::read_to_string(&path).expect("a source can be read");
+            for (number, line) in text.lines().enumerate() {
+                let words = line.trim_start().trim_start_matches(['/', '!']);
+                let is_comment = line.trim_start().starts_with("//");
+                // Tables and drawings are as wide as they need.
+                let is_drawn = words.starts_with("  ") || words.starts_with(" |");
+                if is_comment && !is_drawn && line.chars().count() > COLUMNS {
+                    wide.push(format!("{}:{}", path.display(), number + 1));
+                }
+            }
+        }
+    }
+    assert!(wide.is_empty(), "comments wider than {COLUMNS} columns: {wide:#?}");
+}
+
 #[test]
 fn each_type_name_means_one_thing() {
     let mut declared: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();

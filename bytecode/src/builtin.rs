@@ -834,7 +834,8 @@ macro_rules! for_each_builtin {
             /// A vector of `size` times `byte`, of bits if `bits-p`.
             MakeBytes = array::make_bytes, internal "%MAKE-BYTES" ("size byte bits-p") -> one;
             /// Stores the bits of an operation on those of two arrays, from row-major index `start` on, in
-            /// `target`; the index up to which it has got. Bit 2a+b of `operation` is the result for bits a and b.
+            /// `target`; the index up to which it has got. Bit 2a+b of `operation` is the result for bits a
+            /// and b.
             BitOperation = array::bit_operation, internal "%BIT-OPERATION"
                 ("operation left right target start") -> one;
             /// What keeps the elements: a simple vector or string, the array itself if it is one.
@@ -1161,8 +1162,8 @@ macro_rules! for_each_builtin {
             BeginCompilation = eval::begin_compilation, internal "%BEGIN-COMPILATION" ("form");
             /// A handle of the compilation of a whole text, called `name` in what is said about it.
             BeginFile = eval::begin_file, internal "%BEGIN-FILE" ("name text");
-            /// The functions that run the top-level forms of a compiled file, in order. With a vector of its bytes, the
-            /// file is not read.
+            /// The functions that run the top-level forms of a compiled file, in order. With a vector of its
+            /// bytes, the file is not read.
             CompiledFile = eval::compiled_file, internal "%COMPILED-FILE" ("path &optional is-module bytes");
             /// A handle of a text that is compiled form by form. Functions of a text with a name know where
             /// they stand in it.
@@ -1386,8 +1387,8 @@ macro_rules! for_each_builtin {
             /// A wait that keeps all signals of `events` until it is closed, and lasts for `seconds` if they
             /// are not `NIL`; `NIL` if `count` is not `NIL` and no longer the sum of their counts.
             OpenWait = event::open_wait, internal "%OPEN-WAIT" ("events seconds count what");
-            /// Waits for a signal that a wait has kept: the list of its arguments, or `:timeout`; at the latest
-            /// until a time in nanoseconds, if one is given.
+            /// Waits for a signal that a wait has kept: the list of its arguments, or `:timeout`; at the
+            /// latest until a time in nanoseconds, if one is given.
             TakeSignal = event::take_signal, internal "%TAKE-SIGNAL" ("wait &optional deadline");
             /// Ends a wait.
             CloseWait = event::close_wait, internal "%CLOSE-WAIT" ("wait");
@@ -1412,14 +1413,15 @@ macro_rules! for_each_builtin {
             PassTurn = event::pass_turn, internal "%PASS-TURN" ("");
 
             // ---- fluents and resources
-            /// Sets the value of a fluent, and signals its event unless the value is `EQUAL` to the one before.
+            /// Sets the value of a fluent, and signals its event unless the value is `EQUAL` to the one
+            /// before.
             SetFluent = coordination::set_fluent, internal "%SET-FLUENT" ("fluent value")
                 slowly "%SLOW-SET-FLUENT";
             /// A new record of what this task reads, for a watch or `NIL`.
             NewReads = coordination::new_reads, internal "%NEW-READS" ("watch");
             /// Notes that a source is read, with the count of its event; whether it was not noted yet.
             NoteSource = coordination::note_read, internal "%NOTE-SOURCE" ("source reads");
-            /// The value of a fluent, of which it is noted that it is read if the reads are those of this task.
+            /// The value of a fluent; it is noted as read if the reads are those of this task.
             NotedValue = coordination::noted_value, internal "%NOTED-VALUE" ("fluent reads")
                 slowly "%SLOW-NOTED-VALUE";
             /// Waits for the next signal of what a form has read, or of any event if that is nothing or too

@@ -11,7 +11,7 @@ use esl_bytecode::span::Span;
 
 use crate::core::*;
 use crate::lower::SourceLines;
-use crate::resolve::{children, lambda_nodes};
+use crate::resolve::{children, children_mut, lambda_nodes};
 
 /// A place whose passages are counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,7 +70,7 @@ pub(crate) fn cover(core: &mut Core, lines: &SourceLines, places: &mut Vec<Count
     let number = |node: NodeId| NodeId(numbers[node.index()]);
     let mut nodes = Vec::with_capacity(next as usize);
     for (mut node, counted) in std::mem::take(&mut core.nodes).into_iter().zip(found) {
-        renumber(&mut node.kind, &number);
+        children_mut(&mut node.kind, &mut |child| *child = number(*child));
         if !counted.is_empty() {
             let span = node.span;
             let first = nodes.len() as u32 + 1;
@@ -220,68 +220,4 @@ fn surroundings(core: &Core) -> Vec<Option<Surroundings>> {
         }
     }
     known
-}
-
-/// Gives the nodes that a node refers to their new numbers.
-fn renumber(kind: &mut NodeKind, number: &dyn Fn(NodeId) -> NodeId) {
-    let one = |node: &mut NodeId| *node = number(*node);
-    let all = |nodes: &mut Vec<NodeId>| nodes.iter_mut().for_each(|node| *node = number(*node));
-    match kind {
-        NodeKind::Hole
-        | NodeKind::Constant(_)
-        | NodeKind::Local(_)
-        | NodeKind::Special(_)
-        | NodeKind::FunctionRef(_)
-        | NodeKind::BuiltinRef(_)
-        | NodeKind::Lambda(_)
-        | NodeKind::Pass(_)
-        | NodeKind::Go(..) => {}
-        NodeKind::SetLocal(_, node)
-        | NodeKind::SetSpecial(_, node)
-        | NodeKind::Block(_, node)
-        | NodeKind::ReturnFrom(_, node)
-        | NodeKind::Slot(_, _, node)
-        | NodeKind::IsInstance(_, node)
-        | NodeKind::Functions { body: node, .. } => one(node),
-        NodeKind::If(a, b, c)
-        | NodeKind::Progv(a, b, c)
-        | NodeKind::Recovery { table: a, procedures: b, body: c } => [a, b, c].into_iter().for_each(one),
-        NodeKind::Catch(a, b)
-        | NodeKind::Throw(a, b)
-        | NodeKind::UnwindProtect(a, b)
-        | NodeKind::FailureCleanup(a, b)
-        | NodeKind::BindValues(_, a, b)
-        | NodeKind::FirstValues(a, b)
-        | NodeKind::Handlers(a, b)
-        | NodeKind::Mask(a, b)
-        | NodeKind::SetSlot(_, _, a, b) => [a, b].into_iter().for_each(one),
-        NodeKind::Progn(nodes) | NodeKind::And(nodes) | NodeKind::Or(nodes) | NodeKind::Values(nodes) => {
-            all(nodes);
-        }
-        NodeKind::Let { bindings, body, .. } => {
-            bindings.iter_mut().for_each(|(_, value)| one(value));
-            one(body);
-        }
-        NodeKind::Tagbody(_, items) => {
-            for item in items {
-                if let TagbodyItem::Form(form) = item {
-                    one(form);
-                }
-            }
-        }
-        NodeKind::Call(callee, arguments) | NodeKind::Apply(callee, arguments) => {
-            if let Callee::Value(function) = callee {
-                one(function);
-            }
-            all(arguments);
-        }
-        NodeKind::CallValues(function, forms) => {
-            one(function);
-            all(forms);
-        }
-        NodeKind::HandlerCase(body, clauses) => {
-            one(body);
-            clauses.iter_mut().for_each(|clause| one(&mut clause.body));
-        }
-    }
 }

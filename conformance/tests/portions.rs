@@ -157,7 +157,8 @@ const KEPT: [&str; 3] = [
                   (with-open-file (notes "notes" :direction :output :if-exists :append
                                        :if-does-not-exist :create)
                     (print j notes))))))"#,
-    // Symbols, packages and classes that are made on the way, dynamic bindings, functions that are loaded late.
+    // Symbols, packages and classes that are made on the way,
+    // dynamic bindings, functions that are loaded late.
     r#"(defvar *depth* 0)
      (define-condition odd (error) ((n)))
      (dotimes (i 3)

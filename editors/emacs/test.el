@@ -2,8 +2,8 @@
 
 ;; emacs --batch -L editors/emacs -l editors/emacs/test.el FOLDER
 ;;
-;; Opens a file in FOLDER, starts the server that `esl-command' names (the environment variable ESLC), and does
-;; what one does in an editor.  Ends with status 1 at the first thing that is not as it should be.
+;; Opens a file in FOLDER, starts the server that `esl-command' names (the environment variable ESLC), and
+;; does what one does in an editor. Ends with status 1 at the first thing that is not as it should be.
 
 ;;; Code:
 

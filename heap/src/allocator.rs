@@ -12,17 +12,17 @@
 #[cfg(all(target_os = "linux", target_env = "gnu", not(miri)))]
 const LARGE: i32 = 128 << 10;
 
-/// Bytes that the allocator keeps at the end of its segment: without that much, it would get them and give them
-/// back again and again.
+/// Bytes that the allocator keeps at the end of its segment: without that much, it would get them and give
+/// them back again and again.
 #[cfg(all(target_os = "linux", target_env = "gnu", not(miri)))]
 const KEPT: i32 = 1 << 20;
 
-/// Has the C library's allocator return large blocks to the system for good. It is a setting of the process, so
-/// that it is for programs to call, not for libraries. Does nothing where that allocator is another.
+/// Has the C library's allocator return large blocks to the system for good. It is a setting of the process,
+/// so that it is for programs to call, not for libraries. Does nothing where that allocator is another.
 pub fn return_large_blocks() {
     #[cfg(all(target_os = "linux", target_env = "gnu", not(miri)))]
-    // SAFETY: these calls set a parameter each; the C library allows them at any time. A value that it does not
-    // like it ignores.
+    // SAFETY: these calls set a parameter each; the C library allows them at any time. A value that it does
+    // not like it ignores.
     unsafe {
         libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE);
         libc::mallopt(libc::M_TRIM_THRESHOLD, KEPT);

@@ -249,7 +249,7 @@ struct ExploreArguments {
     /// Most states
     #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..))]
     states: u64,
-    /// Most memory of the exploration, such as 64M or 2G, for states and for snapshots; with less it is slower
+    /// Most memory of the exploration, for states and for snapshots, such as 64M or 2G; less makes it slower
     #[arg(long, value_name = "SIZE", default_value = "512M", value_parser = command::parse_size)]
     memory: usize,
     /// Most seconds

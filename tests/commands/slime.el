@@ -1,5 +1,5 @@
-;;; A session of SLIME in an Emacs without a screen, driven by its own commands. It says what is wrong and ends
-;;; with status 1, or prints "done".
+;;; A session of SLIME in an Emacs without a screen, driven by its own commands. It says what is wrong and
+;;; ends with status 1, or prints "done".
 
 (require 'slime)
 (require 'cl-lib)

@@ -187,8 +187,9 @@ pub(crate) fn install(machine: &mut Vm) {
     });
 }
 
-/// `%MQTT-OPEN`: number, address, name of the client, seconds between signs of life, user and password, topic,
-/// payload, level and retention of the last will, whether the connection is secured, file of what is trusted.
+/// `%MQTT-OPEN`: number, address, name of the client, seconds between signs of life, user and password,
+/// topic, payload, level and retention of the last will, whether the connection is secured, file of what
+/// is trusted.
 async fn open(arguments: CallArguments, clients: Clients) -> Completion {
     let (number, address) = (arguments.integer(0)?, arguments.text(1)?);
     let (host, port) = address.rsplit_once(':').unwrap_or((&address, "1883"));

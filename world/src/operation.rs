@@ -81,8 +81,8 @@ where
     });
 }
 
-/// As [`define`], of an operation that is often over at once, and no part of which the system may delay. It is
-/// begun by the thread of the machine, so that what is there takes no way through another thread.
+/// As [`define`], of an operation that is often over at once, and no part of which the system may delay. It
+/// is begun by the thread of the machine, so that what is there takes no way through another thread.
 pub(crate) fn define_ready<F>(machine: &mut Vm, name: &str, needs: &[Need], mut function: F)
 where
     F: FnMut(CallArguments) -> OperationFuture + Send + 'static,

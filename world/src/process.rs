@@ -148,7 +148,8 @@ fn status_number(status: ExitStatus) -> i32 {
     status.code().unwrap_or(-1)
 }
 
-/// `%PROCESS-RUN`: program, arguments, input, whether output and error output are wanted, folder, environment.
+/// `%PROCESS-RUN`: program, arguments, input, whether output and error output are wanted, folder,
+/// environment.
 async fn run(arguments: CallArguments, mut cancelled: Cancelled) -> Completion {
     let name = arguments.text(0)?;
     let input = arguments.text_if_any(2)?;
@@ -228,8 +229,8 @@ fn output_of(arguments: &CallArguments, index: usize) -> (Stdio, Option<i64>) {
     }
 }
 
-/// `%PROCESS-LAUNCH`: program, arguments, the number of a connection for its input or `NIL`, where output and error
-/// output go, folder, environment.
+/// `%PROCESS-LAUNCH`: program, arguments, the number of a connection for its input or `NIL`, where output and
+/// error output go, folder, environment.
 async fn launch(arguments: CallArguments, programs: Programs, sockets: Sockets) -> Completion {
     let name = arguments.text(0)?;
     let mut command = command(&arguments, 5)?;

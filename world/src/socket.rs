@@ -218,8 +218,8 @@ impl Socket {
     }
 }
 
-/// Returns what a future comes to, unless the socket is closed before. It is not moved here, which would double
-/// the size of whoever waits.
+/// Returns what a future comes to, unless the socket is closed before. It is not moved here, which would
+/// double the size of whoever waits.
 async fn unless_closed<T>(
     mut closing: watch::Receiver<bool>,
     future: Pin<&mut impl Future<Output = Result<T, HostFailure>>>,
@@ -270,8 +270,8 @@ impl Wake for Waiting {
     }
 }
 
-/// Waits until something has arrived at a connection, or it has ended. Of all operations most are of this kind,
-/// so it is small, and needs no more than a place in a table.
+/// Waits until something has arrived at a connection, or it has ended. Of all operations most are of this
+/// kind, so it is small, and needs no more than a place in a table.
 struct Arrival {
     connection: Arc<Connection>,
     number: Option<u64>,

@@ -1,8 +1,8 @@
-//! Variables of a long `let` that find no room in registers: they live in one vector on the heap, made each time
-//! the `let` is entered.
+//! Variables of a long `let` that find no room in registers: they live in one vector on the heap, made each
+//! time the `let` is entered.
 //!
-//! Closures capture the vector instead of the variables, of which they may refer to any number; and parts into
-//! which the function is divided (`split`) do the same. This happens only in functions that do not fit
+//! Closures capture the vector instead of the variables, of which they may refer to any number; and parts
+//! into which the function is divided (`split`) do the same. This happens only in functions that do not fit
 //! otherwise, since it makes each access slower.
 
 use esl_bytecode::builtin::Builtin;
@@ -18,8 +18,8 @@ use crate::resolve::{children, lambda_nodes};
 /// The place of a variable: the variable that holds the vector, and the index there.
 type VectorPlace = (VarId, u32);
 
-/// The work of moving the variables of each `let` with too many of them into a vector. It is done in parts; each
-/// is given the same form.
+/// The work of moving the variables of each `let` with too many of them into a vector. It is done in parts;
+/// each is given the same form.
 pub(super) struct GatheredVariables {
     places: FxHashMap<VarId, VectorPlace>,
     /// Nodes that are still to be looked at, and the lambdas that they belong to.
@@ -107,8 +107,8 @@ impl Gatherer<'_> {
             is_read: true,
             never_returns: false,
         });
-        // Their values are stored where they would be bound; names are resolved, so it makes no difference that
-        // a variable of a parallel `let` has its value before others are computed.
+        // Their values are stored where they would be bound; names are resolved, so it makes no difference
+        // that a variable of a parallel `let` has its value before others are computed.
         let mut index = 0;
         for (target, value) in &mut bindings {
             let BoundVariable::Lexical(variable) = *target else { continue };

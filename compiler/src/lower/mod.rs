@@ -71,8 +71,8 @@ pub fn lower(core: &Core, lines: &SourceLines) -> Result<Module, Vec<Diagnostic>
 /// Number of registers in use from which on variables go to the heap, in forms that do not fit otherwise.
 const SPILLS_FROM: u8 = 80;
 
-/// The lowering of a top-level form in parts. A part ends between two steps of a walk over the form, or between
-/// two functions.
+/// The lowering of a top-level form in parts. A part ends between two steps of a walk over the form, or
+/// between two functions.
 pub struct Lowering {
     core: Core,
     stage: LoweringStage,

@@ -2,8 +2,8 @@
 //!
 //! The failure comes by a guardian, which interrupts the form wherever it is. Afterwards nothing is left:
 //! every body that has begun was cleaned up once, and no task, claim, watch, source or suspension is there. A
-//! form that was suspended and resumed ends as without. Forms with several bodies are suspended in `composition`
-//! and `keeping`.
+//! form that was suspended and resumed ends as without. Forms with several bodies are suspended in
+//! `composition` and `keeping`.
 
 use crate::composition::{NOTHING, check_bodies};
 
@@ -35,8 +35,8 @@ fn check_ends(text: &str, outcomes: &[&str]) {
 }
 
 /// Checks that `form` leaves nothing when it is aborted at any point, nor when a failure comes at any point;
-/// then it ends as one of `outcomes`, its value or the cause of its failure, or with that failure. A form that
-/// takes time always ends with it, since time passes only when all tasks wait.
+/// then it ends as one of `outcomes`, its value or the cause of its failure, or with that failure. A form
+/// that takes time always ends with it, since time passes only when all tasks wait.
 fn check_abort_and_failure(others: &str, form: &str, outcomes: &[&str]) {
     let setup = setup(others);
     check_ends(

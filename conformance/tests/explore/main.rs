@@ -39,8 +39,8 @@ pub(crate) fn endings(text: &str, grain: Grain) -> Exploration<Behaviour> {
         let again = explore(&program, &Settings { memory: 2 << 20, ..settings }).expect("it can start");
         let figures = |found: &Exploration<Behaviour>| (found.states, found.runs, found.has_cycle);
         assert_eq!((figures(&again), ways(&again)), (figures(&found), ways(&found)));
-        // Without snapshots, each run has a machine of its own. Two machines may differ in what a register has
-        // that will not be read, so that one state counts as two; the endings are the same.
+        // Without snapshots, each run has a machine of its own. Two machines may differ in what a register
+        // has that will not be read, so that one state counts as two; the endings are the same.
         let again = explore(&program, &Settings { snapshots: false, ..settings }).expect("it can start");
         let has = |one: &Exploration<Behaviour>, other: &Exploration<Behaviour>| {
             one.endings.iter().all(|ending| other.endings.iter().any(|known| known.what == ending.what))

@@ -8,7 +8,8 @@
 //! rest of the computation is set aside as one of its consumers, and gets each answer once, whenever it is
 //! found. So each combination of answers is considered once, and rules with finitely many answers terminate,
 //! in whatever order they are written. Work is done by strata: a negated call is complete before its negation
-//! is evaluated; a negation that reaches an incomplete table is set aside as well. The tables are in `tabling`.
+//! is evaluated; a negation that reaches an incomplete table is set aside as well. The tables are in
+//! `tabling`.
 //!
 //! Source: OLD resolution with tabulation (Tamaki and Sato 1986), with the continuations of SLG; the strata
 //! are those of Apt, Blair and Walker.

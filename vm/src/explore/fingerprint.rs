@@ -12,8 +12,9 @@
 //! at a point, the state equals no other.
 //!
 //! A *strict* fingerprint is of all that the list calls state of the run: ticks, numbers, the order of
-//! queues, times as they are, all objects in registers, the collector's state, and where objects lie. Two runs that
-//! agree in it go on alike to the tick, and it says so of a run and its replay, in other processes too.
+//! queues, times as they are, all objects in registers, the collector's state, and where objects lie. Two
+//! runs that agree in it go on alike to the tick, and it says so of a run and its replay, in other processes
+//! too.
 
 use std::collections::HashMap;
 use std::rc::Rc;

@@ -251,8 +251,8 @@ impl PointRun {
     }
 }
 
-/// Returns whether time may pass while tasks can run. A cleanup takes no longer than it may: otherwise each that
-/// waits would be found to be cut off somewhere.
+/// Returns whether time may pass while tasks can run. A cleanup takes no longer than it may: otherwise each
+/// that waits would be found to be cut off somewhere.
 fn time_may_pass(vm: &mut Vm) -> bool {
     vm.scheduler.first_timer().is_some()
         && vm.scheduler.timers.first().is_some_and(|timer| timer.due != Due::Cleanup)

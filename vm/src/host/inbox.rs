@@ -76,8 +76,8 @@ struct InboxState {
     contents: Mutex<Vec<Incoming>>,
     /// Notified, under the lock of `contents`, when `is_rung` is set and somebody waits.
     bell: Condvar,
-    /// How many wait for the bell; read and written under the lock of `contents`. To notify nobody takes a call of the
-    /// system too, and most messages come while the machine runs.
+    /// How many wait for the bell; read and written under the lock of `contents`. To notify nobody takes a
+    /// call of the system too, and most messages come while the machine runs.
     waiting: AtomicU32,
     /// Looks, which come beside the contents.
     looks: Mutex<Looks>,

@@ -207,8 +207,8 @@ pub trait Host {
     /// `awaited` says so, standard input has data or ends. May wake too early.
     fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake;
 
-    /// Returns the state of a host whose whole outside is in memory, for [`Host::restore`]. `None` for others:
-    /// what has happened outside cannot be taken back.
+    /// Returns the state of a host whose whole outside is in memory, for [`Host::restore`]. `None` for
+    /// others: what has happened outside cannot be taken back.
     fn save(&self) -> Option<HostState> {
         None
     }

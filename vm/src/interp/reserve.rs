@@ -45,8 +45,8 @@ impl Vm {
     /// Makes room in the running task's stack for `words` words in all.
     ///
     /// # Errors
-    /// `:stack-exhausted` at the limit, and [`Exit::Collect`] if there is no memory for it. Handling either has
-    /// a reserve; see [`Vm::leave_reserve`].
+    /// `:stack-exhausted` at the limit, and [`Exit::Collect`] if there is no memory for it. Handling either
+    /// has a reserve; see [`Vm::leave_reserve`].
     pub(super) fn reserve_stack(&mut self, words: usize) -> Result<(), Exit> {
         if words > self.stack_limit() {
             if self.scheduler.task().flags.uses_reserve() {
