@@ -225,7 +225,8 @@ fn text(switch: &Switch, lines: &mut PlaceTexts) -> String {
 }
 
 fn print_summary(found: &Exploration<Behaviour>, settings: &Settings, findings: usize) {
-    let figures = format!("{} states, {} runs", found.states, found.runs);
+    let counted = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+    let figures = format!("{}, {}", counted(found.states, "state"), counted(found.runs, "run"));
     let why = match found.limit {
         None => None,
         Some(SearchLimit::States) => Some("the limit of states is reached"),
@@ -299,9 +300,12 @@ impl StatusLine {
 /// # Errors
 /// The exit status, after a message.
 pub fn read_schedule(path: &Path) -> Result<Schedule, u8> {
-    let text = std::fs::read_to_string(path).map_err(|error| error.to_string());
-    let schedule = text.and_then(|text| Schedule::parse(&text).map_err(|error| error.to_string()));
-    schedule.map_err(|error| {
+    let bytes = std::fs::read(path).map_err(|error| {
+        complain(format_args!("{} cannot be read: {error}", path.display()));
+        command::USAGE
+    })?;
+    // What is no text is not a schedule, either: its first line says so.
+    Schedule::parse(&String::from_utf8_lossy(&bytes)).map_err(|error| {
         complain(format_args!("{} is no schedule: {error}", path.display()));
         command::USAGE
     })

@@ -1,0 +1,291 @@
+//! Connections, over TCP and Unix sockets and whatever else has two ends.
+//!
+//! What has arrived is kept here until the program takes it, which it does at once, without waiting: an
+//! operation only waits until something is there. So nothing is lost when a call is left at the moment at
+//! which its data come.
+//!
+//! A connection reads ahead at most [`CHUNK`] bytes; a peer that sends more waits.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::future::ready as ready_future;
+use std::io::Error;
+use std::pin::{Pin, pin};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::task::{Context, Poll, Wake, Waker, ready};
+use std::time::Duration;
+
+use esl_vm::host::HostFailure;
+use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt, ReadBuf};
+use tokio::net::TcpStream;
+
+use super::{CHUNK, SocketKind, Sockets, closed, lock, socket_failure, unless_closed};
+use crate::arrived::Arrived;
+use crate::data::{CallArguments, bytes_of, failure};
+use crate::event_loop;
+use crate::operation::{Completion, OperationFuture};
+
+/// Time that a peer has to take the end of a connection.
+const GOODBYE: Duration = Duration::from_secs(1);
+
+type SocketReader = Box<dyn AsyncRead + Send + Unpin>;
+
+type SocketWriter = Box<dyn AsyncWrite + Send + Unpin>;
+
+/// A connection.
+pub(crate) struct Connection {
+    reader: Mutex<SocketReader>,
+    waiting: Arc<Waiting>,
+    is_closed: AtomicBool,
+    writer: tokio::sync::Mutex<SocketWriter>,
+    arrived: Mutex<Arrived>,
+    /// Whether the peer is to be told that nothing more comes, beside by the end of the connection.
+    says_goodbye: bool,
+}
+
+thread_local! {
+    /// Where what is read is put first, so that a connection that waits has no such room of its own.
+    static READ: RefCell<Vec<u8>> = RefCell::new(vec![0; CHUNK]);
+}
+
+/// Those who wait for a connection, in the order in which they came, and the greatest of their numbers.
+#[derive(Default)]
+struct Waiting(Mutex<(u64, BTreeMap<u64, Waker>)>);
+
+impl Waiting {
+    /// Notes who waits, and returns the number, which is the one given if there is one.
+    fn note(&self, number: Option<u64>, waker: &Waker) -> u64 {
+        let mut waiting = lock(&self.0);
+        let number = number.unwrap_or(waiting.0 + 1);
+        waiting.0 = waiting.0.max(number);
+        let before = waiting.1.insert(number, waker.clone());
+        // With a waker its task may end, which has waited here: no lock may be held then.
+        drop(waiting);
+        drop(before);
+        number
+    }
+
+    fn forget(&self, number: u64) {
+        let before = lock(&self.0).1.remove(&number);
+        drop(before);
+    }
+
+    fn wake_all(&self) {
+        let all = std::mem::take(&mut lock(&self.0).1);
+        all.into_values().for_each(Waker::wake);
+    }
+}
+
+impl Wake for Waiting {
+    fn wake(self: Arc<Waiting>) {
+        self.wake_all();
+    }
+}
+
+/// Waits until something has arrived at a connection, or it has ended. Of all operations most are of this
+/// kind, so it is small, and needs no more than a place in a table.
+struct Arrival {
+    connection: Arc<Connection>,
+    number: Option<u64>,
+}
+
+impl Future for Arrival {
+    type Output = Completion;
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Completion> {
+        let connection = self.connection.clone();
+        // Before anything is asked, so that nothing is missed. One who begins is polled again, with a waker.
+        if !context.waker().will_wake(Waker::noop()) {
+            self.number = Some(connection.waiting.note(self.number, context.waker()));
+        }
+        if connection.is_closed.load(Ordering::SeqCst) {
+            return Poll::Ready(Err(closed()));
+        }
+        if lock(&connection.arrived).is_something() {
+            return Poll::Ready(Ok(Vec::new()));
+        }
+        // The system tells one only, who tells the others.
+        let waker = Waker::from(connection.waiting.clone());
+        let arrival = ready!(connection.poll_arrival(&mut Context::from_waker(&waker)));
+        connection.waiting.wake_all();
+        Poll::Ready(arrival.map(|()| Vec::new()).map_err(|error| socket_failure(&error)))
+    }
+}
+
+impl Drop for Arrival {
+    fn drop(&mut self) {
+        if let Some(number) = self.number {
+            self.connection.waiting.forget(number);
+        }
+    }
+}
+
+impl Connection {
+    /// Returns a connection that is read from one side and written to the other.
+    pub(crate) fn over(
+        reader: impl AsyncRead + Send + Unpin + 'static,
+        writer: impl AsyncWrite + Send + Unpin + 'static,
+    ) -> SocketKind {
+        SocketKind::Connection(Arc::new(Connection {
+            reader: Mutex::new(Box::new(reader)),
+            waiting: Arc::default(),
+            is_closed: AtomicBool::new(false),
+            writer: tokio::sync::Mutex::new(Box::new(writer)),
+            arrived: Mutex::default(),
+            says_goodbye: false,
+        }))
+    }
+
+    /// Returns a connection whose protocol has an end of its own.
+    #[cfg(feature = "tls")]
+    pub(super) fn secured(stream: impl AsyncRead + AsyncWrite + Send + 'static) -> SocketKind {
+        let (reader, writer) = tokio::io::split(stream);
+        SocketKind::Connection(Arc::new(Connection {
+            reader: Mutex::new(Box::new(reader)),
+            waiting: Arc::default(),
+            is_closed: AtomicBool::new(false),
+            writer: tokio::sync::Mutex::new(Box::new(writer)),
+            arrived: Mutex::default(),
+            says_goodbye: true,
+        }))
+    }
+
+    pub(super) fn of_tcp(stream: TcpStream) -> (SocketKind, i64, String) {
+        let (port, peer) = Connection::ends_of(&stream);
+        let (reader, writer) = stream.into_split();
+        (Connection::over(reader, writer), port, peer)
+    }
+
+    /// Returns the port of a connection here, and the address there.
+    pub(super) fn ends_of(stream: &TcpStream) -> (i64, String) {
+        // Requests and answers are small, and are not to wait for more; without it they only take longer.
+        drop(stream.set_nodelay(true));
+        let port = stream.local_addr().map_or(0, |address| address.port().into());
+        (port, stream.peer_addr().map_or(String::new(), |address| address.to_string()))
+    }
+
+    /// Reads what has arrived, or notes that the connection has ended. Of those who wait all are woken.
+    fn poll_arrival(&self, context: &mut Context<'_>) -> Poll<Result<(), Error>> {
+        READ.with_borrow_mut(|bytes| {
+            let mut bytes = ReadBuf::new(bytes);
+            ready!(Pin::new(&mut **lock(&self.reader)).poll_read(context, &mut bytes))?;
+            lock(&self.arrived).add(bytes.filled());
+            Poll::Ready(Ok(()))
+        })
+    }
+
+    /// Tells the peer that nothing more comes.
+    /// Ends the connection, of which the peer is told if it is of that kind.
+    pub(super) fn close(self: &Arc<Connection>) {
+        self.is_closed.store(true, Ordering::SeqCst);
+        self.waiting.wake_all();
+        if self.says_goodbye {
+            let connection = self.clone();
+            let mut end = Box::pin(async move { connection.end().await });
+            // Mostly it is said at once, which is as well if the process ends now.
+            if end.as_mut().poll(&mut Context::from_waker(Waker::noop())).is_pending() {
+                // Without the event loop there is nobody to be told.
+                _ = event_loop::spawn(async move { drop(tokio::time::timeout(GOODBYE, end).await) });
+            }
+        }
+    }
+
+    async fn end(&self) {
+        // It may be gone.
+        drop(self.writer.lock().await.shutdown().await);
+    }
+
+    /// Takes what has arrived. `NIL` at the end.
+    pub(super) fn take<T>(&self, take: impl FnOnce(&mut Arrived) -> T) -> T {
+        take(&mut lock(&self.arrived))
+    }
+}
+
+/// `%SOCKET-CONNECT`: number, address, milliseconds, and for TLS the name of the server and a file of
+/// certificates.
+pub(super) async fn connect(arguments: CallArguments, sockets: Sockets) -> Completion {
+    let (number, address) = (arguments.number(0)?, arguments.text(1)?);
+    let server_name = arguments.text_if_any(3)?;
+    let ca_file = arguments.text_if_any(4)?;
+    let connect = async {
+        let addresses =
+            tokio::net::lookup_host(&address).await.map_err(|error| failure("HOST-NOT-FOUND", error))?;
+        let mut last = failure("HOST-NOT-FOUND", format!("`{address}` has no address"));
+        for address in addresses {
+            match TcpStream::connect(address).await {
+                Ok(stream) => return secured(stream, server_name, ca_file).await,
+                Err(error) => last = socket_failure(&error),
+            }
+        }
+        Err(last)
+    };
+    let (kind, port, peer) = if arguments.is_true(2) {
+        let time = Duration::from_millis(u64::try_from(arguments.integer(2)?).unwrap_or(0));
+        let late = |_| Err(failure("TIMEOUT", format!("`{address}` does not answer")));
+        tokio::time::timeout(time, connect).await.unwrap_or_else(late)?
+    } else {
+        connect.await?
+    };
+    sockets.set(number, kind, port, peer)
+}
+
+/// Returns a connection over TCP, secured by TLS if the server has a name.
+#[cfg(feature = "tls")]
+async fn secured(
+    stream: TcpStream,
+    server_name: Option<String>,
+    ca_file: Option<String>,
+) -> Result<(SocketKind, i64, String), HostFailure> {
+    let Some(name) = server_name else { return Ok(Connection::of_tcp(stream)) };
+    let (port, peer) = Connection::ends_of(&stream);
+    Ok((Connection::secured(crate::tls::begin(stream, &name, ca_file).await?), port, peer))
+}
+
+/// Returns a connection over TCP.
+#[cfg(not(feature = "tls"))]
+async fn secured(
+    stream: TcpStream,
+    server_name: Option<String>,
+    _ca_file: Option<String>,
+) -> Result<(SocketKind, i64, String), HostFailure> {
+    match server_name {
+        None => Ok(Connection::of_tcp(stream)),
+        Some(_) => Err(failure("TLS-ERROR", "this program was built without TLS")),
+    }
+}
+
+#[cfg(unix)]
+pub(super) async fn connect_unix(arguments: CallArguments, sockets: Sockets) -> Completion {
+    let (number, path) = (arguments.number(0)?, arguments.text(1)?);
+    let stream = tokio::net::UnixStream::connect(&path).await.map_err(|error| socket_failure(&error))?;
+    let (reader, writer) = stream.into_split();
+    sockets.set(number, Connection::over(reader, writer), 0, path)
+}
+
+/// `%SOCKET-AWAIT`: waits until there is something to be taken.
+pub(super) fn wait(arguments: &CallArguments, sockets: &Sockets) -> OperationFuture {
+    let socket = arguments.number(0).and_then(|number| sockets.get(number));
+    match socket.and_then(|socket| socket.connection()) {
+        Ok(connection) => Box::pin(Arrival { connection, number: None }),
+        Err(failure) => Box::pin(ready_future(Err(failure))),
+    }
+}
+
+/// `%SOCKET-WRITE`: number, text, whether its characters are bytes.
+pub(super) async fn write(arguments: CallArguments, sockets: Sockets) -> Completion {
+    let socket = sockets.get(arguments.number(0)?)?;
+    let connection = socket.connection()?;
+    let text = arguments.text(1)?;
+    let bytes = if arguments.is_true(2) { bytes_of(&text) } else { text.into_bytes() };
+    let mut write = pin!(async {
+        let mut writer = connection.writer.lock().await;
+        let written = async {
+            writer.write_all(&bytes).await?;
+            writer.flush().await
+        };
+        written.await.map_err(|error| socket_failure(&error))
+    });
+    unless_closed(socket.closing.subscribe(), write.as_mut()).await?;
+    Ok(Vec::new())
+}

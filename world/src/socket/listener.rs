@@ -1,0 +1,180 @@
+//! Listeners: connections that others begin.
+
+use std::io::{Error, ErrorKind};
+use std::pin::pin;
+use std::sync::Arc;
+#[cfg(feature = "tls")]
+use std::time::Duration;
+
+use esl_vm::host::HostFailure;
+use tokio::net::{TcpListener, TcpSocket};
+
+use super::{Connection, NewConnection, SocketKind, Sockets, lock, socket_failure, unless_closed};
+use crate::data::{CallArguments, failure};
+use crate::operation::Completion;
+
+/// Time that a peer has to prove who it is, and to be shown who we are.
+#[cfg(feature = "tls")]
+const GREETING: Duration = Duration::from_secs(10);
+/// Most peers that are greeted at a time; more wait in the system's queue.
+#[cfg(feature = "tls")]
+const MOST_GREETED: usize = 256;
+/// Most connections that wait in the system until the program accepts them; the system may allow fewer. More
+/// than that at one moment are told to come again, which takes them seconds.
+const BACKLOG: u32 = 4096;
+
+/// A socket that waits for connections.
+pub(crate) enum Listener {
+    Tcp(TcpListener),
+    #[cfg(feature = "tls")]
+    Secured(TcpListener, tokio_rustls::TlsAcceptor, Greetings),
+    #[cfg(unix)]
+    Unix(tokio::net::UnixListener, std::path::PathBuf),
+}
+
+#[cfg(unix)]
+impl Drop for Listener {
+    fn drop(&mut self) {
+        if let Listener::Unix(_, path) = self {
+            // The file may be gone.
+            drop(std::fs::remove_file(path));
+        }
+    }
+}
+
+/// Connections over which TLS is being begun.
+#[cfg(feature = "tls")]
+pub(crate) type Greetings = tokio::sync::Mutex<tokio::task::JoinSet<Option<NewConnection>>>;
+
+/// `%SOCKET-LISTEN`: number, address, files of certificate and key if it is secured.
+pub(super) async fn listen(arguments: CallArguments, sockets: Sockets) -> Completion {
+    let secured = match (arguments.text_if_any(2)?, arguments.text_if_any(3)?) {
+        (Some(certificate), Some(key)) => Some((certificate, key)),
+        _ => None,
+    };
+    let listener = bind(&arguments.text(1)?).await.map_err(|error| bind_failure(&error))?;
+    let port = listener.local_addr().map_or(0, |address| address.port().into());
+    let listener = match secured {
+        None => Listener::Tcp(listener),
+        #[cfg(feature = "tls")]
+        Some((certificate, key)) => {
+            Listener::Secured(listener, crate::tls::acceptor(certificate, key).await?, Greetings::default())
+        }
+        #[cfg(not(feature = "tls"))]
+        Some(_) => return Err(failure("TLS-ERROR", "this program was built without TLS")),
+    };
+    sockets.set(
+        arguments.number(0)?,
+        SocketKind::Listener(Arc::new(listener), Arc::default()),
+        port,
+        String::new(),
+    )
+}
+
+/// Returns a listener on the first of an address' meanings that can be had.
+async fn bind(address: &str) -> std::io::Result<TcpListener> {
+    let mut last = None;
+    for address in tokio::net::lookup_host(address).await? {
+        match bind_to(address) {
+            Ok(listener) => return Ok(listener),
+            Err(error) => last = Some(error),
+        }
+    }
+    Err(last.unwrap_or_else(|| Error::new(ErrorKind::InvalidInput, "the name has no address")))
+}
+
+fn bind_to(address: std::net::SocketAddr) -> std::io::Result<TcpListener> {
+    let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
+    // A program that is started again has its port, though connections of before linger. Elsewhere this would
+    // take the port from another program.
+    #[cfg(unix)]
+    socket.set_reuseaddr(true)?;
+    socket.bind(address)?;
+    socket.listen(BACKLOG)
+}
+
+/// Returns the next connection over which TLS has begun. A peer with which it does not is dropped, and one
+/// that takes its time delays no other.
+#[cfg(feature = "tls")]
+async fn accept_secured(
+    listener: &TcpListener,
+    acceptor: &tokio_rustls::TlsAcceptor,
+    greetings: &Greetings,
+) -> Result<NewConnection, HostFailure> {
+    let mut greetings = greetings.lock().await;
+    loop {
+        let has_room = greetings.len() < MOST_GREETED;
+        tokio::select! {
+            Some(greeted) = greetings.join_next() => {
+                if let Ok(Some(connection)) = greeted {
+                    return Ok(connection);
+                }
+            }
+            accepted = listener.accept(), if has_room => {
+                let (stream, _) = accepted.map_err(|error| socket_failure(&error))?;
+                let acceptor = acceptor.clone();
+                greetings.spawn(async move {
+                    let (port, peer) = Connection::ends_of(&stream);
+                    let stream = tokio::time::timeout(GREETING, acceptor.accept(stream)).await.ok()?.ok()?;
+                    Some((Connection::secured(stream), port, peer))
+                });
+            }
+        }
+    }
+}
+
+/// Returns the failure for an address that cannot be used here.
+pub(super) fn bind_failure(error: &Error) -> HostFailure {
+    // What the resolver says is no error of the system.
+    if error.raw_os_error().is_none() { failure("HOST-NOT-FOUND", error) } else { socket_failure(error) }
+}
+
+#[cfg(unix)]
+pub(super) async fn listen_unix(arguments: CallArguments, sockets: Sockets) -> Completion {
+    let (number, path) = (arguments.number(0)?, arguments.text(1)?);
+    let bind = || {
+        let socket = tokio::net::UnixSocket::new_stream()?;
+        socket.bind(&path)?;
+        socket.listen(BACKLOG)
+    };
+    let listener = bind().map_err(|error| socket_failure(&error))?;
+    let kind = SocketKind::Listener(Arc::new(Listener::Unix(listener, path.into())), Arc::default());
+    sockets.set(number, kind, 0, String::new())
+}
+
+/// `%SOCKET-ACCEPT`: waits until a connection is there to be taken.
+pub(super) async fn accept(arguments: CallArguments, sockets: Sockets) -> Completion {
+    let socket = sockets.get(arguments.number(0)?)?;
+    let SocketKind::Listener(listener, accepted) = &socket.kind else {
+        return Err(failure("SOCKET-ERROR", "it is no listener"));
+    };
+    if !lock(accepted).is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut next = pin!(async {
+        match &**listener {
+            Listener::Tcp(listener) => {
+                let (stream, _) = listener.accept().await.map_err(|error| socket_failure(&error))?;
+                Ok(Connection::of_tcp(stream))
+            }
+            #[cfg(feature = "tls")]
+            Listener::Secured(listener, acceptor, greetings) => {
+                accept_secured(listener, acceptor, greetings).await
+            }
+            #[cfg(unix)]
+            Listener::Unix(listener, _) => {
+                let (stream, _) = listener.accept().await.map_err(|error| socket_failure(&error))?;
+                let (reader, writer) = stream.into_split();
+                Ok((Connection::over(reader, writer), 0, String::new()))
+            }
+        }
+    });
+    let (kind, port, peer) = unless_closed(socket.closing.subscribe(), next.as_mut()).await?;
+    let number = sockets.add(kind, port, peer);
+    lock(accepted).push_back(number);
+    if *socket.closing.borrow() {
+        // The listener was closed at this moment, and may not have seen it.
+        sockets.close_untaken(accepted);
+    }
+    Ok(Vec::new())
+}
