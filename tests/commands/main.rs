@@ -13,6 +13,7 @@ mod editors;
 mod examples;
 mod exploring;
 mod folder;
+mod grammar;
 mod http;
 #[cfg(unix)]
 mod lines;

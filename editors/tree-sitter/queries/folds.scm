@@ -1,0 +1,3 @@
+; A list that spans several lines folds to its first one.
+(list) @fold
+(block_comment) @fold
