@@ -1384,6 +1384,9 @@ macro_rules! for_each_builtin {
             /// Waits for the next signal of one of `events` and returns its arguments; returns at once if
             /// `count` is not `NIL` and no longer the sum of their counts. `what` is for reports.
             Wait = event::wait, internal "%WAIT" ("events count what");
+            /// Signals `event` and begins to wait for its next signal, in one step; returns at once if `count`
+            /// is no longer its count. `what` is for reports.
+            SignalAndWait = event::signal_and_wait, internal "%SIGNAL-AND-WAIT" ("event count what");
             /// A wait that keeps all signals of `events` until it is closed, and lasts for `seconds` if they
             /// are not `NIL`; `NIL` if `count` is not `NIL` and no longer the sum of their counts.
             OpenWait = event::open_wait, internal "%OPEN-WAIT" ("events seconds count what");

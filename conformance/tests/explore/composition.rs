@@ -88,6 +88,12 @@ fn alternatives_are_suspended_wherever_they_are() {
 }
 
 #[test]
+fn alternatives_at_the_same_time_are_suspended_wherever_they_are() {
+    check_suspension("(try-all (a (fail :lost)) (b 'b))", "(SUCCEEDED B)");
+    check_suspension("(try-all (a (body (fail :lost))) (b (sleep 1) 'b))", "(SUCCEEDED B)");
+}
+
+#[test]
 fn a_partial_order_is_kept() {
     check_bodies(
         "(defvar *done* nil)

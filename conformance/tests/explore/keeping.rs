@@ -89,6 +89,30 @@ fn a_supervisor_and_its_child_are_suspended_wherever_they_are() {
     );
 }
 
+#[test]
+fn a_supervisor_and_its_group_are_suspended_wherever_they_are() {
+    for (strategy, backoff, other) in [
+        (":one-for-all", "(0 1 0)", "(sleep 1)"),
+        (":one-for-all", "(1 1 1)", "(wait-until (> *times* 1))"),
+        (":rest-for-one", "(0 1 0)", "(body (sleep 1))"),
+    ] {
+        check_bodies(
+            &format!(
+                "(defvar *times* 0)
+                 (let ((task (spawn (supervise (:strategy {strategy} :restarts 1)
+                                      (a :restart :transient :backoff {backoff}
+                                        (when (= (incf *times*) 1) (fail :lost)))
+                                      (b :restart :transient {other})))))
+                   (suspend-task task)
+                   (resume-task task)
+                   (wait-for-task task)
+                   (princ (list (task-status task) *times* (left))))"
+            ),
+            &["(SUCCEEDED 2 (0 1 0 0 0 0))"],
+        );
+    }
+}
+
 // ---- watchers beside other forms
 
 #[test]

@@ -44,6 +44,22 @@ fn nobody_goes_on_who_is_suspended() {
 }
 
 #[test]
+fn a_task_stands_still_when_suspend_task_returns() {
+    check_suspension(
+        "(let ((task (spawn (go-on) (go-on))))
+           (suspend-task task)
+           (princ (task-status task))
+           (resume-task task)
+           (suspend-task task)
+           (princ (task-status task))
+           (resume-task task)
+           (wait-for-task task)
+           (princ (left)))",
+        &["SUCCEEDEDSUCCEEDED0", "SUSPENDEDSUCCEEDED0", "SUSPENDEDSUSPENDED0"],
+    );
+}
+
+#[test]
 fn an_abort_reaches_a_task_wherever_its_suspension_is() {
     check_suspension(
         "(define-resource arm)
@@ -160,6 +176,16 @@ fn a_task_that_was_resumed_before_it_stood_still_can_be_suspended_again() {
            (wait-for-task task)
            (princ (left)))",
         &["0"],
+    );
+}
+
+#[test]
+fn one_that_suspends_itself_in_a_cleanup_may_be_aborted_before_it_stands_still() {
+    check_suspension(
+        "(let ((task (spawn (unwind-protect (go-on) (suspend-task (current-task)) (go-on)) (go-on))))
+           (abort-task task)
+           (princ (list (task-status task) (left))))",
+        &["(ABORTED 0)"],
     );
 }
 

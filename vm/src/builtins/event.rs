@@ -303,6 +303,22 @@ pub(super) fn wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     wait_for_signal(vm, events, count, what)
 }
 
+pub(super) fn signal_and_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [event, count, what] = exactly(arguments);
+    if vm.scheduler.task().wait.is_true() {
+        return wait_for_signal(vm, event, count, what);
+    }
+    vm.scheduler.point()?;
+    if was_signalled_since(vm, event, count)? {
+        return Ok(Value::NIL);
+    }
+    vm.scheduler.wait_for_deliveries()?;
+    vm.signal_event(event, &[])?;
+    // If there is no room for the wait now, all is done again, and the count tells.
+    let wait = begin_wait(vm, event, WaitOptions { what, ..WaitOptions::default() })?;
+    vm.scheduler.park_at(wait, None)
+}
+
 pub(super) fn open_wait(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point()?;
     let [events, seconds, count, what] = exactly(arguments);

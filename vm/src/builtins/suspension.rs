@@ -20,13 +20,18 @@ fn index_argument(vm: &mut Vm, v: Value) -> Result<usize, Exit> {
     }
 }
 
-/// Returns the depth of a task in the tree of the task `root`,
-/// which has depth 1; 0 if it is not of that tree.
-/// `depths` is a vector of those that are known, by the places of the tasks. Adds the number of steps to
-/// `work`.
-fn depth_of(vm: &mut Vm, root: usize, place: usize, depths: Value, work: &mut usize) -> usize {
+/// Returns the depth of the task `object`, at `place`, in the tree of the task `root`, which has depth 1; 0 if
+/// it is not of that tree. `depths` is a vector of those that are known, by the places of the tasks. Adds the
+/// number of steps to `work`.
+fn depth_of(
+    vm: &mut Vm,
+    root: usize,
+    (place, object): (usize, Value),
+    depths: Value,
+    work: &mut usize,
+) -> usize {
     let mut path: SmallVec<[usize; 16]> = SmallVec::new();
-    let mut at = place;
+    let (mut at, mut known_object) = (place, Some(object));
     let mut depth = loop {
         if at == root {
             break 1;
@@ -36,14 +41,15 @@ fn depth_of(vm: &mut Vm, root: usize, place: usize, depths: Value, work: &mut us
             break depth;
         }
         path.push(at);
-        let task = vm.scheduler.find(TaskIndex(at as u32)).map(|task| task.object);
-        match task.and_then(|task| lineage::owner_of(&vm.heap, task)) {
+        let find = || vm.scheduler.find(TaskIndex(at as u32)).map(|task| task.object);
+        match known_object.take().or_else(find).and_then(|task| lineage::owner_of(&vm.heap, task)) {
             Some(owner) => at = owner.as_usize(),
             None => break 0,
         }
     };
     *work += path.len();
-    for place in path.into_iter().rev() {
+    // By reference, since a path has much room that would be moved.
+    for &place in path.iter().rev() {
         depth += usize::from(depth > 0);
         vm.heap.vector_set(depths, place, Value::index(depth));
     }
@@ -71,18 +77,18 @@ pub(super) fn tree_part(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         if task.state == TaskState::Ended || number > below {
             continue;
         }
-        let depth = depth_of(vm, root.as_usize(), place, depths, &mut work);
+        let depth = depth_of(vm, root.as_usize(), (place, object), depths, &mut work);
         if depth > 0 && number > above {
             members.push((depth - 1, object));
         }
     }
-    let mut cells = vm.heap.list(&vec![Value::NIL; members.len()])?;
+    let objects: Vec<Value> = members.iter().map(|&(_, object)| object).collect();
+    let mut cells = vm.heap.list(&objects)?;
     vm.exchange.charge(16 * (work + members.len()));
     let deepest = members.iter().map(|&(depth, _)| depth + 1).max().unwrap_or(0);
-    for (depth, object) in members {
+    for (depth, _) in members {
         let Some(pair) = vm.heap.as_cons(cells) else { break };
         let others = vm.heap.vector(generations).and_then(|lists| lists.get(depth).copied());
-        vm.heap.set_car(cells, object);
         vm.heap.set_cdr(cells, others.unwrap_or(Value::NIL));
         vm.heap.vector_set(generations, depth, cells);
         cells = pair.cdr;
