@@ -70,21 +70,22 @@ pub(crate) fn open(
     options: WaitOptions,
 ) -> Result<Value, AllocError> {
     let wait = make(heap, owner, options)?;
-    let mut links = Vec::with_capacity(events.len());
-    links.push(wait);
+    let Some((&first, others)) = events.split_first() else { return Ok(wait) };
     let mut more = options.what;
-    for _ in 1..events.len() {
+    for _ in others {
         let mut slots = [Value::NIL; LENGTH];
         slots[OWNER] = wait;
         slots[MORE] = more;
         more = heap.alloc_record(Kind::Wait, 0, 0, &slots)?;
-        links.push(more);
     }
-    if events.len() > 1 {
+    append(heap, wait, first);
+    if !others.is_empty() {
         heap.slot_set(wait, MORE, more);
     }
-    for (link, &event) in links.into_iter().zip(events) {
+    let mut link = more;
+    for &event in others.iter().rev() {
         append(heap, link, event);
+        link = heap.slot_or_nil(link, MORE);
     }
     Ok(wait)
 }
