@@ -7,10 +7,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Sections of the code map, and the folders whose modules their tables list.
-const SECTIONS: [(&str, &str); 7] = [
+const SECTIONS: [(&str, &str); 8] = [
     ("### `bytecode/`", "bytecode/src"),
     ("### `compiler/`", "compiler/src"),
     ("### `heap/`", "heap/src"),
+    ("### `native/`", "native/src"),
     ("### `vm/`", "vm/src"),
     ("### `world/`", "world/src"),
     ("### `src/`", "src"),

@@ -15,14 +15,26 @@ use esl_bytecode::diagnostic::Severity;
 use esl_conformance::{Expectations, Setting, programs};
 use libtest_mimic::{Arguments, Failed, Trial};
 
+#[cfg(feature = "native")]
+#[path = "run/tiers.rs"]
+mod tiers;
+
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let folder = programs::folder();
-    let trials = programs::paths("").into_iter().map(|path| {
+    let names = programs::paths("").into_iter().map(|path| {
         let name = path.strip_prefix(&folder).unwrap_or(&path).display().to_string();
-        Trial::test(name.clone(), move || check_known(&name, &path))
+        (name, path)
     });
-    libtest_mimic::run(&arguments, trials.collect()).exit_code()
+    let names: Vec<_> = names.collect();
+    #[cfg(feature = "native")]
+    let tiers = tiers::trials(&names);
+    #[cfg(not(feature = "native"))]
+    let tiers = Vec::new();
+    let programs =
+        names.into_iter().map(|(name, path)| Trial::test(name.clone(), move || check_known(&name, &path)));
+    let trials = programs.chain(tiers).collect();
+    libtest_mimic::run(&arguments, trials).exit_code()
 }
 
 /// Checks a program. A program with a known defect must fail, so that its note does not outlive the defect.

@@ -21,7 +21,7 @@ use esl::testing;
 use esl::timeline::Timeline;
 use esl_compiler::diagnostic::{Format, Renderer};
 use esl_vm::value::Value;
-use esl_vm::vm::Vm;
+use esl_vm::vm::{Tier, Vm};
 
 /// Functions whose figures are printed, at most.
 const SHOWN_FUNCTIONS: usize = 40;
@@ -58,6 +58,12 @@ enum EslvmAction {
         /// those with most ticks; with `=coverage`, also what was not run
         #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_missing_value = "run")]
         stats: Option<Stats>,
+        /// How functions run, which no program can tell: by the interpreter, all as machine code, or as
+        /// machine code those that are hot. A build without the code generator interprets all, and --stats
+        /// says so
+        #[arg(long, value_enum, default_value_t = TierChoice::Interpreter, value_name = "TIER")]
+        #[arg(conflicts_with = "schedule")]
+        tier: TierChoice,
         /// Write a timeline of the tasks to a file: a drawing if its name ends in `.svg`, else a trace for
         /// Perfetto
         #[arg(long, value_name = "FILE")]
@@ -190,6 +196,27 @@ enum Stats {
     Coverage,
 }
 
+/// How functions run.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum TierChoice {
+    /// By the interpreter
+    Interpreter,
+    /// All as machine code, from their second call on
+    Native,
+    /// As machine code those that are hot
+    Auto,
+}
+
+impl From<TierChoice> for Tier {
+    fn from(choice: TierChoice) -> Tier {
+        match choice {
+            TierChoice::Interpreter => Tier::Interpreter,
+            TierChoice::Native => Tier::Native,
+            TierChoice::Auto => Tier::Auto,
+        }
+    }
+}
+
 /// Clock of a program.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum ClockChoice {
@@ -310,6 +337,7 @@ fn main() -> ExitCode {
             mut options,
             speed,
             stats,
+            tier,
             timeline,
             profile,
             coverage,
@@ -330,6 +358,7 @@ fn main() -> ExitCode {
                 let schedule = schedule.as_deref().map(explore::read_schedule).transpose()?;
                 let reports = RunReports {
                     stats,
+                    tier,
                     timeline: timeline.as_deref(),
                     profile: profile.as_deref(),
                     coverage: coverage.as_deref(),
@@ -453,6 +482,7 @@ fn run_explore(file: &Path, options: &ExploreArguments, library: &[PathBuf]) -> 
 /// What is to be seen of a run.
 struct RunReports<'a> {
     stats: Option<Stats>,
+    tier: TierChoice,
     timeline: Option<&'a Path>,
     record: Option<&'a Path>,
     profile: Option<&'a Path>,
@@ -469,7 +499,7 @@ fn run(
     schedule: Option<&Schedule>,
     path: &ModulePath,
 ) -> Result<u8, u8> {
-    let RunReports { stats, timeline, profile, coverage, record, trace, operate } = *reports;
+    let RunReports { stats, tier, timeline, profile, coverage, record, trace, operate } = *reports;
     for output in [timeline, profile, coverage, record].into_iter().flatten() {
         command::refuse_overwriting(output, [file])?;
     }
@@ -520,6 +550,7 @@ fn run(
     if is_covered {
         machine.count_passages();
     }
+    machine.set_tier(tier.into());
     let served = operate.begin(&mut machine)?;
     let started = std::time::Instant::now();
     let is_profiled = profile.is_some() || stats == Some(Stats::Functions);
@@ -624,6 +655,17 @@ fn print_stats(machine: &Vm, summary: &Summary, seconds: f64) {
     eprintln!("  all         {:>14.3} ms", milliseconds(pauses.total));
     eprintln!("  longest     {:>14.3} ms", milliseconds(pauses.longest));
     eprintln!("longest slice {:>14} objects", heap.longest_slice);
+    let (tier, report) = machine.tier();
+    if tier != Tier::Interpreter {
+        match &report.refused {
+            Some(reason) => eprintln!("machine code            none: {reason}"),
+            None => {
+                eprintln!("machine code  {:>14} functions", report.functions);
+                eprintln!("  size        {:>14} bytes", report.bytes);
+                eprintln!("  making it   {:>14.3} ms", milliseconds(report.nanoseconds));
+            }
+        }
+    }
 }
 
 /// Prints the functions that have used most ticks.

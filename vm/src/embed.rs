@@ -22,6 +22,7 @@ use crate::outside::{Given, Outside};
 use crate::raise::Exit;
 use crate::schedule::{Choices, Clock, Scheduler};
 use crate::task::TaskId;
+use crate::tier::{CompiledFunctions, Tier, TierReport};
 use crate::trust;
 use crate::value::Value;
 use crate::vm::Vm;
@@ -74,6 +75,7 @@ impl Vm {
             natives: &NATIVES,
             exchange: Exchange::new(),
             watch: Watch::default(),
+            compiled: CompiledFunctions::default(),
             embedder: Embedder { pinned: vec![starter, any_event], ..Embedder::default() },
             config,
         })
@@ -89,6 +91,20 @@ impl Vm {
     /// Returns the limits and settings.
     pub fn config(&self) -> &Config {
         &self.config
+    }
+
+    /// Sets how functions run from now on.
+    #[cfg(not(feature = "native"))]
+    pub fn set_tier(&mut self, tier: Tier) {
+        self.compiled.tier = tier;
+        if tier != Tier::Interpreter {
+            self.compiled.report.refused = Some("this program was built without the code generator".into());
+        }
+    }
+
+    /// Returns how functions run, and figures of the machine code made so far.
+    pub fn tier(&self) -> (Tier, &TierReport) {
+        (self.compiled.tier, &self.compiled.report)
     }
 
     /// Returns the inbox, through which other threads reach the run.

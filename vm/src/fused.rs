@@ -158,11 +158,50 @@ macro_rules! define_fused {
         const ORIGINALS: [u8; 256 - FIRST as usize] = {
             let mut originals = [0; 256 - FIRST as usize];
             $( originals[$number - FIRST as usize] = [$( Opcode::$part as u8 ),+][0]; )*
+            let mut number = 0;
+            while number < QUICK_LOOPS.len() {
+                originals[(QUICK_LOOP + number as u8 - FIRST) as usize] = QUICK_LOOPS[number] as u8;
+                number += 1;
+            }
             originals
         };
     };
 }
 for_each_fused!(define_fused);
+
+/// Number of the first loop instruction that has machine code, in the order of [`QUICK_LOOPS`].
+pub(crate) const QUICK_LOOP: u8 = 0xF4;
+
+/// The loop instructions. One of a function that has machine code gets another number in its word, so that
+/// the loop enters the machine code there.
+const QUICK_LOOPS: [Opcode; 7] = [
+    Opcode::Loop,
+    Opcode::LoopIfNil,
+    Opcode::LoopIfNotNil,
+    Opcode::LoopIfCons,
+    Opcode::LoopLess,
+    Opcode::LoopNotLess,
+    Opcode::LoopCount,
+];
+
+/// Gives the loop instruction at a word of loaded code the number that leads to machine code. An instruction
+/// that was fused with it is one of its own again.
+#[cfg(feature = "native")]
+pub(crate) fn quicken_loop(words: &mut [u32], at: usize) {
+    let quick =
+        Word(words[at]).opcode().and_then(|opcode| QUICK_LOOPS.iter().position(|&loops| loops == opcode));
+    let Some(quick) = quick else { return };
+    words[at] = words[at] & !0xff | u32::from(QUICK_LOOP + quick as u8);
+    if let Some(before) = at.checked_sub(1)
+        && FUSED.iter().any(|fused| {
+            u32::from(fused.number) == words[before] & 0xff
+                && fused.parts.len() == 2
+                && QUICK_LOOPS.contains(&fused.parts[1])
+        })
+    {
+        words[before] = original(Word(words[before])).0;
+    }
+}
 
 /// Returns the word of loaded code as it was before the loader fused it with those behind it.
 #[inline]
@@ -224,7 +263,9 @@ static BEGINS: [bool; 256] = {
     let mut begins = [false; 256];
     let mut number = 0;
     while number < ORIGINALS.len() {
-        begins[ORIGINALS[number] as usize] = ORIGINALS[number] != 0;
+        if number < (QUICK_LOOP - FIRST) as usize {
+            begins[ORIGINALS[number] as usize] = ORIGINALS[number] != 0;
+        }
         number += 1;
     }
     begins

@@ -45,6 +45,7 @@ mod shape;
 mod shared;
 mod snapshot;
 mod state;
+mod tier;
 mod trust;
 mod types;
 mod wait;

@@ -90,6 +90,7 @@ impl Vm {
             outside,
             cpu: _,
             natives: _,
+            compiled: _,
             exchange,
             watch,
             embedder,

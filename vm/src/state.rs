@@ -83,7 +83,7 @@ state! {
         course { config }
         parts { heap, embedder, exchange, watch }
         transient { cpu }
-        process { natives }
+        process { natives, compiled }
     }
 }
 

@@ -14,6 +14,8 @@ use crate::observe::Watch;
 use crate::outside::Outside;
 use crate::raise::Outcome;
 use crate::schedule::Scheduler;
+use crate::tier::CompiledFunctions;
+pub use crate::tier::{Tier, TierReport};
 use crate::value::Value;
 use crate::world::World;
 
@@ -50,6 +52,8 @@ pub struct Vm {
     pub(crate) watch: Watch,
     /// Objects kept for the embedder, and the embedder's requests.
     pub(crate) embedder: Embedder,
+    /// The machine code of functions.
+    pub(crate) compiled: CompiledFunctions,
     /// Limits and settings.
     pub(crate) config: Config,
 }

@@ -17,6 +17,7 @@ const LAYERS: &[&str] = &[
     "fused",
     "host",
     "shape",
+    "tier",
     "trust",
     // Names and code, data from and to the compiler, words for values, failures.
     "world",

@@ -194,6 +194,8 @@ pub struct Heap {
     committed: usize,
     external: External,
     limit: usize,
+    /// Where new code begins to run; `None` for its first word.
+    code_entry: Option<&'static u32>,
 
     stats: HeapStats,
 
@@ -236,6 +238,7 @@ list_state! {
         committed: Derived,
         external: Parts,
         limit: Run,
+        code_entry: Process,
         stats: Parts,
         has_images: Process,
         identity: Process,
@@ -271,6 +274,7 @@ impl Heap {
             committed: 0,
             external: External::default(),
             limit: config.limit.max(ARENA),
+            code_entry: None,
             stats: HeapStats::default(),
             has_images: config.images,
             identity: Arc::default(),

@@ -338,6 +338,14 @@ impl Heap {
         Ok(function)
     }
 
+    /// Sets where code made from now on begins to run; `None` for its first word.
+    ///
+    /// # Safety
+    /// What stands there may run in place of any code, with its frame.
+    pub unsafe fn set_code_entry(&mut self, entry: Option<&'static u32>) {
+        self.code_entry = entry;
+    }
+
     /// Creates code.
     ///
     /// # Safety
@@ -362,7 +370,7 @@ impl Heap {
                 name: parts.name,
                 debug: parts.debug,
                 owner: parts.owner,
-                entry: words,
+                entry: self.code_entry.map_or(words.cast_const(), std::ptr::from_ref),
                 arity: parts.arity,
                 nregs: parts.nregs,
                 nconsts: nconsts as u32,

@@ -10,7 +10,7 @@ use esl_bytecode::word::Word;
 
 use super::arguments::{arrange, count_of_arguments, describe_arity, spread};
 use super::substitute::{deliver, return_all, substitute};
-use super::{Signal, aux_at, code_of, constant, failure, pc_as_value, stubs, word_at};
+use super::{Signal, aux_at, code_of, constant, failure, first_instruction, pc_as_value, stubs, word_at};
 use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::Arguments;
 use crate::raise::{Exit, Raised};
@@ -138,7 +138,7 @@ pub(super) unsafe fn call(
             *registers.add(i) = argument;
         }
         vm.cpu.set_base(registers);
-        vm.cpu.set_pc((*code).entry);
+        vm.cpu.set_pc(first_instruction(code));
     }
     Signal::Reload
 }

@@ -17,6 +17,8 @@ use crate::outside::Outside;
 use crate::saved_pc::SavedPc;
 use crate::schedule::{Scheduler, TurnEnd};
 use crate::task::{Control, Task, Tasks};
+#[cfg(feature = "native")]
+use crate::tier::CompiledFunctions;
 use crate::vm::Vm;
 use crate::wait::Deliveries;
 use crate::world::{Opaques, World};
@@ -142,7 +144,12 @@ fn mark_roots(
 }
 
 /// Marks more: a slice of what is known to be reachable, then the tasks whose stacks have yet to be scanned.
-fn mark_more(heap: &mut Heap, tasks: &mut Tasks, opaques: &mut Opaques) {
+fn mark_more(
+    heap: &mut Heap,
+    tasks: &mut Tasks,
+    opaques: &mut Opaques,
+    #[cfg(feature = "native")] compiled: &mut CompiledFunctions,
+) {
     let SliceOutcome::Drained { left } = heap.slice(SLICE_VISITS) else { return };
     let (mut left, mut has_scanned) = (left as usize, false);
     let cycle = heap.cycle_id();
@@ -167,6 +174,8 @@ fn mark_more(heap: &mut Heap, tasks: &mut Tasks, opaques: &mut Opaques) {
     }
     if !has_scanned {
         opaques.note_unreachable(heap);
+        #[cfg(feature = "native")]
+        Vm::give_back_code(compiled, heap);
         // SAFETY: the roots were marked when the cycle began, and so was the running task, or it has not run
         // since; and every other task since, before it ran.
         unsafe { heap.end_marking() };
@@ -201,6 +210,8 @@ impl Vm {
             return None;
         }
         self.cpu.ticks = left;
+        #[cfg(feature = "native")]
+        self.note_heat();
         Some(Leave::Slice)
     }
 
@@ -268,6 +279,8 @@ impl Vm {
     pub(crate) fn collect_fully(&mut self) {
         let pause = self.begin_pause();
         let Vm { heap, world, compiler, scheduler, outside, exchange, embedder, .. } = self;
+        #[cfg(feature = "native")]
+        let compiled = &mut self.compiled;
         let Scheduler { running, tasks, deliveries, .. } = scheduler;
         // SAFETY: all roots and all tasks are marked; `begin_pause` has noted the running frame of the
         // running task, those of the others were noted at the switch.
@@ -280,7 +293,11 @@ impl Vm {
                         scan(heap, task);
                     }
                 },
-                |heap| opaques.note_unreachable(heap),
+                |heap| {
+                    opaques.note_unreachable(heap);
+                    #[cfg(feature = "native")]
+                    Vm::give_back_code(compiled, heap);
+                },
             );
             world.opaques = opaques;
         }
@@ -292,9 +309,17 @@ impl Vm {
     pub(crate) fn collect_slice(&mut self) {
         let pause = self.begin_pause();
         let Vm { heap, world, compiler, scheduler, outside, exchange, embedder, .. } = self;
+        #[cfg(feature = "native")]
+        let compiled = &mut self.compiled;
         let Scheduler { running, tasks, deliveries, .. } = scheduler;
         match heap.phase() {
-            Phase::Marking => mark_more(heap, tasks, &mut world.opaques),
+            Phase::Marking => mark_more(
+                heap,
+                tasks,
+                &mut world.opaques,
+                #[cfg(feature = "native")]
+                compiled,
+            ),
             Phase::Sweeping => _ = heap.slice(SLICE_VISITS),
             Phase::Idle => {
                 heap.begin_cycle();

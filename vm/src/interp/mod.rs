@@ -44,6 +44,8 @@ mod exit;
 pub(crate) mod frames;
 mod in_window;
 mod interrupt;
+#[cfg(feature = "native")]
+mod native;
 mod reserve;
 pub(crate) mod start;
 pub(crate) mod stubs;
@@ -60,7 +62,7 @@ use esl_bytecode::opcode::Opcode;
 use esl_bytecode::word::Word;
 
 use crate::cpu::Cpu;
-use crate::fused::{for_each_fused, original};
+use crate::fused::{QUICK_LOOP, for_each_fused, original};
 use crate::heap::layout::{Boxed, CodeObject, FunctionObject, Kind, StructureObject, SymbolObject, Vector};
 use crate::raise::{Exit, Raised};
 use crate::shape::Shape;
@@ -85,6 +87,20 @@ macro_rules! define_operations {
             TaskExit = stubs::TASK_EXIT,
             /// The function that ran where the task was interrupted has returned: see `interrupt`.
             InterruptReturn = stubs::INTERRUPT_RETURN,
+            /// The function has machine code: see `native`.
+            #[cfg(feature = "native")]
+            NativeEntry = stubs::NATIVE_ENTRY,
+            /// Machine code is to be made of the function.
+            #[cfg(feature = "native")]
+            MakeAtEntry = stubs::MAKE_AT_ENTRY,
+            /// Loop instructions of functions that have machine code.
+            QuickLoop = QUICK_LOOP,
+            QuickLoopIfNil = QUICK_LOOP + 1,
+            QuickLoopIfNotNil = QUICK_LOOP + 2,
+            QuickLoopIfCons = QUICK_LOOP + 3,
+            QuickLoopLess = QUICK_LOOP + 4,
+            QuickLoopNotLess = QUICK_LOOP + 5,
+            QuickLoopCount = QUICK_LOOP + 6,
             $( $fused = $fused_number, )*
         }
     };
@@ -150,6 +166,16 @@ pub(crate) unsafe fn code_of(function: Value) -> *mut CodeObject {
 pub(crate) unsafe fn constants_of(code: *mut CodeObject) -> *const Value {
     // SAFETY: the constants are at a fixed offset inside the Code.
     unsafe { code.byte_add(CodeObject::CONSTANTS_OFFSET).cast() }
+}
+
+/// Returns the address of the first instruction of a code.
+///
+/// # Safety
+/// `code` points to a Code.
+#[inline(always)]
+unsafe fn first_instruction(code: *mut CodeObject) -> *const u32 {
+    // SAFETY: the words are at this offset inside the Code.
+    unsafe { code.byte_add((*code).words_offset()).cast() }
 }
 
 /// Constant `index` of the function whose frame has its registers at `base`.
@@ -637,6 +663,32 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     pc = return_to;
                     k = constants_of(code_of(*base.sub(2)));
                     go_on!();
+                }};
+            }
+            // Goes on as machine code has left off.
+            #[cfg(feature = "native")]
+            macro_rules! go_on_from {
+                ($leaving:expr) => {{
+                    let leaving = $leaving;
+                    ticks = leaving.ticks;
+                    match leaving.left {
+                        native::Left::Returned(value) => return_value!(value),
+                        native::Left::Values => {
+                            base = leaving.base;
+                            return_all!();
+                        }
+                        native::Left::Again => {
+                            (pc, base) = (leaving.pc, leaving.base);
+                            k = constants_of(code_of(*base.sub(2)));
+                            // By the loop, even if machine code could be entered there.
+                            word = word_at(pc);
+                            continue;
+                        }
+                        native::Left::Signal(signal) => {
+                            (pc, base) = (leaving.pc, leaving.base);
+                            break signal;
+                        }
+                    }
                 }};
             }
             macro_rules! multiply {
@@ -1498,6 +1550,30 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                     break signal;
                 }
                 LoopOperation::TaskExit => break Signal::TaskExit,
+
+                // ---- machine code
+                #[cfg(feature = "native")]
+                LoopOperation::NativeEntry => go_on_from!(native::enter(vm, pc, base, ticks)),
+                #[cfg(feature = "native")]
+                LoopOperation::MakeAtEntry => {
+                    let code = code_of(*base.sub(2));
+                    native::make_at_entry(vm, code);
+                    pc = (*code).entry;
+                    go_on!();
+                }
+                LoopOperation::QuickLoop
+                | LoopOperation::QuickLoopIfNil
+                | LoopOperation::QuickLoopIfNotNil
+                | LoopOperation::QuickLoopIfCons
+                | LoopOperation::QuickLoopLess
+                | LoopOperation::QuickLoopNotLess
+                | LoopOperation::QuickLoopCount => {
+                    #[cfg(feature = "native")]
+                    if let Some(leaving) = native::enter_at_loop(vm, pc, base, ticks) {
+                        go_on_from!(leaving)
+                    }
+                    first_part!()
+                }
 
                 // ---- fused instructions
                 LoopOperation::MulMulAdd => products!(Add),

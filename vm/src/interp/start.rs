@@ -5,7 +5,7 @@ use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::{Count, Pad, Window};
 
 use super::collect::LARGE_STACK;
-use super::{code_of, stubs};
+use super::{code_of, first_instruction, stubs};
 use crate::heap::layout::CodeObject;
 use crate::heap::{AllocError, CodeParts, Heap};
 use crate::saved_pc::SavedPc;
@@ -41,7 +41,7 @@ fn direct_code(heap: &Heap, function: Value, arguments: Value) -> Option<&CodeOb
 /// with the list of arguments.
 pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function: Value, arguments: Value) {
     let stub = stubs::task_exit();
-    if let Some(code) = direct_code(heap, function, arguments) {
+    if direct_code(heap, function, arguments).is_some() {
         // SAFETY: the task was made with `first_words`: room for two links and the registers of this code.
         // The stub's address has the low bits of a fixnum.
         unsafe {
@@ -51,7 +51,9 @@ pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function
             *start.add(2) = function;
             *start.add(3) = Value::from_bits(stub.expose_provenance() as u64);
         }
-        task.pc = SavedPc::new(code.entry);
+        // SAFETY: this is a Code.
+        let first = unsafe { first_instruction(code_of(function)) };
+        task.pc = SavedPc::new(first);
         task.base = FIRST_BASE;
         return;
     }
@@ -66,7 +68,7 @@ pub(crate) fn first_frame(heap: &Heap, task: &mut Task, starter: Value, function
         *start.add(3) = Value::from_bits(stub.expose_provenance() as u64);
         *start.add(4) = function;
         *start.add(6) = arguments;
-        task.pc = SavedPc::new((*code_of(starter)).entry);
+        task.pc = SavedPc::new(first_instruction(code_of(starter)));
     }
     task.base = FIRST_BASE;
 }

@@ -20,6 +20,13 @@ pub(super) const ERROR_RETURN: u8 = 0xC3;
 /// Number of the operation after a function that ran where its task was interrupted.
 pub(super) const INTERRUPT_RETURN: u8 = 0xC4;
 
+/// Number of the operation at the entry of code that has machine code.
+#[cfg(feature = "native")]
+pub(super) const NATIVE_ENTRY: u8 = 0xC5;
+/// Number of the operation at the entry of code of which machine code is to be made.
+#[cfg(feature = "native")]
+pub(super) const MAKE_AT_ENTRY: u8 = 0xC6;
+
 /// Returns a call word whose window is register `window` and that wants all values.
 const fn call_word(window: u8) -> u32 {
     Opcode::Call as u32 | (window as u32) << 8 | (Want::ALL.0 as u32) << 24

@@ -42,13 +42,15 @@ fn constants() -> Vec<Constant> {
         Constant::Vector(vec![PoolIdx(0)]),
         // k13: a class
         Constant::Class(Symbol::esl("POINT")),
-        // k14 to k19: the shared functions
+        // k14 to k21: the shared functions
         Constant::Function(FunctionNumber(0)),
         Constant::Function(FunctionNumber(1)),
         Constant::Function(FunctionNumber(2)),
         Constant::Function(FunctionNumber(3)),
         Constant::Function(FunctionNumber(4)),
         Constant::Function(FunctionNumber(5)),
+        Constant::Function(FunctionNumber(6)),
+        Constant::Function(FunctionNumber(7)),
     ]
 }
 
@@ -121,6 +123,15 @@ fn shared_functions() -> Vec<ModuleFunction> {
             "jump-greater-int r0 0 L \n return r1 \n L: add r6 r1 r0 \n add-int r4 r0 -1 \n load-nil r7.. 1
              move r5 r6 \n call-self r2.. 2 want 1 \n return r2",
         ),
+        // Returns what its argument returns. A call for which the stack grows is none of the loop's, so it calls
+        // one with many registers before.
+        function(
+            Parameters::exactly(1),
+            4,
+            vec![],
+            "make-closure r1 k21 \n call r1.. 0 want 1 \n move r1 r0 \n call r1.. 0 want all \n return-all",
+        ),
+        function(Parameters::default(), 100, vec![], "load-nil r0.. 1 \n return r0"),
     ]
 }
 
@@ -131,7 +142,8 @@ pub(super) fn functions<'a>(programs: impl IntoIterator<Item = &'a str>) -> Vec<
 }
 
 /// A machine without a library, with a class `POINT`, an instance of it in `V`, and the function `SUCCESSOR`.
-pub(super) struct Machine(Vm);
+/// Its programs are called by the function beside it, if there is one.
+pub(super) struct Machine(Vm, Option<Value>);
 
 impl Machine {
     pub(super) fn new() -> Machine {
@@ -144,12 +156,23 @@ impl Machine {
         let mut intern = |name| world.intern(heap, &Symbol::esl(name)).unwrap();
         let [class, x, y] = ["POINT", "X", "Y"].map(&mut intern);
         world.define_class(heap, class, &[], &[x, y], Value::NIL).unwrap();
-        let mut machine = Machine(vm);
+        let mut machine = Machine(vm, None);
         let successor = machine.load(["make-closure r0 k14 \n return r0"])[0];
         let successor = machine.0.call(successor, &[], u64::MAX).unwrap()[0];
         let Vm { heap, world, .. } = &mut machine.0;
         let symbol = world.intern(heap, &Symbol::esl("SUCCESSOR")).unwrap();
         heap.symbol_set_function(symbol, successor).unwrap();
+        machine
+    }
+
+    /// A machine that makes machine code of all functions loaded from now on.
+    #[cfg(feature = "native")]
+    fn native() -> Machine {
+        let mut machine = Machine::new();
+        machine.0.set_tier(crate::vm::Tier::Native);
+        assert_eq!(machine.0.tier().1.refused, None);
+        let caller = machine.load(["make-closure r0 k20 \n return r0"])[0];
+        machine.1 = Some(machine.0.call(caller, &[], u64::MAX).unwrap()[0]);
         machine
     }
 
@@ -187,7 +210,11 @@ impl Machine {
 
     /// Runs the function of a program, and returns its values or the description of its failure.
     pub(super) fn run(&mut self, function: Value) -> String {
-        match self.0.call(function, &[], u64::MAX) {
+        let result = match self.1 {
+            Some(caller) => self.0.call(caller, &[function], u64::MAX),
+            None => self.0.call(function, &[], u64::MAX),
+        };
+        match result {
             Ok(values) => {
                 let values: Vec<String> = values.iter().map(|&v| describe(&self.0.heap, v)).collect();
                 values.join(", ")
@@ -517,6 +544,21 @@ fn slots_are_read_and_written() {
     let mut machine = Machine::new();
     machine.set_point();
     assert_eq!(machine.wrong(INSTANCES.iter().copied()), "");
+}
+
+#[test]
+#[cfg(feature = "native")]
+fn machine_code_does_what_the_arms_do() {
+    let jumps = JUMPS.map(|(jump, is_taken)| (jump_program(jump), if is_taken { "T" } else { "NIL" }));
+    let builtins = builtin_programs();
+    let owned = jumps.iter().chain(&builtins).map(|(program, expected)| (&**program, *expected));
+    let mut machine = Machine::native();
+    assert_eq!(machine.wrong(owned.chain(PROGRAMS.iter().copied())), "");
+    machine.set_point();
+    assert_eq!(machine.wrong(INSTANCES.iter().copied()), "");
+    let report = machine.0.tier().1;
+    assert_eq!(report.refused, None);
+    assert!(report.functions > JUMPS.len() + PROGRAMS.len(), "{} functions", report.functions);
 }
 
 #[test]

@@ -209,5 +209,10 @@ fn the_loop_has_an_arm_for_each_row_in_the_order_of_the_table() {
     assert_eq!(of_rows, rows);
     let (of_stubs, fused) = others.split_at(3);
     assert_eq!(of_stubs, ["ErrorReturn", "InterruptReturn", "TaskExit"]);
+    let (of_machine_code, fused) = fused.split_at(9);
+    let quick = ["", "IfNil", "IfNotNil", "IfCons", "Less", "NotLess", "Count"];
+    let quick = quick.map(|sort| format!("QuickLoop{sort}"));
+    assert_eq!(of_machine_code[..2], ["NativeEntry", "MakeAtEntry"]);
+    assert_eq!(of_machine_code[2..], quick);
     assert_eq!(fused, FUSED.iter().map(|fused| fused.name).collect::<Vec<_>>());
 }

@@ -1,0 +1,87 @@
+//! What machine code is given, and how it is left.
+
+use std::ffi::c_void;
+
+/// The function has returned; the value is in the reply. Its frame is still the topmost one.
+pub const RETURNED: u64 = 0;
+/// The interpreter is to go on at `pc` in the frame `base`; it repeats the instruction there.
+pub const AGAIN: u64 = 1;
+/// A function of the machine has left a signal for the interpreter, for the instruction at `pc` in the frame
+/// `base`.
+pub const SIGNAL: u64 = 2;
+/// A tail call: the frame is that of the callee, and the reply has the address of its machine code. Only
+/// between functions of machine code, and to the interpreter's entry.
+pub const TAIL: u64 = 3;
+/// The function in the frame `base` returns the value list.
+pub const RETURN_VALUES: u64 = 4;
+
+/// What a helper says of an instruction: go on with the next one.
+pub const STEP_NEXT: u64 = 0;
+/// What a helper says of an instruction: it jumps.
+pub const STEP_JUMP: u64 = 1;
+/// What a helper says of an instruction: the machine code is to be left with [`SIGNAL`].
+pub const STEP_SIGNAL: u64 = 2;
+/// What a helper says of a builtin called in place of the function: its values are in the value list.
+pub const STEP_VALUES: u64 = 3;
+
+/// Function of the machine that does the instruction at `pc` in the frame `base`.
+pub type NativeHelper = unsafe extern "C" fn(*mut NativeContext, *const u32, *mut u64) -> u64;
+
+/// Function of the machine that overwrites a slot while objects are marked.
+pub type NativeStore = unsafe extern "C" fn(*mut NativeContext, *mut u64, u64);
+
+/// Machine code of a function: the frame, and the place of entry: 0 for the first instruction, and the
+/// numbers from 1 on for loop instructions.
+pub type NativeEntry = unsafe extern "C" fn(*mut NativeContext, *mut u64, u64) -> NativeReply;
+
+/// What machine code shares with the interpreter.
+#[repr(C)]
+#[derive(Debug)]
+pub struct NativeContext {
+    /// Ticks left until the next safepoint.
+    pub ticks: i32,
+    /// Whether the collector marks, so that overwritten slots have to be logged.
+    pub is_marking: u32,
+    /// End of the stack that machine code may use.
+    pub limit: u64,
+    /// Where it was left: address of the instruction.
+    pub pc: u64,
+    /// Where it was left: base of the frame.
+    pub base: u64,
+    /// Value that a builtin called in place of the function has returned.
+    pub value: u64,
+    /// The machine.
+    pub machine: *mut c_void,
+    /// Does an instruction whose fast way does not apply.
+    pub step: NativeHelper,
+    /// Calls the builtin of a `call-builtin`.
+    pub call_builtin: NativeHelper,
+    /// Calls the builtin of a `tail-call-builtin`.
+    pub tail_builtin: NativeHelper,
+    /// Puts the first value of the value list into the window of a call, as what the call returns.
+    pub first_value: NativeHelper,
+    /// Overwrites a slot while objects are marked.
+    pub store: NativeStore,
+}
+
+/// How a function of machine code was left.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct NativeReply {
+    /// One of the constants of this module.
+    pub status: u64,
+    /// The value that was returned, or the address of the callee's machine code.
+    pub value: u64,
+}
+
+/// The first words of what the entry word of compiled code points to.
+#[repr(C, align(8))]
+#[derive(Clone, Copy, Debug)]
+pub struct EntryStub {
+    /// Operation of the interpreter's loop: the entry to machine code.
+    pub word: u32,
+    /// Number of the machine code, for the interpreter.
+    pub number: u32,
+    /// Address of the machine code, a [`NativeEntry`].
+    pub address: u64,
+}

@@ -1,0 +1,470 @@
+//! Arithmetic and comparisons: on fixnums, and on doubles that are words.
+
+use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
+use cranelift_codegen::ir::{Block, InstBuilder, MemFlagsData, Value as Ssa, types};
+use esl_bytecode::opcode::Instr;
+use esl_heap::Value;
+
+use crate::flow::FlowStep;
+use crate::kinds::Known;
+use crate::translate::Translator;
+
+/// Operation of arithmetic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Arithmetic {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+}
+
+/// Order of two numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NumberOrder {
+    Equal,
+    Less,
+    LessEqual,
+    Greater,
+}
+
+impl NumberOrder {
+    fn of_fixnums(self) -> IntCC {
+        match self {
+            NumberOrder::Equal => IntCC::Equal,
+            NumberOrder::Less => IntCC::SignedLessThan,
+            NumberOrder::LessEqual => IntCC::SignedLessThanOrEqual,
+            NumberOrder::Greater => IntCC::SignedGreaterThan,
+        }
+    }
+
+    fn of_doubles(self) -> FloatCC {
+        match self {
+            NumberOrder::Equal => FloatCC::Equal,
+            NumberOrder::Less => FloatCC::LessThan,
+            NumberOrder::LessEqual => FloatCC::LessThanOrEqual,
+            NumberOrder::Greater => FloatCC::GreaterThan,
+        }
+    }
+}
+
+impl Translator<'_, '_> {
+    pub(crate) fn registers(&mut self, operation: Arithmetic, dst: u8, left: u8, right: u8) {
+        let (x, y) = (self.operand(left), self.operand(right));
+        if x.1 == Known::Double || y.1 == Known::Double {
+            return self.with_double(operation, dst, left, right);
+        }
+        if operation != Arithmetic::Divide && x.1 == Known::Fixnum && y.1 == Known::Fixnum {
+            // What overflows leaves the machine code, so the result is known.
+            let exit = self.exit();
+            let result = self.on_fixnums(operation, x.0, y.0, exit);
+            return self.set(dst, result, Known::Fixnum);
+        }
+        let (slow, done) = (self.cold_block(), self.block_with_value());
+        if operation != Arithmetic::Divide
+            && let Some(test) = self.not_fixnums(x, y)
+        {
+            let (fixnums, others) = (self.block(), self.block());
+            self.branch(test, others, fixnums);
+            self.go_to(fixnums);
+            let result = self.on_fixnums(operation, x.0, y.0, slow);
+            self.jump_with(done.0, result);
+            self.go_to(others);
+        }
+        if x.1 != Known::Fixnum && y.1 != Known::Fixnum {
+            let (doubles, mixed) = (self.block(), self.block());
+            let both = self.b.ins().band(x.0, y.0);
+            let tag = self.b.ins().band_imm_s(both, 3);
+            let is_double = self.equals(tag, 3);
+            self.branch(is_double, doubles, mixed);
+            self.go_to(doubles);
+            let (p, q) = (self.decode(x.0), self.decode(y.0));
+            self.on_doubles(operation, p, q, slow, done.0, false);
+            self.go_to(mixed);
+        }
+        self.mixed(operation, x, y, slow, done.0);
+        self.finish_value(slow, done, dst, Known::Nothing);
+    }
+
+    /// Arithmetic of which one operand is known to be a double.
+    fn with_double(&mut self, operation: Arithmetic, dst: u8, left: u8, right: u8) {
+        let (slow, done) = (self.cold_block(), self.block_with_value());
+        let p = self.double_operand(left, slow);
+        let q = self.double_operand(right, slow);
+        self.on_doubles(operation, p, q, slow, done.0, true);
+        self.finish_double(slow, done, dst);
+    }
+
+    /// Returns the number in a register as a double, for arithmetic with a double; what is neither a fixnum
+    /// nor a double without a box goes to `otherwise`.
+    fn double_operand(&mut self, register: u8, otherwise: Block) -> Ssa {
+        let (word, known) = self.operand(register);
+        match known {
+            Known::Double => self.get_double(register),
+            Known::Fixnum => self.convert(word),
+            Known::Nothing => {
+                let done = self.block_with(types::F64);
+                let (doubles, others, fixnums) = (self.block(), self.block(), self.block());
+                let tag = self.b.ins().band_imm_s(word, 3);
+                let is_double = self.equals(tag, 3);
+                self.branch(is_double, doubles, others);
+                self.go_to(doubles);
+                let double = self.decode(word);
+                self.jump_with(done.0, double);
+                self.go_to(others);
+                self.branch(tag, otherwise, fixnums);
+                self.go_to(fixnums);
+                let double = self.convert(word);
+                self.jump_with(done.0, double);
+                self.go_to(done.0);
+                done.1
+            }
+        }
+    }
+
+    /// Returns the double that a word is; what is none, or one in a box, goes to `otherwise`.
+    pub(crate) fn double_of(&mut self, word: Ssa, otherwise: Block) -> Ssa {
+        let done = self.block_with(types::F64);
+        let (doubles, mut others) = (self.block(), self.cold_block());
+        let tag = self.b.ins().band_imm_s(word, 3);
+        let is_double = self.equals(tag, 3);
+        self.branch(is_double, doubles, others);
+        self.go_to(doubles);
+        let double = self.decode(word);
+        self.jump_with(done.0, double);
+        for (value, double) in [
+            (Value::POSITIVE_ZERO, 0.0),
+            (Value::NEGATIVE_ZERO, -0.0),
+            (Value::INFINITY, f64::INFINITY),
+            (Value::NEGATIVE_INFINITY, f64::NEG_INFINITY),
+            (Value::NAN, f64::NAN),
+        ] {
+            self.go_to(others);
+            let (found, further) = (self.cold_block(), self.cold_block());
+            let is_it = self.equals(word, value.bits());
+            self.branch(is_it, found, further);
+            self.go_to(found);
+            let double = self.b.ins().f64const(double);
+            self.jump_with(done.0, double);
+            others = further;
+        }
+        self.go_to(others);
+        self.jump(otherwise);
+        self.go_to(done.0);
+        done.1
+    }
+
+    pub(crate) fn add_int(&mut self, dst: u8, left: u8, addend: i32) {
+        let (x, y) = (self.operand(left), self.fixnum(addend));
+        if x.1 == Known::Double {
+            // The interpreter leaves zeros to the numeric tower here, whose work may end a slice.
+            let (slow, done) = (self.cold_block(), self.block_with_value());
+            self.require_double(x.0, slow);
+            let (p, q) = (self.get_double(left), self.b.ins().f64const(f64::from(addend)));
+            self.on_doubles(Arithmetic::Add, p, q, slow, done.0, true);
+            return self.finish_double(slow, done, dst);
+        }
+        if x.1 == Known::Fixnum {
+            let exit = self.exit();
+            let sum = self.on_fixnums(Arithmetic::Add, x.0, y.0, exit);
+            return self.set(dst, sum, Known::Fixnum);
+        }
+        let (slow, done) = (self.cold_block(), self.block_with_value());
+        let (fixnums, others) = (self.block(), self.block());
+        let tag = self.b.ins().band_imm_s(x.0, 3);
+        self.branch(tag, others, fixnums);
+        self.go_to(fixnums);
+        let sum = self.on_fixnums(Arithmetic::Add, x.0, y.0, slow);
+        self.jump_with(done.0, sum);
+        self.go_to(others);
+        self.require_double(x.0, slow);
+        let (p, q) = (self.decode(x.0), self.b.ins().f64const(f64::from(addend)));
+        self.on_doubles(Arithmetic::Add, p, q, slow, done.0, false);
+        self.finish_value(slow, done, dst, Known::Nothing);
+    }
+
+    /// Returns the result of two fixnums; what overflows goes to `otherwise`.
+    fn on_fixnums(&mut self, operation: Arithmetic, x: Ssa, y: Ssa, otherwise: Block) -> Ssa {
+        let (result, overflow) = match operation {
+            Arithmetic::Add => self.b.ins().sadd_overflow(x, y),
+            Arithmetic::Subtract => self.b.ins().ssub_overflow(x, y),
+            Arithmetic::Multiply | Arithmetic::Divide => {
+                let x = self.b.ins().sshr_imm_s(x, 2);
+                self.b.ins().smul_overflow(x, y)
+            }
+        };
+        self.refuse(overflow, otherwise);
+        result
+    }
+
+    /// Goes on only if the word is that of a double, or the words whose common bits these are.
+    fn require_double(&mut self, word: Ssa, otherwise: Block) {
+        let tag = self.b.ins().band_imm_s(word, 3);
+        let is_double = self.equals(tag, 3);
+        self.require(is_double, otherwise);
+    }
+
+    /// Returns the double that a word is.
+    fn decode(&mut self, word: Ssa) -> Ssa {
+        let bits = self.b.ins().rotr_imm_s(word, 3);
+        let bias = self.word(Value::DOUBLE_BIAS);
+        let bits = self.b.ins().isub(bits, bias);
+        self.b.ins().bitcast(types::F64, MemFlagsData::new(), bits)
+    }
+
+    /// Jumps to `done` with the word of the result of two doubles, and with the result if `takes_both`; a
+    /// result that is no word goes to `otherwise`.
+    fn on_doubles(
+        &mut self,
+        operation: Arithmetic,
+        p: Ssa,
+        q: Ssa,
+        otherwise: Block,
+        done: Block,
+        takes_both: bool,
+    ) {
+        let result = match operation {
+            Arithmetic::Add => self.b.ins().fadd(p, q),
+            Arithmetic::Subtract => self.b.ins().fsub(p, q),
+            Arithmetic::Multiply => self.b.ins().fmul(p, q),
+            Arithmetic::Divide => self.b.ins().fdiv(p, q),
+        };
+        let bits = self.b.ins().bitcast(types::I64, MemFlagsData::new(), result);
+        let bias = self.word(Value::DOUBLE_BIAS);
+        let bits = self.b.ins().iadd(bits, bias);
+        let word = self.b.ins().rotl_imm_s(bits, 3);
+        self.require_double(word, otherwise);
+        let results = [word.into(), result.into()];
+        self.b.ins().jump(done, if takes_both { &results } else { &results[..1] });
+    }
+
+    /// Arithmetic on a fixnum and a double, in either order; others go to `otherwise`.
+    fn mixed(
+        &mut self,
+        operation: Arithmetic,
+        x: (Ssa, Known),
+        y: (Ssa, Known),
+        otherwise: Block,
+        done: Block,
+    ) {
+        if x.1 == Known::Fixnum && y.1 == Known::Fixnum {
+            return self.jump(otherwise);
+        }
+        let (left, right) = (self.block(), self.block());
+        let tag = self.b.ins().band_imm_s(x.0, 3);
+        self.branch(tag, right, left);
+        self.go_to(left);
+        self.require_double(y.0, otherwise);
+        let (p, q) = (self.convert(x.0), self.decode(y.0));
+        self.on_doubles(operation, p, q, otherwise, done, false);
+        self.go_to(right);
+        self.require_double(x.0, otherwise);
+        let tag = self.b.ins().band_imm_s(y.0, 3);
+        self.refuse(tag, otherwise);
+        let (p, q) = (self.decode(x.0), self.convert(y.0));
+        self.on_doubles(operation, p, q, otherwise, done, false);
+    }
+
+    /// Returns a fixnum as a double.
+    fn convert(&mut self, word: Ssa) -> Ssa {
+        let n = self.b.ins().sshr_imm_s(word, 2);
+        self.b.ins().fcvt_from_sint(types::F64, n)
+    }
+
+    /// Quotients and remainders of fixnums by one above zero.
+    pub(crate) fn divide(&mut self, instr: &Instr, dst: u8, left: u8, right: u8) {
+        let (x, y, slow) = (self.operand(left), self.operand(right), self.cold_block());
+        if let Some(test) = self.not_fixnums(x, y) {
+            self.refuse(test, slow);
+        }
+        let known = of_both(x.1, y.1);
+        let (x, y) = (x.0, y.0);
+        let is_above = self.b.ins().icmp_imm_s(IntCC::SignedGreaterThan, y, 0);
+        self.require(is_above, slow);
+        // Both are shifted by two, and so is the remainder.
+        let result = match instr {
+            Instr::Rem { .. } => self.b.ins().srem(x, y),
+            Instr::Mod { .. } => {
+                let remainder = self.b.ins().srem(x, y);
+                let other = self.b.ins().iadd(remainder, y);
+                let is_negative = self.b.ins().icmp_imm_s(IntCC::SignedLessThan, remainder, 0);
+                self.b.ins().select(is_negative, other, remainder)
+            }
+            Instr::Floor { .. } => {
+                let quotient = self.b.ins().sdiv(x, y);
+                let product = self.b.ins().imul(quotient, y);
+                let remainder = self.b.ins().isub(x, product);
+                let below = self.b.ins().iadd_imm_s(quotient, -1);
+                let is_negative = self.b.ins().icmp_imm_s(IntCC::SignedLessThan, remainder, 0);
+                let quotient = self.b.ins().select(is_negative, below, quotient);
+                self.b.ins().ishl_imm_s(quotient, 2)
+            }
+            _ => {
+                let quotient = self.b.ins().sdiv(x, y);
+                self.b.ins().ishl_imm_s(quotient, 2)
+            }
+        };
+        self.finish_as(slow, result, dst, known);
+    }
+
+    pub(crate) fn bitwise(&mut self, instr: &Instr, dst: u8, left: u8, right: u8) {
+        let (x, y, slow) = (self.operand(left), self.operand(right), self.cold_block());
+        let test = self.not_fixnums(x, y);
+        if let Some(test) = test {
+            self.refuse(test, slow);
+        }
+        let result = match instr {
+            Instr::LogAnd { .. } => self.b.ins().band(x.0, y.0),
+            Instr::LogIor { .. } => self.b.ins().bor(x.0, y.0),
+            _ => self.b.ins().bxor(x.0, y.0),
+        };
+        self.finish_as(slow, result, dst, of_both(x.1, y.1));
+    }
+
+    pub(crate) fn shift(&mut self, dst: u8, left: u8, right: u8) {
+        let (x, y, slow) = (self.operand(left), self.operand(right), self.cold_block());
+        let done = self.block_with_value();
+        if let Some(test) = self.not_fixnums(x, y) {
+            self.refuse(test, slow);
+        }
+        let (n, by) = (x.0, self.b.ins().sshr_imm_s(y.0, 2));
+        let (up, down) = (self.block(), self.block());
+        let is_up = self.b.ins().icmp_imm_s(IntCC::SignedGreaterThan, by, 0);
+        self.branch(is_up, up, down);
+        self.go_to(down);
+        let most = self.word(63);
+        let distance = self.b.ins().ineg(by);
+        let distance = self.b.ins().smin(distance, most);
+        let shifted = self.b.ins().sshr(n, distance);
+        let shifted = self.b.ins().band_imm_s(shifted, !3);
+        self.jump_with(done.0, shifted);
+        self.go_to(up);
+        let is_small = self.b.ins().icmp_imm_s(IntCC::SignedLessThan, by, 62);
+        self.require(is_small, slow);
+        let shifted = self.b.ins().ishl(n, by);
+        let back = self.b.ins().sshr(shifted, by);
+        let is_whole = self.b.ins().icmp(IntCC::Equal, back, n);
+        self.require(is_whole, slow);
+        self.jump_with(done.0, shifted);
+        self.finish_value(slow, done, dst, of_both(x.1, y.1));
+    }
+
+    /// A comparison that gives `t` or `nil`.
+    pub(crate) fn compare(&mut self, order: NumberOrder, dst: u8, left: u8, right: u8) {
+        let (x, y) = (self.operand(left), self.operand(right));
+        let (slow, done) = (self.cold_block(), self.block_with_value());
+        if let Some(test) = self.order_with_double(order, left, right, slow) {
+            let value = self.boolean(test);
+            self.jump_with(done.0, value);
+            return self.finish_value(slow, done, dst, Known::Nothing);
+        }
+        let (test, others) = self.order_of_fixnums(order, x, y);
+        let value = self.boolean(test);
+        self.jump_with(done.0, value);
+        self.go_to(others);
+        if let Some(test) = self.order_of_doubles(order, x, y, slow) {
+            let value = self.boolean(test);
+            self.jump_with(done.0, value);
+        }
+        self.finish_value(slow, done, dst, Known::Nothing);
+    }
+
+    /// Returns the test of two numbers of which one is known to be a double; what is no double without a box
+    /// goes to `slow`, and so does a fixnum, which is compared exactly.
+    fn order_with_double(&mut self, order: NumberOrder, left: u8, right: u8, slow: Block) -> Option<Ssa> {
+        let (x, y) = (self.operand(left), self.operand(right));
+        if x.1 != Known::Double && y.1 != Known::Double {
+            return None;
+        }
+        let p = self.exact_double(left, slow);
+        let q = self.exact_double(right, slow);
+        Some(self.b.ins().fcmp(order.of_doubles(), p, q))
+    }
+
+    /// Returns the double in a register, if it is one that needs no box and has no constant of its own, or is
+    /// known to be one.
+    fn exact_double(&mut self, register: u8, otherwise: Block) -> Ssa {
+        let (word, known) = self.operand(register);
+        if known == Known::Double {
+            return self.get_double(register);
+        }
+        self.require_double(word, otherwise);
+        self.decode(word)
+    }
+
+    /// Returns the test of two numbers if both are fixnums, and the block for others, which is not filled.
+    fn order_of_fixnums(&mut self, order: NumberOrder, x: (Ssa, Known), y: (Ssa, Known)) -> (Ssa, Block) {
+        let others = self.block();
+        match self.not_fixnums(x, y) {
+            Some(test) => self.refuse(test, others),
+            None => self.b.set_cold_block(others),
+        }
+        (self.b.ins().icmp(order.of_fixnums(), x.0, y.0), others)
+    }
+
+    /// Returns the test of two numbers that are not both fixnums, if they may both be doubles; others go to
+    /// `slow`.
+    fn order_of_doubles(
+        &mut self,
+        order: NumberOrder,
+        x: (Ssa, Known),
+        y: (Ssa, Known),
+        slow: Block,
+    ) -> Option<Ssa> {
+        if x.1 == Known::Fixnum || y.1 == Known::Fixnum {
+            self.jump(slow);
+            return None;
+        }
+        let both = self.b.ins().band(x.0, y.0);
+        self.require_double(both, slow);
+        let (p, q) = (self.decode(x.0), self.decode(y.0));
+        Some(self.b.ins().fcmp(order.of_doubles(), p, q))
+    }
+
+    /// A jump that depends on the order of two registers.
+    pub(crate) fn jump_order(&mut self, order: NumberOrder, left: u8, right: u8, step: &FlowStep) {
+        let (x, y) = (self.operand(left), self.operand(right));
+        let (target, next, slow) = (self.target(step), self.block(), self.cold_block());
+        let jumps_when = step.instr.opcode().jumps_when();
+        let (holds, fails) = if jumps_when { (target, next) } else { (next, target) };
+        if let Some(test) = self.order_with_double(order, left, right, slow) {
+            self.branch(test, holds, fails);
+        } else {
+            let (test, others) = self.order_of_fixnums(order, x, y);
+            self.branch(test, holds, fails);
+            self.go_to(others);
+            if let Some(test) = self.order_of_doubles(order, x, y, slow) {
+                self.branch(test, holds, fails);
+            }
+        }
+        self.go_to(slow);
+        self.step_test(target, next);
+        self.go_to(next);
+    }
+
+    /// A jump that depends on the order of a register and a small number.
+    pub(crate) fn jump_order_int(&mut self, order: NumberOrder, left: u8, value: i16, step: &FlowStep) {
+        let x = self.operand(left);
+        let (target, next, slow) = (self.target(step), self.block(), self.cold_block());
+        let (holds, fails) = if step.instr.opcode().jumps_when() { (target, next) } else { (next, target) };
+        let test = if x.1 == Known::Double {
+            let (p, q) = (self.get_double(left), self.b.ins().f64const(f64::from(value)));
+            self.b.ins().fcmp(order.of_doubles(), p, q)
+        } else {
+            if x.1 != Known::Fixnum {
+                let tag = self.b.ins().band_imm_s(x.0, 3);
+                self.refuse(tag, slow);
+            }
+            let word = Value::small(i32::from(value)).bits() as i64;
+            self.b.ins().icmp_imm_s(order.of_fixnums(), x.0, word)
+        };
+        self.branch(test, holds, fails);
+        self.go_to(slow);
+        self.step_test(target, next);
+        self.go_to(next);
+    }
+}
+
+/// Returns what is known of what is computed from two numbers, of two fixnums for the most part a fixnum.
+fn of_both(x: Known, y: Known) -> Known {
+    if (x, y) == (Known::Fixnum, Known::Fixnum) { Known::Fixnum } else { Known::Nothing }
+}

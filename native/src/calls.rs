@@ -1,0 +1,224 @@
+//! Calls, returns and ticks.
+
+use std::mem::offset_of;
+
+use cranelift_codegen::ir::condcodes::IntCC;
+use cranelift_codegen::ir::{Block, InstBuilder, Value as Ssa, types};
+use esl_bytecode::operand::Want;
+use esl_heap::heap::Kind;
+use esl_heap::heap::layout::{CodeObject, FunctionObject, SymbolObject};
+
+use crate::abi::{EntryStub, NativeContext, RETURN_VALUES, RETURNED, STEP_SIGNAL, TAIL};
+use crate::emit::{WORD, in_object, memory};
+use crate::kinds::Known;
+use crate::translate::Translator;
+
+/// Where the link of a frame has its function, from the frame's base on.
+const FUNCTION: i32 = -2 * WORD;
+
+/// A callee that has machine code and takes exactly the given arguments.
+struct NativeCallee {
+    function: Ssa,
+    address: Ssa,
+    registers: Ssa,
+}
+
+impl Translator<'_, '_> {
+    /// Takes a tick, or leaves at this instruction if there is none.
+    pub(crate) fn tick(&mut self) {
+        let (context, exit) = (self.context, self.exit());
+        let offset = offset_of!(NativeContext, ticks) as i32;
+        let ticks = self.b.ins().load(types::I32, memory(), context, offset);
+        let left = self.b.ins().iadd_imm_s(ticks, -1);
+        let is_spent = self.b.ins().icmp_imm_s(IntCC::SignedLessThan, left, 0);
+        self.refuse(is_spent, exit);
+        self.b.ins().store(memory(), left, context, offset);
+    }
+
+    /// Returns the function of the symbol that is a constant.
+    fn global(&mut self, symbol: u32) -> Ssa {
+        let symbol = self.constant(symbol as usize);
+        self.load(symbol, in_object(offset_of!(SymbolObject, function)))
+    }
+
+    /// Returns the running function.
+    fn running(&mut self) -> Ssa {
+        let base = self.base;
+        self.load(base, FUNCTION)
+    }
+
+    /// Leaves at this instruction unless `function`, a Function, has machine code and takes `count`
+    /// arguments.
+    fn callee(&mut self, function: Ssa, count: u8) -> NativeCallee {
+        let exit = self.exit();
+        let code = self.load(function, in_object(offset_of!(FunctionObject, code)));
+        let arity = self.load_u32(code, in_object(offset_of!(CodeObject, arity)));
+        let takes_them = self.equals(arity, u64::from(count));
+        self.require(takes_them, exit);
+        let entry = self.load(code, in_object(offset_of!(CodeObject, entry)));
+        let word = self.load_u32(entry, offset_of!(EntryStub, word) as i32);
+        let is_native = self.equals(word, u64::from(self.source.entry_word));
+        self.require(is_native, exit);
+        let address = self.load(entry, offset_of!(EntryStub, address) as i32);
+        let registers = self.load_u32(code, in_object(offset_of!(CodeObject, nregs)));
+        NativeCallee { function, address, registers }
+    }
+
+    /// Leaves at this instruction unless there is room for so many registers from `base` on.
+    fn require_room(&mut self, base: Ssa, registers: Ssa) {
+        let exit = self.exit();
+        let bytes = self.b.ins().ishl_imm_s(registers, 3);
+        let top = self.b.ins().iadd(base, bytes);
+        let limit = self.load_context(offset_of!(NativeContext, limit));
+        let fits = self.b.ins().icmp(IntCC::UnsignedLessThanOrEqual, top, limit);
+        self.require(fits, exit);
+    }
+
+    pub(crate) fn call_global(&mut self, window: u8, count: u8, want: Want, symbol: u32, next: usize) {
+        if want != Want::ONE {
+            return self.leave();
+        }
+        let function = self.global(symbol);
+        let callee = self.callee(function, count);
+        self.call(window, callee, None, next);
+    }
+
+    pub(crate) fn call_given(&mut self, window: u8, count: u8, want: Want, next: usize) {
+        if want != Want::ONE {
+            return self.leave();
+        }
+        let (function, exit) = (self.get(window), self.exit());
+        self.require_kind(function, Kind::Function, exit);
+        let callee = self.callee(function, count);
+        self.call(window, callee, None, next);
+    }
+
+    pub(crate) fn call_self(&mut self, window: u8, want: Want, next: usize) {
+        if want != Want::ONE {
+            return self.leave();
+        }
+        let function = self.running();
+        let (itself, pointer) = (self.itself, self.pointer);
+        let address = self.b.ins().func_addr(pointer, itself);
+        let registers = self.word(self.source.registers as u64);
+        self.call(window, NativeCallee { function, address, registers }, Some(()), next);
+    }
+
+    /// Makes the frame of a callee in the window, and calls it.
+    fn call(&mut self, window: u8, callee: NativeCallee, itself: Option<()>, next: usize) {
+        let (context, base) = (self.context, self.base);
+        let place = i32::from(window) * WORD;
+        let frame = self.b.ins().iadd_imm_s(base, i64::from(place + 2 * WORD));
+        self.require_room(frame, callee.registers);
+        self.tick();
+        self.store(callee.function, base, place);
+        let return_to = self.pc(next);
+        self.store(return_to, base, place + WORD);
+        let first = self.word(0);
+        let (again, address) = self.block_with_value();
+        let (done, value) = self.block_with_value();
+        let other = self.cold_block();
+        let status_of_other = self.b.append_block_param(other, types::I64);
+        let value_of_other = self.b.append_block_param(other, types::I64);
+        let results = |this: &mut Self, call| {
+            let results = this.b.inst_results(call);
+            let (status, value) = (results[0], results[1]);
+            this.b.ins().brif(status, other, &[status.into(), value.into()], done, &[value.into()]);
+        };
+        if itself.is_some() {
+            let call = self.b.ins().call(self.itself, &[context, frame, first]);
+            results(self, call);
+            self.b.set_cold_block(again);
+        } else {
+            self.jump_with(again, callee.address);
+        }
+        self.go_to(again);
+        let call = self.b.ins().call_indirect(self.entry_signature, address, &[context, frame, first]);
+        results(self, call);
+
+        self.go_to(other);
+        let (further, values, leave) = (self.cold_block(), self.cold_block(), self.cold_block());
+        let is_tail = self.equals(status_of_other, TAIL);
+        self.b.ins().brif(is_tail, again, &[value_of_other.into()], further, &[]);
+        self.go_to(further);
+        let is_values = self.equals(status_of_other, RETURN_VALUES);
+        self.branch(is_values, values, leave);
+        self.go_to(leave);
+        self.b.ins().return_(&[status_of_other, value_of_other]);
+        self.go_to(values);
+        self.call_helper(offset_of!(NativeContext, first_value));
+        let first = self.load(base, place);
+        self.jump_with(done, first);
+        self.go_to(done);
+        self.set(window, value, Known::Nothing);
+    }
+
+    pub(crate) fn tail_call_global(&mut self, window: u8, count: u8, symbol: u32) {
+        let function = self.global(symbol);
+        self.tail_call(window, count, function);
+    }
+
+    pub(crate) fn tail_call_given(&mut self, window: u8, count: u8) {
+        let (function, exit) = (self.get(window), self.exit());
+        self.require_kind(function, Kind::Function, exit);
+        self.tail_call(window, count, function);
+    }
+
+    /// Puts the frame of a callee in place of this one, and leaves the call to the caller.
+    fn tail_call(&mut self, window: u8, count: u8, function: Ssa) {
+        let base = self.base;
+        let callee = self.callee(function, count);
+        self.require_room(base, callee.registers);
+        self.tick();
+        let arguments: Vec<Ssa> = (0..count).map(|i| self.get(window + 2 + i)).collect();
+        for (i, argument) in arguments.into_iter().enumerate() {
+            self.store(argument, base, i as i32 * WORD);
+        }
+        self.store(function, base, FUNCTION);
+        self.reply_with(TAIL, callee.address);
+        self.ended();
+    }
+
+    pub(crate) fn call_builtin(&mut self, window: u8, want: Want) {
+        self.tick();
+        let outcome = self.call_helper(offset_of!(NativeContext, call_builtin));
+        let signal = self.signal();
+        self.refuse(outcome, signal);
+        self.reload(window, want.registers());
+    }
+
+    pub(crate) fn tail_call_builtin(&mut self) {
+        self.tick();
+        let outcome = self.call_helper(offset_of!(NativeContext, tail_builtin));
+        let (signal, one, more) = (self.signal(), self.block(), self.cold_block());
+        let is_signal = self.equals(outcome, STEP_SIGNAL);
+        self.refuse(is_signal, signal);
+        self.branch(outcome, more, one);
+        self.go_to(one);
+        let value = self.load_context(offset_of!(NativeContext, value));
+        self.reply_with(RETURNED, value);
+        self.go_to(more);
+        self.return_values();
+    }
+
+    pub(crate) fn return_value(&mut self, register: u8) {
+        let value = self.get(register);
+        self.reply_with(RETURNED, value);
+        self.ended();
+    }
+
+    /// Returns the value list.
+    pub(crate) fn return_values(&mut self) {
+        let base = self.base;
+        self.store_context(base, offset_of!(NativeContext, base));
+        self.reply(RETURN_VALUES);
+        self.ended();
+    }
+
+    /// Leaves at this instruction whatever happens.
+    pub(crate) fn leave(&mut self) {
+        let exit: Block = self.exit();
+        self.jump(exit);
+        self.ended();
+    }
+}

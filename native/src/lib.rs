@@ -1,0 +1,47 @@
+//! Machine code for hot functions of the virtual machine, made by Cranelift from verified bytecode.
+//!
+//! The contract between this crate and the interpreter (`esl_vm`, module `interp::native`):
+//!
+//! * **N1, source.** What is translated is the code of one function that has passed the verifier
+//!   (`esl_bytecode::verify`, V1 to V13), at the address at which it stays. Its constants are read when the
+//!   machine code runs, since some of them change; one that is a number when machine code is made is tested to
+//!   be that one then.
+//! * **N2, frames.** Machine code is entered with the base of a frame of that function (F2 of the
+//!   interpreter), at its first instruction or at one of its loop instructions. It reads and writes registers
+//!   of that frame, and links and registers of frames that it makes above it, below [`NativeContext::limit`].
+//! * **N3, truth.** Before an instruction of the bytecode has ended, its results are in the task's stack. So
+//!   whatever the machine code leaves can be taken up by the interpreter, at the instruction that
+//!   [`NativeContext::pc`] names in the frame [`NativeContext::base`].
+//! * **N4, exits.** Machine code is left at the beginning of an instruction, before it has had any effect
+//!   ([`AGAIN`]), or behind a function of the machine that has done the instruction and says what is to be
+//!   done next ([`SIGNAL`], [`RETURN_VALUES`]), or with the value of the function ([`RETURNED`]).
+//! * **N5, ticks.** A call, and an instruction that jumps back, takes one tick where the interpreter takes
+//!   it, after everything that could make the machine code give the instruction up. Without one left it gives
+//!   the instruction up, so that the interpreter meets the safepoint.
+//! * **N6, objects.** Nothing collects while machine code runs, and no object moves. An address is followed
+//!   only after the tests that the interpreter makes. A slot is overwritten without the machine's help only
+//!   while nothing is marked ([`NativeContext::is_marking`]).
+//! * **N7, native stack.** A frame of machine code holds nothing that another one needs. There are as many as
+//!   fit between the base at the entry and [`NativeContext::limit`], which the interpreter keeps near.
+//!
+//! The code is in memory that is either writable or executable, never both. It is given back when the
+//! [`MachineCode`] is dropped: whoever keeps it must not drop it while it runs.
+
+#![allow(unsafe_code)]
+
+pub mod abi;
+mod arithmetic;
+mod branches;
+mod calls;
+mod emit;
+mod flow;
+pub mod helper;
+mod instruction;
+mod kinds;
+pub mod maker;
+mod objects;
+mod translate;
+
+pub use abi::{AGAIN, NativeContext, NativeReply, RETURN_VALUES, RETURNED, SIGNAL};
+pub use helper::{MachineCodeHelper, MadeCode};
+pub use maker::{MachineCode, MachineCodeMaker, NativeSource, NotMade};

@@ -1,0 +1,168 @@
+//! Making, keeping and giving back machine code.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use cranelift_codegen::ir::{AbiParam, Signature, types};
+use cranelift_codegen::isa::{OwnedTargetIsa, TargetIsa};
+use cranelift_codegen::settings::{self, Configurable};
+use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
+use cranelift_jit::{JITBuilder, JITModule};
+use cranelift_module::{Linkage, Module, default_libcall_names};
+use esl_heap::Value;
+
+use crate::abi::NativeEntry;
+use crate::flow::NativeFlow;
+use crate::kinds::NativeKinds;
+use crate::translate::Translator;
+
+/// Most words of a function that is translated; longer ones are left to the interpreter.
+pub const MAX_WORDS: usize = 4000;
+
+/// What is translated: see N1.
+#[derive(Clone, Debug)]
+pub struct NativeSource {
+    /// The instructions, none of them fused.
+    pub words: Vec<u32>,
+    /// Address of the first of them, where the interpreter runs them.
+    pub words_at: u64,
+    /// Address of the first constant.
+    pub constants_at: u64,
+    /// The constants, as they are now.
+    pub constants: Vec<Value>,
+    /// Number of registers.
+    pub registers: usize,
+    /// The first word of an [`EntryStub`](crate::abi::EntryStub).
+    pub entry_word: u32,
+}
+
+/// Why no machine code was made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum NotMade {
+    /// The function is too long, or it is no code that the verifier takes.
+    Unfit,
+    /// This processor or system is not known to the code generator, or memory may not be executed.
+    Unsupported(String),
+}
+
+/// Makes machine code.
+pub struct MachineCodeMaker {
+    isa: OwnedTargetIsa,
+    builders: FunctionBuilderContext,
+}
+
+impl MachineCodeMaker {
+    /// Prepares the code generator for this processor.
+    ///
+    /// # Errors
+    /// [`NotMade::Unsupported`].
+    pub fn new() -> Result<MachineCodeMaker, NotMade> {
+        if cfg!(not(all(unix, any(target_arch = "x86_64", target_arch = "aarch64")))) {
+            return Err(NotMade::Unsupported("this system has another way of calling".into()));
+        }
+        let unsupported = |error: &dyn std::fmt::Display| NotMade::Unsupported(error.to_string());
+        let mut flags = settings::builder();
+        let verifies = if cfg!(debug_assertions) { "true" } else { "false" };
+        for (name, value) in [
+            ("opt_level", "speed"),
+            ("use_colocated_libcalls", "false"),
+            ("is_pic", "false"),
+            ("enable_verifier", verifies),
+        ] {
+            flags.set(name, value).map_err(|error| unsupported(&error))?;
+        }
+        let builder = cranelift_native::builder().map_err(|error| unsupported(&error))?;
+        let isa = builder.finish(settings::Flags::new(flags)).map_err(|error| unsupported(&error))?;
+        Ok(MachineCodeMaker { isa, builders: FunctionBuilderContext::new() })
+    }
+
+    /// Translates a function, and returns how long that took.
+    pub fn make(&mut self, source: &NativeSource) -> (Result<MachineCode, NotMade>, Duration) {
+        let started = Instant::now();
+        let result = self.translate(source);
+        (result, started.elapsed())
+    }
+
+    fn translate(&mut self, source: &NativeSource) -> Result<MachineCode, NotMade> {
+        if source.words.len() > MAX_WORDS {
+            return Err(NotMade::Unfit);
+        }
+        let flow = NativeFlow::of(&source.words).ok_or(NotMade::Unfit)?;
+        let unsupported = |error: cranelift_module::ModuleError| NotMade::Unsupported(error.to_string());
+        let isa: Arc<dyn TargetIsa> = self.isa.clone();
+        let mut module = JITModule::new(JITBuilder::with_isa(isa, default_libcall_names()));
+        let mut context = module.make_context();
+        context.func.signature = entry_signature(&module);
+        let id = module
+            .declare_function("function", Linkage::Local, &context.func.signature)
+            .map_err(unsupported)?;
+        let itself = module.declare_func_in_func(id, &mut context.func);
+        let builder = FunctionBuilder::new(&mut context.func, &mut self.builders);
+        let config = module.isa().frontend_config();
+        let kinds = NativeKinds::of(&flow, source.registers, &source.constants);
+        Translator::new(builder, source, (&flow, &kinds), itself, module.isa().pointer_type())
+            .translate(config);
+        module.define_function(id, &mut context).map_err(unsupported)?;
+        let bytes = context.compiled_code().map_or(0, |code| code.code_buffer().len());
+        module.finalize_definitions().map_err(unsupported)?;
+        let address = module.get_finalized_function(id);
+        // SAFETY: the function was declared with the signature of an entry, and is finished.
+        let entry = unsafe { std::mem::transmute::<*const u8, NativeEntry>(address) };
+        Ok(MachineCode { module: Some(module), entry, bytes, loops: flow.loops })
+    }
+}
+
+/// The signature of [`NativeEntry`].
+fn entry_signature(module: &JITModule) -> Signature {
+    let mut signature = module.make_signature();
+    signature.params.extend([AbiParam::new(types::I64); 3]);
+    signature.returns.extend([AbiParam::new(types::I64); 2]);
+    signature
+}
+
+/// The machine code of a function. Dropping it gives its memory back.
+pub struct MachineCode {
+    module: Option<JITModule>,
+    entry: NativeEntry,
+    bytes: usize,
+    loops: Vec<usize>,
+}
+
+impl MachineCode {
+    /// Returns the entry.
+    pub fn entry(&self) -> NativeEntry {
+        self.entry
+    }
+
+    /// Returns its length in bytes.
+    pub fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// Returns the words of the loop instructions at which it may be entered, the first at place 1.
+    pub fn loops(&self) -> &[usize] {
+        &self.loops
+    }
+}
+
+impl Drop for MachineCode {
+    fn drop(&mut self) {
+        if let Some(module) = self.module.take() {
+            // SAFETY: the contract of the crate: it does not run, and whoever kept it does not enter it
+            // again.
+            unsafe { module.free_memory() };
+        }
+    }
+}
+
+// SAFETY: the memory belongs to this value alone, and what is in it does not depend on a thread.
+unsafe impl Send for MachineCode {}
+
+impl std::fmt::Debug for MachineCode {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("MachineCode")
+            .field("bytes", &self.bytes)
+            .field("loops", &self.loops)
+            .finish_non_exhaustive()
+    }
+}

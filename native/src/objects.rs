@@ -1,0 +1,92 @@
+//! Parts of objects: halves of pairs, elements, slots of structures, captures.
+
+use std::mem::offset_of;
+
+use cranelift_codegen::ir::condcodes::IntCC;
+use cranelift_codegen::ir::{Block, InstBuilder, Value as Ssa, types};
+use esl_heap::Value;
+use esl_heap::heap::Kind;
+use esl_heap::heap::layout::{FunctionObject, Header, Str};
+
+use crate::emit::{ELEMENTS, WORD, in_cons, in_object, memory};
+use crate::translate::Translator;
+
+impl Translator<'_, '_> {
+    /// Follows halves of pairs.
+    pub(crate) fn follow(&mut self, dst: u8, list: u8, halves: &[usize]) {
+        let (mut value, slow) = (self.get(list), self.cold_block());
+        for &half in halves {
+            let is_cons = self.is_cons(value);
+            self.require(is_cons, slow);
+            value = self.load(value, in_cons(half));
+        }
+        self.finish_with(slow, value, dst);
+    }
+
+    pub(crate) fn set_half(&mut self, pair: u8, value: u8, half: usize) {
+        let (pair, value, slow) = (self.get(pair), self.get(value), self.cold_block());
+        let is_cons = self.is_cons(pair);
+        self.require(is_cons, slow);
+        self.store_slot(value, pair, in_cons(half));
+        self.finish_effect(slow);
+    }
+
+    pub(crate) fn element_ref(&mut self, dst: u8, vector: u8, index: u8) {
+        let (vector, index, slow) = (self.get(vector), self.operand(index), self.cold_block());
+        let element = self.element(vector, index, slow);
+        let value = self.load(element, in_object(ELEMENTS as usize));
+        self.finish_with(slow, value, dst);
+    }
+
+    pub(crate) fn element_set(&mut self, vector: u8, index: u8, value: u8) {
+        let (vector, index, slow) = (self.get(vector), self.operand(index), self.cold_block());
+        let value = self.get(value);
+        let element = self.element(vector, index, slow);
+        self.store_slot(value, element, in_object(ELEMENTS as usize));
+        self.finish_effect(slow);
+    }
+
+    pub(crate) fn char_ref(&mut self, dst: u8, string: u8, index: u8) {
+        let (string, index, slow) = (self.get(string), self.operand(index), self.cold_block());
+        self.require_kind(string, Kind::String, slow);
+        let at = self.index(string, index, slow);
+        let offset = self.b.ins().ishl_imm_s(at, 2);
+        let place = self.b.ins().iadd(string, offset);
+        let code = self.load_u32(place, in_object(offset_of!(Str, characters)));
+        let is_code =
+            self.b.ins().icmp_imm_s(IntCC::UnsignedLessThan, code, i64::from(Value::CHARACTER_LIMIT));
+        self.require(is_code, slow);
+        let shifted = self.b.ins().ishl_imm_s(code, 8);
+        let mark = Value::character(0).map_or(0, Value::bits);
+        let value = self.b.ins().bor_imm_s(shifted, mark as i64);
+        self.finish_with(slow, value, dst);
+    }
+
+    /// Returns where a slot of an instance of just this class is, from the value on.
+    pub(crate) fn slot(&mut self, instance: Ssa, slot: u8, class: u32, slow: Block) -> i32 {
+        self.require_class(instance, class as usize, slow);
+        // The class comes before the slots.
+        let place = i64::from(slot) + 1;
+        let length = self.length(instance);
+        let is_there = self.b.ins().icmp_imm_s(IntCC::UnsignedGreaterThan, length, place);
+        self.require(is_there, slow);
+        in_object(ELEMENTS as usize) + place as i32 * WORD
+    }
+
+    pub(crate) fn capture(&mut self, index: u8) -> Ssa {
+        let base = self.base;
+        let function = self.load(base, -2 * WORD);
+        self.load(function, capture(index))
+    }
+
+    pub(crate) fn refuse_flags(&mut self, symbol: Ssa, flags: u8, otherwise: Block) {
+        let found = self.b.ins().uload8(types::I64, memory(), symbol, in_object(offset_of!(Header, flags)));
+        let set = self.b.ins().band_imm_s(found, i64::from(flags));
+        self.refuse(set, otherwise);
+    }
+}
+
+/// Where a capture of a function is, from its value on.
+pub(crate) fn capture(index: u8) -> i32 {
+    in_object(offset_of!(FunctionObject, captures)) + i32::from(index) * WORD
+}

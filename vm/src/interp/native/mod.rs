@@ -1,0 +1,440 @@
+//! Machine code beside the loop: entering it, what it asks of the machine, and making it.
+//!
+//! The contract is that of `esl_native` (N1 to N7). Machine code is entered where the loop meets the stub
+//! that the entry word of compiled code leads to, or a loop instruction that was quickened. When it is left,
+//! the loop goes on with the instruction at which it was left, as if it had run all before.
+//!
+//! The entry word of a Code leads to its first instruction, to the stub of its machine code, or to
+//! [`MAKE_AT_ENTRY`]. So nobody but the arms of the loop that make frames goes by it; a task that stands at
+//! the beginning of a function stands at the first instruction.
+
+mod step;
+
+use std::ffi::c_void;
+
+use esl_bytecode::opcode::Opcode;
+use esl_native::abi::{EntryStub, NativeEntry, TAIL};
+use esl_native::maker::MAX_WORDS;
+use esl_native::{
+    AGAIN, MachineCode, MachineCodeHelper, MachineCodeMaker, NativeContext, NativeReply, NativeSource,
+    NotMade, RETURN_VALUES, RETURNED,
+};
+
+use super::{Signal, aux_at, code_of, constant, constants_of, first_instruction, stubs, word_at};
+use crate::fused::{quicken_loop, unfused};
+use crate::heap::layout::{CodeObject, Kind, SymbolObject};
+use crate::heap::{Heap, Phase};
+use crate::shape::Shape;
+use crate::tier::{CompiledFunctions, InstalledCode, Tier};
+use crate::value::Value;
+use crate::vm::Vm;
+
+/// Words of the stack that one entry may use, which bounds the native stack too: about 500 KB.
+const WORDS_AT_ONCE: usize = 4096;
+
+/// Most bytes of machine code of one machine.
+const MOST_BYTES: usize = 32 << 20;
+
+/// How often a function is found running at the end of a slice before machine code is made of it.
+const HOT: u32 = 2;
+
+/// How often machine code is left at a call before machine code is made of the callee.
+const HOT_CALLS: u32 = 32;
+
+/// Entries at loop instructions after which their use is looked at.
+const ENTRIES: u32 = 1024;
+
+/// Ticks that each of them has to take on average, lest the interpreter run the loops alone: machine code
+/// that is left at once costs more than it saves.
+const LEAST_TICKS: u32 = 8;
+
+/// Frames that are looked at, from the running one on.
+const FRAMES: usize = 4;
+
+/// The entry of code of which machine code is made at its first call.
+pub(crate) static MAKE_AT_ENTRY: u32 = stubs::MAKE_AT_ENTRY as u32;
+
+/// Why machine code was left.
+pub(super) enum Left {
+    /// The function has returned this.
+    Returned(Value),
+    /// The function returns the value list.
+    Values,
+    /// The loop goes on.
+    Again,
+    /// As in the loop.
+    Signal(Signal),
+}
+
+/// Machine code that was left, and the registers of the loop.
+pub(super) struct Leaving {
+    pub(super) left: Left,
+    pub(super) pc: *const u32,
+    pub(super) base: *mut Value,
+    pub(super) ticks: i32,
+}
+
+/// What helpers find behind `NativeContext::machine`.
+struct Caller {
+    vm: *mut Vm,
+    signal: Signal,
+}
+
+/// Runs the machine code behind the stub at `pc` in the frame at `base`.
+///
+/// # Safety
+/// The frame at `base` is the running one, and the entry of its function's code leads to the stub.
+pub(super) unsafe fn enter(vm: &mut Vm, pc: *const u32, base: *mut Value, ticks: i32) -> Leaving {
+    // SAFETY: by the contract the stub is that of installed code, which stands as long as the code's entry
+    // leads to it.
+    unsafe {
+        let stub = pc.cast::<EntryStub>();
+        let entry = std::mem::transmute::<u64, NativeEntry>((*stub).address);
+        run(vm, entry, 0, base, ticks)
+    }
+}
+
+/// Runs the machine code of the running function from the loop instruction at `pc` on; `None` if there is
+/// none.
+///
+/// # Safety
+/// The frame at `base` is the running one, and `pc` is at a loop instruction of its function.
+pub(super) unsafe fn enter_at_loop(
+    vm: &mut Vm,
+    pc: *const u32,
+    base: *mut Value,
+    ticks: i32,
+) -> Option<Leaving> {
+    // SAFETY: F2: the function of the frame keeps its code alive. Its entry leads to a stub if it is
+    // compiled.
+    unsafe {
+        let code = code_of(*base.sub(2));
+        if *(*code).entry != u32::from(stubs::NATIVE_ENTRY) {
+            return None;
+        }
+        let number = (*(*code).entry.cast::<EntryStub>()).number as usize;
+        let installed = vm.compiled.installed.get(number)?.as_ref()?;
+        let word = pc.offset_from_unsigned(first_instruction(code));
+        let place = installed.made.loops().binary_search(&word).ok()?;
+        let entry = installed.made.entry();
+        let leaving = run(vm, entry, place as u64 + 1, base, ticks);
+        let is_auto = vm.compiled.tier == Tier::Auto;
+        let installed = vm.compiled.installed.get_mut(number)?.as_mut().filter(|_| is_auto);
+        if let Some(installed) = installed {
+            installed.loop_entries += 1;
+            let taken = ticks.saturating_sub(leaving.ticks).max(0) as u32;
+            installed.loop_ticks = installed.loop_ticks.saturating_add(taken);
+            if installed.loop_entries == ENTRIES {
+                if installed.loop_ticks < ENTRIES * LEAST_TICKS {
+                    calm_loops(code, installed.made.loops());
+                }
+                (installed.loop_entries, installed.loop_ticks) = (0, 0);
+            }
+        }
+        Some(leaving)
+    }
+}
+
+/// Lets no loop instruction of a code lead to machine code any more.
+///
+/// # Safety
+/// `code` points to a Code, and has loop instructions at these words.
+#[cold]
+unsafe fn calm_loops(code: *mut CodeObject, loops: &[usize]) {
+    // SAFETY: by the contract these are words of the code, and nobody holds a reference to one.
+    unsafe {
+        let first = first_instruction(code).cast_mut();
+        for &at in loops {
+            *first.add(at) = word_at(first.add(at)).0;
+        }
+    }
+}
+
+/// Runs machine code until it is left.
+///
+/// # Safety
+/// N2: `entry` is that of the code of the function of the frame at `base`, which is the running one.
+unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, ticks: i32) -> Leaving {
+    let end = vm.cpu.stack_end();
+    let limit = base.wrapping_add(WORDS_AT_ONCE).min(end);
+    let is_marking = u32::from(vm.heap.phase() == Phase::Marking);
+    let mut caller = Caller { vm: &raw mut *vm, signal: Signal::Next };
+    let mut context = NativeContext {
+        ticks,
+        is_marking,
+        limit: limit.expose_provenance() as u64,
+        pc: 0,
+        base: 0,
+        value: 0,
+        machine: (&raw mut caller).cast::<c_void>(),
+        step: step::step,
+        call_builtin: step::call_builtin,
+        tail_builtin: step::tail_builtin,
+        first_value: step::first_value,
+        store: step::store,
+    };
+    // SAFETY: N2, N7: by the contract; the machine is borrowed for as long, and only helpers use it. A tail
+    // call has made the frame of the function whose machine code the reply names.
+    let reply: NativeReply = unsafe {
+        let context = &raw mut context;
+        let mut reply = entry(context, base.cast(), place);
+        while reply.status == TAIL {
+            let callee = std::mem::transmute::<u64, NativeEntry>(reply.value);
+            reply = callee(context, base.cast(), 0);
+        }
+        reply
+    };
+    if reply.status == AGAIN && context.ticks > 0 && vm.compiled.tier == Tier::Auto {
+        // SAFETY: N4: it was left at an instruction of that frame.
+        unsafe { note_call(vm, context.pc, context.base) };
+    }
+    let left = match reply.status {
+        // SAFETY: N3: a value of the program.
+        RETURNED => Left::Returned(unsafe { Value::from_bits(reply.value) }),
+        RETURN_VALUES => Left::Values,
+        AGAIN => Left::Again,
+        _ => Left::Signal(caller.signal),
+    };
+    Leaving {
+        left,
+        pc: std::ptr::with_exposed_provenance(context.pc as usize),
+        base: std::ptr::with_exposed_provenance_mut(context.base as usize),
+        ticks: context.ticks,
+    }
+}
+
+/// Counts a call at which machine code was left, and makes machine code of the callee if there were many.
+///
+/// # Safety
+/// `pc` is the address of an instruction of the frame `base`.
+#[cold]
+#[inline(never)]
+unsafe fn note_call(vm: &mut Vm, pc: u64, base: u64) {
+    let pc: *const u32 = std::ptr::with_exposed_provenance(pc as usize);
+    let base: *mut Value = std::ptr::with_exposed_provenance_mut(base as usize);
+    // SAFETY: V1, V3, V4: the operands of the instruction are there; the function of a symbol is a Function.
+    unsafe {
+        let word = word_at(pc);
+        let function = match word.opcode() {
+            Some(Opcode::CallGlobal | Opcode::TailCallGlobal) => {
+                (*constant(base, aux_at(pc) as usize).object_ptr().cast::<SymbolObject>()).function
+            }
+            Some(Opcode::Call | Opcode::TailCall) => *base.add(word.a()),
+            _ => return,
+        };
+        if !function.is_object() || (*function.object_ptr()).kind != Kind::Function {
+            return;
+        }
+        let code = code_of(function);
+        if (*code).arity != word.b() as u32 || !Shape::is_bytecode((*code).spare[0]) {
+            return;
+        }
+        let heat = vm.compiled.heat.entry(code.addr() as u64).or_insert(0);
+        *heat += 1;
+        if *heat == HOT_CALLS {
+            make(vm, code);
+        }
+    }
+}
+
+/// Makes machine code of a code at its first call; puts back the way to its first instruction if none is
+/// made.
+///
+/// # Safety
+/// `code` points to a Code of bytecode.
+#[cold]
+#[inline(never)]
+pub(super) unsafe fn make_at_entry(vm: &mut Vm, code: *mut CodeObject) {
+    // SAFETY: by the contract; the entry of a Code may lead to its first instruction or to its machine code.
+    unsafe {
+        (*code).entry = first_instruction(code);
+        make(vm, code);
+    }
+}
+
+/// Makes machine code of a code and installs it, or has it made; unless there is some, or too much
+/// altogether.
+///
+/// # Safety
+/// `code` points to a Code of bytecode.
+unsafe fn make(vm: &mut Vm, code: *mut CodeObject) {
+    let compiled = &mut vm.compiled;
+    if compiled.report.refused.is_some() || compiled.report.bytes > MOST_BYTES {
+        return;
+    }
+    // SAFETY: the contract says that this is a live Code, whose entry leads to an operation of the loop.
+    unsafe {
+        if *(*code).entry == u32::from(stubs::NATIVE_ENTRY) || instructions(code).len() > MAX_WORDS {
+            return;
+        }
+        if compiled.tier == Tier::Native {
+            let maker = match &mut compiled.maker {
+                Some(maker) => Ok(maker),
+                none => MachineCodeMaker::new().map(|maker| none.insert(maker)),
+            };
+            let (result, duration) = match maker {
+                Ok(maker) => maker.make(&source_of(code)),
+                Err(reason) => (Err(reason), Default::default()),
+            };
+            compiled.report.nanoseconds += duration.as_nanos() as u64;
+            install(compiled, code, result);
+            return;
+        }
+        let helper = match &mut compiled.helper {
+            Some(helper) => Ok(helper),
+            none => MachineCodeHelper::start().map(|helper| none.insert(helper)),
+        };
+        match helper {
+            Ok(helper) => {
+                compiled.orders += 1;
+                compiled.asked.insert(compiled.orders, Value::from_object(code.cast()).bits());
+                helper.ask(compiled.orders, source_of(code));
+            }
+            Err(reason) => install(compiled, code, Err(reason)),
+        }
+    }
+}
+
+/// Installs what was made on the other thread.
+fn install_made(compiled: &mut CompiledFunctions) {
+    while let Some(made) = compiled.helper.as_ref().and_then(MachineCodeHelper::take) {
+        compiled.report.nanoseconds += made.duration.as_nanos() as u64;
+        // The code may be gone.
+        let Some(code) = compiled.asked.remove(&made.order) else { continue };
+        // SAFETY: the word was made of the address of a Code, which is there: else the order was forgotten
+        // when all that is reached had been marked.
+        unsafe { install(compiled, Value::from_bits(code).object_ptr().cast(), made.result) };
+    }
+}
+
+/// Returns the instructions of a code, which may be fused.
+///
+/// # Safety
+/// `code` points to a Code of bytecode.
+unsafe fn instructions<'a>(code: *mut CodeObject) -> &'a [u32] {
+    // SAFETY: the contract says that this is a live Code. Its words end with one for each capture (`shape`).
+    unsafe {
+        let captures = (*code).spare[1] as usize;
+        std::slice::from_raw_parts(first_instruction(code), (*code).nwords as usize - captures)
+    }
+}
+
+/// Returns what is translated of a code.
+///
+/// # Safety
+/// `code` points to a Code of bytecode.
+unsafe fn source_of(code: *mut CodeObject) -> NativeSource {
+    // SAFETY: by the contract this is a live Code.
+    unsafe {
+        NativeSource {
+            words: unfused(instructions(code)),
+            words_at: first_instruction(code).expose_provenance() as u64,
+            constants_at: constants_of(code).expose_provenance() as u64,
+            constants: std::slice::from_raw_parts(constants_of(code), (*code).nconsts as usize).to_vec(),
+            registers: (*code).nregs as usize,
+            entry_word: u32::from(stubs::NATIVE_ENTRY),
+        }
+    }
+}
+
+/// Makes calls and loops of a code lead to machine code, or notes why there is none.
+///
+/// # Safety
+/// `code` points to a Code of bytecode, and the machine code is made of it.
+unsafe fn install(
+    compiled: &mut CompiledFunctions,
+    code: *mut CodeObject,
+    result: Result<MachineCode, NotMade>,
+) {
+    let made = match result {
+        Ok(made) => made,
+        Err(NotMade::Unfit) => return,
+        Err(NotMade::Unsupported(reason)) => {
+            compiled.report.refused = Some(reason);
+            return;
+        }
+    };
+    // SAFETY: by the contract this is a live Code, and nobody holds a reference to its words.
+    unsafe {
+        if *(*code).entry == u32::from(stubs::NATIVE_ENTRY) {
+            return;
+        }
+        let number = compiled.free.pop().unwrap_or_else(|| {
+            compiled.installed.push(None);
+            compiled.installed.len() as u32 - 1
+        });
+        let address = made.entry() as usize as u64;
+        let stub = Box::new(EntryStub { word: u32::from(stubs::NATIVE_ENTRY), number, address });
+        compiled.report.functions += 1;
+        // Memory is taken in pages.
+        compiled.report.bytes += made.bytes().next_multiple_of(4096);
+        let words = instructions(code).len();
+        let words = std::slice::from_raw_parts_mut(first_instruction(code).cast_mut(), words);
+        for &at in made.loops() {
+            quicken_loop(words, at);
+        }
+        (*code).entry = (&raw const *stub).cast();
+        let code = Value::from_object(code.cast()).bits();
+        compiled.installed[number as usize] =
+            Some(InstalledCode { stub, made, code, loop_entries: 0, loop_ticks: 0 });
+    }
+}
+
+impl Vm {
+    /// Sets how functions run from now on. What was made stays. Machine code takes up to 512 KiB of the
+    /// thread's stack.
+    pub fn set_tier(&mut self, tier: Tier) {
+        if cfg!(feature = "no-ticks") {
+            return;
+        }
+        if self.config.snapshots && tier != Tier::Interpreter {
+            // A snapshot would bring back code that leads to machine code given back since.
+            self.compiled.report.refused = Some("the machine is made for snapshots".into());
+            return;
+        }
+        self.compiled.tier = tier;
+        // SAFETY: the operation there makes machine code of the code that is called, or lets it begin at its
+        // first instruction.
+        unsafe { self.heap.set_code_entry((tier == Tier::Native).then_some(&MAKE_AT_ENTRY)) };
+    }
+
+    /// Notes which functions run at the end of a slice, and makes machine code of those that are hot.
+    pub(super) fn note_heat(&mut self) {
+        if self.compiled.tier == Tier::Interpreter {
+            return;
+        }
+        install_made(&mut self.compiled);
+        let functions: Vec<Value> = self.frames().take(FRAMES).map(|frame| frame.function).collect();
+        for function in functions {
+            // SAFETY: F2: the function of a frame is a Function.
+            unsafe {
+                let code = code_of(function);
+                let is_stub = (*code).nwords < 2;
+                let heat = self.compiled.heat.entry(code.addr() as u64).or_insert(0);
+                *heat += 1;
+                if (*heat == HOT || *heat == HOT_CALLS) && !is_stub {
+                    make(self, code);
+                }
+            }
+        }
+    }
+
+    /// Gives back the machine code of functions that nothing reaches. To be called when all that is reached
+    /// is marked, and no machine code runs.
+    pub(super) fn give_back_code(compiled: &mut CompiledFunctions, heap: &Heap) {
+        compiled.heat.clear();
+        // SAFETY: the word was made of the address of a code; whether it is marked is told by its address.
+        compiled.asked.retain(|_, code| heap.is_marked(unsafe { Value::from_bits(*code) }));
+        for installed in &mut compiled.installed {
+            let Some(InstalledCode { made, code, stub, .. }) = installed else { continue };
+            // SAFETY: the word was made of the address of the code; whether it is marked is told by its
+            // address.
+            if !heap.is_marked(unsafe { Value::from_bits(*code) }) {
+                debug_assert_eq!(stub.word, u32::from(stubs::NATIVE_ENTRY));
+                compiled.report.bytes -= made.bytes().next_multiple_of(4096);
+                compiled.free.push(stub.number);
+                *installed = None;
+            }
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! How functions run: by the interpreter alone, or those that are hot as machine code (`interp::native`).
+//!
+//! No program can see the difference, in no value, tick or turn. So nothing here is state of a run.
+
+#[cfg(feature = "native")]
+use std::collections::HashMap;
+
+#[cfg(feature = "native")]
+use esl_native::abi::EntryStub;
+#[cfg(feature = "native")]
+use esl_native::{MachineCode, MachineCodeHelper, MachineCodeMaker};
+
+/// How the functions of a machine run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tier {
+    /// All by the interpreter.
+    #[default]
+    Interpreter,
+    /// All as machine code, from their second call on. For tests: to make it takes longer than to run most
+    /// functions once.
+    Native,
+    /// Those that are found running at the ends of slices again and again as machine code.
+    Auto,
+}
+
+/// Figures of machine code.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TierReport {
+    /// Functions of which machine code was made.
+    pub functions: usize,
+    /// Bytes of machine code.
+    pub bytes: usize,
+    /// Nanoseconds that it took to make it.
+    pub nanoseconds: u64,
+    /// Why no machine code is made, if it is wanted.
+    pub refused: Option<String>,
+}
+
+/// The machine code of a machine's functions.
+#[derive(Default)]
+pub(crate) struct CompiledFunctions {
+    /// What was asked for.
+    pub(crate) tier: Tier,
+    /// Figures.
+    pub(crate) report: TierReport,
+    /// Makes machine code at once: for [`Tier::Native`].
+    #[cfg(feature = "native")]
+    pub(crate) maker: Option<MachineCodeMaker>,
+    /// Makes machine code on a thread of its own: for [`Tier::Auto`].
+    #[cfg(feature = "native")]
+    pub(crate) helper: Option<MachineCodeHelper>,
+    /// The code that machine code was asked for, by its value's word and the number of the order.
+    #[cfg(feature = "native")]
+    pub(crate) asked: HashMap<u64, u64>,
+    /// Number of the last order.
+    #[cfg(feature = "native")]
+    pub(crate) orders: u64,
+    /// By number; `None` where it was given back.
+    #[cfg(feature = "native")]
+    pub(crate) installed: Vec<Option<InstalledCode>>,
+    /// The numbers that were given back.
+    #[cfg(feature = "native")]
+    pub(crate) free: Vec<u32>,
+    /// How often a code was found running, by its address.
+    #[cfg(feature = "native")]
+    pub(crate) heat: HashMap<u64, u32>,
+}
+
+/// Machine code that calls may enter.
+#[cfg(feature = "native")]
+pub(crate) struct InstalledCode {
+    /// What the entry word of the code points to. It stays where it is.
+    pub(crate) stub: Box<EntryStub>,
+    /// The machine code.
+    pub(crate) made: MachineCode,
+    /// The code, by its value's word.
+    pub(crate) code: u64,
+    /// How often it was entered at a loop instruction, and the ticks that it has taken then, since both were
+    /// looked at.
+    pub(crate) loop_entries: u32,
+    /// See `loop_entries`.
+    pub(crate) loop_ticks: u32,
+}
