@@ -1348,7 +1348,7 @@ macro_rules! for_each_builtin {
             Now = outside::now, esl "NOW" ("");
             /// Microseconds on the machine's clock, which never goes back.
             InternalRealTime = outside::internal_real_time, cl "GET-INTERNAL-REAL-TIME" ("");
-            /// Microseconds on the machine's clock in which some task could run.
+            /// Microseconds for which processors have worked for the process; under a virtual clock, in which tasks ran.
             InternalRunTime = outside::internal_run_time, cl "GET-INTERNAL-RUN-TIME" ("");
             /// Seconds since the beginning of 1900, UTC.
             UniversalTime = outside::universal_time, cl "GET-UNIVERSAL-TIME" ("");

@@ -14,6 +14,9 @@ use crate::program::{Program, Source};
 /// Size in bytes beyond which a file is refused: nobody has written that much, or it does not end at all.
 const MAX_BYTES: u64 = 64 << 20;
 
+/// Extensions of the names of sources.
+const SOURCES: [&str; 2] = ["esl", "lisp"];
+
 /// Content of a file that holds a program.
 pub enum ProgramFile {
     /// Source text.
@@ -50,19 +53,39 @@ pub fn read_program(path: &Path) -> Result<ProgramFile, u8> {
     })
 }
 
-/// Refuses to write to a file that is one of `inputs`, by whatever path.
+/// Refuses to write to a file that is one of `inputs`, by whatever path, and to any other that is there and has
+/// the name of a source: nobody wants that lost for an output.
 ///
 /// # Errors
 /// The exit status, after a message.
 pub fn refuse_overwriting<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<(), u8> {
-    let Ok(output) = output.canonicalize() else { return Ok(()) };
+    let Ok(existing) = output.canonicalize() else { return Ok(()) };
     for input in inputs {
-        if input.canonicalize().is_ok_and(|input| input == output) {
+        if input.canonicalize().is_ok_and(|input| is_same_file(&input, &existing)) {
             complain(format_args!("{} is read and cannot be written as well", input.display()));
             return Err(USAGE);
         }
     }
+    if [output, &existing].into_iter().any(is_named_as_source) {
+        let name = output.display();
+        complain(format_args!("{name} is there already, and is a source by its name; name another file"));
+        return Err(USAGE);
+    }
     Ok(())
+}
+
+fn is_named_as_source(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| SOURCES.iter().any(|source| extension == *source))
+}
+
+/// Returns whether two paths, both without links, lead to one file: they may be two names of it.
+fn is_same_file(one: &Path, other: &Path) -> bool {
+    #[cfg(unix)]
+    if let (Ok(one), Ok(other)) = (std::fs::metadata(one), std::fs::metadata(other)) {
+        use std::os::unix::fs::MetadataExt;
+        return (one.dev(), one.ino()) == (other.dev(), other.ino());
+    }
+    one == other
 }
 
 /// Writes a file: beside it first, so that an existing one is never left half written. An existing file keeps

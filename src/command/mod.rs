@@ -21,7 +21,7 @@ mod size;
 
 use std::path::Path;
 
-use esl_bytecode::diagnostic::{Diagnostic, Severity};
+use esl_bytecode::diagnostic::Severity;
 use esl_compiler::diagnostic::{Format, Renderer};
 
 use crate::program::{Compiled, Ended};
@@ -76,22 +76,37 @@ pub fn complain(text: impl std::fmt::Display) {
     eprintln!("{}: {text}", command_name());
 }
 
-/// Prints the diagnostics of a compilation and, for people, their number.
+/// Errors, and warnings, that are shown to people. To find the place of one takes time with the length of its line.
+const SHOWN_DIAGNOSTICS: usize = 100;
+
+/// Prints the diagnostics of a compilation: for tools all; for people the first errors and warnings, and the
+/// numbers of all.
 pub fn print_diagnostics(compiled: &Compiled, renderer: &Renderer) {
-    let after = if renderer.format == Format::Json { "" } else { "\n" };
-    for diagnostic in &compiled.diagnostics {
-        eprintln!("{}{after}", renderer.render(diagnostic, &compiled.sources));
-    }
-    if renderer.format == Format::Json || compiled.diagnostics.is_empty() {
+    if renderer.format == Format::Json {
+        for diagnostic in &compiled.diagnostics {
+            eprintln!("{}", renderer.render(diagnostic, &compiled.sources));
+        }
         return;
     }
-    let is_error = |diagnostic: &&Diagnostic| diagnostic.severity == Severity::Error;
-    let errors = compiled.diagnostics.iter().filter(is_error).count();
-    let warnings = compiled.diagnostics.len() - errors;
+    let (mut errors, mut warnings) = (0, 0);
+    for diagnostic in &compiled.diagnostics {
+        let number = match diagnostic.severity {
+            Severity::Error => &mut errors,
+            Severity::Warning => &mut warnings,
+        };
+        *number += 1;
+        if *number <= SHOWN_DIAGNOSTICS {
+            eprintln!("{}\n", renderer.render(diagnostic, &compiled.sources));
+        }
+    }
+    if compiled.diagnostics.is_empty() {
+        return;
+    }
     let count = |n: usize, what: &str| match n {
         0 => None,
         1 => Some(format!("1 {what}")),
-        n => Some(format!("{n} {what}s")),
+        2..=SHOWN_DIAGNOSTICS => Some(format!("{n} {what}s")),
+        n => Some(format!("{n} {what}s, of which the first {SHOWN_DIAGNOSTICS} are shown")),
     };
     let counts: Vec<String> =
         [count(errors, "error"), count(warnings, "warning")].into_iter().flatten().collect();

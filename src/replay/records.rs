@@ -38,6 +38,7 @@ mod tag {
     pub(super) const EXISTS: u8 = 14;
     pub(super) const CALLED: u8 = 15;
     pub(super) const BROKEN_OUTPUT: u8 = 16;
+    pub(super) const PROCESSOR_TIME: u8 = 17;
     pub(super) const DUE: u8 = 32;
     pub(super) const RECEIVED: u8 = 33;
     pub(super) const CHECK: u8 = 48;
@@ -81,6 +82,10 @@ pub(super) fn write(out: &mut ByteWriter, noted: &NotedRecord, before: &mut Befo
         Record::WallClock(time) => {
             begin(out, tag::WALL_CLOCK);
             out.signed(*time);
+        }
+        Record::ProcessorTime(time) => {
+            begin(out, tag::PROCESSOR_TIME);
+            out.number(*time);
         }
         Record::Waited(wake) => {
             begin(out, tag::WAITED);
@@ -315,6 +320,7 @@ pub(super) fn read(from: &mut ByteReader<'_>, before: &mut Before) -> Option<Not
     let record = match tag {
         tag::MONOTONIC => Record::Monotonic(time(from, before)?),
         tag::WALL_CLOCK => Record::WallClock(from.signed()?),
+        tag::PROCESSOR_TIME => Record::ProcessorTime(from.number()?),
         tag::WAITED => Record::Waited(match from.byte()? {
             0 => Wake::Time,
             1 => Wake::Arrival,

@@ -136,6 +136,7 @@ fn records() -> Vec<NotedRecord> {
         Record::Monotonic(u64::MAX),
         Record::Monotonic(5),
         Record::WallClock(i64::MIN),
+        Record::ProcessorTime(u64::MAX),
         Record::Waited(Wake::Time),
         Record::Waited(Wake::Arrival),
         Record::Waited(Wake::Never),
@@ -318,6 +319,7 @@ fn a_recording_that_is_cut_is_replayed_to_its_end() {
 fn changed(record: &Record) -> Option<Record> {
     Some(match record {
         Record::WallClock(time) => Record::WallClock(time + 10_000_000_000),
+        Record::ProcessorTime(time) => Record::ProcessorTime(time + 10_000_000_000),
         Record::Read(_) => Record::Read(Input::Data(b"changed\n".to_vec())),
         Record::Exists(exists) => Record::Exists(!exists),
         Record::Checked(check) => Record::Checked(RunCheck { canary: check.canary ^ 1, ..*check }),

@@ -67,6 +67,11 @@ pub(super) struct FinishedTest {
 
 /// Runs the tests of `files`, and prints what becomes of them. Returns the exit status.
 pub fn run(files: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
+    for output in [&options.junit, &options.coverage].into_iter().flatten() {
+        if let Err(status) = command::refuse_overwriting(output, files.iter().map(PathBuf::as_path)) {
+            return status;
+        }
+    }
     let suites = match files
         .iter()
         .map(|file| suite(file, library, options))

@@ -263,14 +263,26 @@ fn no_command_writes_over_what_it_reads() {
     let (program, part) = (path("program.esl"), path("part.esl"));
     let message = "is read and cannot be written";
     let indirect = path("../overwrite/program.esl");
-    for output in [&program, &part] {
-        check(&run(&mut eslc(&["compile", &program, "-o", output]), b""), 2, message);
-    }
+    check(&run(&mut eslc(&["compile", &program, "-o", &program]), b""), 2, message);
+    check(&run(&mut eslc(&["compile", &program, "-o", &part]), b""), 2, "is a source by its name");
     if std::fs::exists(&indirect).expect("the folder can be read") {
         check(&run(&mut eslc(&["compile", &program, "-o", &indirect]), b""), 2, message);
     }
-    check(&run(&mut eslvm(&["run", "--timeline", &program, &program]), b""), 2, message);
-    assert_eq!(std::fs::read_to_string(program).expect("it is there"), text);
+    let link = path("link.txt");
+    std::fs::hard_link(&program, &link).expect("the folder takes links");
+    check(&run(&mut eslc(&["compile", &program, "-o", &link]), b""), 2, message);
+    // Other sources are not lost either.
+    let (other, message) = (path("other.lisp"), "other.lisp is there already, and is a source by its name");
+    std::fs::write(&other, text).expect("the folder can be written");
+    check(&run(&mut eslc(&["compile", &program, "-o", &other]), b""), 2, message);
+    check(&run(&mut eslvm(&["test", "--junit", &other, &program]), b""), 2, message);
+    for option in ["--timeline", "--coverage", "--profile", "--record"] {
+        check(&run(&mut eslvm(&["run", option, &program, &program]), b""), 2, "is read and cannot be");
+        check(&run(&mut eslvm(&["run", option, &other, &program]), b""), 2, message);
+    }
+    for source in [program, other] {
+        assert_eq!(std::fs::read_to_string(source).expect("it is there"), text);
+    }
 }
 
 #[test]
@@ -287,4 +299,21 @@ fn messages_for_tools_have_one_object_a_line() {
     let done = run(&mut eslc(&["check", "--messages", "json", &path]), b"");
     assert!(done.errors.lines().count() >= 3, "{}", done.errors);
     assert!(done.errors.lines().all(|line| line.starts_with('{') && line.ends_with('}')), "{}", done.errors);
+}
+
+#[test]
+fn of_many_warnings_people_are_shown_the_first() {
+    // All stand on one line, whose length each excerpt takes time for.
+    let folder = Folder::new("many-warnings");
+    let variables: String = (0..300).map(|number| format!("(v{number} 1)")).collect();
+    let path = folder.file("program.esl", &format!("(print (let ({variables}) 1))"));
+    let done = run(&mut eslc(&["check", &path]), b"");
+    assert_eq!(done.errors.matches("warning[unused-variable]").count(), 100, "{}", done.errors);
+    assert!(
+        done.errors.ends_with("eslc: 300 warnings, of which the first 100 are shown\n"),
+        "{}",
+        done.errors
+    );
+    let done = run(&mut eslc(&["check", "--messages", "json", &path]), b"");
+    assert_eq!(done.errors.lines().count(), 300);
 }

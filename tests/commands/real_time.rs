@@ -19,3 +19,19 @@ fn a_form_that_signals_does_not_put_off_the_timeout_of_wait_until() {
     let run = process::run(&mut eslvm(&["run", &source]), "");
     assert_eq!(run.output.split_whitespace().collect::<Vec<_>>(), [":TIMEOUT", "T", "T"]);
 }
+
+#[test]
+fn the_time_of_the_processor_passes_only_while_something_is_computed() {
+    // What the processor does for other processes does not count, so this holds on a busy machine.
+    let program = r"
+(defun spent-by (function)
+  (let ((begin (get-internal-run-time)))
+    (funcall function)
+    (- (get-internal-run-time) begin)))
+(defvar *asleep* (spent-by (lambda () (sleep 0.5))))
+(defvar *awake* (spent-by (lambda () (loop until (> (get-internal-run-time) 700000)))))
+(print (list (< -1 *asleep* 400000) (>= (+ *awake* *asleep*) 0) (>= (get-internal-run-time) 700000)))";
+    let source = Folder::new("processor-time").file("spending.esl", program);
+    let run = process::run(&mut eslvm(&["run", &source]), "");
+    assert_eq!(run.output.split_whitespace().collect::<Vec<_>>(), ["(T", "T", "T)"]);
+}

@@ -122,6 +122,28 @@ fn a_fifo_whose_writer_comes_late_delays_only_its_reader() {
 }
 
 #[test]
+fn data_are_read_from_files_and_fifos() {
+    let text = "(with-open-file (s \"data\" :direction :output) (format s \"(a b)~%c #(1)\"))
+(with-open-file (s \"data\")
+  (loop for datum = (read s nil :end) do (print datum) until (eq datum :end)))
+(mark \"begun\")
+(with-open-file (s \"in\")
+  (print (read s))
+  (mark \"read\")
+  (print (list (read s) (read s nil :end) (read s nil :end))))";
+    let mut running = Running::start("data", &format!("{MARK}{text}"));
+    running.await_file("begun");
+    let mut fifo = std::fs::File::options().write(true).open(running.path("in")).expect("it is there");
+    fifo.write_all(b"(x\n y) ha").expect("it is read");
+    running.await_file("read");
+    fifo.write_all(b"lf").expect("it is read");
+    drop(fifo);
+    let output = running.output();
+    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    assert_eq!(lines, ["(A B)", "C", "#(1)", ":END", "(X Y)", "(HALF :END :END)"]);
+}
+
+#[test]
 fn programs_that_are_loaded_from_slow_files_delay_only_their_task() {
     // What is loaded, and then a module, come from FIFOs whose writers come late; a load can be left.
     let text = "(spawn (:name 'other :daemon t) (dotimes (i 50) (sleep 0.001)) (mark \"ticked\") (loop (sleep 0.001)))

@@ -31,7 +31,12 @@ pub(super) fn internal_real_time(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn internal_run_time(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
-    let run = vm.outside.host.monotonic().saturating_sub(vm.scheduler.clock.idled);
+    // Under a virtual clock the processor's time is that in which the clock moved while tasks computed.
+    let run = if vm.scheduler.clock.is_virtual {
+        vm.outside.host.monotonic().saturating_sub(vm.scheduler.clock.idled)
+    } else {
+        vm.outside.host.processor_time()
+    };
     Ok(Value::fixnum((run / 1000) as i64).unwrap_or(Value::NIL))
 }
 

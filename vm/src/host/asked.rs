@@ -30,6 +30,7 @@ enum AskedQuestion {
     Begin,
     Permit,
     RequestOfFiles,
+    ProcessorTime,
 }
 
 /// A machine's host, and the canary of the questions that it was asked.
@@ -91,6 +92,11 @@ impl Host for Asked {
     fn wall_clock(&mut self) -> i64 {
         self.note(AskedQuestion::WallClock);
         self.host.wall_clock()
+    }
+
+    fn processor_time(&mut self) -> u64 {
+        self.note(AskedQuestion::ProcessorTime);
+        self.host.processor_time()
     }
 
     fn due(&mut self, deadline: u64) -> Option<u64> {
@@ -235,6 +241,7 @@ mod tests {
             canary(|_| {}),
             canary(|host| _ = host.monotonic()),
             canary(|host| _ = host.wall_clock()),
+            canary(|host| _ = host.processor_time()),
             canary(|host| _ = host.write(Output::Standard, b"a")),
             canary(|host| _ = host.write(Output::Standard, b"b")),
             canary(|host| _ = host.write(Output::Error, b"a")),

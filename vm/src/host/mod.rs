@@ -198,6 +198,12 @@ pub trait Host {
     /// Returns the nanoseconds since 1970-01-01 00:00 UTC.
     fn wall_clock(&mut self) -> i64;
 
+    /// Returns the nanoseconds for which processors have worked for this process: the monotonic clock's where
+    /// the host cannot tell.
+    fn processor_time(&mut self) -> u64 {
+        self.monotonic()
+    }
+
     /// Returns the time of the monotonic clock in nanoseconds, if it is `deadline` or later.
     fn due(&mut self, deadline: u64) -> Option<u64> {
         Some(self.monotonic()).filter(|&now| now >= deadline)

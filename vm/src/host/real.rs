@@ -263,6 +263,13 @@ impl Host for RealHost {
         self.virtual_time.unwrap_or_else(|| nanoseconds(scaled(elapsed, self.speed)))
     }
 
+    #[cfg(unix)]
+    fn processor_time(&mut self) -> u64 {
+        use rustix::time::{ClockId, clock_gettime};
+        let spent = clock_gettime(ClockId::ProcessCPUTime);
+        (spent.tv_sec as u64).saturating_mul(1_000_000_000).saturating_add(spent.tv_nsec as u64)
+    }
+
     fn stopwatch(&mut self) -> u64 {
         nanoseconds(self.start.elapsed())
     }

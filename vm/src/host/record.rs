@@ -110,6 +110,8 @@ define_records! {
     Monotonic(u64);
     /// Time of the wall clock.
     WallClock(i64);
+    /// Time of the processor.
+    ProcessorTime(u64);
     /// Outcome of a wait.
     Waited(Wake);
     /// Whether time is virtual.
@@ -152,6 +154,7 @@ impl Record {
         match self {
             Record::Monotonic(_) => "the time",
             Record::WallClock(_) => "the time of day",
+            Record::ProcessorTime(_) => "the time of the processor",
             Record::Waited(_) => "a wait",
             Record::Virtual(_) => "whether time is virtual",
             Record::Seed(_) => "the seed",
@@ -251,6 +254,11 @@ impl<H: Host, R: Recorder> Host for RecordingHost<H, R> {
 
     fn wall_clock(&mut self) -> i64 {
         let answer = WallClock(self.host.wall_clock());
+        self.note_plain(answer).0
+    }
+
+    fn processor_time(&mut self) -> u64 {
+        let answer = ProcessorTime(self.host.processor_time());
         self.note_plain(answer).0
     }
 

@@ -12,8 +12,8 @@ use esl_bytecode::span::Span;
 
 use super::record::{
     Arguments, BrokenOutput, Called, Due, Exists, FileRead, Filed, Interactive, Monotonic, NotedRecord,
-    PassedOn, Permitted, QuestionHash, Read, Received, Record, RecordedAnswer, Seed, Virtual, Waited,
-    WallClock, Written,
+    PassedOn, Permitted, ProcessorTime, QuestionHash, Read, Received, Record, RecordedAnswer, Seed, Virtual,
+    Waited, WallClock, Written,
 };
 use super::{
     Awaited, Captured, FileAnswer, FileRequest, Host, HostError, HostFailure, Inbox, Incoming, Input, Output,
@@ -253,6 +253,10 @@ impl Host for ReplayHost {
 
     fn wall_clock(&mut self) -> i64 {
         self.next_plain::<WallClock>("the time of day").map_or(0, |answer| answer.0)
+    }
+
+    fn processor_time(&mut self) -> u64 {
+        self.next_plain::<ProcessorTime>("the time of the processor").map_or(0, |answer| answer.0)
     }
 
     fn wait(&mut self, deadline: Option<u64>, awaited: Awaited) -> Wake {

@@ -366,8 +366,8 @@ pub(crate) fn characters(vm: &mut Vm, v: Value, start: Value, end: Value) -> Res
 /// A failure if it is not an open input stream.
 pub(crate) fn source(vm: &mut Vm, stream: Value, limit: usize) -> Result<StreamSource, Exit> {
     let (stream, kind) = designated_stream(vm, stream, true)?;
-    if kind == StreamKind::Channel {
-        // What it will have to read decides where the datum ends.
+    if channel::may_go_on(&vm.heap, stream, kind) {
+        // What will be supplied decides where the datum ends.
         return Err(Exit::Slowly);
     }
     if kind == StreamKind::StandardInput {
