@@ -116,7 +116,7 @@ fn check_returns(text: &str, config: &Config, portion: u64, returns: &[usize]) {
     let config = Config { snapshots: true, ..config.clone() };
     let mut machine = program::machine(config, Box::new(host)).expect("there is room for the library");
     program::begin(&mut machine, &program).expect("it can start");
-    let (mut course, mut snapshots) = (Vec::new(), Vec::new());
+    let (mut course, mut snapshots) = (Vec::new(), Vec::<Option<_>>::new());
     for _ in 0..12 {
         let before = present(&machine, &captured);
         // While the collector works there is none.

@@ -306,7 +306,7 @@ fn of_many_warnings_people_are_shown_the_first() {
     // All stand on one line, whose length each excerpt takes time for.
     let folder = Folder::new("many-warnings");
     let variables: String = (0..300).map(|number| format!("(v{number} 1)")).collect();
-    let path = folder.file("program.esl", &format!("(print (let ({variables}) 1))"));
+    let path = folder.file("program.esl", format!("(print (let ({variables}) 1))"));
     let done = run(&mut eslc(&["check", &path]), b"");
     assert_eq!(done.errors.matches("warning[unused-variable]").count(), 100, "{}", done.errors);
     assert!(

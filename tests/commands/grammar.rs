@@ -64,7 +64,7 @@ fn error_in(tree: &Tree) -> Option<Node<'_>> {
         return None;
     }
     loop {
-        let inner = (0..node.child_count() as u32).filter_map(|at| node.child(at)).find(Node::has_error);
+        let inner = (0..node.child_count()).filter_map(|at| node.child(at)).find(Node::has_error);
         match inner {
             Some(child) => node = child,
             None => return Some(node),
