@@ -15,6 +15,9 @@ pub const TAIL: u64 = 3;
 /// The function in the frame `base` returns the value list.
 pub const RETURN_VALUES: u64 = 4;
 
+/// As [`AGAIN`], since a register does not hold what was guessed when the machine code was made.
+pub const GUESSED_WRONG: u64 = 5;
+
 /// What a helper says of an instruction: go on with the next one.
 pub const STEP_NEXT: u64 = 0;
 /// What a helper says of an instruction: it jumps.

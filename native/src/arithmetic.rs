@@ -60,6 +60,12 @@ impl Translator<'_, '_> {
             return self.set(dst, result, Known::Fixnum);
         }
         let (slow, done) = (self.cold_block(), self.block_with_value());
+        if self.guess == Some(dst) {
+            let p = self.exact_double(left, slow);
+            let q = self.exact_double(right, slow);
+            self.on_doubles(operation, p, q, slow, done.0, true);
+            return self.finish_double(slow, done, dst);
+        }
         if operation != Arithmetic::Divide
             && let Some(test) = self.not_fixnums(x, y)
         {

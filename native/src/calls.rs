@@ -185,6 +185,7 @@ impl Translator<'_, '_> {
         let signal = self.signal();
         self.refuse(outcome, signal);
         self.reload(window, want.registers());
+        self.check_guess(window);
     }
 
     pub(crate) fn tail_call_builtin(&mut self) {

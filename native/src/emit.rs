@@ -9,7 +9,7 @@ use esl_heap::heap::Kind;
 use esl_heap::heap::layout::{Header, StructureObject};
 use esl_heap::value::{TAG_CONS, TAG_MASK, TAG_OBJECT};
 
-use crate::abi::{AGAIN, NativeContext, SIGNAL, STEP_SIGNAL};
+use crate::abi::{AGAIN, GUESSED_WRONG, NativeContext, SIGNAL, STEP_SIGNAL};
 use crate::kinds::Known;
 use crate::translate::Translator;
 
@@ -85,11 +85,30 @@ impl Translator<'_, '_> {
         let base = self.base;
         self.store(value, base, i32::from(register) * WORD);
         self.note(register, value, known);
+        if known == Known::Nothing {
+            self.check_guess(register);
+        }
+    }
+
+    /// Leaves the machine code behind the instruction if a register is guessed to hold a double, and holds
+    /// something else.
+    pub(crate) fn check_guess(&mut self, register: u8) {
+        if self.guess == Some(register) {
+            let (value, wrong) = (self.get(register), self.wrong_at(self.next));
+            let double = self.double_of(value, wrong);
+            self.note_double(register, value, double);
+        }
     }
 
     /// As [`Translator::set`], with a double, whose word is given too.
     pub(crate) fn set_double(&mut self, register: u8, word: Ssa, double: Ssa) {
         self.set(register, word, Known::Double);
+        self.note_double(register, word, double);
+    }
+
+    /// Notes that a register has a double in its place already.
+    fn note_double(&mut self, register: u8, word: Ssa, double: Ssa) {
+        self.note(register, word, Known::Double);
         let variable = self.doubles[usize::from(register)];
         self.b.def_var(variable, double);
     }
@@ -322,7 +341,9 @@ impl Translator<'_, '_> {
         let double = self.b.append_block_param(done.0, types::F64);
         self.go_to(slow);
         self.step();
-        let (base, exit) = (self.base, self.exit_at(self.next));
+        let is_guess = self.guess == Some(dst);
+        let exit = if is_guess { self.wrong_at(self.next) } else { self.exit_at(self.next) };
+        let base = self.base;
         let value = self.load(base, i32::from(dst) * WORD);
         let made = self.double_of(value, exit);
         self.b.ins().jump(done.0, &[value.into(), made.into()]);
@@ -367,6 +388,16 @@ impl Translator<'_, '_> {
         block
     }
 
+    /// Returns the block that leaves at the instruction at a word, since a guess was wrong.
+    pub(crate) fn wrong_at(&mut self, at: usize) -> Block {
+        if let Some(&block) = self.wrong.get(&at) {
+            return block;
+        }
+        let block = self.cold_block();
+        self.wrong.insert(at, block);
+        block
+    }
+
     /// Returns the block that leaves with a signal.
     pub(crate) fn signal(&mut self) -> Block {
         if let Some(block) = self.signal {
@@ -379,12 +410,14 @@ impl Translator<'_, '_> {
 
     /// Writes the blocks that leave.
     pub(crate) fn emit_exits(&mut self) {
-        for (at, block) in std::mem::take(&mut self.exits) {
+        let (exits, wrong) = (std::mem::take(&mut self.exits), std::mem::take(&mut self.wrong));
+        let exits = exits.into_iter().map(|exit| (exit, AGAIN));
+        for ((at, block), status) in exits.chain(wrong.into_iter().map(|exit| (exit, GUESSED_WRONG))) {
             self.go_to(block);
             let (pc, base) = (self.pc(at), self.base);
             self.store_context(pc, offset_of!(NativeContext, pc));
             self.store_context(base, offset_of!(NativeContext, base));
-            self.reply(AGAIN);
+            self.reply(status);
         }
         if let Some(block) = self.signal.take() {
             self.go_to(block);

@@ -6,15 +6,20 @@
 //! all the time. The translation keeps what is said here: a result that is of another kind leads out of the
 //! machine code, at the instruction or behind it. Where machine code is entered at a loop instruction, it
 //! tests what is said of the registers that are used from there on.
+//!
+//! Nothing tells what comes from an object or a call, or what a parameter is. If the register held a double
+//! when the machine code was asked for, the guess is that it is one again; this is tested at the instruction.
 
 use esl_bytecode::opcode::{Instr, RegisterAccess};
+use esl_bytecode::operand::Want;
 use esl_heap::Value;
 
 use crate::flow::{FlowStep, NativeFlow};
+use crate::maker::NativeSource;
 
 /// What is known of the content of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Known {
+pub enum Known {
     /// Nothing.
     Nothing,
     /// It is a fixnum.
@@ -25,7 +30,7 @@ pub(crate) enum Known {
 
 impl Known {
     /// Returns what is known of a value.
-    pub(crate) fn of(value: Value) -> Known {
+    pub fn of(value: Value) -> Known {
         match (value.as_fixnum(), value.as_double()) {
             (Some(_), _) => Known::Fixnum,
             (_, Some(_)) => Known::Double,
@@ -43,16 +48,59 @@ pub(crate) struct NativeKinds {
     before: Vec<Option<Box<[Known]>>>,
     /// Registers that are read before they are written, from there on.
     live: Vec<ReadRegisters>,
+    /// Registers that are guessed to hold doubles.
+    guesses: Vec<bool>,
 }
 
 impl NativeKinds {
     /// Follows all ways through a function.
-    pub(crate) fn of(flow: &NativeFlow, registers: usize, constants: &[Value]) -> NativeKinds {
-        let mut kinds =
-            NativeKinds { before: vec![None; flow.steps.len()], live: vec![[0; 4]; flow.steps.len()] };
-        kinds.follow(flow, registers, constants);
+    pub(crate) fn of(flow: &NativeFlow, source: &NativeSource) -> NativeKinds {
+        let mut guesses: Vec<bool> = source.guesses.iter().map(|&guess| guess == Known::Double).collect();
+        guesses.resize(source.registers, false);
+        let mut kinds = NativeKinds {
+            before: vec![None; flow.steps.len()],
+            live: vec![[0; 4]; flow.steps.len()],
+            guesses,
+        };
         kinds.find_live(flow);
+        kinds.follow(flow, source.registers, &source.constants);
         kinds
+    }
+
+    /// Returns the register that an instruction writes, if that is guessed to hold a double then.
+    pub(crate) fn guess(&self, instr: &Instr, before: &[Known]) -> Option<u8> {
+        let is_unknown = |left: u8, right: u8| {
+            let of = |register: u8| before[usize::from(register)];
+            (of(left), of(right)) != (Known::Fixnum, Known::Fixnum)
+        };
+        let dst = match *instr {
+            Instr::Add { dst, left, right }
+            | Instr::Sub { dst, left, right }
+            | Instr::Mul { dst, left, right }
+            | Instr::Div { dst, left, right }
+                if is_unknown(left.0, right.0) =>
+            {
+                dst.0
+            }
+            Instr::VectorRef { dst, .. }
+            | Instr::ArrayRef { dst, .. }
+            | Instr::Slot { dst, .. }
+            | Instr::Car { dst, .. }
+            | Instr::BoxRef { dst, .. }
+            | Instr::CaptureRef { dst, .. }
+            | Instr::CaptureBoxRef { dst, .. }
+            | Instr::SymbolValue { dst, .. } => dst.0,
+            Instr::Call { window, want, .. }
+            | Instr::CallGlobal { window, want, .. }
+            | Instr::CallSelf { window, want, .. }
+            | Instr::CallBuiltin { window, want, .. }
+                if want == Want::ONE =>
+            {
+                window.0
+            }
+            _ => return None,
+        };
+        self.guesses[usize::from(dst)].then_some(dst)
     }
 
     /// Returns what is known before the instruction at a word that can be reached.
@@ -66,7 +114,13 @@ impl NativeKinds {
     }
 
     fn follow(&mut self, flow: &NativeFlow, registers: usize, constants: &[Value]) {
-        self.before[0] = Some(vec![Known::Nothing; registers].into());
+        // What is read before it is written is a parameter.
+        let entry = (0..registers).map(|register| {
+            let is_guessed = self.guesses[register] && self.is_live(0, register);
+            if is_guessed { Known::Double } else { Known::Nothing }
+        });
+        let entry: Box<[Known]> = entry.collect();
+        self.before[0] = Some(entry);
         let mut open = vec![0];
         // A loop instruction that no way leads to is an entry all the same.
         let mut entries = flow.loops.clone();
@@ -80,7 +134,11 @@ impl NativeKinds {
                 continue;
             };
             let (Some(step), Some(mut kinds)) = (&flow.steps[at], self.before[at].clone()) else { continue };
+            let guess = self.guess(&step.instr, &kinds);
             apply(&step.instr, &mut kinds, constants);
+            if let Some(register) = guess {
+                kinds[usize::from(register)] = Known::Double;
+            }
             let next = step.instr.opcode().falls_through().then_some(step.next);
             for to in next.into_iter().chain(step.target) {
                 if self.meet(to, &kinds) {

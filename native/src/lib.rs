@@ -42,6 +42,7 @@ pub mod maker;
 mod objects;
 mod translate;
 
-pub use abi::{AGAIN, NativeContext, NativeReply, RETURN_VALUES, RETURNED, SIGNAL};
+pub use abi::{AGAIN, GUESSED_WRONG, NativeContext, NativeReply, RETURN_VALUES, RETURNED, SIGNAL};
 pub use helper::{MachineCodeHelper, MadeCode};
+pub use kinds::Known;
 pub use maker::{MachineCode, MachineCodeMaker, NativeSource, NotMade};

@@ -13,7 +13,7 @@ use esl_heap::Value;
 
 use crate::abi::NativeEntry;
 use crate::flow::NativeFlow;
-use crate::kinds::NativeKinds;
+use crate::kinds::{Known, NativeKinds};
 use crate::translate::Translator;
 
 /// Most words of a function that is translated; longer ones are left to the interpreter.
@@ -32,6 +32,10 @@ pub struct NativeSource {
     pub constants: Vec<Value>,
     /// Number of registers.
     pub registers: usize,
+    /// What the registers held when this was taken, from which it is guessed what they will hold. May be
+    /// shorter than the registers, and may be wrong: then the machine code is left with
+    /// [`GUESSED_WRONG`](crate::abi::GUESSED_WRONG).
+    pub guesses: Vec<Known>,
     /// The first word of an [`EntryStub`](crate::abi::EntryStub).
     pub entry_word: u32,
 }
@@ -99,7 +103,7 @@ impl MachineCodeMaker {
         let itself = module.declare_func_in_func(id, &mut context.func);
         let builder = FunctionBuilder::new(&mut context.func, &mut self.builders);
         let config = module.isa().frontend_config();
-        let kinds = NativeKinds::of(&flow, source.registers, &source.constants);
+        let kinds = NativeKinds::of(&flow, source);
         Translator::new(builder, source, (&flow, &kinds), itself, module.isa().pointer_type())
             .translate(config);
         module.define_function(id, &mut context).map_err(unsupported)?;

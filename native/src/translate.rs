@@ -43,6 +43,10 @@ pub(crate) struct Translator<'a, 'f> {
     pub(crate) at: usize,
     /// Word behind it.
     pub(crate) next: usize,
+    /// The register that is guessed to hold a double behind it.
+    pub(crate) guess: Option<u8>,
+    /// Exits where a guess was wrong.
+    pub(crate) wrong: BTreeMap<usize, Block>,
     /// Whether control goes on behind the instruction.
     is_open: bool,
 }
@@ -90,6 +94,8 @@ impl<'a, 'f> Translator<'a, 'f> {
             entry_signature: entry,
             at: 0,
             next: 0,
+            guess: None,
+            wrong: BTreeMap::new(),
             is_open: false,
         }
     }
@@ -164,12 +170,12 @@ impl<'a, 'f> Translator<'a, 'f> {
         match self.kinds.before(at)[register] {
             Known::Nothing => {}
             Known::Fixnum => {
-                let exit = self.exit_at(at);
+                let exit = self.wrong_at(at);
                 let tag = self.b.ins().band_imm_s(value, 3);
                 self.refuse(tag, exit);
             }
             Known::Double => {
-                let exit = self.exit_at(at);
+                let exit = self.wrong_at(at);
                 let double = self.double_of(value, exit);
                 self.b.def_var(self.doubles[register], double);
             }
@@ -189,6 +195,7 @@ impl<'a, 'f> Translator<'a, 'f> {
         }
         self.known = self.kinds.before(at).to_vec();
         (self.at, self.next) = (at, step.next);
+        self.guess = self.kinds.guess(&step.instr, &self.known);
     }
 
     /// Checks that what is known here is what is said of the instruction at a word, to which control goes.

@@ -49,9 +49,10 @@ pub(crate) struct CompiledFunctions {
     /// Makes machine code on a thread of its own: for [`Tier::Auto`].
     #[cfg(feature = "native")]
     pub(crate) helper: Option<MachineCodeHelper>,
-    /// The code that machine code was asked for, by its value's word and the number of the order.
+    /// The code that machine code was asked for, by its value's word, and whether guesses are made, by the
+    /// number of the order.
     #[cfg(feature = "native")]
-    pub(crate) asked: HashMap<u64, u64>,
+    pub(crate) asked: HashMap<u64, (u64, bool)>,
     /// Number of the last order.
     #[cfg(feature = "native")]
     pub(crate) orders: u64,
@@ -75,6 +76,10 @@ pub(crate) struct InstalledCode {
     pub(crate) made: MachineCode,
     /// The code, by its value's word.
     pub(crate) code: u64,
+    /// Whether guesses were made of what registers hold.
+    pub(crate) has_guesses: bool,
+    /// How often they were wrong.
+    pub(crate) wrong: u32,
     /// How often it was entered at a loop instruction, and the ticks that it has taken then, since both were
     /// looked at.
     pub(crate) loop_entries: u32,

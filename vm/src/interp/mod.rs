@@ -1557,7 +1557,7 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
                 #[cfg(feature = "native")]
                 LoopOperation::MakeAtEntry => {
                     let code = code_of(*base.sub(2));
-                    native::make_at_entry(vm, code);
+                    native::make_at_entry(vm, base);
                     pc = (*code).entry;
                     go_on!();
                 }

@@ -16,8 +16,8 @@ use esl_bytecode::opcode::Opcode;
 use esl_native::abi::{EntryStub, NativeEntry, TAIL};
 use esl_native::maker::MAX_WORDS;
 use esl_native::{
-    AGAIN, MachineCode, MachineCodeHelper, MachineCodeMaker, NativeContext, NativeReply, NativeSource,
-    NotMade, RETURN_VALUES, RETURNED,
+    AGAIN, GUESSED_WRONG, Known, MachineCode, MachineCodeHelper, MachineCodeMaker, NativeContext,
+    NativeReply, NativeSource, NotMade, RETURN_VALUES, RETURNED,
 };
 
 use super::{Signal, aux_at, code_of, constant, constants_of, first_instruction, stubs, word_at};
@@ -47,6 +47,9 @@ const ENTRIES: u32 = 1024;
 /// Ticks that each of them has to take on average, lest the interpreter run the loops alone: machine code
 /// that is left at once costs more than it saves.
 const LEAST_TICKS: u32 = 8;
+
+/// Wrong guesses after which machine code is made without any.
+const WRONG_GUESSES: u32 = 64;
 
 /// Frames that are looked at, from the running one on.
 const FRAMES: usize = 4;
@@ -188,11 +191,15 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
         // SAFETY: N4: it was left at an instruction of that frame.
         unsafe { note_call(vm, context.pc, context.base) };
     }
+    if reply.status == GUESSED_WRONG {
+        // SAFETY: N4: it was left in that frame, whose function has machine code.
+        unsafe { note_wrong_guess(vm, context.base) };
+    }
     let left = match reply.status {
         // SAFETY: N3: a value of the program.
         RETURNED => Left::Returned(unsafe { Value::from_bits(reply.value) }),
         RETURN_VALUES => Left::Values,
-        AGAIN => Left::Again,
+        AGAIN | GUESSED_WRONG => Left::Again,
         _ => Left::Signal(caller.signal),
     };
     Leaving {
@@ -232,23 +239,49 @@ unsafe fn note_call(vm: &mut Vm, pc: u64, base: u64) {
         let heat = vm.compiled.heat.entry(code.addr() as u64).or_insert(0);
         *heat += 1;
         if *heat == HOT_CALLS {
-            make(vm, code);
+            make(vm, code, vec![Known::Nothing]);
         }
     }
 }
 
-/// Makes machine code of a code at its first call; puts back the way to its first instruction if none is
-/// made.
+/// Counts a wrong guess, and has machine code without guesses made of the function if there were many.
 ///
 /// # Safety
-/// `code` points to a Code of bytecode.
+/// `base` is a frame of a function that has machine code.
 #[cold]
 #[inline(never)]
-pub(super) unsafe fn make_at_entry(vm: &mut Vm, code: *mut CodeObject) {
+unsafe fn note_wrong_guess(vm: &mut Vm, base: u64) {
+    let base: *mut Value = std::ptr::with_exposed_provenance_mut(base as usize);
+    // SAFETY: F2: the function of the frame keeps its code alive, whose entry leads to a stub.
+    unsafe {
+        let code = code_of(*base.sub(2));
+        if *(*code).entry != u32::from(stubs::NATIVE_ENTRY) {
+            return;
+        }
+        let number = (*(*code).entry.cast::<EntryStub>()).number as usize;
+        let Some(installed) = vm.compiled.installed.get_mut(number).and_then(Option::as_mut) else { return };
+        installed.wrong += 1;
+        if installed.wrong == WRONG_GUESSES && installed.has_guesses {
+            make(vm, code, Vec::new());
+        }
+    }
+}
+
+/// Makes machine code of the running function at its first call; puts back the way to its first instruction
+/// if none is made.
+///
+/// # Safety
+/// The frame at `base` is the running one, at the beginning of a function of bytecode.
+#[cold]
+#[inline(never)]
+pub(super) unsafe fn make_at_entry(vm: &mut Vm, base: *mut Value) {
     // SAFETY: by the contract; the entry of a Code may lead to its first instruction or to its machine code.
     unsafe {
+        let code = code_of(*base.sub(2));
         (*code).entry = first_instruction(code);
-        make(vm, code);
+        let registers = std::slice::from_raw_parts(base, (*code).nregs as usize);
+        let guesses = registers.iter().map(|&value| Known::of(value)).collect();
+        make(vm, code, guesses);
     }
 }
 
@@ -257,27 +290,30 @@ pub(super) unsafe fn make_at_entry(vm: &mut Vm, code: *mut CodeObject) {
 ///
 /// # Safety
 /// `code` points to a Code of bytecode.
-unsafe fn make(vm: &mut Vm, code: *mut CodeObject) {
+unsafe fn make(vm: &mut Vm, code: *mut CodeObject, guesses: Vec<Known>) {
     let compiled = &mut vm.compiled;
     if compiled.report.refused.is_some() || compiled.report.bytes > MOST_BYTES {
         return;
     }
     // SAFETY: the contract says that this is a live Code, whose entry leads to an operation of the loop.
     unsafe {
-        if *(*code).entry == u32::from(stubs::NATIVE_ENTRY) || instructions(code).len() > MAX_WORDS {
+        let is_made = *(*code).entry == u32::from(stubs::NATIVE_ENTRY);
+        if (is_made && !guesses.is_empty()) || instructions(code).len() > MAX_WORDS {
             return;
         }
+        let source = source_of(code, guesses);
+        let has_guesses = source.guesses.contains(&Known::Double);
         if compiled.tier == Tier::Native {
             let maker = match &mut compiled.maker {
                 Some(maker) => Ok(maker),
                 none => MachineCodeMaker::new().map(|maker| none.insert(maker)),
             };
             let (result, duration) = match maker {
-                Ok(maker) => maker.make(&source_of(code)),
+                Ok(maker) => maker.make(&source),
                 Err(reason) => (Err(reason), Default::default()),
             };
             compiled.report.nanoseconds += duration.as_nanos() as u64;
-            install(compiled, code, result);
+            install(compiled, code, has_guesses, result);
             return;
         }
         let helper = match &mut compiled.helper {
@@ -287,10 +323,11 @@ unsafe fn make(vm: &mut Vm, code: *mut CodeObject) {
         match helper {
             Ok(helper) => {
                 compiled.orders += 1;
-                compiled.asked.insert(compiled.orders, Value::from_object(code.cast()).bits());
-                helper.ask(compiled.orders, source_of(code));
+                let word = Value::from_object(code.cast()).bits();
+                compiled.asked.insert(compiled.orders, (word, has_guesses));
+                helper.ask(compiled.orders, source);
             }
-            Err(reason) => install(compiled, code, Err(reason)),
+            Err(reason) => install(compiled, code, has_guesses, Err(reason)),
         }
     }
 }
@@ -300,10 +337,10 @@ fn install_made(compiled: &mut CompiledFunctions) {
     while let Some(made) = compiled.helper.as_ref().and_then(MachineCodeHelper::take) {
         compiled.report.nanoseconds += made.duration.as_nanos() as u64;
         // The code may be gone.
-        let Some(code) = compiled.asked.remove(&made.order) else { continue };
+        let Some((code, has_guesses)) = compiled.asked.remove(&made.order) else { continue };
         // SAFETY: the word was made of the address of a Code, which is there: else the order was forgotten
         // when all that is reached had been marked.
-        unsafe { install(compiled, Value::from_bits(code).object_ptr().cast(), made.result) };
+        unsafe { install(compiled, Value::from_bits(code).object_ptr().cast(), has_guesses, made.result) };
     }
 }
 
@@ -323,7 +360,7 @@ unsafe fn instructions<'a>(code: *mut CodeObject) -> &'a [u32] {
 ///
 /// # Safety
 /// `code` points to a Code of bytecode.
-unsafe fn source_of(code: *mut CodeObject) -> NativeSource {
+unsafe fn source_of(code: *mut CodeObject, guesses: Vec<Known>) -> NativeSource {
     // SAFETY: by the contract this is a live Code.
     unsafe {
         NativeSource {
@@ -332,6 +369,7 @@ unsafe fn source_of(code: *mut CodeObject) -> NativeSource {
             constants_at: constants_of(code).expose_provenance() as u64,
             constants: std::slice::from_raw_parts(constants_of(code), (*code).nconsts as usize).to_vec(),
             registers: (*code).nregs as usize,
+            guesses,
             entry_word: u32::from(stubs::NATIVE_ENTRY),
         }
     }
@@ -344,6 +382,7 @@ unsafe fn source_of(code: *mut CodeObject) -> NativeSource {
 unsafe fn install(
     compiled: &mut CompiledFunctions,
     code: *mut CodeObject,
+    has_guesses: bool,
     result: Result<MachineCode, NotMade>,
 ) {
     let made = match result {
@@ -356,7 +395,23 @@ unsafe fn install(
     };
     // SAFETY: by the contract this is a live Code, and nobody holds a reference to its words.
     unsafe {
+        let words = instructions(code).len();
+        let words = std::slice::from_raw_parts_mut(first_instruction(code).cast_mut(), words);
         if *(*code).entry == u32::from(stubs::NATIVE_ENTRY) {
+            // Its guesses were wrong.
+            let number = (*(*code).entry.cast::<EntryStub>()).number as usize;
+            let old = compiled.installed.get_mut(number).and_then(Option::as_mut);
+            if let Some(old) = old.filter(|old| old.has_guesses && !has_guesses) {
+                for &at in made.loops() {
+                    quicken_loop(words, at);
+                }
+                (old.loop_entries, old.loop_ticks) = (0, 0);
+                old.stub.address = made.entry() as usize as u64;
+                compiled.report.bytes += made.bytes().next_multiple_of(4096);
+                compiled.report.bytes -= old.made.bytes().next_multiple_of(4096);
+                old.made = made;
+                old.has_guesses = false;
+            }
             return;
         }
         let number = compiled.free.pop().unwrap_or_else(|| {
@@ -368,15 +423,13 @@ unsafe fn install(
         compiled.report.functions += 1;
         // Memory is taken in pages.
         compiled.report.bytes += made.bytes().next_multiple_of(4096);
-        let words = instructions(code).len();
-        let words = std::slice::from_raw_parts_mut(first_instruction(code).cast_mut(), words);
         for &at in made.loops() {
             quicken_loop(words, at);
         }
         (*code).entry = (&raw const *stub).cast();
         let code = Value::from_object(code.cast()).bits();
         compiled.installed[number as usize] =
-            Some(InstalledCode { stub, made, code, loop_entries: 0, loop_ticks: 0 });
+            Some(InstalledCode { stub, made, code, has_guesses, wrong: 0, loop_entries: 0, loop_ticks: 0 });
     }
 }
 
@@ -404,8 +457,9 @@ impl Vm {
             return;
         }
         install_made(&mut self.compiled);
-        let functions: Vec<Value> = self.frames().take(FRAMES).map(|frame| frame.function).collect();
-        for function in functions {
+        let frames = self.frames().take(FRAMES);
+        let functions: Vec<_> = frames.map(|frame| (frame.function, frame.registers().to_vec())).collect();
+        for (function, registers) in functions {
             // SAFETY: F2: the function of a frame is a Function.
             unsafe {
                 let code = code_of(function);
@@ -413,7 +467,7 @@ impl Vm {
                 let heat = self.compiled.heat.entry(code.addr() as u64).or_insert(0);
                 *heat += 1;
                 if (*heat == HOT || *heat == HOT_CALLS) && !is_stub {
-                    make(self, code);
+                    make(self, code, registers.into_iter().map(Known::of).collect());
                 }
             }
         }
@@ -424,7 +478,7 @@ impl Vm {
     pub(super) fn give_back_code(compiled: &mut CompiledFunctions, heap: &Heap) {
         compiled.heat.clear();
         // SAFETY: the word was made of the address of a code; whether it is marked is told by its address.
-        compiled.asked.retain(|_, code| heap.is_marked(unsafe { Value::from_bits(*code) }));
+        compiled.asked.retain(|_, (code, _)| heap.is_marked(unsafe { Value::from_bits(*code) }));
         for installed in &mut compiled.installed {
             let Some(InstalledCode { made, code, stub, .. }) = installed else { continue };
             // SAFETY: the word was made of the address of the code; whether it is marked is told by its
