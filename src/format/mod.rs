@@ -3,7 +3,8 @@
 //! Lines keep their breaks. Each line that does not begin inside a string or a block comment is indented by
 //! the list around its first token: arguments under the first one, bodies two columns in, distinguished
 //! arguments four. Blanks at the ends of lines go. What the reader reads stays the same, as do all comments,
-//! and formatting again changes nothing. The rules are those of Emacs (`lisp-indent-function`,
+//! and formatting again changes nothing. What stands between the comments `; format: off` and `; format: on`
+//! stays as it was laid out by hand. The rules are those of Emacs (`lisp-indent-function`,
 //! `common-lisp-indent-function`), with the lambda lists of macros in place of most of its table.
 //!
 //! ```
@@ -40,10 +41,15 @@ pub fn format(tree: &SyntaxTree, styles: &Styles, lines: Option<RangeInclusive<u
     let mut indenter = Indenter::new(tree, styles, &starts);
     let mut out = String::with_capacity(text.len());
     let is_wanted = |line: usize| lines.as_ref().is_none_or(|lines| lines.contains(&line));
+    let mut is_off = false;
     for line in 0..starts.count() {
         let place = starts.range(line);
         let is_inside = fixed.begins_inside[line];
-        if !is_wanted(line) || (is_inside && fixed.kept_up_to[line] >= place.end) {
+        let was_off = is_off;
+        if !is_inside && let Some(switched_off) = switch(&text[place.clone()]) {
+            is_off = switched_off;
+        }
+        if !is_wanted(line) || (was_off && is_off) || (is_inside && fixed.kept_up_to[line] >= place.end) {
             out.push_str(&text[place]);
             continue;
         }
@@ -76,6 +82,16 @@ pub fn format(tree: &SyntaxTree, styles: &Styles, lines: Option<RangeInclusive<u
         out.push('\n');
     }
     out
+}
+
+/// Whether a line switches formatting off or on: `; format: off`, `; format: on`.
+fn switch(line: &str) -> Option<bool> {
+    let comment = line.trim().strip_prefix(';')?.trim_start_matches(';').trim();
+    match comment.strip_prefix("format:")?.trim() {
+        "off" => Some(true),
+        "on" => Some(false),
+        _ => None,
+    }
 }
 
 /// Whether text can be added at the end without becoming part of a token.

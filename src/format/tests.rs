@@ -78,6 +78,16 @@ fn macros_are_indented_by_their_lambda_lists_and_declarations() {
 }
 
 #[test]
+fn a_region_stays_as_it_was_laid_out() {
+    let formatted = |text: &str| format(&SyntaxTree::new(text), &Styles::standard(), None);
+    let text = "(list 1\n; format: off\n 1   0\n 0   1\n ; format: on\n 2)\n";
+    let kept = "(list 1\n      ; format: off\n 1   0\n 0   1\n      ; format: on\n      2)\n";
+    assert_eq!(formatted(text), kept);
+    assert_eq!(formatted("(when a\n;;; format: off\n b   c\n"), "(when a\n  ;;; format: off\n b   c\n");
+    assert_eq!(formatted("(list \"\n; format: off\n\"\nb)\n"), "(list \"\n; format: off\n\"\n      b)\n");
+}
+
+#[test]
 fn data_are_not_taken_for_code() {
     check("'(when a\n  b\n  (let ((c)\n        d)))\n");
     check("#(when a\n  b)\n");

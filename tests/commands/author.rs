@@ -84,14 +84,19 @@ fn a_new_project_runs_and_its_tests_pass() {
 
 #[test]
 fn the_projects_own_files_are_formatted() {
-    // The library has tables, and the conformance programs odd forms, that are laid out by hand.
+    // The library is not among them yet; programs that show what the reader refuses cannot be.
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folders = ["world/modules", "examples", "benches", "src/new/template"];
-    let folders = folders.map(|folder| root.join(folder).display().to_string());
+    let folders = ["world/modules", "examples", "benches", "playground", "src/new/template"];
+    let programs = std::fs::read_dir(root.join("conformance/programs")).expect("the folder can be listed");
+    let programs = programs.map(|entry| entry.expect("the folder can be listed").path());
+    let programs = programs.filter(|path| path.is_dir() && !path.ends_with("diagnostics"));
+    let folders: Vec<String> = folders
+        .iter()
+        .map(|folder| root.join(folder))
+        .chain(programs)
+        .map(|folder| folder.display().to_string())
+        .collect();
     let arguments: Vec<&str> = std::iter::once("--check").chain(folders.iter().map(|path| &**path)).collect();
     let (status, output, errors) = format(&arguments, "");
-    assert_eq!(
-        status, 0,
-        "run `eslc format world/modules examples benches src/new/template`\n{output}{errors}"
-    );
+    assert_eq!(status, 0, "run `eslc format` on these:\n{output}{errors}");
 }
