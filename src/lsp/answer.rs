@@ -4,13 +4,13 @@ use lsp_server::{ErrorCode, Request, Response};
 use lsp_types::request::{
     CodeActionRequest, Completion, DocumentHighlightRequest, DocumentSymbolRequest, ExecuteCommand,
     FoldingRangeRequest, Formatting, GotoDefinition, HoverRequest, InlayHintRequest, PrepareRenameRequest,
-    RangeFormatting, References, Rename, Request as RequestKind, SemanticTokensFullRequest,
-    SemanticTokensRangeRequest, SignatureHelpRequest, WorkspaceSymbolRequest,
+    RangeFormatting, References, Rename, Request as RequestKind, SelectionRangeRequest,
+    SemanticTokensFullRequest, SemanticTokensRangeRequest, SignatureHelpRequest, WorkspaceSymbolRequest,
 };
 use lsp_types::{TextEdit, Uri};
 
 use super::project::Project;
-use super::{complete, describe, expand, navigate, outline, recovery, repair, semantic};
+use super::{complete, describe, expand, navigate, outline, recovery, rename, repair, semantic};
 use crate::format::{format, styles_of};
 
 /// Answers a request.
@@ -27,10 +27,10 @@ pub(super) fn answer(project: &Project, request: Request) -> Response {
             reply::<DocumentHighlightRequest>(request, |p| navigate::highlights(project, &p))
         }
         PrepareRenameRequest::METHOD => {
-            reply::<PrepareRenameRequest>(request, |p| navigate::prepare_rename(project, &p))
+            reply::<PrepareRenameRequest>(request, |p| rename::prepare_rename(project, &p))
         }
         Rename::METHOD => match serde_json::from_value(request.params) {
-            Ok(parameters) => match navigate::rename(project, &parameters) {
+            Ok(parameters) => match rename::rename(project, &parameters) {
                 Ok(edit) => Response::new_ok(request.id, edit),
                 Err(reason) => Response::new_err(request.id, ErrorCode::RequestFailed as i32, reason),
             },
@@ -41,6 +41,9 @@ pub(super) fn answer(project: &Project, request: Request) -> Response {
         }
         WorkspaceSymbolRequest::METHOD => {
             reply::<WorkspaceSymbolRequest>(request, |p| outline::workspace_symbols(project, &p))
+        }
+        SelectionRangeRequest::METHOD => {
+            reply::<SelectionRangeRequest>(request, |p| outline::selections(project, &p))
         }
         FoldingRangeRequest::METHOD => reply::<FoldingRangeRequest>(request, |p| outline::folds(project, &p)),
         SemanticTokensFullRequest::METHOD => {

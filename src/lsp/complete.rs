@@ -121,6 +121,9 @@ fn keywords(project: &Project, found: &mut Candidates<'_>, offset: usize) {
             found.add(&definition.name, CompletionItemKind::ENUM_MEMBER, 1, Some(definition));
         }
     }
+    for name in language().public().filter(|name| name.definition.kind == DefinedAs::Cause) {
+        found.add(&name.definition.name, CompletionItemKind::ENUM_MEMBER, 3, Some(&name.definition));
+    }
     let tree = &text.tree;
     let own = found.place.clone();
     for node in tree.nodes().filter(|&node| tree.range(node) != own) {

@@ -1,29 +1,25 @@
 //! From names to their definitions and uses.
 
-use std::collections::HashMap;
-
 use esl_compiler::reader::lexer::Token;
 use lsp_types::{
     DocumentHighlight, DocumentHighlightParams, GotoDefinitionParams, GotoDefinitionResponse, Location,
-    PrepareRenameResponse, ReferenceParams, RenameParams, TextDocumentPositionParams, TextEdit, Uri,
-    WorkspaceEdit,
+    ReferenceParams, TextDocumentPositionParams,
 };
 
 use super::document::OpenText;
-use super::library::language;
 use super::project::Project;
 use super::scope::{LocalBinding, binding_of};
 use crate::syntax::{NodeId, SyntaxKind, SyntaxTree, bare_name};
 
 /// The name at a position: the text, the node, and its binding if it is local.
-struct NameAt<'a> {
-    text: &'a OpenText,
-    node: NodeId,
-    name: String,
-    binding: Option<LocalBinding>,
+pub(super) struct NameAt<'a> {
+    pub(super) text: &'a OpenText,
+    pub(super) node: NodeId,
+    pub(super) name: String,
+    pub(super) binding: Option<LocalBinding>,
 }
 
-fn name_at<'a>(project: &'a Project, at: &TextDocumentPositionParams) -> Option<NameAt<'a>> {
+pub(super) fn name_at<'a>(project: &'a Project, at: &TextDocumentPositionParams) -> Option<NameAt<'a>> {
     let text = project.text(&at.text_document.uri)?;
     let node = text.tree.node_at(text.offset(at.position));
     let name = bare_name(text.tree.name(node)?);
@@ -46,7 +42,7 @@ pub(super) fn definition(
 }
 
 /// Returns the uses of a name in one text, definitions included.
-fn uses_in(text: &OpenText, found: &NameAt<'_>) -> Vec<NodeId> {
+pub(super) fn uses_in(text: &OpenText, found: &NameAt<'_>) -> Vec<NodeId> {
     let tree = &text.tree;
     let nodes = match found.binding {
         Some(binding) => {
@@ -80,7 +76,7 @@ fn is_designator(tree: &SyntaxTree, node: NodeId, name: &str) -> bool {
 
 /// Returns the texts in which a name may be used: its own; for a global name the modules, and what of the
 /// workspace requires or defines it.
-fn texts_of(project: &Project, found: &NameAt<'_>) -> Vec<OpenText> {
+pub(super) fn texts_of(project: &Project, found: &NameAt<'_>) -> Vec<OpenText> {
     if found.binding.is_some() {
         return vec![found.text.clone()];
     }
@@ -123,62 +119,4 @@ pub(super) fn highlights(
     let highlight =
         |node| DocumentHighlight { range: found.text.range(found.text.tree.range(node)), kind: None };
     Some(uses.map(highlight).collect())
-}
-
-/// Answers whether the name at a position can be renamed.
-pub(super) fn prepare_rename(
-    project: &Project,
-    at: &TextDocumentPositionParams,
-) -> Option<PrepareRenameResponse> {
-    let found = name_at(project, at)?;
-    let is_own = found.binding.is_some() || is_defined_by_program(project, &found);
-    let range = found.text.range(bare_place(found.text, found.node));
-    is_own.then_some(PrepareRenameResponse::Range(range))
-}
-
-/// Whether the program itself defines a global name, and the language does not.
-fn is_defined_by_program(project: &Project, found: &NameAt<'_>) -> bool {
-    let is_language = language().find(&found.name).is_some_and(|name| name.is_public);
-    let definitions = project.find(found.text, &found.name);
-    // A module that comes with the machine is shown as a copy: its file is not to be changed.
-    let cache = super::library::cache_folder();
-    let is_copy = |place: &Location| super::document::path_of(&place.uri).starts_with(&cache);
-    let is_own = |place: &Option<Location>| place.as_ref().is_some_and(|place| !is_copy(place));
-    !is_language && definitions.iter().any(|(_, place)| is_own(place))
-}
-
-/// Returns the place of a name without its package.
-fn bare_place(text: &OpenText, node: NodeId) -> std::ops::Range<usize> {
-    let place = text.tree.range(node);
-    let name = text.tree.text(node);
-    let package = name.rfind(':').map_or(0, |at| at + 1);
-    place.start + package..place.end
-}
-
-/// Renames the name at a position in its text and, if it is global, in all that share it.
-///
-/// # Errors
-/// Why it cannot be renamed.
-pub(super) fn rename(project: &Project, parameters: &RenameParams) -> Result<WorkspaceEdit, String> {
-    let found = name_at(project, &parameters.text_document_position).ok_or("there is no name here")?;
-    let new = &parameters.new_name;
-    let tree = SyntaxTree::new(new.as_str());
-    let is_name = tree.data(0).count() == 1 && tree.name(1) == Some(new) && !new.contains(':');
-    if !is_name || new.chars().all(|c| c == '.' || c.is_ascii_digit()) {
-        return Err(format!("`{new}` is no name"));
-    }
-    if found.binding.is_none() && !is_defined_by_program(project, &found) {
-        return Err(format!("`{}` does not belong to this program", found.name));
-    }
-    #[allow(clippy::mutable_key_type, reason = "the type of the protocol")]
-    let mut changes: HashMap<Uri, Vec<TextEdit>> = HashMap::new();
-    for text in texts_of(project, &found) {
-        let uses = uses_in(&text, &found).into_iter();
-        let edits: Vec<TextEdit> =
-            uses.map(|node| TextEdit::new(text.range(bare_place(&text, node)), new.clone())).collect();
-        if !edits.is_empty() {
-            changes.insert(text.uri.clone(), edits);
-        }
-    }
-    Ok(WorkspaceEdit { changes: Some(changes), ..WorkspaceEdit::default() })
 }

@@ -2,7 +2,8 @@
 
 use lsp_types::{
     DocumentSymbol, DocumentSymbolParams, DocumentSymbolResponse, FoldingRange, FoldingRangeKind,
-    FoldingRangeParams, OneOf, SymbolKind, WorkspaceSymbol, WorkspaceSymbolParams, WorkspaceSymbolResponse,
+    FoldingRangeParams, OneOf, SelectionRange, SelectionRangeParams, SymbolKind, WorkspaceSymbol,
+    WorkspaceSymbolParams, WorkspaceSymbolResponse,
 };
 
 use super::definition::{DefinedAs, definitions};
@@ -135,4 +136,34 @@ pub(super) fn folds(project: &Project, parameters: &FoldingRangeParams) -> Optio
     }
     folds.sort_by_key(|fold| fold.start_line);
     Some(folds)
+}
+
+/// Answers what to select around positions, step by step: a word, its form without the parentheses and with
+/// them, the form around that, up to the whole text.
+pub(super) fn selections(
+    project: &Project,
+    parameters: &SelectionRangeParams,
+) -> Option<Vec<SelectionRange>> {
+    let text = project.text(&parameters.text_document.uri)?;
+    let tree = &text.tree;
+    let around = |&position: &lsp_types::Position| {
+        let mut places = Vec::new();
+        let mut at = Some(tree.node_at(text.offset(position)));
+        while let Some(node) = at {
+            let place = tree.range(node);
+            let (first, last) = (tree.data(node).next(), tree.data(node).last());
+            if let (SyntaxKind::List, Some(first), Some(last)) = (tree.kind(node), first, last) {
+                places.push(tree.range(first).start..tree.range(last).end);
+            }
+            places.push(place);
+            at = tree.parent(node);
+        }
+        places.dedup();
+        let outwards = |parent: Option<Box<SelectionRange>>, place: std::ops::Range<usize>| {
+            Some(Box::new(SelectionRange { range: text.range(place), parent }))
+        };
+        let whole = SelectionRange { range: text.range(0..tree.source().len()), parent: None };
+        places.into_iter().rev().fold(None, outwards).map_or(whole, |range| *range)
+    };
+    Some(parameters.positions.iter().map(around).collect())
 }

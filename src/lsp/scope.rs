@@ -6,6 +6,28 @@
 
 use crate::syntax::{NodeId, SyntaxKind, SyntaxTree, bare_name};
 
+/// Operators of the language that are called `do-…` or `with-…` and bind no variable in their first argument.
+const NOT_BINDING: &[&str] = &[
+    "do-every",
+    "with-automatic-recoveries",
+    "with-budget",
+    "with-cleanup-procedure",
+    "with-guardian",
+    "with-hash-table-iterator",
+    "with-maintained-properties",
+    "with-maintained-property",
+    "with-query-bindings",
+    "with-quota",
+    "with-recovery-procedures",
+    "with-resource",
+    "with-resources",
+    "with-rights",
+    "with-simple-restart",
+    "with-suspension-procedures",
+    "with-timeout",
+    "with-world",
+];
+
 /// A local binding of a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct LocalBinding {
@@ -32,13 +54,33 @@ pub(super) fn bindings_around(tree: &SyntaxTree, node: NodeId) -> Vec<LocalBindi
 /// Returns the binding to which a name refers; `None` if it is global.
 pub(super) fn binding_of(tree: &SyntaxTree, node: NodeId) -> Option<LocalBinding> {
     let name = bare_name(tree.name(node)?);
+    let level = template_level(tree, node)?;
     let bindings = bindings_around(tree, node);
     if let Some(own) = bindings.iter().find(|binding| binding.name == node) {
         return Some(*own);
     }
     let wants_function = is_operator(tree, node);
     let same = |binding: &&LocalBinding| tree.name(binding.name).map(bare_name).as_ref() == Some(&name);
-    bindings.iter().filter(same).find(|binding| binding.is_function == wants_function).copied()
+    let mut known = bindings.iter().filter(same).filter(|binding| binding.is_function == wants_function);
+    known.find(|binding| template_level(tree, binding.name) == Some(level)).copied()
+}
+
+/// Returns the number of backquotes around a node that no comma has left, as names in a template and names
+/// of the code that makes it are not the same; `None` for quoted data.
+fn template_level(tree: &SyntaxTree, node: NodeId) -> Option<i32> {
+    use esl_compiler::reader::lexer::Token;
+    let (mut level, mut is_left) = (0, false);
+    let mut at = tree.parent(node);
+    while let Some(outer) = at {
+        match tree.kind(outer) {
+            SyntaxKind::Mark(Token::Quote) if !is_left => return None,
+            SyntaxKind::Mark(Token::Backquote) => level += 1,
+            SyntaxKind::Mark(Token::Comma | Token::CommaAt) => (level, is_left) = (level - 1, true),
+            _ => {}
+        }
+        at = tree.parent(outer);
+    }
+    Some(level)
 }
 
 /// Whether a name stands where an operator does, or after `#'`.
@@ -111,6 +153,8 @@ fn bound_by(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBinding>) {
                 parameters(tree, list, &mut variable);
             }
         }
+        // These take something else there: seconds, clauses, the name of a resource.
+        name if NOT_BINDING.contains(&name) => bound_by_clause(tree, list, found),
         name if name.starts_with("do") || name.starts_with("with-") => {
             if let Some(header) = argument(1).filter(|&header| tree.kind(header) == SyntaxKind::List) {
                 tree.data(header)

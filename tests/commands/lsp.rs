@@ -276,3 +276,64 @@ fn an_editor_is_helped_while_a_program_is_typed() {
     assert_eq!(edits[0]["newText"], "  (prnit \"é𝄞\" force))\n");
     editor.end();
 }
+
+#[test]
+fn renaming_changes_what_no_name_means() {
+    let folder = Folder::new("lsp_rename");
+    let mut editor = Editor::new(&folder);
+    let mut count = 0;
+    // The text with the first `@` taken out, where the name is; what the edits write, or the refusal.
+    let mut rename = |text: &str, new: &str| {
+        count += 1;
+        let path = folder.join(&format!("{count}.esl"));
+        let at = text.find('@').expect("a name is marked");
+        editor.open(&path, &text.replace('@', ""));
+        let position = json!({ "line": text[..at].matches('\n').count(), "character": at - text[..at].rfind('\n').map_or(0, |at| at + 1) });
+        let asked = json!({ "textDocument": { "uri": uri(&path) }, "position": position, "newName": new });
+        let answer = editor.request("textDocument/rename", asked);
+        let edits = answer["result"]["changes"][uri(&path)].as_array();
+        let texts =
+            edits.map(|edits| edits.iter().filter_map(|edit| edit["newText"].as_str()).collect::<Vec<_>>());
+        texts.map_or_else(|| answer["error"]["message"].to_string(), |texts| texts.join(" "))
+    };
+    for (text, new, expected) in [
+        ("(let ((@x 1)) (print x) (print 'x))", "y", "y y"),
+        ("(let ((@x 1) (y 2)) (+ x y))", "y", "\"`y` is another local name here: it is bound on line 1\""),
+        (
+            "(let ((@x 1))\n (let ((y 2)) (+ x y)))",
+            "y",
+            "\"`y` is another local name here: it is bound on line 2\"",
+        ),
+        ("(let ((y 2))\n (let ((@x 1))\n (+ x y)))", "y", "\"`y` on line 3 would mean the renamed one\""),
+        ("(let ((@x 1)) (car x))", "list", "list list"),
+        ("(flet ((@f () 1)) (f))", "car", "\"`car` belongs to the language\""),
+        ("(defun @go-to () 1) (defun turn () 2)", "turn", "\"`turn` is defined already, on line 1\""),
+        ("(defun @go-to () 1) (go-to)", "print", "\"`print` belongs to the language\""),
+        (
+            "(defun @go-to () 1) (flet ((turn () 2)) (go-to))",
+            "turn",
+            "\"`turn` is another local name here: it is bound on line 1\"",
+        ),
+        ("(defun go-to (&key @speed) speed) (go-to :speed 1)", "pace", "((:speed pace)) pace"),
+        ("(defun go-to (&key (@speed 1)) speed)", "pace", "(:speed pace) pace"),
+        ("(defmacro twice (@x) `(list ,x x))", "y", "y y"),
+        ("(define-resource arm) (with-resource (@arm) 1)", "leg", "leg leg"),
+    ] {
+        assert_eq!(rename(text, new), expected, "{text}");
+    }
+    // Larger and larger parts of a text.
+    let path = folder.join("select.esl");
+    editor.open(&path, "(when a\n  (go 5))\n");
+    let asked =
+        json!({ "textDocument": { "uri": uri(&path) }, "positions": [{ "line": 1, "character": 6 }] });
+    let mut part = &editor.ask("textDocument/selectionRange", asked)[0];
+    let mut starts = Vec::new();
+    while part["range"].is_object() {
+        starts.push((part["range"]["start"]["line"].clone(), part["range"]["start"]["character"].clone()));
+        part = &part["parent"];
+    }
+    let expected =
+        [(1, 6), (1, 3), (1, 2), (0, 1), (0, 0), (0, 0)].map(|(line, column)| (json!(line), json!(column)));
+    assert_eq!(starts, expected);
+    editor.end();
+}
