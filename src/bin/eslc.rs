@@ -1,7 +1,7 @@
 //! `eslc`: compiles and checks ESL programs, and shows their expansion and bytecode.
 #![forbid(unsafe_code)]
 
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -33,6 +33,9 @@ struct Style {
     /// Use of colour in diagnostics
     #[arg(long, value_enum, default_value_t = Color::Auto, global = true)]
     color: Color,
+    /// Do not say at a terminal that compiling takes long
+    #[arg(long, short, global = true)]
+    quiet: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -45,7 +48,7 @@ enum Messages {
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Color {
-    /// Coloured if standard error is a terminal
+    /// Coloured if standard error is a terminal and `NO_COLOR` is not set
     Auto,
     /// Always coloured
     Always,
@@ -147,14 +150,17 @@ fn read(files: &[PathBuf]) -> Result<Vec<Source>, u8> {
 
 /// Compiles sources and prints the diagnostics. Returns the program, if there was no error.
 fn compiled(sources: &[Source], path: &ModulePath, modules: Modules, style: &Style) -> Result<Compiled, u8> {
-    let compiled = program::compile_with(sources, path, modules);
+    let names: Vec<&str> = sources.iter().map(|source| &*source.name).collect();
+    let line = || format!("compiling {}", names.join(", "));
+    let compiled =
+        command::StatusLine::new(style.quiet).during(line, || program::compile_with(sources, path, modules));
     print_diagnostics(&compiled, style);
     if compiled.has_errors() { Err(NOT_COMPILED) } else { Ok(compiled) }
 }
 
 fn print_diagnostics(compiled: &Compiled, style: &Style) {
     let color = match style.color {
-        Color::Auto => std::io::stderr().is_terminal(),
+        Color::Auto => command::wants_color(),
         Color::Always => true,
         Color::Never => false,
     };

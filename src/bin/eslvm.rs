@@ -2,7 +2,6 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stderr, reason = "commands print")]
 
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -15,7 +14,7 @@ use esl::host::{Host, ProcessSignal, RealHost, RecordingHost};
 use esl::module_path::ModulePath;
 use esl::operate::OperateOptions;
 use esl::profile::{INTERVAL, Profile};
-use esl::program::{self, Ended, Modules, Program, Summary};
+use esl::program::{self, Compiled, Ended, Modules, Program, Summary};
 use esl::replay::{self, FileRecorder, ReplayOptions, RunSetup};
 use esl::testing;
 use esl::timeline::Timeline;
@@ -36,6 +35,9 @@ struct Eslvm {
     /// ESL_LIBRARY
     #[arg(long, value_name = "FOLDER", global = true)]
     library: Vec<PathBuf>,
+    /// Do not say at a terminal how far a long compilation, test or exploration is
+    #[arg(long, short, global = true)]
+    quiet: bool,
 }
 
 #[derive(Subcommand)]
@@ -331,7 +333,7 @@ fn main() -> ExitCode {
     #[cfg(unix)]
     raise_limit_of_descriptors();
     esl_vm::allocator::return_large_blocks();
-    let Eslvm { action, library } = Eslvm::parse();
+    let Eslvm { action, library, quiet: is_quiet } = Eslvm::parse();
     let status = match action {
         EslvmAction::Run {
             mut options,
@@ -365,6 +367,7 @@ fn main() -> ExitCode {
                     record: record.as_deref(),
                     trace: &trace,
                     operate: &operate,
+                    is_quiet,
                 };
                 run(&file, host, &options, &reports, schedule.as_ref(), &path)
             })
@@ -378,13 +381,13 @@ fn main() -> ExitCode {
                 testing::run(
                     &sources,
                     &library,
-                    &testing::Options { filter, jobs, seed, junit, coverage, config, rights },
+                    &testing::Options { filter, jobs, seed, junit, coverage, config, rights, is_quiet },
                 )
             })
         }
         EslvmAction::Completions { shell } => Ok(command::print_completions(shell, Eslvm::command())),
         EslvmAction::Man { folder } => Ok(command::write_man_pages(Eslvm::command(), folder.as_deref())),
-        EslvmAction::Explore { options, file } => run_explore(&file, &options, &library),
+        EslvmAction::Explore { options, file } => run_explore(&file, &options, &library, is_quiet),
         EslvmAction::Attach { secret_file, address } => esl::repl::attach(&address, secret_file.as_deref()),
         EslvmAction::Repl { options } => options.rights.rights().and_then(|rights| {
             let path = ModulePath::new([Path::new("-")], &library);
@@ -412,6 +415,7 @@ fn program(
     path: &ModulePath,
     options: &MachineOptions,
     is_covered: bool,
+    is_quiet: bool,
     signals: &SignalTarget,
 ) -> Result<(Program, Option<Coverage>), u8> {
     let source = match command::read_program(file)? {
@@ -421,7 +425,8 @@ fn program(
     };
     let mut watch = |inbox| signals.set(inbox);
     let config = options.config();
-    let compiled = program::compile_for_run(&[source], path, is_covered, &config, &mut watch);
+    let compile = || program::compile_for_run(&[source], path, is_covered, &config, &mut watch);
+    let compiled = compiling(file, is_quiet, compile);
     if let Some(ended) = compiled.stopped {
         match ended {
             Ended::BudgetSpent => complain("compiling the program takes more than the budget"),
@@ -433,17 +438,27 @@ fn program(
         }
         return Err(command::exit_status(ended));
     }
-    let color = std::io::stderr().is_terminal();
+    let color = command::wants_color();
     command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
     let coverage = is_covered.then(|| Coverage::new(&compiled));
     Ok((compiled.program.ok_or(NOT_COMPILED)?, coverage))
+}
+
+/// Compiles a program, and says at a terminal that it takes long, if it does.
+fn compiling(file: &Path, is_quiet: bool, compile: impl FnOnce() -> Compiled) -> Compiled {
+    command::StatusLine::new(is_quiet).during(|| format!("compiling {}", file.display()), compile)
 }
 
 /// Explores the schedules of a program. Returns the exit status.
 ///
 /// # Errors
 /// The exit status, after a message.
-fn run_explore(file: &Path, options: &ExploreArguments, library: &[PathBuf]) -> Result<u8, u8> {
+fn run_explore(
+    file: &Path,
+    options: &ExploreArguments,
+    library: &[PathBuf],
+    is_quiet: bool,
+) -> Result<u8, u8> {
     if let Some(timeline) = &options.timeline {
         command::refuse_overwriting(timeline, [file])?;
     }
@@ -451,8 +466,9 @@ fn run_explore(file: &Path, options: &ExploreArguments, library: &[PathBuf]) -> 
     let program = match command::read_program(file)? {
         ProgramFile::Compiled(program) => program,
         ProgramFile::Source(source) => {
-            let compiled = program::compile_with(&[source], &path, Modules::Inside);
-            let color = std::io::stderr().is_terminal();
+            let compile = || program::compile_with(&[source], &path, Modules::Inside);
+            let compiled = compiling(file, is_quiet, compile);
+            let color = command::wants_color();
             command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
             compiled.program.ok_or(NOT_COMPILED)?
         }
@@ -476,7 +492,12 @@ fn run_explore(file: &Path, options: &ExploreArguments, library: &[PathBuf]) -> 
     };
     let time = std::time::Duration::from_secs(u64::from(options.time));
     let (timeline, json) = (options.timeline.clone(), options.json);
-    Ok(explore::run(&program, file, &path, &explore::ExplorationOptions { settings, time, timeline, json }))
+    Ok(explore::run(
+        &program,
+        file,
+        &path,
+        &explore::ExplorationOptions { settings, time, timeline, json, is_quiet },
+    ))
 }
 
 /// What is to be seen of a run.
@@ -489,6 +510,7 @@ struct RunReports<'a> {
     coverage: Option<&'a Path>,
     trace: &'a [String],
     operate: &'a OperateOptions,
+    is_quiet: bool,
 }
 
 fn run(
@@ -499,14 +521,14 @@ fn run(
     schedule: Option<&Schedule>,
     path: &ModulePath,
 ) -> Result<u8, u8> {
-    let RunReports { stats, tier, timeline, profile, coverage, record, trace, operate } = *reports;
+    let RunReports { stats, tier, timeline, profile, coverage, record, trace, operate, is_quiet } = *reports;
     for output in [timeline, profile, coverage, record].into_iter().flatten() {
         command::refuse_overwriting(output, [file])?;
     }
     let signals = SignalTarget::default();
     command::end_on_signal(signals.clone());
     let is_covered = coverage.is_some() || stats == Some(Stats::Coverage);
-    let (program, mut covered) = program(file, path, options, is_covered, &signals)?;
+    let (program, mut covered) = program(file, path, options, is_covered, is_quiet, &signals)?;
     let setup = |error| {
         complain(error);
         USAGE

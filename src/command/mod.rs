@@ -18,6 +18,8 @@ mod shell;
 #[cfg(feature = "cli")]
 mod signal;
 mod size;
+#[cfg(feature = "cli")]
+mod status_line;
 
 use std::path::Path;
 
@@ -34,6 +36,8 @@ pub use shell::{print_completions, write_man_pages};
 #[cfg(feature = "cli")]
 pub use signal::{Interrupts, SignalTarget, end_on_signal, interrupt_on_signal};
 pub use size::{SizeError, parse_size, parse_stack};
+#[cfg(feature = "cli")]
+pub use status_line::{StatusLine, wants_color};
 
 /// Exit status of success.
 pub const SUCCESS: u8 = 0;

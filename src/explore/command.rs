@@ -2,8 +2,8 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "commands print")]
 
 use std::collections::HashMap;
-use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use esl_vm::vm::Vm;
@@ -13,7 +13,7 @@ use super::{
     Behaviour, Exploration, Grain, Schedule, SearchLimit, SearchProgress, Settings, StandingTask, Switch,
     TimerGrain, explore_while, tell_switches,
 };
-use crate::command::{self, FAILED, NOT_PROVED, SUCCESS, USAGE, complain};
+use crate::command::{self, FAILED, NOT_PROVED, SUCCESS, StatusLine, USAGE, complain};
 use crate::error::Error;
 use crate::module_path::ModulePath;
 use crate::program::{Ended, Program};
@@ -30,6 +30,8 @@ pub struct ExplorationOptions {
     pub timeline: Option<PathBuf>,
     /// Whether findings are written as JSON, one object a line.
     pub json: bool,
+    /// Whether a terminal is not to be told how far the search is.
+    pub is_quiet: bool,
 }
 
 /// A way in which the program ends badly.
@@ -71,12 +73,19 @@ impl PlaceTexts {
 pub fn run(program: &Program, file: &Path, path: &ModulePath, options: &ExplorationOptions) -> u8 {
     let prepare = |machine: &mut Vm| crate::program::set_module_path(machine, path);
     let started = Instant::now();
-    let mut status_line = StatusLine::new(started);
-    let found = explore_while(program, &options.settings, &prepare, |progress| {
-        status_line.show(progress);
-        started.elapsed() < options.time
-    });
-    status_line.clear();
+    let status_line = StatusLine::new(options.is_quiet);
+    let line = Mutex::new(String::from("exploring"));
+    let search = || {
+        let mut told = started;
+        explore_while(program, &options.settings, &prepare, |progress| {
+            if told.elapsed() > Duration::from_millis(100) {
+                told = Instant::now();
+                *line.lock().unwrap_or_else(PoisonError::into_inner) = progress_line(progress, started);
+            }
+            started.elapsed() < options.time
+        })
+    };
+    let found = status_line.during(|| line.lock().unwrap_or_else(PoisonError::into_inner).clone(), search);
     let found = match found {
         Ok(found) => found,
         Err(error) => {
@@ -260,39 +269,13 @@ fn print_summary(found: &Exploration<Behaviour>, settings: &Settings, findings: 
     );
 }
 
-/// A line at the terminal that says how far the search has come.
-struct StatusLine {
-    started: Instant,
-    shown: Option<Instant>,
-}
-
-impl StatusLine {
-    fn new(started: Instant) -> StatusLine {
-        StatusLine { started, shown: None }
-    }
-
-    /// Shows the progress, once a second, at a terminal.
-    fn show(&mut self, progress: &SearchProgress) {
-        let since = self.shown.unwrap_or(self.started).elapsed();
-        if since < Duration::from_secs(1) || !std::io::stderr().is_terminal() {
-            return;
-        }
-        let SearchProgress { states, open, switches, endings, .. } = *progress;
-        let rate = states as f64 / self.started.elapsed().as_secs_f64();
-        eprint!(
-            "\r\x1b[K{states} states, {rate:.0} a second; {open} choices open, {switches} switches, \
-             {endings} endings"
-        );
-        // A terminal that does not take the line is no reason to stop.
-        _ = std::io::stderr().flush();
-        self.shown = Some(Instant::now());
-    }
-
-    fn clear(&self) {
-        if self.shown.is_some() {
-            eprint!("\r\x1b[K");
-        }
-    }
+/// Says how far a search is that began at `started`.
+fn progress_line(progress: &SearchProgress, started: Instant) -> String {
+    let SearchProgress { states, open, switches, endings, .. } = *progress;
+    let rate = states as f64 / started.elapsed().as_secs_f64();
+    format!(
+        "{states} states, {rate:.0} a second; {open} choices open, {switches} switches, {endings} endings"
+    )
 }
 
 /// Reads a schedule from a file.

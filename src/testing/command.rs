@@ -12,7 +12,7 @@ use esl_vm::host::Rights;
 use esl_vm::vm::Config;
 
 use super::{Setup, Test, Verdict, junit, list, run_test};
-use crate::command::{self, FAILED, NOT_COMPILED, ProgramFile, SUCCESS, USAGE, complain};
+use crate::command::{self, FAILED, NOT_COMPILED, ProgramFile, SUCCESS, StatusLine, USAGE, complain};
 use crate::coverage::{Coverage, CoverageReport, refuse_compiled};
 use crate::module_path::ModulePath;
 use crate::program::{self, Modules, Program};
@@ -34,6 +34,8 @@ pub struct Options {
     pub config: Config,
     /// What of the outside a test may reach.
     pub rights: Rights,
+    /// Whether a terminal is not to be told how far the tests are.
+    pub is_quiet: bool,
 }
 
 /// A file with tests.
@@ -96,17 +98,22 @@ pub fn run(files: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
     let next = AtomicUsize::new(0);
     // Number of the first test that was not told of.
     let told = Mutex::new(0);
-    std::thread::scope(|scope| {
-        for _ in 0..options.jobs.clamp(1, runs.len().max(1)) {
-            scope.spawn(|| {
-                while let Some(run) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let finished = finish(run, options);
-                    *run.result.lock().unwrap_or_else(PoisonError::into_inner) = Some(finished);
-                    tell(&runs, &mut told.lock().unwrap_or_else(PoisonError::into_inner), options);
-                }
-            });
-        }
-    });
+    let status_line = StatusLine::new(options.is_quiet);
+    let run_all = || {
+        std::thread::scope(|scope| {
+            for _ in 0..options.jobs.clamp(1, runs.len().max(1)) {
+                scope.spawn(|| {
+                    while let Some(run) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        let finished = finish(run, options);
+                        *run.result.lock().unwrap_or_else(PoisonError::into_inner) = Some(finished);
+                        let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
+                        status_line.beneath(|| tell(&runs, &mut told, options));
+                    }
+                });
+            }
+        });
+    };
+    status_line.during(|| progress(&runs), run_all);
     let failed = runs.iter().filter(|run| has_failed(run)).count();
     println!("{} passed, {failed} failed", runs.len() - failed);
     if let Some(path) = &options.junit
@@ -129,6 +136,14 @@ pub fn run(files: &[PathBuf], library: &[PathBuf], options: &Options) -> u8 {
     if failed > 0 { FAILED } else { SUCCESS }
 }
 
+/// Says how many of the tests have ended, and which one goes on.
+fn progress(runs: &[Run<'_>]) -> String {
+    let has_ended = |run: &Run<'_>| run.result.lock().unwrap_or_else(PoisonError::into_inner).is_some();
+    let ended = runs.iter().filter(|run| has_ended(run)).count();
+    let first = runs.iter().find(|run| !has_ended(run)).map_or("", |run| &run.test.name);
+    format!("{ended} of {} tests; {first}", runs.len())
+}
+
 /// Reads and compiles a file.
 ///
 /// # Errors
@@ -140,11 +155,13 @@ fn suite<'a>(file: &'a Path, library: &[PathBuf], options: &Options) -> Result<S
         ProgramFile::Compiled(_) if options.coverage.is_some() => return Err(refuse_compiled(file)),
         ProgramFile::Compiled(program) => program,
         ProgramFile::Source(source) => {
-            let compiled = match &options.coverage {
+            let compile = || match &options.coverage {
                 Some(_) => program::compile_covered(&[source], &path),
                 None => program::compile_with(&[source], &path, Modules::Inside),
             };
-            let color = std::io::IsTerminal::is_terminal(&std::io::stderr());
+            let line = || format!("compiling {}", file.display());
+            let compiled = StatusLine::new(options.is_quiet).during(line, compile);
+            let color = command::wants_color();
             command::print_diagnostics(&compiled, &Renderer { color, format: Format::Human });
             coverage = options.coverage.is_some().then(|| Arc::new(Mutex::new(Coverage::new(&compiled))));
             compiled.program.ok_or(NOT_COMPILED)?
