@@ -24,24 +24,34 @@
         return undefined;
     }
 
-    function paint(code) {
+    // Colours the text of an element, and underlines the ranges `marks`: `{ start, end, kind }` each.
+    function paint(code, marks = []) {
         const text = code.textContent;
         code.textContent = "";
+        const bounds = marks.flatMap(({ start, end }) => [start, end]).sort((one, other) => one - other);
         let end = 0;
-        for (const match of text.matchAll(tokens)) {
-            code.append(text.slice(end, match.index));
-            end = match.index + match[0].length;
-            const kind = classOf(match, text, match.index);
-            if (kind === undefined) {
-                code.append(match[0]);
-            } else {
-                const span = document.createElement("span");
-                span.className = kind;
-                span.textContent = match[0];
-                code.append(span);
+        function append(until, colour) {
+            while (end < until) {
+                const stop = Math.min(until, bounds.find((bound) => bound > end) ?? until);
+                const mark = marks.find((mark) => mark.start <= end && end < mark.end);
+                const classes = [colour, mark && `mark-${mark.kind}`].filter(Boolean).join(" ");
+                const piece = text.slice(end, stop);
+                if (classes === "") {
+                    code.append(piece);
+                } else {
+                    const span = document.createElement("span");
+                    span.className = classes;
+                    span.textContent = piece;
+                    code.append(span);
+                }
+                end = stop;
             }
         }
-        code.append(text.slice(end));
+        for (const match of text.matchAll(tokens)) {
+            append(match.index, undefined);
+            append(match.index + match[0].length, classOf(match, text, match.index));
+        }
+        append(text.length, undefined);
         code.classList.add("hljs");
     }
 
@@ -57,6 +67,7 @@
         code.classList.add("hljs");
     }
 
-    document.querySelectorAll("code.language-lisp").forEach(paint);
+    window.paintEsl = paint;
+    document.querySelectorAll("code.language-lisp").forEach((code) => paint(code));
     document.querySelectorAll("code.language-console, code.language-repl").forEach(paintCommands);
 })();

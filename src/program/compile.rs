@@ -6,7 +6,7 @@ use esl_bytecode::span::Span;
 use esl_compiler::cover::CountedPlace;
 use esl_compiler::diagnostic::{Sources, code};
 use esl_compiler::session::{Compiler, Texts};
-use esl_vm::host::{Inbox, ProcessSignal, RealHost, Rights};
+use esl_vm::host::{Host, Inbox, ProcessSignal, RealHost, Rights};
 use esl_vm::vm::{Config, Vm};
 
 use super::{Ended, Program, Source, machine, set_module_path};
@@ -79,7 +79,20 @@ fn compile_in(
         compiler = compiler.apart();
     }
     let texts: Vec<(&str, &str)> = sources.iter().map(|source| (&*source.name, &*source.text)).collect();
-    compile_texts(&mut compiler.compile_texts(&texts), path, config, watch)
+    compile_texts(&mut compiler.compile_texts(&texts), path, compile_time_machine(path, config), watch)
+}
+
+/// Compiles sources as [`compile`] does, where macros run on the embedder's host and within the limits of
+/// `config`: for embedders without a system around them.
+pub fn compile_on(sources: &[Source], config: Config, host: Box<dyn Host + Send>) -> Compiled {
+    let texts: Vec<(&str, &str)> = sources.iter().map(|source| (&*source.name, &*source.text)).collect();
+    let compiler = Compiler::default();
+    compile_texts(
+        &mut compiler.compile_texts(&texts),
+        &ModulePath::none(),
+        machine(config, host),
+        &mut |_| {},
+    )
 }
 
 /// Least limit of memory for a compilation, in bytes: the compiler and the library take that much.
@@ -111,19 +124,20 @@ pub fn compile_for_run(
 /// requires are left out.
 pub fn expand(source: &Source, path: &ModulePath) -> (String, Compiled) {
     let mut expansion = Compiler::default().apart().expand_text(&source.name, &source.text);
-    let compiled = compile_texts(&mut expansion, path, Config::DEFAULT, &mut |_| {});
+    let machine = compile_time_machine(path, Config::DEFAULT);
+    let compiled = compile_texts(&mut expansion, path, machine, &mut |_| {});
     (expansion.expansion().to_string(), Compiled { program: None, ..compiled })
 }
 
 fn compile_texts(
     texts: &mut Texts,
     path: &ModulePath,
-    config: Config,
+    machine: Result<Vm, Error>,
     watch: &mut dyn FnMut(Inbox),
 ) -> Compiled {
     let mut find = |name: &str| path.find(name).map_err(|error| error.to_string());
     let (mut stopped, mut passages) = (None, Vec::new());
-    let (module, diagnostics) = match compile_time_machine(path, config) {
+    let (module, diagnostics) = match machine {
         Ok(mut machine) => {
             watch(machine.inbox());
             machine.count_passages();

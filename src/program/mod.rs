@@ -29,11 +29,13 @@ use esl_bytecode::verify::verify;
 use esl_bytecode::{disasm, file};
 use esl_vm::load::LoadError;
 
-pub use compile::{Compiled, Modules, compile, compile_covered, compile_for_run, compile_with, expand};
+pub use compile::{
+    Compiled, Modules, compile, compile_covered, compile_for_run, compile_on, compile_with, expand,
+};
 pub use identity::{EXECUTION_EPOCH, ExecutionIdentity};
 pub(crate) use run::end;
 pub use run::{
-    Ended, Summary, begin, machine, run, run_by, run_in, run_in_portions, set_module_path, set_traces,
+    Ended, Summary, begin, finish, machine, run, run_by, run_in, run_in_portions, set_module_path, set_traces,
 };
 pub(crate) use run::{begin_with, end_rest, load, set_module_folders};
 

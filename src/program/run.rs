@@ -211,10 +211,17 @@ fn run_as(
 ) -> Result<Summary, Error> {
     let main = begin(machine, program)?;
     let outcome = turns(machine);
+    Ok(finish(machine, main, outcome))
+}
+
+/// Ends a run that [`begin`] has begun, when the machine has come back from running it with any outcome but
+/// [`RunOutcome::TicksUsed`]: reports what is to be reported, aborts the tasks that are left, and runs their
+/// cleanups.
+pub fn finish(machine: &mut Vm, main: TaskId, outcome: RunOutcome) -> Summary {
     let ended = end(machine, main, outcome);
     end_rest(machine);
     let (tasks, turns, switches) = machine.tasks_turns_and_switches();
-    Ok(Summary { ended, ticks: machine.ticks(), tasks, turns, switches, heap: machine.heap_stats() })
+    Summary { ended, ticks: machine.ticks(), tasks, turns, switches, heap: machine.heap_stats() }
 }
 
 /// Aborts the tasks that are left at the end of a run, runs their cleanups, and says what does not end.

@@ -1,5 +1,4 @@
-//! The page of the monitor in a browser: Chromium, driven by its
-//! own protocol over pipes. Left out without it.
+//! A browser: Chromium, driven by its own protocol over pipes. The page of the monitor in it. Left out without it.
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
@@ -11,14 +10,14 @@ use crate::operate::{Operated, until};
 use crate::say_left_out;
 
 /// A browser with one page.
-struct Browser {
+pub(crate) struct Browser {
     child: Child,
     to: ChildStdin,
     from: BufReader<ChildStdout>,
     asked: u64,
     page: String,
     /// What went wrong in the page.
-    complaints: Vec<Value>,
+    pub(crate) complaints: Vec<Value>,
 }
 
 impl Drop for Browser {
@@ -30,7 +29,7 @@ impl Drop for Browser {
 
 impl Browser {
     /// Starts the browser; `None` if there is none.
-    fn start(folder: &Folder) -> Option<Browser> {
+    pub(crate) fn start(folder: &Folder) -> Option<Browser> {
         Command::new("chromium")
             .arg("--version")
             .stdout(Stdio::null())
@@ -65,7 +64,7 @@ impl Browser {
     }
 
     /// Asks the page something, or the browser while there is no page.
-    fn ask(&mut self, method: &str, parameters: Value) -> Value {
+    pub(crate) fn ask(&mut self, method: &str, parameters: Value) -> Value {
         self.asked += 1;
         let mut question = json!({ "id": self.asked, "method": method, "params": parameters });
         if !self.page.is_empty() {
@@ -88,13 +87,13 @@ impl Browser {
     }
 
     /// Returns the value of a script in the page.
-    fn value(&mut self, script: &str) -> Value {
+    pub(crate) fn value(&mut self, script: &str) -> Value {
         let parameters = json!({ "expression": script, "returnByValue": true });
         self.ask("Runtime.evaluate", parameters)["result"]["value"].clone()
     }
 
     /// Waits until a script has the value true.
-    fn until(&mut self, script: &str) {
+    pub(crate) fn until(&mut self, script: &str) {
         until(script, || self.value(script) == true);
     }
 

@@ -26,6 +26,8 @@ mod monitor;
 #[cfg(unix)]
 mod mqtt;
 mod operate;
+#[cfg(unix)]
+mod playground;
 mod profile;
 mod real_time;
 mod recording;

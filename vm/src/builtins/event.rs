@@ -372,13 +372,13 @@ pub(super) fn deadline(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 }
 
 pub(super) fn sleep_until(vm: &mut Vm, arguments: &[Value]) -> Outcome {
-    let Some(deadline) = arguments[0].as_index() else {
+    let Some(deadline) = arguments[0].as_fixnum().and_then(|time| u64::try_from(time).ok()) else {
         return vm.exchange.type_error(arguments[0], "UNSIGNED-BYTE");
     };
-    if time_of_task(vm) >= deadline as u64 {
+    if time_of_task(vm) >= deadline {
         Ok(Value::NIL)
     } else {
-        let time = vm.scheduler.task().when(deadline as u64);
+        let time = vm.scheduler.task().when(deadline);
         vm.scheduler.park_at(Value::NIL, Some(time))
     }
 }

@@ -123,7 +123,7 @@ pub(super) fn task_ticks(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let task = expect_task(vm, arguments[0])?;
     let Some(index) = event::task_index(&vm.heap, task) else { return Ok(Value::NIL) };
     let ticks = vm.scheduler.find(index).map_or(0, |task| task.ticks);
-    Ok(Value::index(ticks as usize))
+    Ok(Value::fixnum(ticks as i64).unwrap_or(Value::NIL))
 }
 
 pub(super) fn task_end(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -19,6 +19,8 @@ pub struct Captured(Arc<Mutex<Contents>>);
 struct Contents {
     output: CopyOnWrite<Vec<u8>>,
     error: CopyOnWrite<Vec<u8>>,
+    /// Order of what was written to the two: to which, and how many bytes.
+    order: CopyOnWrite<Vec<(Output, usize)>>,
     files: CopyOnWrite<BTreeMap<String, Vec<u8>>>,
 }
 
@@ -47,8 +49,36 @@ impl Captured {
         String::from_utf8_lossy(&self.contents().error).into_owned()
     }
 
+    /// Returns what was written to both streams behind the first so many bytes, in the order of writing.
+    pub fn pieces_after(&self, bytes: usize) -> Vec<(Output, Vec<u8>)> {
+        let contents = self.contents();
+        let (mut seen, mut standard, mut error) = (0, 0, 0);
+        let mut pieces = Vec::new();
+        for &(output, length) in contents.order.iter() {
+            let (text, at) = match output {
+                Output::Standard => (&contents.output, &mut standard),
+                Output::Error => (&contents.error, &mut error),
+            };
+            let skipped = bytes.saturating_sub(seen).min(length);
+            if skipped < length {
+                pieces.push((output, text[*at + skipped..*at + length].to_vec()));
+            }
+            seen += length;
+            *at += length;
+        }
+        pieces
+    }
+
     pub(super) fn append(&self, output: Output, bytes: &[u8]) {
         let mut contents = self.contents();
+        match contents.order.last().copied() {
+            Some((last, _)) if last == output => {
+                if let Some((_, length)) = contents.order.last_mut() {
+                    *length += bytes.len();
+                }
+            }
+            _ => contents.order.push((output, bytes.len())),
+        }
         match output {
             Output::Standard => contents.output.extend_from_slice(bytes),
             Output::Error => contents.error.extend_from_slice(bytes),
@@ -357,6 +387,23 @@ mod tests {
         assert_eq!(host.write(Output::Standard, b"xy"), Ok(()));
         assert_eq!(host.write(Output::Standard, b"z!"), Err(HostError::BrokenPipe));
         assert_eq!(captured.output(), "xyz");
+    }
+
+    #[test]
+    fn what_was_written_is_known_in_its_order() {
+        let mut host = VirtualHost::new();
+        let captured = host.captured();
+        for (output, text) in [(Output::Standard, "ab"), (Output::Error, "!"), (Output::Standard, "c")] {
+            host.write(output, text.as_bytes()).expect("there is room");
+            host.write(output, b".").expect("there is room");
+        }
+        let after = |bytes| {
+            let pieces = captured.pieces_after(bytes).into_iter();
+            pieces.map(|(_, bytes)| String::from_utf8(bytes).expect("it is text")).collect::<Vec<_>>()
+        };
+        assert_eq!(after(0), ["ab.", "!.", "c."]);
+        assert_eq!(after(4), [".", "c."]);
+        assert!(after(7).is_empty());
     }
 
     #[test]

@@ -398,13 +398,13 @@ unsafe fn dispatch(vm: &mut Vm) -> Signal {
             }
             // Keeps the ends of arms apart. The code generator would make one end of those that are alike,
             // which costs a jump per instruction; it cannot with a line of assembly that differs, though
-            // nothing is in it.
+            // nothing is in it. WebAssembly has no lines of assembly, and no jumps that could be saved.
             macro_rules! apart {
                 () => {
                     apart!(0)
                 };
                 ($which:literal) => {
-                    #[cfg(not(miri))]
+                    #[cfg(not(any(miri, target_family = "wasm")))]
                     std::arch::asm!(
                         "/* {} {} */", const line!(), const $which, options(nomem, nostack, preserves_flags)
                     );
