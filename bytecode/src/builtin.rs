@@ -1348,7 +1348,8 @@ macro_rules! for_each_builtin {
             Now = outside::now, esl "NOW" ("");
             /// Microseconds on the machine's clock, which never goes back.
             InternalRealTime = outside::internal_real_time, cl "GET-INTERNAL-REAL-TIME" ("");
-            /// Microseconds for which processors have worked for the process; under a virtual clock, in which tasks ran.
+            /// Microseconds for which processors have worked for the process; under a virtual clock, in which
+            /// tasks ran.
             InternalRunTime = outside::internal_run_time, cl "GET-INTERNAL-RUN-TIME" ("");
             /// Seconds since the beginning of 1900, UTC.
             UniversalTime = outside::universal_time, cl "GET-UNIVERSAL-TIME" ("");
@@ -1384,8 +1385,8 @@ macro_rules! for_each_builtin {
             /// Waits for the next signal of one of `events` and returns its arguments; returns at once if
             /// `count` is not `NIL` and no longer the sum of their counts. `what` is for reports.
             Wait = event::wait, internal "%WAIT" ("events count what");
-            /// Signals `event` and begins to wait for its next signal, in one step; returns at once if `count`
-            /// is no longer its count. `what` is for reports.
+            /// Signals `event` and begins to wait for its next signal, in one step; returns at once if
+            /// `count` is no longer its count. `what` is for reports.
             SignalAndWait = event::signal_and_wait, internal "%SIGNAL-AND-WAIT" ("event count what");
             /// A wait that keeps all signals of `events` until it is closed, and lasts for `seconds` if they
             /// are not `NIL`; `NIL` if `count` is not `NIL` and no longer the sum of their counts.

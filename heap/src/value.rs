@@ -173,7 +173,8 @@ impl Value {
         if self.is_fixnum() { Some(self.0 as i64 >> 2) } else { None }
     }
 
-    /// Returns the integer, if this is a fixnum that is not negative, and no more than an address has bits for.
+    /// Returns the integer, if this is a fixnum that is not negative, and no more than an address has bits
+    /// for.
     #[inline(always)]
     pub const fn as_index(self) -> Option<usize> {
         let is_index = self.is_fixnum() && self.0 as i64 >= 0 && self.0 >> 2 <= usize::MAX as u64;

@@ -53,8 +53,8 @@ pub fn read_program(path: &Path) -> Result<ProgramFile, u8> {
     })
 }
 
-/// Refuses to write to a file that is one of `inputs`, by whatever path, and to any other that is there and has
-/// the name of a source: nobody wants that lost for an output.
+/// Refuses to write to a file that is one of `inputs`, by whatever path, and to any other that is there and
+/// has the name of a source: nobody wants that lost for an output.
 ///
 /// # Errors
 /// The exit status, after a message.

@@ -80,7 +80,8 @@ pub fn complain(text: impl std::fmt::Display) {
     eprintln!("{}: {text}", command_name());
 }
 
-/// Errors, and warnings, that are shown to people. To find the place of one takes time with the length of its line.
+/// Errors, and warnings, that are shown to people. To find the place of one takes time with the length of its
+/// line.
 const SHOWN_DIAGNOSTICS: usize = 100;
 
 /// Prints the diagnostics of a compilation: for tools all; for people the first errors and warnings, and the

@@ -66,8 +66,8 @@ impl StatusLine {
     pub fn show(&self, line: &str) {
         let Some(screen) = &self.screen else { return };
         let (screen, is_shown) = &mut *screen.lock().unwrap_or_else(PoisonError::into_inner);
-        // A line that is too long would go on in the next one, which is not erased. What a terminal obeys is no
-        // part of it.
+        // A line that is too long would go on in the next one, which is not erased. What a terminal obeys is
+        // no part of it.
         let width = self.columns.saturating_sub(1);
         let line: String = line.chars().filter(|c| !c.is_control()).take(width).collect();
         // A terminal that does not take the line is no reason to stop.

@@ -92,22 +92,22 @@ fn edit(text: &OpenText, node: NodeId, binding: Option<LocalBinding>, new: &str)
     let old = &text.tree.source()[place.clone()];
     let written =
         match binding.filter(|binding| binding.name == node).and_then(|_| key_parameter(&text.tree, node)) {
-            Some(KeyParameter::Alone) => format!("((:{old} {new}))"),
-            Some(KeyParameter::WithDefault) => format!("(:{old} {new})"),
+            Some(WrittenKey::Alone) => format!("((:{old} {new}))"),
+            Some(WrittenKey::WithDefault) => format!("(:{old} {new})"),
             None => new.to_owned(),
         };
     TextEdit::new(text.range(place), written)
 }
 
 /// How a parameter after `&key` is written.
-enum KeyParameter {
+enum WrittenKey {
     /// `name`
     Alone,
     /// `(name default)`
     WithDefault,
 }
 
-fn key_parameter(tree: &SyntaxTree, name: NodeId) -> Option<KeyParameter> {
+fn key_parameter(tree: &SyntaxTree, name: NodeId) -> Option<WrittenKey> {
     let parent = tree.parent(name)?;
     let follows_key = |list: NodeId, item: NodeId| {
         let before = tree.data(list).take_while(|&other| other != item);
@@ -115,12 +115,12 @@ fn key_parameter(tree: &SyntaxTree, name: NodeId) -> Option<KeyParameter> {
         words.last().is_some_and(|word| word.eq_ignore_ascii_case("&key"))
     };
     if follows_key(parent, name) {
-        return Some(KeyParameter::Alone);
+        return Some(WrittenKey::Alone);
     }
     let list = tree.parent(parent)?;
     let is_first = tree.data(parent).next() == Some(name);
     (is_first && tree.kind(list) == SyntaxKind::List && follows_key(list, parent))
-        .then_some(KeyParameter::WithDefault)
+        .then_some(WrittenKey::WithDefault)
 }
 
 /// Refuses the name of another definition of the same sort, and for functions those of the language.

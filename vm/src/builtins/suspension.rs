@@ -20,9 +20,9 @@ fn index_argument(vm: &mut Vm, v: Value) -> Result<usize, Exit> {
     }
 }
 
-/// Returns the depth of the task `object`, at `place`, in the tree of the task `root`, which has depth 1; 0 if
-/// it is not of that tree. `depths` is a vector of those that are known, by the places of the tasks. Adds the
-/// number of steps to `work`.
+/// Returns the depth of the task `object`, at `place`, in the tree of the task `root`, which has depth 1; 0
+/// if it is not of that tree. `depths` is a vector of those that are known, by the places of the tasks. Adds
+/// the number of steps to `work`.
 fn depth_of(
     vm: &mut Vm,
     root: usize,
