@@ -61,6 +61,58 @@ fn client_and_server_talk() {
     assert!(done.errors.contains("GET /fail: A failure of cause :BROKEN."), "{}", done.errors);
 }
 
+/// Bodies in parts: what is sent from a stream, and what is handed over as it comes.
+#[test]
+fn bodies_come_and_go_in_parts() {
+    let text = "(require :http)
+(defvar *served* nil)
+(spawn (:name 'server :daemon t)
+  (http:with-server (0 :started (lambda (port) (setq *served* port)))
+    (:delete \"/a/:x\" (x) (format nil \"deleted ~a ~a\" x (= http:*port* *served*)))
+    (:patch \"/a\" () \"patched\")
+    (:post \"/echo\" () (http:request-body http:*request*))
+    (:get \"/long\" () (make-string 200000 :initial-element #\\ä))))
+(wait-until *served*)
+(defun url (path) (format nil \"http://127.0.0.1:~a~a\" *served* path))
+(print (http:delete (url \"/a/7\")))
+(print (http:request :patch (url \"/a\")))
+(print (http:post (url \"/echo\") :body (make-string-input-stream \"häl\")))
+(print (length (http:post (url \"/echo\") :body (make-string-input-stream (make-string 100000 :initial-element #\\ü)))))
+(with-open-file (s \"data\" :direction :output :element-type '(unsigned-byte 8)) (write-sequence #(104 195 164) s))
+(with-open-file (s \"data\" :element-type '(unsigned-byte 8)) (print (http:post (url \"/echo\") :body s)))
+(let ((length 0) (parts 0) (others 0))
+  (flet ((take (part)
+           (incf parts)
+           (incf length (length part))
+           (incf others (count #\\ä part :test-not #'eql))))
+    (print (subseq (multiple-value-list (http:get (url \"/long\") :each #'take)) 0 2))
+    (print (list length others (> parts 1)))))
+(let ((length 0))
+  (http:get (url \"/long\") :bytes t :each (lambda (part) (incf length (length part))))
+  (print length))
+(define-cause :enough ())
+(print (handler-case (http:get (url \"/long\") :each (lambda (part) (fail :enough part)))
+         (failure (f) (failure-cause f))))
+(print (block nil (http:get (url \"/long\") :each (lambda (part) (return (char part 0))))))";
+    let folder = Folder::with("http-parts", &[("main.esl", text)]);
+    let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "main.esl"]);
+    let output =
+        process::run(command.current_dir(folder.path()), "").quiet_output().expect("nothing is wrong");
+    let expected = [
+        "\"deleted 7 T\"",
+        "\"patched\"",
+        "\"häl\"",
+        "100000",
+        "\"hä\"",
+        "(NIL 200)",
+        "(200000 0 T)",
+        "400000",
+        ":ENOUGH",
+        "#\\ä",
+    ];
+    assert_eq!(lines(&output), expected);
+}
+
 /// Answers one request with a text, and returns the request.
 fn answer_once(answer: &'static [u8]) -> (u16, std::thread::JoinHandle<String>) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("there is a port");
