@@ -109,6 +109,81 @@ fn messages_go_through_a_broker() {
     assert_eq!(lines, expected);
 }
 
+/// Starts a peer that takes connections, and answers the first packet of each with `answer` and the second one
+/// with `next`; then it closes the connection, or says no more if it `stays`.
+fn start_peer(answer: &'static [u8], next: &'static [u8], stays: bool) -> u16 {
+    use std::io::{Read, Write};
+    let listener = TcpListener::bind("127.0.0.1:0").expect("there is a port");
+    let port = listener.local_addr().expect("it has an address").port();
+    std::thread::spawn(move || {
+        for mut stream in listener.incoming().flatten() {
+            std::thread::spawn(move || {
+                let mut bytes = [0; 1000];
+                for text in [answer, next] {
+                    if text.is_empty() && !stays {
+                        return;
+                    }
+                    // It may have gone.
+                    drop(stream.read(&mut bytes));
+                    drop(stream.write_all(text));
+                }
+                while stays && stream.read(&mut bytes).is_ok_and(|count| count > 0) {}
+            });
+        }
+    });
+    port
+}
+
+/// What a peer answers first and second, whether it stays, the seconds that opening a client and subscribing may
+/// take, and what comes of it.
+type PeerCase = (&'static [u8], &'static [u8], bool, (&'static str, &'static str), &'static str);
+
+/// What is no broker, and what is one for a while only, are failures with causes; nothing hangs.
+#[test]
+fn a_broker_may_send_anything_or_nothing() {
+    const WELCOME: &[u8] = b"\x20\x02\x00\x00";
+    // Only where nothing is ever answered is the time short.
+    let peers: [PeerCase; 10] = [
+        (b"", b"", false, ("60", "60"), "(:OPEN :MQTT-ERROR)"),
+        (b"\x20\x02", b"", false, ("60", "60"), "(:OPEN :MQTT-ERROR)"),
+        (b"\xff\xfe\x80\x80\x80\x80\x80", b"", true, ("60", "60"), "(:OPEN :MQTT-ERROR)"),
+        (b"HTTP/1.1 400 Bad Request\r\n\r\n", b"", false, ("60", "60"), "(:OPEN :MQTT-ERROR)"),
+        (b"\x20\x02\x00\x05", b"", true, ("60", "60"), "(:OPEN :MQTT-ERROR)"),
+        (b"", b"", true, ("1/5", "60"), "(:OPEN :TIMEOUT)"),
+        // Half a message, one that is too long, one whose topic is no text.
+        (WELCOME, b"\x30\x64\x00\x03a/b", false, ("60", "60"), "(:SUBSCRIBE :CONNECTION-LOST)"),
+        (WELCOME, b"\x30\xff\xff\xff\x7f\x00\x01a", true, ("60", "60"), "(:SUBSCRIBE :CONNECTION-LOST)"),
+        (WELCOME, b"\x30\x05\x00\x02\xff\xfex", true, ("60", "60"), "(:SUBSCRIBE :CONNECTION-LOST)"),
+        // The answer to another question.
+        (WELCOME, b"\x90\x03\x77\x77\x00", true, ("60", "1/5"), "(:SUBSCRIBE :TIMEOUT)"),
+    ];
+    let text = "(require :mqtt)
+(defvar *opened* nil)
+(defun try (port to-open to-subscribe)
+  (setq *opened* nil)
+  (handler-case
+      (with-timeout to-open
+        (mqtt:with-client (c \"127.0.0.1\" port)
+          (setq *opened* t)
+          (with-timeout to-subscribe (mqtt:subscribe c \"a\"))
+          (print 'subscribed)))
+    (failure (f) (print (list (if *opened* :subscribe :open) (failure-cause f))))))
+(loop for (port to-open to-subscribe) on (command-line-arguments) by #'cdddr
+      do (try (parse-integer port) (read-from-string to-open) (read-from-string to-subscribe)))";
+    let folder = Folder::with("mqtt-peers", &[("main.esl", text)]);
+    let mut arguments = vec!["run".to_string(), "--allow-net=127.0.0.1".into(), "main.esl".into()];
+    for (answer, next, stays, (to_open, to_subscribe), _) in peers {
+        let port = start_peer(answer, next, stays);
+        arguments.extend([port.to_string(), to_open.into(), to_subscribe.into()]);
+    }
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let run = process::run(eslvm(&arguments).current_dir(folder.path()), "");
+    let output = run.quiet_output().expect("nothing is wrong");
+    let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let expected: Vec<&str> = peers.iter().map(|&(.., expected)| expected).collect();
+    assert_eq!(lines, expected);
+}
+
 #[test]
 fn a_connection_that_is_lost_is_made_again() {
     let Some(program) = broker_program() else {

@@ -45,8 +45,11 @@ struct State {
     messages: VecDeque<Message>,
     /// What is subscribed to, for when the connection is made again.
     filters: HashMap<String, QoS>,
-    /// Who waits for the answers to subscriptions, in their order; nobody for one that is made again.
+    /// Who waits for the answers to subscriptions that have yet to be sent, in their order; nobody for one
+    /// that is made again.
     subscribing: VecDeque<Option<Subscribed>>,
+    /// Who waits for those to subscriptions that were sent, by the protocol's numbers.
+    asked: HashMap<u16, Option<Subscribed>>,
     /// Who waits for the acknowledgements of messages that have yet to be sent, in the order of the requests,
     /// with numbers of their own.
     publishing: VecDeque<(u64, oneshot::Sender<()>)>,
@@ -223,6 +226,7 @@ async fn open(arguments: CallArguments, clients: Clients) -> Completion {
         messages: VecDeque::new(),
         filters: HashMap::new(),
         subscribing: VecDeque::new(),
+        asked: HashMap::new(),
         publishing: VecDeque::new(),
         sent: HashMap::new(),
         problem: None,
@@ -363,6 +367,12 @@ impl Driver {
                         state.sent.insert(number, waiting);
                     }
                 }
+                Ok(Event::Outgoing(Outgoing::Subscribe(number))) => {
+                    let mut state = self.shared.state();
+                    if let Some(waiting) = state.subscribing.pop_front() {
+                        state.asked.insert(number, waiting);
+                    }
+                }
                 Ok(Event::Outgoing(_)) => {}
                 Err(error) => {
                     {
@@ -370,6 +380,7 @@ impl Driver {
                         state.problem = Some(error.to_string());
                         // Who waits for an answer hears that there will be none.
                         state.subscribing.clear();
+                        state.asked.clear();
                         state.publishing.clear();
                         state.sent.clear();
                     }
@@ -397,7 +408,7 @@ impl Driver {
             }
             Packet::SubAck(answer) => {
                 let is_granted = !answer.return_codes.contains(&SubscribeReasonCode::Failure);
-                if let Some(Some(waiting)) = state.subscribing.pop_front() {
+                if let Some(Some(waiting)) = state.asked.remove(&answer.pkid) {
                     // The call may have been left.
                     _ = waiting.send(is_granted);
                 }
