@@ -77,6 +77,30 @@ fn the_spacecraft_is_left_in_order_wherever_its_budget_ends() {
     }
 }
 
+/// A flight goes on beside a task that uses up all memory, whenever that is.
+#[test]
+fn the_spacecraft_survives_one_who_uses_up_the_memory() {
+    let flight = example("spacecraft/scripted.esl");
+    let library = flight.parent().expect("it is in a folder").to_owned();
+    let flight = std::fs::read_to_string(&flight).expect("it is there");
+    let folder = Folder::new("spacecraft-memory");
+    for seed in 1..=6 {
+        let greedy = format!(
+            "(spawn (:name 'greedy :daemon t)
+               (sleep {})
+               (let ((all nil)) (loop (push (make-array 100) all))))",
+            seed * 50
+        );
+        let program = folder.file("flight.esl", format!("{greedy}\n{flight}"));
+        let mut command =
+            eslvm(&["run", "--clock", "virtual", "--memory", "8M", "--seed", &seed.to_string()]);
+        let run = process::run(command.arg("--library").arg(&library).arg(program), "");
+        assert_eq!(run.status, Some(0), "seed {seed}: {}{}", run.output, run.errors);
+        assert!(run.output.ends_with("pointing at SUN, no rule broken\n"), "seed {seed}: {}", run.output);
+        assert!(run.errors.contains("In task GREEDY:\nThe memory is exhausted."), "{}", run.errors);
+    }
+}
+
 /// Starts a simulator, which prints its port, and returns it with its output and the port.
 pub(crate) fn start_simulator(
     command: &mut Command,

@@ -99,12 +99,16 @@ fn the_environment_needs_a_right() {
 #[test]
 fn two_tasks_talk_over_a_connection() {
     let text = "(require :sockets)
+(define-fluent *port* nil)
 (sockets:with-socket (listener (sockets:listen \"127.0.0.1\" 0))
   (spawn (:name 'echo)
     (sockets:with-socket (c (sockets:accept listener))
+      (print (equal (sockets:peer c) (format nil \"127.0.0.1:~d\" (wait-until *port*))))
       (loop for line = (read-line c nil nil)
             while line do (format c \"~a!~%\" line))))
   (sockets:with-socket (c (sockets:connect \"127.0.0.1\" (sockets:local-port listener)))
+    (setf *port* (sockets:local-port c))
+    (print (equal (sockets:peer c) (format nil \"127.0.0.1:~d\" (sockets:local-port listener))))
     (format c \"one~%twö~%\")
     (print (list (read-line c) (read-char c) (peek-char nil c) (read-line c)))
     (write-string (make-string 100000 :initial-element #\\x) c)
@@ -125,6 +129,8 @@ fn two_tasks_talk_over_a_connection() {
     (wait-for-task waiting)))
 (cause (sockets:connect \"localhost\" 1))";
     let expected = [
+        "T",
+        "T",
         "(\"one!\" #\\t #\\w \"wö!\")",
         "100001",
         "(T T T)",
