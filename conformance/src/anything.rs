@@ -3,6 +3,8 @@
 //!
 //! Runs have small limits of ticks and memory and a host without files, so every run ends soon.
 
+use std::cell::RefCell;
+use std::sync::{Mutex, Once, PoisonError};
 use std::time::{Duration, Instant};
 
 use esl::Config;
@@ -12,6 +14,7 @@ use esl::replay::{self, Recorded};
 use esl_bytecode::compile::{Compile, drive};
 use esl_bytecode::module::Module;
 use esl_bytecode::span::SourceId;
+use esl_bytecode::symbol::USER_PACKAGE;
 use esl_bytecode::{file, verify};
 use esl_compiler::diagnostic::{Renderer, Sources};
 use esl_compiler::session::Compiler;
@@ -23,11 +26,70 @@ const TICKS: u64 = 100_000;
 /// broken.
 const PATIENCE: Duration = Duration::from_secs(20);
 
+/// Number of inputs that one machine serves, one after the other, where speed matters.
+const SERVED: usize = 64;
+
+fn config() -> Config {
+    Config { memory: 24 << 20, stack: Some(1 << 13), budget: Some(3 * TICKS), ..Config::default() }
+}
+
 fn machine() -> Vm {
-    let config =
-        Config { memory: 24 << 20, stack: Some(1 << 13), budget: Some(3 * TICKS), ..Config::default() };
     let host = VirtualHost::new().with_output_limit(1 << 20).with_rights(Rights::none());
-    program::machine(config, Box::new(host)).expect("there is room for the library")
+    program::machine(config(), Box::new(host)).expect("there is room for the library")
+}
+
+thread_local! {
+    /// The machine that serves inputs, and the number of those that it has served.
+    static SERVING: RefCell<Option<(Vm, usize)>> = const { RefCell::new(None) };
+}
+
+/// The inputs that the machine of [`SERVING`] has been given: what it does with the last may depend on them.
+static GIVEN: Mutex<Vec<String>> = Mutex::new(Vec::new());
+static TELLS: Once = Once::new();
+
+/// Compiles a text as a program and runs it. The machine has served other texts before: to make it takes a
+/// hundred times as long as to compile and run a small text. If this panics, all of them are printed.
+///
+/// # Panics
+/// If the verifier refuses the compiled module.
+pub fn compile_and_run(text: &str) {
+    TELLS.call_once(|| {
+        let before = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            let given = GIVEN.lock().unwrap_or_else(PoisonError::into_inner);
+            #[allow(clippy::print_stderr, reason = "a fuzz target has no other way to tell")]
+            for (number, text) in given.iter().enumerate() {
+                eprintln!(";;; input {number} of this machine\n{text}");
+            }
+            drop(given);
+            before(panic);
+        }));
+    });
+    SERVING.with_borrow_mut(|serving| {
+        // The lock is not held while a machine works: if that panics, the hook takes it.
+        let is_fresh = serving.is_none();
+        let (machine, served) = serving.get_or_insert_with(|| (machine(), 0));
+        let mut given = GIVEN.lock().unwrap_or_else(PoisonError::into_inner);
+        if is_fresh {
+            given.clear();
+        }
+        given.push(text.to_string());
+        drop(given);
+        *served += 1;
+        machine.begin_program(config());
+        let mut is_full = machine.enter_package(USER_PACKAGE).is_err();
+        if let Some(module) = compile_on(machine, text) {
+            machine.begin_program(config());
+            if !run_on(machine, &module) {
+                is_full = true;
+                assert!(run(&module), "a compiled module is loaded");
+            }
+        }
+        // What a text has left behind must not run among the next.
+        if is_full || *served >= SERVED || !machine.task_figures().is_empty() {
+            *serving = None;
+        }
+    });
 }
 
 /// Does `work`, and panics if it takes too long.
@@ -48,10 +110,13 @@ pub fn read(bytes: &[u8]) -> (usize, usize) {
 /// # Panics
 /// If the verifier refuses the compiled module.
 pub fn compile(text: &str) -> Option<Module> {
-    let mut machine = machine();
+    compile_on(&mut machine(), text)
+}
+
+fn compile_on(machine: &mut Vm, text: &str) -> Option<Module> {
     let source = SourceId::default();
     let mut compilation = Compiler::for_source(source).compile_text("anything.esl", text);
-    let (module, diagnostics) = hasten("compiling", || drive(&mut *compilation, &mut machine));
+    let (module, diagnostics) = hasten("compiling", || drive(&mut *compilation, machine));
     let mut sources = Sources::new();
     sources.add("anything.esl", Some(text.into()));
     for diagnostic in diagnostics.iter().take(100) {
@@ -65,10 +130,10 @@ pub fn compile(text: &str) -> Option<Module> {
 
 /// Verifies a module and runs it if it is accepted. Returns whether it was accepted.
 pub fn run(module: &Module) -> bool {
-    if verify::verify(module).is_err() {
-        return false;
-    }
-    let mut machine = machine();
+    verify::verify(module).is_ok() && run_on(&mut machine(), module)
+}
+
+fn run_on(machine: &mut Vm, module: &Module) -> bool {
     let Ok(functions) = machine.load_module(module) else { return false };
     // Any outcome is legal.
     drop(hasten("running", || machine.run_toplevel(functions, TICKS)));

@@ -179,6 +179,15 @@ proptest! {
         }
     }
 
+    /// As the fuzz target does. What a failure needs of the texts before is for those who search.
+    #[test]
+    #[ignore = "run with --ignored, and PROPTEST_CASES for longer"]
+    fn one_machine_serves_many_programs(texts in prop::collection::vec(any::<Index>(), 1..20)) {
+        for text in texts {
+            anything::compile_and_run(text_at(&text));
+        }
+    }
+
     #[test]
     fn the_verifier_lets_nothing_harmful_through(
         text in any::<Index>(),

@@ -256,6 +256,19 @@ fn an_interrupt_ends_a_wait_for_input() {
 }
 
 #[test]
+#[cfg(unix)]
+fn a_read_that_was_left_does_not_put_off_the_report_of_a_deadlock() {
+    let text = "(princ 1) (finish-output)
+(print (handler-case (with-timeout 0.01 (read-line)) (failure () 'time-is-up)))
+(wait-for-event (make-event 'never))";
+    let mut child = started("left-read", text);
+    let input = child.stdin.take();
+    let done = finish(child);
+    drop(input);
+    check(&done, 4, "waits for event NEVER");
+}
+
+#[test]
 fn no_command_writes_over_what_it_reads() {
     let text = "(require \"part\")\n(print (part))\n";
     let folder = Folder::with("overwrite", &[("program.esl", text), ("part.esl", "(defun part () 1)")]);

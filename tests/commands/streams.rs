@@ -123,7 +123,16 @@ fn a_fifo_whose_writer_comes_late_delays_only_its_reader() {
 
 #[test]
 fn data_are_read_from_files_and_fifos() {
-    let text = "(with-open-file (s \"data\" :direction :output) (format s \"(a b)~%c #(1)\"))
+    // What is longer than what is read of a file at once, in many data and in one, is read in parts.
+    let text = "(with-open-file (s \"long\" :direction :output)
+  (format s \"(~{(item ~d \\\"text\\\")~}) \" (loop for i below 40000 collect i))
+  (dotimes (i 40000) (format s \"(item ~d) \" i))
+  (write-string \"the-end\" s))
+(with-open-file (s \"long\")
+  (print (list (length (read s))
+               (loop for datum = (read s) while (consp datum) sum (second datum))
+               (read s nil :end))))
+(with-open-file (s \"data\" :direction :output) (format s \"(a b)~%c #(1)\"))
 (with-open-file (s \"data\")
   (loop for datum = (read s nil :end) do (print datum) until (eq datum :end)))
 (mark \"begun\")
@@ -140,7 +149,7 @@ fn data_are_read_from_files_and_fifos() {
     drop(fifo);
     let output = running.output();
     let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-    assert_eq!(lines, ["(A B)", "C", "#(1)", ":END", "(X Y)", "(HALF :END :END)"]);
+    assert_eq!(lines, ["(40000 799980000 :END)", "(A B)", "C", "#(1)", ":END", "(X Y)", "(HALF :END :END)"]);
 }
 
 #[test]

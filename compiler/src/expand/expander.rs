@@ -29,6 +29,8 @@ pub(super) const MAX_DEPTH: u32 = 5_000;
 
 /// Limit on the size of the expansion of one top-level form, in bytes.
 const MAX_BYTES: usize = 64 << 20;
+/// Findings beyond which no more warnings are kept: nobody reads so many, and they take memory.
+const MAX_FINDINGS: usize = 10_000;
 /// Limit on the parts of data that go through the macros of one top-level form, as calls or expansions.
 const MAX_PASSED: u64 = 10_000_000;
 /// Forms after which the size of the expansion is looked at again.
@@ -508,6 +510,9 @@ impl Expander {
                     diagnostic = diagnostic.also(origin.span, text);
                 }
             }
+        }
+        if diagnostic.severity == Severity::Warning && self.reported.len() >= MAX_FINDINGS {
+            return;
         }
         // A macro may have used the same part twice.
         let place = (diagnostic.code, diagnostic.primary.span, diagnostic.message.clone());

@@ -21,7 +21,7 @@
 //! Guarantees: a step does a bounded part of the work, for which the task is charged. What compilations hold
 //! counts against the limit of the memory: beyond it, the next step fails for want of room.
 
-use esl_bytecode::compile::{Compilation, Step, StepOutcome, Work};
+use esl_bytecode::compile::{Compilation, CompileTimeFailure, Step, StepOutcome, Work};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::diagnostic::{Diagnostic, Severity};
 use esl_bytecode::file;
@@ -145,7 +145,14 @@ fn answer(
         "MORE" => StepOutcome::More,
         "LOADED" if running.keeps => StepOutcome::Object(unit.pin(outcome)),
         "LOADED" => StepOutcome::Loaded,
-        "FAILED" => StepOutcome::Failed(designated_text(vm, outcome)?.into()),
+        // The report, and how the macro that failed is written.
+        "FAILED" => {
+            let told = vm.heap.as_cons(outcome);
+            let [report, usage] = told.map_or([outcome, Value::NIL], |told| [told.car, told.cdr]);
+            let report = designated_text(vm, report)?;
+            let usage = text_of(&vm.heap, usage);
+            StepOutcome::Failed(CompileTimeFailure { report, usage, ..CompileTimeFailure::default() })
+        }
         _ => return vm.exchange.program_error(format!("{kind} is no outcome of a step")),
     }))
 }
@@ -229,11 +236,10 @@ fn read_datum(vm: &mut Vm, text: &str, start: usize, name: Option<&str>) -> Resu
     }
 }
 
-/// Reads the first datum of `text`. Returns whether there was one, the object, the list of the calls in it
-/// that are to be made, and the number of characters up to its end; `None` if what comes after the text may
-/// belong to the datum.
-fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<([Value; 3], usize)>, Exit> {
+/// Reads the first datum of `text`; `None` if what comes after the text may belong to it.
+fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<FirstRead>, Exit> {
     let count = |end: usize| text[..end].chars().count();
+    let read = |values: [Value; 3], end: usize| FirstRead { values: Ok(values), characters: count(end) };
     Ok(Some(match read_datum(vm, text, 0, None)? {
         ReadOutcome::Datum(_, end)
             if then != Then::End && end == text.len() && !text.ends_with([')', '"']) =>
@@ -242,16 +248,26 @@ fn read_first(vm: &mut Vm, text: &str, then: Then) -> Result<Option<([Value; 3],
         }
         ReadOutcome::Datum(datum, end) => {
             let (object, calls) = read_object(vm, &datum)?;
-            ([Value::T, object, calls], count(end))
+            read([Value::T, object, calls], end)
         }
         // What is faulty where the text is cut may be part of something else.
         ReadOutcome::Fault(fault) if then != Then::Rest && !fault.is_unfinished() => {
-            return vm.exchange.raise(Raised::Reader(fault.text));
+            // What comes after the fault is read the next time.
+            let end = text.ceil_char_boundary((fault.diagnostic.primary.span.end as usize).max(1));
+            FirstRead { values: Err(fault.text), characters: count(end) }
         }
         ReadOutcome::End | ReadOutcome::Fault(_) if then != Then::End => return Ok(None),
-        ReadOutcome::End => ([Value::NIL; 3], count(text.len())),
-        ReadOutcome::Fault(_) => ([vm.world.known.unfinished, Value::NIL, Value::NIL], count(text.len())),
+        ReadOutcome::End => read([Value::NIL; 3], text.len()),
+        ReadOutcome::Fault(_) => read([vm.world.known.unfinished, Value::NIL, Value::NIL], text.len()),
     }))
+}
+
+/// What comes first in a text.
+struct FirstRead {
+    /// Whether there is a datum, the object, and the calls in it; or the message about what is no datum.
+    values: Result<[Value; 3], String>,
+    /// Number of characters up to its end.
+    characters: usize,
 }
 
 /// Returns a datum that was read as an object, and the list of the calls in it.
@@ -462,8 +478,13 @@ pub(super) fn read_from_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         let limit = end.min(start.saturating_add(part));
         let text = text_between(&vm.heap, string, start, limit);
         let then = if limit < end { Then::Rest } else { Then::End };
-        if let Some(([status, object, calls], length)) = read_first(vm, &text, then)? {
-            return vm.give_values(&[status, object, Value::index(start + length), calls]);
+        if let Some(FirstRead { values, characters }) = read_first(vm, &text, then)? {
+            return match values {
+                Ok([status, object, calls]) => {
+                    vm.give_values(&[status, object, Value::index(start + characters), calls])
+                }
+                Err(message) => vm.exchange.raise(Raised::Reader(message)),
+            };
         }
         part = part.saturating_mul(2);
     }
@@ -475,12 +496,17 @@ pub(super) fn read(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut part = FIRST_PART;
     loop {
         let source = source(vm, stream, part)?;
-        if let Some((read, length)) = read_first(vm, &source.text, source.then)? {
-            skip_source(vm, stream, &source, length);
-            return vm.give_values(&read);
+        if let Some(FirstRead { values, characters }) = read_first(vm, &source.text, source.then)? {
+            skip_source(vm, stream, &source, characters);
+            return match values {
+                Ok(values) => vm.give_values(&values),
+                Err(message) => vm.exchange.raise(Raised::Reader(message)),
+            };
         }
         match source.then {
-            Then::Input => more_input(vm)?,
+            Then::Input if source.is_console => more_input(vm)?,
+            // A channel is supplied by the twin.
+            Then::Input => return Err(Exit::Slowly),
             Then::Rest | Then::End => part = part.saturating_mul(2),
         }
     }

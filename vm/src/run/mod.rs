@@ -102,6 +102,7 @@ impl Vm {
     /// Returns whether something can still come for tasks that all wait: a time, input, or news from outside.
     pub fn expects_something(&mut self) -> bool {
         let scheduler = &mut self.scheduler;
+        scheduler.forget_left_streams();
         scheduler.first_timer().is_some()
             || !scheduler.readers.is_empty()
             || !scheduler.writers.is_empty()

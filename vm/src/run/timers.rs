@@ -86,6 +86,7 @@ pub(super) fn go_on_in_time(vm: &mut Vm) -> bool {
     if vm.scheduler.is_paused {
         return false;
     }
+    vm.scheduler.forget_left_streams();
     let input = !vm.scheduler.readers.is_empty();
     let first = vm.scheduler.first_timer();
     let is_virtual = vm.scheduler.clock.is_virtual;
@@ -113,6 +114,7 @@ pub(super) fn go_on_in_time(vm: &mut Vm) -> bool {
 /// Sleeps until a timer is due or something comes from outside. Returns false if nothing ever will.
 pub(crate) fn idle(vm: &mut Vm) -> bool {
     vm.outside.pass_on();
+    vm.scheduler.forget_left_streams();
     let deadline = vm.scheduler.first_timer();
     let awaited = Awaited {
         input: !vm.scheduler.readers.is_empty(),

@@ -346,6 +346,17 @@ impl Scheduler {
         slice.max(1)
     }
 
+    /// Forgets those who waited for a standard stream and do so no more: a read or a write that was aborted, or
+    /// whose time was up, would keep the run waiting for the stream.
+    pub(crate) fn forget_left_streams(&mut self) {
+        let tasks = &self.tasks;
+        let is_in = |id: TaskId, state| tasks.get(id).is_some_and(|task| task.state == state);
+        self.readers.retain(|&id| is_in(id, TaskState::Reading));
+        self.writers.retain(|&id| is_in(id, TaskState::Writing));
+        self.readers.dedup();
+        self.writers.dedup();
+    }
+
     /// Returns the time of the first timer that is still wanted, and drops those before it.
     pub(crate) fn first_timer(&mut self) -> Option<u64> {
         while let Some(timer) = self.timers.first()

@@ -60,7 +60,7 @@ pub(crate) struct StreamSource {
     /// What comes after it.
     pub(crate) then: Then,
     /// Whether the stream is standard input.
-    is_console: bool,
+    pub(crate) is_console: bool,
 }
 
 /// What comes after the beginning of a text.
@@ -366,10 +366,6 @@ pub(crate) fn characters(vm: &mut Vm, v: Value, start: Value, end: Value) -> Res
 /// A failure if it is not an open input stream.
 pub(crate) fn source(vm: &mut Vm, stream: Value, limit: usize) -> Result<StreamSource, Exit> {
     let (stream, kind) = designated_stream(vm, stream, true)?;
-    if channel::may_go_on(&vm.heap, stream, kind) {
-        // What will be supplied decides where the datum ends.
-        return Err(Exit::Slowly);
-    }
     if kind == StreamKind::StandardInput {
         let console = &vm.outside.console;
         let then = match console.is_at_end() {
@@ -383,7 +379,12 @@ pub(crate) fn source(vm: &mut Vm, stream: Value, limit: usize) -> Result<StreamS
         (stream_index(&vm.heap, stream, slot::POSITION), stream_index(&vm.heap, stream, slot::END));
     let limit = end.min(start.saturating_add(limit));
     let text = text_between(&vm.heap, stream_slot(&vm.heap, stream, slot::BUFFER), start, limit);
-    Ok(StreamSource { text, then: if limit < end { Then::Rest } else { Then::End }, is_console: false })
+    let then = match channel::may_go_on(&vm.heap, stream, kind) {
+        _ if limit < end => Then::Rest,
+        true => Then::Input,
+        false => Then::End,
+    };
+    Ok(StreamSource { text, then, is_console: false })
 }
 
 /// Takes so many characters from a stream of which `source` was the beginning.
