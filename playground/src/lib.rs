@@ -9,7 +9,7 @@
 #![deny(unsafe_code)]
 
 #[cfg(target_arch = "wasm32")]
-mod abi;
+pub mod abi;
 
 use std::sync::{Arc, Mutex, PoisonError};
 
