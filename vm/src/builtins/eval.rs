@@ -15,6 +15,8 @@
 //!   => :done functions diagnostics          over; NIL for functions if one of the diagnostics is an error
 //! ```
 //!
+//! In place of `text`, `(text . usage)` also says how the macro that failed is written.
+//!
 //! Diagnostics are a list of `(severity code text)`. Whoever begins a compilation ends it with
 //! `%end-compilation`.
 //!
