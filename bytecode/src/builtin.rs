@@ -956,8 +956,9 @@ macro_rules! for_each_builtin {
             /// Ends the run with this status, from 0 to 255. The remaining tasks are aborted.
             Exit = failure::exit, internal "%EXIT" ("status");
             /// The innermost `limit` frames, each a list of the function's name, and source, line and column
-            /// if known. A function that has no name is `(lambda)`, a form at top level `NIL`.
-            Backtrace = failure::backtrace, internal "%BACKTRACE" ("limit");
+            /// if known. A function that has no name is `(lambda)`, a form at top level `NIL`. With
+            /// `variables` a fifth item lists the names and values of the variables that are in scope there.
+            Backtrace = failure::backtrace, internal "%BACKTRACE" ("limit &optional variables");
             /// Takes away, until the scope around it ends, all rights but these: a list of lists of a keyword
             /// and objects, strings; without objects for all of them. Nothing gives them back.
             NarrowRights = rights::narrow_rights, internal "%NARROW-RIGHTS" ("rights");

@@ -132,6 +132,28 @@ pub struct LineEntry {
     pub column: u32,
 }
 
+/// Where the value of a variable is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum VariablePlace {
+    /// In a register of the frame, or in the box there.
+    Register(u8),
+    /// In a capture of the function, or in the box there.
+    Capture(u8),
+}
+
+/// The words of a function's code at which a variable has its value in one place.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct VariableRange {
+    /// Name as it is written, without a package.
+    pub name: Arc<str>,
+    /// Where the value is.
+    pub place: VariablePlace,
+    /// The first word.
+    pub from: u32,
+    /// The word behind the last one.
+    pub to: u32,
+}
+
 /// A function.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ModuleFunction {
@@ -153,6 +175,9 @@ pub struct ModuleFunction {
     pub code: Vec<u32>,
     /// Source places, by ascending `pc`.
     pub lines: Vec<LineEntry>,
+    /// Variables, by ascending `from`: each at the places at which its value can be looked at. One that the
+    /// compiler has removed has none.
+    pub variables: Vec<VariableRange>,
 }
 
 /// The largest number of registers of a frame.
@@ -186,6 +211,7 @@ impl Module {
             size_of::<ModuleFunction>()
                 + size_of_val(&*function.code)
                 + size_of_val(&*function.lines)
+                + size_of_val(&*function.variables)
                 + size_of_val(&*function.constants)
         });
         size_of::<Module>() + size_of_val(&*self.constants) + functions.sum::<usize>()

@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 
 use esl_bytecode::datum::Datum;
-use esl_vm::host::Output;
+use esl_vm::host::{FrameVariable, Output};
 use esl_vm::run::RunOutcome;
 use esl_vm::task::TaskResult;
 
@@ -399,7 +399,11 @@ impl Debugger {
             let place = frame
                 .place
                 .map_or(String::new(), |place| format!(", {}:{}:{}", place.source, place.line, place.column));
-            text.push_str(&format!("  in {}{place}\n", frame.function));
+            text.push_str(&format!(
+                "  in {}{place}\n{}",
+                frame.function,
+                FrameVariable::lines(&frame.variables)
+            ));
         }
         Ok(text)
     }

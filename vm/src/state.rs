@@ -248,6 +248,8 @@ list_state! { Embedder {
 } }
 list_state! { Watch {
     is_watched: Derived,
+    is_followed: Derived,
+    tells_variables: Process,
     observers: Process,
     coming: Process,
     figures: Process,

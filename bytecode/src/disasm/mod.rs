@@ -16,7 +16,10 @@ use std::collections::BTreeMap;
 use std::fmt::{self, Write};
 
 use crate::builtin::Builtin;
-use crate::module::{CaptureSource, Constant, FunctionNumber, LineEntry, Module, ModuleFunction, PoolIdx};
+use crate::module::{
+    CaptureSource, Constant, FunctionNumber, LineEntry, Module, ModuleFunction, PoolIdx, VariablePlace,
+    VariableRange,
+};
 use crate::opcode::{Instr, TypeCode};
 use crate::operand::Role;
 
@@ -44,6 +47,13 @@ pub fn function(module: &Module, number: FunctionNumber) -> String {
         for (index, capture) in function.captures.iter().enumerate() {
             let boxed = if capture.boxed { ", a box" } else { "" };
             push(&mut text, format_args!("  capture #{index}: {}{boxed}\n", capture.source));
+        }
+        for VariableRange { name, place, from, to } in &function.variables {
+            let place = match place {
+                VariablePlace::Register(register) => format!("r{register}"),
+                VariablePlace::Capture(index) => format!("#{index}"),
+            };
+            push(&mut text, format_args!("  ; {} in {place}, {from} to {to}\n", name.escape_debug()));
         }
         let listing = Listing { module, function, labels: labels(function) };
         listing.write(&mut text);

@@ -10,11 +10,19 @@
 //!     code                           u32
 //! lines                              count u32, then for each: pc, source, line, column, as
 //!                                    LEB128 differences to the entry before
+//! variables                          count, then for each, in LEB128: begin of the range, as the difference
+//!                                    to the one before; its length; twice the number of the register or
+//!                                    capture, + 1 for a capture; number of the name
 //! ```
 
+use std::sync::Arc;
+
 use super::cursor::{ByteOutput, Cursor};
+use super::write::NameTable;
 use super::{NONE, Problem, ReadError};
-use crate::module::{Capture, CaptureSource, LineEntry, ModuleFunction, Parameters, PoolIdx};
+use crate::module::{
+    Capture, CaptureSource, LineEntry, ModuleFunction, Parameters, PoolIdx, VariablePlace, VariableRange,
+};
 
 const FLAG_REST: u8 = 1;
 const FLAG_KEYS: u8 = 2;
@@ -26,7 +34,7 @@ const CAPTURE_LATER: u8 = 2;
 const CAPTURE_BOXED: u8 = 0x80;
 
 /// Appends the record of `function`.
-pub(super) fn write(function: &ModuleFunction, out: &mut ByteOutput) {
+pub(super) fn write(function: &ModuleFunction, names: &mut NameTable, out: &mut ByteOutput) {
     for place in [function.name, function.lambda_list, function.documentation] {
         out.u32(place.map_or(NONE, |PoolIdx(index)| index));
     }
@@ -65,6 +73,18 @@ pub(super) fn write(function: &ModuleFunction, out: &mut ByteOutput) {
         out.signed_leb(entry.column.wrapping_sub(last.column) as i32);
         last = *entry;
     }
+    out.leb(function.variables.len() as u32);
+    let mut last = 0;
+    for VariableRange { name, place, from, to } in &function.variables {
+        out.leb(from.wrapping_sub(last));
+        out.leb(to.wrapping_sub(*from));
+        out.leb(match place {
+            VariablePlace::Register(register) => u32::from(*register) << 1,
+            VariablePlace::Capture(capture) => u32::from(*capture) << 1 | 1,
+        });
+        out.leb(names.number(name));
+        last = *from;
+    }
 }
 
 fn write_pool_indexes(indexes: &[PoolIdx], out: &mut ByteOutput) {
@@ -74,8 +94,13 @@ fn write_pool_indexes(indexes: &[PoolIdx], out: &mut ByteOutput) {
     }
 }
 
-/// Decodes a record, of a module with `pool` constants.
-pub(super) fn read(mut from: Cursor<'_>, pool: usize) -> Result<ModuleFunction, ReadError> {
+/// Decodes a record, of a module with `pool` constants and these names; without its variables if there are no
+/// names.
+pub(super) fn read(
+    mut from: Cursor<'_>,
+    pool: usize,
+    names: Option<&[Arc<str>]>,
+) -> Result<ModuleFunction, ReadError> {
     let name = optional_constant(&mut from, pool)?;
     let lambda_list = optional_constant(&mut from, pool)?;
     let documentation = optional_constant(&mut from, pool)?;
@@ -105,7 +130,11 @@ pub(super) fn read(mut from: Cursor<'_>, pool: usize) -> Result<ModuleFunction, 
     let count = from.count(4)?;
     let code = from.words(count)?.collect();
     let lines = read_lines(&mut from)?;
-    from.end()?;
+    let mut variables = Vec::new();
+    if let Some(names) = names {
+        variables = read_variables(&mut from, names)?;
+        from.end()?;
+    }
     Ok(ModuleFunction {
         name,
         lambda_list,
@@ -116,6 +145,7 @@ pub(super) fn read(mut from: Cursor<'_>, pool: usize) -> Result<ModuleFunction, 
         constants,
         code,
         lines,
+        variables,
     })
 }
 
@@ -176,4 +206,36 @@ fn read_lines(from: &mut Cursor<'_>) -> Result<Vec<LineEntry>, ReadError> {
         lines.push(last);
     }
     Ok(lines)
+}
+
+fn read_variables(from: &mut Cursor<'_>, names: &[Arc<str>]) -> Result<Vec<VariableRange>, ReadError> {
+    let here = from.clone();
+    let count = from.leb()? as usize;
+    // Each takes at least as many bytes as it has numbers.
+    let (expected, found) = (count as u64 * 4, from.rest().len() as u64);
+    if expected > found {
+        return Err(here.damaged(Problem::Short { expected, found }));
+    }
+    let mut variables = Vec::with_capacity(count);
+    let mut begin: u32 = 0;
+    for _ in 0..count {
+        begin = begin.wrapping_add(from.leb()?);
+        let to = begin.wrapping_add(from.leb()?);
+        let here = from.clone();
+        let found = from.leb()?;
+        let Ok(number) = u8::try_from(found >> 1) else {
+            let expected = "the place of a variable";
+            return Err(here.damaged(Problem::Unknown { expected, found }));
+        };
+        let is_capture = found & 1 != 0;
+        let place = if is_capture { VariablePlace::Capture(number) } else { VariablePlace::Register(number) };
+        let here = from.clone();
+        let found = from.leb()?;
+        let Some(name) = names.get(found as usize) else {
+            let count = names.len() as u32;
+            return Err(here.damaged(Problem::Index { of: "names", found, count }));
+        };
+        variables.push(VariableRange { name: name.clone(), place, from: begin, to });
+    }
+    Ok(variables)
 }

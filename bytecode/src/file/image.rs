@@ -11,7 +11,7 @@ use super::{
     FORMAT_VERSION, HEADER_LENGTH, MAGIC, NONE, Problem, ReadError, SECTION_ENTRY, SECTION_TABLE, Section,
     function, tag,
 };
-use crate::module::{FunctionNumber, ModuleFunction, PoolIdx};
+use crate::module::{FunctionNumber, ModuleFunction, PoolIdx, VariableRange};
 
 /// The bytes of a file, embedded in the program or shared.
 #[derive(Clone, Debug)]
@@ -370,13 +370,44 @@ impl ModuleImage {
         self.function_count
     }
 
-    /// One function.
+    /// One function, without its variables, which nobody but debuggers needs.
     ///
     /// # Errors
     /// [`ReadError::Damaged`], also if there is no such function.
     pub fn function(&self, number: FunctionNumber) -> Result<ModuleFunction, ReadError> {
+        self.function_with(number, None)
+    }
+
+    /// The variables of one function.
+    ///
+    /// # Errors
+    /// [`ReadError::Damaged`], also if there is no such function.
+    pub fn variables(&self, number: FunctionNumber) -> Result<Vec<VariableRange>, ReadError> {
+        Ok(self.function_with(number, Some(&self.names()?))?.variables)
+    }
+
+    /// One function, with its variables if there are names.
+    pub(super) fn function_with(
+        &self,
+        number: FunctionNumber,
+        names: Option<&[Arc<str>]>,
+    ) -> Result<ModuleFunction, ReadError> {
         let (offset, length) = self.function_place(number)?;
-        function::read(self.part(Section::Functions, offset as usize, length as usize)?, self.constant_count)
+        let record = self.part(Section::Functions, offset as usize, length as usize)?;
+        function::read(record, self.constant_count, names)
+    }
+
+    /// Returns the names of variables, by number.
+    pub(super) fn names(&self) -> Result<Vec<Arc<str>>, ReadError> {
+        let mut from = self.section(Section::Names);
+        let mut names = Vec::new();
+        while !from.rest().is_empty() {
+            let length = from.leb()? as usize;
+            let here = from.clone();
+            let name = std::str::from_utf8(from.bytes(length)?).map_err(|_| here.damaged(Problem::Utf8))?;
+            names.push(name.into());
+        }
+        Ok(names)
     }
 
     /// Returns how many captures a function has, without decoding all of it.

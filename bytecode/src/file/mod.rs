@@ -3,10 +3,10 @@
 //! ```text
 //! magic           8 bytes   b"ESLB\r\n\x1a\n"
 //! format version  u32       FORMAT_VERSION
-//! section count   u32       6
+//! section count   u32       7
 //! opcode table    u64       fingerprint of the table that the code was compiled for
 //! builtin table   u64       the same of the builtin table
-//! section table   6 × 16    kind u32, offset u32, length u32, CRC-32 u32
+//! section table   7 × 16    kind u32, offset u32, length u32, CRC-32 u32
 //! header CRC      u32       of all of the above
 //! sections, one after the other, without gaps, in the order of `Section`
 //! ```
@@ -23,6 +23,7 @@
 //! functions   the records, back to back
 //! index       count, for each function: offset and length of its record in `functions`
 //! top level   count, then function numbers
+//! names       the names of variables: for each its length in LEB128, UTF-8
 //! ```
 //!
 //! So each symbol, constant and function can be read on its own: [`ModuleImage`] opens a file without looking
@@ -50,7 +51,9 @@ use crate::module::Module;
 /// The first bytes of a file. They betray transfers that change line ends.
 pub const MAGIC: [u8; 8] = *b"ESLB\r\n\x1a\n";
 /// The version of the format that this crate reads and writes.
-pub const FORMAT_VERSION: u32 = 2;
+///
+/// 3: the names of variables, and where their values are.
+pub const FORMAT_VERSION: u32 = 3;
 
 /// In place of an index: there is none.
 const NONE: u32 = u32::MAX;
@@ -75,17 +78,20 @@ pub enum Section {
     Index = 5,
     /// The functions that run the top-level forms.
     Toplevel = 6,
+    /// The names of variables.
+    Names = 7,
 }
 
 impl Section {
     /// All of them, in the order of the file.
-    pub const ALL: [Section; 6] = [
+    pub const ALL: [Section; 7] = [
         Section::Sources,
         Section::Symbols,
         Section::Constants,
         Section::Functions,
         Section::Index,
         Section::Toplevel,
+        Section::Names,
     ];
 
     /// Its name in messages.
@@ -97,6 +103,7 @@ impl Section {
             Section::Functions => "functions",
             Section::Index => "index",
             Section::Toplevel => "top level",
+            Section::Names => "names",
         }
     }
 

@@ -2,6 +2,7 @@ use super::*;
 use crate::datum::ObjectId;
 use crate::module::{
     Capture, CaptureSource, Constant, FunctionNumber, LineEntry, ModuleFunction, Parameters, PoolIdx,
+    VariablePlace, VariableRange,
 };
 use crate::symbol::Symbol;
 use num_bigint::BigInt;
@@ -56,6 +57,11 @@ fn sample() -> Module {
         lines: vec![
             LineEntry { pc: 0, source: 1, line: 300, column: 12 },
             LineEntry { pc: 2, source: 0, line: 1, column: u32::MAX },
+        ],
+        variables: vec![
+            VariableRange { name: "λ".into(), place: VariablePlace::Capture(255), from: 0, to: 3 },
+            VariableRange { name: "X".into(), place: VariablePlace::Register(0), from: 1, to: 3 },
+            VariableRange { name: "λ".into(), place: VariablePlace::Register(249), from: 1, to: 2 },
         ],
     };
     Module {
@@ -125,7 +131,9 @@ fn an_image_is_read_in_parts() {
     assert_eq!(items.iter().collect::<Vec<_>>(), [1, 17].map(PoolIdx));
     assert!(image.constant(PoolIdx(24)).is_err());
     assert_eq!(image.function_count(), 2);
-    assert_eq!(image.function(FunctionNumber(0)).as_ref(), Ok(&module.functions[0]));
+    let without = ModuleFunction { variables: Vec::new(), ..module.functions[0].clone() };
+    assert_eq!(image.function(FunctionNumber(0)), Ok(without));
+    assert_eq!(image.variables(FunctionNumber(0)).as_ref(), Ok(&module.functions[0].variables));
     assert_eq!(image.function(FunctionNumber(1)).as_ref(), Ok(&module.functions[1]));
     assert!(image.function(FunctionNumber(2)).is_err());
     assert_eq!(image.toplevel(), Ok(module.toplevel.clone()));
@@ -144,7 +152,7 @@ fn files_of_others_are_told_apart_from_damaged_ones() {
     check_refused(|file| file[4] = b'\n', "not a compiled ESL file: its first bytes are others");
     check_refused(
         |file| file[8] = 9,
-        "compiled in format version 9, but this is a machine for version 2: compile it again",
+        "compiled in format version 9, but this is a machine for version 3: compile it again",
     );
     check_refused(
         |file| file[16] ^= 1,
@@ -160,7 +168,7 @@ fn files_of_others_are_told_apart_from_damaged_ones() {
 fn damage_is_found_and_placed() {
     check_refused(
         |file| *file.last_mut().unwrap() ^= 1,
-        "damaged file: wrong checksum at byte 744 (top level): compile it again",
+        "damaged file: wrong checksum at byte 788 (names): compile it again",
     );
     check_refused(
         |file| file.truncate(700),

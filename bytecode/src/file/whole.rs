@@ -15,6 +15,7 @@ impl ModuleImage {
     /// [`ReadError::Damaged`].
     pub fn to_module(&self) -> Result<Module, ReadError> {
         let symbols = self.all_symbols()?;
+        let names = self.names()?;
         let mut functions = Vec::with_capacity(self.function_count);
         let mut end = 0;
         for number in 0..self.function_count as u32 {
@@ -23,7 +24,7 @@ impl ModuleImage {
                 return Err(self.section(Section::Index).damaged(Problem::Gap));
             }
             end = offset.saturating_add(length);
-            functions.push(self.function(FunctionNumber(number))?);
+            functions.push(self.function_with(FunctionNumber(number), Some(&names))?);
         }
         if end as usize != self.section(Section::Functions).rest().len() {
             return Err(self.section(Section::Functions).damaged(Problem::Trailing));

@@ -20,7 +20,8 @@ pub fn write(module: &Module) -> Result<Vec<u8>, WriteError> {
     let mut symbols = SymbolTable::default();
     // Constants number the symbols that they use, so they come before the table of symbols is written.
     let constants = write_constants(&module.constants, &mut symbols)?;
-    let (functions, index) = write_functions(module);
+    let mut names = NameTable::default();
+    let (functions, index) = write_functions(module, &mut names);
     let sections = [
         write_names(&[&module.sources, &module.requires]),
         symbols.finish(),
@@ -28,6 +29,7 @@ pub fn write(module: &Module) -> Result<Vec<u8>, WriteError> {
         functions,
         index,
         write_toplevel(module),
+        names.texts,
     ];
     let mut file =
         ByteOutput(Vec::with_capacity(HEADER_LENGTH + sections.iter().map(|s| s.0.len()).sum::<usize>()));
@@ -67,6 +69,27 @@ fn write_names(lists: &[&[String]]) -> ByteOutput {
 fn write_text(text: &str, out: &mut ByteOutput) {
     out.u32(text.len() as u32);
     out.0.extend(text.as_bytes());
+}
+
+/// The names of variables met so far, in the order of their numbers.
+#[derive(Default)]
+pub(super) struct NameTable {
+    numbers: HashMap<Arc<str>, u32>,
+    texts: ByteOutput,
+}
+
+impl NameTable {
+    /// Returns the number of `name`, a new one if it was not met before.
+    pub(super) fn number(&mut self, name: &Arc<str>) -> u32 {
+        if let Some(&number) = self.numbers.get(name) {
+            return number;
+        }
+        let number = self.numbers.len() as u32;
+        self.numbers.insert(name.clone(), number);
+        self.texts.leb(name.len() as u32);
+        self.texts.0.extend(name.as_bytes());
+        number
+    }
 }
 
 /// The symbols met so far, in the order of their numbers.
@@ -214,13 +237,13 @@ fn write_items(items: &[PoolIdx], out: &mut ByteOutput) {
     }
 }
 
-fn write_functions(module: &Module) -> (ByteOutput, ByteOutput) {
+fn write_functions(module: &Module, names: &mut NameTable) -> (ByteOutput, ByteOutput) {
     let mut records = ByteOutput::default();
     let mut index = ByteOutput::default();
     index.u32(module.functions.len() as u32);
     for function in &module.functions {
         let start = records.0.len();
-        function::write(function, &mut records);
+        function::write(function, names, &mut records);
         index.u32(start as u32);
         index.u32((records.0.len() - start) as u32);
     }

@@ -148,6 +148,10 @@ pub enum Fault {
     NotData,
     /// A source place is out of order, or of no source.
     Lines,
+    /// V14: the range of a variable is empty, out of order or outside of the code, or its place is not there.
+    Variables,
+    /// V14: the register that is said to hold a variable may hold something else.
+    Variable(u8),
     /// The function has so many joining paths that checking it would take too long.
     TooComplex,
 }
@@ -250,6 +254,10 @@ impl fmt::Display for Fault {
             Fault::Array => f.write_str("the array's elements do not go with its dimensions"),
             Fault::NotData => f.write_str("expected data, found a class or a function with captures"),
             Fault::Lines => f.write_str("source places must be in order and of a source of the module"),
+            Fault::Variables => f.write_str("ranges of variables must be in order and within the function"),
+            Fault::Variable(register) => {
+                write!(f, "expected the value of a variable in r{register}, which holds nothing on some path")
+            }
             Fault::TooComplex => f.write_str("the function is too complex to be checked: divide it"),
         }
     }

@@ -9,11 +9,11 @@ use std::collections::BTreeSet;
 
 use super::error::{Fault, FaultPlace, VerifyError};
 use super::pool;
-use super::registers::{Class, Registers};
+use super::registers::{Class, RegisterSet, Registers};
 use super::shape::CodeShape;
 use super::state::{KnownEntry, LandingState, PlaceState, VerifiedEntry};
 use crate::module::{
-    CaptureSource, Constant, FunctionNumber, MAX_CONTROL, Module, ModuleFunction, Parameters,
+    CaptureSource, Constant, FunctionNumber, MAX_CONTROL, Module, ModuleFunction, Parameters, VariablePlace,
 };
 use crate::opcode::{CallOperands, Instr, RegisterAccess, Substitute};
 use crate::operand::{Count, FunctionIdx, Role, Want, Window};
@@ -33,6 +33,7 @@ pub(super) fn verify(module: &Module, number: FunctionNumber, shape: &CodeShape)
         module,
         function,
         shape,
+        variables: registers_of_variables(function),
         states: vec![None; function.code.len()],
         pending: BTreeSet::new(),
         work: WORK_FOR_ALL + shape.instructions * WORK_PER_INSTRUCTION,
@@ -41,10 +42,41 @@ pub(super) fn verify(module: &Module, number: FunctionNumber, shape: &CodeShape)
     flow.run().map_err(|(pc, fault)| VerifyError { place: FaultPlace::Instruction(number, pc as u32), fault })
 }
 
+/// Returns which registers are said to hold variables, from each word on at which that changes.
+fn registers_of_variables(function: &ModuleFunction) -> Vec<(u32, RegisterSet)> {
+    let mut changes: Vec<(u32, bool, u8)> = Vec::new();
+    for variable in &function.variables {
+        if let VariablePlace::Register(register) = variable.place {
+            changes.extend([(variable.from, true, register), (variable.to, false, register)]);
+        }
+    }
+    changes.sort_unstable();
+    let mut counts = [0_u32; 256];
+    let mut held = RegisterSet::default();
+    let mut rows: Vec<(u32, RegisterSet)> = Vec::new();
+    for (word, begins, register) in changes {
+        let count = &mut counts[usize::from(register)];
+        // At one word, ends come before begins, so a count never drops below zero.
+        *count = if begins { *count + 1 } else { *count - 1 };
+        if *count == 0 {
+            held.remove(register)
+        } else {
+            held.insert(register)
+        }
+        match rows.last_mut() {
+            Some((last, registers)) if *last == word => *registers = held,
+            _ => rows.push((word, held)),
+        }
+    }
+    rows
+}
+
 struct Flow<'a> {
     module: &'a Module,
     function: &'a ModuleFunction,
     shape: &'a CodeShape,
+    /// From which words on which registers are said to hold variables, by ascending words.
+    variables: Vec<(u32, RegisterSet)>,
     /// For words that control gets to from elsewhere: what is known there.
     states: Vec<Option<Box<PlaceState>>>,
     /// Words whose state has changed since they were gone through.
@@ -70,8 +102,17 @@ impl Flow<'_> {
         let Some(mut state) = self.states[start].as_deref().cloned() else { return Ok(()) };
         self.charge(state.weight()).map_err(|fault| (start, fault))?;
         let mut pc = start;
+        let mut ahead = self.variables.partition_point(|&(from, _)| from as usize <= start);
         loop {
             let here = |fault| (pc, fault);
+            while self.variables.get(ahead).is_some_and(|&(from, _)| from as usize <= pc) {
+                ahead += 1;
+            }
+            if let Some(&(_, held)) = ahead.checked_sub(1).and_then(|index| self.variables.get(index))
+                && let Some(register) = state.registers.first_unknown(held)
+            {
+                return Err(here(Fault::Variable(register)));
+            }
             self.charge(1 + state.entries.len()).map_err(here)?;
             let instr = Instr::decode(&self.function.code, pc).ok_or(here(Fault::MissingAux))?;
             let next = pc + instr.opcode().words();

@@ -1,7 +1,7 @@
 //! The verifier: refuses every module that the interpreter could not run without looking at each step.
 //!
 //! **Theorem.** Of a module for which [`verify`] returned `Ok`, the interpreter may assume the following; V1
-//! to V5 for all of a function's code, V6 to V11 for what control can get to.
+//! to V5 for all of a function's code, V6 to V11 and V14 for what control can get to.
 //!
 //! * **V1, instructions.** Wherever control gets to in a function begins an instruction of the opcode table,
 //!   with its aux word. Bits that no operand uses are zero, and so is an aux word that only fills up. A
@@ -58,6 +58,8 @@
 //! * **V13, the pool.** Entries refer to earlier entries only. A `Symbol` is not `COMMON-LISP:NIL` or `T`; a
 //!   ratio is in lowest terms with a denominator above 1; an array has as many elements as its dimensions say
 //!   and a rank other than 1. No `Class` and no function with captures is inside a pair, vector or array.
+//! * **V14, variables.** The range of each variable lies in the code, its register or capture is there, and
+//!   at each place of the range that control gets to, the register holds an object of the program or a box.
 //!
 //! What the theorem asks of the interpreter in return:
 //!

@@ -16,12 +16,12 @@ impl RegisterSet {
         self.0[word] & bit != 0
     }
 
-    fn insert(&mut self, register: u8) {
+    pub(super) fn insert(&mut self, register: u8) {
         let (word, bit) = RegisterSet::place(register);
         self.0[word] |= bit;
     }
 
-    fn remove(&mut self, register: u8) {
+    pub(super) fn remove(&mut self, register: u8) {
         let (word, bit) = RegisterSet::place(register);
         self.0[word] &= !bit;
     }
@@ -30,6 +30,15 @@ impl RegisterSet {
         let (word, bit) = RegisterSet::place(end);
         self.0[word] &= bit - 1;
         self.0[word + 1..].fill(0);
+    }
+
+    /// Returns the first register that is in neither `some` nor `others`.
+    fn first_outside(self, some: RegisterSet, others: RegisterSet) -> Option<u8> {
+        let rest = |word: usize| self.0[word] & !(some.0[word] | others.0[word]);
+        (0..self.0.len()).find_map(|word| match rest(word) {
+            0 => None,
+            bits => Some((word << 6) as u8 + bits.trailing_zeros() as u8),
+        })
     }
 
     /// Removes what is not in `other`; says whether that was anything.
@@ -78,6 +87,11 @@ impl Registers {
         } else {
             None
         }
+    }
+
+    /// Returns the first of `registers` in which neither an object of the program nor a box is known to be.
+    pub(super) fn first_unknown(&self, registers: RegisterSet) -> Option<u8> {
+        registers.first_outside(self.values, self.boxes)
     }
 
     /// `register` now holds something of `class`, or nothing that is known. Says whether something else was

@@ -6,6 +6,7 @@ use super::pool;
 use crate::builtin::Builtin;
 use crate::module::{
     Constant, FunctionNumber, MAX_CAPTURES, MAX_CODE, MAX_REGISTERS, Module, ModuleFunction, PoolIdx,
+    VariablePlace,
 };
 use crate::opcode::{CallOperands, CallTarget, Instr, Opcode, RegisterAccess, TypeCode};
 use crate::operand::{Count, Role, Want};
@@ -94,7 +95,8 @@ fn verify_header(module: &Module, function: &ModuleFunction) -> Result<(), Fault
         return Err(Fault::PoolIndex(index));
     }
     verify_captures(function)?;
-    verify_lines(module, function)
+    verify_lines(module, function)?;
+    verify_variables(function)
 }
 
 fn verify_captures(function: &ModuleFunction) -> Result<(), Fault> {
@@ -114,6 +116,18 @@ fn verify_lines(module: &Module, function: &ModuleFunction) -> Result<(), Fault>
         (line.source as usize) < module.sources.len() && (line.pc as usize) < function.code.len()
     });
     if ascending && known { Ok(()) } else { Err(Fault::Lines) }
+}
+
+fn verify_variables(function: &ModuleFunction) -> Result<(), Fault> {
+    let ascending = function.variables.windows(2).all(|pair| pair[0].from <= pair[1].from);
+    let within = function.variables.iter().all(|variable| {
+        let is_there = match variable.place {
+            VariablePlace::Register(register) => register < function.registers,
+            VariablePlace::Capture(capture) => usize::from(capture) < function.captures.len(),
+        };
+        is_there && variable.from < variable.to && variable.to as usize <= function.code.len()
+    });
+    if ascending && within { Ok(()) } else { Err(Fault::Variables) }
 }
 
 /// The check of one instruction.

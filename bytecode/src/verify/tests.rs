@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::assembler::assemble;
-use crate::module::{Capture, Constant, LineEntry, ModuleFunction, Parameters, PoolIdx};
+use crate::module::{
+    Capture, Constant, LineEntry, ModuleFunction, Parameters, PoolIdx, VariablePlace, VariableRange,
+};
 use crate::symbol::Symbol;
 
 /// The functions that code under test can refer to, besides itself, which is function 0.
@@ -562,6 +564,49 @@ fn source_places_are_in_order() {
     check_header(|f| f.lines = vec![line(1, 0), line(0, 0)], Err(Fault::Lines));
     check_header(|f| f.lines = vec![line(0, 0), line(2, 0)], Err(Fault::Lines));
     check_header(|f| f.lines = vec![line(0, 1)], Err(Fault::Lines));
+}
+
+#[test]
+fn v14_variables_are_where_they_are_said_to_be() {
+    let ranges = |ranges: &[(VariablePlace, u32, u32)]| -> Vec<VariableRange> {
+        let variable = |&(place, from, to)| VariableRange { name: "X".into(), place, from, to };
+        ranges.iter().map(variable).collect()
+    };
+    let register = VariablePlace::Register;
+    let check_ranges = |given: &[_], expected| check_header(|f| f.variables = ranges(given), expected);
+    check_ranges(&[(register(0), 1, 2)], Ok(()));
+    check_ranges(&[(register(0), 1, 2), (register(0), 1, 2)], Ok(()));
+    check_ranges(&[(register(0), 1, 1)], Err(Fault::Variables));
+    check_ranges(&[(register(0), 1, 3)], Err(Fault::Variables));
+    check_ranges(&[(register(10), 1, 2)], Err(Fault::Variables));
+    check_ranges(&[(VariablePlace::Capture(0), 0, 2)], Err(Fault::Variables));
+    // Before it is set, and one that is never set.
+    check_ranges(&[(register(0), 0, 2)], Err(Fault::Variable(0)));
+    check_ranges(&[(register(9), 1, 2)], Err(Fault::Variable(9)));
+    // On one of two paths, and where a callee's frame has lain.
+    let check_code = |code: &str, given: &[_], expected| {
+        check_function(ModuleFunction { variables: ranges(given), ..function(code) }, expected);
+    };
+    let joins = "load-true r0 \n jump-if-nil r0 L1 \n load-true r1 \n L1: return r0";
+    check_code(joins, &[(register(0), 1, 4)], Ok(()));
+    check_code(joins, &[(register(1), 3, 4)], Err(Fault::Variable(1)));
+    let calls = "load-true r2 \n call-global r2.. 0 want 1 k0 \n move r1 r2 \n return r1";
+    let after = assemble("load-true r2 \n call-global r2.. 0 want 1 k0").unwrap().len() as u32;
+    check_code(calls, &[(register(2), 1, after)], Ok(()));
+    check_code(calls, &[(register(2), after, after + 1)], Ok(()));
+    check_code(calls, &[(register(3), after, after + 1)], Err(Fault::Variable(3)));
+    // Boxes are looked into, and the marker of a parameter without an argument is no value.
+    let boxed = "load-true r0 \n make-box r1 r0 \n return r0";
+    check_code(boxed, &[(register(1), 2, 3)], Ok(()));
+    let optional = "jump-if-supplied r0 L1 \n load-nil r0.. 1 \n L1: return r0";
+    let parameters = Parameters { optional: 1, ..Parameters::default() };
+    let given = |from| ModuleFunction {
+        variables: ranges(&[(register(0), from, 3)]),
+        parameters: parameters.clone(),
+        ..function(optional)
+    };
+    check_function(given(2), Ok(()));
+    check_function(given(0), Err(Fault::Variable(0)));
 }
 
 #[test]

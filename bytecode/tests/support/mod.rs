@@ -7,6 +7,7 @@
 use esl_bytecode::for_each_opcode;
 use esl_bytecode::module::{
     Capture, CaptureSource, Constant, FunctionNumber, LineEntry, Module, ModuleFunction, Parameters, PoolIdx,
+    VariablePlace, VariableRange,
 };
 use esl_bytecode::opcode::{Instr, OPCODES, Opcode};
 use esl_bytecode::operand::*;
@@ -441,6 +442,14 @@ fn any_function(random: &mut Random, pool: usize) -> ModuleFunction {
                 source: random.below(3) as u32,
                 line: random.next() as u32,
                 column: random.below(100) as u32,
+            })
+            .collect(),
+        variables: (0..random.below(4))
+            .map(|_| VariableRange {
+                name: random.pick(&["", "X", "λ"]).into(),
+                place: random.pick(&[VariablePlace::Register(7), VariablePlace::Capture(255)]),
+                from: random.next() as u32,
+                to: random.next() as u32,
             })
             .collect(),
     }

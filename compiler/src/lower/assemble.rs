@@ -8,6 +8,8 @@ use esl_bytecode::span::Span;
 
 use super::graph::{Cond, Graph, SegmentExit, SegmentLabel};
 use super::lines::SourceLines;
+use super::scopes::{self, RegisterRange, ScopedInstr, VariableScope, VariableScopes};
+use crate::core::VarId;
 
 /// The code of a function is longer than [`MAX_CODE`].
 #[derive(Debug)]
@@ -18,13 +20,27 @@ struct Placed {
     instr: Instr,
     target: Option<SegmentLabel>,
     span: Span,
+    scope: VariableScope,
 }
 
-/// Returns the words and line entries of `graph`.
+/// The finished code of a function.
+#[derive(Debug, Default)]
+pub(crate) struct AssembledCode {
+    pub(crate) words: Vec<u32>,
+    pub(crate) lines: Vec<LineEntry>,
+    /// Where variables are.
+    pub(crate) variables: Vec<RegisterRange>,
+}
+
+/// Returns the code of `graph`. `have_one_name` tells whether two variables have the same name.
 ///
 /// # Errors
 /// [`TooLong`] if there are too many words.
-pub(crate) fn assemble(graph: &Graph, lines: &SourceLines) -> Result<(Vec<u32>, Vec<LineEntry>), TooLong> {
+pub(crate) fn assemble(
+    graph: &Graph,
+    lines: &SourceLines,
+    have_one_name: impl Fn(VarId, VarId) -> bool,
+) -> Result<AssembledCode, TooLong> {
     let positions = graph.positions();
     let mut placed: Vec<Placed> = Vec::new();
     // The index into `placed` at which each segment begins, by position.
@@ -36,8 +52,10 @@ pub(crate) fn assemble(graph: &Graph, lines: &SourceLines) -> Result<(Vec<u32>, 
             instr: op.instr,
             target: op.landing,
             span: op.span,
+            scope: op.scope,
         }));
-        let mut put = |instr, target| placed.push(Placed { instr, target: Some(target), span: segment.span });
+        let (span, scope) = (segment.span, segment.scope);
+        let mut put = |instr, target| placed.push(Placed { instr, target: Some(target), span, scope });
         let next = graph.order.get(position + 1).copied();
         let is_back = |label: SegmentLabel| positions[label.index()] <= position;
         let go = |label| {
@@ -75,17 +93,17 @@ pub(crate) fn assemble(graph: &Graph, lines: &SourceLines) -> Result<(Vec<u32>, 
                     };
                     if let Some(mut instr) = over {
                         instr.retarget(1);
-                        placed.push(Placed { instr, target: None, span: segment.span });
+                        placed.push(Placed { instr, target: None, span, scope });
                     }
-                    placed.push(Placed { instr: go(first), target: Some(first), span: segment.span });
+                    placed.push(Placed { instr: go(first), target: Some(first), span, scope });
                     if Some(second) != next {
-                        placed.push(Placed { instr: go(second), target: Some(second), span: segment.span });
+                        placed.push(Placed { instr: go(second), target: Some(second), span, scope });
                     }
                 }
             }
         }
     }
-    encode(&placed, &starts, &positions, lines)
+    encode(&placed, &starts, &positions, lines, &graph.scopes, have_one_name)
 }
 
 fn encode(
@@ -93,7 +111,9 @@ fn encode(
     starts: &[usize],
     positions: &[usize],
     lines: &SourceLines,
-) -> Result<(Vec<u32>, Vec<LineEntry>), TooLong> {
+    scopes: &VariableScopes,
+    have_one_name: impl Fn(VarId, VarId) -> bool,
+) -> Result<AssembledCode, TooLong> {
     let mut offsets = Vec::with_capacity(placed.len() + 1);
     let mut length = 0usize;
     for item in placed {
@@ -106,11 +126,17 @@ fn encode(
     }
     let mut code = Vec::with_capacity(length);
     let mut entries: Vec<LineEntry> = Vec::new();
+    let mut scoped: Vec<ScopedInstr> = Vec::with_capacity(placed.len());
+    // A task begins at the first instruction.
+    let mut stops = vec![0];
     for (index, item) in placed.iter().enumerate() {
         let mut instr = item.instr;
         if let Some(target) = item.target {
             let start = offsets[starts[positions[target.index()]]];
             instr.retarget(start as i32 - offsets[index + 1] as i32);
+            if instr.opcode().is_loop() {
+                stops.push(starts[positions[target.index()]]);
+            }
         }
         if shows_its_line(&instr) {
             note_line(&mut entries, offsets[index], item.span, lines);
@@ -118,8 +144,20 @@ fn encode(
         let (word, aux) = instr.encode();
         code.push(word);
         code.extend(aux);
+        scoped.push(ScopedInstr {
+            words: (offsets[index] as u32, offsets[index + 1] as u32),
+            scope: item.scope,
+            is_stop: shows_its_line(&instr),
+            window: instr.call().map(|call| Reg(call.window.0)),
+        });
     }
-    Ok((code, entries))
+    for index in stops {
+        if let Some(instr) = scoped.get_mut(index) {
+            instr.is_stop = true;
+        }
+    }
+    let variables = scopes::ranges(scopes, scoped.into_iter(), have_one_name);
+    Ok(AssembledCode { words: code, lines: entries, variables })
 }
 
 /// Whether a backtrace may point at the instruction, since it can fail, call, or end the task's slice.

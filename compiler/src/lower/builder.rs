@@ -13,6 +13,7 @@ use super::graph::{Graph, SegmentExit, SegmentLabel};
 use super::lines::SourceLines;
 use super::pool::Pool;
 use super::regalloc::RegisterStack;
+use super::scopes::VariableScope;
 use crate::core::*;
 use crate::resolve::Resolution;
 
@@ -183,6 +184,8 @@ pub(super) struct LoopHead {
     pub(super) label: SegmentLabel,
     /// Number of extents open there.
     pub(super) depth: usize,
+    /// Variables in scope there.
+    pub(super) scope: VariableScope,
 }
 
 /// The vector of a frame for variables that find no room in its registers; see [`super::spill`].
@@ -229,6 +232,8 @@ pub(super) struct FunctionBuilder<'b, 'a> {
     pub(super) lambda: LambdaId,
     pub(super) graph: Graph,
     pub(super) entry: SegmentLabel,
+    /// Variables in scope at the entry.
+    pub(super) entry_scope: VariableScope,
     pub(super) registers: RegisterStack,
     /// Open dynamic extents, the innermost last.
     pub(super) extents: Vec<Extent>,
@@ -265,6 +270,7 @@ impl<'b, 'a> FunctionBuilder<'b, 'a> {
             lambda,
             graph,
             entry,
+            entry_scope: VariableScope::default(),
             registers: RegisterStack::new(),
             extents: Vec::new(),
             blocks: FxHashMap::default(),

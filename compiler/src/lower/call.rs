@@ -70,7 +70,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
 
     fn call_itself(&mut self, arguments: &'a [NodeId], dest: Dest) {
         if let Dest::Tail = dest {
-            self.jump_to_function(self.lambda, self.entry, arguments);
+            self.jump_to_function(self.lambda, self.entry, self.entry_scope, arguments);
         } else {
             self.emit_call(CallRoute::Itself, arguments, dest);
         }

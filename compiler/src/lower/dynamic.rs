@@ -116,9 +116,12 @@ impl FunctionBuilder<'_, '_> {
                 self.branch(Cond::NumEqInt(index, number), this, next);
                 self.graph.bind(this);
             }
+            let scope = self.begin_scope();
             self.module.variables[clause.variable.index()] = condition;
+            self.graph.scopes.add(clause.variable, condition);
             self.box_variable(clause.variable);
             self.form(clause.body, dest);
+            self.end_scope(scope);
             self.join(end, dest);
             self.graph.bind(next);
         }

@@ -3,18 +3,20 @@
 use esl_bytecode::compile::Work;
 use esl_bytecode::datum::{Datum, DatumKind};
 use esl_bytecode::diagnostic::Diagnostic;
-use esl_bytecode::module::{ModuleFunction, Parameters, PoolIdx};
+use esl_bytecode::module::{ModuleFunction, Parameters, PoolIdx, VariablePlace, VariableRange};
 use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::{ConstIdx, Count, PassIdx, Reg};
+use esl_bytecode::symbol::{ESL_PACKAGE, Symbol};
 
 use super::arithmetic::small_integer;
-use super::assemble::assemble;
+use super::assemble::{AssembledCode, assemble};
 use super::builder::{Excess, FunctionBuilder, ModuleBuilder, OversizedFunction};
 use super::dest::Dest;
 use super::fuse;
 use super::graph::Cond;
 use crate::core::*;
 use crate::diagnostic::code;
+use crate::resolve::Lexical;
 
 /// Native stack that one form may take before [`FunctionBuilder::form`] is called again, in bytes.
 const RED_ZONE: usize = 96 * 1024;
@@ -65,11 +67,17 @@ impl ModuleBuilder<'_> {
         fuse::improve(&mut builder.graph);
         // Even a function without registers has one, for instructions that name an empty range.
         builder.registers.reserve(Reg(0), 1);
-        let assembled = assemble(&builder.graph, builder.module.lines);
+        let assembled = {
+            let name = |variable: VarId| &builder.core.variables[variable.index()].name;
+            let is_shown = |variable| is_shown(name(variable));
+            let have_one_name =
+                |one, other| name(one).name() == name(other).name() && is_shown(one) && is_shown(other);
+            assemble(&builder.graph, builder.module.lines, have_one_name)
+        };
         if builder.registers.has_overflowed() {
             builder.excess = Some(Excess::Registers);
         }
-        let (code, lines) = assembled.unwrap_or_else(|_| {
+        let code = assembled.unwrap_or_else(|_| {
             builder.excess = builder.excess.or(Some(Excess::Instructions));
             Default::default()
         });
@@ -78,6 +86,8 @@ impl ModuleBuilder<'_> {
             let diagnostic = too_large(text, excess.what()).help("divide it into several functions");
             self.oversized.push(OversizedFunction { lambda, has_too_many_parameters, diagnostic });
         }
+        let variables = self.variable_ranges(lambda, &code);
+        let AssembledCode { words: code, lines, .. } = code;
         let mut datum = |datum: &Option<Datum>| datum.as_ref().map(|datum| self.pool.datum(datum));
         ModuleFunction {
             name: datum(&text.name),
@@ -89,8 +99,32 @@ impl ModuleBuilder<'_> {
             constants,
             code,
             lines,
+            variables,
         }
     }
+
+    /// Returns where the variables of a lambda's function are that the program has named.
+    fn variable_ranges(&self, lambda: LambdaId, code: &AssembledCode) -> Vec<VariableRange> {
+        let range = |variable: VarId, place, from, to| {
+            let name = &self.core.variables[variable.index()].name;
+            is_shown(name).then(|| VariableRange { name: name.name().into(), place, from, to })
+        };
+        let captures = self.resolution.captures(lambda).iter().enumerate().filter_map(|(index, lexical)| {
+            let Lexical::Variable(variable) = *lexical else { return None };
+            let place = VariablePlace::Capture(u8::try_from(index).ok()?);
+            let is_function = self.resolution.function(variable).is_some();
+            if is_function { None } else { range(variable, place, 0, code.words.len() as u32) }
+        });
+        let registers = code.variables.iter().filter_map(|&(variable, register, from, to)| {
+            range(variable, VariablePlace::Register(register.0), from, to)
+        });
+        captures.chain(registers).collect()
+    }
+}
+
+/// Returns whether debuggers show a variable of this name: one that the program has named, and not a macro.
+fn is_shown(name: &Symbol) -> bool {
+    name.package().is_some() && !(name.name().starts_with('%') && name.is_in(ESL_PACKAGE))
 }
 
 /// Returns the diagnostic for a function that has too much of something.
@@ -211,6 +245,11 @@ impl<'a> FunctionBuilder<'_, 'a> {
         for parameter in in_registers.chain(keys.iter().map(|key| key.optional.parameter)) {
             self.module.variables[parameter.variable.index()] = self.registers.take(1);
         }
+        // The others have no value yet.
+        for parameter in text.required.iter().copied().chain(text.rest) {
+            self.name_parameter(parameter);
+        }
+        self.entry_scope = self.graph.scopes.current;
         if self.module.spills_from.is_some() {
             self.make_spill();
         }
@@ -255,9 +294,18 @@ impl<'a> FunctionBuilder<'_, 'a> {
             self.emit(Instr::LoadNil { first: flag.into(), count: Count(1) });
         }
         self.graph.bind(end);
+        self.name_parameter(optional.parameter);
         self.settle(optional.parameter);
         if let Some((supplied, _)) = supplied {
+            self.name_parameter(supplied);
             self.settle(supplied);
+        }
+    }
+
+    /// Notes that a parameter has its value, for debuggers.
+    pub(super) fn name_parameter(&mut self, parameter: Parameter) {
+        if !parameter.is_special {
+            self.graph.scopes.add(parameter.variable, self.register(parameter.variable));
         }
     }
 

@@ -118,11 +118,12 @@ fn rotate(graph: &mut Graph) {
         if !pays || test.ops.len() > ROTATED_LENGTH || test.ops.iter().any(|op| op.landing.is_some()) {
             continue;
         }
-        let (ops, exit, span) = (test.ops.clone(), test.exit, test.span);
+        let (ops, exit, span, scope) = (test.ops.clone(), test.exit, test.span, test.scope);
         let segment = &mut graph.segments[index];
         segment.ops.extend(ops);
         segment.exit = exit;
         segment.span = span;
+        segment.scope = scope;
     }
 }
 

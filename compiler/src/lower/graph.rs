@@ -11,6 +11,8 @@ use esl_bytecode::opcode::Instr;
 use esl_bytecode::operand::{ClassIdx, ConstIdx, Int8, Int16, Reg, TypeIdx};
 use esl_bytecode::span::Span;
 
+use super::scopes::{VariableScope, VariableScopes};
+
 /// A segment, bound or not yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct SegmentLabel(u32);
@@ -85,6 +87,8 @@ pub(crate) struct Op {
     pub(crate) landing: Option<SegmentLabel>,
     /// Place in the source.
     pub(crate) span: Span,
+    /// Variables in scope.
+    pub(crate) scope: VariableScope,
 }
 
 /// How control leaves a segment.
@@ -116,6 +120,8 @@ pub(crate) struct Segment {
     pub(crate) exit: SegmentExit,
     /// Place of the exit in the source.
     pub(crate) span: Span,
+    /// Variables in scope at the exit.
+    pub(crate) scope: VariableScope,
 }
 
 /// The code of one function.
@@ -125,13 +131,16 @@ pub(crate) struct Graph {
     pub(crate) segments: Vec<Segment>,
     /// Bound segments in the order of the finished code. The first is the entry.
     pub(crate) order: Vec<SegmentLabel>,
+    /// Variables in scope.
+    pub(crate) scopes: VariableScopes,
     open: Option<SegmentLabel>,
 }
 
 impl Graph {
     /// Creates the graph of an empty function, with its entry open. Returns the graph and the entry.
     pub(crate) fn new() -> (Graph, SegmentLabel) {
-        let mut graph = Graph { segments: Vec::new(), order: Vec::new(), open: None };
+        let mut graph =
+            Graph { segments: Vec::new(), order: Vec::new(), scopes: VariableScopes::default(), open: None };
         let entry = graph.label();
         graph.order.push(entry);
         graph.open = Some(entry);
@@ -141,7 +150,8 @@ impl Graph {
     /// Creates a label, to be bound later.
     pub(crate) fn label(&mut self) -> SegmentLabel {
         let label = SegmentLabel(self.segments.len() as u32);
-        self.segments.push(Segment { ops: Vec::new(), exit: SegmentExit::End, span: Span::default() });
+        let (ops, scope) = (Vec::new(), VariableScope::default());
+        self.segments.push(Segment { ops, exit: SegmentExit::End, span: Span::default(), scope });
         label
     }
 
@@ -153,7 +163,7 @@ impl Graph {
     /// Appends an instruction.
     pub(crate) fn push(&mut self, instr: Instr, landing: Option<SegmentLabel>, span: Span) {
         if let Some(open) = self.open {
-            self.segments[open.index()].ops.push(Op { instr, landing, span });
+            self.segments[open.index()].ops.push(Op { instr, landing, span, scope: self.scopes.current });
         }
     }
 
@@ -163,6 +173,7 @@ impl Graph {
             let segment = &mut self.segments[open.index()];
             segment.exit = exit;
             segment.span = span;
+            segment.scope = self.scopes.current;
         }
     }
 

@@ -44,6 +44,7 @@ use esl_bytecode::operand::Reg;
 use super::builder::{FunctionBuilder, LoopHead};
 use super::dest::Dest;
 use super::graph::SegmentLabel;
+use super::scopes::VariableScope;
 use super::variable::VariableLocation;
 use crate::core::*;
 
@@ -56,10 +57,10 @@ impl<'a> FunctionBuilder<'_, 'a> {
                 self.extents.len(),
                 "self calls of inlined functions are in tail position"
             );
-            return self.jump_to_function(lambda, state.label, arguments);
+            return self.jump_to_function(lambda, state.label, state.scope, arguments);
         }
         let text = &self.core.lambdas[lambda.index()];
-        let (top, spilled) = (self.registers.top(), self.spill_height());
+        let scope = self.begin_scope();
         let depth = self.extents.len();
         let is_loop = self.module.resolution.is_self_called(lambda);
         for (parameter, &argument) in text.required.iter().zip(arguments) {
@@ -67,6 +68,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
                 let register = self.registers.top();
                 self.form(argument, Dest::Fresh(register));
                 self.module.variables[parameter.variable.index()] = self.registers.take(1);
+                self.name_parameter(*parameter);
             } else {
                 self.bind_lexical(parameter.variable, argument);
             }
@@ -75,7 +77,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
         if is_loop {
             let head = self.graph.label();
             self.graph.bind(head);
-            self.loops.insert(lambda, LoopHead { label: head, depth });
+            self.loops.insert(lambda, LoopHead { label: head, depth, scope: self.graph.scopes.current });
         }
         for &parameter in &text.required {
             if parameter.is_special || self.module.resolution.is_assigned(parameter.variable) {
@@ -87,17 +89,25 @@ impl<'a> FunctionBuilder<'_, 'a> {
         if has_literals {
             self.literals = None;
         }
-        self.registers.release(top);
-        self.release_spilled(spilled);
+        self.end_scope(scope);
     }
 
     /// Assigns new values to the parameters of a function and jumps to `head`, before the code that boxes
     /// them.
-    pub(super) fn jump_to_function(&mut self, lambda: LambdaId, head: SegmentLabel, arguments: &'a [NodeId]) {
+    pub(super) fn jump_to_function(
+        &mut self,
+        lambda: LambdaId,
+        head: SegmentLabel,
+        scope: VariableScope,
+        arguments: &'a [NodeId],
+    ) {
         let text = &self.core.lambdas[lambda.index()];
         let targets: Vec<VarId> = text.required.iter().map(|parameter| parameter.variable).collect();
+        let here = self.graph.scopes.current;
         self.assign(&targets, arguments);
+        self.graph.scopes.current = scope;
         self.jump(head);
+        self.graph.scopes.current = here;
     }
 
     /// Sets the registers of `targets` to the values of forms, all of which are computed before the first is
@@ -121,6 +131,8 @@ impl<'a> FunctionBuilder<'_, 'a> {
                 waiting.push((register, self.registers.take(1)));
             } else {
                 self.form(value, Dest::Keep(register));
+                // While the other values are computed, this is one of the next turn.
+                self.graph.scopes.hide(register);
             }
         }
         for (register, temporary) in waiting {
@@ -176,7 +188,9 @@ impl<'a> FunctionBuilder<'_, 'a> {
         if !in_registers || distinct.len() != targets.len() {
             return false;
         }
+        let scope = self.graph.scopes.current;
         self.assign(&targets, &values);
+        self.graph.scopes.current = scope;
         self.progn_rest(&forms[count..], dest);
         true
     }

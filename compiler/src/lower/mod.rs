@@ -10,9 +10,10 @@
 //! The walk recurses on the native stack, which is extended as needed (`builder::FunctionBuilder::form`); its
 //! depth is the depth of the core tree, which the expander bounds.
 //!
-//! Layers: `graph`, `dest`, `regalloc`, `pool` and `lines`; then the state of lowering (`builder`), then one
-//! file for each family of forms, whose methods are methods of the `builder::FunctionBuilder`, and last
-//! `function` with the dispatch over forms. A file uses only files before it; `tests/layers.rs` holds that.
+//! Layers: `scopes`, `graph`, `dest`, `regalloc`, `pool` and `lines`; then the state of lowering (`builder`),
+//! then one file for each family of forms, whose methods are methods of the `builder::FunctionBuilder`, and
+//! last `function` with the dispatch over forms. A file uses only files before it; `tests/layers.rs` holds
+//! that.
 //!
 //! Source: Dybvig, Hieb and Butler 1990, "Destination-driven code generation".
 
@@ -36,6 +37,7 @@ mod operator;
 mod pool;
 mod recovery;
 mod regalloc;
+mod scopes;
 mod spill;
 mod split;
 mod structure;

@@ -90,7 +90,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
 
     /// Binds variables to the values of a form around a body.
     pub(super) fn bind_values(&mut self, targets: &[BoundVariable], form: NodeId, body: NodeId, dest: Dest) {
-        let top = self.registers.top();
+        let (scope, top) = (self.begin_scope(), self.registers.top());
         let depth = self.extents.len();
         let base = match targets.len() {
             0 => {
@@ -111,13 +111,14 @@ impl<'a> FunctionBuilder<'_, 'a> {
             match target {
                 BoundVariable::Lexical(variable) => {
                     self.module.variables[variable.index()] = register;
+                    self.graph.scopes.add(*variable, register);
                     self.box_variable(*variable);
                 }
                 BoundVariable::Special(symbol) => self.bind_special(symbol, register),
             }
         }
         self.form_inside(body, dest, depth);
-        self.registers.release(top);
+        self.end_scope(scope);
     }
 
     /// Lowers a form for all its values, and then a second one for effect.

@@ -6,6 +6,7 @@ use esl_bytecode::symbol::Symbol;
 
 use super::builder::{Excess, Extent, FunctionBuilder};
 use super::dest::Dest;
+use super::scopes::VariableScope;
 use crate::core::*;
 use crate::resolve::Lexical;
 
@@ -22,6 +23,14 @@ pub(super) enum VariableLocation {
     CaptureBox(Index),
     /// A place in the vector of variables that find no room in the registers.
     Spilled(Int16),
+}
+
+/// What is in use outside a form that binds variables.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OuterScope {
+    top: Reg,
+    spilled: i16,
+    variables: VariableScope,
 }
 
 impl<'a> FunctionBuilder<'_, 'a> {
@@ -174,7 +183,7 @@ impl<'a> FunctionBuilder<'_, 'a> {
         if self.parallel_assignment(bindings, body, dest) {
             return;
         }
-        let (top, spilled) = (self.registers.top(), self.spill_height());
+        let scope = self.begin_scope();
         let depth = self.extents.len();
         // Special bindings of a parallel `let` are made once all values are computed.
         let mut waiting: Vec<(&Symbol, Reg)> = Vec::new();
@@ -209,8 +218,20 @@ impl<'a> FunctionBuilder<'_, 'a> {
             self.bind_special(symbol, register);
         }
         self.form_inside(body, dest, depth);
-        self.registers.release(top);
-        self.release_spilled(spilled);
+        self.end_scope(scope);
+    }
+
+    /// Returns what is in use before variables are bound, for [`FunctionBuilder::end_scope`].
+    pub(super) fn begin_scope(&self) -> OuterScope {
+        let variables = self.graph.scopes.current;
+        OuterScope { top: self.registers.top(), spilled: self.spill_height(), variables }
+    }
+
+    /// Gives back what was taken for variables since `scope` began.
+    pub(super) fn end_scope(&mut self, scope: OuterScope) {
+        self.registers.release(scope.top);
+        self.release_spilled(scope.spilled);
+        self.graph.scopes.current = scope.variables;
     }
 
     /// Binds a lexical variable to the value of a form.
@@ -220,12 +241,14 @@ impl<'a> FunctionBuilder<'_, 'a> {
         }
         if let Some(register) = self.alias(variable, value) {
             self.module.variables[variable.index()] = register;
+            self.graph.scopes.add(variable, register);
             return;
         }
         let register = self.registers.top();
         self.form(value, Dest::Fresh(register));
         if !self.spill_variable(variable) {
             self.module.variables[variable.index()] = self.registers.take(1);
+            self.graph.scopes.add(variable, register);
             self.box_variable(variable);
         }
     }

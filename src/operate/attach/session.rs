@@ -7,7 +7,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
-use esl_vm::host::{Answer, FunctionRef, Incoming, Question, Sender, SurveyRequest, SurveyedTask};
+use esl_vm::host::{
+    Answer, FrameVariable, FunctionRef, Incoming, Question, Sender, SurveyRequest, SurveyedTask,
+};
 
 use super::datum::{boolean, codes_of, form_of, integer, list, string};
 use super::form::WireForm;
@@ -283,6 +285,7 @@ impl OperatorSession {
         for frame in frames {
             let place = frame.place.map_or(String::new(), |place| format!(", {place}"));
             _ = writeln!(text, "  in {}{place}", frame.function);
+            text.push_str(&FrameVariable::lines(&frame.variables));
         }
         Ok(WireForm::Text(text))
     }

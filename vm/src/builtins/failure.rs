@@ -3,6 +3,7 @@
 
 use smallvec::SmallVec;
 
+use crate::interp::frames::Frame;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::report;
 use crate::run;
@@ -161,7 +162,10 @@ pub(super) fn end_task(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         None => {
             vm.embedder.last_words = vm.heap.string_text(arguments[1]);
             vm.embedder.last_place = report::place_in_program(vm, vm.scheduler.task(), vm.frames());
-            vm.scheduler.task_mut().extra_mut().report = Some(FailureReport { story, ending });
+            let is_wanted = vm.watch.tells_variables;
+            let detailed =
+                is_wanted.then(|| (report::with_variables(vm, &story, vm.frames()).into(), story.len()));
+            vm.scheduler.task_mut().extra_mut().report = Some(FailureReport { story, ending, detailed });
         }
     }
     vm.scheduler.task_mut().begin_end(TaskEnd::Failed(arguments[0]));
@@ -179,28 +183,40 @@ pub(super) fn exit(vm: &mut Vm, arguments: &[Value]) -> Outcome {
 
 pub(super) fn backtrace(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let limit = arguments[0].as_index().unwrap_or(usize::MAX).min(super::LIMIT);
+    let with_variables = arguments.get(1).is_some_and(|variables| variables.is_true());
     let mut rows = Vec::new();
-    let frames: Vec<_> =
-        vm.frames().take(limit).map(|frame| (frame.function, frame.word, frame.is_exact)).collect();
-    for (function, word, is_exact) in frames {
+    let row = |frame: Frame<'_>| {
+        let variables = if with_variables { report::variables_of(vm, &frame) } else { Vec::new() };
+        (frame.function, frame.place(), variables)
+    };
+    let frames: Vec<_> = vm.frames().take(limit).map(row).collect();
+    let shown: usize = frames.iter().map(|(_, _, variables)| variables.len()).sum();
+    for (function, word, variables) in frames {
         let Some(code) = vm.heap.function_code(function) else { continue };
         let name = vm.heap.code(code).map_or(Value::NIL, |code| code.name);
         let is_top_level =
             vm.heap.header(function).is_some_and(|header| header.aux == crate::world::load::TOP_LEVEL);
         let name =
             if name.is_nil() && !is_top_level { vm.heap.list(&[vm.world.known.lambda])? } else { name };
-        // A caller stands behind its call.
-        let word = if is_exact { word } else { word.saturating_sub(1) };
-        let row = match vm.world.source_place(&vm.heap, code, word as u32) {
+        let mut row = match vm.world.source_place(&vm.heap, code, word) {
             Some(place) => {
                 let source = vm.heap.alloc_str(&place.source)?;
                 let (line, column) = (Value::index(place.line as usize), Value::index(place.column as usize));
-                vm.heap.list(&[name, source, line, column])?
+                vec![name, source, line, column]
             }
-            None => vm.heap.list(&[name])?,
+            None => vec![name],
         };
-        rows.push(row);
+        if with_variables {
+            row.resize(4, Value::NIL);
+            let mut pairs = Vec::with_capacity(variables.len());
+            for (name, value) in variables {
+                let name = vm.heap.alloc_str(&name)?;
+                pairs.push(vm.heap.cons(name, value)?);
+            }
+            row.push(vm.heap.list(&pairs)?);
+        }
+        rows.push(vm.heap.list(&row)?);
     }
-    vm.exchange.charge(rows.len() * 64);
+    vm.exchange.charge((rows.len() + shown) * 64);
     Ok(vm.heap.list(&rows)?)
 }

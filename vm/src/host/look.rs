@@ -89,6 +89,24 @@ pub struct FrameRow {
     pub function: String,
     /// Place in the program, `FILE:LINE:COLUMN`.
     pub place: Option<String>,
+    /// The variables that are in scope there.
+    pub variables: Vec<FrameVariable>,
+}
+
+/// A variable of a frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FrameVariable {
+    /// Name.
+    pub name: String,
+    /// A short text for its value.
+    pub value: String,
+}
+
+impl FrameVariable {
+    /// Returns the lines that show variables below that of their frame.
+    pub fn lines(variables: &[FrameVariable]) -> String {
+        variables.iter().map(|FrameVariable { name, value }| format!("      {name} = {value}\n")).collect()
+    }
 }
 
 /// A relation of the database.

@@ -4,11 +4,13 @@
 use std::marker::PhantomData;
 
 use super::{code_of, pc_from_value, stubs, word_at};
+use crate::heap::Heap;
 use crate::heap::layout::CodeObject;
 use crate::task::Entry;
 use crate::task::Task;
 use crate::value::Value;
 use crate::vm::Vm;
+use esl_bytecode::module::VariablePlace;
 use esl_bytecode::opcode::{CallTarget, Opcode};
 
 /// Words below the first register of a task's outermost frame: the frame of the stub at the task's end has
@@ -37,6 +39,22 @@ impl<'a> Frame<'a> {
         // SAFETY: F2, F4: so many registers of the frame lie in the stack, and all its words are values;
         // `Frames` borrows it.
         unsafe { std::slice::from_raw_parts(self.base, self.registers) }
+    }
+
+    /// Returns the word of the code that tells where it stands: a caller stands behind its call.
+    pub(crate) fn place(&self) -> u32 {
+        (if self.is_exact { self.word } else { self.word.saturating_sub(1) }) as u32
+    }
+
+    /// Returns the value at the place of a variable; `None` if the frame does not have it.
+    pub(crate) fn value_at(&self, heap: &Heap, place: VariablePlace) -> Option<Value> {
+        let value = match place {
+            VariablePlace::Register(register) => self.registers().get(usize::from(register)),
+            VariablePlace::Capture(capture) => {
+                heap.function_captures(self.function)?.get(usize::from(capture))
+            }
+        };
+        value.copied().filter(|&value| value != Value::UNSUPPLIED)
     }
 
     /// Returns the address at which its function returns, that of a stub for the outermost frame.

@@ -15,7 +15,7 @@ pub use observer::{Coming, Observer, Seen};
 
 use esl_bytecode::compile::SourcePlace;
 
-use crate::host::Host;
+use crate::host::{FrameVariable, Host};
 use crate::schedule::Scheduler;
 use crate::task::TaskNumber;
 
@@ -26,6 +26,8 @@ pub struct StandingFrame {
     pub function: String,
     /// Where in its source it stands.
     pub place: Option<SourcePlace>,
+    /// The variables that are in scope there.
+    pub variables: Vec<FrameVariable>,
 }
 
 /// Everything that is kept for those who watch a run.
@@ -33,6 +35,10 @@ pub struct StandingFrame {
 pub(crate) struct Watch {
     /// Whether anybody has to be told what happens.
     pub(crate) is_watched: bool,
+    /// Whether that is so of each turn, signal and fact, and not only of failures and the collector.
+    pub(crate) is_followed: bool,
+    /// Whether reports of failures are kept with the variables of their frames.
+    pub(crate) tells_variables: bool,
     /// The observers.
     pub(crate) observers: Observers,
     /// Observers on their way.
@@ -48,12 +54,10 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Updates `is_watched`.
+    /// Updates `is_watched` and `is_followed`.
     pub(crate) fn update_is_watched(&mut self) {
-        self.is_watched = self.traces_tasks
-            || !self.observers.list.is_empty()
-            || self.figures.are_wanted
-            || self.journal.is_kept;
+        self.is_followed = self.traces_tasks || !self.observers.list.is_empty() || self.figures.of_tasks;
+        self.is_watched = self.is_followed || self.figures.are_wanted || self.journal.is_kept;
     }
 
     /// Counts that control passes a place, if that is wanted.

@@ -3,6 +3,7 @@
 use esl_bytecode::compile::SourcePlace;
 
 use super::task_label;
+use super::tasks::place_of;
 use crate::describe::function_name;
 use crate::interp::frames::Frames;
 use crate::task::TaskState;
@@ -17,13 +18,9 @@ impl Vm {
         if task.state == TaskState::Ended {
             return None;
         }
-        let calls = Frames::of_task(task).take(limit).map(|frame| {
-            // A caller stands behind its call.
-            let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
-            let code = self.heap.function_code(frame.function);
-            let place = code.and_then(|code| self.world.source_place(&self.heap, code, word as u32));
-            (function_name(&self.heap, frame.function), place)
-        });
+        let calls = Frames::of_task(task)
+            .take(limit)
+            .map(|frame| (function_name(&self.heap, frame.function), place_of(self, &frame)));
         Some(calls.chain([(task_label(self, task.object), None)]).collect())
     }
 }

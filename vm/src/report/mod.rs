@@ -9,6 +9,7 @@ mod stand;
 mod survey;
 mod tasks;
 mod trace;
+mod variables;
 
 pub(crate) use figures::note_end_in_figures;
 pub(crate) use label::{
@@ -20,3 +21,4 @@ pub(crate) use observe::{
 };
 pub(crate) use tasks::{number_of_owner, operations_left, place_in_program, program_place, tasks_left};
 pub(crate) use trace::{Happening, note, trace_end};
+pub(crate) use variables::{variable_rows, variables_of, with_variables};

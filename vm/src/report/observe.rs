@@ -42,7 +42,14 @@ impl Vm {
     /// Has a journal kept of failures and late timers from now on, for surveys.
     pub fn keep_journal(&mut self) {
         self.watch.journal.is_kept = true;
+        self.watch.tells_variables = true;
         self.watch.update_is_watched();
+    }
+
+    /// Has the reports of failures kept with the variables of their frames from now on, for
+    /// [`Vm::detailed_report`].
+    pub fn tell_variables(&mut self) {
+        self.watch.tells_variables = true;
     }
 
     /// Returns the place where other threads leave observers.
@@ -101,7 +108,7 @@ fn note_failure(vm: &mut Vm, cause: &str) {
 pub(crate) fn note_end_by_failure(vm: &mut Vm, condition: Value) {
     let task = vm.scheduler.task();
     let report = task.extra.as_ref().and_then(|extra| extra.report.as_ref());
-    let text = report.map_or_else(|| report_in_short(&vm.heap, condition), |report| report.text());
+    let text = report.map_or_else(|| report_in_short(&vm.heap, condition), |report| report.detailed_text());
     vm.watch.journal.note_end(task.number.0, text);
 }
 

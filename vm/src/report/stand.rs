@@ -5,7 +5,8 @@
 use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::opcode::{CallTarget, Instr};
 
-use super::task_label;
+use super::tasks::place_of;
+use super::{task_label, variable_rows};
 use crate::describe::{describe, function_name};
 use crate::heap::Kind;
 use crate::interp::frames::{Frame, Frames};
@@ -48,11 +49,10 @@ impl Vm {
     /// Returns the first `limit` frames of a task that has not ended, the innermost first.
     pub fn frames_of(&self, number: TaskNumber, limit: usize) -> Vec<StandingFrame> {
         let Some(task) = self.standing(number) else { return Vec::new() };
-        let row = |frame: Frame<'_>| {
-            let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
-            let code = self.heap.function_code(frame.function);
-            let place = code.and_then(|code| self.world.source_place(&self.heap, code, word as u32));
-            StandingFrame { function: function_name(&self.heap, frame.function), place }
+        let row = |frame: Frame<'_>| StandingFrame {
+            function: function_name(&self.heap, frame.function),
+            place: place_of(self, &frame),
+            variables: variable_rows(self, &frame),
         };
         Frames::of_task(task).take(limit).map(row).collect()
     }

@@ -9,8 +9,8 @@ use esl_bytecode::symbol::Symbol;
 
 use super::holders::{holders_of, number_of};
 use super::label::{field_of, items};
-use super::tasks::{is_of_library, number_of_owner, program_place};
-use super::{reason_of, task_label};
+use super::tasks::{is_of_library, number_of_owner, place_of, program_place};
+use super::{reason_of, task_label, variable_rows};
 use crate::describe::{describe, function_name};
 use crate::host::{
     FrameRow, InputRow, LockRow, RunFigures, Survey, SurveyRequest, SurveyedTask, TaskStanding,
@@ -128,12 +128,11 @@ pub(super) fn row_of(vm: &Vm, task: &Task, owners: &BTreeMap<u64, u64>) -> Surve
 /// Returns the frames of a parked task that do not belong to the library.
 fn frames(vm: &Vm, task: &Task) -> Vec<FrameRow> {
     let row = |frame: crate::interp::frames::Frame<'_>| {
-        let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
-        let code = vm.heap.function_code(frame.function)?;
-        let place = vm.world.source_place(&vm.heap, code, word as u32)?;
+        let place = place_of(vm, &frame)?;
         (!is_of_library(&place.source)).then(|| FrameRow {
             function: function_name(&vm.heap, frame.function),
             place: Some(format!("{}:{}:{}", place.source, place.line, place.column)),
+            variables: variable_rows(vm, &frame),
         })
     };
     let mut rows: Vec<FrameRow> =
@@ -142,7 +141,8 @@ fn frames(vm: &Vm, task: &Task) -> Vec<FrameRow> {
         && let Some(place) = program_place(vm, task)
     {
         // The last call of a function leaves no frame of it.
-        rows.push(FrameRow { function: "a function that this call has left".into(), place: Some(place) });
+        let function = "a function that this call has left".into();
+        rows.push(FrameRow { function, place: Some(place), variables: Vec::new() });
     }
     rows
 }

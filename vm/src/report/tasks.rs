@@ -180,6 +180,17 @@ pub(crate) fn program_place(vm: &Vm, task: &Task) -> Option<String> {
     Some(format!("{}:{}:{}", place.source, place.line, place.column))
 }
 
+/// Returns the place at which a frame stands.
+pub(super) fn place_of(vm: &Vm, frame: &Frame<'_>) -> Option<SourcePlace> {
+    vm.world.source_place(&vm.heap, vm.heap.function_code(frame.function)?, frame.place())
+}
+
+/// Returns the text of the place at which a frame stands.
+pub(super) fn place_text(vm: &Vm, frame: &Frame<'_>) -> Option<String> {
+    let place = place_of(vm, frame)?;
+    Some(format!("{}:{}:{}", place.source, place.line, place.column))
+}
+
 /// Returns the innermost place of the program, not of the library, at which a task with these frames stands.
 /// If tail calls have left no frame of the program, it is that of the tail call in the function with which
 /// the task began, or of its beginning if there are several.
@@ -192,10 +203,7 @@ pub(crate) fn place_in_program<'a>(
         let place = vm.world.source_place(&vm.heap, code, word as u32);
         place.filter(|place| !is_of_library(&place.source))
     };
-    let in_frame = |frame: Frame<'_>| {
-        let word = if frame.is_exact { frame.word } else { frame.word.saturating_sub(1) };
-        place(vm.heap.function_code(frame.function)?, word)
-    };
+    let in_frame = |frame: Frame<'_>| place(vm.heap.function_code(frame.function)?, frame.place() as usize);
     frames.take(FRAMES).find_map(in_frame).or_else(|| {
         let code = first_code_of(task);
         place(code, tail_call_in(vm.heap.code_words(code)?).unwrap_or(0))

@@ -174,6 +174,12 @@ impl Vm {
         }
     }
 
+    /// Returns the same with the variables of its frames, if [`Vm::tell_variables`] has asked for them.
+    pub fn detailed_report(&self, id: TaskId) -> Option<String> {
+        let extra = self.scheduler.tasks.get(id)?.extra.as_ref()?;
+        extra.report.as_ref().map(|report| report.detailed_text()).or_else(|| self.report(id))
+    }
+
     /// Returns the ticks that a task has used.
     pub fn ticks_of(&self, id: TaskId) -> u64 {
         self.scheduler.tasks.get(id).map_or(0, |task| task.ticks)

@@ -140,8 +140,10 @@ pub(super) fn answer_call(vm: &mut Vm, end: TaskEnd, values: &[Value]) -> bool {
             let extra = vm.scheduler.task_mut().extra.as_mut();
             let report = extra.and_then(|extra| extra.report.take());
             let message = vm.embedder.last_words.take().unwrap_or_else(|| vm.describe(condition));
-            let report =
-                report.map_or_else(|| report::report_in_short(&vm.heap, condition), |report| report.text());
+            let report = report.map_or_else(
+                || report::report_in_short(&vm.heap, condition),
+                |report| report.detailed_text(),
+            );
             let (cause, arguments) =
                 (report::cause_label(&vm.heap, condition), report::failure_arguments(vm, condition));
             Answer::Failed { cause, message, report, arguments }

@@ -25,6 +25,8 @@ pub(crate) use limit::{AccountId, Allowance, Fund, Limit};
 pub use tasks::TaskId;
 pub(crate) use tasks::Tasks;
 
+use std::sync::Arc;
+
 use crate::heap::{Heap, Holder};
 use crate::saved_pc::SavedPc;
 use crate::stack::Stack;
@@ -154,9 +156,12 @@ pub(crate) struct FailureReport {
     pub story: String,
     /// Line that says that there is no recovery.
     pub ending: String,
+    /// The account with the variables of its frames, if somebody looks at the run; and the length of that
+    /// without them.
+    pub detailed: Option<(Arc<str>, usize)>,
 }
 
-list_state! { FailureReport { story: Run, ending: Run } }
+list_state! { FailureReport { story: Run, ending: Run, detailed: Process } }
 
 impl FailureReport {
     /// Adds the story of a failure of a cleanup that this one has had run.
@@ -168,6 +173,18 @@ impl FailureReport {
     /// Returns the whole report.
     pub(crate) fn text(&self) -> String {
         format!("{}{}Aborted\n", self.story, self.ending)
+    }
+
+    /// Returns the whole report, with the variables of its frames if they were noted.
+    pub(crate) fn detailed_text(&self) -> String {
+        match &self.detailed {
+            // Cleanups may have added to it since.
+            Some((detailed, length)) => {
+                let added = self.story.get(*length..).unwrap_or_default();
+                format!("{detailed}{added}{}Aborted\n", self.ending)
+            }
+            None => self.text(),
+        }
     }
 }
 

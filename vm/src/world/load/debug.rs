@@ -1,66 +1,128 @@
 //! Information about functions beside their code: lambda list, documentation, and places in the source.
 //!
-//! The `debug` slot of a Code is a Record of four slots: lambda list, documentation, names of the sources (a
-//! simple vector, shared by the functions of a module), and the places: words, four for each entry.
+//! The `debug` slot of a Code is a Record of four slots: lambda list, documentation, the names of a module (a
+//! pair of two simple vectors that its functions share: names of sources, names of variables), and words: the
+//! number of places, four words for each place, two for each variable.
+
+use std::collections::HashMap;
+use std::sync::Arc;
 
 use esl_bytecode::compile::SourcePlace;
-use esl_bytecode::module::{LineEntry, ModuleFunction, PoolIdx};
+use esl_bytecode::module::{LineEntry, Module, ModuleFunction, PoolIdx, VariablePlace};
 
 use crate::heap::{AllocError, Heap, Kind};
 use crate::value::Value;
 
 const LAMBDA_LIST: usize = 0;
 const DOCUMENTATION: usize = 1;
-const SOURCES: usize = 2;
-const PLACES: usize = 3;
+const NAMES: usize = 2;
+const WORDS: usize = 3;
 
 /// Value of `aux` that distinguishes this record from the machine's other records.
 pub(crate) const DEBUG_RECORD: u16 = 1;
 
-/// Makes a simple vector of the names of sources.
-pub(super) fn sources(heap: &mut Heap, sources: &[String]) -> Result<Value, AllocError> {
-    let mut names = Vec::with_capacity(sources.len());
-    for source in sources {
+/// Bits of a word of a variable for its place: a register or capture, and which of the two. The rest is the
+/// number of its name.
+const PLACE_BITS: u32 = 9;
+/// Names of variables that a module may have; others are left out.
+const MAX_NAMES: usize = 1 << (32 - PLACE_BITS);
+
+/// Numbers of the names of a module's variables.
+pub(super) type VariableNames = HashMap<Arc<str>, u32>;
+
+/// Makes the names of a module, and numbers those of its variables.
+pub(super) fn names(
+    heap: &mut Heap,
+    module: &Module,
+    numbers: &mut VariableNames,
+) -> Result<Value, AllocError> {
+    let mut names = Vec::with_capacity(module.sources.len());
+    for source in &module.sources {
         names.push(heap.alloc_str(source)?);
     }
-    heap.alloc_vector(&names)
+    let sources = heap.alloc_vector(&names)?;
+    names.clear();
+    for variable in module.functions.iter().flat_map(|function| &function.variables) {
+        if !numbers.contains_key(&variable.name) && names.len() < MAX_NAMES {
+            numbers.insert(variable.name.clone(), names.len() as u32);
+            names.push(heap.alloc_str(&variable.name)?);
+        }
+    }
+    let variables = heap.alloc_vector(&names)?;
+    heap.cons(sources, variables)
 }
 
-/// Makes the record of a function of a module with this pool.
+/// Makes the record of a function of a module with this pool and these names.
 pub(super) fn describe(
     heap: &mut Heap,
     function: &ModuleFunction,
     pool: &[Value],
-    sources: Value,
+    names: Value,
+    numbers: &VariableNames,
 ) -> Result<Value, AllocError> {
     let constant = |index: Option<PoolIdx>| index.map_or(Value::NIL, |PoolIdx(index)| pool[index as usize]);
-    let places = heap.alloc_words(function.lines.len() * 4, 0)?;
-    if let Some(words) = heap.words_mut(places) {
-        for (words, entry) in words.chunks_exact_mut(4).zip(&function.lines) {
-            words.copy_from_slice(&[entry.pc, entry.source, entry.line, entry.column]);
-        }
+    let mut words = Vec::with_capacity(1 + function.lines.len() * 4 + function.variables.len() * 2);
+    words.push(function.lines.len() as u32);
+    for LineEntry { pc, source, line, column } in &function.lines {
+        words.extend([pc, source, line, column]);
+    }
+    for variable in &function.variables {
+        let Some(name) = numbers.get(&variable.name) else { continue };
+        let place = match variable.place {
+            VariablePlace::Register(register) => u32::from(register) << 1,
+            VariablePlace::Capture(capture) => u32::from(capture) << 1 | 1,
+        };
+        // Code has fewer words than 16 bits can count.
+        words.extend([variable.from | variable.to << 16, place | name << PLACE_BITS]);
+    }
+    let object = heap.alloc_words(words.len(), 0)?;
+    if let Some(room) = heap.words_mut(object) {
+        room.copy_from_slice(&words);
     }
     let mut slots = [Value::NIL; 4];
     slots[LAMBDA_LIST] = constant(function.lambda_list);
     slots[DOCUMENTATION] = constant(function.documentation);
-    slots[SOURCES] = sources;
-    slots[PLACES] = places;
+    slots[NAMES] = names;
+    slots[WORDS] = object;
     heap.alloc_record(Kind::Record, 0, DEBUG_RECORD, &slots)
+}
+
+/// Returns the words of places and those of variables, and the names of sources and of variables, from a
+/// debug record.
+fn parts_of(heap: &Heap, debug: Value) -> Option<([&[u32]; 2], [&[Value]; 2])> {
+    let record = heap.record(debug, Kind::Record)?;
+    let (count, words) = heap.words(record[WORDS])?.split_first()?;
+    let (places, variables) = words.split_at_checked(*count as usize * 4)?;
+    let names = heap.as_cons(record[NAMES])?;
+    Some(([places, variables], [heap.vector(names.car)?, heap.vector(names.cdr)?]))
 }
 
 /// Returns the source place of word `pc` of a code, from its debug record.
 pub(super) fn place_of(heap: &Heap, debug: Value, pc: u32) -> Option<SourcePlace> {
-    let record = heap.record(debug, Kind::Record)?;
-    let words = heap.words(record[PLACES])?;
-    let entries = words.chunks_exact(4).map(|words| LineEntry {
+    let ([places, _], [sources, _]) = parts_of(heap, debug)?;
+    let entries = places.chunks_exact(4).map(|words| LineEntry {
         pc: words[0],
         source: words[1],
         line: words[2],
         column: words[3],
     });
     let entry = entry_at(entries, pc)?;
-    let name = *heap.vector(record[SOURCES])?.get(entry.source as usize)?;
+    let name = *sources.get(entry.source as usize)?;
     Some(SourcePlace { source: heap.string_text(name)?, line: entry.line, column: entry.column })
+}
+
+/// Returns the variables that can be looked at at word `pc` of a code, from its debug record.
+pub(super) fn variables_at(heap: &Heap, debug: Value, pc: u32) -> Vec<(String, VariablePlace)> {
+    let Some(([_, variables], [_, names])) = parts_of(heap, debug) else { return Vec::new() };
+    let here = variables.chunks_exact(2).filter(|words| (words[0] & 0xFFFF..words[0] >> 16).contains(&pc));
+    let row = |words: &[u32]| {
+        let name = heap.string_text(*names.get((words[1] >> PLACE_BITS) as usize)?)?;
+        let number = (words[1] >> 1) as u8;
+        let is_capture = words[1] & 1 != 0;
+        let place = if is_capture { VariablePlace::Capture(number) } else { VariablePlace::Register(number) };
+        Some((name, place))
+    };
+    here.filter_map(row).collect()
 }
 
 /// Returns the last entry that begins at or before `pc`.

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use esl_bytecode::compile::SourcePlace;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::file::{ConstantRecord, ModuleImage, SymbolHome};
-use esl_bytecode::module::{FunctionNumber, ModuleFunction, PoolIdx};
+use esl_bytecode::module::{FunctionNumber, ModuleFunction, PoolIdx, VariablePlace};
 use esl_bytecode::symbol::Symbol;
 use esl_heap::state::{StateSink, Stated};
 
@@ -393,4 +393,14 @@ pub(super) fn place_of(heap: &Heap, world: &World, code: Value, pc: u32) -> Opti
     let entry = debug::entry_at(function.lines.into_iter(), pc)?;
     let source = world.images.source(image, entry.source)?;
     Some(SourcePlace { source, line: entry.line, column: entry.column })
+}
+
+/// Returns the variables that can be looked at at word `pc` of a code of an image, and where they are.
+pub(super) fn variables_at(heap: &Heap, world: &World, code: Value, pc: u32) -> Vec<(String, VariablePlace)> {
+    let number = heap.code(code).and_then(|parts| Some((parts.owner.as_index()?, parts.debug.as_index()?)));
+    let Some((image, number)) = number else { return Vec::new() };
+    let Some(image) = world.images.0.get(image) else { return Vec::new() };
+    let variables = image.module.variables(FunctionNumber(number as u32)).unwrap_or_default();
+    let here = variables.into_iter().filter(|variable| (variable.from..variable.to).contains(&pc));
+    here.map(|variable| (variable.name.to_string(), variable.place)).collect()
 }

@@ -17,7 +17,7 @@ use std::fmt;
 use esl_bytecode::BigInt;
 use esl_bytecode::builtin::BUILTINS;
 use esl_bytecode::file::ReadError;
-use esl_bytecode::module::{Constant, Module, ModuleFunction, PoolIdx};
+use esl_bytecode::module::{Constant, Module, ModuleFunction, PoolIdx, VariablePlace};
 use esl_bytecode::package::PackageId;
 use esl_bytecode::symbol::{Home, Symbol};
 use esl_bytecode::verify::VerifyError;
@@ -154,11 +154,12 @@ impl Loader<'_> {
             let value = self.constant(constant)?;
             self.pool.push(value);
         }
-        let sources = debug::sources(self.heap, &self.module.sources)?;
+        let mut numbers = debug::VariableNames::default();
+        let names = debug::names(self.heap, self.module, &mut numbers)?;
         let mut codes = Vec::with_capacity(self.module.functions.len());
         for (function, object) in self.module.functions.iter().zip(&mut self.functions) {
             let constants = own_constants(function, |PoolIdx(index)| self.pool[index as usize]);
-            let debug = debug::describe(self.heap, function, &self.pool, sources)?;
+            let debug = debug::describe(self.heap, function, &self.pool, names, &numbers)?;
             let parts = LoadedFunction {
                 function,
                 constants: &constants,
@@ -332,6 +333,16 @@ impl World {
             return image::place_of(heap, self, code, pc);
         }
         debug::place_of(heap, parts.debug, pc)
+    }
+
+    /// Returns the names of the variables that can be looked at at word `pc` of a code, and where they are;
+    /// those of inner scopes last.
+    pub(crate) fn variables_at(&self, heap: &Heap, code: Value, pc: u32) -> Vec<(String, VariablePlace)> {
+        let Some(parts) = heap.code(code) else { return Vec::new() };
+        if parts.owner.is_fixnum() {
+            return image::variables_at(heap, self, code, pc);
+        }
+        debug::variables_at(heap, parts.debug, pc)
     }
 
     /// Returns lambda list and documentation of a function; `NIL` for either that it lacks. `None` unless
