@@ -53,7 +53,7 @@ pub(super) fn assert_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let outcome = vm.database.assert(&mut vm.heap, fact, &mut work);
     vm.exchange.charge(4 * work);
     let changed = checked(vm, outcome)?;
-    if vm.watch.is_watched && changed.is_true() {
+    if vm.watch.is_followed && changed.is_true() {
         report::tell_of_change(vm, fact, true);
     }
     Ok(changed)
@@ -101,7 +101,7 @@ pub(super) fn retract_fact(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         Err(FormulaError::Variable(_)) => Ok(Value::small(0)),
         outcome => {
             let changed: Value = checked(vm, outcome)?.into();
-            if vm.watch.is_watched && changed != Value::small(0) {
+            if vm.watch.is_followed && changed != Value::small(0) {
                 report::tell_of_change(vm, fact, false);
             }
             Ok(changed)
@@ -249,7 +249,7 @@ pub(super) fn retract_next(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let fact = vm.database.retract_next(&mut vm.heap, key, &mut work);
     vm.exchange.charge(4 * work);
     let fact = open(vm, fact)??;
-    if vm.watch.is_watched && fact.is_true() {
+    if vm.watch.is_followed && fact.is_true() {
         report::tell_of_change(vm, fact, false);
     }
     Ok(fact)

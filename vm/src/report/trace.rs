@@ -32,7 +32,7 @@ impl Vm {
 /// Notes what happens to the task with this index, for whoever watches.
 #[inline]
 pub(crate) fn note(vm: &mut Vm, index: TaskIndex, happening: Happening) {
-    if vm.watch.is_watched {
+    if vm.watch.is_followed {
         note_for_watchers(vm, index, happening);
     }
 }

@@ -113,7 +113,7 @@ fn wake_waiters(vm: &mut Vm, event: Value, arguments: Value) -> Result<(), Exit>
     let any_event = vm.scheduler.any_event;
     let is_awaited = event::is_awaited(&vm.heap, event);
     let any_is_awaited = event::is_awaited(&vm.heap, any_event);
-    if vm.watch.is_watched && (is_awaited || !vm.heap.is(event, Kind::Task)) {
+    if vm.watch.is_followed && (is_awaited || !vm.heap.is(event, Kind::Task)) {
         report::tell_of_signal(vm, event);
     }
     if !is_awaited && !any_is_awaited {
@@ -277,7 +277,7 @@ fn wake_waiter(vm: &mut Vm, wait: Value, (event, by): (Value, TaskNumber)) {
     let urgent = link::is_urgent(&vm.heap, wait);
     if let Some(index) = vm.scheduler.index_of_parked(&vm.heap, wait) {
         make_runnable(vm, index, urgent);
-        if vm.watch.is_watched {
+        if vm.watch.is_followed {
             report::tell_of_waking(vm, event, by, index);
         }
     }

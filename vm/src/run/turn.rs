@@ -140,7 +140,7 @@ fn go_on_with_slice(vm: &mut Vm, task: Box<Task>, slice: OpenSlice, portion: u64
 fn make_running(vm: &mut Vm, task: Box<Task>) {
     let number = task.number;
     vm.scheduler.running = Some(task);
-    if vm.watch.is_watched {
+    if vm.watch.is_followed {
         report::show(vm, number, Seen::Runs);
     }
     vm.scan_before_running();
@@ -150,7 +150,7 @@ fn make_running(vm: &mut Vm, task: Box<Task>) {
 #[cold]
 fn leave_slice_open(vm: &mut Vm, slice: OpenSlice) {
     vm.save_cpu();
-    if vm.watch.is_watched {
+    if vm.watch.is_followed {
         tell_how_turn_ended(vm, Leave::Slice);
     }
     put_back(vm, Leave::Slice);
@@ -177,7 +177,7 @@ fn end_slice(vm: &mut Vm, slice: OpenSlice, leave: Leave) {
         charge_account(vm, account, Measure::Ticks, used);
         charge_account(vm, account, Measure::Bytes, bytes);
     }
-    if vm.watch.is_watched {
+    if vm.watch.is_followed {
         tell_how_turn_ended(vm, leave);
     }
     put_back(vm, leave);
