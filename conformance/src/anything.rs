@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use esl::Config;
 use esl::host::{Rights, VirtualHost};
 use esl::program;
-use esl::replay::{self, Recorded};
+use esl::replay::{self, Recorded, Rerun};
 use esl_bytecode::compile::{Compile, drive};
 use esl_bytecode::module::Module;
 use esl_bytecode::span::SourceId;
@@ -151,11 +151,18 @@ pub fn run_file(bytes: &[u8]) -> bool {
     }
 }
 
-/// Reads bytes as a recorded run, as they are and with corrected checksums. Returns how often they were one.
+/// Reads bytes as a recorded run, as they are and with corrected checksums, and replays the beginning of what
+/// is one. Returns how often they were one.
 pub fn read_recording(bytes: &[u8]) -> usize {
     let corrected = with_checksums_of_frames(bytes);
     let read = |bytes: &[u8]| match Recorded::read(bytes) {
-        Ok(recorded) => usize::from(recorded.last_check().is_none_or(|check| check.round < u64::MAX)),
+        Ok(recorded) => {
+            // Whether it is the recorded run is all the same.
+            if let Ok(mut rerun) = Rerun::begin(&recorded, |_, _| ()) {
+                _ = rerun.run(TICKS);
+            }
+            usize::from(recorded.last_check().is_none_or(|check| check.round < u64::MAX))
+        }
         Err(error) => {
             drop(error.to_string());
             0

@@ -82,4 +82,52 @@ mod tests {
             assert!(read(&mut wrong.as_bytes()).is_err(), "{wrong}");
         }
     }
+
+    /// What is read is a form that can be written and read again; all else is refused.
+    #[test]
+    fn noise_is_a_form_or_refused() {
+        const PIECES: [&str; 18] = [
+            "(",
+            "(",
+            ")",
+            ")",
+            " ",
+            ":emacs-rex",
+            "swank:",
+            "nil",
+            "t",
+            "\"",
+            "\\",
+            "1",
+            "-",
+            "'",
+            "#",
+            "|",
+            "ü",
+            "99999999999999999999",
+        ];
+        let mut state = 1_u64;
+        let mut below = |count: usize| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 33) as usize % count
+        };
+        let mut forms = 0;
+        for _ in 0..300_000 {
+            let text: String = (0..below(14)).map(|_| PIECES[below(PIECES.len())]).collect();
+            let length = if below(8) == 0 { below(64) } else { text.len() };
+            let mut bytes = format!("{length:06x}{text}").into_bytes();
+            if below(4) == 0 {
+                let at = below(bytes.len());
+                bytes[at] = below(256) as u8;
+            }
+            if let Ok(form) = read(&mut &bytes[..]) {
+                let written = packet(&form).expect("it is small");
+                assert_eq!(read(&mut &written[..]).ok(), Some(form), "{:?}", String::from_utf8_lossy(&bytes));
+                forms += 1;
+            }
+        }
+        assert!(forms > 10_000, "{forms}");
+    }
 }
