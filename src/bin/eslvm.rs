@@ -15,6 +15,7 @@ use esl::module_path::ModulePath;
 use esl::operate::OperateOptions;
 use esl::profile::{INTERVAL, Profile};
 use esl::program::{self, Compiled, Ended, Modules, Program, Summary};
+use esl::repl::AttachSecurity;
 use esl::replay::{self, FileRecorder, ReplayOptions, RunSetup};
 use esl::testing;
 use esl::timeline::Timeline;
@@ -162,8 +163,14 @@ enum EslvmAction {
         /// ESL_SECRET
         #[arg(long, value_name = "FILE")]
         secret_file: Option<PathBuf>,
+        /// Speak TLS, as a run does that was begun with --certificate
+        #[arg(long)]
+        tls: bool,
+        /// The same, with a run whose certificate is in this file, in PEM, or signed by one of it
+        #[arg(long, value_name = "FILE")]
+        ca_file: Option<PathBuf>,
         /// Path or port that was given to --listen
-        #[arg(value_name = "PATH|PORT")]
+        #[arg(value_name = "PATH|[ADDRESS:]PORT")]
         address: String,
     },
     /// Read forms, evaluate them and print their values
@@ -388,7 +395,13 @@ fn main() -> ExitCode {
         EslvmAction::Completions { shell } => Ok(command::print_completions(shell, Eslvm::command())),
         EslvmAction::Man { folder } => Ok(command::write_man_pages(Eslvm::command(), folder.as_deref())),
         EslvmAction::Explore { options, file } => run_explore(&file, &options, &library, is_quiet),
-        EslvmAction::Attach { secret_file, address } => esl::repl::attach(&address, secret_file.as_deref()),
+        EslvmAction::Attach { secret_file, tls, ca_file, address } => {
+            let security = match (tls, &ca_file) {
+                (false, None) => AttachSecurity::Plain,
+                (_, ca_file) => AttachSecurity::Tls(ca_file.as_deref()),
+            };
+            esl::repl::attach(&address, security, secret_file.as_deref())
+        }
         EslvmAction::Repl { options } => options.rights.rights().and_then(|rights| {
             let path = ModulePath::new([Path::new("-")], &library);
             esl::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)

@@ -1,8 +1,8 @@
 //! HTTP for the servers of a run: connections, and answers.
 //!
 //! Guarantees: at most [`CONNECTIONS`] at a time; heads are bounded, in size and in the time that they take;
-//! a request must name the server by an address or as `localhost`, so that no page of another site reaches
-//! it by a name of its own.
+//! a request must name the server by an address or as `localhost`, or come over TLS, so that no page of
+//! another site reaches it by a name of its own.
 
 use std::convert::Infallible;
 use std::net::{IpAddr, TcpListener};
@@ -10,6 +10,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
+use esl_world::TlsIdentity;
 use http_body_util::combinators::BoxBody;
 use http_body_util::{BodyExt, Full};
 use hyper::body::Incoming;
@@ -18,6 +19,7 @@ use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper::{Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::sync::{Notify, Semaphore};
 
 /// Most connections at a time.
@@ -41,11 +43,15 @@ impl Hangup {
     }
 }
 
-/// Serves requests at a listener, on the event loop.
+/// Serves requests at a listener, over TLS if it has an identity, on the event loop.
 ///
 /// # Errors
 /// The reason, if there is no event loop.
-pub(super) fn serve<F, R>(listener: TcpListener, handler: F) -> Result<(), String>
+pub(super) fn serve<F, R>(
+    listener: TcpListener,
+    identity: Option<TlsIdentity>,
+    handler: F,
+) -> Result<(), String>
 where
     F: Fn(Request<Incoming>, Hangup) -> R + Clone + Send + Sync + 'static,
     R: Future<Output = Response<HttpBody>> + Send + 'static,
@@ -61,23 +67,17 @@ where
                 tokio::time::sleep(Duration::from_millis(100)).await;
                 continue;
             };
-            let handler = handler.clone();
+            let (handler, identity) = (handler.clone(), identity.clone());
             tokio::spawn(async move {
-                let hangup = Hangup::default();
-                let end = hangup.clone();
-                let service = service_fn(move |request| {
-                    let answer = answer(request, hangup.clone(), handler.clone());
-                    async move { Ok::<_, Infallible>(answer.await) }
-                });
-                let connection = http1::Builder::new()
-                    .timer(TokioTimer::new())
-                    .header_read_timeout(HEAD_TIME)
-                    .max_buf_size(HEAD)
-                    .serve_connection(TokioIo::new(stream), service);
-                tokio::select! {
-                    // What the peer does wrong ends its connection.
-                    _ = connection => {}
-                    () = end.0.notified() => {}
+                match identity {
+                    None => converse(stream, false, handler).await,
+                    Some(identity) => {
+                        // Who does not speak TLS is let go.
+                        let secured = tokio::time::timeout(HEAD_TIME, identity.accept(stream)).await;
+                        if let Ok(Ok(stream)) = secured {
+                            converse(stream, true, handler).await;
+                        }
+                    }
                 }
                 drop(permit);
             });
@@ -85,12 +85,42 @@ where
     })
 }
 
-async fn answer<F, R>(request: Request<Incoming>, hangup: Hangup, handler: F) -> Response<HttpBody>
+/// Answers the requests of a connection, until it ends.
+async fn converse<F, R>(stream: impl AsyncRead + AsyncWrite + Unpin, is_secured: bool, handler: F)
+where
+    F: Fn(Request<Incoming>, Hangup) -> R + Clone,
+    R: Future<Output = Response<HttpBody>>,
+{
+    let hangup = Hangup::default();
+    let end = hangup.clone();
+    let service = service_fn(move |request| {
+        let answer = answer(request, is_secured, hangup.clone(), handler.clone());
+        async move { Ok::<_, Infallible>(answer.await) }
+    });
+    let connection = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(HEAD_TIME)
+        .max_buf_size(HEAD)
+        .serve_connection(TokioIo::new(stream), service);
+    tokio::select! {
+        // What the peer does wrong ends its connection.
+        _ = connection => {}
+        () = end.0.notified() => {}
+    }
+}
+
+async fn answer<F, R>(
+    request: Request<Incoming>,
+    is_secured: bool,
+    hangup: Hangup,
+    handler: F,
+) -> Response<HttpBody>
 where
     F: Fn(Request<Incoming>, Hangup) -> R,
     R: Future<Output = Response<HttpBody>>,
 {
-    if !request.headers().get(HOST).is_some_and(is_own_name) {
+    // Another site that has its name lead here lacks the certificate for that.
+    if !is_secured && !request.headers().get(HOST).is_some_and(is_own_name) {
         return plain(StatusCode::MISDIRECTED_REQUEST, "this server is reached by its address only\n");
     }
     handler(request, hangup).await

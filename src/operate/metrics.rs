@@ -4,6 +4,7 @@ use std::fmt::{Display, Write};
 use std::net::TcpListener;
 
 use esl_vm::host::{Survey, SurveyRequest, TaskStanding};
+use esl_world::TlsIdentity;
 use hyper::{Method, StatusCode};
 
 use super::http::{self, plain, with};
@@ -13,8 +14,12 @@ use super::scope::RunScope;
 ///
 /// # Errors
 /// The reason, if there is no event loop.
-pub(super) fn serve(listener: TcpListener, scope: RunScope) -> Result<(), String> {
-    http::serve(listener, move |request, _| {
+pub(super) fn serve(
+    listener: TcpListener,
+    identity: Option<TlsIdentity>,
+    scope: RunScope,
+) -> Result<(), String> {
+    http::serve(listener, identity, move |request, _| {
         let scope = scope.clone();
         async move {
             if request.uri().path() != "/metrics" {

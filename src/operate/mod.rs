@@ -3,8 +3,9 @@
 //! Servers live on the event loop of `world/`. What they only look at they see by surveys, which change
 //! nothing in the run; what they do comes through the machine's inbox. Without an option nothing here runs.
 //!
-//! Guarantees: other machines reach nothing without having been told to by an address; what may do anything
-//! asks for a secret, which is compared in constant time; what is asked is bounded before it is parsed.
+//! Guarantees: other machines reach nothing without having been told to by an address, and then over TLS
+//! only; what may do anything asks for a secret, which is compared in constant time; what is asked is bounded
+//! before it is parsed.
 //!
 //! ```
 //! use clap::Parser;
@@ -44,6 +45,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use esl_vm::vm::Vm;
+use esl_world::TlsIdentity;
 
 use crate::command::{USAGE, complain};
 use attach::Entrance;
@@ -57,17 +59,25 @@ pub struct OperateOptions {
     #[arg(long, value_name = "[ADDRESS:]PORT", value_parser = parse_address)]
     metrics: Option<SocketAddr>,
     /// Let operators attach to the run, by `eslvm attach`, at the path of a socket that only its owner can
-    /// open, or at a port of 127.0.0.1, which asks for a secret
-    #[arg(long, value_name = "PATH|PORT")]
+    /// open, or at a port, of 127.0.0.1 unless an address comes before it, which asks for a secret
+    #[arg(long, value_name = "PATH|[ADDRESS:]PORT")]
     listen: Option<String>,
-    /// Show the run in a browser, at a port of 127.0.0.1; any free one without a number
-    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0",
+    /// Show the run in a browser, at a port of 127.0.0.1 unless an address comes before it; any free one
+    /// without a number
+    #[arg(long, value_name = "[ADDRESS:]PORT", num_args = 0..=1, require_equals = true, default_missing_value = "0",
           value_parser = parse_address)]
     monitor: Option<SocketAddr>,
     /// File with the secrets of the roles: lines such as `observe SECRET`, `command SECRET` and `patch
     /// SECRET`; without it they are made anew for each run, and printed
     #[arg(long, value_name = "FILE")]
     secrets: Option<PathBuf>,
+    /// Have all that listens at a port speak TLS, with the certificates of this file, in PEM; an address that
+    /// other machines reach asks for it
+    #[arg(long, value_name = "FILE", requires = "key")]
+    certificate: Option<PathBuf>,
+    /// File with the key of the certificate, in PEM
+    #[arg(long, value_name = "FILE", requires = "certificate")]
+    key: Option<PathBuf>,
 }
 
 /// What is to be undone when a run is over.
@@ -107,34 +117,38 @@ impl OperateOptions {
         if self.metrics.is_some() || self.listen.is_some() || self.monitor.is_some() {
             watch_closely(machine);
         }
+        let identity = self.identity()?;
+        let scheme = if identity.is_some() { "https" } else { "http" };
         if let Some(address) = self.metrics {
+            self.keeps_secret(address)?;
             let (listener, address) = listen(address)?;
-            eprintln!("; metrics at http://{address}/metrics");
-            serve(metrics::serve(listener, scope.clone()))?;
+            eprintln!("; metrics at {scheme}://{address}/metrics");
+            serve(metrics::serve(listener, identity.clone(), scope.clone()))?;
         }
         if let Some(address) = self.monitor {
-            only_loopback(address)?;
+            self.keeps_secret(address)?;
             let secrets = self.secrets()?;
             let (listener, address) = listen(address)?;
             for role in [OperatorRole::Observe, OperatorRole::Command] {
                 if let (Some(secret), None) = (secrets.of(role), &self.secrets) {
-                    eprintln!("; monitor, to {role}: http://{address}/#token={secret}");
+                    eprintln!("; monitor, to {role}: {scheme}://{address}/#token={secret}");
                 }
             }
             if self.secrets.is_some() {
-                eprintln!("; monitor at http://{address}/#token=SECRET");
+                eprintln!("; monitor at {scheme}://{address}/#token=SECRET");
             }
-            serve(monitor::serve(listener, scope.clone(), secrets))?;
+            serve(monitor::serve(listener, identity.clone(), scope.clone(), secrets))?;
         }
         if let Some(place) = &self.listen {
             let door = match parse_address(place) {
                 Ok(address) => {
-                    only_loopback(address)?;
+                    self.keeps_secret(address)?;
                     let secrets = self.secrets()?;
                     let (listener, address) = listen(address)?;
-                    eprintln!("; operators attach with eslvm attach {address}");
+                    let flag = if identity.is_some() { "--tls " } else { "" };
+                    eprintln!("; operators attach with eslvm attach {flag}{address}");
                     self.print_secrets(&secrets);
-                    Entrance::Tcp(listener, secrets)
+                    Entrance::Tcp(listener, secrets, identity)
                 }
                 Err(_) => {
                     let path = PathBuf::from(place);
@@ -160,6 +174,27 @@ impl OperateOptions {
         })
     }
 
+    /// Reads what connections are secured with, if that is asked for.
+    fn identity(&self) -> Result<Option<TlsIdentity>, u8> {
+        let (Some(certificate), Some(key)) = (&self.certificate, &self.key) else { return Ok(None) };
+        TlsIdentity::read(certificate, key).map(Some).map_err(|reason| {
+            complain(reason);
+            USAGE
+        })
+    }
+
+    /// Refuses an address that other machines reach, unless what is said there is secret.
+    fn keeps_secret(&self, address: SocketAddr) -> Result<(), u8> {
+        if address.ip().is_loopback() || self.certificate.is_some() {
+            return Ok(());
+        }
+        complain(format_args!(
+            "others could hear what is said at {address}: use --certificate FILE --key FILE, or a port of \
+             127.0.0.1, which others reach by ssh -L"
+        ));
+        Err(USAGE)
+    }
+
     /// Prints secrets that were made for this run.
     fn print_secrets(&self, secrets: &Secrets) {
         if self.secrets.is_none() {
@@ -168,17 +203,6 @@ impl OperateOptions {
             }
         }
     }
-}
-
-/// Refuses an address that other machines reach: what is said there would not be secret.
-fn only_loopback(address: SocketAddr) -> Result<(), u8> {
-    if address.ip().is_loopback() {
-        return Ok(());
-    }
-    complain(format_args!(
-        "others could hear what is said at {address}: use a port of 127.0.0.1, and reach it by ssh -L"
-    ));
-    Err(USAGE)
 }
 
 /// Listens at the path of a socket that only the owner of the process can open.

@@ -4,6 +4,7 @@ use std::io::{IsTerminal, Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::Duration;
 
 use esl_vm::host::{Inbox, Incoming};
 
@@ -43,29 +44,97 @@ fn is_command(line: &str) -> bool {
             || HELP.lines().any(|line| is_listed(&line[..20.min(line.len())])))
 }
 
+/// How the connection to a port of a run is secured.
+#[derive(Clone, Copy, Debug)]
+pub enum AttachSecurity<'a> {
+    /// Not at all.
+    Plain,
+    /// By TLS; the run proves by a certificate that the system trusts, or by one of a file, that it is that.
+    Tls(Option<&'a Path>),
+}
+
 /// A connection to a run.
 enum Wire {
     Tcp(TcpStream),
     #[cfg(unix)]
     Unix(std::os::unix::net::UnixStream),
+    /// The near end of a connection over TLS.
+    #[cfg(unix)]
+    Secured(std::os::unix::net::UnixStream),
+}
+
+/// Time that TLS may take to begin.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Begins TLS over a connection to an address, and returns its near end, between which and the other one the
+/// event loop passes on all that is said.
+#[cfg(unix)]
+fn secured(
+    stream: TcpStream,
+    address: &str,
+    ca_file: Option<&Path>,
+) -> std::io::Result<std::os::unix::net::UnixStream> {
+    use std::io::Error;
+    use std::os::unix::net::UnixStream;
+    let (near, far) = UnixStream::pair()?;
+    for end in [&far, &near] {
+        end.set_nonblocking(std::ptr::eq(end, &far))?;
+    }
+    stream.set_nonblocking(true)?;
+    let name = address.rsplit_once(':').map_or(address, |(name, _)| name).to_string();
+    let ca_file = ca_file.map(Path::to_path_buf);
+    let (tell, told) = channel();
+    let pass_on = async move {
+        let begin = async {
+            let stream = tokio::net::TcpStream::from_std(stream).map_err(|error| error.to_string())?;
+            let far = tokio::net::UnixStream::from_std(far).map_err(|error| error.to_string())?;
+            Ok::<_, String>((esl_world::begin_tls(stream, &name, ca_file.as_deref()).await?, far))
+        };
+        match tokio::time::timeout(PATIENCE, begin).await {
+            Ok(Ok((mut stream, mut far))) => {
+                _ = tell.send(Ok(()));
+                // When either side is at its end, so is the session.
+                drop(tokio::io::copy_bidirectional(&mut stream, &mut far).await);
+            }
+            Ok(Err(reason)) => _ = tell.send(Err(reason)),
+            Err(_) => _ = tell.send(Err("the run does not speak TLS".into())),
+        }
+    };
+    esl_world::spawn(pass_on).map_err(Error::other)?;
+    told.recv().map_err(Error::other)?.map_err(Error::other)?;
+    Ok(near)
 }
 
 impl Wire {
-    fn connect(address: &str) -> std::io::Result<Wire> {
+    fn connect(address: &str, security: AttachSecurity<'_>) -> std::io::Result<Wire> {
         let port = address.parse::<u16>().map(|port| format!("127.0.0.1:{port}"));
         let is_path = port.is_err() && (address.contains('/') || !address.contains(':'));
+        if is_path && matches!(security, AttachSecurity::Tls(_)) {
+            return Err(std::io::Error::other("a path needs no TLS: leave out --tls and --ca-file"));
+        }
         #[cfg(unix)]
         if is_path {
             return std::os::unix::net::UnixStream::connect(address).map(Wire::Unix);
         }
         _ = is_path;
-        let stream = TcpStream::connect(port.unwrap_or_else(|_| address.into()))?;
+        let address = port.unwrap_or_else(|_| address.into());
+        let stream = TcpStream::connect(&address)?;
         stream.set_nodelay(true)?;
-        Ok(Wire::Tcp(stream))
+        match security {
+            AttachSecurity::Plain => Ok(Wire::Tcp(stream)),
+            #[cfg(unix)]
+            AttachSecurity::Tls(ca_file) => secured(stream, &address, ca_file).map(Wire::Secured),
+            #[cfg(not(unix))]
+            AttachSecurity::Tls(_) => Err(std::io::Error::other("there is no TLS here: use ssh -L")),
+        }
     }
 
     fn needs_secret(&self) -> bool {
-        matches!(self, Wire::Tcp(_))
+        #[cfg(unix)]
+        if let Wire::Unix(_) = self {
+            return false;
+        }
+        true
     }
 
     fn try_clone(&self) -> std::io::Result<Wire> {
@@ -73,6 +142,8 @@ impl Wire {
             Wire::Tcp(stream) => stream.try_clone().map(Wire::Tcp),
             #[cfg(unix)]
             Wire::Unix(stream) => stream.try_clone().map(Wire::Unix),
+            #[cfg(unix)]
+            Wire::Secured(stream) => stream.try_clone().map(Wire::Secured),
         }
     }
 
@@ -81,7 +152,7 @@ impl Wire {
         _ = match self {
             Wire::Tcp(stream) => stream.shutdown(Shutdown::Both),
             #[cfg(unix)]
-            Wire::Unix(stream) => stream.shutdown(Shutdown::Both),
+            Wire::Unix(stream) | Wire::Secured(stream) => stream.shutdown(Shutdown::Both),
         };
     }
 }
@@ -91,7 +162,7 @@ impl Read for Wire {
         match self {
             Wire::Tcp(stream) => stream.read(buffer),
             #[cfg(unix)]
-            Wire::Unix(stream) => stream.read(buffer),
+            Wire::Unix(stream) | Wire::Secured(stream) => stream.read(buffer),
         }
     }
 }
@@ -101,7 +172,7 @@ impl Write for Wire {
         match self {
             Wire::Tcp(stream) => stream.write(bytes),
             #[cfg(unix)]
-            Wire::Unix(stream) => stream.write(bytes),
+            Wire::Unix(stream) | Wire::Secured(stream) => stream.write(bytes),
         }
     }
 
@@ -149,12 +220,12 @@ fn secret(file: Option<&Path>) -> Result<String, String> {
 ///
 /// # Errors
 /// The exit status, after a message, if there is no such run, or standard input cannot be read.
-pub fn attach(address: &str, secret_file: Option<&Path>) -> Result<u8, u8> {
+pub fn attach(address: &str, security: AttachSecurity<'_>, secret_file: Option<&Path>) -> Result<u8, u8> {
     let usage = |error: String| {
         complain(error);
         USAGE
     };
-    let mut wire = Wire::connect(address)
+    let mut wire = Wire::connect(address, security)
         .map_err(|error| usage(format!("no run can be reached at {address}: {error}")))?;
     if wire.needs_secret() {
         let secret = secret(secret_file).map_err(usage)?;

@@ -38,7 +38,7 @@ use esl_vm::vm::{Config, Vm};
 use crate::command::{Interrupts, NOT_COMPILED, SIGNALLED, SUCCESS, USAGE, complain, interrupt_on_signal};
 use crate::module_path::ModulePath;
 use crate::program;
-pub use attached::attach;
+pub use attached::{AttachSecurity, attach};
 use lines::Line;
 use screen::PromptScreen;
 use typing::Typing;
@@ -84,6 +84,7 @@ pub fn run(config: Config, rights: Rights, virtual_time: bool, path: &ModulePath
         drop(lines.send(Line::Signalled(signal)));
     };
     let interrupts = interrupt_on_signal(machine.inbox(), end);
+    machine.tell_variables();
     let mut repl = Repl { machine, typing, interrupts, virtual_time, failure: None };
     repl.call("%REPL-BEGIN", "");
     let status = repl.talk();
@@ -252,7 +253,7 @@ impl Repl {
         self.machine.set_interruptible(None);
         self.interrupts.forget();
         let result = self.machine.result(task);
-        let report = self.machine.report(task);
+        let report = self.machine.detailed_report(task);
         self.machine.forget(task);
         self.machine.flush();
         match result {

@@ -34,6 +34,8 @@ mod recording;
 mod replay;
 mod rights;
 #[cfg(unix)]
+mod secured;
+#[cfg(unix)]
 mod slime;
 mod streams;
 mod terminal;

@@ -41,6 +41,8 @@ use esl_vm::vm::Vm;
 
 pub use event_loop::spawn;
 pub use modules::module;
+#[cfg(feature = "tls")]
+pub use tls::{TlsIdentity, begin_tls};
 
 /// Gives a machine the modules, for `require`, and what they need of the process itself.
 pub fn install_modules(machine: &mut Vm) {

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use esl_vm::host::HostFailure;
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::TcpStream;
 use tokio_rustls::client::TlsStream;
 use tokio_rustls::rustls::crypto::ring;
@@ -64,25 +65,67 @@ pub(crate) async fn client_config(ca_file: Option<String>) -> Result<Arc<ClientC
     tokio::task::spawn_blocking(load).await.map_err(tls_failure)?.map_err(tls_failure)
 }
 
-/// Returns what a listener needs that proves by the certificates of one file, in PEM, and the key of another,
+/// Reads what a listener needs that proves by the certificates of one file, in PEM, and the key of another,
 /// who it is.
+fn read_acceptor(certificate: &Path, key: &Path) -> Result<TlsAcceptor, String> {
+    let unread = |path: &Path, error: &dyn std::fmt::Display| format!("`{}`: {error}", path.display());
+    let chain = CertificateDer::pem_file_iter(certificate).map_err(|error| unread(certificate, &error))?;
+    let chain = chain.collect::<Result<Vec<_>, _>>().map_err(|error| unread(certificate, &error))?;
+    if chain.is_empty() {
+        return Err(unread(certificate, &"there is no certificate in it"));
+    }
+    let private = PrivateKeyDer::from_pem_file(key).map_err(|error| unread(key, &error))?;
+    let builder = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()));
+    let builder = builder.with_safe_default_protocol_versions().map_err(|error| error.to_string())?;
+    let config = builder.with_no_client_auth().with_single_cert(chain, private);
+    Ok(TlsAcceptor::from(Arc::new(config.map_err(|error| unread(key, &error))?)))
+}
+
+/// Returns the same, read where nobody waits for it.
 pub(crate) async fn acceptor(certificate: String, key: String) -> Result<TlsAcceptor, HostFailure> {
-    let load = move || {
-        let unread = |path: &str, error: &dyn std::fmt::Display| format!("`{path}`: {error}");
-        let chain =
-            CertificateDer::pem_file_iter(&certificate).map_err(|error| unread(&certificate, &error))?;
-        let chain = chain.collect::<Result<Vec<_>, _>>().map_err(|error| unread(&certificate, &error))?;
-        if chain.is_empty() {
-            return Err(unread(&certificate, &"there is no certificate in it"));
-        }
-        let private = PrivateKeyDer::from_pem_file(&key).map_err(|error| unread(&key, &error))?;
-        let builder = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()));
-        let builder = builder.with_safe_default_protocol_versions().map_err(|error| error.to_string())?;
-        let builder = builder.with_no_client_auth();
-        builder.with_single_cert(chain, private).map_err(|error| unread(&key, &error))
-    };
-    let config = tokio::task::spawn_blocking(load).await.map_err(tls_failure)?.map_err(tls_failure)?;
-    Ok(TlsAcceptor::from(Arc::new(config)))
+    let load = move || read_acceptor(Path::new(&certificate), Path::new(&key));
+    tokio::task::spawn_blocking(load).await.map_err(tls_failure)?.map_err(tls_failure)
+}
+
+/// What servers of an embedder secure their connections with.
+#[derive(Clone)]
+pub struct TlsIdentity(TlsAcceptor);
+
+impl TlsIdentity {
+    /// Reads the certificates of one file and the key of another, in PEM.
+    ///
+    /// # Errors
+    /// What is wrong with them.
+    pub fn read(certificate: &Path, key: &Path) -> Result<TlsIdentity, String> {
+        read_acceptor(certificate, key).map(TlsIdentity)
+    }
+
+    /// Begins TLS over a connection to a client.
+    ///
+    /// # Errors
+    /// What the peer does wrong.
+    pub async fn accept<S: AsyncRead + AsyncWrite + Unpin>(
+        &self,
+        stream: S,
+    ) -> std::io::Result<tokio_rustls::server::TlsStream<S>> {
+        self.0.accept(stream).await
+    }
+}
+
+/// Begins TLS over a connection to the server of this name, which has to prove that it is that: by a
+/// certificate that the system trusts, or by one of a file.
+///
+/// # Errors
+/// Why it is not secure.
+pub async fn begin_tls<S: AsyncRead + AsyncWrite + Unpin>(
+    stream: S,
+    name: &str,
+    ca_file: Option<&Path>,
+) -> Result<TlsStream<S>, String> {
+    let config = ca_file.map_or_else(config_of_system, config_of_file)?;
+    let name = ServerName::try_from(name.trim_matches(['[', ']']).to_owned());
+    let name = name.map_err(|error| error.to_string())?;
+    TlsConnector::from(config).connect(name, stream).await.map_err(|error| error.to_string())
 }
 
 /// Begins TLS over a connection to the server of this name, which has to prove that it is that.

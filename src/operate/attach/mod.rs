@@ -22,6 +22,7 @@ use std::time::Duration;
 use esl_bytecode::datum::DatumKind;
 use esl_vm::embed::HostFunction;
 use esl_vm::vm::Vm;
+use esl_world::TlsIdentity;
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
 use tokio::sync::{Semaphore, mpsc};
 
@@ -58,8 +59,8 @@ impl SessionOutputs {
 
 /// Where operators connect.
 pub(super) enum Entrance {
-    /// At a port, with a secret.
-    Tcp(std::net::TcpListener, Secrets),
+    /// At a port, with a secret, and over TLS if there is an identity.
+    Tcp(std::net::TcpListener, Secrets, Option<TlsIdentity>),
     /// At a path that only the owner of the process can open.
     #[cfg(unix)]
     Unix(std::os::unix::net::UnixListener),
@@ -133,17 +134,27 @@ async fn accept(door: Entrance, attendance: Arc<Attendance>) {
     let room = Arc::new(Semaphore::new(SESSIONS));
     // They have been made for this, so the event loop takes them.
     match door {
-        Entrance::Tcp(listener, secrets) => {
+        Entrance::Tcp(listener, secrets, identity) => {
             let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
             loop {
                 let Ok(permit) = room.clone().acquire_owned().await else { return };
                 match listener.accept().await {
                     Ok((stream, _)) => {
-                        let (attendance, secrets) = (attendance.clone(), secrets.clone());
+                        let (attendance, secrets) = (attendance.clone(), Some(secrets.clone()));
+                        let identity = identity.clone();
                         drop(stream.set_nodelay(true));
-                        let (reader, writer) = stream.into_split();
                         tokio::spawn(async move {
-                            drop(attend(reader, writer, Some(secrets), &attendance).await);
+                            if let Some(identity) = identity {
+                                // Who does not speak TLS is let go.
+                                let secured = tokio::time::timeout(PATIENCE, identity.accept(stream)).await;
+                                if let Ok(Ok(stream)) = secured {
+                                    let (reader, writer) = tokio::io::split(stream);
+                                    drop(attend(reader, writer, secrets, &attendance).await);
+                                }
+                            } else {
+                                let (reader, writer) = stream.into_split();
+                                drop(attend(reader, writer, secrets, &attendance).await);
+                            }
                             drop(permit);
                         });
                     }

@@ -18,7 +18,8 @@ use bytes::Bytes;
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
-use esl_vm::host::{Answer, FunctionRef, Incoming, Question, Sender, SurveyRequest};
+use esl_vm::host::{Answer, FrameVariable, FunctionRef, Incoming, Question, Sender, SurveyRequest};
+use esl_world::TlsIdentity;
 use http_body_util::{BodyExt, Channel, Limited};
 use hyper::header::{AUTHORIZATION, CONTENT_SECURITY_POLICY, HOST, HeaderValue, ORIGIN, REFERRER_POLICY};
 use hyper::{Method, Request, Response, StatusCode};
@@ -48,6 +49,8 @@ const POST: usize = 64 << 10;
 struct MonitorState {
     scope: RunScope,
     secrets: Secrets,
+    /// What the origin of its own page begins with.
+    scheme: &'static str,
     model: Mutex<RunModel>,
     views: Mutex<BTreeMap<String, ViewerView>>,
     /// Notified when a viewer comes.
@@ -65,17 +68,24 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 ///
 /// # Errors
 /// The reason, if there is no event loop.
-pub(super) fn serve(listener: TcpListener, scope: RunScope, secrets: Secrets) -> Result<(), String> {
+pub(super) fn serve(
+    listener: TcpListener,
+    identity: Option<TlsIdentity>,
+    scope: RunScope,
+    secrets: Secrets,
+) -> Result<(), String> {
+    let is_secured = identity.is_some();
     let monitor = Arc::new(MonitorState {
         scope,
         secrets,
+        scheme: if is_secured { "https://" } else { "http://" },
         model: Mutex::default(),
         views: Mutex::default(),
         coming: Notify::new(),
         looks: watch::Sender::new(0),
     });
     esl_world::spawn(look_on(monitor.clone()))?;
-    http::serve(listener, move |request, hangup| answer(monitor.clone(), request, hangup))
+    http::serve(listener, identity, move |request, hangup| answer(monitor.clone(), request, hangup))
 }
 
 /// Looks at the run again and again while there are viewers.
@@ -118,7 +128,7 @@ async fn answer(
     match (request.method(), request.uri().path()) {
         (&Method::GET, "/") => page(),
         (&Method::GET, "/events") => {
-            if !is_from_here(&request, false) {
+            if !is_from_here(&request, monitor.scheme, false) {
                 return plain(StatusCode::FORBIDDEN, "the request comes from another site\n");
             }
             let parameters = parameters(request.uri().query().unwrap_or_default());
@@ -129,7 +139,7 @@ async fn answer(
             }
         }
         (&Method::POST, "/view" | "/do") => {
-            if !is_from_here(&request, true) {
+            if !is_from_here(&request, monitor.scheme, true) {
                 return plain(StatusCode::FORBIDDEN, "the request comes from another site\n");
             }
             let token = request.headers().get(AUTHORIZATION).and_then(|value| value.to_str().ok());
@@ -188,10 +198,10 @@ fn page() -> Response<HttpBody> {
 
 /// Returns whether a request comes from a page of this server. Browsers leave the origin out where a page
 /// only reads from its own server.
-fn is_from_here(request: &Request<hyper::body::Incoming>, must_say: bool) -> bool {
+fn is_from_here(request: &Request<hyper::body::Incoming>, scheme: &str, must_say: bool) -> bool {
     let header = |name| request.headers().get(name).and_then(|value: &HeaderValue| value.to_str().ok());
     match (header(ORIGIN), header(HOST)) {
-        (Some(origin), Some(host)) => origin.strip_prefix("http://") == Some(host),
+        (Some(origin), Some(host)) => origin.strip_prefix(scheme) == Some(host),
         _ => !must_say,
     }
 }
@@ -285,7 +295,7 @@ async fn message(monitor: &MonitorState, viewer: &str, role: OperatorRole) -> Op
         message["task"] = match (view.task, more.tasks.first()) {
             (Some(_), Some(row)) => json!({
                 "n": row.number, "name": row.name, "waits": row.waits_for, "ticks": row.ticks, "maker": row.maker,
-                "frames": more.frames.iter().map(|frame| json!([frame.function, frame.place])).collect::<Vec<_>>(),
+                "frames": more.frames.iter().map(|frame| json!([frame.function, frame.place, FrameVariable::lines(&frame.variables)])).collect::<Vec<_>>(),
             }),
             (Some(number), None) => json!({ "n": number, "ended": true }),
             _ => Value::Null,
