@@ -42,7 +42,7 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
         &format!(
             "(+ 1 2)\n(list *\n (drive 5))\n:facts\n(fail :oops 1)\n:bt\n:patch {patch}\n(list (drive 1) *speed* (fresh))\n\
              :undo-patch\n(list (drive 1) *speed* (fboundp 'fresh))\n:undo-patch\n:patch {wrong}\n:patch {incomplete}\n\
-             :patch {other}\n(drive 1)\n(list * **)\n:patch /no/such/file\n:abort 9999\n:abort\n(format t \"half\")\n"
+             :patch {other}\n(drive 1)\n(list * **)\n(progn (defun look (where) (list (car where))) (look \"crater\"))\n:bt\n:patch /no/such/file\n:abort 9999\n:abort\n(format t \"half\")\n"
         ),
     );
     let expected = format!(
@@ -52,8 +52,13 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
          Failure :SIMPLE-ERROR, no recovery available.\nAborted\nThe last form of {incomplete} is incomplete.\n\
          Failure :PROGRAM-ERROR, no recovery available.\nAborted\n\
          A patch consists of DEFUN, DEFMACRO, DEFMETHOD, DEFGENERIC, DEFVAR, DEFPARAMETER, SETQ, DEFTYPE, \
-         DEFINE-CAUSE, DEFINE-MODIFY-MACRO, DEFINE-COMPILER-MACRO and TO-ACHIEVE, not of (PRINT 1).\n\
+         DEFINE-CAUSE, DEFINE-MODIFY-MACRO, DEFINE-COMPILER-MACRO, DEFSTRUCT, DEFCLASS, DEFINE-CONDITION, \
+         DEFCONSTANT, DEFINE-SYMBOL-MACRO, DEFINE-FLUENT, DEFINE-INPUT, DEFINE-PROPERTY, DEFINE-RESOURCE and \
+         TO-ACHIEVE, not of (PRINT 1).\n\
          Failure :PROGRAM-ERROR, no recovery available.\nAborted\n3\n(3 (3 3 NIL))\n\
+         The value \"crater\" is not of type LIST.\nFailure :TYPE-ERROR, no recovery available.\nAborted\n\
+         The value \"crater\" is not of type LIST.\n  in LOOK\n      WHERE = \"crater\"\n  in top level\n\
+         Failure :TYPE-ERROR, no recovery available.\nAborted\n\
          ; /no/such/file cannot be read: No such file or directory (os error 2)\n; there is no task 9999\n\
          ; `esl:abort` needs the number of a task\nhalf\nNIL\n"
     );
@@ -73,6 +78,80 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
     let (output, status) = session(&socket, "");
     assert!(output.starts_with(&format!("eslvm: no run can be reached at {socket}")), "{output}");
     assert_eq!(status, Some(2));
+}
+
+/// Structures, classes, conditions, fluents, resources and the like.
+#[test]
+fn a_patch_of_kinds_and_shared_things_is_made_and_undone_in_one_step() {
+    let folder = Folder::new("attach_kinds");
+    let program = "
+        (defstruct wheel size)
+        (defclass rover () ((speed :initform 1 :accessor rover-speed)))
+        (define-condition stuck (error) ((where :initarg :where :reader stuck-where)))
+        (define-resource antenna :capacity 1)
+        (define-fluent battery 10)
+        (defvar *wheel* (make-wheel :size 3))
+        (defvar *rover* (make-instance 'rover))
+        (setf (rover-speed *rover*) 7)
+        (defun state () (list (wheel-size *wheel*) (wheel-size (make-wheel)) (rover-speed *rover*) battery))
+        (read-line *standard-input* nil)
+        (format t \"~s~%\" (state))";
+    let patch = folder.file(
+        "patch.esl",
+        "(defstruct wheel (size 99))
+         (defstruct hub (n 1))
+         (defstruct (big-hub (:include hub)) m)
+         (defclass rover () ((speed :initform 1 :accessor rover-speed) (fuel :initform 50 :accessor rover-fuel)))
+         (define-condition stuck (error)
+           ((where :initarg :where :reader stuck-where) (depth :initarg :depth :reader stuck-depth)))
+         (define-resource antenna :capacity 2)
+         (define-resource arm)
+         (define-property place (what))
+         (defconstant +limit+ 5)
+         (define-input hints :capacity 3)
+         (define-fluent power 3)
+         (define-fluent (low) (< power 2))
+         (define-fluent battery 77)
+         (defun state ()
+           (assert '(place rock here))
+           (list (hub-n (make-big-hub :m 5)) (wheel-size (make-wheel)) (wheel-size *wheel*) (rover-fuel *rover*)
+                 (handler-case (error 'stuck :where 1 :depth 2) (stuck (c) (stuck-depth c)))
+                 (with-resource (antenna :amount 2 :if-denied :fail) (with-resource (arm) :held))
+                 (place 'rock) +limit+ (input-dropped hints) power (low) battery))",
+    );
+    let narrower = folder.file("narrower.esl", "(defun state () nil) (defstruct wheel)");
+    let constant = folder.file("constant.esl", "(defun state () nil) (defconstant +limit+ 6)");
+    let rule = folder.file("rule.esl", "(defun state () nil) (define-rule (near ?x) (place ?x here))");
+    let class = folder.file("class.esl", "(defclass rover () ((speed) (fuel))) (defparameter *no* (car 1))");
+    let socket = folder.join("s");
+    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
+    run.said("; operators attach with eslvm attach ");
+    let (output, status) = session(
+        &socket,
+        &format!(
+            "(state)\n:patch {patch}\n(state)\n:patch {narrower}\n:patch {constant}\n:patch {rule}\n:patch {class}\n\
+             (slot-value *rover* 'fuel)\n:undo-patch\n(state)\n\
+             (list (slot-exists-p *rover* 'fuel) (fboundp 'stuck-depth) (fboundp 'make-hub) (fboundp 'low) \
+             (boundp 'hints))\n"
+        ),
+    );
+    let aborted = |cause: &str| format!("Failure {cause}, no recovery available.\nAborted\n");
+    let (refused, wrong) = (aborted(":PROGRAM-ERROR"), aborted(":TYPE-ERROR"));
+    let lines: Vec<&str> =
+        output.lines().filter(|line| !line.is_empty() && !line.starts_with([' ', 'w'])).collect();
+    let expected = format!(
+        "(3 NIL 7 10)\n; 14 definitions are changed\n(1 99 3 50 2 :HELD HERE 5 0 3 NIL 10)\n\
+         The structure WHEEL keeps its slots, (SIZE): a structure with others needs another name.\n{refused}\
+         +LIMIT+ is a constant already, with the value 5.\n{refused}\
+         A rule cannot be taken back, so no patch has any: evaluate (DEFINE-RULE (NEAR ?X) (PLACE ?X HERE)).\n\
+         {refused}The value 1 is not of type LIST.\n{wrong}50\n; "
+    );
+    let found = lines.join("\n");
+    assert!(found.starts_with(&expected), "{found}\n{expected}");
+    let rest = found[expected.len()..].split_once(' ').map(|(_, rest)| rest);
+    assert_eq!(rest, Some("definitions are as before\n(3 NIL 7 10)\n(NIL NIL NIL NIL NIL)"), "{found}");
+    assert_eq!(status, Some(0));
+    assert_eq!(run.finish().output, "(3 NIL 7 10)\n");
 }
 
 #[test]
