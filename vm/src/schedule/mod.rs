@@ -346,8 +346,8 @@ impl Scheduler {
         slice.max(1)
     }
 
-    /// Forgets those who waited for a standard stream and do so no more: a read or a write that was aborted, or
-    /// whose time was up, would keep the run waiting for the stream.
+    /// Forgets those who waited for a standard stream and do so no more: a read or a write that was aborted,
+    /// or whose time was up, would keep the run waiting for the stream.
     pub(crate) fn forget_left_streams(&mut self) {
         let tasks = &self.tasks;
         let is_in = |id: TaskId, state| tasks.get(id).is_some_and(|task| task.state == state);
