@@ -187,7 +187,7 @@ fn damage_is_found_and_placed() {
     };
     check_refused(
         change(Section::Sources, 3, 0xFF),
-        "damaged file: expected 17112760328 more bytes, found 27 at byte 136 (sources): compile it again",
+        "damaged file: expected 17112760328 more bytes, found 27 at byte 152 (sources): compile it again",
     );
 }
 

@@ -87,19 +87,31 @@ pub(super) fn describe(
     heap.alloc_record(Kind::Record, 0, DEBUG_RECORD, &slots)
 }
 
-/// Returns the words of places and those of variables, and the names of sources and of variables, from a
-/// debug record.
-fn parts_of(heap: &Heap, debug: Value) -> Option<([&[u32]; 2], [&[Value]; 2])> {
+/// The tables of a debug record.
+struct DebugTables<'a> {
+    /// Four words for each source place.
+    places: &'a [u32],
+    /// Two words for each variable.
+    variables: &'a [u32],
+    /// Names of sources.
+    sources: &'a [Value],
+    /// Names of variables.
+    names: &'a [Value],
+}
+
+/// Returns the tables of a debug record.
+fn tables_of(heap: &Heap, debug: Value) -> Option<DebugTables<'_>> {
     let record = heap.record(debug, Kind::Record)?;
     let (count, words) = heap.words(record[WORDS])?.split_first()?;
     let (places, variables) = words.split_at_checked(*count as usize * 4)?;
     let names = heap.as_cons(record[NAMES])?;
-    Some(([places, variables], [heap.vector(names.car)?, heap.vector(names.cdr)?]))
+    let (sources, names) = (heap.vector(names.car)?, heap.vector(names.cdr)?);
+    Some(DebugTables { places, variables, sources, names })
 }
 
 /// Returns the source place of word `pc` of a code, from its debug record.
 pub(super) fn place_of(heap: &Heap, debug: Value, pc: u32) -> Option<SourcePlace> {
-    let ([places, _], [sources, _]) = parts_of(heap, debug)?;
+    let DebugTables { places, sources, .. } = tables_of(heap, debug)?;
     let entries = places.chunks_exact(4).map(|words| LineEntry {
         pc: words[0],
         source: words[1],
@@ -113,7 +125,7 @@ pub(super) fn place_of(heap: &Heap, debug: Value, pc: u32) -> Option<SourcePlace
 
 /// Returns the variables that can be looked at at word `pc` of a code, from its debug record.
 pub(super) fn variables_at(heap: &Heap, debug: Value, pc: u32) -> Vec<(String, VariablePlace)> {
-    let Some(([_, variables], [_, names])) = parts_of(heap, debug) else { return Vec::new() };
+    let Some(DebugTables { variables, names, .. }) = tables_of(heap, debug) else { return Vec::new() };
     let here = variables.chunks_exact(2).filter(|words| (words[0] & 0xFFFF..words[0] >> 16).contains(&pc));
     let row = |words: &[u32]| {
         let name = heap.string_text(*names.get((words[1] >> PLACE_BITS) as usize)?)?;
