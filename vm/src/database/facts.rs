@@ -73,8 +73,9 @@ impl Database {
         }
         self.time += 1;
         let relation = &mut self.relations[number as usize];
-        self.bytes += relation.row_bytes();
         relation.add(arguments, self.time);
+        let (before, bytes) = relation.recount();
+        self.bytes = self.bytes + bytes - before;
         self.facts += 1;
         Ok(outcome)
     }

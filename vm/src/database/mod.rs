@@ -274,7 +274,8 @@ impl Database {
             self.unlinked.pop_front();
             let relation = &mut self.relations[ended.relation as usize];
             relation.free(ended.row);
-            self.bytes = self.bytes.saturating_sub(relation.row_bytes());
+            let (before, bytes) = relation.recount();
+            self.bytes = self.bytes + bytes - before;
             for &term in relation.row(ended.row) {
                 self.terms.release(term);
             }

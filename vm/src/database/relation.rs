@@ -87,6 +87,8 @@ pub(super) struct Relation {
     wanted: Vec<WantedIndex>,
     free: Vec<u32>,
     live: usize,
+    /// Bytes for it that the database has counted.
+    counted: usize,
 }
 
 /// How to find the rows for a query.
@@ -160,6 +162,7 @@ impl Relation {
             wanted: Vec::new(),
             free: Vec::new(),
             live: 0,
+            counted: 0,
         }
     }
 
@@ -258,9 +261,12 @@ impl Relation {
         self.set.find(hash_cells(cells), is_it)
     }
 
-    /// Returns the bytes that a fact takes, approximately.
-    pub(super) fn row_bytes(&self) -> usize {
-        8 * self.width + 40 + 8 * self.indexes.len()
+    /// Counts the bytes that its facts take, approximately. Returns those that were counted before, and those
+    /// that are now: a new index has facts take more that were there before it.
+    pub(super) fn recount(&mut self) -> (usize, usize) {
+        let rows = self.spans.len() - self.free.len();
+        let bytes = rows * (8 * self.width + 40 + 8 * self.indexes.len());
+        (std::mem::replace(&mut self.counted, bytes), bytes)
     }
 
     /// Adds a fact that is not there. The relation then holds its cells.
