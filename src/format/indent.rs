@@ -174,7 +174,7 @@ impl<'a> Indenter<'a> {
             Indentation::Call(_) => self.argument(list, index, node).unwrap_or(inner),
             Indentation::Body(heads, columns, _) if index <= heads.len() => start + columns,
             Indentation::Tagbody(heads) if index <= *heads => start + 4,
-            Indentation::Tagbody(_) if node.is_some_and(|node| tree.name(node).is_some()) => start + 1,
+            Indentation::Tagbody(_) if node.is_some_and(|node| is_tag(tree, node)) => start + 1,
             Indentation::Tagbody(_) => start + 3,
             Indentation::Sequence(_) if index > 1 => self.first_argument(list).unwrap_or(start + 2),
             Indentation::Body(..) | Indentation::Sequence(_) => start + 2,
@@ -288,10 +288,24 @@ impl<'a> Indenter<'a> {
 
 /// Returns the shape of a form, by its operator.
 fn form_shape(tree: &SyntaxTree, styles: &Styles, list: NodeId) -> Indentation {
-    match tree.operator(list) {
-        Some(operator) => styles.of_operator(&operator),
+    if let Some(operator) = tree.operator(list) {
+        return styles.of_operator(&operator);
+    }
+    match tree.data(list).next().and_then(|first| filled_in(tree, first)) {
+        Some(operator) => styles.of_filled_in(&bare_name(operator)),
         None => Indentation::Column(Arc::new(Indentation::Form), Arc::new(Indentation::Form)),
     }
+}
+
+/// Returns the name whose value a template takes in at this node: `top` for `,top`.
+fn filled_in(tree: &SyntaxTree, node: NodeId) -> Option<&str> {
+    let is_filled_in = tree.kind(node) == SyntaxKind::Mark(Token::Comma);
+    tree.data(node).next().filter(|_| is_filled_in).and_then(|inner| tree.name(inner))
+}
+
+/// Whether an element of a tagbody is a tag, also one that a template takes in.
+fn is_tag(tree: &SyntaxTree, node: NodeId) -> bool {
+    tree.name(node).is_some() || filled_in(tree, node).is_some()
 }
 
 /// Returns the shape of element `index` of a list.

@@ -78,9 +78,9 @@ impl Styles {
         let forms = |heads: usize| body(vec![Form; heads], Form);
         let rows: [(&str, Indentation); 27] = [
             ("block catch eval-when unless when return-from prog1 the-environment", forms(1)),
-            ("multiple-value-call multiple-value-prog1 multiple-value-setq", forms(1)),
+            ("multiple-value-call multiple-value-prog1 multiple-value-setq %with-failure-cleanup", forms(1)),
             ("progn locally", sequence(Form)),
-            ("prog2 progv", forms(2)),
+            ("prog2 progv %with-recovery", forms(2)),
             ("unwind-protect", Indentation::Body([Form].into(), 5, Arc::new(Form))),
             ("cond", Indentation::Call(Arc::new(keyed(Form, Form)))),
             ("case ccase ecase typecase ctypecase etypecase", keys()),
@@ -172,6 +172,12 @@ impl Styles {
         } else {
             header()
         }
+    }
+
+    /// Returns the shape of a form whose operator a template takes in from a variable of this name: `,let` is
+    /// mostly a kind of `let`.
+    pub(super) fn of_filled_in(&self, variable: &str) -> Indentation {
+        self.shapes.get(variable).cloned().unwrap_or_else(header)
     }
 }
 

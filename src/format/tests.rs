@@ -66,6 +66,13 @@ fn clauses_of_loops_stand_under_each_other() {
 }
 
 #[test]
+fn templates_are_indented_as_what_they_make() {
+    check("`(tagbody\n  ,top\n    (work)\n    (go ,top)\n  ,end)\n");
+    check("`(,let ,bindings\n   ,@body)\n");
+    check("`(,function ,x\n            ,@more)\n");
+}
+
+#[test]
 fn macros_are_indented_by_their_lambda_lists_and_declarations() {
     check(
         "(defmacro with-arm ((arm &key\n                     speed) &body body)\n  `(list ,arm\n         ,@body))\n",

@@ -8,7 +8,7 @@ use lsp_types::{
 use super::definition::{DefinedAs, NameDefinition};
 use super::document::OpenText;
 use super::project::Project;
-use super::scope::binding_of;
+use super::scope::{LocalSort, binding_of};
 use crate::syntax::{NodeId, SyntaxKind, SyntaxTree, bare_name};
 
 /// Answers what the name at a position is.
@@ -20,8 +20,12 @@ pub(super) fn hover(project: &Project, parameters: &HoverParams) -> Option<Hover
     let value = match binding_of(&text.tree, node) {
         Some(binding) => {
             let line = text.position(text.tree.range(binding.name).start).line + 1;
-            let what = if binding.is_function { "local function" } else { "local variable" };
-            format!("`{name}`: {what}, bound on line {line}")
+            match binding.sort {
+                LocalSort::Variable => format!("`{name}`: local variable, bound on line {line}"),
+                LocalSort::Function => format!("`{name}`: local function, bound on line {line}"),
+                LocalSort::Block => format!("`{name}`: block, which begins on line {line}"),
+                LocalSort::Tag => format!("`{name}`: tag on line {line}"),
+            }
         }
         None => {
             let found = project.find(text, &name);
@@ -53,13 +57,32 @@ pub(super) fn kind_word(kind: DefinedAs) -> &'static str {
     }
 }
 
-/// Returns a call as it is written: the name, and the lambda list without its parentheses.
+/// Returns a call as it is written: as the text says, if it begins with that, or else the name, and the
+/// lambda list without its parentheses.
 pub(super) fn usage(definition: &NameDefinition) -> String {
+    if let Some(usage) = told_usage(definition) {
+        return usage;
+    }
     match parameters_of(definition).join(" ") {
         list if definition.lambda_list.is_none() => list + &definition.name,
         list if list.is_empty() => format!("({})", definition.name),
         list => format!("({} {list})", definition.name),
     }
+}
+
+/// Returns the usage with which the text of a macro or operator begins: `(IF TEST THEN [ELSE]) evaluates …`.
+fn told_usage(definition: &NameDefinition) -> Option<String> {
+    let name = definition.name.to_uppercase();
+    let text = definition.text.strip_prefix('(').filter(|text| text.starts_with(&name))?;
+    if !matches!(definition.kind, DefinedAs::Macro | DefinedAs::Operator) {
+        return None;
+    }
+    let mut depth = 1;
+    let end = text.find(|c| {
+        depth += i32::from(c == '(') - i32::from(c == ')');
+        depth == 0
+    })?;
+    Some(format!("({})", text[..end].to_lowercase()))
 }
 
 /// Returns a definition as Markdown: usage, kind, documentation.
@@ -78,8 +101,30 @@ fn parameters_of(definition: &NameDefinition) -> Vec<String> {
     let Some(list) = &definition.lambda_list else { return Vec::new() };
     let tree = SyntaxTree::new(list.as_str());
     let Some(list) = tree.data(SyntaxTree::ROOT).next() else { return Vec::new() };
-    let one_line = |node| tree.text(node).split_whitespace().collect::<Vec<_>>().join(" ");
-    tree.data(list).map(one_line).collect()
+    let one_line = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut parts: Vec<String> = Vec::new();
+    let mut data = tree.data(list);
+    while let Some(node) = data.next() {
+        let shown = match tree.name(node).map(bare_name).as_deref() {
+            // What no caller writes.
+            Some("&environment" | "&whole") => {
+                data.next();
+                continue;
+            }
+            Some("&aux") => break,
+            _ => tree.text(node),
+        };
+        let part: Vec<NodeId> = tree.data(node).collect();
+        let has_words = parts.iter().any(|word| matches!(&**word, "&optional" | "&key"));
+        parts.push(match (&*part, tree.kind(node)) {
+            // Whether it was given is for the function itself.
+            (&[name, default, _], SyntaxKind::List) if has_words && tree.name(name).is_some() => {
+                format!("({} {})", tree.text(name), one_line(tree.text(default)))
+            }
+            _ => one_line(shown),
+        });
+    }
+    parts
 }
 
 /// Returns the list in which a position is, and the number of data before it there.
@@ -103,9 +148,14 @@ pub(super) fn signature(project: &Project, parameters: &SignatureHelpParams) -> 
     let text = project.text(&at.text_document.uri)?;
     let (list, index) = call_at(text, text.offset(at.position))?;
     let name = text.tree.operator(list)?;
-    let (definition, _) =
-        project.find(text, &name).into_iter().find(|(found, _)| found.lambda_list.is_some())?;
+    let is_call = |found: &NameDefinition| found.lambda_list.is_some() || told_usage(found).is_some();
+    let (definition, _) = project.find(text, &name).into_iter().find(|(found, _)| is_call(found))?;
     let parts = parameters_of(&definition);
+    // The names of the lambda list are to be found in what is shown.
+    let label = match parts.is_empty() {
+        true => usage(&definition),
+        false => format!("({} {})", definition.name, parts.join(" ")),
+    };
     let active = active_parameter(&parts, &typed(text, list), index.saturating_sub(1));
     let information = |part: &String| ParameterInformation {
         label: ParameterLabel::Simple(part.clone()),
@@ -113,7 +163,7 @@ pub(super) fn signature(project: &Project, parameters: &SignatureHelpParams) -> 
     };
     let value = definition.text.clone();
     let signature = SignatureInformation {
-        label: usage(&definition),
+        label,
         documentation: (!value.is_empty()).then_some(Documentation::String(value)),
         parameters: Some(parts.iter().map(information).collect()),
         active_parameter: active.map(|active| active as u32),

@@ -22,6 +22,7 @@ mod navigate;
 mod outline;
 mod project;
 mod recovery;
+mod reference;
 mod rename;
 mod repair;
 mod scope;
@@ -29,11 +30,12 @@ mod semantic;
 
 use std::path::PathBuf;
 
-use lsp_server::{Connection, Message, Notification};
+use lsp_server::{Connection, ErrorCode, Message, Notification, Response};
 use lsp_types::notification::{
-    DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, DidSaveTextDocument,
+    DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, DidSaveTextDocument, Exit,
     Notification as NotificationKind,
 };
+use lsp_types::request::{Request as _, Shutdown};
 use lsp_types::{
     CodeActionProviderCapability, CompletionOptions, ExecuteCommandOptions, FoldingRangeProviderCapability,
     HoverProviderCapability, InitializeParams, OneOf, PositionEncodingKind, RenameOptions,
@@ -41,19 +43,20 @@ use lsp_types::{
     SignatureHelpOptions, TextDocumentSyncCapability, TextDocumentSyncKind,
 };
 
-use crate::command::{SUCCESS, USAGE, complain};
+use crate::command::{FAILED, SUCCESS, USAGE, complain};
 use check::Checker;
 use document::{ColumnUnit, path_of};
 use project::Project;
 
-/// Serves one client until it says goodbye. Returns the exit status.
+/// Serves one client until it says goodbye. Returns the exit status: 0 if the client has asked for the end
+/// before, 1 if it has not, 2 if it has not said hello.
 pub fn serve(folders: Vec<PathBuf>) -> u8 {
     let (connection, threads) = Connection::stdio();
     let result = session(&connection, folders);
     // The writing thread ends when nobody can send any more.
     drop(connection);
-    match result.and_then(|()| threads.join().map_err(|error| error.to_string())) {
-        Ok(()) => SUCCESS,
+    match result.and_then(|status| threads.join().map(|()| status).map_err(|error| error.to_string())) {
+        Ok(status) => status,
         Err(error) => {
             complain(error);
             USAGE
@@ -61,7 +64,7 @@ pub fn serve(folders: Vec<PathBuf>) -> u8 {
     }
 }
 
-fn session(connection: &Connection, folders: Vec<PathBuf>) -> Result<(), String> {
+fn session(connection: &Connection, folders: Vec<PathBuf>) -> Result<u8, String> {
     let (id, parameters) = connection.initialize_start().map_err(|error| error.to_string())?;
     let parameters: InitializeParams = serde_json::from_value(parameters)
         .map_err(|error| format!("the client says hello wrongly: {error}"))?;
@@ -76,22 +79,32 @@ fn session(connection: &Connection, folders: Vec<PathBuf>) -> Result<(), String>
     let mut project = Project::new(folders, roots, unit);
     let sender = connection.sender.clone();
     let checker = Checker::start(move |message| sender.send(message).is_ok());
+    // What an end without a goodbye means: the client may have been killed.
+    let mut status = FAILED;
     for message in &connection.receiver {
         match message {
             Message::Request(request) => {
-                if connection.handle_shutdown(&request).map_err(|error| error.to_string())? {
-                    return Ok(());
-                }
-                let response = answer::answer(&project, request);
+                let response = match &*request.method {
+                    _ if status == SUCCESS => {
+                        let message = "the server has been asked to shut down".into();
+                        Response::new_err(request.id, ErrorCode::InvalidRequest as i32, message)
+                    }
+                    Shutdown::METHOD => {
+                        status = SUCCESS;
+                        Response::new_ok(request.id, ())
+                    }
+                    _ => answer::answer(&project, request),
+                };
                 if connection.sender.send(Message::Response(response)).is_err() {
-                    return Ok(());
+                    break;
                 }
             }
+            Message::Notification(notification) if notification.method == Exit::METHOD => break,
             Message::Notification(notification) => take(&mut project, &checker, notification),
             Message::Response(_) => {}
         }
     }
-    Ok(())
+    Ok(status)
 }
 
 /// Takes a change of a text in the editor. A notification that cannot be understood is left aside, as the

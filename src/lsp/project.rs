@@ -8,7 +8,7 @@ use lsp_types::{Location, Uri};
 
 use super::definition::{NameDefinition, definitions};
 use super::document::{ColumnUnit, OpenText, path_of, uri_of};
-use super::library::{language, shown_source};
+use super::library::{LanguageName, language, shown_source};
 use crate::format::required;
 use crate::module_path::ModulePath;
 
@@ -90,6 +90,11 @@ impl Project {
         modules
     }
 
+    /// Returns the names of the modules that a text can require.
+    pub(super) fn module_names(&self, text: &OpenText) -> Vec<String> {
+        self.module_path(&text.path()).names()
+    }
+
     /// Returns the texts of the workspace: the open ones, and the sources in its folders.
     pub(super) fn workspace(&self) -> Vec<OpenText> {
         let mut folders = self.roots.clone();
@@ -127,13 +132,15 @@ impl Project {
         if !of_modules.is_empty() {
             return of_modules;
         }
-        let Some(found) = language().find(name) else { return Vec::new() };
-        let location = found.source.and_then(|source| {
-            let (name, text) = esl_stdlib::SOURCES[source];
-            let uri = uri_of(&shown_source(name, text)?)?;
-            let text = OpenText::new(uri, 0, text.to_owned(), self.unit);
-            Some(text.location(found.definition.name_place.clone()))
-        });
-        vec![(found.definition.clone(), location)]
+        let located = |found: &LanguageName| {
+            let location = found.source.and_then(|source| {
+                let (name, text) = esl_stdlib::SOURCES[source];
+                let uri = uri_of(&shown_source(name, text)?)?;
+                let text = OpenText::new(uri, 0, text.to_owned(), self.unit);
+                Some(text.location(found.definition.name_place.clone()))
+            });
+            (found.definition.clone(), location)
+        };
+        language().find_all(name).into_iter().map(located).collect()
     }
 }

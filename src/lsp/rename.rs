@@ -16,7 +16,7 @@ use super::document::OpenText;
 use super::library::language;
 use super::navigate::{NameAt, name_at, texts_of, uses_in};
 use super::project::Project;
-use super::scope::{LocalBinding, binding_of, bindings_around, is_operator};
+use super::scope::{LocalBinding, LocalSort, binding_of, bindings_around, sort_at};
 use crate::syntax::{NodeId, SyntaxKind, SyntaxTree, bare_name};
 
 /// Answers whether the name at a position can be renamed.
@@ -67,7 +67,7 @@ pub(super) fn rename(project: &Project, parameters: &RenameParams) -> Result<Wor
     let wanted = new.to_lowercase();
     // Another way to write the same name changes nothing.
     let is_other = wanted != found.name;
-    if is_other && found.binding.is_none_or(|binding| binding.is_function) {
+    if is_other && found.binding.is_none_or(|binding| binding.sort == LocalSort::Function) {
         refuse_defined(project, &found, &wanted)?;
     }
     #[allow(clippy::mutable_key_type, reason = "the type of the protocol")]
@@ -165,11 +165,11 @@ fn refuse_capture(
     let line = |node: NodeId| text.position(tree.range(node).start).line + 1;
     let is_new = |name: NodeId| tree.name(name).map(bare_name).is_some_and(|name| name == new);
     for &node in uses {
-        let is_function = binding.map_or_else(|| is_operator(tree, node), |binding| binding.is_function);
+        let sort = binding.map_or_else(|| sort_at(tree, node), |binding| binding.sort);
         let scope = binding.map(|binding| tree.range(binding.scope));
         let captures = |other: &LocalBinding| {
             let is_inside = scope.as_ref().is_none_or(|scope| scope.start <= tree.range(other.scope).start);
-            is_inside && other.is_function == is_function && is_new(other.name)
+            is_inside && other.sort == sort && is_new(other.name)
         };
         if let Some(other) = bindings_around(tree, node).into_iter().find(captures) {
             return Err(format!(
@@ -183,7 +183,7 @@ fn refuse_capture(
     for node in (tree.first_at(scope.start)..tree.first_at(scope.end)).filter(|&node| is_new(node)) {
         let is_quoted =
             tree.parent(node).is_some_and(|mark| tree.kind(mark) == SyntaxKind::Mark(Token::Quote));
-        let is_same_sort = is_operator(tree, node) == binding.is_function;
+        let is_same_sort = sort_at(tree, node) == binding.sort;
         let is_free = binding_of(tree, node).is_none_or(|other| tree.range(other.scope).start < scope.start);
         if !is_quoted && is_same_sort && is_free {
             return Err(format!("`{new}` on line {} would mean the renamed one", line(node)));

@@ -28,6 +28,17 @@ const NOT_BINDING: &[&str] = &[
     "with-world",
 ];
 
+/// What a local name is a name of: each sort has names of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum LocalSort {
+    Variable,
+    Function,
+    /// What `return-from` leaves.
+    Block,
+    /// Where `go` goes on.
+    Tag,
+}
+
 /// A local binding of a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct LocalBinding {
@@ -35,7 +46,7 @@ pub(super) struct LocalBinding {
     pub(super) name: NodeId,
     /// The form in which the binding holds.
     pub(super) scope: NodeId,
-    pub(super) is_function: bool,
+    pub(super) sort: LocalSort,
 }
 
 /// Returns the bindings around a node, the innermost first.
@@ -59,10 +70,33 @@ pub(super) fn binding_of(tree: &SyntaxTree, node: NodeId) -> Option<LocalBinding
     if let Some(own) = bindings.iter().find(|binding| binding.name == node) {
         return Some(*own);
     }
-    let wants_function = is_operator(tree, node);
+    let sort = sort_at(tree, node);
     let same = |binding: &&LocalBinding| tree.name(binding.name).map(bare_name).as_ref() == Some(&name);
-    let mut known = bindings.iter().filter(same).filter(|binding| binding.is_function == wants_function);
+    let mut known = bindings.iter().filter(same).filter(|binding| is_seen(tree, binding, sort, node));
     known.find(|binding| template_level(tree, binding.name) == Some(level)).copied()
+}
+
+/// Whether a binding is one of this sort for a name inside its form. The body of a local function is a block
+/// of the function's name.
+fn is_seen(tree: &SyntaxTree, binding: &LocalBinding, sort: LocalSort, node: NodeId) -> bool {
+    let is_block = || {
+        let definition = tree.parent(binding.name).map(|definition| tree.range(definition));
+        binding.sort == LocalSort::Function
+            && definition.is_some_and(|place| place.contains(&tree.range(node).start))
+    };
+    binding.sort == sort || sort == LocalSort::Block && is_block()
+}
+
+/// Returns the sort of the name that stands here.
+pub(super) fn sort_at(tree: &SyntaxTree, node: NodeId) -> LocalSort {
+    let list = tree.parent(node).filter(|&list| tree.kind(list) == SyntaxKind::List);
+    let jump = list.filter(|&list| tree.data(list).nth(1) == Some(node)).and_then(|list| tree.operator(list));
+    match jump.as_deref() {
+        Some("return-from") => LocalSort::Block,
+        Some("go") => LocalSort::Tag,
+        _ if is_operator(tree, node) => LocalSort::Function,
+        _ => LocalSort::Variable,
+    }
 }
 
 /// Returns the number of backquotes around a node that no comma has left, as names in a template and names
@@ -89,9 +123,34 @@ pub(super) fn is_operator(tree: &SyntaxTree, node: NodeId) -> bool {
     match tree.parent(node).map(|parent| (parent, tree.kind(parent))) {
         Some((_, SyntaxKind::Mark(Token::Function))) => true,
         Some((parent, SyntaxKind::List)) => {
-            tree.data(parent).next() == Some(node) && !is_clause(tree, parent)
+            tree.data(parent).next() == Some(node)
+                && !is_clause(tree, parent)
+                && !is_description(tree, parent)
         }
         _ => false,
+    }
+}
+
+/// Whether a list describes something in a definition: parameters, slots, parents.
+fn is_description(tree: &SyntaxTree, list: NodeId) -> bool {
+    let place = |inner: NodeId| {
+        let outer = tree.parent(inner)?;
+        let operator = tree.operator(outer).filter(|operator| operator.starts_with("def"))?;
+        Some((operator, tree.data(outer).position(|part| part == inner)?))
+    };
+    let has_slots = |operator: &str| matches!(operator, "defstruct" | "defclass" | "define-condition");
+    let has_value = |operator: &str| {
+        matches!(operator, "defvar" | "defparameter" | "defconstant" | "deftest" | "define-fluent")
+    };
+    match place(list) {
+        Some((operator, at)) if has_slots(&operator) => at >= 1,
+        Some((operator, at)) => at == 1 && operator != "define-resource" || at == 2 && !has_value(&operator),
+        // A slot with options, a parameter with a default or a class.
+        None => tree.parent(list).and_then(place).is_some_and(|(operator, at)| match &*operator {
+            "defstruct" => false,
+            "defclass" | "define-condition" => at == 3,
+            _ => at == 2 && !has_value(&operator),
+        }),
     }
 }
 
@@ -113,9 +172,11 @@ fn is_clause(tree: &SyntaxTree, list: NodeId) -> bool {
 
 /// Adds what a list binds.
 fn bound_by(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBinding>) {
-    let mut variable = |name: NodeId| found.push(LocalBinding { name, scope: list, is_function: false });
     let argument = |at: usize| tree.data(list).nth(at);
     let Some(operator) = tree.operator(list) else { return bound_by_clause(tree, list, found) };
+    blocks_and_tags(tree, list, &operator, found);
+    let mut variable =
+        |name: NodeId| found.push(LocalBinding { name, scope: list, sort: LocalSort::Variable });
     match &*operator {
         "let" | "let*" | "do" | "do*" | "prog" | "prog*" | "symbol-macrolet" | "with-slots"
         | "with-accessors" => {
@@ -142,7 +203,7 @@ fn bound_by(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBinding>) {
             let functions = argument(1).into_iter().flat_map(|functions| tree.data(functions));
             let names = functions.filter_map(|function| tree.data(function).next());
             let names = names.filter(|&name| tree.name(name).is_some());
-            found.extend(names.map(|name| LocalBinding { name, scope: list, is_function: true }));
+            found.extend(names.map(|name| LocalBinding { name, scope: list, sort: LocalSort::Function }));
         }
         "task-net" | "or-parallel" | "try-all" | "pursue" | "try-in-order" | "supervise" => {
             let clauses = tree.data(list).skip(1).filter(|&clause| tree.kind(clause) == SyntaxKind::List);
@@ -168,9 +229,37 @@ fn bound_by(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBinding>) {
     }
 }
 
+/// Adds the block that a form is, and the tags in it.
+fn blocks_and_tags(tree: &SyntaxTree, list: NodeId, operator: &str, found: &mut Vec<LocalBinding>) {
+    let block = match operator {
+        "block" => tree.data(list).nth(1),
+        "loop" => {
+            let words: Vec<NodeId> = tree.data(list).skip(1).take(2).collect();
+            let is_named = words.first().and_then(|&word| tree.name(word)).map(bare_name);
+            words.get(1).copied().filter(|_| is_named.as_deref() == Some("named"))
+        }
+        _ => None,
+    };
+    let is_name = |&name: &NodeId| tree.name(name).is_some_and(|name| bare_name(name) != "nil");
+    found.extend(block.filter(is_name).map(|name| LocalBinding {
+        name,
+        scope: list,
+        sort: LocalSort::Block,
+    }));
+    let heads = match operator {
+        "tagbody" => 1,
+        "prog" | "prog*" | "dolist" | "dotimes" => 2,
+        "do" | "do*" => 3,
+        _ => return,
+    };
+    let tags = tree.data(list).skip(heads).filter(is_name);
+    found.extend(tags.map(|name| LocalBinding { name, scope: list, sort: LocalSort::Tag }));
+}
+
 /// Adds what a list binds by its place in another form: a local function, a clause.
 fn bound_by_clause(tree: &SyntaxTree, list: NodeId, found: &mut Vec<LocalBinding>) {
-    let mut variable = |name: NodeId| found.push(LocalBinding { name, scope: list, is_function: false });
+    let mut variable =
+        |name: NodeId| found.push(LocalBinding { name, scope: list, sort: LocalSort::Variable });
     let Some(parent) = tree.parent(list) else { return };
     if matches!(tree.operator(parent).as_deref(), Some("handler-case" | "restart-case"))
         && tree.data(parent).nth(1) != Some(list)

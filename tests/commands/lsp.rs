@@ -114,6 +114,8 @@ impl Editor {
     /// Says goodbye.
     fn end(mut self) {
         self.ask("shutdown", Value::Null);
+        let late = self.request("workspace/symbol", json!({ "query": "" }));
+        assert_eq!(late["error"]["code"], -32600, "{late}");
         self.tell("exit", Value::Null);
         drop(self.input);
         assert_eq!(finish(self.child).status, Some(0));
@@ -335,5 +337,146 @@ fn renaming_changes_what_no_name_means() {
     let expected =
         [(1, 6), (1, 3), (1, 2), (0, 1), (0, 0), (0, 0)].map(|(line, column)| (json!(line), json!(column)));
     assert_eq!(starts, expected);
+    editor.end();
+}
+
+#[test]
+fn causes_of_the_language_are_known_with_its_conditions() {
+    let folder = Folder::new("lsp_causes");
+    let mut editor = Editor::new(&folder);
+    let path = folder.join("causes.esl");
+    let text = "(with-recovery-procedures ((:division-by-zero (abort))) (fail :timeou)) (error 'type-error)";
+    editor.open(&path, text);
+    let said = hover(&mut editor, &path, place(text, ":division", 0));
+    assert!(said.contains("a kind of `:arithmetic-error`"), "{said}");
+    let said = hover(&mut editor, &path, place(text, "type-error", 0));
+    assert!(said.contains("*type*") && said.contains("the cause `:type-error`"), "{said}");
+    let at = json!({ "line": 0, "character": text.find("timeou").map(|at| at + 6) });
+    let offered = editor.ask_at("textDocument/completion", &path, at, json!({}));
+    assert_eq!(offered["items"][0]["label"], ":timeout", "{offered}");
+    editor.end();
+}
+
+#[test]
+fn an_end_without_a_goodbye_has_another_status() {
+    let folder = Folder::new("lsp_end");
+    let mut editor = Editor::new(&folder);
+    editor.tell("exit", Value::Null);
+    drop(editor.input);
+    assert_eq!(finish(editor.child).status, Some(1));
+    let mut editor = Editor::new(&folder);
+    editor.ask("shutdown", Value::Null);
+    drop(editor.input);
+    assert_eq!(finish(editor.child).status, Some(0), "the client is gone, but has said so");
+}
+
+/// Labels of what is offered where `here` stands in a text, which is taken out of it.
+fn offered(editor: &mut Editor, path: &str, text: &str, here: &str) -> Vec<String> {
+    let at = place(text, here, 0);
+    editor.open(path, &text.replacen(here, "", 1));
+    let answer = editor.ask_at("textDocument/completion", path, at, json!({}));
+    let items = answer["items"].as_array().cloned().unwrap_or_default();
+    items.iter().filter_map(|item| item["label"].as_str()).map(str::to_owned).collect()
+}
+
+#[test]
+fn blocks_and_tags_are_names_of_their_own() {
+    let folder = Folder::new("lsp_blocks");
+    let mut editor = Editor::new(&folder);
+    let path = folder.join("blocks.esl");
+    let text = "(defun search (list)
+  (block found
+    (let ((found 1))
+      (dolist (item list)
+        (when item (return-from found item)))
+      (tagbody
+       found
+         (go found))
+      (labels ((inner (x) (return-from inner x)))
+        (inner found))
+      (return-from search found))))
+";
+    editor.open(&path, text);
+    let mut places = |word: &str, nth: usize| -> Vec<(u64, u64)> {
+        let more = json!({ "context": { "includeDeclaration": true } });
+        let found = editor.ask_at("textDocument/references", &path, place(text, word, nth), more);
+        let start = |place: &Value| {
+            let start = &place["range"]["start"];
+            (start["line"].as_u64().unwrap_or(99), start["character"].as_u64().unwrap_or(99))
+        };
+        found.as_array().map(|all| all.iter().map(start).collect()).unwrap_or_default()
+    };
+    let (block, variable, tag) = ([(1, 9), (4, 32)], [(2, 11), (9, 15), (10, 26)], [(6, 7), (7, 13)]);
+    assert_eq!(places("found", 0), block);
+    assert_eq!(places("found item", 0), block);
+    assert_eq!(places("found 1", 0), variable);
+    assert_eq!(places("found\n", 1), tag);
+    assert_eq!(places("found))\n      (labels", 0), tag);
+    assert_eq!(places("inner x", 0), [(8, 16), (8, 39), (9, 9)]);
+    assert_eq!(places("search found", 0), [(0, 7), (10, 19)]);
+    assert_eq!(
+        hover(&mut editor, &path, place(text, "found item", 0)),
+        "`found`: block, which begins on line 2"
+    );
+    let definition =
+        editor.ask_at("textDocument/definition", &path, place(text, "found))\n      (labels", 0), json!({}));
+    assert_eq!(definition["range"]["start"], json!({ "line": 6, "character": 7 }));
+    let offers = offered(&mut editor, &path, "(defun f () (block out (tagbody again (return-from @))))", "@");
+    assert_eq!(offers, ["out", "f"]);
+    let offers = offered(&mut editor, &path, "(defun f () (block out (tagbody again (go a@))))", "@");
+    assert_eq!(offers, ["again"]);
+    editor.end();
+}
+
+#[test]
+fn declarations_and_modules_are_completed() {
+    let folder = Folder::with("lsp_declare", &[("arm.esl", ARM)]);
+    let mut editor = Editor::new(&folder);
+    let path = folder.join("main.esl");
+    let mut offers = |text: &str| offered(&mut editor, &path, text, "@");
+    assert_eq!(offers("(defun f (x y) (declare (ig@)))"), ["ignore", "ignorable"]);
+    assert_eq!(offers("(defun f (left right) (let ((near 1)) (declare (ignore n@))))"), ["near"]);
+    assert_eq!(offers("(defun f (left right) (declare (ignorable @)))"), ["left", "right"]);
+    assert_eq!(offers("(declaim (optimize (sp@)))"), ["speed", "space"]);
+    assert_eq!(offers("(declaim (optimize sp@))"), ["speed", "space"]);
+    assert_eq!(offers("(require \"a@\")"), ["arm"]);
+    assert_eq!(offers("(require \"js@\")"), ["json"]);
+    editor.end();
+}
+
+#[test]
+fn names_of_the_language_are_told_as_the_reference_has_them() {
+    let folder = Folder::new("lsp_reference");
+    let mut editor = Editor::new(&folder);
+    let path = folder.join("names.esl");
+    let text = "(defclass rover () ((speed :initarg :speed)))
+(defstruct valve (state (list 1)))
+(if (gethash 1 table) (mapcar f list) (error 'error))
+(make-instance 'rover :
+";
+    editor.open(&path, text);
+    let mut said = |word: &str| hover(&mut editor, &path, place(text, word, 0));
+    assert!(said("gethash").starts_with("```lisp\n(gethash key table &optional default)\n```\n*function*"));
+    assert!(said("mapcar").starts_with("```lisp\n(mapcar function list &rest more-lists)\n```\n*function*"));
+    assert!(said("if").starts_with("```lisp\n(if test then [else])\n```\n*special operator*"));
+    let both = said("error 'error");
+    assert!(both.contains("*function*") && both.contains("*type*"), "{both}");
+    let at = json!({ "line": 3, "character": 23 });
+    let offered = editor.ask_at("textDocument/completion", &path, at, json!({}));
+    let labels: Vec<_> =
+        offered["items"].as_array().expect("a list").iter().map(|item| &item["label"]).collect();
+    assert_eq!(labels, [":speed"]);
+    let help = json!({ "line": 2, "character": 4 });
+    let help = editor.ask_at("textDocument/signatureHelp", &path, help, json!({}));
+    assert_eq!(help["signatures"][0]["label"], "(if test then [else])", "{help}");
+    // Slots and parents are not called.
+    let document = json!({ "textDocument": { "uri": uri(&path) } });
+    let tokens = editor.ask("textDocument/semanticTokens/full", document);
+    let numbers: Vec<u64> =
+        tokens["data"].as_array().expect("a list").iter().filter_map(Value::as_u64).collect();
+    let second_line: Vec<&[u64]> = numbers.chunks(5).skip_while(|token| token[0] == 0).collect();
+    let functions =
+        second_line.iter().skip(1).take_while(|token| token[0] == 0).filter(|token| token[3] == 5);
+    assert_eq!(functions.count(), 2, "the structure's name, and list");
     editor.end();
 }
