@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "commands print")]
 
 use std::collections::HashMap;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -11,7 +12,7 @@ use serde_json::json;
 
 use super::{
     Behaviour, Exploration, Grain, Schedule, SearchLimit, SearchProgress, Settings, StandingTask, Switch,
-    TimerGrain, explore_while, tell_switches,
+    TimerGrain, explore_together, tell_switches,
 };
 use crate::command::{self, FAILED, NOT_PROVED, SUCCESS, StatusLine, USAGE, complain};
 use crate::error::Error;
@@ -19,11 +20,18 @@ use crate::module_path::ModulePath;
 use crate::program::{Ended, Program};
 use crate::timeline::Timeline;
 
+/// Prints a line. Whoever has closed the pipe wants no more of it; the exit status still tells.
+macro_rules! say {
+    ($($part:tt)*) => { _ = writeln!(std::io::stdout(), $($part)*) };
+}
+
 /// How to explore, and what to say of it.
 #[derive(Clone, Debug)]
 pub struct ExplorationOptions {
     /// What is explored.
     pub settings: Settings,
+    /// Number of threads.
+    pub jobs: usize,
     /// Time after which the search gives up.
     pub time: Duration,
     /// File for a timeline of the first finding.
@@ -77,7 +85,7 @@ pub fn run(program: &Program, file: &Path, path: &ModulePath, options: &Explorat
     let line = Mutex::new(String::from("exploring"));
     let search = || {
         let mut told = started;
-        explore_while(program, &options.settings, &prepare, |progress| {
+        explore_together(program, &options.settings, options.jobs, &prepare, |progress| {
             if told.elapsed() > Duration::from_millis(100) {
                 told = Instant::now();
                 *line.lock().unwrap_or_else(PoisonError::into_inner) = progress_line(progress, started);
@@ -105,7 +113,7 @@ pub fn run(program: &Program, file: &Path, path: &ModulePath, options: &Explorat
     if options.json {
         let limit = found.limit.map(|limit| format!("{limit:?}").to_lowercase());
         let (states, runs, count) = (found.states, found.runs, findings.len());
-        println!(
+        say!(
             "{}",
             json!({ "states": states, "runs": runs, "findings": count, "limit": limit, "seconds": seconds })
         );
@@ -174,11 +182,12 @@ fn tell(
     std::fs::write(&name, schedule.to_string())
         .map_err(|error| format!("{name} cannot be written: {error}"))?;
     let timeline = options.timeline.as_ref().filter(|_| number == 1);
-    let pictured = std::cell::RefCell::new(None);
+    let pictured = Mutex::new(None);
     let prepare = |machine: &mut Vm| {
         prepare(machine)?;
         if let Some(path) = timeline {
-            pictured.replace(Some(Timeline::begin(path, machine)));
+            let timeline = Timeline::begin(path, machine);
+            *pictured.lock().unwrap_or_else(PoisonError::into_inner) = Some(timeline);
         }
         Ok::<(), Error>(())
     };
@@ -186,22 +195,22 @@ fn tell(
     let mut told = |switch| switches.push(switch);
     tell_switches(program, &options.settings, &finding.choices, finding.ends, &prepare, &mut told)
         .map_err(|error| error.to_string())?;
-    if let Some(timeline) = pictured.into_inner() {
+    if let Some(timeline) = pictured.into_inner().unwrap_or_else(PoisonError::into_inner) {
         let told = timeline.and_then(Timeline::complete);
         told.map_err(|error| format!("the timeline cannot be written: {error}"))?;
     }
     if options.json {
         let switches: Vec<_> = switches.iter().map(|switch| text(switch, lines)).collect();
         let (what, errors) = (&finding.what, &finding.errors);
-        println!("{}", json!({ "finding": what, "switches": switches, "report": errors, "schedule": name }));
+        say!("{}", json!({ "finding": what, "switches": switches, "report": errors, "schedule": name }));
         return Ok(());
     }
-    println!("finding {number}: {}", finding.what);
+    say!("finding {number}: {}", finding.what);
     for (switch, number) in switches.iter().zip(1..) {
-        println!("  {number}. {}", text(switch, lines).replace('\n', "\n     "));
+        say!("  {number}. {}", text(switch, lines).replace('\n', "\n     "));
     }
-    finding.errors.lines().for_each(|line| println!("  {line}"));
-    println!("  again: eslvm run --schedule {name} {}\n", file.display());
+    finding.errors.lines().for_each(|line| say!("  {line}"));
+    say!("  again: eslvm run --schedule {name} {}\n", file.display());
     Ok(())
 }
 
@@ -245,13 +254,13 @@ fn print_summary(found: &Exploration<Behaviour>, settings: &Settings, findings: 
         Some(SearchLimit::Asked) => Some("the time is over"),
     };
     match (findings, why) {
-        (0, None) => println!("complete: no schedule ends badly ({figures})"),
-        (0, Some(why)) => println!("bounded, not proved: {why}; no schedule so far ends badly ({figures})"),
-        (_, None) => println!("complete: findings: {findings} ({figures})"),
-        (_, Some(why)) => println!("bounded: {why}; findings: {findings} ({figures})"),
+        (0, None) => say!("complete: no schedule ends badly ({figures})"),
+        (0, Some(why)) => say!("bounded, not proved: {why}; no schedule so far ends badly ({figures})"),
+        (_, None) => say!("complete: findings: {findings} ({figures})"),
+        (_, Some(why)) => say!("bounded: {why}; findings: {findings} ({figures})"),
     }
     if found.has_cycle {
-        println!(
+        say!(
             "Some schedules return to where they were: they can go on for ever, if they are unfair to a task."
         );
     }
@@ -261,12 +270,15 @@ fn print_summary(found: &Exploration<Behaviour>, settings: &Settings, findings: 
     };
     let reads = match settings.grain {
         Grain::Changes => "; switches before a task only looks at what others do (--grain reads)",
-        Grain::Reads => "",
+        Grain::Reads | Grain::Ticks => "",
     };
-    println!(
-        "Not seen: changes of variables, slots and tables by tasks that are outside of critical sections\
-         {reads}{timers}."
-    );
+    let objects = "changes of variables, slots and tables by tasks that are outside of critical sections \
+                   (--grain ticks)";
+    match (settings.grain, settings.timers) {
+        (Grain::Ticks, TimerGrain::Any) => {}
+        (Grain::Ticks, TimerGrain::Idle) => say!("Not seen: {}.", timers.trim_start_matches("; ")),
+        _ => say!("Not seen: {objects}{reads}{timers}."),
+    }
 }
 
 /// Says how far a search is that began at `started`.

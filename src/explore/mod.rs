@@ -21,10 +21,7 @@
 
 #[cfg(feature = "cli")]
 mod command;
-#[cfg(feature = "cli")]
 mod schedule;
-
-use std::cell::RefCell;
 
 #[cfg(feature = "cli")]
 pub use command::{ExplorationOptions, read_schedule, run};
@@ -35,7 +32,6 @@ pub use esl_vm::explore::{
 use esl_vm::host::{Captured, VirtualHost};
 use esl_vm::task::TaskId;
 use esl_vm::vm::{Config, Vm};
-#[cfg(feature = "cli")]
 pub use schedule::{Schedule, ScheduleError};
 
 use crate::error::Error;
@@ -53,7 +49,7 @@ pub struct Behaviour {
 }
 
 /// Prepares each machine before the program is loaded.
-type Prepare<'a> = &'a dyn Fn(&mut Vm) -> Result<(), Error>;
+type Prepare<'a> = &'a (dyn Fn(&mut Vm) -> Result<(), Error> + Sync);
 
 /// Returns a machine that is about to run a program, its main task, and its outputs.
 fn begin(program: &Program, prepare: Prepare<'_>, snapshots: bool) -> Result<(Vm, TaskId, Captured), Error> {
@@ -82,32 +78,40 @@ pub fn explore_with(
     settings: &Settings,
     prepare: Prepare<'_>,
 ) -> Result<Exploration<Behaviour>, Error> {
-    explore_while(program, settings, prepare, |_| true)
+    explore_together(program, settings, 1, prepare, |_| true)
 }
 
-/// As [`explore_with`], for as long as `goes_on`, which is asked before each run and in each new state.
+/// As [`explore_with`], in so many threads, which find the same as one, and for as long as `goes_on`, which
+/// is asked now and then.
 ///
 /// # Errors
 /// As [`explore_with`].
-pub fn explore_while(
+pub fn explore_together(
     program: &Program,
     settings: &Settings,
+    jobs: usize,
     prepare: Prepare<'_>,
     goes_on: impl FnMut(&SearchProgress) -> bool,
 ) -> Result<Exploration<Behaviour>, Error> {
-    let present = RefCell::new(None);
     let begin = || {
         let (machine, main, captured) = begin(program, prepare, settings.snapshots)?;
-        present.replace(Some((main, captured)));
-        Ok(machine)
+        Ok((machine, (main, captured)))
     };
-    let judge = |machine: &mut Vm, outcome| {
-        let present = present.borrow();
-        let (main, captured) = present.as_ref().expect("a machine that has run was begun");
+    let judge = |machine: &mut Vm, (main, captured): &(TaskId, Captured), outcome| {
         let ended = program::end(machine, *main, outcome);
         Behaviour { ended, output: captured.output(), errors: captured.error() }
     };
-    esl_vm::explore::explore_while(settings, begin, judge, goes_on)
+    esl_vm::explore::explore_together(settings, (jobs, &side_by_side), begin, judge, goes_on)
+}
+
+/// Calls functions in threads of their own and the last one in this thread, and waits for all of them.
+fn side_by_side(others: Vec<Box<dyn FnOnce() + Send + '_>>, own: &mut dyn FnMut()) {
+    std::thread::scope(|scope| {
+        for other in others {
+            scope.spawn(other);
+        }
+        own();
+    });
 }
 
 /// Runs a program by a list of choices that [`explore`] has found with the same settings.

@@ -17,7 +17,7 @@
 use std::fmt;
 
 use super::{Grain, Settings, TimerGrain};
-use crate::program::Program;
+use crate::program::{ExecutionIdentity, Program};
 
 /// First line of a file.
 const HEADER: &str = "esl-schedule 2";
@@ -111,10 +111,11 @@ impl Schedule {
         let machine = machine.ok_or(wrong(2, "a number, `-`, and a checksum in hexadecimal digits"))?;
         let program = hexadecimal(field(3, "program", "`program` and a checksum")?);
         let program = program.ok_or(wrong(3, "a checksum in hexadecimal digits"))?;
-        let grain = match field(4, "grain", "`grain changes` or `grain reads`")? {
+        let grain = match field(4, "grain", "`grain changes`, `grain reads` or `grain ticks`")? {
             "changes" => Grain::Changes,
             "reads" => Grain::Reads,
-            _ => return Err(wrong(4, "`changes` or `reads`")),
+            "ticks" => Grain::Ticks,
+            _ => return Err(wrong(4, "`changes`, `reads` or `ticks`")),
         };
         let timers = match field(5, "timers", "`timers idle` or `timers any`")? {
             "idle" => TimerGrain::Idle,
@@ -159,6 +160,7 @@ impl fmt::Display for Schedule {
         let grain = match self.grain {
             Grain::Changes => "changes",
             Grain::Reads => "reads",
+            Grain::Ticks => "ticks",
         };
         let timers = match self.timers {
             TimerGrain::Idle => "idle",
@@ -174,7 +176,8 @@ impl fmt::Display for Schedule {
 
 /// Returns the epoch of this machine's behaviour, and the checksum of its library.
 fn this_machine() -> (u32, u32) {
-    (esl_vm::EXECUTION_EPOCH, crc32fast::hash(esl_stdlib::IMAGE))
+    let identity = ExecutionIdentity::current();
+    (identity.epoch, identity.library)
 }
 
 /// Returns the checksum of a program; 0 for one that no file can hold.

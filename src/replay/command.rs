@@ -9,8 +9,8 @@ use clap::Args;
 use esl_vm::host::Output;
 
 use super::breakpoint::{Breakpoint, Target};
-use super::file::Recorded;
-use super::rerun::{Replayed, Rerun};
+use super::file::{Recorded, RecordedError};
+use super::rerun::{Replayed, Rerun, RerunError};
 use super::session;
 use crate::command::{DIVERGED, NOT_COMPILED, SUCCESS, USAGE, complain, refuse_overwriting};
 use crate::timeline::Timeline;
@@ -46,7 +46,7 @@ pub fn run(options: &ReplayOptions) -> Result<u8, u8> {
         complain(format_args!("{} cannot be read: {error}", file.display()));
         USAGE
     })?;
-    let recorded = Recorded::read(&bytes).map_err(|error| refused(file, &error))?;
+    let recorded = Recorded::read(&bytes).map_err(|error| refused(file, &RerunError::Recording(error)))?;
     if options.until.is_some() || !options.breakpoints.is_empty() {
         return session::run(recorded, options.until.clone(), options.breakpoints.clone())
             .map_err(|error| refused(file, &error));
@@ -103,9 +103,13 @@ pub(super) fn show(output: Output, bytes: &[u8]) {
     };
 }
 
-fn refused(file: &Path, error: &dyn std::fmt::Display) -> u8 {
+fn refused(file: &Path, error: &RerunError) -> u8 {
     complain(format_args!("{} cannot be replayed: {error}", file.display()));
-    NOT_COMPILED
+    match error {
+        // The run that this machine would make of it is another one.
+        RerunError::Recording(RecordedError::OtherMachine | RecordedError::Format(_)) => DIVERGED,
+        _ => NOT_COMPILED,
+    }
 }
 
 fn not_written(path: &Path, error: &std::io::Error) -> u8 {

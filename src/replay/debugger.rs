@@ -427,6 +427,8 @@ impl Debugger {
             .ok()
             .and_then(|text| machine.spawn_library("%REPL-EVALUATE", &[text]).ok());
         let Some(task) = task else { return Ok("There is no memory left for it.\n".into()) };
+        // In a run by a schedule, nobody chooses for the form.
+        machine.end_following();
         let outcome = machine.run_until(Some(task), FORM_TICKS);
         machine.flush();
         let mut output = captured.output().split_off(before.0);

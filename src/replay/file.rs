@@ -11,7 +11,8 @@
 //!   content
 //! ```
 //!
-//! Numbers are little-endian. The first frame is the header: what the run began with, the program included.
+//! Numbers are little-endian. The first frame is the header: what the run began with, the program included,
+//! as it is: to compress it takes longer than the beginning of a small program does.
 //! Each frame of records holds those that were made between two writes to the file. The last one is the end:
 //! how the run has ended.
 //!
@@ -29,11 +30,12 @@ use esl_vm::vm::Config;
 
 use super::pack::{ByteReader, ByteWriter};
 use super::records::{self, Before};
+use crate::program::ExecutionIdentity;
 
 /// The first bytes of a file. They betray transfers that change line ends.
 pub const MAGIC: [u8; 8] = *b"ESLJ\r\n\x1a\n";
 /// The version of the format that this library reads and writes.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 3;
 
 /// Length of what is before the content of a frame.
 const FRAME: usize = 11;
@@ -72,6 +74,8 @@ pub struct Beginning {
     pub traces: Vec<String>,
     /// The folders in which modules are looked for.
     pub folders: Vec<String>,
+    /// The schedule by which tasks take turns, as a text, if there is one.
+    pub schedule: Option<String>,
     /// The functions of the embedder's.
     pub functions: Vec<GivenFunction>,
     /// Identity of the machine and its library.
@@ -165,6 +169,7 @@ pub(super) fn beginning_bytes(beginning: &Beginning) -> Vec<u8> {
     write_config(&mut out, &beginning.config);
     out.list(&beginning.traces, |out, text| out.text(text));
     out.list(&beginning.folders, |out, text| out.text(text));
+    out.list(beginning.schedule.as_slice(), |out, text| out.text(text));
     out.list(&beginning.functions, |out, function| {
         out.text(&function.name);
         out.byte(function.is_operation.into());
@@ -173,9 +178,7 @@ pub(super) fn beginning_bytes(beginning: &Beginning) -> Vec<u8> {
             out.number(need.argument as u64);
         });
     });
-    let program = lz4_flex::block::compress(&beginning.program);
-    out.number(beginning.program.len() as u64);
-    out.bytes(&program);
+    out.bytes(&beginning.program);
     frame(&mut bytes, kind::HEADER, &out.0);
     bytes
 }
@@ -186,6 +189,8 @@ fn read_beginning(content: &[u8]) -> Option<Beginning> {
     let config = read_config(&mut from)?;
     let traces = from.list(|from| Some(from.text()?.into()))?;
     let folders = from.list(|from| Some(from.text()?.into()))?;
+    let mut schedules: Vec<String> = from.list(|from| Some(from.text()?.into()))?;
+    let schedule = schedules.pop();
     let functions = from.list(|from| {
         let (name, is_operation) = (from.text()?.into(), from.flag()?);
         let needs = from.list(|from| {
@@ -195,9 +200,8 @@ fn read_beginning(content: &[u8]) -> Option<Beginning> {
         })?;
         Some(GivenFunction { name, is_operation, needs })
     })?;
-    let length = usize::try_from(from.number()?).ok()?;
-    let program = decompress(from.bytes()?, length)?;
-    from.is_empty().then_some(Beginning { program, config, traces, folders, functions, identity })
+    let program = from.bytes()?.to_vec();
+    from.is_empty().then_some(Beginning { program, config, traces, folders, schedule, functions, identity })
 }
 
 fn decompress(bytes: &[u8], length: usize) -> Option<Vec<u8>> {
@@ -273,16 +277,19 @@ impl Unwritten {
 
     /// Takes what waits as a frame; nothing if nothing does.
     pub(super) fn take(&mut self) -> Vec<u8> {
-        let content = std::mem::take(&mut self.packed.0);
+        let content = &mut self.packed.0;
         let mut bytes = Vec::new();
         if content.len() > COMPRESSED_ABOVE {
             let mut out = ByteWriter::default();
             out.number(content.len() as u64);
-            out.0.extend_from_slice(&lz4_flex::block::compress(&content));
+            out.0.extend_from_slice(&lz4_flex::block::compress(content));
             frame(&mut bytes, kind::COMPRESSED, &out.0);
         } else if !content.is_empty() {
-            frame(&mut bytes, kind::RECORDS, &content);
+            bytes.reserve(FRAME + content.len());
+            frame(&mut bytes, kind::RECORDS, content);
         }
+        // Its room stays, for the next.
+        content.clear();
         bytes
     }
 }
@@ -357,6 +364,7 @@ impl Recorded {
         }
         let (mut beginning, mut end) = (None, None);
         let (mut records, mut before) = (Vec::new(), Before::default());
+        let mut is_ours = true;
         while !rest.is_empty() {
             let offset = bytes.len() - rest.len();
             let damaged = |problem| RecordedError::Damaged { offset, problem };
@@ -368,7 +376,12 @@ impl Recorded {
             if end.is_some() || beginning.is_some() == (kind == kind::HEADER) {
                 return Err(damaged("this frame does not belong here"));
             }
-            let malformed = || damaged("the content is not what its kind says");
+            // Another machine may have written what this one does not know.
+            if kind == kind::HEADER {
+                is_ours = ByteReader(content).text().is_none_or(is_own);
+            }
+            let strange = |problem| if is_ours { damaged(problem) } else { RecordedError::OtherMachine };
+            let malformed = || strange("the content is not what its kind says");
             match kind {
                 kind::HEADER => beginning = Some(read_beginning(content).ok_or_else(malformed)?),
                 kind::RECORDS => add_records(&mut records, content, &mut before).ok_or_else(malformed)?,
@@ -380,7 +393,7 @@ impl Recorded {
                     add_records(&mut records, &content, &mut before).ok_or_else(malformed)?;
                 }
                 kind::END => end = Some(read_end(content).ok_or_else(malformed)?),
-                _ => return Err(damaged("a frame of an unknown kind")),
+                _ => return Err(strange("a frame of an unknown kind")),
             }
             rest = &rest[FRAME + content_length(rest)..];
         }
@@ -395,6 +408,11 @@ impl Recorded {
             _ => None,
         })
     }
+}
+
+/// Returns whether an identity is that of this machine and its library.
+pub(super) fn is_own(identity: &str) -> bool {
+    identity == ExecutionIdentity::current().to_string()
 }
 
 /// Returns the length of the content of the frame at the beginning of `bytes`, which is whole.

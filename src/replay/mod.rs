@@ -53,6 +53,7 @@ use esl_vm::vm::{Config, Vm};
 
 use crate::command::exit_status;
 use crate::error::Error;
+use crate::explore::Schedule;
 use crate::program::{self, ExecutionIdentity, Program, Summary};
 
 #[cfg(feature = "cli")]
@@ -70,6 +71,9 @@ pub struct RunSetup {
     pub traces: Vec<String>,
     /// The folders in which `require` looks for modules.
     pub folders: Vec<String>,
+    /// The schedule by which the tasks of the program take turns, if it has one. It is for the caller to run
+    /// the program by it.
+    pub schedule: Option<Schedule>,
 }
 
 /// Why a run could not be recorded, or not be replayed.
@@ -142,6 +146,7 @@ pub fn beginning(program: &Program, setup: &RunSetup, machine: &Vm) -> Result<Be
         config: setup.config.clone(),
         traces: setup.traces.clone(),
         folders: setup.folders.clone(),
+        schedule: setup.schedule.as_ref().map(Schedule::to_string),
         functions: functions.collect(),
         identity: ExecutionIdentity::current().to_string(),
     })

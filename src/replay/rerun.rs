@@ -3,16 +3,18 @@
 use std::fmt;
 
 use esl_vm::embed::HostFunction;
+use esl_vm::explore::FollowedRun;
 use esl_vm::host::{HostFailure, Output, ReplayHost, RunCheck};
 use esl_vm::load::LoadError;
 use esl_vm::run::RunOutcome;
 use esl_vm::task::TaskId;
 use esl_vm::vm::Vm;
 
-use super::file::{Recorded, RecordedError};
+use super::file::{Recorded, RecordedError, is_own};
 use crate::command::exit_status;
 use crate::error::Error;
-use crate::program::{self, Ended, ExecutionIdentity, Program};
+use crate::explore::Schedule;
+use crate::program::{self, Ended, Program};
 
 /// Why a recorded run cannot be run again.
 #[derive(Debug)]
@@ -55,6 +57,8 @@ pub struct Rerun {
     pub(super) host: ReplayHost,
     recorded: Recorded,
     main: TaskId,
+    /// The choices by which tasks take turns, if the run was one by a schedule.
+    followed: Option<FollowedRun>,
     replayed: Option<Replayed>,
 }
 
@@ -68,27 +72,40 @@ impl Rerun {
         screen: impl FnMut(Output, &[u8]) + Send + 'static,
     ) -> Result<Rerun, RerunError> {
         let beginning = &recorded.beginning;
-        if beginning.identity != ExecutionIdentity::current().to_string() {
+        if !is_own(&beginning.identity) {
             return Err(RerunError::Recording(RecordedError::OtherMachine));
         }
         let program = Program::from_bytes(&beginning.program).map_err(RerunError::Program)?;
         let host = ReplayHost::new(recorded.records.clone()).with_screen(screen);
         let begun = begin(recorded, &program, host.clone());
         // A world that has diverged has made the preparations fail.
-        let (machine, main) = begun.map_err(|error| match host.divergence() {
+        let (mut machine, main) = begun.map_err(|error| match host.divergence() {
             Some(_) => RerunError::Recording(RecordedError::Damaged {
                 offset: 0,
                 problem: "the records do not fit the beginning of the run",
             }),
             None => RerunError::Machine(error),
         })?;
-        Ok(Rerun { machine, host, recorded: recorded.clone(), main, replayed: None })
+        let followed = match &beginning.schedule {
+            Some(text) => {
+                let schedule = Schedule::parse(text).map_err(|_| {
+                    let problem = "the schedule in it cannot be read";
+                    RerunError::Recording(RecordedError::Damaged { offset: 0, problem })
+                })?;
+                Some(machine.begin_to_follow(&schedule.settings(), schedule.choices().to_vec()))
+            }
+            None => None,
+        };
+        Ok(Rerun { machine, host, recorded: recorded.clone(), main, followed, replayed: None })
     }
 
     /// Runs on for at most `ticks`. Returns how the replay has ended, once it has.
     pub fn run(&mut self, ticks: u64) -> Option<&Replayed> {
         if self.replayed.is_none() {
-            let outcome = self.machine.run(ticks);
+            let outcome = match &mut self.followed {
+                Some(followed) => self.machine.go_on_following(followed, ticks),
+                None => self.machine.run(ticks),
+            };
             if outcome != RunOutcome::TicksUsed || self.host.has_diverged() {
                 let replayed = self.end(outcome);
                 self.replayed = Some(replayed);

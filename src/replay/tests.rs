@@ -80,6 +80,7 @@ fn rerun(recorded: &Recorded) -> Replayed {
 
 fn beginning() -> Beginning {
     Beginning {
+        schedule: None,
         program: vec![7; 5000],
         config: Config { budget: Some(9), stack: Some(1 << 20), ..Config::DEFAULT },
         traces: vec!["tasks".into()],
@@ -370,6 +371,10 @@ fn the_program_of_another_run_diverges() {
     assert!(said.contains("to write") && said.contains("other arguments"), "{said}");
     let mut beginning = read(&one).beginning;
     beginning.identity.push('x');
+    // What another machine has written need not be known here: that is no damage.
+    let mut bytes = beginning_bytes(&beginning);
+    super::file::frame(&mut bytes, 2, &[255, 1, 2, 3]);
+    assert_eq!(Recorded::read(&bytes).err(), Some(RecordedError::OtherMachine));
     let error = Rerun::begin(&Recorded { beginning, ..read(&one) }, |_, _| ()).err();
     assert!(matches!(error, Some(RerunError::Recording(RecordedError::OtherMachine))));
 }

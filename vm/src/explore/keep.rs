@@ -29,6 +29,8 @@ struct KeptPlace {
 /// The machine of a search, and the places to which it can return.
 pub(super) struct Keeper<'a> {
     settings: &'a Settings,
+    /// Bytes that the snapshots may take, with what the search takes.
+    memory: usize,
     machine: Option<Vm>,
     pub(super) fingerprints: Fingerprints,
     /// The beginning.
@@ -37,6 +39,8 @@ pub(super) struct Keeper<'a> {
     kept: HashMap<u32, Rc<KeptPlace>>,
     /// Their nodes, the oldest first; some have gone.
     order: VecDeque<u32>,
+    /// Places that runs of this batch have come to, by run and step.
+    fresh: VecDeque<((u64, usize), Rc<KeptPlace>)>,
     /// The place at which the machine was last: its next snapshot has most in common with that one.
     base: Option<Rc<KeptPlace>>,
     /// Sum of the bytes that all take beside the images of heaps.
@@ -48,20 +52,43 @@ pub(super) struct Keeper<'a> {
 }
 
 impl<'a> Keeper<'a> {
-    /// Creates a keeper of nothing.
-    pub(super) fn new(settings: &'a Settings) -> Keeper<'a> {
+    /// Creates a keeper of nothing, which may take so many bytes.
+    pub(super) fn new(settings: &'a Settings, memory: usize) -> Keeper<'a> {
         Keeper {
             settings,
+            memory,
             machine: None,
             fingerprints: Fingerprints::default(),
             start: None,
             kept: HashMap::new(),
             order: VecDeque::new(),
+            fresh: VecDeque::new(),
             base: None,
             bytes: 0,
             taken: 0,
             followed: 0,
         }
+    }
+
+    /// Takes note of what the search has made of the last batch: which places are open, and which no longer.
+    pub(super) fn settle(&mut self, search: &Search) {
+        for (at, kept) in std::mem::take(&mut self.fresh) {
+            match search.placed.get(&at).filter(|&&node| search.nodes[node as usize].open > 0) {
+                Some(&node) => {
+                    self.kept.insert(node, kept);
+                    self.order.push_back(node);
+                }
+                None => self.bytes -= kept.bytes,
+            }
+        }
+        search.closed.iter().for_each(|&node| self.forget(node));
+        self.taken = search.bytes();
+        self.make_room();
+    }
+
+    /// Returns whether there is a snapshot of the place after a node.
+    pub(super) fn has(&self, node: u32) -> bool {
+        self.kept.contains_key(&node)
     }
 
     /// Returns the machine, how it goes on, and the choices that lead it to `place` and beyond the choice
@@ -73,17 +100,13 @@ impl<'a> Keeper<'a> {
         &mut self,
         search: &Search,
         place: u32,
-        begin: &mut impl FnMut() -> Result<Vm, E>,
+        begin: impl FnOnce() -> Result<Vm, E>,
     ) -> Result<(Vm, PointRun, Vec<u32>), E> {
         let mut before = place;
         let mut kept = None;
         while before != ROOT && kept.is_none() {
             before = search.nodes[before as usize].parent;
             kept = self.kept.get(&before).cloned();
-        }
-        let parent = search.nodes[place as usize].parent;
-        if search.nodes[parent as usize].open == 0 {
-            self.forget(parent);
         }
         if let Some(kept) = kept.or_else(|| self.start.clone())
             && let Some(mut machine) = self.machine.take()
@@ -99,6 +122,7 @@ impl<'a> Keeper<'a> {
         // Snapshots of the machine before are of no use to another.
         self.kept.clear();
         self.order.clear();
+        self.fresh.clear();
         (self.start, self.base, self.bytes) = (None, None, 0);
         let mut machine = begin()?;
         explore_by(&mut machine, self.settings);
@@ -115,33 +139,32 @@ impl<'a> Keeper<'a> {
         self.machine = Some(machine);
     }
 
-    /// Keeps the place after a node, where the machine stands.
-    pub(super) fn keep(&mut self, vm: &mut Vm, run: PointRun, node: u32) {
-        // Without the beginning there was no snapshot of the machine; the first one of a large heap is as
-        // large as that.
-        if self.start.is_none() || vm.heap.stats().committed as usize > self.settings.memory / 2 {
-            return;
-        }
-        if let Some(kept) = self.save(vm, run) {
-            self.kept.insert(node, kept);
-            self.order.push_back(node);
+    /// Keeps the place at which the machine stands, a step of a run of this batch.
+    pub(super) fn keep(&mut self, vm: &mut Vm, run: PointRun, at: (u64, usize)) {
+        if let Some(kept) = self.save_if_small(vm, run) {
+            self.fresh.push_back((at, kept));
             self.make_room();
         }
     }
 
-    /// Keeps a place that has lost its snapshot, if it was far to there and it is needed again.
-    pub(super) fn keep_on_the_way(&mut self, vm: &mut Vm, run: PointRun, search: &Search, node: u32) {
-        let is_needed = self.followed > FEW && search.nodes[node as usize].open > 0;
-        if is_needed && !self.kept.contains_key(&node) {
-            self.keep(vm, run, node);
-        }
+    fn save_if_small(&mut self, vm: &mut Vm, run: PointRun) -> Option<Rc<KeptPlace>> {
+        // Without the beginning there was no snapshot of the machine; the first one of a large heap is as
+        // large as that.
+        let is_large = vm.heap.stats().committed as usize > self.memory / 2;
+        if self.start.is_none() || is_large { None } else { self.save(vm, run) }
     }
 
-    /// Notes that the search takes so many bytes. Returns whether there is room for that.
-    pub(super) fn has_room(&mut self, taken: usize) -> bool {
-        self.taken = taken;
-        self.make_room();
-        taken <= self.settings.memory
+    /// Keeps a place that has lost its snapshot, if it was far to there and it is needed again.
+    pub(super) fn keep_on_the_way(&mut self, vm: &mut Vm, run: PointRun, search: &Search, node: u32) {
+        let is_needed = self.followed > FEW && search.nodes[node as usize].open > 1;
+        if is_needed
+            && !self.kept.contains_key(&node)
+            && let Some(kept) = self.save_if_small(vm, run)
+        {
+            self.kept.insert(node, kept);
+            self.order.push_back(node);
+            self.make_room();
+        }
     }
 
     fn save(&mut self, vm: &mut Vm, run: PointRun) -> Option<Rc<KeptPlace>> {
@@ -165,10 +188,15 @@ impl<'a> Keeper<'a> {
     /// Gives up the oldest places, as far as there is no room for them.
     fn make_room(&mut self) {
         while let Some(start) = &self.start
-            && start.snapshot.bytes_of_all() + self.bytes + self.taken > self.settings.memory
-            && let Some(oldest) = self.order.pop_front()
+            && start.snapshot.bytes_of_all() + self.bytes + self.taken > self.memory
         {
-            self.forget(oldest);
+            if let Some(oldest) = self.order.pop_front() {
+                self.forget(oldest);
+            } else if let Some((_, kept)) = self.fresh.pop_front() {
+                self.bytes -= kept.bytes;
+            } else {
+                break;
+            }
         }
         if self.order.len() > 2 * self.kept.len() + 64 {
             let kept = &self.kept;

@@ -6,6 +6,8 @@
 //! fingerprint   telling states apart           content  visiting the fields that belong to a state
 //! live          which registers of a frame belong to a state
 //! search        the tree of choices, and the states found
+//! trace         one run of the search, and taking in what it has come by
+//! crew          this thread, or several, among which the runs are divided
 //! keep          returning to places of that tree
 //! ```
 //!
@@ -30,7 +32,8 @@
 //! where memory had no room for it, or there could be none, of one before it, or of the beginning, from where
 //! the machine follows the choices. The search proceeds by the number of preemptions (points at which a task
 //! had to give way although it could have continued), so the first schedule that leads to an ending is one
-//! with the fewest preemptions.
+//! with the fewest preemptions. Runs are made in batches, each with the states that were known before it, and
+//! taken in in order: what is found does not depend on how many threads take part.
 //!
 //! **States** are told apart by fingerprints of 128 bits (see `fingerprint`). We accept the risk of a
 //! fingerprint collision; exploring a state twice only costs time.
@@ -42,6 +45,7 @@
 //! 1988).
 
 mod content;
+mod crew;
 mod fingerprint;
 mod keep;
 mod live;
@@ -49,15 +53,18 @@ mod point;
 mod search;
 #[cfg(test)]
 mod tests;
+mod trace;
 
-use std::collections::hash_map::Entry;
+use std::sync::atomic::AtomicBool;
+use std::sync::{PoisonError, RwLock};
 
 use crate::run::RunOutcome;
 pub use crate::schedule::Grain;
 use crate::vm::Vm;
-use keep::Keeper;
-pub use point::{StandingTask, Switch};
-use search::{ChoiceNode, ROOT, Search};
+use crew::{Crew, LoneCrew, RunPlace, ThreadCrew};
+pub use point::{FollowedRun, StandingTask, Switch};
+use search::Search;
+use trace::{MergePlace, Merged, Merging, TraceEnd};
 
 /// When timers fire in an exploration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -169,6 +176,45 @@ pub struct SearchProgress {
     pub endings: usize,
 }
 
+/// A program as a search runs it: how a machine is begun, and what is said of the end of its run.
+trait Subject {
+    type Ending;
+    type Error;
+
+    /// Makes a machine that is about to run the program.
+    fn begin(&mut self) -> Result<Vm, Self::Error>;
+
+    /// Describes how a run has ended.
+    fn judge(&mut self, machine: &mut Vm, outcome: RunOutcome) -> Self::Ending;
+}
+
+/// A subject of two functions, and what the first tells the second of the machine.
+struct TwoFunctions<C, B, J> {
+    present: Option<C>,
+    begin: B,
+    judge: J,
+}
+
+impl<C, T, E, B, J> Subject for TwoFunctions<C, B, J>
+where
+    B: FnMut() -> Result<(Vm, C), E>,
+    J: FnMut(&mut Vm, &C, RunOutcome) -> T,
+{
+    type Ending = T;
+    type Error = E;
+
+    fn begin(&mut self) -> Result<Vm, E> {
+        let (machine, present) = (self.begin)()?;
+        self.present = Some(present);
+        Ok(machine)
+    }
+
+    fn judge(&mut self, machine: &mut Vm, outcome: RunOutcome) -> T {
+        let present = self.present.as_ref().expect("a machine that has run was begun");
+        (self.judge)(machine, present, outcome)
+    }
+}
+
 /// Runs a program under all schedules. Each machine made by `begin` is about to run it: its main task exists.
 /// `judge` describes how a run has ended.
 ///
@@ -176,116 +222,126 @@ pub struct SearchProgress {
 ///
 /// # Errors
 /// Those of `begin`.
-pub fn explore<T: PartialEq, E>(
-    settings: &Settings,
-    begin: impl FnMut() -> Result<Vm, E>,
-    judge: impl FnMut(&mut Vm, RunOutcome) -> T,
-) -> Result<Exploration<T>, E> {
-    explore_while(settings, begin, judge, |_| true)
-}
-
-/// As [`explore`], for as long as `goes_on`, which is asked before each run and in each new state.
-///
-/// # Errors
-/// Those of `begin`.
-pub fn explore_while<T: PartialEq, E>(
+pub fn explore<T: PartialEq + Clone, E>(
     settings: &Settings,
     mut begin: impl FnMut() -> Result<Vm, E>,
     mut judge: impl FnMut(&mut Vm, RunOutcome) -> T,
+) -> Result<Exploration<T>, E> {
+    let begin = || Ok((begin()?, ()));
+    explore_while(settings, begin, |machine, (), outcome| judge(machine, outcome), |_| true)
+}
+
+/// As [`explore`], for as long as `goes_on`, which is asked before each run and in each new state. `begin`
+/// also returns what `judge` has to know of the machine.
+///
+/// # Errors
+/// Those of `begin`.
+pub fn explore_while<C, T: PartialEq + Clone, E>(
+    settings: &Settings,
+    begin: impl FnMut() -> Result<(Vm, C), E>,
+    judge: impl FnMut(&mut Vm, &C, RunOutcome) -> T,
+    goes_on: impl FnMut(&SearchProgress) -> bool,
+) -> Result<Exploration<T>, E> {
+    let search = RwLock::new(Search::default());
+    let subject = TwoFunctions { present: None, begin, judge };
+    let mut alone = LoneCrew::new(settings, &search, subject);
+    search_by(settings, &search, &mut alone, goes_on)
+}
+
+/// Calls functions in threads of their own and the last one in this thread, and waits for all of them.
+pub type SideBySide<'f> = dyn Fn(Vec<Box<dyn FnOnce() + Send + '_>>, &mut dyn FnMut()) + 'f;
+
+/// As [`explore_while`], in so many threads, which are made by `side_by_side`. What is found, and its order,
+/// is the same for any number. `goes_on` is asked now and then.
+///
+/// # Errors
+/// Those of `begin`.
+pub fn explore_together<C, T: PartialEq + Clone + Send, E: Send>(
+    settings: &Settings,
+    (jobs, side_by_side): (usize, &SideBySide<'_>),
+    begin: impl Fn() -> Result<(Vm, C), E> + Sync,
+    judge: impl Fn(&mut Vm, &C, RunOutcome) -> T + Sync,
     mut goes_on: impl FnMut(&SearchProgress) -> bool,
 ) -> Result<Exploration<T>, E> {
-    let mut search = Search::default();
-    let root = search.node(ChoiceNode::new(ROOT, 0, 0, 0));
-    search.open(0, root);
-    let mut keeper = Keeper::new(settings);
+    if jobs <= 1 {
+        return explore_while(settings, begin, judge, goes_on);
+    }
+    let (search, stop) = (RwLock::new(Search::default()), AtomicBool::new(false));
+    let subject = || TwoFunctions { present: None, begin: &begin, judge: &judge };
+    let (crew, works) = ThreadCrew::new(jobs, settings, (&search, &stop), &subject);
+    let (mut crew, mut found) = (Some(crew), None);
+    side_by_side(works, &mut || {
+        // The threads end when the crew goes.
+        if let Some(mut crew) = crew.take() {
+            found = Some(search_by(settings, &search, &mut crew, &mut goes_on));
+        }
+    });
+    found.expect("the last function was called")
+}
+
+/// Runs of a batch: few enough that the shortest schedules come first, and enough for all threads.
+const BATCH: usize = 64;
+
+/// Searches with the help of a crew.
+fn search_by<T: PartialEq + Clone, E>(
+    settings: &Settings,
+    search: &RwLock<Search>,
+    crew: &mut dyn Crew<T, E>,
+    mut goes_on: impl FnMut(&SearchProgress) -> bool,
+) -> Result<Exploration<T>, E> {
+    let write = || search.write().unwrap_or_else(PoisonError::into_inner);
+    write().begin();
     let mut endings: Vec<ExploredEnding<T>> = Vec::new();
     let (mut runs, mut limit) = (0, None);
-    while let Some((switches, place)) = search.next() {
-        if matches!(limit, Some(SearchLimit::States | SearchLimit::Memory)) {
-            break;
-        }
-        if !goes_on(&search.progress(runs, switches, endings.len())) {
+    while !matches!(limit, Some(SearchLimit::States | SearchLimit::Memory | SearchLimit::Asked)) {
+        let Some((switches, batch)) = write().next(BATCH) else { break };
+        let progress = write().progress(runs, switches, endings.len());
+        if !goes_on(&progress) {
             limit = Some(SearchLimit::Asked);
-        }
-        if limit == Some(SearchLimit::Asked) {
             break;
         }
-        let (mut machine, run, choices) = keeper.go_to(&search, place, &mut begin)?;
-        runs += 1;
-        let mut given = choices.into_iter();
-        // Position of the run: the choices so far, and the state in which the last step began.
-        let mut node = place;
-        let mut before = (place != ROOT).then(|| search.nodes[place as usize].state);
-        let outcome = run.go_on(&mut machine, &mut |vm, run, runnable| {
-            if given.len() == 1 && runnable.count() > 1 {
-                keeper.keep_on_the_way(vm, run, &search, search.nodes[place as usize].parent);
-            }
-            if runnable.count() > 1
-                && let Some(choice) = given.next()
-            {
-                return Some(choice);
-            }
-            if given.len() > 0 {
-                return Some(0);
-            }
-            let next = search.places.len() as u32;
-            let (state, is_new) = match search.states.entry(keeper.fingerprints.of(vm)) {
-                Entry::Occupied(known) => (*known.get(), false),
-                Entry::Vacant(free) => (*free.insert(next), true),
-            };
-            if let Some(before) = before {
-                search.steps.push((before, state));
-            }
-            if !is_new {
-                return None;
-            }
-            search.places.push(node);
-            if search.places.len() >= settings.states {
-                limit = Some(SearchLimit::States);
-                return None;
-            }
-            if search.places.len().is_multiple_of(64) && !keeper.has_room(search.bytes()) {
-                limit = Some(SearchLimit::Memory);
-                return None;
-            }
-            // A run may come to new states for ever.
-            if !goes_on(&search.progress(runs, switches, endings.len())) {
-                limit = Some(SearchLimit::Asked);
-                return None;
-            }
-            before = Some(state);
-            if runnable.count() > 1 {
-                // A preemption is a switch at which the task that has just run could have continued.
-                let switches = switches + usize::from(runnable.has_last);
-                let before = search.nodes[node as usize].faults;
-                let faults = before + u32::from(runnable.ways.is_some());
-                if settings.switches.is_some_and(|most| switches > most) {
-                    limit = limit.or(Some(SearchLimit::Switches));
-                } else if settings.faults.is_some_and(|most| faults as usize > most) {
-                    limit = limit.or(Some(SearchLimit::Faults));
-                } else {
-                    for choice in (1..runnable.count()).rev() {
-                        let other = search.node(ChoiceNode::new(node, choice, state, faults));
-                        search.open(switches, other);
-                    }
-                    keeper.keep(vm, run, node);
+        let places: Vec<RunPlace> =
+            batch.into_iter().zip(runs as u64..).map(|(node, serial)| RunPlace { node, serial }).collect();
+        let mut traces = crew.run(places.clone(), &mut || goes_on(&progress))?;
+        let search = &mut *write();
+        search.settled();
+        for (number, &RunPlace { node, .. }) in places.iter().enumerate() {
+            let mut merging = Merging { settings, limit: &mut limit, switches };
+            let mut place = MergePlace::of(search, node);
+            runs += 1;
+            let (mut run, mut first) = (number, 0);
+            let merged = loop {
+                let steps = (places[run].serial, &*traces[run].steps, first);
+                let merged = merging.take_in(search, &mut place, steps);
+                match traces[run].end {
+                    // What the other run goes on with, this one would have, too.
+                    TraceEnd::Joined(step) if merged == Merged::New => (run, first) = (step.0, step.1 + 1),
+                    _ => break merged,
                 }
-                node = search.node(ChoiceNode::new(node, 0, state, before));
+            };
+            search.close(node);
+            match (merged, &mut traces[run].end) {
+                (Merged::Over, _) => break,
+                (Merged::Known, _) | (Merged::New, TraceEnd::Known | TraceEnd::Joined(_)) => {}
+                (Merged::New, TraceEnd::Full) => limit = Some(SearchLimit::Memory),
+                (Merged::New, TraceEnd::Stopped) => limit = Some(SearchLimit::Asked),
+                (Merged::New, TraceEnd::Ended(what)) => {
+                    search.last.extend(place.before);
+                    match endings.iter_mut().find(|ending| ending.what == *what) {
+                        Some(ending) => ending.runs += 1,
+                        None => {
+                            let choices = search.choices(place.node);
+                            endings.push(ExploredEnding { what: what.clone(), choices, runs: 1 });
+                        }
+                    }
+                }
             }
-            Some(0)
-        });
-        let Some(outcome) = outcome else {
-            keeper.take_back(machine);
-            continue;
-        };
-        search.last.extend(before);
-        let what = judge(&mut machine, outcome);
-        keeper.take_back(machine);
-        match endings.iter_mut().find(|ending| ending.what == what) {
-            Some(ending) => ending.runs += 1,
-            None => endings.push(ExploredEnding { what, choices: search.choices(node), runs: 1 }),
+            if limit == Some(SearchLimit::Asked) {
+                break;
+            }
         }
     }
+    let search = write();
     let endless = if limit.is_none() { search.endless() } else { None };
     let (states, has_cycle) = (search.states.len(), search.has_cycle());
     Ok(Exploration { states, runs, endings, endless, has_cycle, limit })

@@ -6,7 +6,7 @@ use super::{Settings, TimerGrain};
 use crate::heap::Kind;
 use crate::report::{program_place, task_label};
 use crate::run::{self, RunOutcome};
-use crate::schedule::{Choices, Due};
+use crate::schedule::{Choices, Due, Grain};
 use crate::task::{TaskIndex, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
@@ -82,7 +82,46 @@ impl StandingTask {
     }
 }
 
+/// A run by a list of choices, which may be given its ticks in portions.
+#[derive(Clone, Debug)]
+pub struct FollowedRun {
+    run: PointRun,
+    choices: Vec<u32>,
+    /// Number of choices made so far.
+    made: usize,
+}
+
 impl Vm {
+    /// Prepares to run the program as [`Vm::follow`] does, by [`Vm::go_on_following`].
+    pub fn begin_to_follow(&mut self, settings: &Settings, choices: Vec<u32>) -> FollowedRun {
+        explore_by(self, settings);
+        FollowedRun { run: PointRun::begin(self, settings), choices, made: 0 }
+    }
+
+    /// Runs on along the list of choices, for at most so many ticks.
+    pub fn go_on_following(&mut self, followed: &mut FollowedRun, ticks: u64) -> RunOutcome {
+        let end = self.scheduler.spent.saturating_add(ticks);
+        let FollowedRun { run, choices, made } = followed;
+        let outcome = run.go_on(self, end, &mut |_, _, runnable| {
+            if runnable.count() <= 1 {
+                return Some(0);
+            }
+            let choice = choices.get(*made).copied().unwrap_or(0);
+            *made += 1;
+            Some(choice)
+        });
+        let outcome = outcome.unwrap_or(RunOutcome::Done);
+        if outcome != RunOutcome::TicksUsed {
+            self.end_following();
+        }
+        outcome
+    }
+
+    /// Makes tasks stop at points no longer.
+    pub fn end_following(&mut self) {
+        self.scheduler.points.grain = None;
+    }
+
     /// Runs the program from point to point along a list of choices found by [`super::explore`] with the same
     /// settings; beyond the end of the list, the first choice is taken. `told` is told of the other choices.
     pub fn follow(
@@ -120,8 +159,9 @@ fn follow(
         }
         Some(choice)
     };
-    let outcome = PointRun::begin(vm, settings).go_on(vm, &mut |vm, _, runnable| next(vm, runnable));
-    vm.scheduler.points.grain = None;
+    let mut run = PointRun::begin(vm, settings);
+    let outcome = run.go_on(vm, u64::MAX, &mut |vm, _, runnable| next(vm, runnable));
+    vm.end_following();
     outcome
 }
 
@@ -146,7 +186,7 @@ fn switch(vm: &mut Vm, runnable: Runnable<'_>, choice: u32) -> Switch {
 /// Makes tasks stop at points from now on.
 pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
     vm.scheduler.points.grain = Some(settings.grain);
-    vm.config.slice = settings.turn;
+    vm.config.slice = if settings.grain == Grain::Ticks { 1 } else { settings.turn };
     vm.scheduler.choices = Choices::first();
     vm.outside.console.note_all(settings.output);
 }
@@ -179,11 +219,23 @@ impl PointRun {
         }
     }
 
-    /// Runs from point to point; at each, `choose` says which task continues. It is given the run as it
-    /// stands, from which [`PointRun::go_on`] comes to the same choice again. Returns how the run has ended,
-    /// unless it was given up.
-    pub(super) fn go_on(mut self, vm: &mut Vm, choose: &mut Choose<'_>) -> Option<RunOutcome> {
+    /// Returns the task that ran last.
+    pub(super) fn last(&self) -> TaskNumber {
+        self.last
+    }
+
+    /// Runs from point to point, up to so many ticks of the whole run; at each, `choose` says which task
+    /// continues. It is given the run as it stands, from which [`PointRun::go_on`] comes to the same choice
+    /// again. Returns how the run has ended, unless it was given up.
+    pub(super) fn go_on(&mut self, vm: &mut Vm, end: u64, choose: &mut Choose<'_>) -> Option<RunOutcome> {
         loop {
+            if vm.scheduler.spent >= end {
+                return Some(RunOutcome::TicksUsed);
+            }
+            if let Some(turn) = vm.scheduler.open_turn.take() {
+                run::go_on_with_turn(vm, turn, end);
+                continue;
+            }
             if !self.is_at_point
                 && let Some(outcome) = self.come_to_point(vm)
             {
@@ -203,7 +255,7 @@ impl PointRun {
                 continue;
             };
             let tasks: SmallVec<[TaskIndex; 16]> = runnable.iter().map(|&(.., index)| index).collect();
-            let here = PointRun { is_at_point: true, ..self };
+            let here = PointRun { is_at_point: true, ..*self };
             if let Some(ways) = vm.scheduler.points.asked {
                 let ways = Some(ways as u32);
                 let asking = Runnable { tasks: &tasks, ways, has_last: false, has_timer: false };
@@ -214,7 +266,7 @@ impl PointRun {
                     if let Some(task) = vm.scheduler.tasks.at_mut(index) {
                         task.flags.set_at_point(false);
                     }
-                    run::give_turn(vm, index, u64::MAX);
+                    run::give_turn(vm, index, end);
                 }
                 continue;
             }
@@ -231,7 +283,7 @@ impl PointRun {
                 vm.scheduler.points.is_open = task.flags.at_point();
                 task.flags.set_at_point(false);
             }
-            run::give_turn(vm, index, u64::MAX);
+            run::give_turn(vm, index, end);
         }
     }
 
@@ -270,6 +322,9 @@ fn runnable_tasks(vm: &Vm) -> impl Iterator<Item = (TaskNumber, TaskIndex)> + '_
 /// Most turns of a task that checks what always has to hold, in one state.
 const CHECK_TURNS: u32 = 1_000;
 
+/// Ticks of such a turn.
+const CHECK_SLICE: u32 = 100_000;
+
 /// Lets the task run that checks what always has to hold, if the program has one (`stdlib/exploration.esl`):
 /// until it waits for the event in the variable `checks`, where it stands at first, and then from each signal
 /// of that event until it waits again. It stops at no points, so that it adds no states. Returns whether its
@@ -290,6 +345,7 @@ fn check_state(vm: &mut Vm, checks: Value) -> bool {
         run::deliver_some(vm);
     }
     let grain = vm.scheduler.points.grain.take();
+    let slice = std::mem::replace(&mut vm.config.slice, CHECK_SLICE);
     let mut turns = 0;
     while turns < CHECK_TURNS {
         let woken = runnable_tasks(vm).map(|(_, index)| index).find(|index| !before.contains(index));
@@ -297,6 +353,6 @@ fn check_state(vm: &mut Vm, checks: Value) -> bool {
         run::give_turn(vm, index, u64::MAX);
         turns += 1;
     }
-    vm.scheduler.points.grain = grain;
+    (vm.scheduler.points.grain, vm.config.slice) = (grain, slice);
     turns < CHECK_TURNS
 }

@@ -1,6 +1,7 @@
 //! The state of a search: the tree of choices that were made, those to be made, and the states found.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use super::SearchProgress;
 
@@ -13,15 +14,8 @@ pub(super) struct ChoiceNode {
     pub(super) state: u32,
     /// Number of choices so far, by `choose`, that were not the first form.
     pub(super) faults: u32,
-    /// Number of nodes after it that are still to be continued from.
+    /// Number of nodes after it that are still to be continued from, or from which a run is under way.
     pub(super) open: u32,
-}
-
-impl ChoiceNode {
-    /// Creates a node from which nothing is open.
-    pub(super) fn new(parent: u32, choice: u32, state: u32, faults: u32) -> ChoiceNode {
-        ChoiceNode { parent, choice, state, faults, open: 0 }
-    }
 }
 
 /// The first node.
@@ -41,17 +35,32 @@ pub(super) struct Search {
     pub(super) steps: Vec<(u32, u32)>,
     /// States from which a step leads to the end.
     pub(super) last: Vec<u32>,
+    /// Nodes at which other choices of the last batch's runs stand open, by run and step.
+    pub(super) placed: HashMap<(u64, usize), u32>,
+    /// Nodes after which nothing is open any more since the last batch.
+    pub(super) closed: Vec<u32>,
 }
 
 impl Search {
-    /// Adds a node.
-    pub(super) fn node(&mut self, node: ChoiceNode) -> u32 {
-        self.nodes.push(node);
+    /// Opens the first node.
+    pub(super) fn begin(&mut self) {
+        self.open(0, (ROOT, 0, 0, 0));
+    }
+
+    /// Adds a node: its parent, its choice, the state of that and the faults so far.
+    pub(super) fn node(&mut self, (parent, choice, state, faults): (u32, u32, u32, u32)) -> u32 {
+        self.nodes.push(ChoiceNode { parent, choice, state, faults, open: 0 });
         (self.nodes.len() - 1) as u32
     }
 
     /// Adds a node to continue from, after so many preemptions.
-    pub(super) fn open(&mut self, switches: usize, node: u32) {
+    pub(super) fn open(&mut self, switches: usize, node: (u32, u32, u32, u32)) {
+        let node = self.node(node);
+        self.open_again(switches, node);
+    }
+
+    /// Makes a node one to continue from.
+    pub(super) fn open_again(&mut self, switches: usize, node: u32) {
         if self.open.len() <= switches {
             self.open.resize(switches + 1, Vec::new());
         }
@@ -60,13 +69,42 @@ impl Search {
         self.nodes[parent as usize].open += 1;
     }
 
-    /// Returns the next node to continue from, one with the fewest preemptions, and that number.
-    pub(super) fn next(&mut self) -> Option<(usize, u32)> {
-        let pop = |(switches, nodes): (usize, &mut Vec<u32>)| Some((switches, nodes.pop()?));
-        let (switches, node) = self.open.iter_mut().enumerate().find_map(pop)?;
+    /// Takes the next nodes to continue from, at most so many. They have the same number of preemptions, the
+    /// fewest of all, which is returned with them.
+    pub(super) fn next(&mut self, most: usize) -> Option<(usize, Vec<u32>)> {
+        let is_open = |(_, nodes): &(usize, &mut Vec<u32>)| !nodes.is_empty();
+        let (switches, nodes) = self.open.iter_mut().enumerate().find(is_open)?;
+        let rest = nodes.len().saturating_sub(most);
+        Some((switches, nodes.drain(rest..).rev().collect()))
+    }
+
+    /// Notes that the run from a node is over.
+    pub(super) fn close(&mut self, node: u32) {
         let parent = self.nodes[node as usize].parent;
-        self.nodes[parent as usize].open -= 1;
-        Some((switches, node))
+        let open = &mut self.nodes[parent as usize].open;
+        *open -= 1;
+        if *open == 0 {
+            self.closed.push(parent);
+        }
+    }
+
+    /// Forgets what was noted for those who run the batches, who have taken note of it.
+    pub(super) fn settled(&mut self) {
+        self.placed.clear();
+        self.closed.clear();
+    }
+
+    /// Returns the number of the state with this fingerprint, and whether it is new; then it was reached
+    /// first from this node.
+    pub(super) fn state(&mut self, fingerprint: u128, node: u32) -> (u32, bool) {
+        let next = self.places.len() as u32;
+        match self.states.entry(fingerprint) {
+            Entry::Occupied(known) => (*known.get(), false),
+            Entry::Vacant(free) => {
+                self.places.push(node);
+                (*free.insert(next), true)
+            }
+        }
     }
 
     /// Returns the bytes that the search takes, about.

@@ -17,6 +17,8 @@ pub enum Grain {
     Changes,
     /// Also those that look at what others have changed.
     Reads,
+    /// Also all ticks, which is wherever the machine can preempt a task.
+    Ticks,
 }
 
 /// Where tasks stop while schedules are explored.
@@ -49,7 +51,8 @@ impl Scheduler {
     /// As [`Scheduler::point`].
     #[inline]
     pub(crate) fn point_of_read(&mut self) -> Result<(), Exit> {
-        if self.points.grain == Some(Grain::Reads) && self.stops_here() { Err(Exit::Again) } else { Ok(()) }
+        let is_fine = matches!(self.points.grain, Some(Grain::Reads | Grain::Ticks));
+        if is_fine && self.stops_here() { Err(Exit::Again) } else { Ok(()) }
     }
 
     /// Returns whether the running task stops at the point that it has come to.

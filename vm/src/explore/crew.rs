@@ -1,0 +1,240 @@
+//! Who runs the parts of a search: this thread, or several, each with a machine of its own.
+//!
+//! The search hands out a batch of places at a time. Nobody changes the tree and the states while a batch is
+//! under way, and what its runs have found is taken in afterwards, in the order of the batch: so a search
+//! finds the same, in the same order, however many take part.
+
+use core::time::Duration;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard};
+
+use super::search::Search;
+use super::trace::{RunTrace, TraceEnd, Tracer};
+use super::{Settings, Subject};
+use crate::task::TaskNumber;
+
+/// A place of the tree from which a run goes on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RunPlace {
+    pub(super) node: u32,
+    /// Number of the run, which no other run of the search has.
+    pub(super) serial: u64,
+}
+
+/// A step of a run of a batch: the number of the run in the batch, and that of the step.
+pub(super) type ClaimedStep = (usize, usize);
+
+/// A state, and the task that has run last: what a run does from there on follows from both.
+type Claimable = (u128, TaskNumber);
+
+/// The states that the runs of a batch have come to, each with the first step that has.
+#[derive(Default)]
+pub(super) struct Claims([Mutex<HashMap<Claimable, ClaimedStep>>; 16]);
+
+impl Claims {
+    /// Claims a state for a step. Returns the step that has claimed it before, if one has.
+    pub(super) fn claim(&self, state: Claimable, step: ClaimedStep) -> Option<ClaimedStep> {
+        let mut part = self.0[state.0 as usize & 15].lock().unwrap_or_else(PoisonError::into_inner);
+        match part.entry(state) {
+            Entry::Occupied(first) => Some(*first.get()),
+            Entry::Vacant(free) => {
+                free.insert(step);
+                None
+            }
+        }
+    }
+}
+
+/// Those who run the parts of a search.
+pub(super) trait Crew<T, E> {
+    /// Runs on from each of these places, and returns what the runs have come by, in the same order. Where
+    /// one comes to what another one has claimed, it ends. Stops all when `goes_on` is false.
+    ///
+    /// # Errors
+    /// That with which a machine could not be begun.
+    fn run(&mut self, batch: Vec<RunPlace>, goes_on: &mut dyn FnMut() -> bool)
+    -> Result<Vec<RunTrace<T>>, E>;
+}
+
+/// Returns what the search knows, which nobody changes now.
+fn read(search: &RwLock<Search>) -> RwLockReadGuard<'_, Search> {
+    search.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// This thread alone.
+pub(super) struct LoneCrew<'a, S: Subject> {
+    search: &'a RwLock<Search>,
+    tracer: Tracer<'a, S>,
+}
+
+impl<'a, S: Subject> LoneCrew<'a, S> {
+    pub(super) fn new(settings: &'a Settings, search: &'a RwLock<Search>, subject: S) -> LoneCrew<'a, S> {
+        LoneCrew { search, tracer: Tracer::new(settings, settings.memory, subject) }
+    }
+}
+
+impl<S: Subject> Crew<S::Ending, S::Error> for LoneCrew<'_, S> {
+    fn run(
+        &mut self,
+        batch: Vec<RunPlace>,
+        goes_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Vec<RunTrace<S::Ending>>, S::Error> {
+        let search = read(self.search);
+        self.tracer.settle(&search);
+        let claims = Claims::default();
+        let mut traces = Vec::with_capacity(batch.len());
+        for (place, number) in batch.into_iter().zip(0..) {
+            traces.push(self.tracer.run(&search, place, (number, &claims), goes_on)?);
+        }
+        Ok(traces)
+    }
+}
+
+/// A batch that threads work on.
+struct SharedBatch {
+    places: Vec<RunPlace>,
+    /// Which of them somebody has taken.
+    taken: Vec<AtomicBool>,
+    claims: Claims,
+}
+
+impl SharedBatch {
+    /// Takes a place for oneself: the first one of which `is_near` is true, or else the last one. Returns its
+    /// number; `None` if all are taken.
+    fn take(&self, is_near: impl Fn(RunPlace) -> bool) -> Option<usize> {
+        let is_free = |&number: &usize| !self.taken[number].load(Ordering::Relaxed);
+        loop {
+            let mut free = (0..self.places.len()).filter(is_free);
+            let near = free.find(|&number| is_near(self.places[number]));
+            let number = near.or_else(|| (0..self.places.len()).rev().find(is_free))?;
+            if !self.taken[number].swap(true, Ordering::Relaxed) {
+                return Some(number);
+            }
+        }
+    }
+}
+
+/// What a thread tells.
+enum Told<T, E> {
+    /// What a run has come by, and its place in the batch.
+    Run(usize, RunTrace<T>),
+    /// A machine could not be begun.
+    Failed(E),
+    /// Nothing is left to be taken of this batch.
+    Idle,
+}
+
+/// Tells that a thread is idle when it goes, also if the thread panics.
+struct TellsIdle<'a, T, E>(&'a Sender<Told<T, E>>);
+
+impl<T, E> Drop for TellsIdle<'_, T, E> {
+    fn drop(&mut self) {
+        // Nobody listens any more once the search is over.
+        _ = self.0.send(Told::Idle);
+    }
+}
+
+/// Several threads.
+pub(super) struct ThreadCrew<'a, T, E> {
+    members: Vec<Sender<Arc<SharedBatch>>>,
+    told: Receiver<Told<T, E>>,
+    /// Whether all are to stop.
+    stop: &'a AtomicBool,
+}
+
+/// The work of one thread.
+pub(super) type Member<'a> = Box<dyn FnOnce() + Send + 'a>;
+
+impl<'a, T: Send + 'a, E: Send + 'a> ThreadCrew<'a, T, E> {
+    /// Creates a crew of so many members, whom the caller lets work in threads. Each makes a subject of its
+    /// own.
+    pub(super) fn new<S: Subject<Ending = T, Error = E>>(
+        jobs: usize,
+        settings: &'a Settings,
+        (search, stop): (&'a RwLock<Search>, &'a AtomicBool),
+        subject: &'a (impl Fn() -> S + Sync),
+    ) -> (ThreadCrew<'a, T, E>, Vec<Member<'a>>) {
+        let (tell, told) = channel();
+        let (mut members, mut works) = (Vec::new(), Vec::<Member<'a>>::new());
+        for _ in 0..jobs {
+            let (order, orders) = channel::<Arc<SharedBatch>>();
+            let tell = tell.clone();
+            works.push(Box::new(move || {
+                let mut tracer = Tracer::new(settings, settings.memory / jobs, subject());
+                for batch in orders {
+                    let _idle = TellsIdle(&tell);
+                    work(&mut tracer, &read(search), &batch, stop, &tell);
+                }
+            }));
+            members.push(order);
+        }
+        (ThreadCrew { members, told, stop }, works)
+    }
+}
+
+/// Does one thread's part of a batch.
+fn work<S: Subject>(
+    tracer: &mut Tracer<'_, S>,
+    search: &Search,
+    batch: &SharedBatch,
+    stop: &AtomicBool,
+    tell: &Sender<Told<S::Ending, S::Error>>,
+) {
+    tracer.settle(search);
+    while let Some(number) = batch.take(|place| tracer.is_near(search, place)) {
+        let mut goes_on = || !stop.load(Ordering::Relaxed);
+        let ran = tracer.run(search, batch.places[number], (number, &batch.claims), &mut goes_on);
+        let told = ran.map_or_else(Told::Failed, |trace| Told::Run(number, trace));
+        if tell.send(told).is_err() {
+            return;
+        }
+    }
+}
+
+impl<T: Send, E: Send> Crew<T, E> for ThreadCrew<'_, T, E> {
+    fn run(
+        &mut self,
+        batch: Vec<RunPlace>,
+        goes_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Vec<RunTrace<T>>, E> {
+        let taken = batch.iter().map(|_| AtomicBool::new(false)).collect();
+        let count = batch.len();
+        let batch = Arc::new(SharedBatch { places: batch, taken, claims: Claims::default() });
+        let mut working = 0;
+        for member in &self.members {
+            working += usize::from(member.send(batch.clone()).is_ok());
+        }
+        let mut traces: Vec<Option<RunTrace<T>>> = (0..count).map(|_| None).collect();
+        let mut failed = None;
+        while working > 0 {
+            match self.told.recv_timeout(Duration::from_millis(50)) {
+                Ok(Told::Run(number, trace)) => traces[number] = Some(trace),
+                Ok(Told::Failed(error)) => {
+                    self.stop.store(true, Ordering::Relaxed);
+                    failed = failed.or(Some(error));
+                }
+                Ok(Told::Idle) => working -= 1,
+                Err(RecvTimeoutError::Timeout) => {}
+                // A thread has panicked, which the scope tells.
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            if !goes_on() {
+                self.stop.store(true, Ordering::Relaxed);
+            }
+        }
+        match failed {
+            Some(error) => Err(error),
+            None => Ok(traces.into_iter().map(|trace| trace.unwrap_or_else(RunTrace::stopped)).collect()),
+        }
+    }
+}
+
+impl<T> RunTrace<T> {
+    /// Returns the trace of a run that did not begin.
+    pub(super) fn stopped() -> RunTrace<T> {
+        RunTrace { steps: Vec::new(), end: TraceEnd::Stopped }
+    }
+}

@@ -1,0 +1,213 @@
+//! One run of a search: from a place of the tree to the end, or to a state that is known already.
+
+use super::Subject;
+use super::crew::{ClaimedStep, Claims, RunPlace};
+use super::keep::Keeper;
+use super::search::{ROOT, Search};
+use super::{SearchLimit, Settings};
+
+/// Bytes that a step of a run takes until the search has taken it in, about.
+const STEP_BYTES: usize = 64;
+
+/// A state that a run has come to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TraceStep {
+    /// Its fingerprint.
+    pub(super) state: u128,
+    /// Number of choices there.
+    pub(super) count: u32,
+    /// Whether the first of them lets the task go on that ran last.
+    pub(super) has_last: bool,
+    /// Whether the program itself chooses.
+    pub(super) has_ways: bool,
+}
+
+/// How a run of the search has ended.
+#[derive(Debug)]
+pub(super) enum TraceEnd<T> {
+    /// As the program ends.
+    Ended(T),
+    /// In a state that was known before.
+    Known,
+    /// In the state to which another run of the batch has come by this step, and in the same way: what that
+    /// run goes on with belongs to this one, too.
+    Joined(ClaimedStep),
+    /// For want of room.
+    Full,
+    /// When it was asked to.
+    Stopped,
+}
+
+/// What a run has come by.
+#[derive(Debug)]
+pub(super) struct RunTrace<T> {
+    pub(super) steps: Vec<TraceStep>,
+    pub(super) end: TraceEnd<T>,
+}
+
+/// A machine of a search with its places, and who began it.
+pub(super) struct Tracer<'a, S> {
+    settings: &'a Settings,
+    keeper: Keeper<'a>,
+    subject: S,
+}
+
+impl<'a, S: Subject> Tracer<'a, S> {
+    /// Creates a tracer that may take so many bytes for snapshots.
+    pub(super) fn new(settings: &'a Settings, memory: usize, subject: S) -> Tracer<'a, S> {
+        Tracer { settings, keeper: Keeper::new(settings, memory), subject }
+    }
+
+    /// Takes note of what the search has made of the last batch.
+    pub(super) fn settle(&mut self, search: &Search) {
+        self.keeper.settle(search);
+    }
+
+    /// Whether the machine returns to this place by a snapshot of it.
+    pub(super) fn is_near(&self, search: &Search, place: RunPlace) -> bool {
+        self.keeper.has(search.nodes[place.node as usize].parent)
+    }
+
+    /// Runs on from a place: as this run of the batch, which have claimed states.
+    ///
+    /// # Errors
+    /// Those of the subject.
+    pub(super) fn run(
+        &mut self,
+        search: &Search,
+        place: RunPlace,
+        (number, claims): (usize, &Claims),
+        goes_on: &mut dyn FnMut() -> bool,
+    ) -> Result<RunTrace<S::Ending>, S::Error> {
+        let Tracer { settings, keeper, subject } = self;
+        let (mut machine, mut run, choices) = keeper.go_to(search, place.node, || subject.begin())?;
+        let parent = search.nodes[place.node as usize].parent;
+        let mut given = choices.into_iter();
+        let mut steps: Vec<TraceStep> = Vec::new();
+        let mut end = TraceEnd::Known;
+        let most = settings.states.min(settings.memory / STEP_BYTES);
+        let outcome = run.go_on(&mut machine, u64::MAX, &mut |vm, run, runnable| {
+            if given.len() == 1 && runnable.count() > 1 {
+                keeper.keep_on_the_way(vm, run, search, parent);
+            }
+            if runnable.count() > 1
+                && let Some(choice) = given.next()
+            {
+                return Some(choice);
+            }
+            if given.len() > 0 {
+                return Some(0);
+            }
+            let state = keeper.fingerprints.of(vm);
+            let (count, has_last) = (runnable.count(), runnable.has_last);
+            steps.push(TraceStep { state, count, has_last, has_ways: runnable.ways.is_some() });
+            end = if search.states.contains_key(&state) {
+                TraceEnd::Known
+            } else if let Some(step) = claims.claim((state, run.last()), (number, steps.len() - 1)) {
+                TraceEnd::Joined(step)
+            } else if !goes_on() {
+                TraceEnd::Stopped
+            } else if steps.len() >= most {
+                TraceEnd::Full
+            } else {
+                if count > 1 {
+                    keeper.keep(vm, run, (place.serial, steps.len() - 1));
+                }
+                return Some(0);
+            };
+            None
+        });
+        if let Some(outcome) = outcome {
+            end = TraceEnd::Ended(subject.judge(&mut machine, outcome));
+        }
+        keeper.take_back(machine);
+        Ok(RunTrace { steps, end })
+    }
+}
+
+/// What a search makes of the runs of a batch.
+pub(super) struct Merging<'a> {
+    pub(super) settings: &'a Settings,
+    /// What has kept the search from trying everything.
+    pub(super) limit: &'a mut Option<SearchLimit>,
+    /// Preemptions of the schedules that are tried.
+    pub(super) switches: usize,
+}
+
+/// Where a run is taken in: the choices so far, and the state in which the last step began.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MergePlace {
+    pub(super) node: u32,
+    pub(super) before: Option<u32>,
+}
+
+/// What is to be done after the steps of a run were taken in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Merged {
+    /// They lead to a state that is known.
+    Known,
+    /// All are new: the run counts as it has ended.
+    New,
+    /// The search gives up.
+    Over,
+}
+
+impl Merging<'_> {
+    /// Takes in the steps of a run, from the one with number `first` on.
+    pub(super) fn take_in(
+        &mut self,
+        search: &mut Search,
+        place: &mut MergePlace,
+        (serial, steps, first): (u64, &[TraceStep], usize),
+    ) -> Merged {
+        for (step, at) in steps.iter().zip(0..).skip(first) {
+            let (state, is_new) = search.state(step.state, place.node);
+            if let Some(before) = place.before {
+                search.steps.push((before, state));
+            }
+            if !is_new {
+                return Merged::Known;
+            }
+            place.before = Some(state);
+            if search.places.len() >= self.settings.states {
+                *self.limit = Some(SearchLimit::States);
+                return Merged::Over;
+            }
+            if search.places.len().is_multiple_of(64) && search.bytes() > self.settings.memory {
+                *self.limit = Some(SearchLimit::Memory);
+                return Merged::Over;
+            }
+            if step.count > 1 {
+                self.open(search, *step, place, (serial, at));
+            }
+        }
+        Merged::New
+    }
+
+    /// Opens the other choices of a state.
+    fn open(&mut self, search: &mut Search, step: TraceStep, place: &mut MergePlace, at: (u64, usize)) {
+        // A preemption is a switch at which the task that has just run could have continued.
+        let switches = self.switches + usize::from(step.has_last);
+        let before = search.nodes[place.node as usize].faults;
+        let faults = before + u32::from(step.has_ways);
+        let state = place.before.unwrap_or_default();
+        if self.settings.switches.is_some_and(|most| switches > most) {
+            *self.limit = self.limit.or(Some(SearchLimit::Switches));
+        } else if self.settings.faults.is_some_and(|most| faults as usize > most) {
+            *self.limit = self.limit.or(Some(SearchLimit::Faults));
+        } else {
+            for choice in (1..step.count).rev() {
+                search.open(switches, (place.node, choice, state, faults));
+            }
+        }
+        search.placed.insert(at, place.node);
+        place.node = search.node((place.node, 0, state, before));
+    }
+}
+
+impl MergePlace {
+    /// Returns where a run from a node is taken in.
+    pub(super) fn of(search: &Search, node: u32) -> MergePlace {
+        MergePlace { node, before: (node != ROOT).then(|| search.nodes[node as usize].state) }
+    }
+}
