@@ -149,6 +149,103 @@ mod tests {
 
     use super::*;
 
+    /// Reads a text as strictly as the description of the format, and the advice for names, are. Returns the
+    /// names of the metrics with samples, and their series.
+    ///
+    /// Source: "Exposition formats" and "Metric and label naming" of Prometheus.
+    fn strictly(text: &str) -> Result<Vec<String>, String> {
+        assert!(text.ends_with('\n') && !text.contains('\r'));
+        let is_name = |name: &str| {
+            name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+                && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
+        };
+        let (mut metric, mut kind) = (String::new(), String::new());
+        let (mut metrics, mut series) = (Vec::new(), Vec::new());
+        let mut helped = None;
+        for line in text.lines() {
+            let wrong = |reason: &str| Err(format!("{reason}: {line}"));
+            if let Some(rest) = line.strip_prefix("# HELP ") {
+                let Some((name, help)) = rest.split_once(' ') else { return wrong("no help") };
+                if helped.is_some() || help.replace("\\\\", "").replace("\\n", "").contains('\\') {
+                    return wrong("a help without a type, or a wrong escape");
+                }
+                helped = Some(name.to_string());
+            } else if let Some(rest) = line.strip_prefix("# TYPE ") {
+                let Some((name, found)) = rest.split_once(' ') else { return wrong("no type") };
+                if helped.take().as_deref() != Some(name) || metrics.contains(&name.to_string()) {
+                    return wrong("a type without a help, or twice");
+                }
+                let is_total = name.ends_with("_total");
+                let ends_well = match found {
+                    "counter" => is_total,
+                    "gauge" | "summary" => !is_total && !name.ends_with("_count"),
+                    _ => false,
+                };
+                if !is_name(name) || !ends_well || !name.starts_with("esl_") {
+                    return wrong("a name that is not one of its kind");
+                }
+                metrics.push(name.to_string());
+                (metric, kind) = (name.into(), found.into());
+            } else {
+                let Some((named, value)) = line.rsplit_once(' ') else { return wrong("no value") };
+                let (name, labels) = match named.split_once('{') {
+                    None => (named, ""),
+                    Some((name, rest)) => match rest.strip_suffix('}') {
+                        Some(labels) => (name, labels),
+                        None => return wrong("labels without an end"),
+                    },
+                };
+                let of_summary = ["_sum", "_count"].iter().any(|end| format!("{metric}{end}") == name);
+                if helped.is_some() || !(if kind == "summary" { of_summary } else { name == metric }) {
+                    return wrong("a sample of another metric");
+                }
+                if !value.parse::<f64>().is_ok_and(|value| value.is_finite() && value >= 0.0) {
+                    return wrong("no number");
+                }
+                if !labels.is_empty() {
+                    let Some((label, quoted)) = labels.split_once('=') else { return wrong("no label") };
+                    let inside = quoted.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+                    let rest =
+                        inside.map(|text| text.replace("\\\\", "").replace("\\\"", "").replace("\\n", ""));
+                    if !is_name(label) || rest.is_none_or(|rest| rest.contains(['\\', '"'])) {
+                        return wrong("a label that is not written well");
+                    }
+                }
+                if series.contains(&named.to_string()) {
+                    return wrong("twice");
+                }
+                series.push(named.to_string());
+            }
+        }
+        if helped.is_some() { Err("a help at the end".into()) } else { Ok(series) }
+    }
+
+    #[test]
+    fn the_text_is_in_the_format_to_the_letter() {
+        let input = |name: &str| esl_vm::host::InputRow {
+            name: name.into(),
+            kept: 1,
+            capacity: 2,
+            signals: u64::MAX,
+            dropped: 3,
+        };
+        let figures = RunFigures {
+            failures: vec![(":A \"B\\\nC} 1".into(), 3), (":ü".into(), u64::MAX)],
+            pauses: [2, u64::MAX, 1],
+            ..RunFigures::default()
+        };
+        let inputs = vec![input("a\\"), input("b{c=\"d\"} 7"), input("")];
+        let survey = Survey { figures, inputs, ..Survey::default() };
+        let series = strictly(&text_of(&survey)).expect("it is in the format");
+        assert!(series.len() > 30, "{series:?}");
+        strictly(&text_of(&Survey::default())).expect("it is in the format");
+        for wrong in
+            ["a 1\n", "# TYPE esl_a gauge\nesl_a 1\n", "# HELP esl_a x\n# TYPE esl_a counter\nesl_a 1\n"]
+        {
+            assert!(strictly(wrong).is_err(), "{wrong}");
+        }
+    }
+
     #[test]
     fn figures_become_samples() {
         let figures = RunFigures {

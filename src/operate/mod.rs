@@ -36,6 +36,8 @@ pub(crate) mod attach;
 mod http;
 mod metrics;
 mod monitor;
+#[doc(hidden)]
+pub mod noise;
 mod scope;
 mod secrets;
 mod slime;

@@ -78,7 +78,7 @@ impl Secrets {
         Secrets::parse(&text)
     }
 
-    fn parse(text: &str) -> Result<Secrets, String> {
+    pub(super) fn parse(text: &str) -> Result<Secrets, String> {
         let mut secrets = Vec::new();
         let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
         for (number, line) in lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')) {

@@ -53,8 +53,8 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
          Failure :PROGRAM-ERROR, no recovery available.\nAborted\n\
          A patch consists of DEFUN, DEFMACRO, DEFMETHOD, DEFGENERIC, DEFVAR, DEFPARAMETER, SETQ, DEFTYPE, \
          DEFINE-CAUSE, DEFINE-MODIFY-MACRO, DEFINE-COMPILER-MACRO, DEFSTRUCT, DEFCLASS, DEFINE-CONDITION, \
-         DEFCONSTANT, DEFINE-SYMBOL-MACRO, DEFINE-FLUENT, DEFINE-INPUT, DEFINE-PROPERTY, DEFINE-RESOURCE and \
-         TO-ACHIEVE, not of (PRINT 1).\n\
+         DEFCONSTANT, DEFINE-SYMBOL-MACRO, DEFINE-FLUENT, DEFINE-INPUT, DEFINE-PROPERTY, DEFINE-RESOURCE, \
+         DEFINE-RULE and TO-ACHIEVE, not of (PRINT 1).\n\
          Failure :PROGRAM-ERROR, no recovery available.\nAborted\n3\n(3 (3 3 NIL))\n\
          The value \"crater\" is not of type LIST.\nFailure :TYPE-ERROR, no recovery available.\nAborted\n\
          The value \"crater\" is not of type LIST.\n  in LOOK\n      WHERE = \"crater\"\n  in top level\n\
@@ -121,7 +121,7 @@ fn a_patch_of_kinds_and_shared_things_is_made_and_undone_in_one_step() {
     );
     let narrower = folder.file("narrower.esl", "(defun state () nil) (defstruct wheel)");
     let constant = folder.file("constant.esl", "(defun state () nil) (defconstant +limit+ 6)");
-    let rule = folder.file("rule.esl", "(defun state () nil) (define-rule (near ?x) (place ?x here))");
+    let unfit = folder.file("unfit.esl", "(defun state () nil) (define-rule (place ?x ?y) (near ?x))");
     let class = folder.file("class.esl", "(defclass rover () ((speed) (fuel))) (defparameter *no* (car 1))");
     let socket = folder.join("s");
     let mut run = Operated::start(&folder, program, &["--listen", &socket]);
@@ -129,7 +129,7 @@ fn a_patch_of_kinds_and_shared_things_is_made_and_undone_in_one_step() {
     let (output, status) = session(
         &socket,
         &format!(
-            "(state)\n:patch {patch}\n(state)\n:patch {narrower}\n:patch {constant}\n:patch {rule}\n:patch {class}\n\
+            "(state)\n:patch {patch}\n(state)\n:patch {narrower}\n:patch {constant}\n:patch {unfit}\n:patch {class}\n\
              (slot-value *rover* 'fuel)\n:undo-patch\n(state)\n\
              (list (slot-exists-p *rover* 'fuel) (fboundp 'stuck-depth) (fboundp 'make-hub) (fboundp 'low) \
              (boundp 'hints))\n"
@@ -143,15 +143,107 @@ fn a_patch_of_kinds_and_shared_things_is_made_and_undone_in_one_step() {
         "(3 NIL 7 10)\n; 14 definitions are changed\n(1 99 3 50 2 :HELD HERE 5 0 3 NIL 10)\n\
          The structure WHEEL keeps its slots, (SIZE): a structure with others needs another name.\n{refused}\
          +LIMIT+ is a constant already, with the value 5.\n{refused}\
-         A rule cannot be taken back, so no patch has any: evaluate (DEFINE-RULE (NEAR ?X) (PLACE ?X HERE)).\n\
-         {refused}The value 1 is not of type LIST.\n{wrong}50\n; "
+         Expected the head of a rule, which is no property, found (PLACE ?X ?Y).\n{refused}The value 1 is not of type LIST.\n{wrong}50\n\
+         ; 14 definitions are as before\n(3 NIL 7 10)\n(NIL NIL NIL NIL NIL)"
     );
-    let found = lines.join("\n");
-    assert!(found.starts_with(&expected), "{found}\n{expected}");
-    let rest = found[expected.len()..].split_once(' ').map(|(_, rest)| rest);
-    assert_eq!(rest, Some("definitions are as before\n(3 NIL 7 10)\n(NIL NIL NIL NIL NIL)"), "{found}");
+    assert_eq!(lines.join("\n"), expected);
     assert_eq!(status, Some(0));
     assert_eq!(run.finish().output, "(3 NIL 7 10)\n");
+}
+
+/// What a patch defines for the first time has no name after it is undone, and can be defined otherwise then.
+#[test]
+fn rules_are_patched_and_new_kinds_are_gone_after_an_undo() {
+    let folder = Folder::new("attach_undo");
+    let program = "
+        (assert '(at rock 1)) (assert '(at ice 2))
+        (define-rule (near ?x) (at ?x ?n) (:test (< #?n 2)))
+        (define-input hints :capacity 2)
+        (defvar *kept* nil)
+        (defvar *woken* nil)
+        (defun near () (db-query '(near ?x)))
+        (defun known ()
+          (list (mapcar (lambda (name) (if (find-class name nil) t nil)) '(hub stuck probe))
+                (constantp '+limit+) (fboundp 'place) (db-query '(place rock ?x)) (esl::%special-p '*new*)))
+        (read-line *standard-input* nil)
+        (format t \"~s ~s~%\" (near) (known))";
+    let patch = folder.file(
+        "patch.esl",
+        "(define-rule (near ?x) (at ?x ?n) (:test (< #?n 2)))
+         (define-rule (near ?x) (far ?x ?y) (near ?y))
+         (define-rule (seen ?x) (near ?x))
+         (defstruct hub (n 1))
+         (define-condition stuck (error) ((where :initarg :where :reader stuck-where)))
+         (defclass probe () ((depth :initform 4 :accessor probe-depth)))
+         (defconstant +limit+ 5)
+         (defvar *new* 1)
+         (define-property place (what))
+         (define-input hints :capacity 9)
+         (define-input others)
+         (defun guarded (function)
+           (handler-case (funcall function) (stuck (c) (stuck-where c)) (type-error () :other)))",
+    );
+    let wrong =
+        folder.file("wrong.esl", "(define-rule (near ice)) (defstruct spoke) (defparameter *no* (car 1))");
+    let again = folder.file(
+        "again.esl",
+        "(defstruct hub n m) (defconstant +limit+ 6) (defclass probe () (width))
+         (define-rule (near ice))",
+    );
+    let socket = folder.join("s");
+    let mut run = Operated::start(&folder, program, &["--listen", &socket]);
+    run.said("; operators attach with eslvm attach ");
+    let (output, status) = session(
+        &socket,
+        &format!(
+            "(near)\n:patch {wrong}\n(list (near) (find-class 'spoke nil))\n:patch {patch}\n(assert '(far dune rock))\n\
+             (list (near) (db-query '(seen ?x)))\n\
+             (progn (assert '(place rock a)) (assert '(place rock b)) (known))\n\
+             (setq *kept* (list (make-hub) (make-instance 'probe) #'guarded))\n\
+             (list (guarded (lambda () (error 'stuck :where 7))) (hub-n (first *kept*)))\n\
+             (multiple-value-list (esl::%input-rule hints))\n\
+             :undo-patch\n(list (near) (db-query '(seen ?x)))\n(known)\n*kept*\n\
+             (list (slot-value (second *kept*) 'depth) (type-of (first *kept*)))\n\
+             (funcall (third *kept*) (lambda () (error 'type-error :datum 1 :expected-type 'list)))\n\
+             (multiple-value-list (esl::%input-rule hints))\n:signal others 1\n(assert '(place rock c))\n\
+             (db-query '(place rock ?x))\n\
+             (progn (spawn (:daemon t) (wait-until (db-query '(near ice))) (setq *woken* t)) :waits)\n\
+             :patch {again}\n(loop until *woken* do (sleep 0.01))\n(list (hub-m (make-hub :m 3)) +limit+ (near) (hub-p (first *kept*)))\n:undo-patch\n(near)\n"
+        ),
+    );
+    let expected = "(((?X . ROCK)))
+The value 1 is not of type LIST.
+Failure :TYPE-ERROR, no recovery available.
+Aborted
+((((?X . ROCK))) NIL)
+; 12 definitions are changed
+T
+((((?X . ROCK)) ((?X . DUNE))) (((?X . ROCK)) ((?X . DUNE))))
+((T T T) T T (((?X . B))) T)
+(#S(HUB :N 1) #<PROBE> #<FUNCTION GUARDED>)
+(7 1)
+(9 0)
+; 12 definitions are as before
+((((?X . ROCK))) NIL)
+((NIL NIL NIL) NIL NIL (((?X . B))) NIL)
+(#S(HUB :N 1) #<PROBE> #<FUNCTION GUARDED>)
+(4 HUB)
+:OTHER
+(2 0)
+There is no input or event in a variable OTHERS.
+Failure :PROGRAM-ERROR, no recovery available.
+Aborted
+T
+(((?X . B)) ((?X . C)))
+:WAITS
+; 4 definitions are changed
+NIL
+(3 6 (((?X . ROCK)) ((?X . ICE))) NIL)
+; 4 definitions are as before
+(((?X . ROCK)))";
+    assert_eq!((output.trim_end(), status), (expected, Some(0)));
+    let ended = "(((?X . ROCK))) ((NIL NIL NIL) NIL NIL (((?X . B)) ((?X . C))) NIL)\n";
+    assert_eq!(run.finish().output, ended);
 }
 
 #[test]
@@ -169,7 +261,8 @@ fn a_patch_of_other_definitions_is_undone_as_a_whole() {
         (read-line *standard-input* nil)";
     let patch = folder.file(
         "patch.esl",
-        "(progn (defmacro twice (form) `(vector ,form)) (defmacro thrice (form) `(list 3 ,form)))
+        "(defun look-at (n) (seen-at n)) (defun seen-at (n) (twice n))
+         (progn (defmacro twice (form) `(vector ,form)) (defmacro thrice (form) `(list 3 ,form)))
          (defun both (n) (list (twice n) (thrice n)))
          (defmethod weight ((thing integer)) (* 2 thing))
          (defmethod weight ((thing string)) (length thing))
@@ -189,7 +282,7 @@ fn a_patch_of_other_definitions_is_undone_as_a_whole() {
     let (output, status) = session(
         &socket,
         &format!(
-            "{look}:patch {patch}\n{look}(list (weight \"abc\") (size 1))\n(achieve (donep 1))\n:patch {wrong}\n{look}\
+            "{look}:patch {patch}\n{look}(list (weight \"abc\") (size 1) (look-at 1))\n(achieve (donep 1))\n:patch {wrong}\n{look}\
              (weight 'x)\n:undo-patch\n{look}(weight \"abc\")\n(achieve (donep 2))\n:undo-patch\n"
         ),
     );
@@ -198,7 +291,7 @@ fn a_patch_of_other_definitions_is_undone_as_a_whole() {
     let lines: Vec<&str> = output.lines().collect();
     assert_eq!(status, Some(0), "{output}");
     assert!(
-        output.starts_with(&format!("{before}; 9 definitions are changed\n{after}(3 (:SIZE 1))\n")),
+        output.starts_with(&format!("{before}; 11 definitions are changed\n{after}(3 (:SIZE 1) (1 1))\n")),
         "{output}"
     );
     assert!(output.contains("\n:PATCHED"), "{output}");
@@ -285,6 +378,7 @@ fn each_role_may_do_what_its_secret_says() {
         ("esl:pause", 1),
         ("esl:continue", 1),
         ("esl:signal", 1),
+        ("esl:rights", 2),
         ("esl:evaluate", 2),
         ("esl:watch", 2),
         ("esl:complete", 2),
@@ -381,6 +475,62 @@ fn each_role_may_do_what_its_secret_says() {
         assert!(answers.is_empty(), "{wrong}: {answers:?}");
     }
     assert_eq!(run.finish().output, "(3 CALM NIL)\n");
+}
+
+/// Names that are sent are texts: only what somebody evaluates makes symbols in the program.
+#[test]
+fn what_strangers_send_makes_no_symbols() {
+    let folder = Folder::new("attach_symbols");
+    let (run, address) = start_with_secrets(&folder);
+    let requests = [
+        "(swank:connection-info zorro :zorro \"zorro\")",
+        "(zorro:zorro)",
+        "(esl:facts \"zorro\")",
+        "(esl:signal \"zorro\" \"zorro (:zorro) #:zorro |zorro| esl-user::zorro\")",
+        "(esl:signal \"news\" \"zorro\")",
+        "(esl:evaluate \"(quote zorro)\")",
+        "(swank:swank-require '(zorro :zorro))",
+        "(cl:mapc 'zorro '(zorro))",
+    ];
+    for (at, request) in requests.iter().enumerate() {
+        // One at a time: so each is done before the next session looks.
+        let text = format!("(:emacs-rex {request} zorro :zorro {at})");
+        let answers = ask(&address, "command-0123456789", &[text]);
+        assert!(answers.len() == 1 && answers[0].ends_with(&format!(" {at})")), "{request}: {answers:?}");
+    }
+    let form = "(list (find-symbol \\\"ZORRO\\\") (find-symbol \\\"ZORRO\\\" \\\"KEYWORD\\\") (find-symbol \\\"zorro\\\"))";
+    let look = format!("(:emacs-rex (esl:evaluate \"{form}\") nil t 1)");
+    let answers = ask(&address, "patch-0123456789", &[look]);
+    assert!(answers[0].contains("(NIL NIL NIL)"), "{answers:?}");
+    assert_eq!(run.finish().output, "(3 CALM NIL)\n");
+}
+
+/// What a session does is part of the run, and is there again in a replay; who only looks is not.
+#[test]
+fn a_run_with_sessions_is_replayed_without_them() {
+    let folder = Folder::new("attach_recorded");
+    let patch = folder.file("patch.esl", "(defun drive (n) (list :fast n)) (define-rule (calm) (mode calm))");
+    let (socket, recording) = (folder.join("s"), folder.join("run.eslj"));
+    let options = ["--listen", &socket, "--metrics", "0", "--record", &recording];
+    let mut run = Operated::start(&folder, PROGRAM, &options);
+    let address = run.said("; metrics at http://");
+    run.said("; operators attach with eslvm attach ");
+    let input = format!(
+        ":tasks\n:patch {patch}\n(list (drive 1) (db-query '(calm)))\n:data\n(fail :oops 1)\n:pause\n:facts\n:continue\n\
+         :signal news 1 (2)\n(spawn (:name 'late :daemon t) (loop (sleep 1000)))\n:bt 1\n:undo-patch\n(drive 1)\n\
+         (loop until (mode 'awake) do (sleep 0.01))\n(setq *speed* 9)\n"
+    );
+    let (output, status) = session(&socket, &input);
+    assert!(output.contains("((:FAST 1) ") && output.ends_with("\n9\n") && status == Some(0), "{output}");
+    let figures = crate::operate::request(address.trim_end_matches("/metrics"), "GET", "/metrics", "", "");
+    assert!(figures.contains("esl_failures_total"), "{figures}");
+    let finished = run.finish();
+    assert_eq!((&*finished.output, finished.status), ("(9 AWAKE NIL)\n", Some(0)), "{}", finished.errors);
+    let check = process::run(&mut eslvm(&["replay", "--check", &recording]), "");
+    assert_eq!((check.status, &*check.errors), (Some(0), ""), "{}", check.output);
+    assert!(check.output.starts_with("equal: "), "{}", check.output);
+    let again = process::run(&mut eslvm(&["replay", &recording]), "");
+    assert_eq!((again.status, &*again.output), (Some(0), "(9 AWAKE NIL)\n"), "{}", again.errors);
 }
 
 /// Random numbers that are the same in each run.

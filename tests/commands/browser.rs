@@ -1,4 +1,5 @@
-//! A browser: Chromium, driven by its own protocol over pipes. The page of the monitor in it. Left out without it.
+//! A browser: Chromium, driven by its own protocol over pipes. The
+//! page of the monitor in it. Left out without it.
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
@@ -133,6 +134,11 @@ fn the_page_shows_a_run_and_commands_it() {
     browser.value("filter = document.getElementById('filter'), filter.value = 'task left', filter.blur(), filtered(), true");
     browser.until("last.matching === 2 && last.from === 0");
     browser.press("ArrowDown");
+    browser.until("document.getElementById('t-task').textContent.includes('waits for resource LEG')");
+    // Where it waits for another, that one is a key away, and back.
+    browser.press("h");
+    browser.until("document.getElementById('t-task').textContent.includes('waits for resource ARM')");
+    browser.press("h");
     browser.until("document.getElementById('t-task').textContent.includes('waits for resource LEG')");
     browser.press("a");
     browser.until("document.getElementById('abort').textContent === 'Really abort it'");

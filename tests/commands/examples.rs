@@ -101,6 +101,38 @@ fn the_spacecraft_survives_one_who_uses_up_the_memory() {
     }
 }
 
+/// A flight whose memory is used up, and never given back, ends early; the spacecraft points at the sun then,
+/// too.
+#[test]
+fn the_spacecraft_is_left_in_order_when_the_memory_stays_used_up() {
+    let flight = example("spacecraft/scripted.esl");
+    let library = flight.parent().expect("it is in a folder").to_owned();
+    let flight = std::fs::read_to_string(&flight).expect("it is there");
+    let folder = Folder::new("spacecraft-memory-kept");
+    for seed in 1..=6 {
+        // Some stop at the first refusal, some go on asking.
+        let again = match seed % 2 {
+            0 => "(loop (handler-case (hold-more) (storage-condition () (sleep 1))))",
+            _ => "(hold-more)",
+        };
+        let greedy = format!(
+            "(defvar *held* nil)
+             (defun hold-more () (loop (push (make-array 100) *held*)))
+             (spawn (:name 'greedy :daemon t) (sleep {}) {again})",
+            seed * 40
+        );
+        let program = folder.file("flight.esl", format!("{greedy}\n{flight}"));
+        // What plays the battery may be gone, and the flight wait for ever for it.
+        let options = ["run", "--clock", "virtual", "--memory", "8M", "--budget", "500000", "--seed"];
+        let mut command = eslvm(&options);
+        command.arg(seed.to_string()).arg("--library").arg(&library).arg(program);
+        let run = process::run(&mut command, "");
+        // Others may be done before, or wait for each other for ever.
+        assert!(matches!(run.status, Some(0 | 4 | 5)), "seed {seed}: {}{}", run.output, run.errors);
+        assert!(run.output.ends_with("pointing at SUN, no rule broken\n"), "seed {seed}: {}", run.output);
+    }
+}
+
 /// Starts a simulator, which prints its port, and returns it with its output and the port.
 pub(crate) fn start_simulator(
     command: &mut Command,

@@ -202,3 +202,67 @@ fn memory_bounds_an_exploration() {
     let (status, _, errors) = run(&folder, &["explore", "--memory", "much", "lost.esl"]);
     assert!(status == Some(2) && errors.contains("--memory <SIZE>"), "{errors}");
 }
+
+/// Several threads find what one does, in the same order and by the same schedules.
+#[test]
+fn threads_find_the_same_as_one() {
+    let folder = Folder::new("exploring-jobs");
+    let text = "(defvar *a* (make-event 'a))
+(defvar *b* (make-event 'b))
+(defvar *left* 3)
+(task-net
+  (one (signal *a*) (wait-for-event *b*) (decf *left*))
+  (two (signal *b*) (wait-for-event *a*) (decf *left*))
+  (three (signal *a*) (signal *b*) (when (choose nil t) (fail :dropped))))
+";
+    folder.file("signals.esl", text);
+    let found = |jobs: &str| {
+        let (status, output, errors) = run(&folder, &["explore", "--jobs", jobs, "signals.esl"]);
+        assert_eq!((status, errors.as_str()), (Some(1), ""), "{output}");
+        (output, std::fs::read_to_string(folder.path().join("signals-1.schedule")).expect("it was written"))
+    };
+    let one = found("1");
+    assert!(one.0.contains("finding 2: "), "{}", one.0);
+    assert_eq!(one, found("2"));
+    assert_eq!(one, found("5"));
+}
+
+/// What only a switch at a tick can show.
+#[test]
+fn at_every_tick_shared_variables_are_seen() {
+    let folder = Folder::new("exploring-ticks");
+    let text = "(defvar *count* 0)
+(defun twice (n) (+ n n))
+(task-net
+  (one (setq *count* (+ *count* (twice (twice 1)))))
+  (two (setq *count* (+ *count* (twice (twice 2))))))
+(unless (= *count* 12) (exit 9))
+";
+    folder.file("count.esl", text);
+    let (status, output, errors) = run(&folder, &["explore", "count.esl"]);
+    assert_eq!((status, errors.as_str()), (Some(0), ""), "{output}");
+    assert!(output.contains("outside of critical sections (--grain ticks)"), "{output}");
+    let (status, output, errors) = run(&folder, &["explore", "--grain", "ticks", "count.esl"]);
+    assert_eq!((status, errors.as_str()), (Some(1), ""), "{output}");
+    assert!(output.starts_with("finding 1: the program ends with status 9\n"), "{output}");
+    assert_eq!(run(&folder, &["run", "--schedule", "count-1.schedule", "count.esl"]).0, Some(9));
+}
+
+/// A finding is recorded, and gone through forwards and backwards.
+#[test]
+fn a_run_by_a_schedule_is_recorded_and_replayed() {
+    let folder = Folder::new("exploring-replay");
+    folder.file("lost.esl", LOST_SIGNAL);
+    assert_eq!(run(&folder, &["explore", "lost.esl"]).0, Some(1));
+    let record = ["run", "--schedule", "lost-1.schedule", "--record", "lost.eslj", "lost.esl"];
+    let (status, _, errors) = run(&folder, &record);
+    assert_eq!(status, Some(4), "{errors}");
+    let (status, _, errors) = run(&folder, &["replay", "lost.eslj"]);
+    assert_eq!(status, Some(4), "{errors}");
+    assert!(errors.contains("task RADIO waits for event TAKEN, lost.esl:7:12"), "{errors}");
+    let commands = "break task:RADIO\ncontinue\nprint *picture*\ntick 1\ncontinue\nprint (list *picture*)\n";
+    let replay = &mut eslvm(&["replay", "--until", "tick:1", "lost.eslj"]);
+    let finished = process::run(replay.current_dir(folder.path()), commands);
+    assert_eq!(finished.status, Some(0), "{}", finished.errors);
+    assert!(finished.output.contains("NIL") || finished.output.contains("T"), "{}", finished.output);
+}

@@ -67,6 +67,18 @@ impl Viewer {
         found.expect("it has come in")
     }
 
+    /// Takes an event. Returns false if there are no more.
+    fn goes_on(&mut self) -> bool {
+        let mut line = String::new();
+        while self.0.read_line(&mut line).is_ok_and(|read| read > 0) {
+            if line.starts_with("data: ") {
+                return true;
+            }
+            line.clear();
+        }
+        false
+    }
+
     /// Returns the next event.
     fn next(&mut self) -> Value {
         loop {
@@ -210,6 +222,14 @@ fn viewers_come_and_go() {
     for round in 0..40 {
         drop(Viewer::come_in(&address, &observe, &format!("v{round}")));
     }
+    // A viewer whose connection is lost comes again under its name, whatever has become of the last one.
+    for _ in 0..1000 {
+        drop(Viewer::come(&address, &observe, "same"));
+    }
+    until("a viewer who is not taken for one of those before", || {
+        let mut viewer = Viewer::come_in(&address, &observe, "same");
+        (0..5).all(|_| viewer.goes_on())
+    });
     // Those who take nothing do not keep others from being served.
     let stalled: Vec<Viewer> =
         (0..3).map(|i| Viewer::come_in(&address, &observe, &format!("s{i}"))).collect();

@@ -109,8 +109,8 @@ fn messages_go_through_a_broker() {
     assert_eq!(lines, expected);
 }
 
-/// Starts a peer that takes connections, and answers the first packet of each with `answer` and the second one
-/// with `next`; then it closes the connection, or says no more if it `stays`.
+/// Starts a peer that takes connections, and answers the first packet of each with `answer` and the second
+/// one with `next`; then it closes the connection, or says no more if it `stays`.
 fn start_peer(answer: &'static [u8], next: &'static [u8], stays: bool) -> u16 {
     use std::io::{Read, Write};
     let listener = TcpListener::bind("127.0.0.1:0").expect("there is a port");
@@ -134,8 +134,8 @@ fn start_peer(answer: &'static [u8], next: &'static [u8], stays: bool) -> u16 {
     port
 }
 
-/// What a peer answers first and second, whether it stays, the seconds that opening a client and subscribing may
-/// take, and what comes of it.
+/// What a peer answers first and second, whether it stays, the seconds that opening a client and subscribing
+/// may take, and what comes of it.
 type PeerCase = (&'static [u8], &'static [u8], bool, (&'static str, &'static str), &'static str);
 
 /// What is no broker, and what is one for a while only, are failures with causes; nothing hangs.

@@ -2,6 +2,7 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
+use std::path::Path;
 use std::process::{Child, ChildStderr};
 use std::time::Duration;
 
@@ -19,11 +20,16 @@ pub(crate) struct Operated {
 impl Operated {
     /// Starts a program with these options.
     pub(crate) fn start(folder: &Folder, text: &str, options: &[&str]) -> Operated {
+        Operated::start_in(Path::new("."), folder, text, options)
+    }
+
+    /// Starts a program in a folder other than that of the tests.
+    pub(crate) fn start_in(place: &Path, folder: &Folder, text: &str, options: &[&str]) -> Operated {
         let program = folder.file("program.esl", text);
         let mut arguments = vec!["run"];
         arguments.extend(options);
         arguments.push(&program);
-        let mut child = start(&mut eslvm(&arguments));
+        let mut child = start(eslvm(&arguments).current_dir(place));
         let errors = BufReader::new(child.stderr.take().expect("it is a pipe"));
         Operated { child, errors }
     }

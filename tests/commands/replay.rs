@@ -148,9 +148,12 @@ fn a_replay_that_diverges_says_where_and_has_a_status_of_its_own() {
     }
     let mut bytes = std::fs::read(&one).expect("it is there");
     bytes[40] ^= 1;
-    let damaged = folder.file("damaged.eslj", bytes);
+    let damaged = folder.file("damaged.eslj", &bytes);
+    bytes[8] = 1;
+    let older = folder.file("older.eslj", bytes);
     for (path, status, message) in [
         (&*damaged, 3, "damaged.eslj cannot be replayed: it is damaged at byte 12"),
+        (&*older, 6, "older.eslj cannot be replayed: it has version 1 of the format; this machine reads"),
         (&*folder.file("text", "(print 1)"), 3, "it is no recording of a run"),
         ("no-such-file", 2, "no-such-file cannot be read"),
     ] {
@@ -223,6 +226,21 @@ fn line_is_like(shown: &str, found: &str) -> bool {
         rest = &rest[at + part.len()..];
     }
     rest.is_empty()
+}
+
+/// What is evaluated at a stop is evaluated in a copy.
+#[test]
+fn a_replay_goes_on_as_if_nothing_had_been_printed() {
+    let folder = Folder::new("replay-print");
+    let program = "(defvar *n* 0)\n(defun more () (incf *n* 2))\n(dotimes (i 100) (more))\n(print *n*)\n";
+    let (recording, run) = record(&folder, program, &[], "");
+    assert_eq!(run.output, "\n200 ");
+    let input = "print (setq *n* -1000)\nprint (progn (defun more () (error \"no more\")) (assert '(x)) (more))\n\
+                 print (spawn (setq *n* 7))\nprint *n*\nback 3\nprint (setq *n* 5)\ncontinue\n";
+    let again = replay(&["--until", "tick:60", &recording], input);
+    assert_eq!(again.status, Some(0), "{}", again.errors);
+    assert!(again.output.contains("-1000") && again.output.contains("no more"), "{}", again.output);
+    assert!(again.output.contains("\n200 "), "{}", again.output);
 }
 
 /// What is typed wrong is answered, and changes nothing.

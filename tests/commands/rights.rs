@@ -4,6 +4,7 @@ use esl_conformance::process::{self, Finished};
 
 use crate::eslvm;
 use crate::folder::Folder;
+use crate::operate::Operated;
 
 /// A program that reads and writes in and beside its folder, and reports each refusal.
 const PROGRAM: &str = "
@@ -108,6 +109,101 @@ fn the_repl_has_the_same_flags() {
     let report = "There is no right to read \"../other/secret\": --allow-read=../other/secret grants it.";
     assert!(refused.contains(report), "{refused}");
     assert!(ask(&["--allow-read=../other"]).contains("\"5\""));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_session_of_an_operator_has_the_same_flags() {
+    let folder = folder("rights-attach");
+    let socket = folder.join("s");
+    let (place, secret) = (folder.path().join("work"), "../other/secret");
+    let granted = ["--listen", &socket, "--allow-read=../other", "--allow-env=HOME"];
+    let mut run = Operated::start_in(&place, &folder, "(read-line *standard-input* nil)", &granted);
+    run.said("; operators attach with eslvm attach ");
+    let ask = |flags: &[&str], form: &str| {
+        let arguments = [&["attach"], flags, &[&socket]].concat();
+        let finished = process::run(&mut eslvm(&arguments), format!("{form}\n"));
+        finished.output + &finished.errors
+    };
+    let look = format!(
+        "(with-recovery-procedures (((:permission-denied right object flag) (abort (list right object flag))))
+           (values (with-open-file (stream {secret:?}) (read-line stream))))"
+    );
+    let refused = format!("(:READ {secret:?} \"--allow-read={secret}\")\n");
+    assert_eq!(ask(&[], &look), refused);
+    assert_eq!(ask(&["--allow-write", "--allow-env"], &look), refused);
+    assert_eq!(ask(&["--allow-read=../other"], &look), "\"5\"\n");
+    assert_eq!(ask(&["--allow-all"], &look), "\"5\"\n");
+    folder.file("grants", "--allow-read\n");
+    assert_eq!(ask(&["--rights", &folder.join("grants")], &look), "\"5\"\n");
+    // Tasks that a session makes have no more, nor has what it watches; a form around takes away for good.
+    let spawned = format!("(nth-value 1 (wait-for-task (spawn {look})))");
+    assert_eq!(ask(&[], &spawned), refused);
+    let narrowed = format!("(with-rights () {look})");
+    assert_eq!(ask(&["--allow-read=../other"], &narrowed), format!("(:READ {secret:?} NIL)\n"));
+    // What the run lacks, no session has.
+    assert!(
+        ask(&["--allow-all"], "(probe-file \"/etc/passwd\")").contains("--allow-read=/etc/passwd grants it.")
+    );
+    // What is below the folder of the run needs no flag, and the session starts only with flags that parse.
+    assert_eq!(ask(&[], "(and (probe-file \"own\") t)"), "T\n");
+    folder.file("wrong", "read everything\n");
+    assert!(ask(&["--rights", &folder.join("wrong")], "1").contains("wrong:1:"));
+    assert_eq!(run.end(), Some(0));
+}
+
+/// Whatever reaches outside asks for its right; the refusal has the right, the object, and the whole flag.
+#[cfg(unix)]
+#[test]
+fn every_way_out_of_the_program_needs_its_right() {
+    let rows = [
+        (r#"(os:getenv "HOME")"#, ":ENV", "HOME"),
+        (r#"(process:run-program '("ls" "-l"))"#, ":RUN", "ls"),
+        (r#"(process:launch-program '("/bin/ls"))"#, ":RUN", "/bin/ls"),
+        (r#"(sockets:connect "127.0.0.1" 80)"#, ":NET", "127.0.0.1:80"),
+        (r#"(sockets:connect "::1" 80 :tls t)"#, ":NET", "[::1]:80"),
+        (r#"(sockets:listen "0.0.0.0" 0)"#, ":NET", "0.0.0.0:0"),
+        ("(sockets:udp-open)", ":NET", "0.0.0.0:0"),
+        (r#"(sockets:udp-open "127.0.0.1" 9)"#, ":NET", "127.0.0.1:9"),
+        (r#"(sockets:with-server ((c "127.0.0.1" 80)) c)"#, ":NET", "127.0.0.1:80"),
+        (r#"(sockets:connect-unix "/tmp/x")"#, ":READ", "/tmp/x"),
+        (r#"(sockets:listen-unix "/tmp/x")"#, ":READ", "/tmp/x"),
+        (r#"(http:get "http://example.com/x")"#, ":NET", "example.com:80"),
+        (r#"(http:post "https://example.com/x" :body "y")"#, ":NET", "example.com:443"),
+        (r#"(http:with-server (8080) (:get "/" () "x"))"#, ":NET", "127.0.0.1:8080"),
+        (r#"(mqtt:with-client (c "h" 1883) c)"#, ":NET", "h:1883"),
+        (r#"(serial:with-serial-port (s "/dev/ttyS0") s)"#, ":SERIAL", "/dev/ttyS0"),
+        (r#"(log:to-file "/tmp/log")"#, ":WRITE", "/tmp/log"),
+        (r#"(watch-path "/tmp")"#, ":READ", "/tmp"),
+        (r#"(load "/tmp/x.esl")"#, ":READ", "/tmp/x.esl"),
+        (r#"(open "/tmp/x")"#, ":READ", "/tmp/x"),
+        (r#"(open "/tmp/x" :direction :output)"#, ":WRITE", "/tmp/x"),
+        (r#"(probe-file "/tmp/x")"#, ":READ", "/tmp/x"),
+        (r#"(file-write-date "/tmp/x")"#, ":READ", "/tmp/x"),
+        (r#"(directory "/tmp/*")"#, ":READ", "/tmp/"),
+        (r#"(delete-file "/tmp/x")"#, ":WRITE", "/tmp/x"),
+        (r#"(rename-file "own" "/tmp/x")"#, ":WRITE", "/tmp/x"),
+        (r#"(rename-file "/tmp/x" "new")"#, ":WRITE", "/tmp/x"),
+        (r#"(ensure-directories-exist "/tmp/a/b/")"#, ":WRITE", "/tmp/a/b/"),
+    ];
+    let folder = folder("rights-of-all");
+    let mut program = String::from(
+        "(require :sockets) (require :process) (require :http) (require :mqtt) (require :serial) (require :log)
+         (require :os)
+         (defmacro refusal (form)
+           `(with-recovery-procedures (((:permission-denied right object flag) (abort (list right object flag))))
+              ,form))\n",
+    );
+    let mut expected = Vec::new();
+    for (form, right, object) in rows {
+        program += &format!("(format t \"~s~%\" (refusal {form}))\n");
+        let name = right.trim_start_matches(':').to_lowercase();
+        expected.push(format!("({right} {object:?} \"--allow-{name}={object}\")"));
+    }
+    folder.file("work/all.esl", program);
+    let mut command = eslvm(&["run", "all.esl"]);
+    let run = process::run(command.current_dir(folder.path().join("work")), "");
+    assert_eq!(run.output.lines().collect::<Vec<_>>(), expected, "{}", run.errors);
 }
 
 #[test]

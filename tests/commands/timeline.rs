@@ -200,3 +200,20 @@ fn figures_tell_of_pauses_and_of_tasks() {
     assert!(all.contains("succeeded  the main task") && all.contains("failed     task UNLUCKY"), "{all}");
     assert!(!run("--stats").contains("  task "));
 }
+
+#[cfg(unix)]
+#[test]
+fn a_wait_for_an_operation_has_its_name() {
+    let folder = Folder::new("timeline-operation");
+    let source = folder.file("program.esl", "(require :process) (process:run-program '(\"true\"))");
+    for (file, expected) in [
+        ("run.json", "\"waits for operation %PROCESS-RUN 1\""),
+        ("run.svg", "<title>waits for operation %PROCESS-RUN 1,"),
+    ] {
+        let path = folder.join(file);
+        let run = process::run(&mut eslvm(&["run", "--allow-run=true", "--timeline", &path, &source]), "");
+        assert_eq!(run.status, Some(0), "{}", run.errors);
+        let timeline = std::fs::read_to_string(path).expect("it is there");
+        assert!(timeline.contains(expected), "{timeline}");
+    }
+}

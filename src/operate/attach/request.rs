@@ -67,6 +67,8 @@ requests! {
     Continue = Command "esl:continue";
     /// Signals an input with data.
     Signal = Command "esl:signal";
+    /// Narrows the rights of what is evaluated: pairs of a right and what it is for, or "" for all.
+    Narrow = Patch "esl:rights";
     /// Evaluates forms.
     Evaluate = Patch "esl:evaluate";
     /// Writes the value of a form after each change.

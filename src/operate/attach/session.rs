@@ -8,7 +8,7 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
 use esl_vm::host::{
-    Answer, FrameVariable, FunctionRef, Incoming, Question, Sender, SurveyRequest, SurveyedTask,
+    Answer, FrameVariable, FunctionRef, Incoming, Question, Right, Sender, SurveyRequest, SurveyedTask,
 };
 
 use super::datum::{boolean, codes_of, form_of, integer, list, string};
@@ -131,12 +131,24 @@ impl OperatorSession {
                 let data = codes_of(text(1)?)?;
                 self.call("%SESSION-SIGNAL", vec![string(&text(0)?.to_uppercase()), data]).await
             }
+            SessionRequest::Narrow => {
+                let rights =
+                    rights_of(arguments).ok_or_else(|| format!("`{name}` needs pairs of strings"))?;
+                self.call("%SESSION-NARROW", vec![integer(self.number as i64), rights]).await
+            }
             SessionRequest::Evaluate => self.call_in("%SESSION-EVALUATE", &[text(0)?]).await,
             SessionRequest::Watch => self.call_in("%SESSION-WATCH", &[text(0)?]).await,
             SessionRequest::Complete => self.call_in("%SESSION-COMPLETE", &[text(0)?]).await,
             SessionRequest::Change => self.call_in("%SESSION-PATCH", &[text(0)?, text(1)?]).await,
             SessionRequest::Undo => self.call("%SESSION-UNDO", Vec::new()).await,
         }
+    }
+
+    /// Returns the role that a request needs; `None` if there is no such request.
+    pub(super) fn role_for(name: &str) -> Option<OperatorRole> {
+        SessionRequest::named(name)
+            .map(SessionRequest::role)
+            .or_else(|| slime::step(name, &[]).map(|(role, _)| role))
     }
 
     /// Refuses a request for which the role of this session is not enough.
@@ -368,6 +380,19 @@ impl OperatorSession {
             Answer::Tasks(_) => Err("it has another answer".into()),
         }
     }
+}
+
+/// Returns the list of rights that the arguments of a request are: names, each before what it is for.
+fn rights_of(arguments: &[WireForm]) -> Option<Datum> {
+    let (pairs, rest) = arguments.as_chunks::<2>();
+    let part = |[name, object]: &[WireForm; 2]| {
+        let name = Right::of_name(name.as_text()?)?.name().to_uppercase();
+        let right = Datum::symbol(Symbol::keyword(&name), Span::default());
+        let object = Some(object.as_text()?).filter(|object| !object.is_empty());
+        Some(list([right].into_iter().chain(object.map(string))))
+    };
+    let rights = pairs.iter().map(part).collect::<Option<Vec<Datum>>>()?;
+    (rest.is_empty() && !rights.is_empty()).then(|| list(rights))
 }
 
 fn call(function: &str, arguments: Vec<Datum>) -> Question {

@@ -8,6 +8,7 @@
 //! not take what is sent is let go.
 
 mod model;
+mod wish;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::TcpListener;
@@ -16,21 +17,20 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use esl_bytecode::datum::Datum;
-use esl_bytecode::span::Span;
-use esl_bytecode::symbol::Symbol;
 use esl_vm::host::{Answer, FrameVariable, FunctionRef, Incoming, Question, Sender, SurveyRequest};
 use esl_world::TlsIdentity;
 use http_body_util::{BodyExt, Channel, Limited};
-use hyper::header::{AUTHORIZATION, CONTENT_SECURITY_POLICY, HOST, HeaderValue, ORIGIN, REFERRER_POLICY};
-use hyper::{Method, Request, Response, StatusCode};
+use hyper::header::{CONTENT_SECURITY_POLICY, HeaderValue, REFERRER_POLICY};
+use hyper::{Request, Response, StatusCode};
 use serde_json::{Value, json};
 use tokio::sync::{Notify, watch};
 
-use super::attach::codes_of;
+use super::attach::datum::{boolean, integer, string};
 use super::http::{self, Hangup, HttpBody, plain, with};
 use super::scope::RunScope;
 use super::secrets::{OperatorRole, Secrets};
 use model::{RunModel, ViewerView};
+use wish::{Admitted, MonitorDeed, Wish, admit, wish};
 
 /// The page; `NONCE` stands for what its script and its style are marked with.
 const PAGE: &str = include_str!("page.html");
@@ -125,55 +125,41 @@ async fn answer(
     request: Request<hyper::body::Incoming>,
     hangup: Hangup,
 ) -> Response<HttpBody> {
-    match (request.method(), request.uri().path()) {
-        (&Method::GET, "/") => page(),
-        (&Method::GET, "/events") => {
-            if !is_from_here(&request, monitor.scheme, false) {
-                return plain(StatusCode::FORBIDDEN, "the request comes from another site\n");
-            }
-            let parameters = parameters(request.uri().query().unwrap_or_default());
-            let get = |name: &str| parameters.get(name).map_or("", String::as_str);
-            match monitor.secrets.role_of(get("token").as_bytes()) {
-                Some(role) => events(monitor, role, get("viewer"), hangup),
-                None => plain(StatusCode::UNAUTHORIZED, "the token is not one of this run\n"),
-            }
-        }
-        (&Method::POST, "/view" | "/do") => {
-            if !is_from_here(&request, monitor.scheme, true) {
-                return plain(StatusCode::FORBIDDEN, "the request comes from another site\n");
-            }
-            let token = request.headers().get(AUTHORIZATION).and_then(|value| value.to_str().ok());
-            let token = token.and_then(|value| value.strip_prefix("Bearer ")).unwrap_or_default();
-            let Some(role) = monitor.secrets.role_of(token.as_bytes()) else {
-                return plain(StatusCode::UNAUTHORIZED, "the token is not one of this run\n");
+    let (head, body) = request.into_parts();
+    let (role, is_view) = match admit(&monitor.secrets, monitor.scheme, &head) {
+        Err((status, text)) => return plain(status, text),
+        Ok(Admitted::Page) => return page(),
+        Ok(Admitted::Viewer(role, viewer)) => return events(monitor, role, &viewer, hangup),
+        Ok(Admitted::Post { role, is_view }) => (role, is_view),
+    };
+    let body = tokio::time::timeout(PATIENCE, Limited::new(body, POST).collect()).await;
+    let Ok(Ok(body)) = body else {
+        return plain(StatusCode::PAYLOAD_TOO_LARGE, "the request is too large, or comes too slowly\n");
+    };
+    match wish(role, is_view, &body.to_bytes()) {
+        Err((status, text)) => plain(status, text),
+        Ok(Wish::View { viewer, view }) => set_view(&monitor, &viewer, view),
+        Ok(Wish::Deed(deed)) => {
+            let done = match deed {
+                Ok(deed) => act(&monitor, deed).await,
+                Err(reason) => Err(reason),
             };
-            let is_view = request.uri().path() == "/view";
-            let body =
-                tokio::time::timeout(PATIENCE, Limited::new(request.into_body(), POST).collect()).await;
-            let Ok(Ok(body)) = body else {
-                return plain(
-                    StatusCode::PAYLOAD_TOO_LARGE,
-                    "the request is too large, or comes too slowly\n",
-                );
-            };
-            let Ok(value) = serde_json::from_slice::<Value>(&body.to_bytes()) else {
-                return plain(StatusCode::BAD_REQUEST, "the request is no JSON\n");
-            };
-            if is_view {
-                return set_view(&monitor, &value);
-            }
-            if role < OperatorRole::Command {
-                return plain(StatusCode::FORBIDDEN, "this token is for looking only\n");
-            }
-            let (status, text) = match act(&monitor, &value).await {
+            let (status, text) = match done {
                 Ok(()) => (StatusCode::OK, json!({ "ok": true })),
                 Err(reason) => (StatusCode::CONFLICT, json!({ "ok": false, "reason": reason })),
             };
             with(status, "application/json", text.to_string())
         }
-        (_, "/" | "/events" | "/view" | "/do") => plain(StatusCode::METHOD_NOT_ALLOWED, "not in this way\n"),
-        _ => plain(StatusCode::NOT_FOUND, "the monitor is at /\n"),
     }
+}
+
+/// Takes bytes as those of a connection, and what is in its posts as what is asked for; does nothing of it.
+/// Returns the number of requests that were understood.
+pub(super) fn understand(secrets: &Secrets, bytes: &[u8]) -> usize {
+    http::understand(bytes, |head, body| match admit(secrets, "http://", head) {
+        Ok(Admitted::Post { role, is_view }) => wish(role, is_view, body).is_ok(),
+        admitted => admitted.is_ok(),
+    })
 }
 
 /// Returns the page.
@@ -196,25 +182,6 @@ fn page() -> Response<HttpBody> {
     response
 }
 
-/// Returns whether a request comes from a page of this server. Browsers leave the origin out where a page
-/// only reads from its own server.
-fn is_from_here(request: &Request<hyper::body::Incoming>, scheme: &str, must_say: bool) -> bool {
-    let header = |name| request.headers().get(name).and_then(|value: &HeaderValue| value.to_str().ok());
-    match (header(ORIGIN), header(HOST)) {
-        (Some(origin), Some(host)) => origin.strip_prefix(scheme) == Some(host),
-        _ => !must_say,
-    }
-}
-
-/// Returns the parameters of a query that need no decoding.
-fn parameters(query: &str) -> BTreeMap<&str, String> {
-    query
-        .split('&')
-        .filter_map(|part| part.split_once('='))
-        .map(|(name, value)| (name, value.into()))
-        .collect()
-}
-
 /// Sends a viewer what is seen, until it goes.
 fn events(
     monitor: Arc<MonitorState>,
@@ -222,27 +189,26 @@ fn events(
     viewer: &str,
     hangup: Hangup,
 ) -> Response<HttpBody> {
-    let is_name = (1..=64).contains(&viewer.len()) && viewer.bytes().all(|byte| byte.is_ascii_alphanumeric());
-    if !is_name {
-        return plain(StatusCode::BAD_REQUEST, "a viewer has a name of letters and digits\n");
-    }
-    {
+    let coming = {
         let mut views = lock(&monitor.views);
         if views.len() >= VIEWERS && !views.contains_key(viewer) {
             return plain(StatusCode::SERVICE_UNAVAILABLE, "there are too many viewers\n");
         }
-        views.insert(viewer.into(), ViewerView { count: model::ROWS, ..ViewerView::default() });
-    }
+        // Who comes again is told all anew, and its last connection ends.
+        let coming = views.get(viewer).map_or(0, |view| view.coming) + 1;
+        views.insert(viewer.into(), ViewerView { count: model::ROWS, coming, ..ViewerView::default() });
+        coming
+    };
     monitor.coming.notify_one();
     let (mut sender, body) = Channel::<Bytes, std::convert::Infallible>::new(1);
-    let watching = Watching { monitor: monitor.clone(), viewer: viewer.into() };
+    let watching = Watching { monitor: monitor.clone(), viewer: viewer.into(), coming };
     tokio::spawn(async move {
         let _watching = &watching;
         // Who may signal something keeps a run that waits from being over.
         let _sender = (role >= OperatorRole::Command).then(|| monitor.scope.sender());
         let mut looks = monitor.looks.subscribe();
         loop {
-            let Some(message) = message(&monitor, &watching.viewer, role).await else { return };
+            let Some(message) = message(&watching, role).await else { return };
             let event = Bytes::from(format!("data: {message}\n\n"));
             match tokio::time::timeout(PATIENCE, sender.send_data(event)).await {
                 Ok(Ok(())) => {}
@@ -264,17 +230,23 @@ fn events(
 struct Watching {
     monitor: Arc<MonitorState>,
     viewer: String,
+    /// How often a viewer of this name had come then.
+    coming: u64,
 }
 
 impl Drop for Watching {
     fn drop(&mut self) {
-        lock(&self.monitor.views).remove(&self.viewer);
+        let mut views = lock(&self.monitor.views);
+        if views.get(&self.viewer).is_some_and(|view| view.coming == self.coming) {
+            views.remove(&self.viewer);
+        }
     }
 }
 
 /// Returns what a viewer is told now; `None` if it has gone.
-async fn message(monitor: &MonitorState, viewer: &str, role: OperatorRole) -> Option<Value> {
-    let view = lock(&monitor.views).get(viewer)?.clone();
+async fn message(watching: &Watching, role: OperatorRole) -> Option<Value> {
+    let Watching { monitor, viewer, coming } = watching;
+    let view = lock(&monitor.views).get(viewer).filter(|view| view.coming == *coming)?.clone();
     let request = SurveyRequest {
         named: view.task.into_iter().collect(),
         frames_of: view.task,
@@ -287,7 +259,7 @@ async fn message(monitor: &MonitorState, viewer: &str, role: OperatorRole) -> Op
         let model = lock(&monitor.model);
         (model.message(&view), model.latest_failure())
     };
-    if let Some(view) = lock(&monitor.views).get_mut(viewer) {
+    if let Some(view) = lock(&monitor.views).get_mut(viewer).filter(|view| view.coming == *coming) {
         view.failure = latest;
     }
     message["role"] = role.name().into();
@@ -307,18 +279,10 @@ async fn message(monitor: &MonitorState, viewer: &str, role: OperatorRole) -> Op
 }
 
 /// Sets what a viewer sees.
-fn set_view(monitor: &MonitorState, value: &Value) -> Response<HttpBody> {
-    let text = |name: &str| value[name].as_str().unwrap_or_default().chars().take(200).collect::<String>();
-    let number = |name: &str| value[name].as_u64().unwrap_or(0) as usize;
-    match lock(&monitor.views).get_mut(&text("viewer")) {
-        Some(view) => {
-            view.text = text("text").to_lowercase();
-            view.from = number("from");
-            view.count = number("count").min(model::ROWS);
-            view.task = value["task"].as_u64().filter(|&task| task > 0);
-            view.relation = text("relation");
-            view.facts_from = number("facts_from");
-        }
+fn set_view(monitor: &MonitorState, viewer: &str, wanted: ViewerView) -> Response<HttpBody> {
+    match lock(&monitor.views).get_mut(viewer) {
+        // Which failures it has been shown is not for it to say, nor who it is.
+        Some(view) => *view = ViewerView { failure: view.failure, coming: view.coming, ..wanted },
         None => return plain(StatusCode::CONFLICT, "this viewer does not watch\n"),
     }
     monitor.looks.send_modify(|look| *look += 1);
@@ -329,28 +293,18 @@ fn set_view(monitor: &MonitorState, value: &Value) -> Response<HttpBody> {
 ///
 /// # Errors
 /// Why it was not done.
-async fn act(monitor: &MonitorState, value: &Value) -> Result<(), String> {
+async fn act(monitor: &MonitorState, deed: MonitorDeed) -> Result<(), String> {
     let sender = monitor.scope.sender();
-    let task = || value["task"].as_u64().filter(|&n| n > 0).ok_or("it needs the number of a task");
-    match value["action"].as_str().unwrap_or_default() {
-        "abort" => sender.inbox().put(Incoming::Abort(task()?)),
-        "pause" => sender.inbox().put(Incoming::Pause(true)),
-        "continue" => sender.inbox().put(Incoming::Pause(false)),
-        action @ ("suspend" | "resume") => {
-            let number = Datum::integer(i64::try_from(task()?).unwrap_or(i64::MAX), Span::default());
-            let suspends = if action == "suspend" { "T" } else { "NIL" };
-            let suspends = match suspends {
-                "T" => Datum::symbol(Symbol::cl("T"), Span::default()),
-                _ => Datum::nil(Span::default()),
-            };
-            call(&sender, "%SESSION-SUSPEND", vec![number, suspends]).await?;
+    match deed {
+        MonitorDeed::Abort(task) => sender.inbox().put(Incoming::Abort(task)),
+        MonitorDeed::Pause(pauses) => sender.inbox().put(Incoming::Pause(pauses)),
+        MonitorDeed::Suspend(task, suspends) => {
+            let number = i64::try_from(task).unwrap_or(i64::MAX);
+            call(&sender, "%SESSION-SUSPEND", vec![integer(number), boolean(suspends)]).await?;
         }
-        "signal" => {
-            let name = value["input"].as_str().unwrap_or_default().to_uppercase();
-            let data = codes_of(value["data"].as_str().unwrap_or_default())?;
-            call(&sender, "%SESSION-SIGNAL", vec![Datum::string(&name, Span::default()), data]).await?;
+        MonitorDeed::Signal(name, data) => {
+            call(&sender, "%SESSION-SIGNAL", vec![string(&name), data]).await?;
         }
-        _ => return Err("there is no such action".into()),
     }
     Ok(())
 }

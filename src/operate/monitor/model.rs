@@ -31,6 +31,8 @@ pub(super) struct ViewerView {
     pub(super) facts_from: usize,
     /// Number of the latest failure that was shown.
     pub(super) failure: u64,
+    /// How often a viewer of this name has come.
+    pub(super) coming: u64,
 }
 
 /// The model of a run.

@@ -118,6 +118,24 @@ impl Database {
         Ok(true)
     }
 
+    /// Facts of this name with `width` arguments are ordinary facts from now on. Those that there are stay.
+    ///
+    /// # Errors
+    /// As for every allocation.
+    pub(crate) fn drop_property(
+        &mut self,
+        heap: &mut Heap,
+        name: Value,
+        width: usize,
+    ) -> Result<(), AllocError> {
+        let functor = self.terms.atom(heap, name)?;
+        if let Some(number) = self.find_relation(functor, width) {
+            self.relations[number as usize].drop_property();
+        }
+        self.terms.release(functor);
+        Ok(())
+    }
+
     /// Returns the value of a property for given arguments, unbound if there is none.
     ///
     /// # Errors

@@ -181,6 +181,30 @@ impl Database {
         Ok(())
     }
 
+    /// Removes the rule made from this source, as it is written. Returns whether there was one.
+    ///
+    /// # Errors
+    /// [`FormulaError`] if the source is not that of a rule, or there is no room for its terms.
+    pub(crate) fn remove_rule(
+        &mut self,
+        heap: &mut Heap,
+        source: Value,
+        work: &mut usize,
+    ) -> Result<bool, FormulaError> {
+        self.tidy(heap);
+        let mut parser = FormulaParser::new(&mut self.terms, heap, source);
+        let text = parser.text(source);
+        *work += 4 * parser.work();
+        let FormulaParser { held, .. } = parser;
+        let rules = Arc::make_mut(&mut self.rules);
+        let removed = text.as_ref().ok().and_then(|&source| rules.remove(source));
+        held.into_iter().for_each(|term| self.terms.release(term));
+        if let Some(rule) = &removed {
+            self.retired.push_back((self.serial, rule.held.clone()));
+        }
+        text.map(|_| removed.is_some())
+    }
+
     // ---- terms and room
 
     /// Returns the object of a term.

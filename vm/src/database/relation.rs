@@ -226,6 +226,11 @@ impl Relation {
         *work += usize::MAX - left;
     }
 
+    /// Lets there be several last arguments for given others.
+    pub(super) fn drop_property(&mut self) {
+        self.is_property = false;
+    }
+
     /// Returns the positions of all arguments but the last, as a mask.
     fn arguments_mask(width: usize) -> u64 {
         if (2..=INDEXED_POSITIONS).contains(&width) { (1 << (width - 1)) - 1 } else { 0 }

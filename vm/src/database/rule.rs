@@ -69,6 +69,25 @@ impl Rules {
         replaced
     }
 
+    /// Removes the rule made from this source, and returns it.
+    pub(super) fn remove(&mut self, source: Term) -> Option<Arc<Rule>> {
+        let is_it = |rule: &Arc<Rule>| rule.source == source;
+        let (number, place) = self
+            .predicates
+            .iter()
+            .enumerate()
+            .find_map(|(number, predicate)| Some((number, predicate.rules.iter().position(is_it)?)))?;
+        let rules = &mut self.predicates[number].rules;
+        let removed = rules.remove(place);
+        if rules.is_empty() {
+            self.predicates.remove(number);
+            let names = self.predicates.iter().enumerate();
+            self.by_name = names.map(|(at, one)| ((one.functor.bits(), one.width), at)).collect();
+        }
+        self.stratify();
+        Some(removed)
+    }
+
     /// Gives each predicate the least stratum above those of the predicates that it negates.
     fn stratify(&mut self) {
         for predicate in &mut self.predicates {

@@ -160,6 +160,11 @@ impl Inbox {
         self.0.handled.fetch_or(1 << signal.number(), Ordering::Relaxed);
     }
 
+    /// Notes that no signal of the process is handled any more.
+    pub(crate) fn note_none_handled(&self) {
+        self.0.handled.store(0, Ordering::Relaxed);
+    }
+
     /// Returns whether both are the inbox of one machine.
     pub fn is_same(&self, other: &Inbox) -> bool {
         Arc::ptr_eq(&self.0, &other.0)

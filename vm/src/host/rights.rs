@@ -124,6 +124,12 @@ impl Rights {
         self
     }
 
+    /// Returns these rights one by one, each with its object, or without one for all objects.
+    pub fn parts(&self) -> impl Iterator<Item = (Right, Option<&str>)> {
+        let whole = self.whole.iter().map(|&right| (right, None));
+        whole.chain(self.single.iter().map(|(right, object)| (*right, Some(&**object))))
+    }
+
     /// Returns whether these contain the right to an object, which for a path is `object` after following
     /// links; `follow` does that.
     pub(super) fn contain(&self, right: Right, object: &str, follow: &dyn Fn(&str) -> PathBuf) -> bool {
