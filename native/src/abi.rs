@@ -53,6 +53,9 @@ pub struct NativeContext {
     pub base: u64,
     /// Value that a builtin called in place of the function has returned.
     pub value: u64,
+    /// Registers of the frame in whose places there are bits of doubles, not words: see N3. None while
+    /// machine code runs.
+    pub raw_doubles: [u64; 4],
     /// The machine.
     pub machine: *mut c_void,
     /// Does an instruction whose fast way does not apply.

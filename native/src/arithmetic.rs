@@ -1,7 +1,7 @@
 //! Arithmetic and comparisons: on fixnums, and on doubles that are words.
 
 use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
-use cranelift_codegen::ir::{Block, InstBuilder, MemFlagsData, Value as Ssa, types};
+use cranelift_codegen::ir::{Block, InstBuilder, Value as Ssa, types};
 use esl_bytecode::opcode::Instr;
 use esl_heap::Value;
 
@@ -10,7 +10,7 @@ use crate::kinds::Known;
 use crate::translate::Translator;
 
 /// Operation of arithmetic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Arithmetic {
     Add,
     Subtract,
@@ -49,9 +49,19 @@ impl NumberOrder {
 
 impl Translator<'_, '_> {
     pub(crate) fn registers(&mut self, operation: Arithmetic, dst: u8, left: u8, right: u8) {
-        let (x, y) = (self.operand(left), self.operand(right));
-        if x.1 == Known::Double || y.1 == Known::Double {
+        let is_double = |register: u8| self.known[usize::from(register)] == Known::Double;
+        if is_double(left) || is_double(right) {
             return self.with_double(operation, dst, left, right);
+        }
+        self.close_batch();
+        let (x, y) = (self.operand(left), self.operand(right));
+        if self.guess == Some(dst) {
+            let wrong = self.wrong();
+            let [p, q] = [x, y].map(|(word, known)| match known {
+                Known::Fixnum => self.convert(word),
+                _ => self.double_of(word, wrong),
+            });
+            return self.on_doubles_later(operation, p, q, dst);
         }
         if operation != Arithmetic::Divide && x.1 == Known::Fixnum && y.1 == Known::Fixnum {
             // What overflows leaves the machine code, so the result is known.
@@ -60,12 +70,6 @@ impl Translator<'_, '_> {
             return self.set(dst, result, Known::Fixnum);
         }
         let (slow, done) = (self.cold_block(), self.block_with_value());
-        if self.guess == Some(dst) {
-            let p = self.exact_double(left, slow);
-            let q = self.exact_double(right, slow);
-            self.on_doubles(operation, p, q, slow, done.0, true);
-            return self.finish_double(slow, done, dst);
-        }
         if operation != Arithmetic::Divide
             && let Some(test) = self.not_fixnums(x, y)
         {
@@ -84,7 +88,7 @@ impl Translator<'_, '_> {
             self.branch(is_double, doubles, mixed);
             self.go_to(doubles);
             let (p, q) = (self.decode(x.0), self.decode(y.0));
-            self.on_doubles(operation, p, q, slow, done.0, false);
+            self.on_doubles(operation, p, q, slow, done.0);
             self.go_to(mixed);
         }
         self.mixed(operation, x, y, slow, done.0);
@@ -93,82 +97,67 @@ impl Translator<'_, '_> {
 
     /// Arithmetic of which one operand is known to be a double.
     fn with_double(&mut self, operation: Arithmetic, dst: u8, left: u8, right: u8) {
-        let (slow, done) = (self.cold_block(), self.block_with_value());
-        let p = self.double_operand(left, slow);
-        let q = self.double_operand(right, slow);
-        self.on_doubles(operation, p, q, slow, done.0, true);
-        self.finish_double(slow, done, dst);
+        let p = self.double_operand(left);
+        let q = self.double_operand(right);
+        self.on_doubles_later(operation, p, q, dst);
     }
 
-    /// Returns the number in a register as a double, for arithmetic with a double; what is neither a fixnum
-    /// nor a double without a box goes to `otherwise`.
-    fn double_operand(&mut self, register: u8, otherwise: Block) -> Ssa {
-        let (word, known) = self.operand(register);
-        match known {
-            Known::Double => self.get_double(register),
-            Known::Fixnum => self.convert(word),
-            Known::Nothing => {
-                let done = self.block_with(types::F64);
-                let (doubles, others, fixnums) = (self.block(), self.block(), self.block());
-                let tag = self.b.ins().band_imm_s(word, 3);
-                let is_double = self.equals(tag, 3);
-                self.branch(is_double, doubles, others);
-                self.go_to(doubles);
-                let double = self.decode(word);
-                self.jump_with(done.0, double);
-                self.go_to(others);
-                self.branch(tag, otherwise, fixnums);
-                self.go_to(fixnums);
-                let double = self.convert(word);
-                self.jump_with(done.0, double);
-                self.go_to(done.0);
-                done.1
+    /// Computes with two doubles; the result is tested with the batch.
+    fn on_doubles_later(&mut self, operation: Arithmetic, p: Ssa, q: Ssa, dst: u8) {
+        let result = match self.results.get(&(operation, p, q)) {
+            Some(&result) => result,
+            None => {
+                let result = self.operate(operation, p, q);
+                self.test_later(result, true);
+                self.results.insert((operation, p, q), result);
+                result
             }
-        }
+        };
+        self.set_double(dst, result);
     }
 
-    /// Returns the double that a word is; what is none, or one in a box, goes to `otherwise`.
-    pub(crate) fn double_of(&mut self, word: Ssa, otherwise: Block) -> Ssa {
-        let done = self.block_with(types::F64);
-        let (doubles, mut others) = (self.block(), self.cold_block());
+    /// Returns the number in a register as a double, for arithmetic with a double; the machine code is left
+    /// if it is neither a fixnum nor a double without a box.
+    fn double_operand(&mut self, register: u8) -> Ssa {
+        let known = self.known[usize::from(register)];
+        if known == Known::Double {
+            return self.get_double(register);
+        }
+        let word = self.get(register);
+        if known == Known::Fixnum {
+            return self.convert(word);
+        }
+        self.close_batch();
+        let (done, wrong) = (self.block_with(types::F64), self.wrong());
+        let (doubles, others, fixnums, zeros) = (self.block(), self.block(), self.block(), self.cold_block());
         let tag = self.b.ins().band_imm_s(word, 3);
         let is_double = self.equals(tag, 3);
         self.branch(is_double, doubles, others);
         self.go_to(doubles);
         let double = self.decode(word);
         self.jump_with(done.0, double);
-        for (value, double) in [
-            (Value::POSITIVE_ZERO, 0.0),
-            (Value::NEGATIVE_ZERO, -0.0),
-            (Value::INFINITY, f64::INFINITY),
-            (Value::NEGATIVE_INFINITY, f64::NEG_INFINITY),
-            (Value::NAN, f64::NAN),
-        ] {
-            self.go_to(others);
-            let (found, further) = (self.cold_block(), self.cold_block());
-            let is_it = self.equals(word, value.bits());
-            self.branch(is_it, found, further);
-            self.go_to(found);
-            let double = self.b.ins().f64const(double);
-            self.jump_with(done.0, double);
-            others = further;
-        }
         self.go_to(others);
-        self.jump(otherwise);
+        self.branch(tag, zeros, fixnums);
+        self.go_to(fixnums);
+        let double = self.convert(word);
+        self.jump_with(done.0, double);
+        self.go_to(zeros);
+        self.zero_or(word, done.0, wrong);
         self.go_to(done.0);
         done.1
     }
 
     pub(crate) fn add_int(&mut self, dst: u8, left: u8, addend: i32) {
-        let (x, y) = (self.operand(left), self.fixnum(addend));
-        if x.1 == Known::Double {
+        if self.known[usize::from(left)] == Known::Double {
             // The interpreter leaves zeros to the numeric tower here, whose work may end a slice.
-            let (slow, done) = (self.cold_block(), self.block_with_value());
-            self.require_double(x.0, slow);
             let (p, q) = (self.get_double(left), self.b.ins().f64const(f64::from(addend)));
-            self.on_doubles(Arithmetic::Add, p, q, slow, done.0, true);
-            return self.finish_double(slow, done, dst);
+            self.test_later(p, false);
+            let sum = self.operate(Arithmetic::Add, p, q);
+            self.test_later(sum, false);
+            return self.set_double(dst, sum);
         }
+        self.close_batch();
+        let (x, y) = (self.operand(left), self.fixnum(addend));
         if x.1 == Known::Fixnum {
             let exit = self.exit();
             let sum = self.on_fixnums(Arithmetic::Add, x.0, y.0, exit);
@@ -184,7 +173,7 @@ impl Translator<'_, '_> {
         self.go_to(others);
         self.require_double(x.0, slow);
         let (p, q) = (self.decode(x.0), self.b.ins().f64const(f64::from(addend)));
-        self.on_doubles(Arithmetic::Add, p, q, slow, done.0, false);
+        self.on_doubles(Arithmetic::Add, p, q, slow, done.0);
         self.finish_value(slow, done, dst, Known::Nothing);
     }
 
@@ -209,38 +198,25 @@ impl Translator<'_, '_> {
         self.require(is_double, otherwise);
     }
 
-    /// Returns the double that a word is.
-    fn decode(&mut self, word: Ssa) -> Ssa {
-        let bits = self.b.ins().rotr_imm_s(word, 3);
-        let bias = self.word(Value::DOUBLE_BIAS);
-        let bits = self.b.ins().isub(bits, bias);
-        self.b.ins().bitcast(types::F64, MemFlagsData::new(), bits)
-    }
-
-    /// Jumps to `done` with the word of the result of two doubles, and with the result if `takes_both`; a
-    /// result that is no word goes to `otherwise`.
-    fn on_doubles(
-        &mut self,
-        operation: Arithmetic,
-        p: Ssa,
-        q: Ssa,
-        otherwise: Block,
-        done: Block,
-        takes_both: bool,
-    ) {
-        let result = match operation {
+    fn operate(&mut self, operation: Arithmetic, p: Ssa, q: Ssa) -> Ssa {
+        match operation {
             Arithmetic::Add => self.b.ins().fadd(p, q),
             Arithmetic::Subtract => self.b.ins().fsub(p, q),
             Arithmetic::Multiply => self.b.ins().fmul(p, q),
             Arithmetic::Divide => self.b.ins().fdiv(p, q),
-        };
-        let bits = self.b.ins().bitcast(types::I64, MemFlagsData::new(), result);
+        }
+    }
+
+    /// Jumps to `done` with the word of the result of two doubles; a result that is no word goes to
+    /// `otherwise`.
+    fn on_doubles(&mut self, operation: Arithmetic, p: Ssa, q: Ssa, otherwise: Block, done: Block) {
+        let result = self.operate(operation, p, q);
+        let bits = self.bits_of(result);
         let bias = self.word(Value::DOUBLE_BIAS);
         let bits = self.b.ins().iadd(bits, bias);
         let word = self.b.ins().rotl_imm_s(bits, 3);
         self.require_double(word, otherwise);
-        let results = [word.into(), result.into()];
-        self.b.ins().jump(done, if takes_both { &results } else { &results[..1] });
+        self.jump_with(done, word);
     }
 
     /// Arithmetic on a fixnum and a double, in either order; others go to `otherwise`.
@@ -261,13 +237,13 @@ impl Translator<'_, '_> {
         self.go_to(left);
         self.require_double(y.0, otherwise);
         let (p, q) = (self.convert(x.0), self.decode(y.0));
-        self.on_doubles(operation, p, q, otherwise, done, false);
+        self.on_doubles(operation, p, q, otherwise, done);
         self.go_to(right);
         self.require_double(x.0, otherwise);
         let tag = self.b.ins().band_imm_s(y.0, 3);
         self.refuse(tag, otherwise);
         let (p, q) = (self.decode(x.0), self.convert(y.0));
-        self.on_doubles(operation, p, q, otherwise, done, false);
+        self.on_doubles(operation, p, q, otherwise, done);
     }
 
     /// Returns a fixnum as a double.
@@ -377,8 +353,8 @@ impl Translator<'_, '_> {
     /// Returns the test of two numbers of which one is known to be a double; what is no double without a box
     /// goes to `slow`, and so does a fixnum, which is compared exactly.
     fn order_with_double(&mut self, order: NumberOrder, left: u8, right: u8, slow: Block) -> Option<Ssa> {
-        let (x, y) = (self.operand(left), self.operand(right));
-        if x.1 != Known::Double && y.1 != Known::Double {
+        let is_double = |register: u8| self.known[usize::from(register)] == Known::Double;
+        if !is_double(left) && !is_double(right) {
             return None;
         }
         let p = self.exact_double(left, slow);
@@ -389,10 +365,10 @@ impl Translator<'_, '_> {
     /// Returns the double in a register, if it is one that needs no box and has no constant of its own, or is
     /// known to be one.
     fn exact_double(&mut self, register: u8, otherwise: Block) -> Ssa {
-        let (word, known) = self.operand(register);
-        if known == Known::Double {
+        if self.known[usize::from(register)] == Known::Double {
             return self.get_double(register);
         }
+        let word = self.get(register);
         self.require_double(word, otherwise);
         self.decode(word)
     }

@@ -93,6 +93,9 @@ impl Translator<'_, '_> {
     }
 
     pub(crate) fn loop_count(&mut self, counter: u8, limit: u8, by: i32, step: &FlowStep) {
+        if self.known[usize::from(counter)] == Known::Double {
+            self.put_back();
+        }
         let (x, y) = (self.operand(counter), self.operand(limit));
         let addend = self.constant_value(Value::small(by));
         if x.1 == Known::Fixnum {

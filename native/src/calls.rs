@@ -2,7 +2,7 @@
 
 use std::mem::offset_of;
 
-use cranelift_codegen::ir::condcodes::IntCC;
+use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::{Block, InstBuilder, Value as Ssa, types};
 use esl_bytecode::operand::Want;
 use esl_heap::heap::Kind;
@@ -78,6 +78,7 @@ impl Translator<'_, '_> {
         if want != Want::ONE {
             return self.leave();
         }
+        self.put_back();
         let function = self.global(symbol);
         let callee = self.callee(function, count);
         self.call(window, callee, None, next);
@@ -87,6 +88,7 @@ impl Translator<'_, '_> {
         if want != Want::ONE {
             return self.leave();
         }
+        self.put_back();
         let (function, exit) = (self.get(window), self.exit());
         self.require_kind(function, Kind::Function, exit);
         let callee = self.callee(function, count);
@@ -97,6 +99,7 @@ impl Translator<'_, '_> {
         if want != Want::ONE {
             return self.leave();
         }
+        self.put_back();
         let function = self.running();
         let (itself, pointer) = (self.itself, self.pointer);
         let address = self.b.ins().func_addr(pointer, itself);
@@ -132,7 +135,7 @@ impl Translator<'_, '_> {
         } else {
             self.jump_with(again, callee.address);
         }
-        self.go_to(again);
+        self.b.switch_to_block(again);
         let call = self.b.ins().call_indirect(self.entry_signature, address, &[context, frame, first]);
         results(self, call);
 
@@ -154,11 +157,13 @@ impl Translator<'_, '_> {
     }
 
     pub(crate) fn tail_call_global(&mut self, window: u8, count: u8, symbol: u32) {
+        self.put_back();
         let function = self.global(symbol);
         self.tail_call(window, count, function);
     }
 
     pub(crate) fn tail_call_given(&mut self, window: u8, count: u8) {
+        self.put_back();
         let (function, exit) = (self.get(window), self.exit());
         self.require_kind(function, Kind::Function, exit);
         self.tail_call(window, count, function);
@@ -179,7 +184,19 @@ impl Translator<'_, '_> {
         self.ended();
     }
 
+    /// The square root of a double.
+    pub(crate) fn root(&mut self, window: u8) {
+        let (double, exit) = (self.get_double(window + 2), self.exit());
+        let zero = self.b.ins().f64const(0.0);
+        let has_root = self.b.ins().fcmp(FloatCC::GreaterThanOrEqual, double, zero);
+        self.require(has_root, exit);
+        self.tick();
+        let root = self.b.ins().sqrt(double);
+        self.set_double(window, root);
+    }
+
     pub(crate) fn call_builtin(&mut self, window: u8, want: Want) {
+        self.put_back();
         self.tick();
         let outcome = self.call_helper(offset_of!(NativeContext, call_builtin));
         let signal = self.signal();
@@ -189,6 +206,7 @@ impl Translator<'_, '_> {
     }
 
     pub(crate) fn tail_call_builtin(&mut self) {
+        self.put_back();
         self.tick();
         let outcome = self.call_helper(offset_of!(NativeContext, tail_builtin));
         let (signal, one, more) = (self.signal(), self.block(), self.cold_block());
@@ -203,13 +221,16 @@ impl Translator<'_, '_> {
     }
 
     pub(crate) fn return_value(&mut self, register: u8) {
+        self.make_word(usize::from(register));
         let value = self.get(register);
+        self.clear_places();
         self.reply_with(RETURNED, value);
         self.ended();
     }
 
     /// Returns the value list.
     pub(crate) fn return_values(&mut self) {
+        self.put_back();
         let base = self.base;
         self.store_context(base, offset_of!(NativeContext, base));
         self.reply(RETURN_VALUES);

@@ -11,6 +11,7 @@ use esl_heap::value::{TAG_CONS, TAG_MASK, TAG_OBJECT};
 
 use crate::abi::{AGAIN, GUESSED_WRONG, NativeContext, SIGNAL, STEP_SIGNAL};
 use crate::kinds::Known;
+use crate::places::WayOut;
 use crate::translate::Translator;
 
 /// Bytes of a value.
@@ -75,13 +76,18 @@ impl Translator<'_, '_> {
 
     // Registers of the frame.
 
+    /// Returns the word that is the content of a register.
     pub(crate) fn get(&mut self, register: u8) -> Ssa {
+        if self.known[usize::from(register)] == Known::Double {
+            return self.word_of_double(usize::from(register));
+        }
         let variable = self.variables[usize::from(register)];
         self.b.use_var(variable)
     }
 
     /// Writes a register: its place in the stack, and what later instructions read.
     pub(crate) fn set(&mut self, register: u8, value: Ssa, known: Known) {
+        debug_assert!(self.batch.is_none() && known != Known::Double, "{} at {}", register, self.at);
         let base = self.base;
         self.store(value, base, i32::from(register) * WORD);
         self.note(register, value, known);
@@ -94,22 +100,26 @@ impl Translator<'_, '_> {
     /// something else.
     pub(crate) fn check_guess(&mut self, register: u8) {
         if self.guess == Some(register) {
-            let (value, wrong) = (self.get(register), self.wrong_at(self.next));
+            let (value, wrong) = (self.get(register), self.way_out(self.next, GUESSED_WRONG));
             let double = self.double_of(value, wrong);
-            self.note_double(register, value, double);
+            self.note_double(register, double);
+            self.words[usize::from(register)] = Some(value);
         }
     }
 
-    /// As [`Translator::set`], with a double, whose word is given too.
-    pub(crate) fn set_double(&mut self, register: u8, word: Ssa, double: Ssa) {
-        self.set(register, word, Known::Double);
-        self.note_double(register, word, double);
+    /// Writes a register, and keeps the double back: its place in the stack is not written.
+    pub(crate) fn set_double(&mut self, register: u8, double: Ssa) {
+        self.note_double(register, double);
+        self.kept_back.insert(usize::from(register));
     }
 
     /// Notes that a register has a double in its place already.
-    fn note_double(&mut self, register: u8, word: Ssa, double: Ssa) {
-        self.note(register, word, Known::Double);
-        let variable = self.doubles[usize::from(register)];
+    fn note_double(&mut self, register: u8, double: Ssa) {
+        let (register, variable) = (usize::from(register), self.doubles[usize::from(register)]);
+        self.save_for_batch(register);
+        self.kept_back.remove(register);
+        self.words[register] = None;
+        self.known[register] = Known::Double;
         self.b.def_var(variable, double);
     }
 
@@ -124,6 +134,8 @@ impl Translator<'_, '_> {
         let variable = self.variables[usize::from(register)];
         self.b.def_var(variable, value);
         self.known[usize::from(register)] = known;
+        self.kept_back.remove(usize::from(register));
+        self.words[usize::from(register)] = None;
     }
 
     /// Takes registers from the stack, after a function of the machine has written them.
@@ -159,8 +171,10 @@ impl Translator<'_, '_> {
         block
     }
 
+    /// Goes on in a block to which nothing jumps that is still to come.
     pub(crate) fn go_to(&mut self, block: Block) {
         self.b.switch_to_block(block);
+        self.b.seal_block(block);
     }
 
     pub(crate) fn jump(&mut self, block: Block) {
@@ -259,12 +273,17 @@ impl Translator<'_, '_> {
 
     /// Returns the number that a fixnum is, if it is below the length of an object.
     pub(crate) fn index(&mut self, object: Ssa, index: (Ssa, Known), otherwise: Block) -> Ssa {
+        let length = self.length(object);
+        self.index_below(length, index, otherwise)
+    }
+
+    /// Returns the number that a fixnum is, if it is below a length.
+    pub(crate) fn index_below(&mut self, length: Ssa, index: (Ssa, Known), otherwise: Block) -> Ssa {
         if index.1 != Known::Fixnum {
             let tag = self.b.ins().band_imm_s(index.0, 3);
             self.refuse(tag, otherwise);
         }
         let at = self.b.ins().ushr_imm_s(index.0, 2);
-        let length = self.length(object);
         let is_below = self.b.ins().icmp(IntCC::UnsignedLessThan, at, length);
         self.require(is_below, otherwise);
         at
@@ -294,7 +313,12 @@ impl Translator<'_, '_> {
     }
 
     /// Has a function of the machine do the instruction, and returns what it says.
+    ///
+    /// What is kept back is written first, on this way only.
     pub(crate) fn call_helper(&mut self, helper: usize) -> Ssa {
+        debug_assert!(self.batch.is_none(), "{}", self.at);
+        let (doubles, spent) = self.kept_back();
+        self.write_back(doubles, spent);
         let (context, base, pc) = (self.context, self.base, self.pc(self.at));
         let helper = self.load_context(helper);
         let call = self.b.ins().call_indirect(self.helper_signature, helper, &[context, pc, base]);
@@ -335,22 +359,6 @@ impl Translator<'_, '_> {
         self.set(dst, done.1, known);
     }
 
-    /// As [`Translator::finish_value`] for a double: `done` takes its word and itself. What the machine makes
-    /// is none if it needs a box.
-    pub(crate) fn finish_double(&mut self, slow: Block, done: (Block, Ssa), dst: u8) {
-        let double = self.b.append_block_param(done.0, types::F64);
-        self.go_to(slow);
-        self.step();
-        let is_guess = self.guess == Some(dst);
-        let exit = if is_guess { self.wrong_at(self.next) } else { self.exit_at(self.next) };
-        let base = self.base;
-        let value = self.load(base, i32::from(dst) * WORD);
-        let made = self.double_of(value, exit);
-        self.b.ins().jump(done.0, &[value.into(), made.into()]);
-        self.go_to(done.0);
-        self.set_double(dst, done.1, double);
-    }
-
     /// As [`Translator::finish_value`] when the fast way goes on here with `value`.
     pub(crate) fn finish_with(&mut self, slow: Block, value: Ssa, dst: u8) {
         self.finish_as(slow, value, dst, Known::Nothing);
@@ -380,21 +388,25 @@ impl Translator<'_, '_> {
 
     /// Returns the block that leaves at the instruction at a word.
     pub(crate) fn exit_at(&mut self, at: usize) -> Block {
-        if let Some(&block) = self.exits.get(&at) {
-            return block;
-        }
-        let block = self.cold_block();
-        self.exits.insert(at, block);
-        block
+        self.way_out(at, AGAIN)
     }
 
-    /// Returns the block that leaves at the instruction at a word, since a guess was wrong.
-    pub(crate) fn wrong_at(&mut self, at: usize) -> Block {
-        if let Some(&block) = self.wrong.get(&at) {
+    /// Returns the block that leaves at the instruction that is translated, since what was taken for a double
+    /// is none.
+    pub(crate) fn wrong(&mut self) -> Block {
+        self.way_out(self.at, GUESSED_WRONG)
+    }
+
+    /// Returns the block that writes what is kept back, and leaves at the instruction at a word.
+    pub(crate) fn way_out(&mut self, at: usize, status: u64) -> Block {
+        debug_assert!(self.batch.is_none(), "{at}");
+        let (doubles, spent) = self.kept_back();
+        let way = WayOut { at, status, doubles, spent };
+        if let Some(&block) = self.ways_out.get(&way) {
             return block;
         }
         let block = self.cold_block();
-        self.wrong.insert(at, block);
+        self.ways_out.insert(way, block);
         block
     }
 
@@ -410,19 +422,23 @@ impl Translator<'_, '_> {
 
     /// Writes the blocks that leave.
     pub(crate) fn emit_exits(&mut self) {
-        let (exits, wrong) = (std::mem::take(&mut self.exits), std::mem::take(&mut self.wrong));
-        let exits = exits.into_iter().map(|exit| (exit, AGAIN));
-        for ((at, block), status) in exits.chain(wrong.into_iter().map(|exit| (exit, GUESSED_WRONG))) {
+        for (way, block) in std::mem::take(&mut self.ways_out) {
             self.go_to(block);
-            let (pc, base) = (self.pc(at), self.base);
-            self.store_context(pc, offset_of!(NativeContext, pc));
-            self.store_context(base, offset_of!(NativeContext, base));
-            self.reply(status);
+            self.write_back(way.doubles, way.spent);
+            self.leave_at(way.at, way.status);
         }
         if let Some(block) = self.signal.take() {
             self.go_to(block);
             self.reply(SIGNAL);
         }
+    }
+
+    /// Leaves at the instruction at a word.
+    pub(crate) fn leave_at(&mut self, at: usize, status: u64) {
+        let (pc, base) = (self.pc(at), self.base);
+        self.store_context(pc, offset_of!(NativeContext, pc));
+        self.store_context(base, offset_of!(NativeContext, base));
+        self.reply(status);
     }
 
     /// Returns from the machine code with a status.

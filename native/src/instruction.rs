@@ -13,7 +13,7 @@ use esl_heap::heap::layout::{Boxed, Cons, SymbolObject};
 use crate::arithmetic::{Arithmetic, NumberOrder};
 use crate::emit::in_object;
 use crate::flow::FlowStep;
-use crate::kinds::Known;
+use crate::kinds::{Known, is_root};
 use crate::objects::capture;
 use crate::translate::Translator;
 
@@ -22,13 +22,27 @@ impl Translator<'_, '_> {
     pub(crate) fn instruction(&mut self, step: &FlowStep) {
         use Arithmetic::{Add, Divide, Multiply, Subtract};
         use NumberOrder::{Equal, Greater, Less, LessEqual};
+        let may_join_batch = matches!(
+            step.instr,
+            Instr::Move { .. }
+                | Instr::LoadConst { .. }
+                | Instr::Add { .. }
+                | Instr::Sub { .. }
+                | Instr::Mul { .. }
+                | Instr::Div { .. }
+                | Instr::AddInt { .. }
+        );
+        if !may_join_batch {
+            self.close_batch();
+        }
         match step.instr {
             Instr::Move { dst, src } => {
-                let (value, known) = self.operand(src.0);
-                if known == Known::Double {
+                if self.known[usize::from(src.0)] == Known::Double {
                     let double = self.get_double(src.0);
-                    self.set_double(dst.0, value, double);
+                    self.set_double(dst.0, double);
                 } else {
+                    self.close_batch();
+                    let (value, known) = self.operand(src.0);
                     self.set(dst.0, value, known);
                 }
             }
@@ -197,9 +211,13 @@ impl Translator<'_, '_> {
             Instr::SetCar { pair, value } => self.set_half(pair.0, value.0, offset_of!(Cons, car)),
             Instr::SetCdr { pair, value } => self.set_half(pair.0, value.0, offset_of!(Cons, cdr)),
 
-            Instr::VectorRef { dst, vector, index } => self.element_ref(dst.0, vector.0, index.0),
+            Instr::VectorRef { dst, vector, index } => {
+                self.simple_element_ref(dst.0, vector.0, index.0);
+            }
             Instr::ArrayRef { dst, array, index } => self.element_ref(dst.0, array.0, index.0),
-            Instr::VectorSet { vector, index, value } => self.element_set(vector.0, index.0, value.0),
+            Instr::VectorSet { vector, index, value } => {
+                self.simple_element_set(vector.0, index.0, value.0);
+            }
             Instr::ArraySet { array, index, value } => self.element_set(array.0, index.0, value.0),
             Instr::CharRef { dst, string, index } => self.char_ref(dst.0, string.0, index.0),
             Instr::Slot { dst, instance, slot, class } => {
@@ -276,6 +294,7 @@ impl Translator<'_, '_> {
                 self.call_global(window.0, count.0, want, symbol.0, step.next);
             }
             Instr::CallSelf { window, want, .. } => self.call_self(window.0, want, step.next),
+            Instr::CallBuiltin { window, .. } if is_root(&step.instr, &self.known) => self.root(window.0),
             Instr::CallBuiltin { window, want, .. } => self.call_builtin(window.0, want),
             Instr::TailCall { window, count, .. } => self.tail_call_given(window.0, count.0),
             Instr::TailCallGlobal { window, count, symbol } => {
@@ -319,28 +338,30 @@ impl Translator<'_, '_> {
         }
     }
 
-    /// A number is taken for the one that it is now; the machine code is left if it is another one then.
+    /// A number stays the one that it is.
     fn load_constant(&mut self, dst: u8, index: usize) {
-        let value = self.constant(index);
-        match self.source.constants.get(index).map(|&constant| (constant, Known::of(constant))) {
-            Some((constant, known)) if known != Known::Nothing => {
-                let exit = self.exit();
-                let is_same = self.equals(value, constant.bits());
-                self.require(is_same, exit);
-                match constant.as_double() {
-                    Some(double) => {
-                        let double = self.b.ins().f64const(double);
-                        self.set_double(dst, value, double);
-                    }
-                    None => self.set(dst, value, known),
-                }
+        let value = self.source.constants.get(index).copied();
+        match (self.kinds.of_constant(value.as_ref()), value) {
+            (Known::Double, Some(value)) => {
+                let double = self.b.ins().f64const(value.as_double().unwrap_or_default());
+                self.set_double(dst, double);
             }
-            _ => self.set(dst, value, Known::Nothing),
+            (known @ Known::Fixnum, Some(value)) => {
+                self.close_batch();
+                let value = self.constant_value(value);
+                self.set(dst, value, known);
+            }
+            _ => {
+                self.close_batch();
+                let value = self.constant(index);
+                self.set(dst, value, Known::Nothing);
+            }
         }
     }
 
     /// Has the machine do the whole instruction.
     pub(crate) fn leave_to_machine(&mut self, step: &FlowStep) {
+        self.put_back();
         self.step();
         step.instr.visit_registers(|access| {
             if let RegisterAccess::Write { first, count } = access {

@@ -9,13 +9,19 @@
 //!
 //! Nothing tells what comes from an object or a call, or what a parameter is. If the register held a double
 //! when the machine code was asked for, the guess is that it is one again; this is tested at the instruction.
+//!
+//! A double that was computed is kept in a register of the processor, and its place in the stack is not
+//! written: it is *kept back* until somebody may look there (N3). Here is also said which registers are kept
+//! back where ways meet: all that may be.
 
+use esl_bytecode::builtin::Builtin;
 use esl_bytecode::opcode::{Instr, RegisterAccess};
 use esl_bytecode::operand::Want;
 use esl_heap::Value;
 
 use crate::flow::{FlowStep, NativeFlow};
 use crate::maker::NativeSource;
+use crate::places::RegisterBits;
 
 /// What is known of the content of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,8 +30,11 @@ pub enum Known {
     Nothing,
     /// It is a fixnum.
     Fixnum,
-    /// It is a double without a box.
+    /// It is a finite double without a box.
     Double,
+    /// Nobody reads it from there on, and on some way there it is a double that is kept back. Where it is
+    /// not, the register of the processor has a mark.
+    Spent,
 }
 
 impl Known {
@@ -33,38 +42,50 @@ impl Known {
     pub fn of(value: Value) -> Known {
         match (value.as_fixnum(), value.as_double()) {
             (Some(_), _) => Known::Fixnum,
-            (_, Some(_)) => Known::Double,
+            (_, Some(double)) if double.is_finite() => Known::Double,
             _ => Known::Nothing,
         }
     }
 }
 
-/// A set of registers.
-type ReadRegisters = [u64; 4];
-
 /// What is known before each word of a function at which an instruction begins.
 #[derive(Debug)]
 pub(crate) struct NativeKinds {
     before: Vec<Option<Box<[Known]>>>,
-    /// Registers that are read before they are written, from there on.
-    live: Vec<ReadRegisters>,
-    /// Registers that are guessed to hold doubles.
-    guesses: Vec<bool>,
+    /// RegisterBits that are read before they are written, from there on.
+    live: Vec<RegisterBits>,
+    /// RegisterBits that may be kept back there.
+    kept_back: Vec<RegisterBits>,
+    /// What registers are guessed to hold.
+    guesses: Vec<Known>,
+    /// Whether doubles are told from other values at all.
+    tells_doubles: bool,
 }
 
 impl NativeKinds {
     /// Follows all ways through a function.
     pub(crate) fn of(flow: &NativeFlow, source: &NativeSource) -> NativeKinds {
-        let mut guesses: Vec<bool> = source.guesses.iter().map(|&guess| guess == Known::Double).collect();
-        guesses.resize(source.registers, false);
+        let mut guesses = source.guesses.clone();
+        guesses.resize(source.registers, Known::Nothing);
         let mut kinds = NativeKinds {
             before: vec![None; flow.steps.len()],
-            live: vec![[0; 4]; flow.steps.len()],
+            live: vec![RegisterBits::NONE; flow.steps.len()],
+            kept_back: vec![RegisterBits::NONE; flow.steps.len()],
             guesses,
+            tells_doubles: !source.guesses.is_empty(),
         };
         kinds.find_live(flow);
         kinds.follow(flow, source.registers, &source.constants);
+        kinds.find_kept_back(flow, &source.constants);
         kinds
+    }
+
+    /// Returns what is known of a constant.
+    pub(crate) fn of_constant(&self, constant: Option<&Value>) -> Known {
+        match constant.map_or(Known::Nothing, |&value| Known::of(value)) {
+            Known::Double if !self.tells_doubles => Known::Nothing,
+            known => known,
+        }
     }
 
     /// Returns the register that an instruction writes, if that is guessed to hold a double then.
@@ -100,7 +121,7 @@ impl NativeKinds {
             }
             _ => return None,
         };
-        self.guesses[usize::from(dst)].then_some(dst)
+        (self.guesses[usize::from(dst)] == Known::Double).then_some(dst)
     }
 
     /// Returns what is known before the instruction at a word that can be reached.
@@ -110,15 +131,18 @@ impl NativeKinds {
 
     /// Returns whether a register may be read from the instruction at a word on.
     pub(crate) fn is_live(&self, at: usize, register: usize) -> bool {
-        self.live[at][register / 64] >> (register % 64) & 1 != 0
+        self.live[at].contains(register)
+    }
+
+    /// Returns the registers that may be kept back before the instruction at a word.
+    pub(crate) fn kept_back(&self, at: usize) -> RegisterBits {
+        self.kept_back[at]
     }
 
     fn follow(&mut self, flow: &NativeFlow, registers: usize, constants: &[Value]) {
         // What is read before it is written is a parameter.
-        let entry = (0..registers).map(|register| {
-            let is_guessed = self.guesses[register] && self.is_live(0, register);
-            if is_guessed { Known::Double } else { Known::Nothing }
-        });
+        let entry = (0..registers)
+            .map(|register| if self.is_live(0, register) { self.guesses[register] } else { Known::Nothing });
         let entry: Box<[Known]> = entry.collect();
         self.before[0] = Some(entry);
         let mut open = vec![0];
@@ -134,14 +158,10 @@ impl NativeKinds {
                 continue;
             };
             let (Some(step), Some(mut kinds)) = (&flow.steps[at], self.before[at].clone()) else { continue };
-            let guess = self.guess(&step.instr, &kinds);
-            apply(&step.instr, &mut kinds, constants);
-            if let Some(register) = guess {
-                kinds[usize::from(register)] = Known::Double;
-            }
+            self.apply(&step.instr, &mut kinds, constants);
             let next = step.instr.opcode().falls_through().then_some(step.next);
             for to in next.into_iter().chain(step.target) {
-                if self.meet(to, &kinds) {
+                if self.meet(flow, to, &kinds) {
                     open.push(to);
                 }
             }
@@ -149,19 +169,69 @@ impl NativeKinds {
     }
 
     /// Takes away what is not known on another way to a word; returns whether that changed anything.
-    fn meet(&mut self, to: usize, kinds: &[Known]) -> bool {
+    fn meet(&mut self, flow: &NativeFlow, to: usize, kinds: &[Known]) -> bool {
+        let live = self.live[to];
+        // Where only one way leads, what was said before is no longer so: a guess depends on what is not
+        // known.
+        let has_one_way = flow.steps[to].as_ref().is_some_and(|step| !step.is_target);
+        if has_one_way && self.before[to].as_deref() != Some(kinds) {
+            self.before[to] = None;
+        }
         let Some(known) = &mut self.before[to] else {
             self.before[to] = Some(kinds.into());
             return true;
         };
         let mut has_changed = false;
-        for (known, &kind) in known.iter_mut().zip(kinds) {
-            if *known != Known::Nothing && *known != kind {
-                *known = Known::Nothing;
-                has_changed = true;
+        for (register, (known, &kind)) in known.iter_mut().zip(kinds).enumerate() {
+            if *known == kind {
+                continue;
             }
+            let is_kept = |known| matches!(known, Known::Double | Known::Spent);
+            let met = if (is_kept(*known) || is_kept(kind)) && !live.contains(register) {
+                Known::Spent
+            } else {
+                Known::Nothing
+            };
+            has_changed |= met != *known;
+            *known = met;
         }
         has_changed
+    }
+
+    /// Follows all ways once more: a register is kept back if it may be on one of them.
+    fn find_kept_back(&mut self, flow: &NativeFlow, constants: &[Value]) {
+        let mut has_changed = true;
+        while has_changed {
+            has_changed = false;
+            for (at, step) in flow.steps.iter().enumerate() {
+                let (Some(step), Some(mut kinds)) = (step, self.before[at].clone()) else { continue };
+                let mut kept_back = self.kept_back[at];
+                if window_of(&step.instr).is_some() && !is_root(&step.instr, &kinds) {
+                    kept_back = RegisterBits::NONE;
+                }
+                step.instr.visit_registers(|access| {
+                    if let RegisterAccess::Write { first, count } = access {
+                        kept_back.remove_range(usize::from(first), usize::from(count));
+                    }
+                });
+                self.apply(&step.instr, &mut kinds, constants);
+                if let Some(dst) = computed(&step.instr)
+                    && kinds[usize::from(dst)] == Known::Double
+                {
+                    kept_back.insert(usize::from(dst));
+                }
+                let next = step.instr.opcode().falls_through().then_some(step.next);
+                for to in next.into_iter().chain(step.target) {
+                    let mut there = kept_back;
+                    for (register, known) in self.before(to).iter().enumerate() {
+                        if !matches!(known, Known::Double | Known::Spent) {
+                            there.remove(register);
+                        }
+                    }
+                    has_changed |= self.kept_back[to].unite(there);
+                }
+            }
+        }
     }
 
     fn find_live(&mut self, flow: &NativeFlow) {
@@ -177,36 +247,68 @@ impl NativeKinds {
         }
     }
 
-    fn live_before(&self, step: &FlowStep) -> ReadRegisters {
-        let mut live = [0; 4];
+    fn live_before(&self, step: &FlowStep) -> RegisterBits {
+        let mut live = RegisterBits::NONE;
         let next = step.instr.opcode().falls_through().then_some(step.next);
         for to in next.into_iter().chain(step.target) {
-            for (word, more) in live.iter_mut().zip(self.live[to]) {
-                *word |= more;
-            }
+            live.unite(self.live[to]);
         }
-        let registers = |live: &mut ReadRegisters, first: u8, count: u8, are_in: bool| {
-            for register in usize::from(first)..usize::from(first) + usize::from(count) {
-                if let Some(word) = live.get_mut(register / 64) {
-                    let bit = 1 << (register % 64);
-                    *word = if are_in { *word | bit } else { *word & !bit };
-                }
-            }
-        };
         step.instr.visit_registers(|access| {
             if let RegisterAccess::Write { first, count } = access {
-                registers(&mut live, first, count, false);
+                live.remove_range(usize::from(first), usize::from(count));
             }
         });
         step.instr.visit_registers(|access| {
             if let RegisterAccess::Read { first, count } = access {
-                registers(&mut live, first, count, true);
+                live.insert_range(usize::from(first), usize::from(count));
             }
         });
         if let Some((window, count)) = window_of(&step.instr) {
-            registers(&mut live, window, count.saturating_add(2), true);
+            live.insert_range(usize::from(window), usize::from(count) + 2);
         }
         live
+    }
+
+    /// Makes what is known before an instruction what is known behind it.
+    fn apply(&self, instr: &Instr, kinds: &mut [Known], constants: &[Value]) {
+        let guess = self.guess(instr, kinds);
+        if let Some((window, _)) = window_of(instr)
+            && is_root(instr, kinds)
+        {
+            kinds[usize::from(window)] = Known::Double;
+            return;
+        }
+        apply(instr, kinds, |index| self.of_constant(constants.get(index)));
+        if let Some(register) = guess {
+            kinds[usize::from(register)] = Known::Double;
+        }
+    }
+}
+
+/// Returns the register that an instruction computes, if it is one that keeps a double back.
+fn computed(instr: &Instr) -> Option<u8> {
+    match *instr {
+        Instr::Move { dst, .. }
+        | Instr::LoadConst { dst, .. }
+        | Instr::Add { dst, .. }
+        | Instr::Sub { dst, .. }
+        | Instr::Mul { dst, .. }
+        | Instr::Div { dst, .. }
+        | Instr::AddInt { dst, .. } => Some(dst.0),
+        Instr::CallBuiltin { window, builtin, .. } if builtin.0 == Builtin::Sqrt.number() => Some(window.0),
+        _ => None,
+    }
+}
+
+/// Returns whether an instruction takes the square root of what is known to be a double.
+pub(crate) fn is_root(instr: &Instr, before: &[Known]) -> bool {
+    match *instr {
+        Instr::CallBuiltin { window, count, want, builtin } => {
+            builtin.0 == Builtin::Sqrt.number()
+                && (count.0, want) == (1, Want::ONE)
+                && before[usize::from(window.0) + 2] == Known::Double
+        }
+        _ => false,
     }
 }
 
@@ -226,16 +328,17 @@ fn window_of(instr: &Instr) -> Option<(u8, u8)> {
     }
 }
 
-/// Makes what is known before an instruction what is known behind it.
-fn apply(instr: &Instr, kinds: &mut [Known], constants: &[Value]) {
-    use Known::{Fixnum, Nothing};
-    let of = |register: u8| kinds[usize::from(register)];
+/// Makes what is known before an instruction what is known behind it, guesses left out.
+fn apply(instr: &Instr, kinds: &mut [Known], of_constant: impl Fn(usize) -> Known) {
+    use Known::{Fixnum, Nothing, Spent};
+    let of = |register: u8| match kinds[usize::from(register)] {
+        Spent => Nothing,
+        known => known,
+    };
     let result = match *instr {
         Instr::Move { dst, src } => Some((dst.0, of(src.0))),
         Instr::LoadInt { dst, .. } => Some((dst.0, Fixnum)),
-        Instr::LoadConst { dst, constant } => {
-            Some((dst.0, constants.get(usize::from(constant.0)).map_or(Nothing, |&value| Known::of(value))))
-        }
+        Instr::LoadConst { dst, constant } => Some((dst.0, of_constant(usize::from(constant.0)))),
         Instr::Add { dst, left, right }
         | Instr::Sub { dst, left, right }
         | Instr::Mul { dst, left, right } => Some((dst.0, of_number(of(left.0), of(right.0), Fixnum))),

@@ -4,14 +4,16 @@
 //!
 //! * **N1, source.** What is translated is the code of one function that has passed the verifier
 //!   (`esl_bytecode::verify`, V1 to V13), at the address at which it stays. Its constants are read when the
-//!   machine code runs, since some of them change; one that is a number when machine code is made is tested to
-//!   be that one then.
+//!   machine code runs, since some of them change; one that is a number stays the same.
 //! * **N2, frames.** Machine code is entered with the base of a frame of that function (F2 of the
 //!   interpreter), at its first instruction or at one of its loop instructions. It reads and writes registers
 //!   of that frame, and links and registers of frames that it makes above it, below [`NativeContext::limit`].
-//! * **N3, truth.** Before an instruction of the bytecode has ended, its results are in the task's stack. So
-//!   whatever the machine code leaves can be taken up by the interpreter, at the instruction that
-//!   [`NativeContext::pc`] names in the frame [`NativeContext::base`].
+//! * **N3, truth.** Where machine code is left, and before it calls anything, all results are in the task's
+//!   stack. So whatever the machine code leaves can be taken up by the interpreter, at the instruction that
+//!   [`NativeContext::pc`] names in the frame [`NativeContext::base`]. Between, doubles may be kept back.
+//!   Those that are written on a way out are written as they are; [`NativeContext::raw_doubles`] names them,
+//!   and the machine makes words of them before anything else looks.
+//!   Where the function returns, they are no more; other words without an address are in their places.
 //! * **N4, exits.** Machine code is left at the beginning of an instruction, before it has had any effect
 //!   ([`AGAIN`]), or behind a function of the machine that has done the instruction and says what is to be
 //!   done next ([`SIGNAL`], [`RETURN_VALUES`]), or with the value of the function ([`RETURNED`]).
@@ -33,6 +35,7 @@ pub mod abi;
 mod arithmetic;
 mod branches;
 mod calls;
+mod doubles;
 mod emit;
 mod flow;
 pub mod helper;
@@ -40,6 +43,7 @@ mod instruction;
 mod kinds;
 pub mod maker;
 mod objects;
+mod places;
 mod translate;
 
 pub use abi::{AGAIN, GUESSED_WRONG, NativeContext, NativeReply, RETURN_VALUES, RETURNED, SIGNAL};

@@ -9,6 +9,7 @@ use esl_heap::heap::Kind;
 use esl_heap::heap::layout::{FunctionObject, Header, Str};
 
 use crate::emit::{ELEMENTS, WORD, in_cons, in_object, memory};
+use crate::kinds::Known;
 use crate::translate::Translator;
 
 impl Translator<'_, '_> {
@@ -31,6 +32,40 @@ impl Translator<'_, '_> {
         self.finish_effect(slow);
     }
 
+    /// An element of a simple vector. What is none, or is not there, fails by the interpreter.
+    pub(crate) fn simple_element_ref(&mut self, dst: u8, vector: u8, index: u8) {
+        let (vector, index, exit) = (self.get(vector), self.operand(index), self.exit());
+        let element = self.simple_element(vector, index, exit);
+        let value = self.load(element, in_object(ELEMENTS as usize));
+        self.set(dst, value, Known::Nothing);
+    }
+
+    /// As [`Translator::element`], on the way that control takes always. Neither kind nor length of a vector
+    /// changes, so they are looked at once.
+    fn simple_element(&mut self, vector: Ssa, index: (Ssa, Known), exit: Block) -> Ssa {
+        let length = match self.lengths.get(&vector) {
+            Some(&length) => length,
+            None => {
+                self.require_kind(vector, Kind::SimpleVector, exit);
+                let length = self.length(vector);
+                self.lengths.insert(vector, length);
+                length
+            }
+        };
+        let at = self.index_below(length, index, exit);
+        let offset = self.b.ins().ishl_imm_s(at, 3);
+        self.b.ins().iadd(vector, offset)
+    }
+
+    /// As [`Translator::simple_element_ref`], for an assignment.
+    pub(crate) fn simple_element_set(&mut self, vector: u8, index: u8, value: u8) {
+        self.make_word(usize::from(value));
+        let (vector, index, exit) = (self.get(vector), self.operand(index), self.exit());
+        let value = self.get(value);
+        let element = self.simple_element(vector, index, exit);
+        self.store_slot(value, element, in_object(ELEMENTS as usize));
+    }
+
     pub(crate) fn element_ref(&mut self, dst: u8, vector: u8, index: u8) {
         let (vector, index, slow) = (self.get(vector), self.operand(index), self.cold_block());
         let element = self.element(vector, index, slow);
@@ -39,6 +74,7 @@ impl Translator<'_, '_> {
     }
 
     pub(crate) fn element_set(&mut self, vector: u8, index: u8, value: u8) {
+        self.make_word(usize::from(value));
         let (vector, index, slow) = (self.get(vector), self.operand(index), self.cold_block());
         let value = self.get(value);
         let element = self.element(vector, index, slow);

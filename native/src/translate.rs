@@ -1,9 +1,9 @@
 //! The translation of a function: its entries and blocks, and what is known of its registers.
 //!
-//! Each register of the frame is a variable of the code generator, and every write goes to the stack as well
-//! (N3).
+//! Each register of the frame is a variable of the code generator, and every write goes to the stack as well,
+//! but for doubles that are kept back (N3).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use cranelift_codegen::ir::{
     AbiParam, Block, FuncRef, InstBuilder, JumpTableData, SigRef, Signature, Type, Value as Ssa, types,
@@ -12,17 +12,21 @@ use cranelift_codegen::isa::TargetFrontendConfig;
 use cranelift_frontend::{FunctionBuilder, Variable};
 use esl_heap::Value;
 
+use crate::abi::GUESSED_WRONG;
+use crate::arithmetic::Arithmetic;
+use crate::doubles::{DoubleBatch, EdgeWork};
 use crate::emit::WORD;
 use crate::flow::{FlowStep, NativeFlow};
 use crate::kinds::{Known, NativeKinds};
 use crate::maker::NativeSource;
+use crate::places::{RegisterBits, WayOut};
 
 /// A translation under way.
 pub(crate) struct Translator<'a, 'f> {
     pub(crate) b: FunctionBuilder<'f>,
     pub(crate) source: &'a NativeSource,
     flow: &'a NativeFlow,
-    kinds: &'a NativeKinds,
+    pub(crate) kinds: &'a NativeKinds,
     /// The function itself, for calls.
     pub(crate) itself: FuncRef,
     pub(crate) pointer: Type,
@@ -33,8 +37,19 @@ pub(crate) struct Translator<'a, 'f> {
     pub(crate) doubles: Vec<Variable>,
     /// What is known of each register here.
     pub(crate) known: Vec<Known>,
+    /// RegisterBits that hold doubles that are not in their places, or may hold such.
+    pub(crate) kept_back: RegisterBits,
+    /// The words of doubles, where they are at hand.
+    pub(crate) words: Vec<Option<Ssa>>,
+    /// Results that are not tested yet.
+    pub(crate) batch: Option<DoubleBatch>,
+    /// What was computed of doubles on all ways here, and is tested or in the batch.
+    pub(crate) results: HashMap<(Arithmetic, Ssa, Ssa), Ssa>,
+    /// The lengths of what is known to be simple vectors on all ways here.
+    pub(crate) lengths: HashMap<Ssa, Ssa>,
     blocks: BTreeMap<usize, Block>,
-    pub(crate) exits: BTreeMap<usize, Block>,
+    edges: Vec<(Block, usize, Vec<EdgeWork>)>,
+    pub(crate) ways_out: BTreeMap<WayOut, Block>,
     pub(crate) signal: Option<Block>,
     pub(crate) helper_signature: SigRef,
     pub(crate) store_signature: SigRef,
@@ -45,8 +60,6 @@ pub(crate) struct Translator<'a, 'f> {
     pub(crate) next: usize,
     /// The register that is guessed to hold a double behind it.
     pub(crate) guess: Option<u8>,
-    /// Exits where a guess was wrong.
-    pub(crate) wrong: BTreeMap<usize, Block>,
     /// Whether control goes on behind the instruction.
     is_open: bool,
 }
@@ -84,10 +97,16 @@ impl<'a, 'f> Translator<'a, 'f> {
             context,
             base,
             known: vec![Known::Nothing; source.registers],
+            kept_back: RegisterBits::NONE,
+            words: vec![None; source.registers],
+            batch: None,
+            results: HashMap::new(),
+            lengths: HashMap::new(),
             variables,
             doubles,
             blocks: BTreeMap::new(),
-            exits: BTreeMap::new(),
+            edges: Vec::new(),
+            ways_out: BTreeMap::new(),
             signal: None,
             helper_signature: helper,
             store_signature: store,
@@ -95,7 +114,6 @@ impl<'a, 'f> Translator<'a, 'f> {
             at: 0,
             next: 0,
             guess: None,
-            wrong: BTreeMap::new(),
             is_open: false,
         }
     }
@@ -119,6 +137,11 @@ impl<'a, 'f> Translator<'a, 'f> {
             self.begin(at, step);
             self.is_open = true;
             self.instruction(step);
+        }
+        for (block, to, works) in std::mem::take(&mut self.edges) {
+            self.go_to(block);
+            self.do_edge_works(&works);
+            self.jump(self.blocks[&to]);
         }
         self.emit_exits();
         self.b.seal_all_blocks();
@@ -161,56 +184,47 @@ impl<'a, 'f> Translator<'a, 'f> {
     /// Takes a register from the stack, and leaves the machine code at the instruction at a word unless it is
     /// what it is known to be there.
     fn take(&mut self, register: usize, at: usize) {
-        let base = self.base;
-        let value = self.load(base, register as i32 * WORD);
-        self.b.def_var(self.variables[register], value);
-        if !self.kinds.is_live(at, register) {
+        let (base, known) = (self.base, self.kinds.before(at)[register]);
+        if matches!(known, Known::Nothing | Known::Fixnum) && !self.kinds.is_live(at, register) {
             return;
         }
-        match self.kinds.before(at)[register] {
-            Known::Nothing => {}
+        let value = self.load(base, register as i32 * WORD);
+        self.b.def_var(self.variables[register], value);
+        match known {
             Known::Fixnum => {
-                let exit = self.wrong_at(at);
+                let wrong = self.way_out(at, GUESSED_WRONG);
                 let tag = self.b.ins().band_imm_s(value, 3);
-                self.refuse(tag, exit);
+                self.refuse(tag, wrong);
             }
+            // Who leaves later puts it back, read or not.
             Known::Double => {
-                let exit = self.wrong_at(at);
-                let double = self.double_of(value, exit);
+                let wrong = self.way_out(at, GUESSED_WRONG);
+                let double = self.double_of(value, wrong);
                 self.b.def_var(self.doubles[register], double);
             }
+            Known::Spent => self.do_edge_works(&[EdgeWork::Mark(register)]),
+            Known::Nothing => {}
         }
     }
 
     /// Begins an instruction: a block if jumps lead to it.
     fn begin(&mut self, at: usize, step: &FlowStep) {
-        if self.is_open {
-            self.expect(at);
-        }
         if let Some(&block) = self.blocks.get(&at) {
             if self.is_open {
+                self.close_batch();
+                let works = self.edge_works(at);
+                self.do_edge_works(&works);
                 self.jump(block);
             }
-            self.go_to(block);
+            self.b.switch_to_block(block);
+            self.kept_back = self.kinds.kept_back(at);
+            self.words.fill(None);
+            self.results.clear();
+            self.lengths.clear();
         }
-        self.known = self.kinds.before(at).to_vec();
+        self.known.copy_from_slice(self.kinds.before(at));
         (self.at, self.next) = (at, step.next);
         self.guess = self.kinds.guess(&step.instr, &self.known);
-    }
-
-    /// Checks that what is known here is what is said of the instruction at a word, to which control goes.
-    pub(crate) fn expect(&self, to: usize) {
-        debug_assert!(
-            self.kinds
-                .before(to)
-                .iter()
-                .zip(&self.known)
-                .all(|(&said, &known)| said == Known::Nothing || said == known),
-            "from {} to {to}: {:?}, {:?} expected",
-            self.at,
-            self.known,
-            self.kinds.before(to)
-        );
     }
 
     /// Notes that control does not go on behind the instruction.
@@ -219,10 +233,15 @@ impl<'a, 'f> Translator<'a, 'f> {
     }
 
     /// Returns the block to which the instruction jumps.
-    pub(crate) fn target(&self, step: &FlowStep) -> Block {
+    pub(crate) fn target(&mut self, step: &FlowStep) -> Block {
         let to = step.target.unwrap_or(step.next);
-        self.expect(to);
-        self.blocks[&to]
+        let works = self.edge_works(to);
+        if works.is_empty() {
+            return self.blocks[&to];
+        }
+        let block = self.block();
+        self.edges.push((block, to, works));
+        block
     }
 
     pub(crate) fn operand(&mut self, register: u8) -> (Ssa, Known) {

@@ -85,4 +85,6 @@ pub(crate) struct InstalledCode {
     pub(crate) loop_entries: u32,
     /// See `loop_entries`.
     pub(crate) loop_ticks: u32,
+    /// Whether its loop instructions do not lead to it for now.
+    pub(crate) is_calm: bool,
 }

@@ -1,8 +1,9 @@
-//! Programs run in both tiers: nothing of a run tells whether functions are interpreted or run as machine code.
+//! Programs run in both tiers: nothing of a run tells whether
+//! functions are interpreted or run as machine code.
 //!
-//! A part of the conformance programs, and random functions of numbers in loops: with long slices, short ones,
-//! and slices of one tick. With the variable `ESL_TIERS=all` of the environment all programs run, also with a
-//! collection at each safepoint, and more random ones.
+//! A part of the conformance programs, and random functions of numbers in loops: with long slices, short
+//! ones, and slices of one tick. With the variable `ESL_TIERS=all` of the environment all programs run, also
+//! with a collection at each safepoint, and more random ones.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -85,7 +86,7 @@ fn check_random(seed: u64) -> Result<(), Failed> {
 
 /// Runs a program by the interpreter and as machine code. That which is made on a thread of its own comes at
 /// times that differ from run to run, which shows no more.
-fn compare(program: &Program, config: &Config) -> Result<(), Failed> {
+pub(super) fn compare(program: &Program, config: &Config) -> Result<(), Failed> {
     let interpreted = run(program, config, Tier::Interpreter)?;
     let tiers = if are_all_asked_for() { &[Tier::Native, Tier::Auto][..] } else { &[Tier::Native] };
     for &tier in tiers {

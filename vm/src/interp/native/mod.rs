@@ -129,6 +129,7 @@ pub(super) unsafe fn enter_at_loop(
             installed.loop_ticks = installed.loop_ticks.saturating_add(taken);
             if installed.loop_entries == ENTRIES {
                 if installed.loop_ticks < ENTRIES * LEAST_TICKS {
+                    installed.is_calm = true;
                     calm_loops(code, installed.made.loops());
                 }
                 (installed.loop_entries, installed.loop_ticks) = (0, 0);
@@ -153,6 +154,25 @@ unsafe fn calm_loops(code: *mut CodeObject, loops: &[usize]) {
     }
 }
 
+/// Lets the loop instructions that lead no longer to machine code lead there again: what made it leave them
+/// at once may have been a call of what has machine code now.
+fn rouse_loops(compiled: &mut CompiledFunctions) {
+    for installed in compiled.installed.iter_mut().flatten().filter(|installed| installed.is_calm) {
+        installed.is_calm = false;
+        (installed.loop_entries, installed.loop_ticks) = (0, 0);
+        // SAFETY: the word was made of the address of a code, which is there: else this had been given back
+        // when all that is reached had been marked. Nobody holds a reference to its words.
+        unsafe {
+            let code = Value::from_bits(installed.code).object_ptr().cast::<CodeObject>();
+            let words = instructions(code).len();
+            let words = std::slice::from_raw_parts_mut(first_instruction(code).cast_mut(), words);
+            for &at in installed.made.loops() {
+                quicken_loop(words, at);
+            }
+        }
+    }
+}
+
 /// Runs machine code until it is left.
 ///
 /// # Safety
@@ -169,6 +189,7 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
         pc: 0,
         base: 0,
         value: 0,
+        raw_doubles: [0; 4],
         machine: (&raw mut caller).cast::<c_void>(),
         step: step::step,
         call_builtin: step::call_builtin,
@@ -187,6 +208,11 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
         }
         reply
     };
+    if matches!(reply.status, AGAIN | GUESSED_WRONG) {
+        let base = std::ptr::with_exposed_provenance_mut(context.base as usize);
+        // SAFETY: N3, N4: it was left in that frame.
+        unsafe { make_words(&mut context, base) };
+    }
     if reply.status == AGAIN && context.ticks > 0 && vm.compiled.tier == Tier::Auto {
         // SAFETY: N4: it was left at an instruction of that frame.
         unsafe { note_call(vm, context.pc, context.base) };
@@ -207,6 +233,30 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
         pc: std::ptr::with_exposed_provenance(context.pc as usize),
         base: std::ptr::with_exposed_provenance_mut(context.base as usize),
         ticks: context.ticks,
+    }
+}
+
+/// Makes words of the doubles that machine code has written as they are.
+///
+/// # Safety
+/// `base` is the frame in which machine code was left, or has called the machine.
+#[inline]
+unsafe fn make_words(context: &mut NativeContext, base: *mut Value) {
+    for (index, names) in context.raw_doubles.iter_mut().enumerate() {
+        while *names != 0 {
+            let register = index * 64 + names.trailing_zeros() as usize;
+            *names &= *names - 1;
+            // SAFETY: N3: the place is one of the frame, and has the bits of a double.
+            unsafe {
+                let place = base.add(register);
+                let double = Value::double(place.cast::<f64>().read());
+                debug_assert!(
+                    double.is_some_and(|v| v.as_double().is_some_and(f64::is_finite)),
+                    "{register}"
+                );
+                place.write(double.unwrap_or(Value::NAN));
+            }
+        }
     }
 }
 
@@ -302,7 +352,7 @@ unsafe fn make(vm: &mut Vm, code: *mut CodeObject, guesses: Vec<Known>) {
             return;
         }
         let source = source_of(code, guesses);
-        let has_guesses = source.guesses.contains(&Known::Double);
+        let has_guesses = !source.guesses.is_empty();
         if compiled.tier == Tier::Native {
             let maker = match &mut compiled.maker {
                 Some(maker) => Ok(maker),
@@ -411,6 +461,7 @@ unsafe fn install(
                 compiled.report.bytes -= old.made.bytes().next_multiple_of(4096);
                 old.made = made;
                 old.has_guesses = false;
+                old.is_calm = false;
             }
             return;
         }
@@ -428,8 +479,17 @@ unsafe fn install(
         }
         (*code).entry = (&raw const *stub).cast();
         let code = Value::from_object(code.cast()).bits();
-        compiled.installed[number as usize] =
-            Some(InstalledCode { stub, made, code, has_guesses, wrong: 0, loop_entries: 0, loop_ticks: 0 });
+        compiled.installed[number as usize] = Some(InstalledCode {
+            stub,
+            made,
+            code,
+            has_guesses,
+            wrong: 0,
+            loop_entries: 0,
+            loop_ticks: 0,
+            is_calm: false,
+        });
+        rouse_loops(compiled);
     }
 }
 

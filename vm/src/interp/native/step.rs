@@ -11,7 +11,7 @@ use esl_native::abi::{STEP_JUMP, STEP_NEXT, STEP_SIGNAL, STEP_VALUES};
 
 use super::super::{Signal, aux_at, cold, constant, double, is_instance_of_exactly, substitute, unwind};
 use super::super::{variable, word_at};
-use super::Caller;
+use super::{Caller, make_words};
 use crate::heap::Phase;
 use crate::heap::layout::{Kind, SymbolObject};
 use crate::raise::Exit;
@@ -80,8 +80,9 @@ unsafe fn attend(context: *mut NativeContext, vm: &mut Vm) {
 pub(super) unsafe extern "C" fn step(context: *mut NativeContext, pc: *const u32, base: *mut u64) -> u64 {
     // SAFETY: machine code calls this at an instruction of the frame at `base`.
     unsafe {
-        let (vm, _) = parts(context);
         let base = base.cast::<Value>();
+        make_words(&mut *context, base);
+        let (vm, _) = parts(context);
         match instruction(vm, pc, base) {
             Done::Fast => STEP_NEXT,
             Done::Slow => {

@@ -1,0 +1,167 @@
+//! Programs that are bad for a tier of machine code: functions that change while they run as such, code that
+//! piles up, code that is too long, recursion that is too deep, numbers that leave their kind in a loop.
+
+use esl::Config;
+use esl::host::VirtualHost;
+use esl::program::{self, Program, Source};
+use esl_vm::vm::Tier;
+use libtest_mimic::{Failed, Trial};
+
+use super::tiers::compare;
+
+/// Name and text of each.
+const CASES: [(&str, &str); 7] = [
+    (
+        "functions redefined while they run",
+        "(defun step-of (x) (+ x 1))
+         (defun walk (n)
+           (let ((sum 0))
+             (dotimes (i n)
+               (setq sum (+ sum (step-of i)))
+               (when (= i 300) (setf (symbol-function 'step-of) (lambda (x) (+ x 2.5))))
+               (when (= i 600) (setf (symbol-function 'step-of) (lambda (x &optional y) (list x y) 3)))
+               (when (= i 700) (setf (symbol-function 'walk) (lambda (n) (list :other n)))))
+             sum))
+         (print (walk 100)) (print (walk 1000)) (print (walk 5))
+         (defun again (n)
+           (when (= n 40) (setf (symbol-function 'again) (lambda (n) (list :new n))))
+           (if (= n 0) :old (again (- n 1))))
+         (print (again 100)) (print (again 3))",
+    ),
+    (
+        "recursion deeper than the frames of one entry",
+        "(defun deep (n x) (if (= n 0) x (+ 0.5 (deep (- n 1) (* x 1.0)))))
+         (print (deep 20000 1.0)) (print (deep 20000 2))
+         (defun endless (x) (+ 1.5 (endless (+ x 1.5))))
+         (print (handler-case (endless 0.0) (error (e) (type-of e))))",
+    ),
+    (
+        "doubles that become something else in a loop",
+        "(defun run (x y n)
+           (let ((a x) (b y) (c 0.0))
+             (dotimes (i n)
+               (let ((d (* a b)) (e (- a b)))
+                 (setq c (+ c d) a (+ (* a 1.5) e) b (- d e))))
+             (list a b c)))
+         (defun try (x y n) (print (handler-case (run x y n) (error (e) (type-of e)))))
+         (try 1.0 2.0 5) (try 1.0 2.0 40) (try 0.0 -0.0 9) (try 1.0e-200 1.0e-100 9) (try 1/3 2.5 9)
+         (try 1.0e150 1.0e150 9) (try 3 4 9) (try 2.0 nil 9) (try 1.0 2.0 5) (try -1.0e-300 1.0e300 60)",
+    ),
+    (
+        "registers that hold doubles and other values by turns",
+        "(defun turns (n)
+           (let ((x 1.0) (seen nil) (sum 0.0))
+             (dotimes (i n)
+               (let ((y (* x 2.0)))
+                 (cond ((= 0 (mod i 7)) (setq seen (cons y seen) x 1.0))
+                       ((= 3 (mod i 7)) (let ((z (list x y))) (setq sum (+ sum (car z) (cadr z)))))
+                       (t (let ((z (- y x))) (setq x (+ z 0.25))))))
+               (when (< sum 0.0) (return :never)))
+             (list x sum (length seen) (car seen))))
+         (print (turns 10)) (print (turns 500)) (print (turns 501))
+         (defun kept (n)
+           (let ((x 0.5) (last nil))
+             (dotimes (i n)
+               (setq last (catch 'out
+                            (setq x (* x 1.01))
+                            (when (= 0 (mod i 3)) (throw 'out (list x)))
+                            (setq x (+ x 0.125))
+                            i)))
+             (list x last)))
+         (print (kept 4)) (print (kept 200))",
+    ),
+    (
+        "roots of numbers of all kinds",
+        "(defun roots (x n)
+           (let ((sum 0.0) (y x))
+             (dotimes (i n) (setq y (+ y 0.0) sum (+ sum (sqrt (* y 1.0)))) (setq y (- y 0.75)))
+             sum))
+         (print (roots 1000.0 100)) (print (roots 0.0 1)) (print (roots 3.0 20)) (print (roots 1.0e-290 3))
+         (print (roots 1000 100)) (print (handler-case (roots nil 2) (error (e) (type-of e))))",
+    ),
+    (
+        "vectors of doubles and of other values",
+        "(defun scale (v by)
+           (dotimes (i (length v)) (setf (svref v i) (* (svref v i) by)))
+           (let ((sum 0.0)) (dotimes (i (length v)) (incf sum (svref v i))) sum))
+         (defun of (&rest items) (coerce items 'simple-vector))
+         (let ((v (of 1.0 2.0 3.5 -0.0)))
+           (dotimes (i 50) (print (scale v 1.25))) (print (scale v 0.0)) (print (scale v -1.0)) (print v))
+         (print (scale (of 1 2 3) 2.0)) (print (scale (of 1/2 1.0 3) 3))
+         (print (handler-case (scale (of 1.0 :x 2.0) 2.0) (error (e) (type-of e))))
+         (print (handler-case (scale (list 1.0) 2.0) (error (e) (type-of e))))",
+    ),
+    (
+        "doubles of frames that are left for good",
+        "(defun inner (x n)
+           (let ((a (* x 1.5)) (b (+ x 2.0)))
+             (when (= n 0) (error \"enough\"))
+             (+ (* a b) (inner (- a b) (- n 1)))))
+         (defun outer (n)
+           (let ((x 1.0) (failures 0))
+             (dotimes (i n)
+               (setq x (+ x 0.5))
+               (handler-case (inner x (mod i 5)) (error () (setq x (* x 1.25)) (incf failures))))
+             (list x failures)))
+         (print (outer 3)) (print (outer 60))",
+    ),
+];
+
+/// Returns the tests.
+pub(super) fn trials() -> Vec<Trial> {
+    let cases = CASES.iter().map(|&(name, text)| {
+        Trial::test(format!("tiers bad case: {name}"), move || {
+            let program = compile(text)?;
+            for slice in [2000, 50, 1] {
+                compare(&program, &Config { slice, memory: 64 << 20, ..Config::default() })?;
+            }
+            Ok(())
+        })
+    });
+    cases
+        .chain([
+            Trial::test(
+                "tiers bad case: a function that is too long",
+                a_long_function_is_left_to_the_interpreter,
+            ),
+            Trial::test("tiers bad case: eval in a loop", machine_code_does_not_pile_up),
+        ])
+        .collect()
+}
+
+fn compile(text: &str) -> Result<Program, Failed> {
+    let compiled = program::compile(&[Source::new("case.esl", text.to_string())]);
+    compiled.program.ok_or_else(|| format!("{:#?}\n{text}", compiled.diagnostics).into())
+}
+
+fn a_long_function_is_left_to_the_interpreter() -> Result<(), Failed> {
+    let mut text = String::from("(defun long (x)\n");
+    for number in 0..6000 {
+        text += &format!("  (setq x (logand (+ x {}) 65535))\n", number % 100);
+    }
+    text += "  x)\n(dotimes (i 5) (print (long i)))\n";
+    let program = compile(&text)?;
+    compare(&program, &Config::default())
+}
+
+/// A machine that keeps the machine code of all that was ever evaluated would have a page for each.
+fn machine_code_does_not_pile_up() -> Result<(), Failed> {
+    const PAGE: usize = 4096;
+    let text = "(defvar *sum* 0.0)
+         (dotimes (i 250)
+           (let ((f (eval `(lambda (x) (+ x ,(* i 0.5))))))
+             (dotimes (k 3) (setq *sum* (+ (funcall f 1.0) *sum*))))
+           (make-array 20000))
+         (print *sum*)";
+    let program = compile(text)?;
+    let config = Config { memory: 48 << 20, ..Config::default() };
+    compare(&program, &config)?;
+    let mut machine = program::machine(config, Box::new(VirtualHost::new()))?;
+    machine.set_tier(Tier::Native);
+    program::run_in(&mut machine, &program)?;
+    let report = &machine.tier().1;
+    if report.bytes > (report.functions - 100) * PAGE {
+        return Err(format!("nothing was given back: {report:?}").into());
+    }
+    Ok(())
+}
