@@ -189,6 +189,9 @@ macro_rules! for_each_builtin {
             SetMacro = define::set_macro, internal "%SET-MACRO" ("symbol function");
             /// Makes `symbol` a special variable, and returns it.
             ProclaimSpecial = define::proclaim_special, internal "%PROCLAIM-SPECIAL" ("symbol");
+            /// Makes `symbol`, which does not belong to the language, neither a special variable nor a
+            /// constant any more, and returns it.
+            ForgetVariable = define::forget_variable, internal "%FORGET-VARIABLE" ("symbol");
             /// Makes `symbol` a constant with `value`, and returns it. Fails if it is a constant with another
             /// value.
             DefineConstant = define::define_constant, internal "%DEFINE-CONSTANT" ("symbol value");
@@ -960,8 +963,9 @@ macro_rules! for_each_builtin {
             /// `variables` a fifth item lists the names and values of the variables that are in scope there.
             Backtrace = failure::backtrace, internal "%BACKTRACE" ("limit &optional variables");
             /// Takes away, until the scope around it ends, all rights but these: a list of lists of a keyword
-            /// and objects, strings; without objects for all of them. Nothing gives them back.
-            NarrowRights = rights::narrow_rights, internal "%NARROW-RIGHTS" ("rights");
+            /// and objects, strings; without objects for all of them. Nothing gives them back. A flag of a
+            /// command gives more if `by-flag`: refusals name it.
+            NarrowRights = rights::narrow_rights, internal "%NARROW-RIGHTS" ("rights &optional by-flag");
             /// Fails unless the program has a right, a keyword, to an object. What to use in its place: for a
             /// path the one to which its links lead.
             DemandRight = rights::demand_right, internal "%DEMAND-RIGHT" ("right object");
@@ -1101,6 +1105,9 @@ macro_rules! for_each_builtin {
             /// The class of this name, kept if it has these superclasses (classes or their names) and slots
             /// (symbols), else made.
             MakeClass = class::make_class, internal "%MAKE-CLASS" ("name supers slots data");
+            /// Makes `class` the class of this name, which does not belong to the language; with `NIL`, there
+            /// is none of this name any more. Instances keep their class.
+            SetClass = class::set_class, internal "%SET-CLASS" ("name class");
             /// The class of this name, or `NIL`.
             FindClass = class::find_class, internal "%FIND-CLASS" ("name");
             /// The class of a structure or condition, `NIL` for everything else.
@@ -1121,6 +1128,8 @@ macro_rules! for_each_builtin {
             SubclassP = class::subclass_p, internal "%SUBCLASS-P" ("class ancestor");
             /// A fresh instance of a class, or of the class of that name. Slots without a value are `NIL`.
             MakeStructure = class::make_structure, internal "%MAKE-STRUCTURE" ("class &rest values");
+            /// As `%MAKE-STRUCTURE`, an instance that `EQUAL` compares by its slots.
+            MakeValueStructure = class::make_value_structure, internal "%MAKE-VALUE-STRUCTURE" ("class &rest values");
             /// A copy of a structure.
             CopyStructure = class::copy_structure, cl "COPY-STRUCTURE" ("structure");
             /// Whether `object` is an instance of some class.
@@ -1176,7 +1185,8 @@ macro_rules! for_each_builtin {
             /// Tells a compilation what became of its last step, and returns the next one: `:expand` function
             /// form environment, `:load` functions keep, or `:done` functions diagnostics.
             CompilationStep = eval::compilation_step, internal "%COMPILATION-STEP" ("handle kind outcome");
-            /// Ends a compilation, or lets go of a text.
+            /// Ends a compilation, or lets go of a text; whether there are data left for further calls to
+            /// free.
             EndCompilation = eval::end_compilation, internal "%END-COMPILATION" ("handle");
             /// Reads a datum: whether there was one, or `:unfinished`; the datum; and the index after it.
             ReadDatum = eval::read_from_string, internal "%READ-FROM-STRING" ("string &optional start end");
@@ -1316,11 +1326,15 @@ macro_rules! for_each_builtin {
             /// From now on the last of `width` arguments of facts of this name is unique for given others;
             /// `NIL` if there are rules for such facts.
             MakeProperty = database::make_property, internal "%MAKE-PROPERTY" ("name width");
+            /// From now on there may be several last arguments for given others again.
+            DropProperty = database::drop_property, internal "%DROP-PROPERTY" ("name width");
             /// The last argument of the fact that begins with the terms of a list, and whether there is one.
             /// For properties.
             PropertyValue = database::property_value, internal "%PROPERTY-VALUE" ("property");
             /// Adds a rule, unless one with an equal source is there, which it replaces.
             DefineRule = database::define_rule, internal "%DEFINE-RULE" ("head body source");
+            /// Removes the rule whose source is equal to a list; whether there was one.
+            RemoveRule = database::remove_rule, internal "%REMOVE-RULE" ("source");
             /// Begins a query in which variables have the values of an association list, and does its first
             /// step: the first answers; the number of the query, or `NIL` if these were all; and whether all
             /// answers are found.
@@ -1400,6 +1414,8 @@ macro_rules! for_each_builtin {
             /// The input that the outside knows by a name, a symbol or string: a new one, or one that is
             /// there already, with this capacity and the rule of this number.
             AddInput = input::add_input, internal "%ADD-INPUT" ("name capacity rule");
+            /// The capacity of an input, and the number of its rule.
+            InputRule = input::input_rule, internal "%INPUT-RULE" ("input");
             /// Has the outside know no input of this name any more.
             RemoveInput = input::remove_input, internal "%REMOVE-INPUT" ("name");
             /// How many signals of an input were dropped.

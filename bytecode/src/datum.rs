@@ -290,6 +290,31 @@ impl Drop for DatumNode {
     }
 }
 
+/// Data that are given up, to be freed in parts: freeing takes nearly as long as making.
+#[derive(Default)]
+pub struct DatumRemains(Vec<Datum>);
+
+impl DatumRemains {
+    /// Adds a datum.
+    pub fn add(&mut self, datum: Datum) {
+        self.0.push(datum);
+    }
+
+    /// Frees at most `allowed` nodes, and returns how many it could have freed beyond those that there were.
+    pub fn free(&mut self, allowed: usize) -> usize {
+        let mut left = allowed;
+        while left > 0
+            && let Some(Datum(node)) = self.0.pop()
+        {
+            left -= 1;
+            if let Some(mut node) = Arc::into_inner(node) {
+                release(&mut node.kind, &mut self.0);
+            }
+        }
+        left
+    }
+}
+
 /// Moves the children of a node that is about to go to `orphans`, leaving the node flat.
 fn release(kind: &mut DatumKind, orphans: &mut Vec<Datum>) {
     use DatumKind::{Array, Call, Cons, Vector};

@@ -10,10 +10,12 @@ use std::sync::Arc;
 
 use esl_bytecode::compile::{Compilation, Compile, Part, Step};
 use esl_bytecode::diagnostic::Diagnostic;
+use esl_bytecode::module::Module;
 use slotmap::{Key, KeyData, SlotMap, new_key_type};
 
-use crate::datum::{DatumWalk, Unit};
+use crate::datum::{DatumWalk, Unit, UnitRemains};
 use crate::value::Value;
+use crate::world::load::ModuleLoad;
 
 new_key_type! {
     /// Key of a job in the table.
@@ -81,12 +83,23 @@ pub(crate) struct ActiveCompilation {
     pub(crate) unit: Unit,
     /// The walk that makes a datum of the expansion with which the program has answered.
     pub(crate) expansion: Option<DatumWalk>,
-    /// A step that the program has not received yet, for lack of room.
+    /// A step that the program has not received yet, for lack of room or because its module is being loaded.
     pub(crate) step: Option<Step>,
+    /// The loading of its module.
+    pub(crate) load: Option<Box<ModuleLoad<Module>>>,
     /// Whether it waits for the value of a module that was to be loaded.
     pub(crate) keeps: bool,
     /// Whether its form comes from a text without a name, as the embedder's do.
     pub(crate) is_nameless: bool,
+}
+
+impl ActiveCompilation {
+    /// Begins a compilation of data of this unit. `is_nameless` says whether its form comes from a text
+    /// without a name.
+    pub(crate) fn new(compilation: Box<dyn Compilation>, unit: Unit, is_nameless: bool) -> ActiveCompilation {
+        let (expansion, step, load) = (None, None, None);
+        ActiveCompilation { compilation, unit, expansion, step, load, keeps: false, is_nameless }
+    }
 }
 
 /// The compiler of a machine, and the jobs of its programs.
@@ -100,6 +113,8 @@ pub(crate) struct Compilations {
     pub(crate) unit: RefCell<Unit>,
     /// Errors of the form of a nameless text that was refused last, for the embedder.
     pub(crate) refused: Vec<Diagnostic>,
+    /// What is left of jobs that have ended.
+    pub(crate) remains: Vec<UnitRemains>,
     /// Number of jobs so far.
     pub(crate) begun: u64,
 }
@@ -114,6 +129,9 @@ impl Compilations {
                     running.unit.roots(visit);
                     if let Some(walk) = &running.expansion {
                         walk.roots(visit);
+                    }
+                    if let Some(load) = &running.load {
+                        load.roots(visit);
                     }
                 }
                 CompilerJob::Form(form) => {
@@ -138,13 +156,15 @@ impl Compilations {
         let of_job = |job: &CompilerJob| match job {
             CompilerJob::Compilation(running) => {
                 let expansion = running.expansion.as_ref().map_or(0, DatumWalk::bytes);
-                running.compilation.bytes() + running.unit.bytes() + expansion
+                let load = running.load.as_ref().map_or(0, |load| load.bytes());
+                running.compilation.bytes() + running.unit.bytes() + expansion + load
             }
             CompilerJob::Form(form) => form.walk.bytes() + form.unit.bytes(),
             CompilerJob::Text(text) => text.text.len(),
             CompilerJob::Taken => 0,
         };
-        self.jobs.values().map(of_job).sum()
+        let remains: usize = self.remains.iter().map(UnitRemains::bytes).sum();
+        self.jobs.values().map(of_job).sum::<usize>() + remains
     }
 
     fn find(&self, handle: Value) -> Option<JobId> {
@@ -168,10 +188,28 @@ impl Compilations {
         }
     }
 
-    /// Ends the job that `handle` names, if there is one.
+    /// Ends the job that `handle` names, if there is one. Its data are freed by [`Compilations::free`].
     pub(crate) fn end(&mut self, handle: Value) {
-        if let Some(id) = self.find(handle) {
-            self.jobs.remove(id);
+        let job = self.find(handle).and_then(|id| self.jobs.remove(id));
+        match job {
+            Some(CompilerJob::Compilation(running)) => self.remains.push(UnitRemains::new(running.unit)),
+            Some(CompilerJob::Form(form)) => self.remains.push(UnitRemains::new(form.unit)),
+            Some(CompilerJob::Text(_) | CompilerJob::Taken) | None => {}
         }
+    }
+
+    /// Frees at most `allowed` data of jobs that have ended. Returns how many it has freed, and whether there
+    /// are more.
+    pub(crate) fn free(&mut self, allowed: usize) -> (usize, bool) {
+        let mut left = allowed;
+        while left > 0
+            && let Some(remains) = self.remains.last_mut()
+        {
+            left = remains.free(left);
+            if left > 0 {
+                self.remains.pop();
+            }
+        }
+        (allowed - left, !self.remains.is_empty())
     }
 }

@@ -131,6 +131,12 @@ mod tag {
     pub(super) const CLASS: u8 = 13;
 }
 
+/// Returns the checksum of a file's header, which has the checksums of all sections in it: so it tells files
+/// apart without looking at all of them. The file is taken to be intact.
+pub fn checksum(file: &[u8]) -> Option<u32> {
+    file.get(..HEADER_LENGTH)?.last_chunk().map(|checksum| u32::from_le_bytes(*checksum))
+}
+
 /// Decodes a whole file. The module is well-formed as a file; call [`crate::verify::verify`] before it is
 /// run.
 ///

@@ -108,6 +108,17 @@ fn a_module_survives_writing_and_reading() {
 }
 
 #[test]
+fn the_checksum_of_a_header_tells_files_apart() {
+    let file = write(&sample()).expect("it can be written");
+    let mut other = sample();
+    other.sources.push("other.esl".into());
+    let other = write(&other).expect("it can be written");
+    assert!(checksum(&file).is_some() && checksum(&file) == checksum(&file.clone()));
+    assert_ne!(checksum(&file), checksum(&other));
+    assert_eq!(checksum(&file[..HEADER_LENGTH - 1]), None);
+}
+
+#[test]
 fn an_image_is_read_in_parts() {
     let module = sample();
     let file = write(&module).unwrap();

@@ -104,15 +104,24 @@ use crate::{opcode::TypeCode, operand::Want};
 /// # Errors
 /// The first fault that is found.
 pub fn verify(module: &Module) -> Result<(), VerifyError> {
+    verify_outline(module)?;
+    (0..module.functions.len() as u32).try_for_each(|number| verify_function(module, FunctionNumber(number)))
+}
+
+/// Checks what belongs to no function: the constants, and which functions run top-level forms.
+///
+/// # Errors
+/// The first fault that is found.
+pub fn verify_outline(module: &Module) -> Result<(), VerifyError> {
     pool::verify(module)?;
     for (index, &number) in module.toplevel.iter().enumerate() {
         verify_toplevel(module, number)
             .map_err(|fault| VerifyError { place: FaultPlace::Toplevel(index), fault })?;
     }
-    (0..module.functions.len() as u32).try_for_each(|number| verify_function(module, FunctionNumber(number)))
+    Ok(())
 }
 
-/// Checks one function of a module whose constants are in order (V13).
+/// Checks one function of a module whose outline is in order.
 ///
 /// # Errors
 /// The first fault that is found.

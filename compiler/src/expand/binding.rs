@@ -5,9 +5,9 @@ use esl_bytecode::datum::Datum;
 use esl_bytecode::symbol::Symbol;
 
 use super::expander::Expander;
-use super::form::{Checked, Form, Make, check_distinct, name, on_one_line, quoted};
+use super::form::{Checked, Form, Make, bound_twice, check_distinct, name, on_one_line, quoted};
 use super::function::Body;
-use super::job::{Job, LetBindings, To, VariableBinding};
+use super::job::{Job, LetBindings, To, UncheckedLet, VariableBinding};
 use super::origin::OriginId;
 use super::scope::{ScopeEntry, VariableMeaning};
 use super::variable::Deed;
@@ -53,44 +53,46 @@ impl Expander {
 /// Bindings of a `let` that are looked at in one part.
 const BINDINGS_AT_ONCE: usize = 1000;
 
-fn bindings(
-    expander: &Expander,
-    environment: &dyn Environment,
-    form: &Form,
-    shape: &str,
-) -> Checked<Vec<VariableBinding>> {
+/// Returns the bindings of a form as they are written.
+fn written_bindings(form: &Form, shape: &str) -> Checked<Vec<Datum>> {
     let Some(list) = form.args.first() else { return Err(form.missing(shape)) };
     let Some(items) = list.as_list() else {
         let what = format!("{shape}, not {}", quoted(list));
         return Err(form.fault(code::MALFORMED_BINDING, list.span(), &what));
     };
-    let mut bindings = Vec::with_capacity(items.len());
-    for item in items {
-        let (datum, value) = match item.as_cons() {
-            None => (item, None),
-            Some((datum, rest)) => match rest.as_list().as_deref() {
-                Some([]) => (datum, None),
-                Some([value]) => (datum, Some((*value).clone())),
-                _ => {
-                    let what = format!("needs one name and one value in each binding, not {}", quoted(item));
-                    return Err(form.fault(code::MALFORMED_BINDING, item.span(), &what));
-                }
-            },
-        };
-        if item.as_cons().is_none() && item.as_symbol().is_none() && !item.is_nil() {
-            let what = format!("needs bindings of a name and a value, not {}", quoted(item));
-            let fault = form.fault(code::MALFORMED_BINDING, item.span(), &what);
-            // `(let (x 1) …)` lacks the parentheses around its only binding.
-            let is_bare =
-                list.as_list().is_some_and(|parts| parts.len() == 2 && parts[0].as_symbol().is_some());
-            let help = format!("a list of one binding is written `({})`", on_one_line(list, 40));
-            return Err(if is_bare { Box::new(fault.help(help)) } else { fault });
-        }
-        let symbol = expander.variable_name(environment, datum, form, Deed::Bind)?;
-        let value = value.unwrap_or_else(|| Datum::nil(form.at(datum.span())));
-        bindings.push(VariableBinding { datum: datum.clone(), symbol, value });
+    Ok(items.into_iter().cloned().collect())
+}
+
+/// Takes a binding of a form apart.
+fn binding(
+    expander: &Expander,
+    environment: &dyn Environment,
+    form: &Form,
+    item: &Datum,
+) -> Checked<VariableBinding> {
+    let (datum, value) = match item.as_cons() {
+        None => (item, None),
+        Some((datum, rest)) => match rest.as_list().as_deref() {
+            Some([]) => (datum, None),
+            Some([value]) => (datum, Some((*value).clone())),
+            _ => {
+                let what = format!("needs one name and one value in each binding, not {}", quoted(item));
+                return Err(form.fault(code::MALFORMED_BINDING, item.span(), &what));
+            }
+        },
+    };
+    if item.as_cons().is_none() && item.as_symbol().is_none() && !item.is_nil() {
+        let what = format!("needs bindings of a name and a value, not {}", quoted(item));
+        let fault = form.fault(code::MALFORMED_BINDING, item.span(), &what);
+        // `(let (x 1) …)` lacks the parentheses around its only binding.
+        let list = &form.args[0];
+        let is_bare = list.as_list().is_some_and(|parts| parts.len() == 2 && parts[0].as_symbol().is_some());
+        let help = format!("a list of one binding is written `({})`", on_one_line(list, 40));
+        return Err(if is_bare { Box::new(fault.help(help)) } else { fault });
     }
-    Ok(bindings)
+    let symbol = expander.variable_name(environment, datum, form, Deed::Bind)?;
+    let value = value.unwrap_or_else(|| Datum::nil(form.at(datum.span())));
+    Ok(VariableBinding { datum: datum.clone(), symbol, value })
 }
 
 /// `(let ({name | (name [value])}*) . body)`
@@ -120,19 +122,42 @@ fn expand_let(
     to: To,
     sequential: bool,
 ) -> Checked {
-    let found = bindings(expander, environment, &form, "needs a list of bindings, such as `((x 1) (y 2))`")?;
-    if !sequential {
-        check_distinct(found.iter().map(|binding| (&binding.symbol, binding.datum.span())), &form)?;
-    }
-    let body = expander.take_body(&form.args[1..], false, &form, to.origin)?;
-    let found = found.into_iter();
-    let (jobs, entries, variables, bound) = Default::default();
-    let bindings = LetBindings { form, to, sequential, found, body, jobs, entries, variables, bound };
-    expander.go_on_with_let(environment, Box::new(bindings));
-    Ok(())
+    let items = written_bindings(&form, "needs a list of bindings, such as `((x 1) (y 2))`")?.into_iter();
+    let (found, seen) = Default::default();
+    let state = UncheckedLet { form, to, sequential, items, found, seen };
+    expander.check_let(environment, Box::new(state))
 }
 
 impl Expander {
+    /// Goes on looking at the bindings of a `let`; after the last, binds the variables.
+    pub(super) fn check_let(
+        &mut self,
+        environment: &dyn Environment,
+        mut state: Box<UncheckedLet>,
+    ) -> Checked {
+        let UncheckedLet { form, sequential, items, found, seen, .. } = &mut *state;
+        for item in items.by_ref().take(BINDINGS_AT_ONCE) {
+            self.checked_bindings += 1;
+            let binding = binding(self, environment, form, &item)?;
+            let span = binding.datum.span();
+            if !*sequential && let Some(first) = seen.insert(binding.symbol.clone(), span) {
+                return Err(bound_twice(&binding.symbol, (first, span), form));
+            }
+            found.push(binding);
+        }
+        if items.len() > 0 {
+            self.schedule([Job::CheckLet(state)]);
+            return Ok(());
+        }
+        let UncheckedLet { form, to, sequential, found, .. } = *state;
+        let body = self.take_body(&form.args[1..], false, &form, to.origin)?;
+        let found = found.into_iter();
+        let (jobs, entries, variables, bound) = Default::default();
+        let bindings = LetBindings { form, to, sequential, found, body, jobs, entries, variables, bound };
+        self.go_on_with_let(environment, Box::new(bindings));
+        Ok(())
+    }
+
     /// Goes on with the variables of a `let`; after the last, schedules what is inside.
     pub(super) fn go_on_with_let(&mut self, environment: &dyn Environment, mut state: Box<LetBindings>) {
         let LetBindings { form, to, sequential, found, body, jobs, entries, variables, bound } = &mut *state;
@@ -158,7 +183,7 @@ impl Expander {
             inside = self.result(to);
             self.fill(to, NodeKind::Let { sequential, bindings: variables, body: inside.node });
         }
-        let free = body.free_specials(&bound);
+        let free = body.free_declarations(&bound);
         let count = bound.len() + free.len();
         entries.extend(free);
         jobs.push(Job::Enter(entries));
@@ -204,7 +229,7 @@ pub(super) fn multiple_value_bind(
     let inside = expander.result(to);
     expander.fill(to, NodeKind::BindValues(variables, values, inside.node));
     let bound: Vec<Symbol> = names.into_iter().map(|(symbol, _)| symbol).collect();
-    entries.extend(body.free_specials(&bound));
+    entries.extend(body.free_declarations(&bound));
     let count = entries.len();
     let mut jobs = vec![job, Job::Enter(entries)];
     jobs.extend(expander.body(std::mem::take(&mut body.forms), inside));
@@ -257,7 +282,10 @@ pub(super) fn symbol_macros(
     origin: Option<OriginId>,
 ) -> Checked<(Vec<ScopeEntry>, Body)> {
     let shape = "needs a list of names and expansions, such as `((x (car y)))`";
-    let found = bindings(expander, environment, form, shape)?;
+    let items = written_bindings(form, shape)?;
+    let found: Checked<Vec<VariableBinding>> =
+        items.iter().map(|item| binding(expander, environment, form, item)).collect();
+    let found = found?;
     let items = form.args[0].as_list().unwrap_or_default();
     if let Some(item) = items.iter().find(|item| item.as_list().is_none_or(|parts| parts.len() != 2)) {
         let what = "needs a name and an expansion in each definition";
@@ -273,7 +301,7 @@ pub(super) fn symbol_macros(
         }
         entries.push(ScopeEntry::Variable(symbol, VariableMeaning::SymbolMacro(value), None));
     }
-    entries.extend(body.free_specials(&[]));
+    entries.extend(body.free_declarations(&[]));
     Ok((entries, body))
 }
 
@@ -292,7 +320,7 @@ pub(super) fn symbol_macrolet(
 /// `(locally . body)`
 pub(super) fn locally(expander: &mut Expander, _: &mut dyn Environment, form: Form, to: To) -> Checked {
     let body = expander.take_body(&form.args, false, &form, to.origin)?;
-    expander.scoped_body(body.free_specials(&[]), body.forms, to);
+    expander.scoped_body(body.free_declarations(&[]), body.forms, to);
     Ok(())
 }
 

@@ -13,18 +13,8 @@ use crate::core::NodeKind;
 use crate::diagnostic::code;
 
 /// Declarations that are accepted without effect.
-const WITHOUT_EFFECT: &[&str] = &[
-    "INDENT",
-    "TYPE",
-    "FTYPE",
-    "FUNCTION",
-    "INLINE",
-    "NOTINLINE",
-    "OPTIMIZE",
-    "DYNAMIC-EXTENT",
-    "VALUES",
-    "DECLARATION",
-];
+const WITHOUT_EFFECT: &[&str] =
+    &["INDENT", "TYPE", "FTYPE", "FUNCTION", "OPTIMIZE", "DYNAMIC-EXTENT", "VALUES", "DECLARATION"];
 
 impl Expander {
     /// Takes a body apart. With `documentation`, a string that a form follows is the documentation.
@@ -89,6 +79,10 @@ impl Expander {
                     }
                 }
             }
+        } else if symbol.is_cl("INLINE") || symbol.is_cl("NOTINLINE") {
+            let is_written = symbol.is_cl("NOTINLINE");
+            let functions = names.iter().filter_map(|name| name.as_symbol());
+            body.written.extend(functions.map(|name| (name.clone(), is_written)));
         } else if symbol.is_cl("IGNORE") || symbol.is_cl("IGNORABLE") {
             // `(function f)` declares a function, and unused functions are not reported.
             body.ignored.extend(names.iter().filter_map(|name| name.as_symbol().cloned()));

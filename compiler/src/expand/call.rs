@@ -75,6 +75,10 @@ impl Expander {
         }
         if let Some(compiler_macro) = environment.property(&form.operator, &Symbol::esl("%COMPILER-MACRO"))
             && let Some(compiler_macro) = compiler_macro.as_symbol()
+            && !self
+                .scope
+                .is_written(&form.operator)
+                .unwrap_or_else(|| environment.property(&form.operator, &Symbol::esl("%NOTINLINE")).is_some())
         {
             let function = MacroRef::Global(compiler_macro.clone());
             let waiting = |origin| AwaitedOutcome::Call(form.clone(), To { origin, ..to });

@@ -188,13 +188,17 @@ pub(super) fn proclamations(
         expander.declaration(specifier, &mut body, form, origin)?;
     }
     let make = Make(form.span);
-    if body.specials.is_empty() {
+    if body.specials.is_empty() && body.written.is_empty() {
         return Ok(make.nil());
     }
-    let effects = body
-        .specials
-        .iter()
-        .map(|symbol| make.call_esl("%PROCLAIM-SPECIAL", [make.quote(make.symbol(symbol))]));
+    let specials = body.specials.iter();
+    let specials =
+        specials.map(|symbol| make.call_esl("%PROCLAIM-SPECIAL", [make.quote(make.symbol(symbol))]));
+    let written = body.written.iter().map(|(name, is_written)| {
+        let to = if *is_written { make.symbol(&Symbol::cl("T")) } else { make.nil() };
+        make.call_esl("%PROCLAIM-NOTINLINE", [make.quote(make.symbol(name)), to])
+    });
+    let effects = specials.chain(written);
     Ok(make.cl("EVAL-WHEN", std::iter::once(always(make)).chain(effects)))
 }
 

@@ -95,6 +95,8 @@ pub struct Expander {
     passed: u64,
     /// Jobs until the size of the current top-level form is looked at.
     unmeasured: u32,
+    /// Number of bindings of `let` forms that are known to be in order.
+    pub(super) checked_bindings: u64,
     /// Uses and definitions of global names.
     pub(super) globals: GlobalUses,
 }
@@ -121,6 +123,7 @@ impl Expander {
             is_given_up: false,
             passed: 0,
             unmeasured: 0,
+            checked_bindings: 0,
             globals: GlobalUses::default(),
         }
     }
@@ -151,9 +154,9 @@ impl Expander {
         self.passed += work.take_passed();
         loop {
             let Some(job) = self.jobs.pop() else { return Stop::Done };
-            let made = self.nodes_made();
+            let before = self.progress();
             self.work(environment, job);
-            work.add(self.nodes_made().saturating_sub(made) + 1);
+            work.add(self.progress().saturating_sub(before) + 1);
             if let Some(stop) = self.stopped.take() {
                 return stop;
             }
@@ -163,9 +166,9 @@ impl Expander {
         }
     }
 
-    /// Returns the number of nodes in the chunk that is being built.
-    fn nodes_made(&self) -> u64 {
-        self.open.last().map_or(0, |open| open.core.nodes.len() as u64)
+    /// Returns the number of nodes in the chunk that is being built, and of the bindings looked at before.
+    fn progress(&self) -> u64 {
+        self.open.last().map_or(0, |open| open.core.nodes.len() as u64) + self.checked_bindings
     }
 
     /// Returns about how many bytes the expansion of the current top-level form takes.
@@ -213,6 +216,7 @@ impl Expander {
         if self.is_given_up {
             match job {
                 Job::Expand(_, to) => return self.fill_nil(to),
+                Job::CheckLet(state) => return self.fill_nil(state.to),
                 Job::Place(_, to) => return self.places.push(SetfExpansion::broken(to.span)),
                 Job::Macro(..) => return self.objects.push(None),
                 Job::TopLevel(..) => return,
@@ -240,6 +244,11 @@ impl Expander {
                         self.check_use(&gone);
                     }
                 }
+            }
+            Job::CheckLet(state) => {
+                let to = state.to;
+                let outcome = self.check_let(environment, state);
+                self.settle(outcome, to);
             }
             Job::Let(bindings) => self.go_on_with_let(environment, bindings),
             Job::Lambda(text, lambda, to) => self.expand_lambda(environment, *text, lambda, to),

@@ -314,12 +314,17 @@ pub(super) fn check_distinct<'a>(
     let mut seen = FxHashMap::default();
     for (symbol, span) in names {
         if let Some(first) = seen.insert(symbol, span) {
-            let message = format!("{} is bound twice", name(symbol));
-            let diagnostic = code::DUPLICATE_PARAMETER.at(form.at(span), message);
-            return Err(Box::new(diagnostic.also(form.at(first), "it is bound here already")));
+            return Err(bound_twice(symbol, (first, span), form));
         }
     }
     Ok(())
+}
+
+/// The error for a name that a form binds at two places.
+pub(super) fn bound_twice(symbol: &Symbol, (first, second): (Span, Span), form: &Form) -> Box<Diagnostic> {
+    let message = format!("{} is bound twice", name(symbol));
+    let diagnostic = code::DUPLICATE_PARAMETER.at(form.at(second), message);
+    Box::new(diagnostic.also(form.at(first), "it is bound here already"))
 }
 
 /// Returns the place of `datum` if that is known, and `otherwise` if not.

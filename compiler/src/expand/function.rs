@@ -99,6 +99,8 @@ impl WrittenName {
 pub(super) struct Body {
     /// Names declared special.
     pub(super) specials: Vec<Symbol>,
+    /// Functions declared `notinline`, or `inline`.
+    pub(super) written: Vec<(Symbol, bool)>,
     /// Names declared `ignore` or `ignorable`.
     pub(super) ignored: Vec<Symbol>,
     /// Documentation string.
@@ -109,10 +111,13 @@ pub(super) struct Body {
 }
 
 impl Body {
-    /// Returns entries for the names that are declared special but not bound by the form itself.
-    pub(super) fn free_specials(&self, bound: &[Symbol]) -> Vec<ScopeEntry> {
+    /// Returns entries for what is declared of names that the form itself does not bind: which variables are
+    /// special, and whether calls of functions stay as they are written.
+    pub(super) fn free_declarations(&self, bound: &[Symbol]) -> Vec<ScopeEntry> {
         let free = self.specials.iter().filter(|symbol| !bound.contains(symbol));
-        free.map(|symbol| ScopeEntry::Variable(symbol.clone(), VariableMeaning::Special, None)).collect()
+        let special = free.map(|symbol| ScopeEntry::Variable(symbol.clone(), VariableMeaning::Special, None));
+        let written = self.written.iter().map(|(name, is)| ScopeEntry::Written(name.clone(), *is));
+        special.chain(written).collect()
     }
 }
 

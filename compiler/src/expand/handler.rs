@@ -72,7 +72,7 @@ pub(super) fn handler_case(
                 entries.push(ScopeEntry::Variable(name.clone(), VariableMeaning::Lexical(variable), report));
             }
         }
-        entries.extend(body.free_specials(&[name]));
+        entries.extend(body.free_declarations(&[name]));
         clauses.push(HandlerClause {
             condition_type: (*condition_type).clone(),
             variable,

@@ -6,6 +6,7 @@
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
+use rustc_hash::FxHashMap;
 
 use super::form::{Form, is_known};
 use super::function::{Body, FunctionText};
@@ -93,6 +94,22 @@ pub(super) struct VariableBinding {
     pub(super) value: Datum,
 }
 
+/// A `let` some of whose bindings are known to be in order.
+#[derive(Debug)]
+pub(super) struct UncheckedLet {
+    /// The whole form.
+    pub(super) form: Form,
+    pub(super) to: To,
+    /// Whether variables are bound one after another.
+    pub(super) sequential: bool,
+    /// Bindings that are to be looked at, as written.
+    pub(super) items: std::vec::IntoIter<Datum>,
+    /// Bindings that are in order.
+    pub(super) found: Vec<VariableBinding>,
+    /// Places of the names, which must differ unless variables are bound one after another.
+    pub(super) seen: FxHashMap<Symbol, Span>,
+}
+
 /// A `let` some of whose variables are bound.
 #[derive(Debug)]
 pub(super) struct LetBindings {
@@ -125,6 +142,8 @@ pub(super) enum Job {
     Leave(usize),
     /// Expands the text of a function.
     Lambda(Box<FunctionText>, LambdaId, To),
+    /// Looks at more bindings of a `let`.
+    CheckLet(Box<UncheckedLet>),
     /// Binds more variables of a `let`.
     Let(Box<LetBindings>),
     /// Compiles the function of a local macro, given as a form.

@@ -102,7 +102,7 @@ impl Expander {
 
         let Filling { mut jobs, bound, .. } = filling;
         let mut count = bound.len();
-        let mut entries = body.free_specials(&bound);
+        let mut entries = body.free_declarations(&bound);
         if let Some(block) = block {
             let id = self.block(Some(block.clone()), inner);
             let within = self.child(inner);

@@ -118,7 +118,7 @@ fn local_functions(
     let inside = expander.child(to);
     expander.fill(to, NodeKind::Functions { definitions: functions, body: inside.node });
 
-    let free = body.free_specials(&[]);
+    let free = body.free_declarations(&[]);
     let count = entries.len() + free.len();
     let mut jobs = Vec::new();
     if recursive {
@@ -158,7 +158,7 @@ pub(super) fn local_macros(
         names.push(name.cell);
     }
     let body = expander.take_body(&form.args[1..], false, form, to.origin)?;
-    let free = body.free_specials(&[]);
+    let free = body.free_declarations(&[]);
     let count = names.len() + free.len();
     jobs.push(Job::EnterMacros(names));
     jobs.push(Job::Enter(free));

@@ -71,6 +71,8 @@ pub(super) enum ScopeEntry {
     Block(Symbol, BlockId),
     /// A tag, and its number in the tagbody.
     Tag(Tag, TagbodyId, u32),
+    /// Whether compiler macros leave calls of a function as they are written.
+    Written(Symbol, bool),
 }
 
 /// A lexical variable that has gone out of scope, to be reported if it is unused.
@@ -106,6 +108,7 @@ enum Undo {
     Function(Symbol, Option<Held<FunctionMeaning>>, Option<Arc<[LocalDefinition]>>),
     Block(Symbol, Option<Held<BlockId>>),
     Tag(Tag, Option<Held<(TagbodyId, u32)>>),
+    Written(Symbol, Option<bool>),
 }
 
 /// The local meanings of names.
@@ -115,6 +118,8 @@ pub(super) struct Scope {
     functions: FxHashMap<Symbol, Held<FunctionMeaning>>,
     blocks: FxHashMap<Symbol, Held<BlockId>>,
     tags: FxHashMap<Tag, Held<(TagbodyId, u32)>>,
+    /// Functions that are declared `notinline` here, or `inline`.
+    written: FxHashMap<Symbol, bool>,
     log: Vec<Undo>,
     /// Functions and macros in scope, the innermost last.
     definitions: Vec<LocalDefinition>,
@@ -147,6 +152,10 @@ impl Scope {
                 let old = self.tags.insert(tag.clone(), Held { meaning: (tagbody, number), level });
                 Undo::Tag(tag, old)
             }
+            ScopeEntry::Written(name, is_written) => {
+                let old = self.written.insert(name.clone(), is_written);
+                Undo::Written(name, old)
+            }
         };
         self.log.push(undo);
     }
@@ -177,6 +186,13 @@ impl Scope {
                 restore(&mut self.tags, &tag, old);
                 None
             }
+            Undo::Written(name, old) => {
+                match old {
+                    Some(old) => self.written.insert(name, old),
+                    None => self.written.remove(&name),
+                };
+                None
+            }
         }
     }
 
@@ -200,6 +216,11 @@ impl Scope {
             }
             Some(held) => Visible::Is(held.meaning.clone()),
         }
+    }
+
+    /// Returns whether calls of the function `name` stay as they are written; `None` if nothing is declared.
+    pub(super) fn is_written(&self, name: &Symbol) -> Option<bool> {
+        self.written.get(name).copied()
     }
 
     /// Returns the block called `name`.

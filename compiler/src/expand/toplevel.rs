@@ -77,7 +77,7 @@ impl Expander {
             "PROGN" => self.top_forms(form.args, top),
             "LOCALLY" => {
                 let body = self.take_body(&form.args, false, &form, top.origin)?;
-                let entries = body.free_specials(&[]);
+                let entries = body.free_declarations(&[]);
                 let count = entries.len();
                 self.top_scope(vec![Job::Enter(entries)], count, body.forms, top);
             }

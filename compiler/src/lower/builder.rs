@@ -22,6 +22,8 @@ pub(super) struct OversizedFunction {
     pub(super) lambda: LambdaId,
     /// Whether it would be too large without a body.
     pub(super) has_too_many_parameters: bool,
+    /// Whether it makes a closure with too many captures, or is one.
+    pub(super) has_many_captures: bool,
     pub(super) diagnostic: Diagnostic,
 }
 

@@ -57,7 +57,12 @@ impl ModuleBuilder<'_> {
         if has_too_many_parameters {
             let diagnostic =
                 too_large(text, "parameters").help("take the rest of them as a list, with `&rest`");
-            self.oversized.push(OversizedFunction { lambda, has_too_many_parameters, diagnostic });
+            self.oversized.push(OversizedFunction {
+                lambda,
+                has_too_many_parameters,
+                has_many_captures: false,
+                diagnostic,
+            });
             return ModuleFunction::default();
         }
         let mut builder = FunctionBuilder::new(self, lambda);
@@ -74,6 +79,7 @@ impl ModuleBuilder<'_> {
                 |one, other| name(one).name() == name(other).name() && is_shown(one) && is_shown(other);
             assemble(&builder.graph, builder.module.lines, have_one_name)
         };
+        let has_many_captures = builder.excess == Some(Excess::Captures);
         if builder.registers.has_overflowed() {
             builder.excess = Some(Excess::Registers);
         }
@@ -84,7 +90,12 @@ impl ModuleBuilder<'_> {
         let (registers, constants, excess) = (builder.registers.used(), builder.constants, builder.excess);
         if let Some(excess) = excess {
             let diagnostic = too_large(text, excess.what()).help("divide it into several functions");
-            self.oversized.push(OversizedFunction { lambda, has_too_many_parameters, diagnostic });
+            self.oversized.push(OversizedFunction {
+                lambda,
+                has_too_many_parameters,
+                has_many_captures,
+                diagnostic,
+            });
         }
         let variables = self.variable_ranges(lambda, &code);
         let AssembledCode { words: code, lines, .. } = code;

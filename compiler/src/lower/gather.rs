@@ -4,6 +4,9 @@
 //! Closures capture the vector instead of the variables, of which they may refer to any number; and parts
 //! into which the function is divided (`split`) do the same. This happens only in functions that do not fit
 //! otherwise, since it makes each access slower.
+//!
+//! Where a closure has more captures than the format has room for, the variables of forms inside each other
+//! share one vector, as far as the inner forms are entered at most once each time the outer one is.
 
 use esl_bytecode::builtin::Builtin;
 use esl_bytecode::compile::Work;
@@ -22,34 +25,94 @@ type VectorPlace = (VarId, u32);
 /// each is given the same form.
 pub(super) struct GatheredVariables {
     places: FxHashMap<VarId, VectorPlace>,
-    /// Nodes that are still to be looked at, and the lambdas that they belong to.
-    pending: Vec<(NodeId, LambdaId)>,
+    /// Nodes that are still to be looked at, and where they are.
+    pending: Vec<(NodeId, GatherSite)>,
+    /// Vectors so far.
+    vectors: Vec<GatheredVector>,
+    /// The `let` whose variables are being moved.
+    current: Option<GatheredLet>,
     /// Number of nodes in which references have been replaced.
     replaced: usize,
     most: usize,
+    /// Whether forms inside each other share a vector.
+    shares: bool,
+}
+
+/// Where a node is: the lambda that it belongs to, and the number of the vector that it may share.
+#[derive(Clone, Copy)]
+struct GatherSite {
+    lambda: LambdaId,
+    vector: Option<usize>,
+}
+
+/// A `let` whose variables are being moved.
+struct GatheredLet {
+    node: NodeId,
+    site: GatherSite,
+    sequential: bool,
+    bindings: Vec<(BoundVariable, NodeId)>,
+    body: NodeId,
+    /// Number of the vector, and the first place there that is free.
+    vector: usize,
+    place: u32,
+    /// Number of bindings that are seen to.
+    done: usize,
+}
+
+/// A vector of variables.
+struct GatheredVector {
+    variable: VarId,
+    /// Node of its size.
+    size: NodeId,
+    /// Places in use.
+    used: u32,
 }
 
 impl GatheredVariables {
-    /// Begins with the texts of `lambdas`, where a `let` may have `most` variables.
-    pub(super) fn new(core: &Core, lambdas: &[LambdaId], most: usize) -> GatheredVariables {
+    /// Begins with the texts of `lambdas`, where a `let` may have `most` variables. If it `shares` vectors,
+    /// all variables go into some.
+    pub(super) fn new(core: &Core, lambdas: &[LambdaId], most: usize, shares: bool) -> GatheredVariables {
         let mut pending = Vec::new();
         for &lambda in lambdas {
-            lambda_nodes(&core.lambdas[lambda.index()], &mut |node| pending.push((node, lambda)));
+            let site = GatherSite { lambda, vector: None };
+            lambda_nodes(&core.lambdas[lambda.index()], &mut |node| pending.push((node, site)));
         }
-        GatheredVariables { places: FxHashMap::default(), pending, replaced: 0, most }
+        let most = if shares { 0 } else { most };
+        let (places, vectors) = (FxHashMap::default(), Vec::new());
+        GatheredVariables { places, pending, vectors, current: None, replaced: 0, most, shares }
     }
 
     /// Goes on. Returns whether all is done; otherwise the work that is allowed is done.
     pub(super) fn run(&mut self, core: &mut Core, work: &mut Work) -> bool {
-        while let Some((node, lambda)) = self.pending.pop() {
+        loop {
+            let mut gatherer = Gatherer { core, places: &mut self.places, vectors: &mut self.vectors };
+            if let Some(mut current) = self.current.take() {
+                if !gatherer.store(&mut current, work) {
+                    self.current = Some(current);
+                    return false;
+                }
+                gatherer.finish(current);
+            }
+            let Some((node, site)) = self.pending.pop() else { break };
             if work.is_done() {
-                self.pending.push((node, lambda));
+                self.pending.push((node, site));
                 return false;
             }
             let before = self.pending.len();
-            children(&core.nodes[node.index()].kind, &mut |child| self.pending.push((child, lambda)));
+            let kind = &gatherer.core.nodes[node.index()].kind;
+            children(kind, &mut |child| self.pending.push((child, site)));
+            // What is inside these may be entered again.
+            let repeats = matches!(kind, NodeKind::Tagbody(..) | NodeKind::Recovery { .. });
             work.add(1 + (self.pending.len() - before) as u64 / PARTS_PER_UNIT);
-            Gatherer { core, places: &mut self.places }.let_form(node, lambda, self.most);
+            self.current = gatherer.begin(node, site, self.most);
+            let vector = self.current.as_ref().map(|current| current.vector);
+            if let Some(vector) = vector.map(Some).or(repeats.then_some(None)).filter(|_| self.shares) {
+                self.pending[before..].iter_mut().for_each(|(_, site)| site.vector = vector);
+            }
+        }
+        for GatheredVector { size, used, .. } in self.vectors.drain(..) {
+            let size = &mut core.nodes[size.index()];
+            size.kind = NodeKind::Constant(Datum::integer(used, size.span));
         }
         // Without places there is nothing to replace.
         let end = if self.places.is_empty() { 0 } else { core.nodes.len() };
@@ -59,7 +122,7 @@ impl GatheredVariables {
             }
             work.add(1);
             for index in self.replaced..end.min(self.replaced + PARTS_PER_UNIT as usize) {
-                Gatherer { core, places: &mut self.places }.reference(index);
+                Gatherer { core, places: &mut self.places, vectors: &mut self.vectors }.reference(index);
             }
             self.replaced += PARTS_PER_UNIT as usize;
         }
@@ -71,10 +134,17 @@ impl GatheredVariables {
 
 /// Nodes that count as a unit of work.
 const PARTS_PER_UNIT: u64 = 8;
+/// Bindings that count as a unit of work.
+const BINDINGS_PER_UNIT: usize = 2;
+
+fn is_lexical(target: &BoundVariable) -> bool {
+    matches!(target, BoundVariable::Lexical(_))
+}
 
 struct Gatherer<'a> {
     core: &'a mut Core,
     places: &'a mut FxHashMap<VarId, VectorPlace>,
+    vectors: &'a mut Vec<GatheredVector>,
 }
 
 impl Gatherer<'_> {
@@ -83,21 +153,77 @@ impl Gatherer<'_> {
         NodeId(self.core.nodes.len() as u32 - 1)
     }
 
-    /// Gives the variables of a `let` places in a vector, if they are too many.
-    fn let_form(&mut self, node: NodeId, lambda: LambdaId, most: usize) {
+    /// Begins to give the variables of a `let` places in a vector, if they are too many: in that of the site,
+    /// if it has one.
+    fn begin(&mut self, node: NodeId, site: GatherSite, most: usize) -> Option<GatheredLet> {
         let Node { kind: NodeKind::Let { bindings, .. }, span } = &mut self.core.nodes[node.index()] else {
-            return;
+            return None;
         };
-        let is_lexical = |target: &BoundVariable| matches!(target, BoundVariable::Lexical(_));
         let count = bindings.iter().filter(|(target, _)| is_lexical(target)).count();
         if count <= most {
-            return;
+            return None;
         }
         let (span, old) = (*span, std::mem::replace(&mut self.core.nodes[node.index()].kind, NodeKind::Hole));
-        let NodeKind::Let { sequential, mut bindings, body } = old else {
+        let NodeKind::Let { sequential, bindings, body } = old else {
             unreachable!("the kind was looked at above")
         };
-        let vector = VarId(self.core.variables.len() as u32);
+        let number = site.vector.unwrap_or_else(|| self.vector(site.lambda, span));
+        let vector = &mut self.vectors[number];
+        let place = vector.used;
+        vector.used += count as u32;
+        Some(GatheredLet { node, site, sequential, bindings, body, vector: number, place, done: 0 })
+    }
+
+    /// Has the values of variables stored where they would be bound; names are resolved, so it makes no
+    /// difference that a variable of a parallel `let` has its value before others are computed. Returns
+    /// whether all are seen to; otherwise the work that is allowed is done.
+    fn store(&mut self, current: &mut GatheredLet, work: &mut Work) -> bool {
+        let variable = self.vectors[current.vector].variable;
+        while let Some((target, value)) = current.bindings.get_mut(current.done) {
+            if current.done.is_multiple_of(BINDINGS_PER_UNIT) {
+                if work.is_done() {
+                    return false;
+                }
+                work.add(1);
+            }
+            current.done += 1;
+            let BoundVariable::Lexical(bound) = *target else { continue };
+            let place = (variable, current.place);
+            current.place += 1;
+            self.places.insert(bound, place);
+            let span = self.core.nodes[value.index()].span;
+            let store = self.set(place, *value, span);
+            *value = self.node(store, span);
+        }
+        true
+    }
+
+    /// Puts what is left of a `let` in its place.
+    fn finish(&mut self, current: GatheredLet) {
+        let GatheredLet { node, site, sequential, bindings, body, vector, .. } = current;
+        let span = self.core.nodes[node.index()].span;
+        let inner = if bindings.iter().all(|(target, _)| is_lexical(target)) {
+            let forms = bindings.into_iter().map(|(_, value)| value).chain([body]).collect();
+            NodeKind::Progn(forms)
+        } else {
+            NodeKind::Let { sequential, bindings, body }
+        };
+        if site.vector.is_some() {
+            self.core.nodes[node.index()].kind = inner;
+            return;
+        }
+        let inner = self.node(inner, span);
+        let nothing = self.node(NodeKind::Constant(Datum::nil(span)), span);
+        let GatheredVector { variable, size, .. } = self.vectors[vector];
+        let make = NodeKind::Call(Callee::Builtin(Builtin::MakeVector), vec![size, nothing]);
+        let make = self.node(make, span);
+        let bindings = vec![(BoundVariable::Lexical(variable), make)];
+        self.core.nodes[node.index()].kind = NodeKind::Let { sequential: true, bindings, body: inner };
+    }
+
+    /// Adds a vector that a form of this lambda makes, and returns its number.
+    fn vector(&mut self, lambda: LambdaId, span: Span) -> usize {
+        let variable = VarId(self.core.variables.len() as u32);
         self.core.variables.push(Variable {
             name: Symbol::esl("%VARIABLES"),
             span,
@@ -107,31 +233,9 @@ impl Gatherer<'_> {
             is_read: true,
             never_returns: false,
         });
-        // Their values are stored where they would be bound; names are resolved, so it makes no difference
-        // that a variable of a parallel `let` has its value before others are computed.
-        let mut index = 0;
-        for (target, value) in &mut bindings {
-            let BoundVariable::Lexical(variable) = *target else { continue };
-            let place = (vector, index);
-            index += 1;
-            self.places.insert(variable, place);
-            let span = self.core.nodes[value.index()].span;
-            let store = self.set(place, *value, span);
-            *value = self.node(store, span);
-        }
-        let inner = if bindings.iter().all(|(target, _)| is_lexical(target)) {
-            let forms = bindings.into_iter().map(|(_, value)| value).chain([body]).collect();
-            NodeKind::Progn(forms)
-        } else {
-            NodeKind::Let { sequential, bindings, body }
-        };
-        let inner = self.node(inner, span);
-        let size = self.node(NodeKind::Constant(Datum::integer(index, span)), span);
-        let nothing = self.node(NodeKind::Constant(Datum::nil(span)), span);
-        let make = NodeKind::Call(Callee::Builtin(Builtin::MakeVector), vec![size, nothing]);
-        let make = self.node(make, span);
-        let bindings = vec![(BoundVariable::Lexical(vector), make)];
-        self.core.nodes[node.index()].kind = NodeKind::Let { sequential: true, bindings, body: inner };
+        let size = self.node(NodeKind::Hole, span);
+        self.vectors.push(GatheredVector { variable, size, used: 0 });
+        self.vectors.len() - 1
     }
 
     /// Returns the operands that lead to a place.

@@ -93,6 +93,8 @@ enum LoweringStage {
     Inline(Box<InlineDecision>),
     Resolve(Box<ResolveWalk>),
     Functions(Box<SuspendedBuilder>, Vec<ModuleFunction>),
+    /// The form is freed, which takes a part of the time that it takes to make it.
+    Free(Box<Module>),
 }
 
 impl Lowering {
@@ -109,8 +111,8 @@ impl Lowering {
     }
 
     /// Has functions divided next.
-    fn divide(&mut self, lambdas: Vec<LambdaId>, limits: split::Limits) {
-        let division = split::FunctionDivision::new(&self.core, lambdas, limits);
+    fn divide(&mut self, lambdas: Vec<LambdaId>, limits: split::Limits, shares_vectors: bool) {
+        let division = split::FunctionDivision::new(&self.core, lambdas, limits, shares_vectors);
         self.stage = LoweringStage::Divide(Box::new(division));
     }
 
@@ -124,7 +126,7 @@ impl Lowering {
                         work.add(self.core.nodes.len() as u64 / NODES_PER_UNIT);
                         let large = split::larger_than(&self.core, LARGE_FUNCTION);
                         if !large.is_empty() {
-                            self.divide(large, split::LIMITS[0]);
+                            self.divide(large, split::LIMITS[0], false);
                             continue;
                         }
                     }
@@ -160,7 +162,8 @@ impl Lowering {
                         return None;
                     }
                     if builder.oversized.is_empty() {
-                        return Some(Ok(builder.module(functions)));
+                        self.stage = LoweringStage::Free(Box::new(builder.module(functions)));
+                        continue;
                     }
                     // To divide the texts of functions does not give them fewer parameters.
                     let parameters = |function: &&OversizedFunction| function.has_too_many_parameters;
@@ -184,8 +187,21 @@ impl Lowering {
                             builder.oversized.iter().any(|function| function.lambda == frame)
                         })
                         .collect();
+                    let shares_vectors = builder.oversized.iter().any(|function| function.has_many_captures);
                     drop(builder);
-                    self.divide(too_large, limits);
+                    self.divide(too_large, limits, shares_vectors);
+                }
+                LoweringStage::Free(module) => {
+                    let left = self.core.nodes.len();
+                    if left == 0 {
+                        return Some(Ok(*module));
+                    }
+                    self.stage = LoweringStage::Free(module);
+                    if work.is_done() {
+                        return None;
+                    }
+                    self.core.nodes.truncate(left.saturating_sub(FREED_PER_UNIT));
+                    work.add(1);
                 }
             }
         }
@@ -194,6 +210,9 @@ impl Lowering {
 
 /// Number of nodes above which a function is divided before it is lowered, since that is done in one part.
 const LARGE_FUNCTION: usize = 12_000;
+
+/// Nodes that are freed in a unit of work.
+const FREED_PER_UNIT: usize = 64;
 
 /// Nodes that count as a unit of work where the whole form is looked at.
 const NODES_PER_UNIT: u64 = 8;

@@ -86,8 +86,14 @@ struct CurrentRoot {
 
 impl FunctionDivision {
     /// Begins to divide the texts of `lambdas`.
-    pub(super) fn new(core: &Core, lambdas: Vec<LambdaId>, limits: Limits) -> FunctionDivision {
-        let variables = GatheredVariables::new(core, &lambdas, limits.bindings);
+    /// If they make closures with too many captures, their variables share vectors.
+    pub(super) fn new(
+        core: &Core,
+        lambdas: Vec<LambdaId>,
+        limits: Limits,
+        shares_vectors: bool,
+    ) -> FunctionDivision {
+        let variables = GatheredVariables::new(core, &lambdas, limits.bindings, shares_vectors);
         let roots = Vec::new();
         FunctionDivision {
             limits,
@@ -137,7 +143,7 @@ impl FunctionDivision {
 /// Divides the texts of `lambdas`.
 #[cfg(test)]
 pub(super) fn split(core: &mut Core, lambdas: &[LambdaId], limits: Limits) {
-    FunctionDivision::new(core, lambdas.to_vec(), limits).run(core, &mut Work::unbounded());
+    FunctionDivision::new(core, lambdas.to_vec(), limits, false).run(core, &mut Work::unbounded());
 }
 
 /// Nodes that count as a unit of work.

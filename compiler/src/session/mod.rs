@@ -520,7 +520,11 @@ impl CompilationState {
             self.renumber(diagnostic);
         }
         let has_failed = diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error);
-        let mut module = (!has_failed).then(|| join(std::mem::take(&mut self.chunks)));
+        let mut module = (!has_failed).then(|| match std::mem::take(&mut self.chunks) {
+            // Joining takes as long as making.
+            mut chunks if chunks.len() == 1 => chunks.swap_remove(0),
+            chunks => join(chunks),
+        });
         if let (Some(module), FormSource::Texts(queue)) = (&mut module, &mut self.input) {
             module.requires = if self.apart { queue.take_apart() } else { Vec::new() };
         }

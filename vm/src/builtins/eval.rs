@@ -44,7 +44,7 @@ use crate::host::Host;
 use crate::raise::{Exit, Outcome, Raised};
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::world::load::{Alone, load};
+use crate::world::load::{Alone, ModuleLoad, load};
 
 use super::expect::exactly;
 use super::integer::radix;
@@ -62,8 +62,11 @@ fn is_unfinished(code: &str) -> bool {
 /// work, which is worth more than a cell of a list.
 const WORK_UNITS: usize = 256;
 
-/// Nodes of a form that become a datum in one step.
-const FORM_STEP: usize = 8192;
+/// Steps of the walk in which a form becomes a datum that are taken at once.
+const FORM_STEP: usize = 4096;
+
+/// Data of a compilation that has ended that are freed in one step.
+const FREED_STEP: usize = 4096;
 
 /// As [`WORK_UNITS`], for each of these.
 const FORM_UNITS: usize = 16;
@@ -71,8 +74,7 @@ const FORM_UNITS: usize = 16;
 /// Begins a compilation and returns its handle. `is_nameless` says whether its form comes from a text
 /// without a name.
 fn begin(vm: &mut Vm, compilation: Box<dyn Compilation>, unit: Unit, is_nameless: bool) -> Value {
-    let running =
-        ActiveCompilation { compilation, unit, expansion: None, step: None, keeps: false, is_nameless };
+    let running = ActiveCompilation::new(compilation, unit, is_nameless);
     let handle = vm.compiler.add(CompilerJob::Compilation(Box::new(running)));
     recount(vm);
     handle
@@ -108,8 +110,7 @@ fn go_on_with_form(vm: &mut Vm, form: &mut FormWalk) -> Result<Option<ActiveComp
     };
     let compilation = environment::with_compiler(vm, |_, compiler| compiler.compile_form(datum, None))?;
     let unit = std::mem::take(&mut form.unit);
-    let is_nameless = false;
-    Ok(Some(ActiveCompilation { compilation, unit, expansion: None, step: None, keeps: false, is_nameless }))
+    Ok(Some(ActiveCompilation::new(compilation, unit, false)))
 }
 
 /// Returns the outcome of the last step, as the program tells it; `None` if a part of the work that makes a
@@ -159,8 +160,8 @@ fn answer(
     }))
 }
 
-/// Tells the program what a compilation wants.
-fn tell(vm: &mut Vm, compilation: &dyn Compilation, step: &Step) -> Outcome {
+/// Tells the program what a compilation wants. `functions` run the module of the step, if it has one.
+fn tell(vm: &mut Vm, compilation: &dyn Compilation, step: &Step, functions: Value) -> Outcome {
     let mut results = [Value::NIL; 4];
     let kind = match step {
         Step::Expand(call) => {
@@ -171,9 +172,8 @@ fn tell(vm: &mut Vm, compilation: &dyn Compilation, step: &Step) -> Outcome {
             }
             "EXPAND"
         }
-        Step::Load { module, keep } => {
-            let functions = environment::load_in_unit(vm, module);
-            results[1] = vm.exchange.loaded(functions)?;
+        Step::Load { keep, .. } => {
+            results[1] = functions;
             results[2] = Value::boolean(*keep);
             "LOAD"
         }
@@ -182,11 +182,8 @@ fn tell(vm: &mut Vm, compilation: &dyn Compilation, step: &Step) -> Outcome {
             results[1] = vm.heap.alloc_str(name)?;
             "REQUIRE"
         }
-        Step::Done(module, diagnostics) => {
-            if let Some(module) = module {
-                let functions = environment::load_in_unit(vm, module);
-                results[1] = vm.exchange.loaded(functions)?;
-            }
+        Step::Done(_, diagnostics) => {
+            results[1] = functions;
             results[2] = list_of_diagnostics(vm, compilation, diagnostics)?;
             "DONE"
         }
@@ -440,32 +437,64 @@ fn step(vm: &mut Vm, running: &mut ActiveCompilation, kind: Value, outcome: Valu
             vm.exchange.charge(passed as usize);
             let outer = vm.compiler.unit.replace(std::mem::take(&mut running.unit));
             let mut work = Work::up_to(Work::STEP).after_passing(passed);
-            let step = running.compilation.step(vm, answer, &mut work);
+            let mut step = running.compilation.step(vm, answer, &mut work);
             running.unit = vm.compiler.unit.replace(outer);
             vm.exchange.charge(work.done() as usize * WORK_UNITS);
             if let (Step::Done(None, diagnostics), true) = (&step, running.is_nameless) {
                 let is_error = |diagnostic: &&Diagnostic| diagnostic.severity == Severity::Error;
                 vm.compiler.refused = diagnostics.iter().filter(is_error).cloned().collect();
             }
+            if let Step::Load { module, .. } | Step::Done(Some(module), _) = &mut step {
+                running.load = Some(Box::new(ModuleLoad::new(std::mem::take(module))));
+            }
             step
         }
     };
+    let functions = match go_on_loading(vm, running) {
+        Ok(Some(functions)) => functions,
+        Ok(None) => {
+            running.step = Some(step);
+            return tell_more(vm);
+        }
+        Err(exit) => {
+            match exit {
+                Exit::Collect => running.step = Some(step),
+                _ => running.load = None,
+            }
+            return Err(exit);
+        }
+    };
     let outer = vm.compiler.unit.replace(std::mem::take(&mut running.unit));
-    let told = tell(vm, &*running.compilation, &step);
+    let told = tell(vm, &*running.compilation, &step, functions);
     running.unit = vm.compiler.unit.replace(outer);
     let work = running.unit.take_work();
     vm.exchange.charge(work as usize);
     running.keeps = matches!(step, Step::Load { keep: true, .. });
     if told == Err(Exit::Collect) {
         running.step = Some(step);
+    } else {
+        running.load = None;
     }
     told
 }
 
+/// Goes on loading the module of a step. Returns the list of its functions, `NIL` if there is no module, and
+/// nothing if a part of the work is done.
+fn go_on_loading(vm: &mut Vm, running: &mut ActiveCompilation) -> Result<Option<Value>, Exit> {
+    let Some(load) = &mut running.load else { return Ok(Some(Value::NIL)) };
+    let mut work = Work::up_to(Work::STEP);
+    let functions = load.run(&mut vm.heap, &mut vm.world, &mut running.unit, &mut work);
+    vm.exchange.charge(work.done() as usize * WORK_UNITS);
+    vm.exchange.loaded(functions)
+}
+
+/// Returns whether there are data left to be freed by further calls.
 pub(super) fn end_compilation(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.compiler.end(arguments[0]);
+    let (freed, are_left) = vm.compiler.free(FREED_STEP);
+    vm.exchange.charge(freed * FORM_UNITS);
     recount(vm);
-    Ok(Value::NIL)
+    Ok(Value::boolean(are_left))
 }
 
 /// The first value is `NIL` at the end of the string, and `:unfinished` if the datum goes on behind it.

@@ -269,17 +269,14 @@ fn large_functions_are_divided() {
 }
 
 #[test]
-fn a_function_with_too_many_captures_is_refused() {
+fn a_function_captures_any_number_of_variables() {
     let names = |text: &str| (0..300).map(|i| text.replace('#', &i.to_string())).collect::<String>();
-    // One `let` of them all is no trouble.
-    let source = format!("(let* ({}) (lambda () (list {})))", names("(v# (f))"), names("v# "));
     let lines = crate::lower::SourceLines::new();
-    assert!(crate::lower::lower(&super::notation::core(&source), &lines).is_ok());
+    let one = format!("(let* ({}) (lambda () (list {})))", names("(v# (f))"), names("v# "));
+    assert!(crate::lower::lower(&super::notation::core(&one), &lines).is_ok());
     let (open, close) = (names("(let ((v# (f)))"), ")".repeat(300));
-    let source = format!("{open} (lambda () (list {})) {close}", names("v# "));
-    let faults = crate::lower::lower(&super::notation::core_in_big_stack(&source), &lines);
-    let faults = faults.expect_err("no such function fits");
-    assert!(faults.iter().all(|fault| fault.code == "function-too-large"), "{faults:?}");
+    let nested = format!("{open} (lambda () (list {})) {close}", names("v# "));
+    assert!(crate::lower::lower(&super::notation::core_in_big_stack(&nested), &lines).is_ok());
 }
 
 #[test]

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use esl_bytecode::compile::SourcePlace;
+use esl_bytecode::compile::{SourcePlace, Work};
 use esl_bytecode::module::{LineEntry, Module, ModuleFunction, PoolIdx, VariablePlace};
 
 use crate::heap::{AllocError, Heap, Kind};
@@ -27,29 +27,62 @@ const PLACE_BITS: u32 = 9;
 /// Names of variables that a module may have; others are left out.
 const MAX_NAMES: usize = 1 << (32 - PLACE_BITS);
 
-/// Numbers of the names of a module's variables.
-pub(super) type VariableNames = HashMap<Arc<str>, u32>;
+/// The names of a module, and the numbers of those of its variables.
+#[derive(Default)]
+pub(super) struct ModuleNames {
+    sources: Vec<Value>,
+    variables: Vec<Value>,
+    numbers: HashMap<Arc<str>, u32>,
+    /// Number of functions whose variables have numbers.
+    passed: usize,
+    /// The pair of both, when all are known.
+    pair: Option<Value>,
+}
 
-/// Makes the names of a module, and numbers those of its variables.
-pub(super) fn names(
-    heap: &mut Heap,
-    module: &Module,
-    numbers: &mut VariableNames,
-) -> Result<Value, AllocError> {
-    let mut names = Vec::with_capacity(module.sources.len());
-    for source in &module.sources {
-        names.push(heap.alloc_str(source)?);
+/// Names that count as a unit of work.
+const NAMES_PER_UNIT: usize = 8;
+
+impl ModuleNames {
+    /// Calls `visit` with every object that it keeps alive.
+    pub(super) fn roots(&self, visit: &mut dyn FnMut(Value)) {
+        let lists = [&self.sources, &self.variables];
+        lists.into_iter().flatten().chain(&self.pair).for_each(|&value| visit(value));
     }
-    let sources = heap.alloc_vector(&names)?;
-    names.clear();
-    for variable in module.functions.iter().flat_map(|function| &function.variables) {
-        if !numbers.contains_key(&variable.name) && names.len() < MAX_NAMES {
-            numbers.insert(variable.name.clone(), names.len() as u32);
-            names.push(heap.alloc_str(&variable.name)?);
+
+    /// Goes on making the names of a module. Returns whether all are made; otherwise the work that is allowed
+    /// is done.
+    pub(super) fn run(
+        &mut self,
+        heap: &mut Heap,
+        module: &Module,
+        work: &mut Work,
+    ) -> Result<bool, AllocError> {
+        if self.pair.is_some() {
+            return Ok(true);
         }
+        while let Some(source) = module.sources.get(self.sources.len()) {
+            let name = heap.alloc_str(source)?;
+            self.sources.push(name);
+        }
+        while let Some(function) = module.functions.get(self.passed) {
+            if work.is_done() {
+                return Ok(false);
+            }
+            for variable in &function.variables {
+                if !self.numbers.contains_key(&variable.name) && self.variables.len() < MAX_NAMES {
+                    let name = heap.alloc_str(&variable.name)?;
+                    self.numbers.insert(variable.name.clone(), self.variables.len() as u32);
+                    self.variables.push(name);
+                }
+            }
+            work.add((1 + function.variables.len() / NAMES_PER_UNIT) as u64);
+            self.passed += 1;
+        }
+        let sources = heap.alloc_vector(&self.sources)?;
+        let variables = heap.alloc_vector(&self.variables)?;
+        self.pair = Some(heap.cons(sources, variables)?);
+        Ok(true)
     }
-    let variables = heap.alloc_vector(&names)?;
-    heap.cons(sources, variables)
 }
 
 /// Makes the record of a function of a module with this pool and these names.
@@ -57,8 +90,7 @@ pub(super) fn describe(
     heap: &mut Heap,
     function: &ModuleFunction,
     pool: &[Value],
-    names: Value,
-    numbers: &VariableNames,
+    names: &ModuleNames,
 ) -> Result<Value, AllocError> {
     let constant = |index: Option<PoolIdx>| index.map_or(Value::NIL, |PoolIdx(index)| pool[index as usize]);
     let mut words = Vec::with_capacity(1 + function.lines.len() * 4 + function.variables.len() * 2);
@@ -67,7 +99,7 @@ pub(super) fn describe(
         words.extend([pc, source, line, column]);
     }
     for variable in &function.variables {
-        let Some(name) = numbers.get(&variable.name) else { continue };
+        let Some(name) = names.numbers.get(&variable.name) else { continue };
         let place = match variable.place {
             VariablePlace::Register(register) => u32::from(register) << 1,
             VariablePlace::Capture(capture) => u32::from(capture) << 1 | 1,
@@ -82,7 +114,7 @@ pub(super) fn describe(
     let mut slots = [Value::NIL; 4];
     slots[LAMBDA_LIST] = constant(function.lambda_list);
     slots[DOCUMENTATION] = constant(function.documentation);
-    slots[NAMES] = names;
+    slots[NAMES] = names.pair.unwrap_or(Value::NIL);
     slots[WORDS] = object;
     heap.alloc_record(Kind::Record, 0, DEBUG_RECORD, &slots)
 }

@@ -1,8 +1,9 @@
 //! Loading: from compiled modules to functions in the heap.
 //!
-//! A module that is read or compiled while the machine runs is verified and loaded as a whole. Nothing of it
-//! stays outside of the heap, so code that a program no longer reaches is collected. The image of the library
-//! is trusted and loaded piece by piece (`image`): a function is a stub until its first call.
+//! A module that is read or compiled while the machine runs is verified and loaded whole, before any of it
+//! runs, but in parts between which others have their turns. Nothing of it stays outside of the heap, so code
+//! that a program no longer reaches is collected. The image of the library is trusted and loaded piece by
+//! piece (`image`): a function is a stub until its first call.
 //!
 //! Guarantees: one value for each entry of a module's pool, so that literal data keep their identity; a Code
 //! is laid out as `shape` says.
@@ -11,11 +12,13 @@
 //! an instruction first needs it, so code may be loaded before the class is defined, and uses the class as it
 //! is then.
 
+use std::borrow::Borrow;
 use std::collections::BTreeMap;
 use std::fmt;
 
 use esl_bytecode::BigInt;
 use esl_bytecode::builtin::BUILTINS;
+use esl_bytecode::compile::Work;
 use esl_bytecode::file::ReadError;
 use esl_bytecode::module::{Constant, Module, ModuleFunction, PoolIdx, VariablePlace};
 use esl_bytecode::package::PackageId;
@@ -27,7 +30,7 @@ use crate::heap::layout::CodeObject;
 use crate::heap::{AllocError, CodeParts, Heap, Kind};
 use crate::shape::{Shape, Sort, capture_word};
 use crate::trust::LAZY_WORD;
-use crate::trust::{self, Verified};
+use crate::trust::{self, Verification, Verified};
 use crate::value::Value;
 use crate::world::World;
 
@@ -122,78 +125,182 @@ pub(crate) fn load(
     module: &Module,
     shared: &mut dyn SharedObjects,
 ) -> Result<Value, LoadError> {
-    let verified = Verified::module(module).map_err(LoadError::Refused)?;
-    Loader { heap, world, module, shared, verified, pool: Vec::new(), functions: Vec::new() }.load()
+    let mut load = ModuleLoad::new(module);
+    loop {
+        if let Some(functions) = load.run(heap, world, shared, &mut Work::unbounded())? {
+            return Ok(functions);
+        }
+    }
 }
 
-/// A module being loaded.
-struct Loader<'a> {
-    heap: &'a mut Heap,
-    world: &'a mut World,
-    module: &'a Module,
-    shared: &'a mut dyn SharedObjects,
-    verified: Verified,
-    /// Values of the pool.
-    pool: Vec<Value>,
+/// The loading of a module, which goes on in parts. Between two of them its values are roots of the
+/// collector. What it cannot do for want of room it does when it goes on.
+pub(crate) struct ModuleLoad<M> {
+    module: M,
+    verification: Verification,
+    verified: Option<Verified>,
+    /// What stands for functions whose code is not there yet.
+    stub: Value,
     /// Functions by number: the Function of one without captures, the Code of one with captures.
     functions: Vec<Value>,
+    /// Values of the pool.
+    pool: Vec<Value>,
+    names: debug::ModuleNames,
+    /// Codes by the numbers of functions.
+    codes: Vec<Value>,
+    /// Number of functions whose Codes refer to those with captures.
+    filled: usize,
+    /// The list of the functions for the top-level forms, when all is done.
+    toplevel: Option<Value>,
 }
 
-impl Loader<'_> {
-    fn load(mut self) -> Result<Value, LoadError> {
+/// Constants or functions that count as a unit of work where nothing more is done than to make an object.
+const OBJECTS_PER_UNIT: usize = 8;
+/// Words of code that count as a unit of work.
+const WORDS_PER_UNIT: usize = 4;
+
+impl<M: Borrow<Module>> ModuleLoad<M> {
+    /// Begins to load a module.
+    pub(crate) fn new(module: M) -> ModuleLoad<M> {
+        ModuleLoad {
+            module,
+            verification: Verification::default(),
+            verified: None,
+            stub: Value::NIL,
+            functions: Vec::new(),
+            pool: Vec::new(),
+            names: debug::ModuleNames::default(),
+            codes: Vec::new(),
+            filled: 0,
+            toplevel: None,
+        }
+    }
+
+    /// Calls `visit` with every object that it keeps alive.
+    pub(crate) fn roots(&self, visit: &mut dyn FnMut(Value)) {
+        let lists = [&self.functions, &self.pool, &self.codes];
+        lists.into_iter().flatten().chain(&self.toplevel).for_each(|&value| visit(value));
+        visit(self.stub);
+        self.names.roots(visit);
+    }
+
+    /// Returns about how many bytes it takes.
+    pub(crate) fn bytes(&self) -> usize {
+        let values = self.functions.len() + self.pool.len() + self.codes.len();
+        self.module.borrow().bytes() + values * size_of::<Value>()
+    }
+
+    /// Goes on. Returns a list of the functions that run the module's top-level forms, in order; `None` if
+    /// the work that is allowed is done before.
+    ///
+    /// # Errors
+    /// [`LoadError`]
+    pub(crate) fn run(
+        &mut self,
+        heap: &mut Heap,
+        world: &mut World,
+        shared: &mut dyn SharedObjects,
+        work: &mut Work,
+    ) -> Result<Option<Value>, LoadError> {
+        let ModuleLoad { module, verification, verified, stub, functions, pool, names, codes, .. } = self;
+        let module = (*module).borrow();
+        let verified = match verified {
+            Some(verified) => verified,
+            None => match verification.run(module, work).map_err(LoadError::Refused)? {
+                Some(proof) => verified.insert(proof),
+                None => return Ok(None),
+            },
+        };
         // Data may contain functions, and functions each other, so functions are made before their code.
-        let shape = Shape::other(Sort::Lazy, 0);
-        let stub = trust::alloc_stub(self.heap, Value::NIL, Value::NIL, shape, 0, LAZY_WORD)?;
-        for function in &self.module.functions {
+        if stub.is_nil() {
+            let shape = Shape::other(Sort::Lazy, 0);
+            *stub = trust::alloc_stub(heap, Value::NIL, Value::NIL, shape, 0, LAZY_WORD)?;
+        }
+        while let Some(function) = module.functions.get(functions.len()) {
+            if functions.len().is_multiple_of(OBJECTS_PER_UNIT) {
+                if work.is_done() {
+                    return Ok(None);
+                }
+                work.add(1);
+            }
             let has_captures = !function.captures.is_empty();
-            let object = if has_captures { Value::NIL } else { trust::alloc_function(self.heap, stub, &[])? };
-            self.functions.push(object);
+            let object = if has_captures { Value::NIL } else { trust::alloc_function(heap, *stub, &[])? };
+            functions.push(object);
         }
-        self.pool.reserve_exact(self.module.constants.len());
-        for constant in &self.module.constants {
-            let value = self.constant(constant)?;
-            self.pool.push(value);
+        let mut constants = Constants { heap, world, shared, functions: &*functions };
+        while let Some(constant) = module.constants.get(pool.len()) {
+            if pool.len().is_multiple_of(OBJECTS_PER_UNIT) {
+                if work.is_done() {
+                    return Ok(None);
+                }
+                work.add(1);
+            }
+            let value = constants.make(constant, pool)?;
+            pool.push(value);
         }
-        let mut numbers = debug::VariableNames::default();
-        let names = debug::names(self.heap, self.module, &mut numbers)?;
-        let mut codes = Vec::with_capacity(self.module.functions.len());
-        for (function, object) in self.module.functions.iter().zip(&mut self.functions) {
-            let constants = own_constants(function, |PoolIdx(index)| self.pool[index as usize]);
-            let debug = debug::describe(self.heap, function, &self.pool, names, &numbers)?;
-            let parts = LoadedFunction {
-                function,
-                constants: &constants,
-                name: name_of(function, &self.pool),
-                debug,
-            };
-            let code = make_code(self.heap, &self.verified, &parts, Value::NIL)?;
+        if !names.run(heap, module, work)? {
+            return Ok(None);
+        }
+        while let Some(function) = module.functions.get(codes.len()) {
+            if work.is_done() {
+                return Ok(None);
+            }
+            work.add(1 + (function.code.len() / WORDS_PER_UNIT) as u64);
+            let constants = own_constants(function, |PoolIdx(index)| pool[index as usize]);
+            let debug = debug::describe(heap, function, pool, names)?;
+            let parts =
+                LoadedFunction { function, constants: &constants, name: name_of(function, pool), debug };
+            let code = make_code(heap, verified, &parts, Value::NIL)?;
+            let object = &mut functions[codes.len()];
             if object.is_nil() {
                 *object = code;
             } else {
-                trust::replace_stub(self.heap, *object, code);
+                trust::replace_stub(heap, *object, code);
             }
             codes.push(code);
         }
-        self.fill_in(&codes);
-        let toplevel: Vec<Value> =
-            self.module.toplevel.iter().map(|number| self.functions[number.0 as usize]).collect();
-        for &function in &toplevel {
-            self.heap.set_aux(function, Kind::Function, TOP_LEVEL);
+        while self.filled < self.codes.len() {
+            if work.is_done() {
+                return Ok(None);
+            }
+            work.add(1);
+            let end = self.codes.len().min(self.filled + OBJECTS_PER_UNIT);
+            (self.filled..end).for_each(|number| self.fill_in(heap, number));
+            self.filled = end;
         }
-        Ok(self.heap.list(&toplevel)?)
+        if self.toplevel.is_none() {
+            let toplevel = &self.module.borrow().toplevel;
+            let toplevel: Vec<Value> =
+                toplevel.iter().map(|number| self.functions[number.0 as usize]).collect();
+            for &function in &toplevel {
+                heap.set_aux(function, Kind::Function, TOP_LEVEL);
+            }
+            self.toplevel = Some(heap.list(&toplevel)?);
+        }
+        Ok(self.toplevel)
     }
 
-    /// Stores the Codes of functions with captures, known only now, into the constants that refer to them.
-    fn fill_in(&mut self, codes: &[Value]) {
-        for (function, &code) in self.module.functions.iter().zip(codes) {
-            for (index, &PoolIdx(constant)) in function.constants.iter().enumerate() {
-                if let Constant::Function(number) = self.module.constants[constant as usize] {
-                    trust::set_constant(self.heap, code, index, self.functions[number.0 as usize]);
-                }
+    /// Stores the Codes of functions with captures, known only now, into the constants of a function that
+    /// refer to them.
+    fn fill_in(&self, heap: &mut Heap, number: usize) {
+        let module = self.module.borrow();
+        for (index, &PoolIdx(constant)) in module.functions[number].constants.iter().enumerate() {
+            if let Constant::Function(function) = module.constants[constant as usize] {
+                trust::set_constant(heap, self.codes[number], index, self.functions[function.0 as usize]);
             }
         }
     }
+}
 
+/// What the values of constants are made from.
+struct Constants<'a> {
+    heap: &'a mut Heap,
+    world: &'a mut World,
+    shared: &'a mut dyn SharedObjects,
+    functions: &'a [Value],
+}
+
+impl Constants<'_> {
     fn symbol(&mut self, symbol: &Symbol) -> Result<Value, AllocError> {
         let Home::Uninterned(id) = *symbol.home() else { return self.world.intern(self.heap, symbol) };
         if let Some(object) = self.shared.uninterned(id) {
@@ -205,8 +312,8 @@ impl Loader<'_> {
     }
 
     /// Returns the value of a constant; the values of earlier ones are in the pool.
-    fn constant(&mut self, constant: &Constant) -> Result<Value, LoadError> {
-        let pool = |&PoolIdx(index): &PoolIdx| self.pool[index as usize];
+    fn make(&mut self, constant: &Constant, pool: &[Value]) -> Result<Value, LoadError> {
+        let pool = |&PoolIdx(index): &PoolIdx| pool[index as usize];
         Ok(match constant {
             Constant::Nil => Value::NIL,
             Constant::True => Value::T,
