@@ -40,7 +40,7 @@ mod watch;
 use esl_vm::vm::Vm;
 
 pub use event_loop::spawn;
-pub use modules::module;
+pub use modules::{module, module_names};
 #[cfg(feature = "tls")]
 pub use tls::{TlsIdentity, begin_tls};
 

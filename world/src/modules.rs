@@ -27,6 +27,11 @@ pub fn module(name: &str) -> Option<&'static str> {
     MODULES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|&(_, text)| text)
 }
 
+/// Returns the names of the modules.
+pub fn module_names() -> impl Iterator<Item = &'static str> {
+    MODULES.iter().map(|&(name, _)| name)
+}
+
 /// Has `require` find the modules when the program runs.
 pub(crate) fn install(machine: &mut Vm) {
     let text = |arguments: &[Datum]| {

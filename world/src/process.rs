@@ -132,7 +132,13 @@ fn command(arguments: &CallArguments, index: usize) -> Result<Command, HostFailu
 }
 
 fn start(mut command: Command, name: &str) -> Result<Child, HostFailure> {
-    command.spawn().map_err(|error| failure("PROCESS-ERROR", format!("`{name}` cannot be run: {error}")))
+    command.spawn().map_err(|error| {
+        // The system does not say which of the two is not there.
+        let folder = command.as_std().get_current_dir().filter(|folder| !folder.is_dir());
+        let place =
+            folder.map_or(String::new(), |folder| format!(" in {}, which is no folder", folder.display()));
+        failure("PROCESS-ERROR", format!("`{name}` cannot be run{place}: {error}"))
+    })
 }
 
 fn pipe_if(is_wanted: bool) -> Stdio {

@@ -3,6 +3,8 @@
 //! What is long or deep is taken apart by the module `:json`, which is in ESL and can be interrupted; its
 //! parts come here. Nothing here recurses deeper than [`DEPTH`].
 
+use smallvec::SmallVec;
+
 use crate::builtins::stream::{few_characters, write_part as write_characters};
 use crate::builtins::table::puthash;
 use crate::equality::KeyTest;
@@ -18,6 +20,9 @@ use super::expect::exactly;
 const LENGTH: usize = 1 << 13;
 /// Lists within lists that one call reads.
 const DEPTH: usize = 100;
+
+const QUOTE: u32 = 0x22;
+const BACKSLASH: u32 = 0x5C;
 
 /// Reason why a value is not read.
 enum JsonStop {
@@ -64,36 +69,38 @@ fn is_digit(code: Option<u32>) -> bool {
 /// Returns the length of the value at the beginning of a text, or of all of it if it has no end; `None` if
 /// that is too long, or the value too deep.
 fn extent(text: &[u32]) -> Option<usize> {
-    let mut depth = 0;
-    let mut is_string = false;
-    let mut is_escaped = false;
-    for (at, &code) in text.iter().enumerate().take(LENGTH) {
-        let character = char::from_u32(code).unwrap_or(' ');
-        if is_string {
-            match character {
-                _ if is_escaped => is_escaped = false,
-                '\\' => is_escaped = true,
-                '"' => is_string = false,
-                _ => {}
+    let end = text.len().min(LENGTH);
+    let (mut at, mut depth) = (0, 0);
+    while at < end {
+        match text[at] {
+            QUOTE => {
+                at += 1;
+                while at < end && text[at] != QUOTE {
+                    // Whatever is escaped does not end the string.
+                    at += if text[at] == BACKSLASH { 2 } else { 1 };
+                }
+                if at >= end {
+                    break;
+                }
+                if depth == 0 {
+                    return Some(at + 1);
+                }
             }
-            if is_string || depth > 0 {
-                continue;
-            }
-            return Some(at + 1);
-        }
-        match character {
-            '"' => is_string = true,
-            '[' | '{' => {
+            // [ and {
+            0x5B | 0x7B => {
                 depth += 1;
                 if depth > DEPTH {
                     return None;
                 }
             }
-            ']' | '}' if depth <= 1 => return Some(at + depth),
-            ']' | '}' => depth -= 1,
-            ',' | ' ' | '\t' | '\n' | '\r' if depth == 0 => return Some(at),
+            // ] and }
+            0x5D | 0x7D if depth <= 1 => return Some(at + depth),
+            0x5D | 0x7D => depth -= 1,
+            0x2C if depth == 0 => return Some(at),
+            code if depth == 0 && is_blank(code) => return Some(at),
             _ => {}
         }
+        at += 1;
     }
     (text.len() <= LENGTH).then_some(text.len())
 }
@@ -147,7 +154,7 @@ impl JsonReader<'_> {
 
     fn array(&mut self) -> Result<Value, JsonStop> {
         self.at += 1;
-        let mut items = Vec::new();
+        let mut items: SmallVec<[Value; 16]> = SmallVec::new();
         self.skip_blanks();
         if !self.is_next(']') {
             loop {
@@ -166,12 +173,12 @@ impl JsonReader<'_> {
 
     fn object(&mut self) -> Result<Value, JsonStop> {
         self.at += 1;
-        let mut members = Vec::new();
+        let mut members: SmallVec<[(Value, Value); 8]> = SmallVec::new();
         self.skip_blanks();
         if !self.is_next('}') {
             loop {
                 self.skip_blanks();
-                if self.peek() != Some(u32::from('"')) {
+                if self.peek() != Some(QUOTE) {
                     return Err(JsonStop::Fault(self.at, "expected a key, a string"));
                 }
                 let key = self.string()?;
@@ -203,8 +210,16 @@ impl JsonReader<'_> {
     }
 
     fn string(&mut self) -> Result<Value, JsonStop> {
-        let mut characters = Vec::new();
         self.at += 1;
+        let text = self.text;
+        let part = &text[self.at..text.len().min(self.at + LENGTH)];
+        // Most strings have no escapes, and are taken as they are.
+        let length = part.iter().position(|&code| code == QUOTE || code == BACKSLASH || code < 0x20);
+        if let Some(length) = length.filter(|&length| part[length] == QUOTE) {
+            self.at += length + 1;
+            return Ok(self.vm.heap.alloc_string(&part[..length])?);
+        }
+        let mut characters = Vec::new();
         let (at, end) = string_part_of(self.text, self.at, &mut characters);
         self.at = at;
         match end {
@@ -239,13 +254,17 @@ impl JsonReader<'_> {
         }
         let text = &self.text[start..self.at];
         if self.at == end_of_integer {
+            if let Some(integer) = small_integer(text) {
+                return Ok(integer);
+            }
             return match text::parse_integer(text, 0, 10) {
                 text::Parsed::Integer(integer, _) => Ok(self.vm.integer_value("PARSE-INTEGER", &integer)?),
                 _ => Err(JsonStop::Large),
             };
         }
-        let text: String = text.iter().filter_map(|&code| char::from_u32(code)).collect();
-        match text.parse::<f64>() {
+        // It consists of digits, signs, a point and an E.
+        let text: SmallVec<[u8; 32]> = text.iter().map(|&code| code as u8).collect();
+        match std::str::from_utf8(&text).unwrap_or("").parse::<f64>() {
             Ok(number) if number.is_finite() => Ok(self.vm.heap.float(number)?),
             _ => Err(JsonStop::Fault(start, "expected a number in the range of doubles")),
         }
@@ -258,6 +277,20 @@ impl JsonReader<'_> {
         }
         if self.at == start { Err(JsonStop::Fault(self.at, "expected a digit")) } else { Ok(()) }
     }
+}
+
+/// Returns the integer that digits, with a minus sign or without, write, if they are few.
+fn small_integer(text: &[u32]) -> Option<Value> {
+    let (sign, digits) = match text {
+        [sign, digits @ ..] if *sign == u32::from('-') => (-1, digits),
+        _ => (1, text),
+    };
+    // More would not fit.
+    if digits.len() > 18 {
+        return None;
+    }
+    let number = digits.iter().fold(0_i64, |number, &digit| number * 10 + i64::from(digit) - i64::from(b'0'));
+    Value::fixnum(sign * number)
 }
 
 /// Where a part of a string ends.
@@ -276,8 +309,8 @@ fn string_part_of(text: &[u32], start: usize, characters: &mut Vec<u32>) -> (usi
     while at - start < LENGTH {
         match text.get(at).copied() {
             None => return (at, PartEnd::Fault("the string has no end")),
-            Some(0x22) => return (at + 1, PartEnd::Quote),
-            Some(0x5C) => match escape(&text[at..]) {
+            Some(QUOTE) => return (at + 1, PartEnd::Quote),
+            Some(BACKSLASH) => match escape(&text[at..]) {
                 Ok((code, length)) => {
                     characters.push(code);
                     at += length;
@@ -317,7 +350,7 @@ fn unicode_escape(text: &[u32]) -> Result<(u32, usize), &'static str> {
     match first {
         0xD800..=0xDBFF => {
             let half = "expected the second half of a pair of surrogates";
-            if text.get(6..8) != Some(&[0x5C, 0x75]) {
+            if text.get(6..8) != Some(&[BACKSLASH, 0x75]) {
                 return Err(half);
             }
             match hexadecimal(text.get(8..12))? {
@@ -362,7 +395,7 @@ pub(super) fn value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         return vm.give_values(&[Value::NIL, Value::index(start), Value::T]);
     };
     // One more, so that what follows the value is seen.
-    let text = text[start..].iter().take(length + 1).copied().collect::<Vec<u32>>();
+    let text = text[start..text.len().min(start + length + 1)].to_vec();
     vm.exchange.charge((blanks + length) / 4);
     let mut reader = JsonReader { vm, text: &text, at: 0, are_tables: are_tables.is_true() };
     let result = reader.value();

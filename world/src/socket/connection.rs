@@ -95,14 +95,17 @@ impl Future for Arrival {
 
     fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Completion> {
         let connection = self.connection.clone();
-        // Before anything is asked, so that nothing is missed. One who begins is polled again, with a waker.
-        if !context.waker().will_wake(Waker::noop()) {
-            self.number = Some(connection.waiting.note(self.number, context.waker()));
+        let has_data = || lock(&connection.arrived).is_something();
+        if self.number.is_none() && has_data() && !connection.is_closed.load(Ordering::SeqCst) {
+            // Nobody need be told of one who does not wait.
+            return Poll::Ready(Ok(Vec::new()));
         }
+        // Before anything is asked, so that nothing is missed.
+        self.number = Some(connection.waiting.note(self.number, context.waker()));
         if connection.is_closed.load(Ordering::SeqCst) {
             return Poll::Ready(Err(closed()));
         }
-        if lock(&connection.arrived).is_something() {
+        if has_data() {
             return Poll::Ready(Ok(Vec::new()));
         }
         // The system tells one only, who tells the others.
@@ -127,13 +130,21 @@ impl Connection {
         reader: impl AsyncRead + Send + Unpin + 'static,
         writer: impl AsyncWrite + Send + Unpin + 'static,
     ) -> SocketKind {
+        Connection::with(reader, writer, false)
+    }
+
+    fn with(
+        reader: impl AsyncRead + Send + Unpin + 'static,
+        writer: impl AsyncWrite + Send + Unpin + 'static,
+        says_goodbye: bool,
+    ) -> SocketKind {
         SocketKind::Connection(Arc::new(Connection {
             reader: Mutex::new(Box::new(reader)),
             waiting: Arc::default(),
             is_closed: AtomicBool::new(false),
             writer: tokio::sync::Mutex::new(Box::new(writer)),
             arrived: Mutex::default(),
-            says_goodbye: false,
+            says_goodbye,
         }))
     }
 
@@ -141,14 +152,7 @@ impl Connection {
     #[cfg(feature = "tls")]
     pub(super) fn secured(stream: impl AsyncRead + AsyncWrite + Send + 'static) -> SocketKind {
         let (reader, writer) = tokio::io::split(stream);
-        SocketKind::Connection(Arc::new(Connection {
-            reader: Mutex::new(Box::new(reader)),
-            waiting: Arc::default(),
-            is_closed: AtomicBool::new(false),
-            writer: tokio::sync::Mutex::new(Box::new(writer)),
-            arrived: Mutex::default(),
-            says_goodbye: true,
-        }))
+        Connection::with(reader, writer, true)
     }
 
     pub(super) fn of_tcp(stream: TcpStream) -> (SocketKind, i64, String) {
