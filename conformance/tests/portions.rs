@@ -102,6 +102,78 @@ fn portions_of_a_fixed_length_change_nothing() {
     }
 }
 
+/// Two machines have their objects at other addresses. The collector's marks and what it has yet to follow
+/// are state, too, and are looked at while it works: among classes, and in compilations.
+#[test]
+fn addresses_change_nothing() {
+    let compiles = "(let ((form (cons 'list (loop for i below 300 collect (list 'quote (list i))))))
+                      (spawn (loop (make-array 400)))
+                      (loop (eval form)))";
+    for text in [PROGRAMS[6], compiles] {
+        let program = program::compile(&[Source::new("addresses", text)]).program.expect("it compiles");
+        let machines: [_; 2] = std::array::from_fn(|_| {
+            let host = VirtualHost::new();
+            let mut machine = program::machine(Config::default(), Box::new(host)).expect("there is room");
+            program::begin(&mut machine, &program).expect("it can start");
+            machine
+        });
+        let [mut one, mut other] = machines;
+        for _ in 0..400 {
+            let outcome = one.run(253);
+            assert_eq!(other.run(253), outcome, "{text}");
+            assert_eq!(other.fingerprint(), one.fingerprint(), "after {} ticks of {text}", one.ticks());
+            if outcome != RunOutcome::TicksUsed {
+                break;
+            }
+        }
+        assert!(one.heap_stats().cycles > 0, "{} cycles of {text}", one.heap_stats().cycles);
+    }
+}
+
+/// Whoever looks at a run, as the monitor and the metrics do, is no part of it.
+#[test]
+fn looking_changes_nothing() {
+    use esl::host::{Look, SurveyRequest};
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU64, Ordering};
+    for text in PROGRAMS {
+        let program = program::compile(&[Source::new("looks", text)]).program.expect("it compiles");
+        let fly = |portion: u64, looks: bool| {
+            let host = VirtualHost::new();
+            let captured = host.captured();
+            let mut machine = program::machine(Config::default(), Box::new(host)).expect("there is room");
+            machine.gather_figures(false);
+            machine.keep_journal();
+            program::begin(&mut machine, &program).expect("it can start");
+            let told = Arc::new(AtomicU64::new(0));
+            loop {
+                if looks {
+                    let told = told.clone();
+                    let request = SurveyRequest {
+                        tasks: 3,
+                        frames_of: Some(machine.ticks() % 5 + 1),
+                        data: true,
+                        failures_after: Some(0),
+                        facts: Some((String::new(), 0)),
+                        ..SurveyRequest::default()
+                    };
+                    let tell = move |_| _ = told.fetch_add(1, Ordering::Relaxed);
+                    machine.inbox().look(Look::Survey(request, Box::new(tell)));
+                }
+                if machine.run(portion) != RunOutcome::TicksUsed {
+                    break;
+                }
+            }
+            let told = told.load(Ordering::Relaxed);
+            ((machine.ticks(), machine.canary(), machine.fingerprint(), captured.output()), told)
+        };
+        let (alone, _) = fly(u64::MAX, false);
+        let (seen, looks) = fly(501, true);
+        assert_eq!(seen, alone, "{text}");
+        assert!(looks > 3, "{looks} looks at {text}");
+    }
+}
+
 /// What can be told of a run between two portions.
 fn present(machine: &Vm, captured: &Captured) -> (u64, u64, u128, String) {
     (machine.ticks(), machine.canary(), machine.fingerprint(), captured.output())

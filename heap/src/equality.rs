@@ -56,8 +56,14 @@ fn walk(heap: &Heap, loosely: bool, a: Value, b: Value, work: &mut usize) -> Opt
             open.push((left.car, right.car));
             continue;
         }
-        let is_same =
-            if loosely { loosely_same(heap, a, b, &mut open, work)? } else { same_rows(heap, a, b, work)? };
+        let is_same = if loosely {
+            loosely_same(heap, a, b, &mut open, work)?
+        } else if let (Some(left), Some(right)) = (heap.value_slots(a), heap.value_slots(b)) {
+            open.extend(left.iter().copied().zip(right.iter().copied()));
+            heap.structure_class(a) == heap.structure_class(b)
+        } else {
+            same_rows(heap, a, b, work)?
+        };
         if !is_same {
             return Some(false);
         }
@@ -291,6 +297,8 @@ fn parts_hash(heap: &Heap, v: Value, loosely: bool) -> u64 {
         } else if let Some(bits) = bits_of(heap, v) {
             let shown = bits.iter().take(HASHED_CHARACTERS);
             hash = shown.fold(mix(hash, bits.len() as u64), |hash, &bit| mix(hash, u64::from(bit)));
+        } else if let Some(slots) = heap.value_slots(v) {
+            open.extend(slots.iter().rev().copied());
         } else {
             hash = mix(hash, number_hash(heap, v).unwrap_or_else(|| heap.identity(v)));
         }

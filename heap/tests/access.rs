@@ -132,6 +132,11 @@ fn slots_are_set_within_bounds_only() {
     assert_eq!(heap.record_set(stream, Kind::Stream, 4, n(1)), None);
     assert_eq!(heap.record_set(stream, Kind::Package, 0, n(1)), None);
     assert_eq!(heap.header(stream).map(|Header { aux, len, .. }| (aux, len)), Some((2, 4)));
+    assert_eq!(heap.slots::<5>(stream, Kind::Stream), None);
+    assert_eq!(heap.slots::<2>(stream, Kind::Package), None);
+    assert_eq!(heap.slots_mut::<5>(stream, Kind::Stream), None);
+    heap.slots_mut::<2>(stream, Kind::Stream).unwrap()[1] = n(2);
+    assert_eq!(heap.slots::<4>(stream, Kind::Stream), Some(&[Value::NIL, n(2), Value::NIL, n(1)]));
     heap.set_aux(stream, Kind::Stream, 1).unwrap();
     heap.set_flags(stream, Kind::Stream, 9).unwrap();
     assert_eq!(heap.header(stream).map(|h| (h.aux, h.flags)), Some((1, 9)));
@@ -146,6 +151,7 @@ fn what_the_interpreter_trusts_cannot_be_overwritten() {
     let mut heap = heap();
     let class = heap.alloc_record(Kind::Class, 0, 0, &[]).unwrap();
     let instance = heap.alloc_structure(class, &[n(1)]).unwrap();
+    assert_eq!(heap.slots_mut::<1>(instance, Kind::Structure), None);
     assert_eq!(heap.record_set(instance, Kind::Structure, 0, n(1)), None);
     assert_eq!(heap.structure_set(instance, 0, n(2)), Some(()));
     assert_eq!(heap.structure_set(instance, 1, n(2)), None);
@@ -154,6 +160,7 @@ fn what_the_interpreter_trusts_cannot_be_overwritten() {
     assert_eq!(heap.structure_class(instance), Some(class));
 
     let f = function(&mut heap);
+    assert_eq!(heap.slots_mut::<1>(f, Kind::Function), None);
     assert_eq!(heap.record_set(f, Kind::Function, 0, n(1)), None);
     // SAFETY: nobody runs the code of this function.
     let mut set_capture = |index| unsafe { heap.function_set_capture(f, index, n(1)) };
@@ -161,6 +168,7 @@ fn what_the_interpreter_trusts_cannot_be_overwritten() {
     assert_eq!(heap.function_captures(f), Some(&[n(10), n(1)][..]));
 
     let s = symbol(&mut heap, "x");
+    assert_eq!(heap.slots_mut::<1>(s, Kind::Symbol), None);
     assert_eq!(heap.record_set(s, Kind::Symbol, 2, n(1)), None);
     assert_eq!(heap.symbol_set_function(s, n(1)), None);
     assert_eq!(heap.symbol_set_function(s, f), Some(()));

@@ -357,7 +357,14 @@ impl Model {
                 unsafe { heap.function_set_capture(shadow.value, index - 1, value) }
             }
             Some(Kind::Structure) if index > 0 => heap.structure_set(shadow.value, index - 1, value),
-            Some(kind) => heap.record_set(shadow.value, kind, index, value),
+            // Half of them as one of several slots.
+            Some(kind) => match heap.slots_mut::<2>(shadow.value, kind) {
+                Some(slots) if index < 2 => {
+                    slots[index] = value;
+                    Some(())
+                }
+                _ => heap.record_set(shadow.value, kind, index, value),
+            },
         };
         if stored.is_some() {
             let old = std::mem::replace(&mut shadow.slots[index], new);

@@ -33,7 +33,7 @@ use crate::task::{Control, Extra, RunningCleanup, Task};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::Deliveries;
-use crate::world::{GivenMap, Opaques, World};
+use crate::world::{Opaques, RootMap, World};
 
 /// What those who visit content do with the course: the fields that tell themselves.
 pub(crate) trait VisitCourse {
@@ -155,7 +155,7 @@ state! {
     /// Visits the content of a compiler.
     Compilations by VisitCompiler :: compiler_content {
         content { jobs }
-        transient { unit, refused }
+        transient { unit, refused, remains }
         process { compiler, begun }
     }
 }
@@ -187,7 +187,7 @@ fn tell_objects(objects: &BTreeMap<PackageId, Value>, sink: &mut dyn StateSink) 
 }
 
 /// The classes themselves are reached from their names.
-fn tell_count(classes: &GivenMap<u64, Value>, sink: &mut dyn StateSink) {
+fn tell_count(classes: &RootMap<Value>, sink: &mut dyn StateSink) {
     sink.word(classes.len() as u64);
 }
 

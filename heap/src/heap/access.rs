@@ -5,9 +5,10 @@
 //! behind it, are the facts H1 to H5 of [`super`]. A slice of the heap borrows the heap, so nothing can be
 //! stored, allocated or collected while it is in use.
 //!
-//! Every store of a value goes through [`Heap::store`], the write barrier; stores of raw data need none. Some
-//! parts of objects the interpreter trusts without a test: the function of a symbol, the code of a function,
-//! the data of an array, the class of a structure. These have setters of their own, or none.
+//! Every store of a value goes through [`Heap::store`], the write barrier, or into slots that
+//! [`Heap::slots_mut`] has logged; stores of raw data need none. Some parts of objects the interpreter trusts
+//! without a test: the function of a symbol, the code of a function, the data of an array, the class of a
+//! structure. These have setters of their own, or none.
 
 use super::Heap;
 use super::layout::{
@@ -135,6 +136,45 @@ impl Heap {
         self.slot(v, index).unwrap_or(Value::NIL)
     }
 
+    /// Returns the first `N` slots of a record of this kind; `None` if `v` is not one, has fewer, or is a
+    /// hash table.
+    #[inline(always)]
+    pub fn slots<const N: usize>(&self, v: Value, kind: Kind) -> Option<&[Value; N]> {
+        self.record(v, kind)?.first_chunk()
+    }
+
+    /// Returns the first `N` slots of a record of this kind, to be set; `None` if `v` is not one, has fewer,
+    /// or is of a kind whose slots [`Heap::record_set`] does not set.
+    ///
+    /// All of them count as overwritten, so this is for those who set several.
+    #[inline(always)]
+    pub fn slots_mut<const N: usize>(&mut self, v: Value, kind: Kind) -> Option<&mut [Value; N]> {
+        if !kind.is_record() || is_vouched_for(kind) {
+            return None;
+        }
+        if self.marking {
+            self.log_slots(v, N);
+        }
+        let object = self.object_of(v, kind)?;
+        // SAFETY: H3: a record has `len` values after its header; H5: the first `N` of them are borrowed with
+        // the heap, mutably, so nobody else sees them.
+        unsafe {
+            if N > (*object).len as usize {
+                return None;
+            }
+            Some(&mut *object.add(1).cast::<[Value; N]>())
+        }
+    }
+
+    /// Logs the first `count` slots of a record, all of which may be overwritten, while marking is under way.
+    #[cold]
+    #[inline(never)]
+    fn log_slots(&mut self, v: Value, count: usize) {
+        for index in 0..count {
+            self.mark(self.slot_or_nil(v, index));
+        }
+    }
+
     /// Sets slot `index` of a record of any kind; see [`Heap::record_set`].
     #[inline]
     pub fn slot_set(&mut self, v: Value, index: usize, new: Value) -> Option<()> {
@@ -242,6 +282,12 @@ impl Heap {
     #[inline]
     pub fn is_instance(&self, v: Value) -> bool {
         self.flags(v, Kind::Structure).is_some_and(|flags| flags & StructureObject::INSTANCE != 0)
+    }
+
+    /// Returns the slots of a structure that `equal` compares by them: see [`StructureObject::VALUE`].
+    pub fn value_slots(&self, v: Value) -> Option<&[Value]> {
+        let flags = self.flags(v, Kind::Structure)?;
+        if flags & StructureObject::VALUE != 0 { self.structure_slots(v) } else { None }
     }
 
     /// Makes `v`, an instance, one of another class; `None` if it is none, or `class` is not a Class.

@@ -304,7 +304,11 @@ impl Heap {
         block: usize,
         fits: impl Fn(&super::arena::BlockInfo) -> bool,
     ) -> bool {
+        let may_take_lent = self.lent_to_cleanup || self.taken() <= self.limit;
         let Some(arena) = self.arenas.get_mut(arena).and_then(Option::as_mut) else { return false };
+        if arena.is_lent && !may_take_lent {
+            return false;
+        }
         let takes = arena.block(block).state == BlockState::Swept && fits(arena.block(block));
         if takes {
             arena.take(block);
@@ -312,15 +316,48 @@ impl Heap {
         takes
     }
 
-    /// Returns the number of bytes that may be taken from the system, with the reserve if it is open.
+    /// Returns the number of bytes that may be taken from the system, with the reserves that are open.
     pub(super) fn limit_now(&self) -> usize {
+        if self.lent_to_cleanup {
+            // The other reserve may be used up for good.
+            return self.limit.saturating_add(super::RESERVE + super::CLEANUP_RESERVE);
+        }
+        self.limit_for_all()
+    }
+
+    /// Returns the number of bytes that may be taken from the system by who runs no cleanup.
+    fn limit_for_all(&self) -> usize {
         if self.reserve_open { self.limit.saturating_add(super::RESERVE) } else { self.limit }
+    }
+
+    /// Lends what is kept for cleanups, or takes it back: then both regions leave an arena that is lent.
+    #[cold]
+    pub(super) fn change_lending(&mut self, lends: bool) {
+        self.lent_to_cleanup = lends;
+        if lends || self.taken() <= self.limit {
+            return;
+        }
+        let marking = self.phase == Phase::Marking;
+        for which in [Which::First, Which::Second] {
+            // The cursor has passed the block of the current hole, or stands at its end.
+            let address = self.region(which).next;
+            let lent = self.arenas.iter().flatten().any(|arena| arena.is_lent && arena.contains(address));
+            if lent {
+                let region = self.region(which);
+                let allocated = region.uncounted();
+                region.counted = region.next;
+                region.retire(marking);
+                region.scan = None;
+                self.count_allocated(allocated);
+            }
+        }
     }
 
     /// Takes a new arena from the system. Its number is the least free one.
     fn grow(&mut self) -> Option<usize> {
         let number = self.arenas.iter().position(Option::is_none).unwrap_or(self.arenas.len());
-        let arena = Arena::new(u32::try_from(number).ok()?, self.has_images)?;
+        let mut arena = Arena::new(u32::try_from(number).ok()?, self.has_images)?;
+        arena.is_lent = self.taken().saturating_add(ARENA) > self.limit_for_all();
         if number == self.arenas.len() {
             self.arenas.push(Some(arena));
         } else {

@@ -103,11 +103,13 @@ impl Drop for ArenaMemory {
 pub(super) struct Arena {
     base: NonNull<u8>,
     blocks: [BlockInfo; BLOCKS + 1],
+    /// Whether it was taken from what is kept for cleanups.
+    pub(super) is_lent: bool,
     memory: Arc<ArenaMemory>,
 }
 
 // The objects and metadata behind `base` are the run's, their address is the process's.
-list_state! { Arena { base: Visited, blocks: Parts, memory: Process } }
+list_state! { Arena { base: Visited, blocks: Parts, is_lent: Run, memory: Process } }
 
 impl Arena {
     /// Creates an arena with empty blocks; `None` if the system has no memory. All of it is initialised if it
@@ -121,7 +123,7 @@ impl Arena {
             base.cast().write(ArenaHeader { number, grays: 0 });
             base.as_ptr().expose_provenance();
             let memory = Arc::new(ArenaMemory(base));
-            let arena = Arena { base, blocks: [BlockInfo::EMPTY; BLOCKS + 1], memory };
+            let arena = Arena { base, blocks: [BlockInfo::EMPTY; BLOCKS + 1], is_lent: false, memory };
             if cfg!(debug_assertions) {
                 for block in 1..=BLOCKS {
                     poison(arena.address(block), 0..BLOCK_GRANULES);
@@ -132,8 +134,13 @@ impl Arena {
     }
 
     /// Returns the arena with this memory, which `blocks` describes, as it was.
-    pub(super) fn again(memory: &Arc<ArenaMemory>, blocks: [BlockInfo; BLOCKS + 1]) -> Arena {
-        Arena { base: memory.0, blocks, memory: memory.clone() }
+    pub(super) fn again(memory: &Arc<ArenaMemory>, blocks: [BlockInfo; BLOCKS + 1], is_lent: bool) -> Arena {
+        Arena { base: memory.0, blocks, is_lent, memory: memory.clone() }
+    }
+
+    /// Returns whether an address lies in the arena.
+    pub(super) fn contains(&self, address: usize) -> bool {
+        address & !(ARENA - 1) == self.base.addr().get()
     }
 
     /// Returns the memory.

@@ -59,9 +59,10 @@ impl Heap {
 
     /// Notes that a part of what `holder` has takes `after` bytes instead of `before`.
     pub fn recount_external(&mut self, holder: Holder, before: usize, after: usize) {
-        let held = self.external.held[holder as usize];
         // It is too much or not: whoever asked for it has checked.
-        _ = self.set_external(holder, held.saturating_sub(before).saturating_add(after));
+        for count in [&mut self.external.held[holder as usize], &mut self.external.total] {
+            *count = count.saturating_sub(before).saturating_add(after);
+        }
     }
 
     /// Checks that there is room for so many bytes more, inside or outside of the heap.

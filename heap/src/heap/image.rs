@@ -73,6 +73,7 @@ struct BlockImage {
 struct ArenaImage {
     memory: Arc<ArenaMemory>,
     blocks: [BlockInfo; BLOCKS + 1],
+    is_lent: bool,
     contents: [Option<Arc<BlockImage>>; BLOCKS + 1],
 }
 
@@ -93,6 +94,7 @@ pub struct HeapImage {
     second: Region,
     due: bool,
     reserve_open: bool,
+    lent_to_cleanup: bool,
     epoch: u8,
     cycle_id: u64,
     pacing: Pacing,
@@ -132,7 +134,8 @@ impl Heap {
                 let old = old.and_then(|old| old.contents[block].as_ref());
                 Some(block_image(arena, block, &unused, old, &count))
             });
-            Some(ArenaImage { memory: arena.memory().clone(), blocks: arena.blocks(), contents })
+            let (blocks, is_lent) = (arena.blocks(), arena.is_lent);
+            Some(ArenaImage { memory: arena.memory().clone(), blocks, is_lent, contents })
         });
         let arenas = arenas.collect();
         let large = self.large.iter_mut().enumerate().map(|(index, object)| {
@@ -154,6 +157,7 @@ impl Heap {
             second: self.second.clone(),
             due: self.due,
             reserve_open: self.reserve_open,
+            lent_to_cleanup: self.lent_to_cleanup,
             epoch: self.epoch,
             cycle_id: self.cycle_id,
             pacing: self.pacing,
@@ -196,6 +200,7 @@ impl Heap {
         self.marking = false;
         (self.first, self.second) = (image.first.clone(), image.second.clone());
         (self.due, self.reserve_open) = (image.due, image.reserve_open);
+        self.lent_to_cleanup = image.lent_to_cleanup;
         (self.epoch, self.cycle_id) = (image.epoch, image.cycle_id);
         (self.pacing, self.sweep) = (image.pacing, image.sweep);
         (self.large_number, self.committed) = (image.large_number, image.committed);
@@ -242,7 +247,7 @@ fn block_image(
 /// Returns an arena as it was. `now` is what has its number at present.
 fn restore_arena(now: Option<Arena>, image: &ArenaImage) -> Arena {
     let now = now.filter(|now| Arc::ptr_eq(now.memory(), &image.memory));
-    let mut arena = Arena::again(&image.memory, image.blocks);
+    let mut arena = Arena::again(&image.memory, image.blocks, image.is_lent);
     arena.header_mut().grays = 0;
     for block in 1..=BLOCKS {
         let Some(contents) = &image.contents[block] else {

@@ -429,6 +429,8 @@ pub struct StructureObject {
 impl StructureObject {
     /// Flag of an instance of a class of `defclass`, which may get another class.
     pub const INSTANCE: u8 = 1;
+    /// Flag of a structure that `equal` compares by its slots, as a pathname.
+    pub const VALUE: u8 = 2;
 }
 
 const _: () = assert!(size_of::<StructureObject>() == 16);

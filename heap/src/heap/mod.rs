@@ -84,6 +84,9 @@ use sweep::Sweep;
 /// heap.
 pub const RESERVE: usize = ARENA + ARENA / 2;
 
+/// Bytes above that which a cleanup may use ([`Heap::lend_to_cleanup`]).
+pub const CLEANUP_RESERVE: usize = 2 * ARENA;
+
 /// Number of visits of an ordinary slice.
 ///
 /// With 100 MB live a slice takes 3 µs on a list in order of allocation, 85 µs on a random graph of vectors,
@@ -179,6 +182,7 @@ pub struct Heap {
     marking: bool,
     due: bool,
     reserve_open: bool,
+    lent_to_cleanup: bool,
 
     phase: Phase,
     epoch: u8,
@@ -226,6 +230,7 @@ list_state! {
         marking: Derived,
         due: Derived,
         reserve_open: Run,
+        lent_to_cleanup: Run,
         phase: Run by |&phase: &Phase, sink: &mut dyn StateSink| sink.word(phase as u64),
         epoch: Run,
         cycle_id: Run,
@@ -262,6 +267,7 @@ impl Heap {
             marking: false,
             due: false,
             reserve_open: false,
+            lent_to_cleanup: false,
             phase: Phase::Idle,
             epoch: 1,
             cycle_id: 0,
@@ -335,6 +341,16 @@ impl Heap {
     /// Closes the reserve. Objects in it stay; the next allocation beyond the limit fails again.
     pub fn close_reserve(&mut self) {
         self.reserve_open = false;
+    }
+
+    /// Lets those who allocate from now on use what is kept above the limit for cleanups, or no longer. What
+    /// is left of it is out of reach of others: arenas that were taken from it are theirs only once the heap
+    /// is within its limit again.
+    #[inline]
+    pub fn lend_to_cleanup(&mut self, lends: bool) {
+        if lends != self.lent_to_cleanup {
+            self.change_lending(lends);
+        }
     }
 
     /// Returns a number that distinguishes a value from all others alive at the same time, and is the same in

@@ -18,14 +18,14 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use esl_bytecode::datum::{Datum, DatumKind, ObjectId};
+use esl_bytecode::datum::{Datum, DatumKind, DatumRemains, ObjectId};
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{Home, Symbol};
 
 use crate::heap::{AllocError, Heap};
 use crate::value::Value;
 use crate::world::load::{SharedObjects, array, character, integer, integer_of, ratio};
-use crate::world::{GivenMap, GivenSet, World};
+use crate::world::{GivenMap, GivenSet, RootMap, World};
 
 pub(crate) use walk::DatumWalk;
 use walk::{ObjectParts, parts_of};
@@ -72,9 +72,9 @@ pub(crate) struct Unit {
     uninterned: BTreeMap<u32, Value>,
     uninterned_ids: GivenMap<u64, u32>,
     /// Objects and their data, by the address of the object.
-    data: GivenMap<u64, (Value, Datum)>,
+    data: RootMap<(Value, Datum)>,
     /// Data and their objects, by the address of the datum.
-    values: GivenMap<u64, (Datum, Value)>,
+    values: RootMap<(Datum, Value)>,
     /// Addresses of objects whose data were made from them, not the other way round: their place is that of
     /// the macro call that they came from last.
     made: GivenSet<u64>,
@@ -84,6 +84,42 @@ pub(crate) struct Unit {
     work: u64,
     /// Whether the data are for the embedder, who knows its own.
     is_for_embedder: bool,
+}
+
+/// What is left of a unit that is given up. It is freed in parts.
+pub(crate) struct UnitRemains {
+    data: indexmap::map::IntoValues<u64, (Value, Datum)>,
+    values: indexmap::map::IntoValues<u64, (Datum, Value)>,
+    datums: DatumRemains,
+}
+
+impl UnitRemains {
+    /// Gives up a unit.
+    pub(crate) fn new(unit: Unit) -> UnitRemains {
+        UnitRemains {
+            data: unit.data.into_values(),
+            values: unit.values.into_values(),
+            datums: DatumRemains::default(),
+        }
+    }
+
+    /// Returns about how many bytes are left.
+    pub(crate) fn bytes(&self) -> usize {
+        (self.data.len() + self.values.len()) / 2 * NODE_BYTES
+    }
+
+    /// Frees at most `allowed` nodes, and returns how many it could have freed beyond those that there were.
+    pub(crate) fn free(&mut self, allowed: usize) -> usize {
+        let mut left = self.datums.free(allowed);
+        while left > 0 {
+            let (data, values) = (&mut self.data, &mut self.values);
+            let next = values.next().map(|(datum, _)| datum).or_else(|| data.next().map(|(_, datum)| datum));
+            let Some(datum) = next else { break };
+            self.datums.add(datum);
+            left = self.datums.free(left);
+        }
+        left
+    }
 }
 
 impl SharedObjects for Unit {

@@ -7,7 +7,7 @@ use super::{DatumError, MAX_NODES, NODE_BYTES, Unit};
 use crate::heap::layout::Array;
 use crate::heap::{Heap, Kind};
 use crate::value::Value;
-use crate::world::{GivenMap, GivenSet, World};
+use crate::world::{GivenSet, RootMap, World};
 
 /// Circular literals in one form, at most.
 const MAX_CIRCULAR: usize = 64;
@@ -40,7 +40,7 @@ pub(crate) struct DatumWalk {
     steps: Vec<ToDatum>,
     made: Vec<Datum>,
     /// Compound objects met by this walk; without a datum while it is inside.
-    met: GivenMap<u64, (Value, Option<Datum>)>,
+    met: RootMap<(Value, Option<Datum>)>,
     nodes: usize,
 }
 
@@ -55,7 +55,7 @@ impl DatumWalk {
             circular: 0,
             steps: vec![ToDatum::Visit(object)],
             made: Vec::new(),
-            met: GivenMap::default(),
+            met: RootMap::default(),
             nodes: 0,
         }
     }
@@ -81,7 +81,8 @@ impl DatumWalk {
         self.steps.capacity() * size_of::<ToDatum>() + (self.made.len() + self.met.len()) * NODE_BYTES
     }
 
-    /// Goes on with the walk. Returns the datum, or `None` after `allowed` nodes more.
+    /// Goes on with the walk. Returns the datum, or `None` after `allowed` steps more: each compound node
+    /// takes two.
     ///
     /// # Errors
     /// [`DatumError`]; for want of room, the walk can go on when there is some.
@@ -93,7 +94,7 @@ impl DatumWalk {
         allowed: usize,
     ) -> Result<Option<Datum>, DatumError> {
         let start = self.nodes;
-        let outcome = self.go_on(unit, heap, world, start.saturating_add(allowed));
+        let outcome = self.go_on(unit, heap, world, allowed);
         unit.work += (self.nodes - start) as u64;
         match outcome {
             Ok(datum) => Ok(datum),
@@ -115,16 +116,18 @@ impl DatumWalk {
         unit: &mut Unit,
         heap: &Heap,
         world: &World,
-        end: usize,
+        allowed: usize,
     ) -> Result<Option<Datum>, WalkError> {
         let span = self.span;
+        let mut left = allowed;
         // What has been made already is counted when a part of the walk is over.
         let room = heap.room() / NODE_BYTES;
         let before = self.made.len() + self.met.len();
         while !self.steps.is_empty() {
-            if self.nodes >= end {
+            if left == 0 {
                 return Ok(None);
             }
+            left -= 1;
             if self.made.len() + self.met.len() > room.saturating_add(before) {
                 return Err(WalkError::Datum(DatumError::NoRoom((room + 1) * NODE_BYTES)));
             }

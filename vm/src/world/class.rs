@@ -46,6 +46,18 @@ impl World {
         self.classes.get(&name.bits()).copied()
     }
 
+    /// Makes `class` the class of this name, a symbol; none if there is no `class`. Instances keep their
+    /// class.
+    pub(crate) fn set_class(&mut self, heap: &mut Heap, name: Value, class: Option<Value>) {
+        let old = match class {
+            Some(class) => self.classes.insert(name.bits(), class),
+            None => self.classes.swap_remove(&name.bits()),
+        };
+        if let Some(old) = old {
+            heap.log_if_marking(old);
+        }
+    }
+
     /// Defines a class by its name (a symbol), superclasses (Classes), names of slots (symbols), and data of
     /// the library.
     ///

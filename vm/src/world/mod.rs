@@ -20,6 +20,7 @@ use std::sync::Arc;
 use esl_bytecode::builtin::{BUILTINS, Builtin, Visibility};
 use esl_bytecode::package::{PackageId, Packages};
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol};
+use indexmap::IndexMap;
 
 use crate::heap::layout::SymbolObject;
 use crate::heap::{AllocError, Heap, Holder, Kind};
@@ -63,6 +64,9 @@ impl Hasher for GivenHash {
 
 /// A map with keys that hash themselves well.
 pub(crate) type GivenMap<K, V> = HashMap<K, V, BuildHasherDefault<GivenHash>>;
+/// A map with keys that are addresses, in the order of insertion: that of addresses differs from run to run,
+/// and a run meets its roots in the same order each time.
+pub(crate) type RootMap<V> = IndexMap<u64, V, BuildHasherDefault<GivenHash>>;
 
 /// A set of keys that hash themselves well.
 pub(crate) type GivenSet<K> = std::collections::HashSet<K, BuildHasherDefault<GivenHash>>;
@@ -116,7 +120,7 @@ pub(crate) struct World {
     /// Things of the embedder's that the program holds.
     pub(crate) opaques: CopyOnWrite<Opaques>,
     /// Classes of structures and conditions, by the address of their names.
-    pub(crate) classes: CopyOnWrite<GivenMap<u64, Value>>,
+    pub(crate) classes: CopyOnWrite<RootMap<Value>>,
 }
 
 impl World {
