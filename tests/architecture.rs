@@ -81,20 +81,29 @@ fn declared_types(folder: PathBuf) -> BTreeSet<String> {
     types
 }
 
-/// Returns the files of Rust below a folder that are no tests.
-fn product_sources(folder: PathBuf) -> Vec<PathBuf> {
+/// Returns the files of Rust below a folder.
+fn sources(folder: PathBuf) -> Vec<PathBuf> {
     let (mut folders, mut files) = (vec![folder], Vec::new());
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(folder).expect("the sources can be listed") {
             let path = entry.expect("the sources can be listed").path();
-            let is_test = path.file_stem().is_some_and(|name| name == "tests");
-            if path.is_dir() && !is_test {
+            if path.is_dir() {
                 folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs") && !is_test {
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
                 files.push(path);
             }
         }
     }
+    files
+}
+
+/// Returns the files of Rust below a folder that are no tests.
+fn product_sources(folder: PathBuf) -> Vec<PathBuf> {
+    let mut files = sources(folder.clone());
+    files.retain(|file| {
+        let inner = file.strip_prefix(&folder).expect("it is below the folder");
+        inner.iter().all(|part| Path::new(part).file_stem().is_none_or(|stem| stem != "tests"))
+    });
     files
 }
 
@@ -116,7 +125,9 @@ const COLUMNS: usize = 110;
 fn comments_are_as_narrow_as_code() {
     let mut wide = Vec::new();
     for (_, folder) in SECTIONS {
-        for path in product_sources(root().join(folder)) {
+        let package = root().join(folder.trim_end_matches("src"));
+        let parts = ["src", "tests"].map(|part| package.join(part));
+        for path in parts.into_iter().filter(|part| part.is_dir()).flat_map(sources) {
             let text = fs::read_to_string(&path).expect("a source can be read");
             for (number, line) in text.lines().enumerate() {
                 let words = line.trim_start().trim_start_matches(['/', '!']);

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The only places with unsafe code: the heap, the loop, machine code, what all rely on, the name of a parser in C,
-/// and names of functions that JavaScript calls.
+/// The only places with unsafe code: the heap, the loop, machine code, what all rely on, the name of a parser
+/// in C, and names of functions that JavaScript calls.
 const ALLOWED: [&str; 7] = [
     "heap/",
     "native/",

@@ -18,6 +18,8 @@ use esl_bytecode::symbol::USER_PACKAGE;
 use esl_bytecode::{file, verify};
 use esl_compiler::diagnostic::{Renderer, Sources};
 use esl_compiler::session::Compiler;
+#[cfg(feature = "native")]
+use esl_vm::vm::Tier;
 use esl_vm::vm::Vm;
 
 /// Limit of a run, in ticks.
@@ -149,6 +151,53 @@ pub fn run_file(bytes: &[u8]) -> bool {
             false
         }
     }
+}
+
+/// What of a run does not depend on how functions run.
+#[cfg(feature = "native")]
+#[derive(Debug, PartialEq)]
+struct TierCourse {
+    output: String,
+    errors: String,
+    ticks: u64,
+    canary: u64,
+    has_ended_well: bool,
+}
+
+/// Verifies a module, and runs it by the interpreter and as machine code if it is accepted. Returns whether
+/// it was.
+///
+/// # Panics
+/// If the runs differ.
+#[cfg(feature = "native")]
+pub fn run_in_tiers(module: &Module, slice: u32) -> bool {
+    let course = |tier: Tier| {
+        let host = VirtualHost::new().with_output_limit(1 << 20).with_rights(Rights::none());
+        let captured = host.captured();
+        let config = Config { slice, ..config() };
+        let mut machine = program::machine(config, Box::new(host)).expect("there is room for the library");
+        machine.set_tier(tier);
+        let functions = machine.load_module(module).ok()?;
+        let result = machine.run_toplevel(functions, TICKS);
+        Some(TierCourse {
+            output: captured.output(),
+            errors: captured.error(),
+            ticks: machine.ticks(),
+            canary: machine.canary(),
+            has_ended_well: result.is_ok(),
+        })
+    };
+    if verify::verify(module).is_err() {
+        return false;
+    }
+    assert_eq!(course(Tier::Interpreter), course(Tier::Native));
+    true
+}
+
+/// As [`run_in_tiers`], for a bytecode file.
+#[cfg(feature = "native")]
+pub fn run_file_in_tiers(bytes: &[u8]) -> bool {
+    file::read(bytes).is_ok_and(|module| run_in_tiers(&module, 50))
 }
 
 /// Reads bytes as a recorded run, as they are and with corrected checksums, and replays the beginning of what

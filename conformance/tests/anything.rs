@@ -220,3 +220,21 @@ proptest! {
         anything::run_file(&bytes);
     }
 }
+
+#[cfg(feature = "native")]
+proptest! {
+    // Machine code is made of all that runs, which takes its time.
+    #![proptest_config(ProptestConfig { cases: cases() / 8, max_shrink_iters: 50, ..ProptestConfig::default() })]
+
+    #[test]
+    fn changed_bytecode_runs_alike_in_both_tiers(
+        text in any::<Index>(),
+        mutations in prop::collection::vec((any::<Index>(), 0..16_u8, any::<Index>(), any::<u32>()), 0..3),
+        slice in prop::sample::select(vec![1_u32, 20, 2000]),
+    ) {
+        if let Some(mut module) = anything::compile(text_at(&text)) {
+            mutations.iter().for_each(|mutation| mutate(&mut module, mutation));
+            anything::run_in_tiers(&module, slice);
+        }
+    }
+}

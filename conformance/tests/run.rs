@@ -16,6 +16,9 @@ use esl_conformance::{Expectations, Setting, programs};
 use libtest_mimic::{Arguments, Failed, Trial};
 
 #[cfg(feature = "native")]
+#[path = "run/tier_cases.rs"]
+mod tier_cases;
+#[cfg(feature = "native")]
 #[path = "run/tiers.rs"]
 mod tiers;
 
@@ -28,9 +31,9 @@ fn main() -> ExitCode {
     });
     let names: Vec<_> = names.collect();
     #[cfg(feature = "native")]
-    let tiers = tiers::trials(&names);
+    let tiers = tiers::trials(&names).into_iter().chain(tier_cases::trials());
     #[cfg(not(feature = "native"))]
-    let tiers = Vec::new();
+    let tiers = std::iter::empty();
     let programs =
         names.into_iter().map(|(name, path)| Trial::test(name.clone(), move || check_known(&name, &path)));
     let trials = programs.chain(tiers).collect();

@@ -100,3 +100,24 @@ fn functions_are_held_and_called_from_anywhere() {
     assert_eq!(engine.call::<i64>("+", [1_i64.into(), 2_i64.into()]), Ok(3));
     assert!(matches!(engine.function("5"), Err(Error::NotOfType { .. })));
 }
+
+#[test]
+fn engines_in_several_threads_have_nothing_in_common() {
+    let run = |number: i64| {
+        let mut engine = engine();
+        define_lag(&mut engine);
+        engine.define("OWN-NUMBER", "()", "Returns the number.", move |_| Ok(number)).expect("it compiles");
+        check(
+            &mut engine,
+            "(progn (defvar *own* (own-number)) (define-property level ()) 'defined)",
+            "DEFINED",
+        );
+        let together = "(progn (assert (list 'level *own*))
+                               (dotimes (i 3) (spawn (let ((more (lag i 10))) (incf *own* more))))
+                               (loop until (= *own* (+ 30 (own-number))) do (sleep 0.001))
+                               (list (level) (- *own* (lag 1 30)) (own-number)))";
+        check(&mut engine, together, &format!("({number} {number} {number})"));
+    };
+    let threads: Vec<_> = (0..4).map(|number| std::thread::spawn(move || run(number))).collect();
+    assert!(threads.into_iter().all(|thread| thread.join().is_ok()));
+}

@@ -98,7 +98,8 @@ impl Vm {
     pub fn set_tier(&mut self, tier: Tier) {
         self.compiled.tier = tier;
         if tier != Tier::Interpreter {
-            self.compiled.report.refused = Some("this program was built without the code generator".into());
+            self.compiled.report.refused =
+                Some("this program was built without the cargo feature `native`".into());
         }
     }
 
@@ -236,9 +237,15 @@ impl Vm {
     }
 
     /// Sets limits and settings from here on, except the limit of memory. Ticks are counted anew, and the
-    /// canary of turns begins.
+    /// canary of turns begins. Nothing that an earlier program has asked for is in force any more: its main
+    /// task, its status, the signals of the process that it has handled.
     pub fn begin_program(&mut self, config: Config) {
         self.config = Config { memory: self.config.memory, ..config };
+        self.outside.exit_status = None;
+        self.outside.senders = self.outside.senders.saturating_sub(self.embedder.begin_program());
+        self.outside.inbox.note_none_handled();
+        (self.scheduler.main, self.scheduler.main_number, self.scheduler.counts.made_at_end) =
+            (None, None, 0);
         self.scheduler.choices = Choices::seeded(self.config.seed);
         self.scheduler.spent = 0;
         self.scheduler.canary = Canary::default();

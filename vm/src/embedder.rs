@@ -53,6 +53,16 @@ impl Embedder {
         self.kept_so_far
     }
 
+    /// Forgets what an earlier program has asked for, and how it has ended. Returns how many signals of the
+    /// process it has handled.
+    pub(crate) fn begin_program(&mut self) -> u64 {
+        let handlers = std::mem::take(&mut self.handlers);
+        handlers.values().for_each(|&function| self.unpin(function));
+        (self.interruptible, self.ended_by, self.last_words, self.last_place) = (None, None, None, None);
+        (self.is_ending, self.is_cut_short) = (false, false);
+        handlers.len() as u64
+    }
+
     /// Calls `visit` with each value that the embedder or the outside holds.
     pub(crate) fn visit(&self, visit: &mut impl FnMut(Value)) {
         self.pinned.iter().chain(self.kept.values()).for_each(|&value| visit(value));

@@ -8,8 +8,9 @@
 #![allow(unsafe_code)]
 
 use esl_bytecode::builtin::Builtin;
-use esl_bytecode::module::Module;
-use esl_bytecode::verify::{VerifyError, verify};
+use esl_bytecode::compile::Work;
+use esl_bytecode::module::{FunctionNumber, Module};
+use esl_bytecode::verify::{VerifyError, verify_function, verify_outline};
 
 use crate::heap::layout::CodeObject;
 use crate::heap::{AllocError, CodeParts, Heap, HeapConfig, HeapImage};
@@ -53,15 +54,45 @@ pub(crate) fn heap_for_tests() -> Heap {
 /// verified it.
 pub(crate) struct Verified(());
 
-impl Verified {
-    /// Verifies a module.
+/// The verification of a module in parts. Each must be given the same module, unchanged: the loader keeps it
+/// together with this.
+#[derive(Default)]
+pub(crate) struct Verification {
+    /// Whether the parts that belong to no function are in order.
+    has_begun: bool,
+    /// Number of functions that are in order.
+    passed: usize,
+}
+
+impl Verification {
+    /// Goes on. Returns the evidence when all is verified; `None` if the work that is allowed is done before.
     ///
     /// # Errors
     /// The first rule that the module breaks.
-    pub(crate) fn module(module: &Module) -> Result<Verified, VerifyError> {
-        verify(module).map(|()| Verified(()))
+    pub(crate) fn run(&mut self, module: &Module, work: &mut Work) -> Result<Option<Verified>, VerifyError> {
+        if !self.has_begun {
+            verify_outline(module)?;
+            work.add((module.constants.len() / CONSTANTS_PER_UNIT) as u64);
+            self.has_begun = true;
+        }
+        while let Some(function) = module.functions.get(self.passed) {
+            if work.is_done() {
+                return Ok(None);
+            }
+            work.add(1 + (function.code.len() / WORDS_PER_UNIT) as u64);
+            verify_function(module, FunctionNumber(self.passed as u32))?;
+            self.passed += 1;
+        }
+        Ok(Some(Verified(())))
     }
+}
 
+/// Constants that count as a unit of work where they are verified.
+const CONSTANTS_PER_UNIT: usize = 32;
+/// Words of code that count as a unit of work where they are verified.
+const WORDS_PER_UNIT: usize = 3;
+
+impl Verified {
     /// Vouches for an image, which is part of this program.
     pub(crate) fn image() -> Verified {
         Verified(())

@@ -3,6 +3,7 @@
 use crate::builtins::LIMIT;
 use crate::builtins::define::definable;
 use crate::builtins::list::list_items;
+use crate::heap::layout::StructureObject;
 use crate::heap::{Heap, Kind};
 use crate::raise::{Exit, Expected, Outcome, Raised};
 use crate::value::Value;
@@ -82,6 +83,16 @@ pub(super) fn make_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.world.define_class(&mut vm.heap, name, &classes, &slots, data)?)
 }
 
+pub(super) fn set_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [name, class] = exactly(arguments);
+    definable(vm, name, "type")?;
+    if class.is_true() && !vm.heap.is(class, Kind::Class) {
+        return vm.exchange.type_error(class, "CLASS");
+    }
+    vm.world.set_class(&mut vm.heap, name, Some(class).filter(|class| class.is_true()));
+    Ok(name)
+}
+
 pub(super) fn find_class(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(vm.world.find_class(arguments[0]).unwrap_or(Value::NIL))
 }
@@ -145,6 +156,12 @@ pub(super) fn make_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut slots = values.to_vec();
     slots.resize(count, Value::NIL);
     Ok(vm.heap.alloc_structure(class, &slots)?)
+}
+
+pub(super) fn make_value_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let instance = make_structure(vm, arguments)?;
+    vm.heap.set_flags(instance, Kind::Structure, StructureObject::VALUE);
+    Ok(instance)
 }
 
 pub(super) fn copy_structure(vm: &mut Vm, arguments: &[Value]) -> Outcome {

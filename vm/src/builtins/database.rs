@@ -73,6 +73,18 @@ pub(super) fn make_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(made.into())
 }
 
+pub(super) fn drop_property(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let [name, width] = exactly(arguments);
+    vm.scheduler.point()?;
+    prepare(vm)?;
+    if !vm.world.is_symbol(&vm.heap, name) {
+        return vm.exchange.type_error(name, "SYMBOL");
+    }
+    let width = vm.exchange.count(width)?;
+    vm.database.drop_property(&mut vm.heap, name, width)?;
+    Ok(name)
+}
+
 pub(super) fn property_value(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.scheduler.point_of_read()?;
     prepare(vm)?;
@@ -118,6 +130,15 @@ pub(super) fn define_rule(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     vm.exchange.charge(4 * work);
     checked(vm, outcome)?;
     Ok(Value::T)
+}
+
+pub(super) fn remove_rule(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    vm.scheduler.point()?;
+    prepare(vm)?;
+    let mut work = 0;
+    let outcome = vm.database.remove_rule(&mut vm.heap, arguments[0], &mut work);
+    vm.exchange.charge(4 * work);
+    Ok(checked(vm, outcome)?.into())
 }
 
 pub(super) fn open_query(vm: &mut Vm, arguments: &[Value]) -> Outcome {

@@ -48,6 +48,14 @@ pub(crate) fn proclaim_special(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(name)
 }
 
+pub(crate) fn forget_variable(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let name = arguments[0];
+    let symbol = definable(vm, name, "variable")?;
+    let flags = vm.heap.flags(symbol, Kind::Symbol).unwrap_or(0);
+    vm.heap.set_flags(symbol, Kind::Symbol, flags & !(SymbolObject::SPECIAL | SymbolObject::CONSTANT));
+    Ok(name)
+}
+
 pub(crate) fn define_constant(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [name, value] = exactly(arguments);
     let symbol = symbol_object(vm, name)?;

@@ -98,10 +98,20 @@ fn take_kept_by_one_of(vm: &mut Vm, events: Value) -> Result<Option<Value>, Exit
 ///
 /// # Errors
 /// [`Exit::Collect`]; [`Exit::Again`] while signals are under delivery. Then nothing has happened.
+#[inline(always)]
 fn take_kept_by(vm: &mut Vm, event: Value) -> Result<Option<Value>, Exit> {
-    if !input::is_input(&vm.heap, event) || input::is_empty(&vm.heap, event) {
-        return Ok(None);
+    if input::is_input(&vm.heap, event) && !input::is_empty(&vm.heap, event) {
+        take_oldest(vm, event)
+    } else {
+        Ok(None)
     }
+}
+
+/// Takes the oldest signal that an input keeps, which keeps one.
+///
+/// # Errors
+/// As [`take_kept_by`].
+fn take_oldest(vm: &mut Vm, event: Value) -> Result<Option<Value>, Exit> {
     let room = input::room(&vm.heap, event);
     if event::is_awaited(&vm.heap, room) {
         vm.scheduler.wait_for_deliveries()?;

@@ -43,6 +43,13 @@ pub(super) fn add_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     Ok(input)
 }
 
+pub(super) fn input_rule(vm: &mut Vm, arguments: &[Value]) -> Outcome {
+    let input = expect_input(vm, arguments[0])?;
+    let capacity = Value::index(input::capacity(&vm.heap, input));
+    let rule = Value::index(input::when_full(&vm.heap, input) as usize);
+    vm.give_values(&[capacity, rule])
+}
+
 pub(super) fn remove_input(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if let Some(key) = key_of(vm, arguments[0])
         && let Some(input) = vm.outside.inputs.remove(&key)

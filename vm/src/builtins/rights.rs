@@ -3,7 +3,7 @@
 //! What forms have narrowed is a binding of a symbol that no program can name ([`World::rights`]), so that
 //! nothing can set it back, and tasks inherit it as they do all bindings. Its value is a list of strings, the
 //! innermost form's first, each of which writes [`Rights`] as a text that is made here and reaches no
-//! program.
+//! program. Rights that flags of a command have set say so, since another flag would widen them.
 //!
 //! [`World::rights`]: crate::world::World
 
@@ -21,6 +21,8 @@ use crate::vm::Vm;
 
 /// Ends each part of a text that writes rights.
 const END: char = '\0';
+/// Begins a text of rights that a flag would widen. It is the name of no right.
+const BY_FLAG: &str = "by-flag\0\0";
 
 /// Makes sure that the program has a right to an object. Returns what to use in its place: for a path, the
 /// one to which its links lead. This is the only place at which rights are asked for.
@@ -28,27 +30,37 @@ const END: char = '\0';
 /// # Errors
 /// A failure `:PERMISSION-DENIED` if it does not have it.
 pub(crate) fn demand(vm: &mut Vm, right: Right, object: &str) -> Result<String, Exit> {
-    let narrowed = narrowed(vm);
+    let (narrowed, by_forms) = narrowed(vm);
     match vm.outside.host.permit(right, object, &narrowed) {
         Permit::Granted(whole) => Ok(whole),
         Permit::NotGranted => {
             vm.exchange.raise(Raised::Denied(right, object.into(), Some(right.flag(object))))
         }
-        Permit::Narrowed => vm.exchange.raise(Raised::Denied(right, object.into(), None)),
+        Permit::Narrowed => {
+            let would_do = by_forms.len() < narrowed.len()
+                && matches!(vm.outside.host.permit(right, object, &by_forms), Permit::Granted(_));
+            let flag = would_do.then(|| right.flag(object));
+            vm.exchange.raise(Raised::Denied(right, object.into(), flag))
+        }
     }
 }
 
-/// Returns the rights that forms around the present point have narrowed to, innermost first.
-fn narrowed(vm: &mut Vm) -> Vec<Rights> {
-    let mut found = Vec::new();
+/// Returns the rights to which those are narrowed at the present point, innermost first; and of these the
+/// ones that no flag would widen.
+fn narrowed(vm: &mut Vm) -> (Vec<Rights>, Vec<Rights>) {
+    let (mut found, mut by_forms) = (Vec::new(), Vec::new());
     let mut list = in_force(vm);
     while let Some(pair) = vm.heap.as_cons(list) {
         let text = vm.heap.string_text(pair.car).unwrap_or_default();
         vm.exchange.charge_elements(text.len());
-        found.push(decode(&text));
+        let rights = decode(text.strip_prefix(BY_FLAG).unwrap_or(&text));
+        if !text.starts_with(BY_FLAG) {
+            by_forms.push(rights.clone());
+        }
+        found.push(rights);
         list = pair.cdr;
     }
-    found
+    (found, by_forms)
 }
 
 /// Returns the list of what is narrowed in the running task.
@@ -85,9 +97,12 @@ fn expect_object(vm: &mut Vm, v: Value) -> Result<String, Exit> {
     }
 }
 
-/// `(%narrow-rights rights)`
+/// `(%narrow-rights rights &optional by-flag)`
 pub(super) fn narrow_rights(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let mut text = String::new();
+    if !optional(arguments, 1).is_nil() {
+        text.push_str(BY_FLAG);
+    }
     for right in list_items(vm, optional(arguments, 0), LIMIT)? {
         let parts = list_items(vm, right, LIMIT)?;
         let Some((&name, objects)) = parts.split_first() else {

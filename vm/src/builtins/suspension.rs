@@ -74,11 +74,11 @@ pub(super) fn tree_part(vm: &mut Vm, arguments: &[Value]) -> Outcome {
         let Some(task) = vm.scheduler.find(TaskIndex(place as u32)) else { continue };
         let (number, object) = (task.number.0, task.object);
         // Of those that are newer nothing is known: their places may have been those of others.
-        if task.state == TaskState::Ended || number > below {
+        if task.state == TaskState::Ended || number <= above || number > below {
             continue;
         }
         let depth = depth_of(vm, root.as_usize(), (place, object), depths, &mut work);
-        if depth > 0 && number > above {
+        if depth > 0 {
             members.push((depth - 1, object));
         }
     }

@@ -112,7 +112,7 @@ pub(crate) fn with_compiler<T>(
 ///
 /// # Errors
 /// [`LoadError`].
-pub(crate) fn load_in_unit(vm: &mut Vm, module: &Module) -> Result<Value, LoadError> {
+fn load_in_unit(vm: &mut Vm, module: &Module) -> Result<Value, LoadError> {
     let mut unit = vm.compiler.unit.take();
     let functions = load(&mut vm.heap, &mut vm.world, module, &mut unit);
     vm.compiler.unit.replace(unit);

@@ -15,7 +15,7 @@ use esl_bytecode::module::Parameters;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE, Symbol, setf_cell};
 
-pub(crate) use host::{load_in_unit, macro_call, with_compiler};
+pub(crate) use host::{macro_call, with_compiler};
 
 use crate::heap::Heap;
 use crate::heap::layout::SymbolObject;

@@ -99,6 +99,9 @@ unsafe fn collect(vm: &mut Vm) -> Signal {
     let place = (SavedPc::new(vm.cpu.pc()), vm.scheduler.task().ticks, vm.cpu.ticks);
     if vm.exchange.collected_at == Some(place) {
         vm.exchange.collected_at = None;
+        if vm.open_cleanup_memory() {
+            return Signal::Reload;
+        }
         if is_call {
             vm.cpu.ticks -= 1;
         }

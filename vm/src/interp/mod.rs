@@ -287,6 +287,7 @@ pub(crate) fn interrupt(vm: &mut Vm, function: Value, arguments: &[Value]) -> Re
 }
 
 /// Runs the task in `vm.scheduler.running` from `vm.cpu` until it leaves the processor.
+#[inline]
 pub(crate) fn run(vm: &mut Vm) -> Leave {
     if vm.scheduler.task().control.is_unwinding() {
         // SAFETY: F1: the task is loaded, and what unwinds it works on its control stack and on `vm.cpu`

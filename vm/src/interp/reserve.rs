@@ -1,4 +1,5 @@
-//! Room on the running task's stack, and the reserves that are for handling the exhaustion of stack and heap.
+//! Room on the running task's stack, and the reserves that are for handling the exhaustion of stack and heap,
+//! and for cleanups.
 
 use crate::raise::{Exit, Raised};
 use crate::task::{Bindings, Entry, TaskEnd, UnwindTarget, Unwinding};
@@ -140,6 +141,30 @@ impl Vm {
         {
             self.scheduler.task_mut().flags.set_uses_reserve(false);
             self.update_stack_end();
+        }
+    }
+
+    /// Has the running task use the memory that is kept for cleanups, if it runs one or works for one.
+    /// Returns false if it may not, or does already.
+    pub(super) fn open_cleanup_memory(&mut self) -> bool {
+        let task = self.scheduler.task_mut();
+        let may_use = task.runs_cleanup() || task.flags.serves_cleanup();
+        if !may_use || task.flags.uses_cleanup_memory() {
+            return false;
+        }
+        task.flags.set_uses_cleanup_memory(true);
+        self.heap.lend_to_cleanup(true);
+        true
+    }
+
+    /// Notes that a cleanup of the running task is over: with the outermost, so is the use of what is kept
+    /// for cleanups.
+    #[inline]
+    pub(super) fn close_cleanup_memory(&mut self) {
+        let task = self.scheduler.task_mut();
+        if task.flags.uses_cleanup_memory() && !task.runs_cleanup() && !task.flags.serves_cleanup() {
+            task.flags.set_uses_cleanup_memory(false);
+            self.heap.lend_to_cleanup(false);
         }
     }
 

@@ -201,6 +201,7 @@ pub(super) unsafe fn end_cleanup(vm: &mut Vm, _pc: *const u32, _base: *mut Value
     control.unwinding = pending;
     let unwinds = control.unwinding.is_some();
     vm.exchange.values = values;
+    vm.close_cleanup_memory();
     if vm.scheduler.task().flags.attention() {
         // What waited for the end of the cleanup waits no longer.
         vm.exchange.charges.end_slice();
@@ -309,6 +310,7 @@ pub(super) unsafe fn unwind(vm: &mut Vm) -> Signal {
                     Some(unwinding.or_interrupted(interrupted))
                 };
                 vm.scheduler.task_mut().control.unwinding = next;
+                vm.close_cleanup_memory();
             }
             EntryKind::Limit => {
                 task.control.unwinding = Some(unwinding);

@@ -128,11 +128,6 @@ impl Outside {
         self.inputs.values().for_each(|&input| visit(input));
     }
 
-    /// Returns whether something is expected in the inbox.
-    pub(crate) fn expects_news(&self) -> bool {
-        !self.operations.is_empty() || self.senders > 0
-    }
-
     /// Writes what programs have printed and is still in a buffer, as far as there is room.
     pub(crate) fn pass_on(&mut self) {
         self.console.pass_on(&mut self.host);

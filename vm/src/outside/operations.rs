@@ -46,6 +46,11 @@ impl Operations {
         self.open.is_empty()
     }
 
+    /// Returns the handles of those under way, that of the newest first.
+    pub(crate) fn handles(&self) -> impl Iterator<Item = Value> {
+        self.open.values().rev().map(|open| open.handle)
+    }
+
     /// Returns the number of the operation that begins next.
     pub(crate) fn next_number(&self) -> u64 {
         self.begun + 1

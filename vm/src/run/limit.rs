@@ -104,8 +104,15 @@ pub(super) fn charge_account(vm: &mut Vm, id: AccountId, measure: Measure, units
 /// # Errors
 /// [`Exit::Again`] if that is more than a quota allows: before the task does it again, the form with the
 /// quota ends. Where it cannot, as in a cleanup, the unit may be taken then.
+#[inline]
 pub(crate) fn admit(vm: &mut Vm, measure: Measure) -> Result<(), Exit> {
-    let account = vm.scheduler.running_account();
+    match vm.scheduler.running_account() {
+        AccountId::NONE => Ok(()),
+        account => admit_to(vm, account, measure),
+    }
+}
+
+fn admit_to(vm: &mut Vm, account: AccountId, measure: Measure) -> Result<(), Exit> {
     let Err(expired) = vm.scheduler.accounts.admit(account, measure) else { return Ok(()) };
     for (index, number) in expired {
         expire(vm, index, number, vm.world.known.budget_exhausted);

@@ -44,11 +44,11 @@ pub(crate) use rest::{begin_rest, can_rest, end_rest, resume_from_rest};
 pub(crate) use signal::{deliver_some, show_kept, signal};
 pub(crate) use spawn::{SpawnOptions, make_task};
 pub(crate) use timers::idle;
-pub(crate) use turn::give_turn;
+pub(crate) use turn::{give_turn, go_on_with_turn};
 
 use abort::abort_more;
+use operation::expects_news;
 use timers::{go_on_in_time, look_at_clock};
-use turn::go_on_with_turn;
 
 use crate::host::{Awaited, Host, RunCheck};
 use crate::task::{TaskId, TaskIndex, TaskState};
@@ -106,7 +106,7 @@ impl Vm {
         scheduler.first_timer().is_some()
             || !scheduler.readers.is_empty()
             || !scheduler.writers.is_empty()
-            || self.outside.expects_news()
+            || expects_news(self)
     }
 
     /// Returns how far the run is.

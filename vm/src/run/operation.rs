@@ -5,10 +5,20 @@ use crate::datum;
 use crate::host::News;
 use crate::value::Value;
 use crate::vm::Vm;
-use crate::wait::operation;
+use crate::wait::{event, operation};
 use esl_bytecode::datum::Datum;
 use esl_bytecode::span::Span;
 use esl_bytecode::symbol::Symbol;
+
+/// Returns whether something may come into the inbox that lets a waiting task go on: a signal of an input, or
+/// news of an operation whose handle somebody waits for. Of the others, such as one that an earlier program
+/// has left, no task would hear.
+pub(super) fn expects_news(vm: &Vm) -> bool {
+    let is_awaited = |event| event::is_awaited(&vm.heap, event);
+    let any_is_awaited = is_awaited(vm.scheduler.any_event);
+    vm.outside.senders > 0
+        || vm.outside.operations.handles().any(|handle| any_is_awaited || is_awaited(handle))
+}
 
 /// Takes in what is heard of an operation: notes it in the handle, and signals that. What is heard of one
 /// that is over has no effect.

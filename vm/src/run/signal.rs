@@ -47,6 +47,7 @@ impl Vm {
 ///
 /// # Errors
 /// [`Exit::Collect`] without room; then nothing has happened.
+#[inline(always)]
 pub(crate) fn signal(vm: &mut Vm, event: Value, arguments: Value) -> Result<(), Exit> {
     if input::is_input(&vm.heap, event) {
         return signal_input(vm, event, arguments);
@@ -90,9 +91,10 @@ fn count_takers(vm: &mut Vm, input: Value) -> usize {
     let (mut count, mut seen) = (0, 0);
     let mut link = link::first(&vm.heap, input);
     while link.is_true() && count < 2 {
-        count += usize::from(is_ready(vm, link::wait_of(&vm.heap, link)));
+        let (wait, next) = link::wait_and_next(&vm.heap, link);
+        count += usize::from(is_ready(vm, wait));
         seen += 1;
-        link = link::next(&vm.heap, link);
+        link = next;
     }
     vm.exchange.charge(seen);
     count
@@ -150,6 +152,7 @@ fn wake_waiters(vm: &mut Vm, event: Value, arguments: Value) -> Result<(), Exit>
 
 /// Returns how many of the waits for `event` keep signals; `None` if there are too many waits to see to in
 /// one step.
+#[inline]
 fn keepers_if_few(heap: &Heap, event: Value) -> Option<usize> {
     let (mut keepers, mut count) = (0, 0);
     let mut link = link::first(heap, event);
@@ -158,8 +161,9 @@ fn keepers_if_few(heap: &Heap, event: Value) -> Option<usize> {
         if count > AT_ONCE {
             return None;
         }
-        keepers += usize::from(link::keeps(heap, link::wait_of(heap, link)));
-        link = link::next(heap, link);
+        let (wait, next) = link::wait_and_next(heap, link);
+        keepers += usize::from(link::keeps(heap, wait));
+        link = next;
     }
     Some(keepers)
 }
@@ -182,8 +186,8 @@ fn deliver(vm: &mut Vm, event: Value, arguments: Value, mut cells: Value) -> usi
     let by = vm.scheduler.running_number();
     while link.is_true() {
         // A wait is in the list once, so closing it does not touch the next link.
-        let next = link::next(&vm.heap, link);
-        hand_over(vm, link, (event, by), arguments, &mut cells);
+        let (wait, next) = link::wait_and_next(&vm.heap, link);
+        hand_over(vm, wait, (event, by), arguments, &mut cells);
         woken += 1;
         link = next;
     }
@@ -206,19 +210,20 @@ fn begin_delivery(vm: &mut Vm, event: Value, arguments: Value) {
 pub(crate) fn deliver_some(vm: &mut Vm) {
     let Some(&delivery) = vm.scheduler.deliveries.signals.front() else { return };
     let Delivery { event, arguments, next, account, by } = delivery;
-    let mut links = Vec::with_capacity(AT_ONCE);
+    let mut waits = Vec::with_capacity(AT_ONCE);
     let (mut link, mut keepers) = (next, 0);
-    while link.is_true() && links.len() < AT_ONCE {
-        keepers += usize::from(link::keeps(&vm.heap, link::wait_of(&vm.heap, link)));
-        links.push(link);
-        link = link::next(&vm.heap, link);
+    while link.is_true() && waits.len() < AT_ONCE {
+        let (wait, next) = link::wait_and_next(&vm.heap, link);
+        keepers += usize::from(link::keeps(&vm.heap, wait));
+        waits.push(wait);
+        link = next;
     }
     let mut cells = allocate_without_retry(vm, |vm| cells(&mut vm.heap, keepers, arguments));
-    for &link in &links {
-        hand_over(vm, link, (event, by), arguments, &mut cells);
+    for &wait in &waits {
+        hand_over(vm, wait, (event, by), arguments, &mut cells);
     }
-    vm.scheduler.spent += links.len() as u64;
-    charge_account(vm, account, Measure::Ticks, links.len() as u64);
+    vm.scheduler.spent += waits.len() as u64;
+    charge_account(vm, account, Measure::Ticks, waits.len() as u64);
     let deliveries = &mut vm.scheduler.deliveries;
     match deliveries.signals.front_mut() {
         Some(delivery) if link.is_true() => delivery.next = link,
@@ -241,10 +246,10 @@ fn release_held(vm: &mut Vm) {
     }
 }
 
-/// Hands a signal, an event and the task that gave it, to the wait that `link` belongs to. A wait that keeps
-/// signals gets the first of `cells`.
-fn hand_over(vm: &mut Vm, link: Value, signal: (Value, TaskNumber), arguments: Value, cells: &mut Value) {
-    let wait = link::wait_of(&vm.heap, link);
+/// Hands a signal, an event and the task that gave it, to a wait. A wait that keeps signals gets the first of
+/// `cells`.
+#[inline(always)]
+fn hand_over(vm: &mut Vm, wait: Value, signal: (Value, TaskNumber), arguments: Value, cells: &mut Value) {
     if input::is_input(&vm.heap, signal.0) && link::takes(&vm.heap, wait) {
         // What an input keeps is taken by the wait itself, when its task looks.
         if !input::is_empty(&vm.heap, signal.0) || !is_ready(vm, wait) {
@@ -273,6 +278,7 @@ pub(super) fn keep(vm: &mut Vm, wait: Value, cell: Value, event: Value) {
 }
 
 /// Makes the task runnable that is parked at this wait, if one is.
+#[inline(always)]
 fn wake_waiter(vm: &mut Vm, wait: Value, (event, by): (Value, TaskNumber)) {
     let urgent = link::is_urgent(&vm.heap, wait);
     if let Some(index) = vm.scheduler.index_of_parked(&vm.heap, wait) {

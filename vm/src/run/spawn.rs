@@ -9,7 +9,7 @@ use crate::interp;
 use crate::raise::{Exit, Raised};
 use crate::report::{self, Happening};
 use crate::schedule::{AccountOwner, Amount, Measure};
-use crate::task::{Bindings, DEFAULT_PRIORITY, Fund, Task, TaskId, TaskNumber, TaskState};
+use crate::task::{AccountId, Bindings, DEFAULT_PRIORITY, Fund, Task, TaskId, TaskNumber, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
 use crate::wait::{event, lineage};
@@ -173,13 +173,16 @@ pub(crate) fn make_task(
         task.extra_mut().fund = Some(fund);
     }
     if let Some(maker) = scheduler.running.as_ref().filter(|_| !options.is_service) {
-        // What a cleanup makes in a form that has used up its account is not to end at once.
-        let is_free = maker.runs_cleanup();
-        let account = scheduler.accounts.for_child(maker.account, is_free);
-        scheduler.accounts.enter(account);
-        task.account = account;
-        if !options.hidden {
-            scheduler.accounts.take(account, Measure::Tasks);
+        task.flags.set_serves_cleanup(maker.runs_cleanup() || maker.flags.serves_cleanup());
+        if maker.account != AccountId::NONE {
+            // What a cleanup makes in a form that has used up its account is not to end at once.
+            let is_free = maker.runs_cleanup();
+            let account = scheduler.accounts.for_child(maker.account, is_free);
+            scheduler.accounts.enter(account);
+            task.account = account;
+            if !options.hidden {
+                scheduler.accounts.take(account, Measure::Tasks);
+            }
         }
         if let Some(control) = maker.control.get()
             && control.bindings.len() > 0

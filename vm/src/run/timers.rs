@@ -5,6 +5,7 @@
 
 use super::arrival::{serve_looks, wait_in_host, wake_readers};
 use super::limit::expire_in_time;
+use super::operation::expects_news;
 use super::tell_how_far;
 use super::wake::{call_attention, make_runnable};
 use crate::host::{Awaited, Host, Wake};
@@ -120,7 +121,7 @@ pub(crate) fn idle(vm: &mut Vm) -> bool {
         input: !vm.scheduler.readers.is_empty(),
         // Room may have come since a task has parked; the note that says so has not.
         output: vm.outside.console.is_behind() || !vm.scheduler.writers.is_empty(),
-        news: vm.outside.expects_news(),
+        news: expects_news(vm),
     };
     if deadline.is_none() && awaited == Awaited::default() {
         return false;

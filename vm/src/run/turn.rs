@@ -19,61 +19,90 @@ use crate::vm::Vm;
 /// Gives a runnable task its turn: one slice, or as many as it takes to leave a critical section. `end` is
 /// the number of ticks of the run at which the portion is over; the turn stays open then.
 pub(crate) fn give_turn(vm: &mut Vm, index: TaskIndex, end: u64) {
-    take_turn(vm, index, None, end);
+    while let Some(leave) = run_slice(vm, index, end)
+        && goes_on(vm, index, leave, end)
+    {}
 }
 
 /// Goes on with a turn that the end of the last portion has left open.
 #[cold]
-pub(super) fn go_on_with_turn(vm: &mut Vm, turn: OpenTurn, end: u64) {
-    if vm.scheduler.tasks.contains(turn.task) {
-        take_turn(vm, turn.task.index, turn.slice, end);
+pub(crate) fn go_on_with_turn(vm: &mut Vm, turn: OpenTurn, end: u64) {
+    let index = turn.task.index;
+    if !vm.scheduler.tasks.contains(turn.task) {
+        return;
     }
-}
-
-/// Gives a task its turn, which begins with the rest of a slice if one is given.
-fn take_turn(vm: &mut Vm, index: TaskIndex, mut rest: Option<OpenSlice>, end: u64) {
-    loop {
-        let Some(leave) = run_slice(vm, index, rest.take(), end) else { return };
-        let scheduler = &mut vm.scheduler;
-        let Some(task) = scheduler.tasks.at_mut(index) else { return };
-        match leave {
-            Leave::Ended => return,
-            Leave::Slice => {
-                let goes_on = task.critical > 0 || scheduler.turn.end == TurnEnd::Cut;
-                if goes_on && !scheduler.is_budget_spent(&vm.config) {
-                    if scheduler.spent < end {
-                        continue;
-                    }
-                    return scheduler.leave_open(None);
-                }
-                return match scheduler.turn.end {
-                    TurnEnd::Held => scheduler.hold(index),
-                    TurnEnd::Spent | TurnEnd::Cut | TurnEnd::Passed => make_runnable(vm, index, false),
-                };
-            }
-            Leave::Parked => return park_task(vm, index),
+    if let Some(slice) = turn.slice {
+        let Some(leave) = run_rest_of_slice(vm, index, slice, end) else { return };
+        if !goes_on(vm, index, leave, end) {
+            return;
         }
     }
+    give_turn(vm, index, end);
 }
 
-/// Gives a task a slice, or the rest of one. `None` if the portion has ended before the slice, which then
-/// stays open.
-fn run_slice(vm: &mut Vm, index: TaskIndex, rest: Option<OpenSlice>, end: u64) -> Option<Leave> {
-    if rest.is_none() && !vm.scheduler.deliveries.is_empty() {
+/// Does what follows on a slice, and returns whether that is another one in the same turn.
+#[inline(always)]
+fn goes_on(vm: &mut Vm, index: TaskIndex, leave: Leave, end: u64) -> bool {
+    let scheduler = &mut vm.scheduler;
+    match leave {
+        Leave::Ended => {}
+        Leave::Parked => park_task(vm, index),
+        Leave::Slice => {
+            let Some(task) = scheduler.tasks.at_mut(index) else { return false };
+            let is_cut = task.critical > 0 || scheduler.turn.end == TurnEnd::Cut;
+            if is_cut && !scheduler.is_budget_spent(&vm.config) {
+                if scheduler.spent < end {
+                    return true;
+                }
+                scheduler.leave_open(None);
+                return false;
+            }
+            match scheduler.turn.end {
+                TurnEnd::Held => scheduler.hold(index),
+                TurnEnd::Spent | TurnEnd::Cut | TurnEnd::Passed => make_runnable(vm, index, false),
+            }
+        }
+    }
+    false
+}
+
+/// Gives a task a slice. `None` if the portion has ended before the slice, which then stays open.
+fn run_slice(vm: &mut Vm, index: TaskIndex, end: u64) -> Option<Leave> {
+    if !vm.scheduler.deliveries.is_empty() {
         deliver_some(vm);
     }
     let Some(mut task) = vm.scheduler.tasks.take(index) else { return Some(Leave::Ended) };
-    if rest.is_none() && !vm.scan_in_turn(&mut task) {
+    if !vm.scan_in_turn(&mut task) {
         vm.scheduler.tasks.put_back(index, task);
         vm.scheduler.turn.end = TurnEnd::Spent;
         return Some(Leave::Slice);
     }
     let portion = end.saturating_sub(vm.scheduler.spent);
     let allocated = vm.bytes_for_accounts();
-    let (mut slice, leave) = match rest {
-        None => begin_slice(vm, index, task, portion),
-        Some(slice) => (slice, go_on_with_slice(vm, task, slice, portion)),
-    };
+    let (slice, leave) = begin_slice(vm, index, task, portion);
+    settle_slice(vm, slice, leave, portion, allocated)
+}
+
+/// Gives a task the rest of a slice. `None` as by [`run_slice`].
+#[cold]
+fn run_rest_of_slice(vm: &mut Vm, index: TaskIndex, slice: OpenSlice, end: u64) -> Option<Leave> {
+    let Some(task) = vm.scheduler.tasks.take(index) else { return Some(Leave::Ended) };
+    let portion = end.saturating_sub(vm.scheduler.spent);
+    let allocated = vm.bytes_for_accounts();
+    let leave = go_on_with_slice(vm, task, slice, portion);
+    settle_slice(vm, slice, leave, portion, allocated)
+}
+
+/// Ends a slice that the running task has left, or leaves it open if that was because of the portion's end.
+/// `allocated` is the number of bytes allocated when the task came to run.
+#[inline(always)]
+fn settle_slice(
+    vm: &mut Vm,
+    mut slice: OpenSlice,
+    leave: Leave,
+    portion: u64,
+    allocated: u64,
+) -> Option<Leave> {
     let leave = match leave {
         Leave::Ended if vm.scheduler.stops_before_end(&mut vm.exchange.values) => Leave::Slice,
         Leave::Ended => {
@@ -128,7 +157,6 @@ fn begin_slice(vm: &mut Vm, index: TaskIndex, mut task: Box<Task>, portion: u64)
 }
 
 /// Makes a task the running one, and runs it for a further portion of its slice.
-#[cold]
 fn go_on_with_slice(vm: &mut Vm, task: Box<Task>, slice: OpenSlice, portion: u64) -> Leave {
     make_running(vm, task);
     interp::load(vm, slice.left.min(portion) as i32);
@@ -137,8 +165,10 @@ fn go_on_with_slice(vm: &mut Vm, task: Box<Task>, slice: OpenSlice, portion: u64
 }
 
 /// Makes a task the running one.
+#[inline(always)]
 fn make_running(vm: &mut Vm, task: Box<Task>) {
     let number = task.number;
+    vm.heap.lend_to_cleanup(task.flags.uses_cleanup_memory());
     vm.scheduler.running = Some(task);
     if vm.watch.is_followed {
         report::show(vm, number, Seen::Runs);
@@ -158,6 +188,7 @@ fn leave_slice_open(vm: &mut Vm, slice: OpenSlice) {
 }
 
 /// Charges the running task what it has used in its slice, and takes it off the processor.
+#[inline(always)]
 fn end_slice(vm: &mut Vm, slice: OpenSlice, leave: Leave) {
     let OpenSlice { used, bytes, account, .. } = slice;
     let word = if leave == Leave::Ended {
@@ -202,6 +233,7 @@ fn begin_running(vm: &mut Vm, account: AccountId) -> Result<(), Leave> {
 }
 
 /// Puts the record of the running task back into the table, or retires it after the task's end.
+#[inline(always)]
 fn put_back(vm: &mut Vm, leave: Leave) {
     let scheduler = &mut vm.scheduler;
     let Some(mut task) = scheduler.running.take() else { return };
@@ -267,10 +299,10 @@ fn park_task(vm: &mut Vm, index: TaskIndex) {
 
 /// Gives back most of a stack that is much too large for what is on it, if it was the last time too.
 fn trim(heap: &mut Heap, task: &mut Task) {
-    let (top, capacity) = (interp::top_of_task(task), task.stack.capacity());
-    let is_oversized = capacity > 64 && top < capacity / 4;
+    let capacity = task.stack.capacity();
+    let is_oversized = capacity > 64 && interp::top_of_task(task) < capacity / 4;
     if is_oversized && task.flags.oversized() {
-        task.stack.shrink(top + 16);
+        task.stack.shrink(interp::top_of_task(task) + 16);
         task.recount(heap);
     }
     task.flags.set_oversized(is_oversized && !task.flags.oversized());

@@ -5,6 +5,7 @@ use crate::task::{TaskIndex, TaskState};
 use crate::vm::Vm;
 
 /// Makes a parked task runnable, or moves a runnable one to the urgent ones.
+#[inline]
 pub(crate) fn make_runnable(vm: &mut Vm, index: TaskIndex, urgent: bool) {
     if vm.scheduler.make_runnable(index, urgent) {
         report::note(vm, index, Happening::GoesOn);

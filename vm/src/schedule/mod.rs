@@ -247,13 +247,13 @@ impl Scheduler {
     fn wake_takers(&mut self, heap: &Heap, input: Value) {
         let mut link = link::first(heap, input);
         while link.is_true() {
-            let wait = link::wait_of(heap, link);
+            let (wait, next) = link::wait_and_next(heap, link);
             if let Some(index) = self.index_of_parked(heap, wait)
                 && link::takes(heap, wait)
             {
                 self.make_runnable(index, false);
             }
-            link = link::next(heap, link);
+            link = next;
         }
     }
 

@@ -147,6 +147,10 @@ define_flags! {
     rests set_rests = 10;
     /// It was to go on since it is at rest.
     woken set_woken = 11;
+    /// It uses the memory that is kept for cleanups, since there is no other.
+    uses_cleanup_memory set_uses_cleanup_memory = 12;
+    /// A cleanup has made it, or a task that works for one.
+    serves_cleanup set_serves_cleanup = 13;
 }
 
 /// Report of a failure.

@@ -44,7 +44,15 @@ impl Deliveries {
     }
 
     /// Notes that a link leaves its list, in front of `next`, so that no delivery goes by it.
+    #[inline]
     pub(crate) fn pass_over(&mut self, link: Value, next: Value) {
+        if !self.is_empty() {
+            self.pass_over_now(link, next);
+        }
+    }
+
+    #[cold]
+    fn pass_over_now(&mut self, link: Value, next: Value) {
         for delivery in &mut self.signals {
             if delivery.next == link {
                 delivery.next = next;

@@ -27,6 +27,9 @@ pub(crate) const HELD: usize = 7;
 /// Number of slots of a task.
 pub(crate) const TASK_LENGTH: usize = 8;
 
+/// Number of slots that every event has.
+const LENGTH: usize = 4;
+
 /// Creates an event.
 ///
 /// # Errors
@@ -47,8 +50,17 @@ pub(crate) fn count(heap: &Heap, event: Value) -> i64 {
 
 /// Counts a signal of an event.
 pub(crate) fn count_signal(heap: &mut Heap, event: Value) {
-    let count = Value::fixnum(count(heap, event) + 1).unwrap_or(Value::small(0));
-    heap.slot_set(event, COUNT, count);
+    if let Some(slots) = slots_mut(heap, event) {
+        let count = slots[COUNT].as_fixnum().unwrap_or(0) + 1;
+        slots[COUNT] = Value::fixnum(count).unwrap_or(Value::small(0));
+    }
+}
+
+/// Returns the slots that every event has, to be set.
+#[inline]
+pub(super) fn slots_mut(heap: &mut Heap, event: Value) -> Option<&mut [Value; LENGTH]> {
+    let kind = heap.kind(event)?;
+    heap.slots_mut(event, kind)
 }
 
 /// Returns whether a wait for an event is open.

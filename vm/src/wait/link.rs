@@ -59,6 +59,12 @@ fn flags(heap: &Heap, wait: Value) -> u8 {
     heap.header(wait).map_or(0, |header| header.flags)
 }
 
+/// Returns the slots of a link, to be set.
+#[inline]
+fn slots_mut(heap: &mut Heap, link: Value) -> Option<&mut [Value; LENGTH]> {
+    heap.slots_mut(link, Kind::Wait)
+}
+
 /// Opens a wait of the task with this object for events, each given once.
 ///
 /// # Errors
@@ -69,8 +75,11 @@ pub(crate) fn open(
     events: &[Value],
     options: WaitOptions,
 ) -> Result<Value, AllocError> {
-    let wait = make(heap, owner, options)?;
-    let Some((&first, others)) = events.split_first() else { return Ok(wait) };
+    let (first, others) = match events {
+        [] => (Value::NIL, events),
+        [first, others @ ..] => (*first, others),
+    };
+    let wait = make(heap, owner, first, options)?;
     let mut more = options.what;
     for _ in others {
         let mut slots = [Value::NIL; LENGTH];
@@ -78,10 +87,11 @@ pub(crate) fn open(
         slots[MORE] = more;
         more = heap.alloc_record(Kind::Wait, 0, 0, &slots)?;
     }
-    append(heap, wait, first);
-    if !others.is_empty() {
-        heap.slot_set(wait, MORE, more);
+    enter(heap, wait, first);
+    if others.is_empty() {
+        return Ok(wait);
     }
+    heap.slot_set(wait, MORE, more);
     let mut link = more;
     for &event in others.iter().rev() {
         append(heap, link, event);
@@ -90,8 +100,8 @@ pub(crate) fn open(
     Ok(wait)
 }
 
-/// Creates the first link of a wait, in no list yet.
-fn make(heap: &mut Heap, owner: Value, options: WaitOptions) -> Result<Value, AllocError> {
+/// Creates the first link of a wait, which is to [`enter`] the list of `event`, if that is not `NIL`.
+fn make(heap: &mut Heap, owner: Value, event: Value, options: WaitOptions) -> Result<Value, AllocError> {
     let deadline = options.deadline.and_then(|time| Value::fixnum(time as i64)).unwrap_or(Value::NIL);
     let queue = if options.keeps { heap.cons(Value::NIL, Value::NIL)? } else { Value::NIL };
     let mut flags = if options.keeps { KEEPS } else { 0 };
@@ -99,17 +109,20 @@ fn make(heap: &mut Heap, owner: Value, options: WaitOptions) -> Result<Value, Al
     flags |= if options.child { CHILD } else { 0 };
     let mut slots = [Value::NIL; LENGTH];
     slots[OWNER] = owner;
+    slots[EVENT] = event;
+    slots[PREVIOUS] = heap.slot_or_nil(event, event::LAST);
     slots[QUEUE] = queue;
     slots[DEADLINE] = deadline;
     slots[MORE] = options.what;
     heap.alloc_record(Kind::Wait, flags, 0, &slots)
 }
 
-/// Returns the wait that a link belongs to.
+/// Returns the wait that a link belongs to, and the link behind it in the list of its event, or `NIL`.
 #[inline]
-pub(crate) fn wait_of(heap: &Heap, link: Value) -> Value {
-    let owner = heap.slot_or_nil(link, OWNER);
-    if heap.is(owner, Kind::Wait) { owner } else { link }
+pub(crate) fn wait_and_next(heap: &Heap, link: Value) -> (Value, Value) {
+    let Some(slots) = heap.slots::<LENGTH>(link, Kind::Wait) else { return (link, Value::NIL) };
+    let wait = if heap.is(slots[OWNER], Kind::Wait) { slots[OWNER] } else { link };
+    (wait, slots[NEXT])
 }
 
 /// Returns the object of the task that waits.
@@ -120,11 +133,6 @@ pub(crate) fn owner(heap: &Heap, wait: Value) -> Value {
 /// Returns the link of the wait for `event` that began first, or `NIL`.
 pub(crate) fn first(heap: &Heap, event: Value) -> Value {
     heap.slot_or_nil(event, event::FIRST)
-}
-
-/// Returns the link behind this one in the list of its event, or `NIL`.
-pub(crate) fn next(heap: &Heap, link: Value) -> Value {
-    heap.slot_or_nil(link, NEXT)
 }
 
 /// Returns the time at which a wait ends by itself, in nanoseconds.
@@ -181,52 +189,62 @@ pub(crate) fn forget_signals(heap: &mut Heap, wait: Value) {
     }
 }
 
-/// Appends a link to the list of an event.
-fn append(heap: &mut Heap, link: Value, event: Value) {
-    let last = heap.slot_or_nil(event, event::LAST);
-    heap.slot_set(link, EVENT, event);
-    if last.is_true() {
-        heap.slot_set(link, PREVIOUS, last);
-        heap.slot_set(last, NEXT, link);
+/// Puts a link at the end of the list of an event, and returns the one that was there.
+fn enter(heap: &mut Heap, link: Value, event: Value) -> Value {
+    let Some(ends) = event::slots_mut(heap, event) else { return Value::NIL };
+    let last = std::mem::replace(&mut ends[event::LAST], link);
+    if last.is_nil() {
+        ends[event::FIRST] = link;
     } else {
-        heap.slot_set(event, event::FIRST, link);
+        heap.slot_set(last, NEXT, link);
     }
-    heap.slot_set(event, event::LAST, link);
+    last
 }
 
-/// Removes a link from its list, if it is in one.
-fn remove(heap: &mut Heap, deliveries: &mut Deliveries, link: Value) {
-    let event = heap.slot_or_nil(link, EVENT);
-    if event.is_nil() {
-        return;
+/// Appends a link to the list of an event.
+fn append(heap: &mut Heap, link: Value, event: Value) {
+    let last = enter(heap, link, event);
+    if let Some(slots) = slots_mut(heap, link) {
+        slots[EVENT] = event;
+        slots[PREVIOUS] = last;
     }
-    let (previous, next) = (heap.slot_or_nil(link, PREVIOUS), heap.slot_or_nil(link, NEXT));
+}
+
+/// Removes a link from its list, if it is in one, and returns the next link of its wait.
+fn remove(heap: &mut Heap, deliveries: &mut Deliveries, link: Value) -> Value {
+    let Some(slots) = slots_mut(heap, link) else { return Value::NIL };
+    let take = |slot: &mut Value| std::mem::replace(slot, Value::NIL);
+    let more = slots[MORE];
+    let (event, previous, next) =
+        (take(&mut slots[EVENT]), take(&mut slots[PREVIOUS]), take(&mut slots[NEXT]));
+    if event.is_nil() {
+        return more;
+    }
     deliveries.pass_over(link, next);
     if previous.is_true() {
         heap.slot_set(previous, NEXT, next);
-    } else {
-        heap.slot_set(event, event::FIRST, next);
     }
     if next.is_true() {
         heap.slot_set(next, PREVIOUS, previous);
-    } else {
-        heap.slot_set(event, event::LAST, previous);
     }
-    heap.slot_set(link, EVENT, Value::NIL);
-    if previous.is_true() {
-        heap.slot_set(link, PREVIOUS, Value::NIL);
+    if (previous.is_nil() || next.is_nil())
+        && let Some(ends) = event::slots_mut(heap, event)
+    {
+        if previous.is_nil() {
+            ends[event::FIRST] = next;
+        }
+        if next.is_nil() {
+            ends[event::LAST] = previous;
+        }
     }
-    if next.is_true() {
-        heap.slot_set(link, NEXT, Value::NIL);
-    }
+    more
 }
 
 /// Closes a wait: none of its links is in a list any more.
 pub(crate) fn close(heap: &mut Heap, deliveries: &mut Deliveries, wait: Value) {
     let mut link = wait;
     while heap.is(link, Kind::Wait) {
-        remove(heap, deliveries, link);
-        link = heap.slot_or_nil(link, MORE);
+        link = remove(heap, deliveries, link);
     }
 }
 

@@ -123,8 +123,8 @@ fn shared_functions() -> Vec<ModuleFunction> {
             "jump-greater-int r0 0 L \n return r1 \n L: add r6 r1 r0 \n add-int r4 r0 -1 \n load-nil r7.. 1
              move r5 r6 \n call-self r2.. 2 want 1 \n return r2",
         ),
-        // Returns what its argument returns. A call for which the stack grows is none of the loop's, so it calls
-        // one with many registers before.
+        // Returns what its argument returns. A call for which the stack grows is none of the loop's, so it
+        // calls one with many registers before.
         function(
             Parameters::exactly(1),
             4,
