@@ -149,6 +149,28 @@ impl ModulePath {
     }
 }
 
+#[cfg(feature = "cli")]
+impl ModulePath {
+    /// Returns the names of the modules that are there, sorted: of those in the folders themselves, and of
+    /// those that come with the machine.
+    pub fn names(&self) -> Vec<String> {
+        let mut names = Vec::new();
+        for entry in self.folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten() {
+            let path = entry.map(|entry| entry.path()).unwrap_or_default();
+            let is_module =
+                path.extension().is_some_and(|extension| extension == "esl" || extension == "eslb");
+            if let Some(name) = path.file_stem().and_then(|name| name.to_str()).filter(|_| is_module) {
+                names.push(name.to_owned());
+            }
+        }
+        #[cfg(feature = "world")]
+        names.extend(esl_world::module_names().map(str::to_owned));
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+}
+
 fn read(path: &Path) -> Result<Vec<u8>, ModuleError> {
     std::fs::read(path).map_err(|error| ModuleError::Unreadable(path.into(), error))
 }

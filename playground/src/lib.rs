@@ -1,6 +1,6 @@
-//! ESL in a browser: the compiler, the machine and the library as one module of WebAssembly, with an interface
-//! of numbers and bytes (`abi`), so that nothing but the Rust compiler is needed to build it. A page runs a
-//! program in slices, and shows its output, its failures and its timeline.
+//! ESL in a browser: the compiler, the machine and the library as one module of WebAssembly, with an
+//! interface of numbers and bytes (`abi`), so that nothing but the Rust compiler is needed to build it. A
+//! page runs a program in slices, and shows its output, its failures and its timeline.
 //!
 //! Guarantees: nothing here takes longer than its number of ticks, but compiling, whose macros have a budget,
 //! and the end of a run, whose cleanups have an allowance. Time is virtual. Not here: the page, which is in

@@ -60,9 +60,11 @@ pub fn new_project(folder: &Path) -> u8 {
             return USAGE;
         }
     }
+    let shown = folder.display().to_string();
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-".contains(c);
+    let word = if shown.chars().all(is_plain) { shown.clone() } else { format!("'{shown}'") };
     complain(format_args!(
-        "{} is there: `cd {0} && eslvm run main.esl && eslvm test test.esl`",
-        folder.display()
+        "made {shown}; go on with `cd {word} && eslvm run main.esl && eslvm test test.esl`"
     ));
     SUCCESS
 }

@@ -157,7 +157,7 @@ fn compile_texts(
         }
         Err(error) => (None, vec![code::COMPILE_TIME_FAILURE.at(Span::default(), error.to_string())]),
     };
-    let program = module.map(|module| Program { module });
+    let program = module.map(|module| Program { module, file: None });
     let (sources, places) = (texts.sources().clone(), texts.places().to_vec());
     Compiled { program, diagnostics, sources, stopped, places, passages }
 }

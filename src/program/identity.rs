@@ -1,13 +1,10 @@
 //! What has to be the same for a run to repeat exactly: the machine's behaviour, its tables, and the library.
 
 use std::fmt;
-use std::sync::LazyLock;
 
-use esl_bytecode::file::{BUILTIN_TABLE, OPCODE_TABLE};
+use esl_bytecode::file::{BUILTIN_TABLE, OPCODE_TABLE, checksum};
 
 pub use esl_vm::EXECUTION_EPOCH;
-
-static LIBRARY: LazyLock<u32> = LazyLock::new(|| crc32fast::hash(esl_stdlib::IMAGE));
 
 /// Identity of all that decides a run beside the program, its seed and what comes from outside. A record of a
 /// run is of use only to an executable of the same identity.
@@ -30,7 +27,7 @@ impl ExecutionIdentity {
             epoch: EXECUTION_EPOCH,
             opcodes: OPCODE_TABLE,
             builtins: BUILTIN_TABLE,
-            library: *LIBRARY,
+            library: checksum(esl_stdlib::IMAGE).unwrap_or(0),
         }
     }
 }

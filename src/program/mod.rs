@@ -59,6 +59,8 @@ impl Source {
 #[derive(Clone, Debug)]
 pub struct Program {
     module: Module,
+    /// The file that it was read from; `None` if it was compiled just now.
+    file: Option<Arc<[u8]>>,
 }
 
 impl Program {
@@ -69,7 +71,7 @@ impl Program {
     pub fn from_bytes(bytes: &[u8]) -> Result<Program, LoadError> {
         let module = file::read(bytes)?;
         verify(&module).map_err(LoadError::Refused)?;
-        Ok(Program { module })
+        Ok(Program { module, file: Some(bytes.into()) })
     }
 
     /// Returns the bytes of an `.eslb` file.
@@ -77,7 +79,10 @@ impl Program {
     /// # Errors
     /// [`WriteError`], if the program contains an object that no file can hold, or is too large.
     pub fn to_bytes(&self) -> Result<Vec<u8>, WriteError> {
-        file::write(&self.module)
+        match &self.file {
+            Some(bytes) => Ok(bytes.to_vec()),
+            None => file::write(&self.module),
+        }
     }
 
     /// Returns the program as text, instruction by instruction.

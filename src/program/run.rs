@@ -265,6 +265,7 @@ pub(crate) fn end(machine: &mut Vm, main: TaskId, outcome: RunOutcome) -> Ended 
 mod tests {
     use std::sync::{Arc, Mutex};
 
+    use esl_vm::embed::HostFunction;
     use esl_vm::host::{Inbox, Look, Survey, SurveyRequest, VirtualHost};
     use esl_vm::observe::{Observer, Seen};
     use esl_vm::task::TaskNumber;
@@ -286,6 +287,37 @@ mod tests {
             let summary = run(&program, config, Box::new(VirtualHost::new())).expect("it runs");
             assert_eq!(summary.ended, Ended::Failed, "{pause}");
         }
+    }
+
+    #[test]
+    fn what_a_program_leaves_in_a_machine_is_not_the_next_ones() {
+        let ends = |text: &str, machine: &mut Vm| {
+            let program = compile(&[Source::new("next.esl", text)]).program.expect("it compiles");
+            machine.begin_program(Config::DEFAULT);
+            run_in(machine, &program).expect("it runs").ended
+        };
+        let host = VirtualHost::new();
+        let captured = host.captured();
+        let mut machine = machine(Config::DEFAULT, Box::new(host)).expect("there is room");
+        let started = Arc::new(Mutex::new(Vec::new()));
+        let kept = Arc::clone(&started);
+        let keep = move |operation| kept.lock().expect("nobody panics").push(operation);
+        machine.add_host_function("DRIVE", HostFunction::Operation(Box::new(keep)));
+        // It never ends, and nobody waits until it does.
+        let leaves = "(on-signal :hup (print 'hung-up)) (esl::%begin-operation 'drive () t) (exit 7)";
+        assert_eq!(ends(leaves, &mut machine), Ended::Normally(7));
+        assert_eq!(started.lock().expect("nobody panics").len(), 1);
+        for _ in 0..2 {
+            assert_eq!(ends("(wait-for-event (make-event 'bell))", &mut machine), Ended::Deadlocked);
+        }
+        assert!(captured.error().contains("waits for event BELL"), "{}", captured.error());
+        assert_eq!(ends("(print 1)", &mut machine), Ended::Normally(0));
+        // What a task waits for may come, whoever has begun it.
+        let waits =
+            "(defvar *h* (esl::%begin-operation 'drive () t)) (with-timeout 5 (operation-result *h*))";
+        assert_eq!(ends(waits, &mut machine), Ended::Failed);
+        let waits = "(wait-for-events (list (symbol-value '*h*) (make-event)) :timeout 5)";
+        assert_eq!(ends(waits, &mut machine), Ended::Failed);
     }
 
     /// Looks at the machine whenever something happens.

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
-use esl_vm::host::{Inbox, Incoming};
+use esl_vm::host::{Inbox, Incoming, Rights};
 
 use super::lines::Line;
 use super::screen::PromptScreen;
@@ -17,6 +17,8 @@ use crate::operate::attach::{self, WireForm};
 
 /// Environment variable with the secret, unless a file is named.
 const SECRET: &str = "ESL_SECRET";
+/// Name of the role that may evaluate.
+const PATCH: &str = "patch";
 
 const HELP: &str = "\
 :tasks              the tasks of the run, as a tree, with their numbers
@@ -216,11 +218,16 @@ fn secret(file: Option<&Path>) -> Result<String, String> {
 }
 
 /// Attaches to the run at an address, a path or a port, until the end of the input, of the run, or `:quit`.
-/// Returns the exit status.
+/// What is evaluated has these rights, as far as the run has them. Returns the exit status.
 ///
 /// # Errors
 /// The exit status, after a message, if there is no such run, or standard input cannot be read.
-pub fn attach(address: &str, security: AttachSecurity<'_>, secret_file: Option<&Path>) -> Result<u8, u8> {
+pub fn attach(
+    address: &str,
+    security: AttachSecurity<'_>,
+    secret_file: Option<&Path>,
+    rights: &Rights,
+) -> Result<u8, u8> {
     let usage = |error: String| {
         complain(error);
         USAGE
@@ -250,7 +257,7 @@ pub fn attach(address: &str, security: AttachSecurity<'_>, secret_file: Option<&
     heard.map_err(|error| usage(format!("no thread can be made to hear the run: {error}")))?;
     interrupt_run(&wire, &typing, inbox).map_err(usage)?;
     let mut attached = Attached { wire, answers, typing, printer, asked: 0, failure: None };
-    let status = attached.begin(address).and_then(|()| attached.talk());
+    let status = attached.begin(address, rights).and_then(|()| attached.talk());
     attached.wire.close();
     status
 }
@@ -347,8 +354,8 @@ impl Attached {
         }
     }
 
-    /// Greets the run.
-    fn begin(&mut self, address: &str) -> Result<(), u8> {
+    /// Greets the run, and tells it the rights of what is evaluated here, if anything may be.
+    fn begin(&mut self, address: &str, rights: &Rights) -> Result<(), u8> {
         let role = match self.ask("swank:connection-info", &[]) {
             Ok(Ok(info)) => info.items().and_then(|items| items.last()?.as_text().map(str::to_string)),
             Ok(Err(reason)) => {
@@ -356,10 +363,27 @@ impl Attached {
                 return Err(USAGE);
             }
             Err(Disconnected) => {
-                complain(format_args!("the run at {address} refuses: the secret is not one of its own"));
+                let or = if matches!(self.wire, Wire::Tcp(_)) { ", or it speaks TLS: use --tls" } else { "" };
+                complain(format_args!("the run at {address} refuses: the secret is not one of its own{or}"));
                 return Err(USAGE);
             }
         };
+        if role.as_deref() == Some(PATCH) {
+            let parts = rights.parts().flat_map(|(right, object)| [right.name(), object.unwrap_or_default()]);
+            let parts: Vec<WireForm> = parts.map(WireForm::text).collect();
+            let refused = match self.ask("esl:rights", &parts) {
+                Ok(Ok(value)) if value.name().as_deref() == Some("t") => None,
+                Ok(Ok(value)) => Some(value.to_string()),
+                Ok(Err(reason)) => Some(reason),
+                Err(Disconnected) => Some("the run has ended".into()),
+            };
+            if let Some(reason) = refused {
+                complain(format_args!(
+                    "the run at {address} does not narrow the rights of a session: {reason}"
+                ));
+                return Err(USAGE);
+            }
+        }
         if self.typing.is_interactive {
             let role = role.unwrap_or_default();
             self.printer.print(&format!("; attached to {address} as {role}; :help lists the commands\n"));

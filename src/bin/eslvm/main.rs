@@ -1,0 +1,113 @@
+//! `eslvm`: runs ESL programs, and the REPL.
+#![forbid(unsafe_code)]
+#![allow(clippy::print_stderr, reason = "commands print")]
+
+mod explore;
+mod figures;
+mod options;
+mod program;
+mod run;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser};
+use esl::Config;
+use esl::command;
+use esl::host::RealHost;
+use esl::module_path::ModulePath;
+use esl::repl::AttachSecurity;
+use esl::replay;
+use esl::testing;
+
+use explore::run_explore;
+use options::{ClockChoice, Eslvm, EslvmAction};
+use run::{RunReports, run};
+
+/// Lets the process have as many open files and connections as the system allows it.
+#[cfg(unix)]
+fn raise_limit_of_descriptors() {
+    use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+    let limit = getrlimit(Resource::Nofile);
+    // A system that refuses leaves the limit as it is.
+    _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });
+}
+
+fn main() -> ExitCode {
+    #[cfg(unix)]
+    raise_limit_of_descriptors();
+    esl_vm::allocator::return_large_blocks();
+    let Eslvm { action, library, quiet: is_quiet } = Eslvm::parse();
+    let status = match action {
+        EslvmAction::Run {
+            mut options,
+            speed,
+            stats,
+            tier,
+            timeline,
+            profile,
+            coverage,
+            schedule,
+            record,
+            trace,
+            operate,
+            file,
+            arguments,
+        } => {
+            if schedule.is_some() {
+                options.clock = ClockChoice::Virtual;
+            }
+            let path = ModulePath::new([file.as_path()], &library);
+            let rights = options.rights.rights();
+            rights.and_then(|rights| {
+                let host = RealHost::new(arguments).with_rights(path.with_rights(rights)).with_speed(speed);
+                let schedule = schedule.as_deref().map(esl::explore::read_schedule).transpose()?;
+                let reports = RunReports {
+                    stats,
+                    tier,
+                    timeline: timeline.as_deref(),
+                    profile: profile.as_deref(),
+                    coverage: coverage.as_deref(),
+                    record: record.as_deref(),
+                    trace: &trace,
+                    operate: &operate,
+                    is_quiet,
+                };
+                run(&file, host, &options, &reports, schedule.as_ref(), &path)
+            })
+        }
+        EslvmAction::Replay { options } => replay::run_command(&options),
+        EslvmAction::Test { filter, jobs, seed, junit, coverage, budget, memory, rights, sources } => {
+            rights.rights().map(|rights| {
+                let config = Config { budget: Some(budget), memory, ..Config::default() };
+                let jobs = jobs.map_or_else(processors, usize::from);
+                testing::run(
+                    &sources,
+                    &library,
+                    &testing::Options { filter, jobs, seed, junit, coverage, config, rights, is_quiet },
+                )
+            })
+        }
+        EslvmAction::Completions { shell } => Ok(command::print_completions(shell, Eslvm::command())),
+        EslvmAction::Man { folder } => Ok(command::write_man_pages(Eslvm::command(), folder.as_deref())),
+        EslvmAction::Explore { options, file } => run_explore(&file, &options, &library, is_quiet),
+        EslvmAction::Attach { secret_file, tls, ca_file, rights, address } => {
+            let security = match (tls, &ca_file) {
+                (false, None) => AttachSecurity::Plain,
+                (_, ca_file) => AttachSecurity::Tls(ca_file.as_deref()),
+            };
+            let attach = |rights| esl::repl::attach(&address, security, secret_file.as_deref(), &rights);
+            rights.rights().and_then(attach)
+        }
+        EslvmAction::Repl { options } => options.rights.rights().and_then(|rights| {
+            let path = ModulePath::new([Path::new("-")], &library);
+            esl::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)
+        }),
+    };
+    ExitCode::from(status.unwrap_or_else(|status| status))
+}
+
+/// Returns the number of processors.
+pub(crate) fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
