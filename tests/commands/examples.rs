@@ -189,7 +189,7 @@ fn the_executive_flies_what_basilisk_simulates() {
 }
 
 /// Returns a port that is free, from those that the system gives to nobody who asks for any.
-fn free_port() -> u16 {
+pub(crate) fn free_port() -> u16 {
     let first = 20_000 + u16::try_from(std::process::id() % 10_000).expect("it is small");
     (first..32_000).find(|&port| TcpListener::bind(("127.0.0.1", port)).is_ok()).expect("one is free")
 }

@@ -37,7 +37,8 @@ fn client_and_server_talk() {
 (print (nth-value 1 (http:put (url \"/echo\") :body \"x\")))
 (print (multiple-value-list (http:get (url \"/fail\") :headers '((\"Accept\" . \"*/*\")))))
 (print (http:get (url \"/hello/again\") :timeout 60))
-(print (handler-case (http:get \"ftp://x\") (failure (f) (failure-cause f))))"
+(dolist (url '(\"ftp://x\" \"http://\" \"http://:80/\" \"http://127.0.0.1:65536/\"))
+  (print (handler-case (http:get url) (failure (f) (failure-cause f)))))"
     );
     let folder = Folder::with("http-both", &[("main.esl", &text)]);
     let mut command = eslvm(&["run", "--allow-net=127.0.0.1", "main.esl"]);
@@ -53,6 +54,9 @@ fn client_and_server_talk() {
         "405",
         failed,
         "\"hello again\"",
+        ":HTTP-ERROR",
+        ":HTTP-ERROR",
+        ":HTTP-ERROR",
         ":HTTP-ERROR",
     ];
     // A long list is printed over several lines.
@@ -133,13 +137,16 @@ fn answer_once(answer: &'static [u8]) -> (u16, std::thread::JoinHandle<String>) 
 
 #[test]
 fn answers_of_others_are_understood_or_refused() {
-    let answers: [(&[u8], &str); 6] = [
+    let answers: [(&[u8], &str); 8] = [
         (b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n4;x=1\r\nab\xc3\xa4\r\n1\r\n!\r\n0\r\nA: b\r\n\r\n", "(\"abä!\" 200)"),
         (b"HTTP/1.0 404 Not Found\n\nuntil the end", "(\"until the end\" 404)"),
         (b"HTTP/1.1 100 Continue\r\n\r\nHTTP/1.1 204 Nothing\r\nContent-Length: 5\r\n\r\n", "(\"\" 204)"),
         (b"HTTP/1.1 200 OK\r\nContent-Length: 50\r\n\r\nshort", ":HTTP-ERROR"),
         (b"HTTP/1.1 200 OK\r\nContent-Length: 99999999999\r\n\r\n", ":HTTP-ERROR"),
         (b"SSH-2.0\r\n", ":HTTP-ERROR"),
+        // Lengths that contradict each other; one that the chunks overrule.
+        (b"HTTP/1.1 200 OK\r\nContent-Length: 3\r\nContent-Length: 5\r\n\r\nabcde", ":HTTP-ERROR"),
+        (b"HTTP/1.1 200 OK\r\nContent-Length: 9\r\nTransfer-Encoding: chunked\r\n\r\n1\r\na\r\n0\r\n\r\n", "(\"a\" 200)"),
     ];
     let folder = Folder::new("http-answers");
     for (answer, expected) in answers {
@@ -184,6 +191,14 @@ fn a_server_goes_on_whatever_it_is_sent() {
     assert!(ask(b"POST /echo HTTP/1.1\r\nContent-Length: 9\r\n\r\nshort").starts_with("HTTP/1.1 400 "));
     assert!(ask(&[b'x'; 70_000]).starts_with("HTTP/1.1 400 "));
     assert_eq!(ask(b""), "");
+    // A request within the body of another, for whoever believes the other length.
+    let two_lengths = b"POST /echo HTTP/1.1\r\nContent-Length: 3\r\nContent-Length: 4\r\n\r\nabcd";
+    assert!(ask(two_lengths).starts_with("HTTP/1.1 400 "));
+    let both = b"POST /echo HTTP/1.1\r\nContent-Length: 1\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n";
+    assert!(ask(both).starts_with("HTTP/1.1 400 "));
+    // The answer to HEAD has no body, which the next answer would begin with.
+    let two = ask(b"HEAD /hello/a HTTP/1.1\r\n\r\nGET /hello/b HTTP/1.1\r\nConnection: close\r\n\r\n");
+    assert!(two.starts_with("HTTP/1.1 405 ") && two.contains("\r\n\r\nHTTP/1.1 200 OK"), "{two}");
     // Two requests over one connection.
     let two = ask(b"GET /hello/a HTTP/1.1\r\n\r\nGET /hello/b HTTP/1.1\r\nConnection: close\r\n\r\n");
     assert_eq!(two.matches("HTTP/1.1 200 OK").count(), 2, "{two}");

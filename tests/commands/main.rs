@@ -26,6 +26,7 @@ mod monitor;
 #[cfg(unix)]
 mod mqtt;
 mod operate;
+mod peers;
 #[cfg(unix)]
 mod playground;
 mod profile;

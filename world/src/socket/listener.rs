@@ -3,7 +3,6 @@
 use std::io::{Error, ErrorKind};
 use std::pin::pin;
 use std::sync::Arc;
-#[cfg(feature = "tls")]
 use std::time::Duration;
 
 use esl_vm::host::HostFailure;
@@ -22,6 +21,8 @@ const MOST_GREETED: usize = 256;
 /// Most connections that wait in the system until the program accepts them; the system may allow fewer. More
 /// than that at one moment are told to come again, which takes them seconds.
 const BACKLOG: u32 = 4096;
+/// Time after which a connection is asked for again, for which there was no descriptor.
+const PAUSE: Duration = Duration::from_millis(50);
 
 /// A socket that waits for connections.
 pub(crate) enum Listener {
@@ -93,6 +94,29 @@ fn bind_to(address: std::net::SocketAddr) -> std::io::Result<TcpListener> {
     socket.listen(BACKLOG)
 }
 
+/// Returns whether an error is no fault of a listener: the peer has gone already, or there is no descriptor
+/// or memory for one more, until somebody else gives some back.
+fn is_passing(error: &Error) -> bool {
+    #[cfg(unix)]
+    if let Some(error) = rustix::io::Errno::from_io_error(error) {
+        use rustix::io::Errno;
+        return [Errno::CONNABORTED, Errno::MFILE, Errno::NFILE, Errno::NOBUFS, Errno::NOMEM]
+            .contains(&error);
+    }
+    error.kind() == ErrorKind::ConnectionAborted
+}
+
+/// Returns the next connection that `accept` gives. So many peers that there is no descriptor for one more
+/// delay the next, and end nothing.
+async fn next<C, F: Future<Output = std::io::Result<C>>>(accept: impl Fn() -> F) -> Result<C, HostFailure> {
+    loop {
+        match accept().await {
+            Err(error) if is_passing(&error) => tokio::time::sleep(PAUSE).await,
+            result => return result.map_err(|error| socket_failure(&error)),
+        }
+    }
+}
+
 /// Returns the next connection over which TLS has begun. A peer with which it does not is dropped, and one
 /// that takes its time delays no other.
 #[cfg(feature = "tls")]
@@ -110,8 +134,8 @@ async fn accept_secured(
                     return Ok(connection);
                 }
             }
-            accepted = listener.accept(), if has_room => {
-                let (stream, _) = accepted.map_err(|error| socket_failure(&error))?;
+            accepted = next(|| listener.accept()), if has_room => {
+                let (stream, _) = accepted?;
                 let acceptor = acceptor.clone();
                 greetings.spawn(async move {
                     let (port, peer) = Connection::ends_of(&stream);
@@ -151,10 +175,10 @@ pub(super) async fn accept(arguments: CallArguments, sockets: Sockets) -> Comple
     if !lock(accepted).is_empty() {
         return Ok(Vec::new());
     }
-    let mut next = pin!(async {
+    let mut coming = pin!(async {
         match &**listener {
             Listener::Tcp(listener) => {
-                let (stream, _) = listener.accept().await.map_err(|error| socket_failure(&error))?;
+                let (stream, _) = next(|| listener.accept()).await?;
                 Ok(Connection::of_tcp(stream))
             }
             #[cfg(feature = "tls")]
@@ -163,13 +187,13 @@ pub(super) async fn accept(arguments: CallArguments, sockets: Sockets) -> Comple
             }
             #[cfg(unix)]
             Listener::Unix(listener, _) => {
-                let (stream, _) = listener.accept().await.map_err(|error| socket_failure(&error))?;
+                let (stream, _) = next(|| listener.accept()).await?;
                 let (reader, writer) = stream.into_split();
                 Ok((Connection::over(reader, writer), 0, String::new()))
             }
         }
     });
-    let (kind, port, peer) = unless_closed(socket.closing.subscribe(), next.as_mut()).await?;
+    let (kind, port, peer) = unless_closed(socket.closing.subscribe(), coming.as_mut()).await?;
     let number = sockets.add(kind, port, peer);
     lock(accepted).push_back(number);
     if *socket.closing.borrow() {
