@@ -11,7 +11,7 @@ use esl_vm::vm::Vm;
 use tokio::sync::oneshot;
 
 use crate::data::{CallArguments, failure};
-use crate::event_loop;
+use crate::event_loop::{self, Stoppable};
 
 /// What an operation comes to.
 pub(crate) type Completion = Result<Vec<Datum>, HostFailure>;
@@ -32,11 +32,60 @@ impl Cancelled {
 /// A future of an operation.
 pub(crate) type OperationFuture = Pin<Box<dyn Future<Output = Completion> + Send>>;
 
-/// An operation under way. There may be very many, so it is no larger than it has to be.
-struct UnderWay {
+/// An operation that was begun. There may be very many, so it is no larger than it has to be.
+struct Begun {
     /// Dropped when it is over, and when the operation is cancelled.
     future: Option<OperationFuture>,
     operation: Option<HostOperation>,
+}
+
+impl Begun {
+    fn new(future: OperationFuture, operation: HostOperation) -> Begun {
+        Begun { future: Some(future), operation: Some(operation) }
+    }
+
+    fn end(&mut self, answer: Completion) {
+        // What the future holds is let go before the program hears that it is over.
+        self.future = None;
+        match (self.operation.take(), answer) {
+            (Some(operation), Ok(values)) => operation.complete(values),
+            (Some(operation), Err(failure)) => operation.fail(failure),
+            (None, _) => {}
+        }
+    }
+
+    fn cancel(&mut self) {
+        self.end(Err(failure("CANCELLED", "")));
+    }
+}
+
+impl Future for Begun {
+    type Output = ();
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
+        if let Some(future) = &mut self.future {
+            let answer = ready!(future.as_mut().poll(context));
+            self.end(answer);
+        }
+        Poll::Ready(())
+    }
+}
+
+impl Stoppable for Begun {
+    fn listen(&self, stop: impl FnOnce() + Send + 'static) {
+        if let Some(operation) = &self.operation {
+            operation.on_cancel(stop);
+        }
+    }
+
+    fn stop(mut self) {
+        self.cancel();
+    }
+}
+
+/// An operation that is a task of the event loop.
+struct UnderWay {
+    begun: Begun,
     /// Told when the operation is cancelled, unless the future sees to that itself.
     cancelled: Option<oneshot::Receiver<()>>,
 }
@@ -45,26 +94,16 @@ impl Future for UnderWay {
     type Output = ();
 
     fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
-        let cancelled = self.cancelled.as_mut().map(|cancelled| Pin::new(cancelled).poll(context));
-        let answer = match cancelled {
-            Some(Poll::Ready(Ok(()))) => Err(failure("CANCELLED", "")),
-            told => {
-                if told.is_some_and(|told| told.is_ready()) {
-                    // Nobody can cancel it any more.
-                    self.cancelled = None;
-                }
-                let Some(future) = &mut self.future else { return Poll::Ready(()) };
-                ready!(future.as_mut().poll(context))
+        match self.cancelled.as_mut().map(|cancelled| Pin::new(cancelled).poll(context)) {
+            Some(Poll::Ready(Ok(()))) => {
+                self.begun.cancel();
+                return Poll::Ready(());
             }
-        };
-        // What the future holds is let go before the program hears that it is over.
-        self.future = None;
-        match (self.operation.take(), answer) {
-            (Some(operation), Ok(values)) => operation.complete(values),
-            (Some(operation), Err(failure)) => operation.fail(failure),
-            (None, _) => {}
+            // Nobody can cancel it any more.
+            Some(Poll::Ready(Err(_))) => self.cancelled = None,
+            _ => {}
         }
-        Poll::Ready(())
+        Pin::new(&mut self.begun).poll(context)
     }
 }
 
@@ -75,20 +114,22 @@ where
     R: Future<Output = Completion> + Send + 'static,
 {
     add(machine, name, needs, move |operation| {
-        let (cancelled, arguments) = (listen(operation), arguments_of(operation));
-        let future: OperationFuture = Box::pin(function(arguments));
-        (future, Some(cancelled), event_loop::spawn)
+        let cancelled = Some(listen(&operation));
+        let future = Box::pin(function(arguments_of(&operation)));
+        event_loop::spawn(UnderWay { begun: Begun::new(future, operation), cancelled })
     });
 }
 
 /// As [`define`], of an operation that is often over at once, and no part of which the system may delay. It
-/// is begun by the thread of the machine, so that what is there takes no way through another thread.
+/// is begun by the thread of the machine, and goes on in the one that has what it waits for, so that neither
+/// takes a way through another thread.
 pub(crate) fn define_ready<F>(machine: &mut Vm, name: &str, needs: &[Need], mut function: F)
 where
     F: FnMut(CallArguments) -> OperationFuture + Send + 'static,
 {
     add(machine, name, needs, move |operation| {
-        (function(arguments_of(operation)), Some(listen(operation)), event_loop::begin)
+        let future = function(arguments_of(&operation));
+        event_loop::begin(Begun::new(future, operation))
     });
 }
 
@@ -99,9 +140,9 @@ where
     R: Future<Output = Completion> + Send + 'static,
 {
     add(machine, name, needs, move |operation| {
-        let (cancelled, arguments) = (listen(operation), arguments_of(operation));
-        let future: OperationFuture = Box::pin(function(arguments, Cancelled(cancelled)));
-        (future, None, event_loop::spawn)
+        let cancelled = Cancelled(listen(&operation));
+        let future = Box::pin(function(arguments_of(&operation), cancelled));
+        event_loop::spawn(Begun::new(future, operation))
     });
 }
 
@@ -116,19 +157,11 @@ fn listen(operation: &HostOperation) -> oneshot::Receiver<()> {
     cancelled
 }
 
-/// How the future of an operation is run.
-type OperationBody = fn(UnderWay) -> Result<(), String>;
-
-fn add<F>(machine: &mut Vm, name: &str, needs: &[Need], mut function: F)
+fn add<F>(machine: &mut Vm, name: &str, needs: &[Need], mut begin: F)
 where
-    F: FnMut(&HostOperation) -> (OperationFuture, Option<oneshot::Receiver<()>>, OperationBody)
-        + Send
-        + 'static,
+    F: FnMut(HostOperation) -> Result<(), String> + Send + 'static,
 {
-    let begin = move |operation: HostOperation| {
-        let (future, cancelled, run) = function(&operation);
-        // Without the event loop the operation is dropped, which is how the program hears of it.
-        drop(run(UnderWay { future: Some(future), operation: Some(operation), cancelled }));
-    };
+    // Without the event loop the operation is dropped, which is how the program hears of it.
+    let begin = move |operation: HostOperation| drop(begin(operation));
     machine.add_guarded_function(name, HostFunction::Operation(Box::new(begin)), needs);
 }

@@ -4,9 +4,8 @@
 //! operation only waits until something is there. So nothing is lost when a call is left at the moment at
 //! which its data come.
 //!
-//! A connection reads ahead at most [`CHUNK`] bytes; a peer that sends more waits.
+//! A connection reads ahead at most [`super::CHUNK`] bytes; a peer that sends more waits.
 
-use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::future::ready as ready_future;
 use std::io::Error;
@@ -20,7 +19,7 @@ use esl_vm::host::HostFailure;
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt, ReadBuf};
 use tokio::net::TcpStream;
 
-use super::{CHUNK, SocketKind, Sockets, closed, lock, socket_failure, unless_closed};
+use super::{READ, SocketKind, Sockets, closed, lock, socket_failure, unless_closed};
 use crate::arrived::Arrived;
 use crate::data::{CallArguments, bytes_of, failure};
 use crate::event_loop;
@@ -42,11 +41,6 @@ pub(crate) struct Connection {
     arrived: Mutex<Arrived>,
     /// Whether the peer is to be told that nothing more comes, beside by the end of the connection.
     says_goodbye: bool,
-}
-
-thread_local! {
-    /// Where what is read is put first, so that a connection that waits has no such room of its own.
-    static READ: RefCell<Vec<u8>> = RefCell::new(vec![0; CHUNK]);
 }
 
 /// Those who wait for a connection, in the order in which they came, and the greatest of their numbers.
@@ -179,7 +173,6 @@ impl Connection {
         })
     }
 
-    /// Tells the peer that nothing more comes.
     /// Ends the connection, of which the peer is told if it is of that kind.
     pub(super) fn close(self: &Arc<Connection>) {
         self.is_closed.store(true, Ordering::SeqCst);
@@ -195,6 +188,7 @@ impl Connection {
         }
     }
 
+    /// Tells the peer that nothing more comes.
     async fn end(&self) {
         // It may be gone.
         drop(self.writer.lock().await.shutdown().await);

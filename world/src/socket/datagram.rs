@@ -1,12 +1,13 @@
 //! Datagrams, over UDP.
 
 use std::collections::VecDeque;
+use std::io::ErrorKind;
 use std::pin::pin;
 use std::sync::{Arc, Mutex};
 
 use tokio::net::UdpSocket;
 
-use super::{CHUNK, SocketKind, Sockets, bind_failure, lock, socket_failure, unless_closed};
+use super::{READ, SocketKind, Sockets, bind_failure, lock, socket_failure, unless_closed};
 use crate::data::{CallArguments, bytes_of};
 use crate::operation::Completion;
 
@@ -39,10 +40,20 @@ pub(super) async fn wait(arguments: CallArguments, sockets: Sockets) -> Completi
     if !lock(&datagrams).is_empty() {
         return Ok(Vec::new());
     }
-    let mut bytes = vec![0; CHUNK];
-    let receive = async { udp.recv_from(&mut bytes).await.map_err(|error| socket_failure(&error)) };
-    let (count, address) = unless_closed(socket.closing.subscribe(), pin!(receive)).await?;
-    bytes.truncate(count);
-    lock(&datagrams).push_back((bytes, address.to_string()));
+    let receive = async {
+        loop {
+            udp.readable().await.map_err(|error| socket_failure(&error))?;
+            // Who waits has no room of its own.
+            let received = READ.with_borrow_mut(|room| {
+                udp.try_recv_from(room).map(|(count, address)| (room[..count].to_vec(), address.to_string()))
+            });
+            match received {
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+                received => return received.map_err(|error| socket_failure(&error)),
+            }
+        }
+    };
+    let datagram = unless_closed(socket.closing.subscribe(), pin!(receive)).await?;
+    lock(&datagrams).push_back(datagram);
     Ok(Vec::new())
 }

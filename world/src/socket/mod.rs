@@ -7,6 +7,7 @@ mod connection;
 mod datagram;
 mod listener;
 
+use std::cell::RefCell;
 use std::collections::{HashMap, VecDeque};
 use std::io::{Error, ErrorKind};
 use std::pin::Pin;
@@ -32,6 +33,11 @@ use crate::operation::{Completion, OperationFuture, define_ready};
 
 /// Most bytes that are read at a time.
 const CHUNK: usize = 1 << 16;
+
+thread_local! {
+    /// Where what is read is put first, so that a socket that waits has no such room of its own.
+    static READ: RefCell<Vec<u8>> = RefCell::new(vec![0; CHUNK]);
+}
 
 /// A connection, its port here, and the address there.
 type NewConnection = (SocketKind, i64, String);
