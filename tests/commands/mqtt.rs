@@ -184,6 +184,45 @@ fn a_broker_may_send_anything_or_nothing() {
     assert_eq!(lines, expected);
 }
 
+/// What a client leaves behind when it is killed, and not when it ends.
+#[test]
+fn the_last_will_of_a_client_that_is_killed_is_published() {
+    let Some(program) = broker_program() else {
+        crate::say_left_out("it needs `mosquitto`");
+        return;
+    };
+    let folder = Folder::new("mqtt-will");
+    let (_broker, port) = start_broker(program, &folder, "");
+    let number = port.to_string();
+    let text = "(require :mqtt)
+(mqtt:with-client (c \"127.0.0.1\" (parse-integer (first (command-line-arguments)))
+                     :id (second (command-line-arguments))
+                     :will (list \"left/robot\" (second (command-line-arguments)) :qos 1 :retain t))
+  (format t \"open~%\")
+  (finish-output)
+  (when (third (command-line-arguments)) (sleep 1000)))";
+    folder.file("robot.esl", text);
+    let start = |arguments: &[&str]| {
+        let all = [&["run", "--allow-net=127.0.0.1", "robot.esl", &number], arguments].concat();
+        process::start(eslvm(&all).current_dir(folder.path()))
+    };
+    let mut killed = start(&["killed", "stays"]);
+    let mut line = String::new();
+    let output = killed.stdout.take().expect("it is a pipe");
+    std::io::BufRead::read_line(&mut std::io::BufReader::new(output), &mut line).expect("it opens");
+    killed.kill().and_then(|()| killed.wait()).expect("it is our child");
+    let ended = process::finish(start(&["ended"])).quiet_output();
+    assert_eq!((&*line, ended), ("open\n", Ok("open\n".into())));
+    let text = "(require :mqtt)
+(mqtt:with-client (c \"127.0.0.1\" (parse-integer (first (command-line-arguments))))
+  (print (multiple-value-list (wait-for-event (mqtt:subscribe c \"left/+\" :qos 1)))))";
+    folder.file("heir.esl", text);
+    let mut heir = eslvm(&["run", "--allow-net=127.0.0.1", "heir.esl", &number]);
+    let output = process::run(heir.current_dir(folder.path()), "").quiet_output();
+    let output = output.expect("nothing is wrong");
+    assert!(output.trim().starts_with("(\"left/robot\" \"killed\""), "{output}");
+}
+
 #[test]
 fn a_connection_that_is_lost_is_made_again() {
     let Some(program) = broker_program() else {

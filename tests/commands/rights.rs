@@ -206,6 +206,67 @@ fn every_way_out_of_the_program_needs_its_right() {
     assert_eq!(run.output.lines().collect::<Vec<_>>(), expected, "{}", run.errors);
 }
 
+/// A Unix socket is a path that is read and written: one right does not stand for the other.
+#[cfg(unix)]
+#[test]
+fn a_unix_socket_needs_both_rights() {
+    let text = "(require :sockets)
+(defmacro refusal (form)
+  `(print (with-recovery-procedures (((:permission-denied right) (abort right))) ,form)))
+(with-rights (:read) (refusal (sockets:listen-unix \"talk\")))
+(with-rights (:write) (refusal (sockets:listen-unix \"talk\")))
+(sockets:with-socket (l (sockets:listen-unix \"talk\"))
+  (with-rights (:read) (refusal (sockets:connect-unix \"talk\")))
+  (with-rights (:write) (refusal (sockets:connect-unix \"talk\")))
+  (with-rights (:read :write) (close (sockets:connect-unix \"talk\"))))";
+    let folder = folder("rights-unix");
+    folder.file("work/main.esl", text);
+    assert_eq!(lines(&folder, &[]), [":WRITE", ":READ", ":WRITE", ":READ"]);
+}
+
+/// What a script or a mock answers reaches nothing outside; what none answers needs its right.
+#[test]
+fn what_a_script_or_a_mock_answers_needs_no_right() {
+    let text = "(require :process) (require :sockets)
+(defmacro refusal (form)
+  `(print (with-recovery-procedures (((:permission-denied right object) (abort (list right object)))) ,form)))
+(with-world ((:answer (process:run-program * . *) :with 'scripted :times 1)
+             (:answer (sockets:connect \"127.0.0.1\" *) :failing (:connection-refused)))
+  (refusal (process:run-program '(\"ls\")))
+  (refusal (handler-case (sockets:connect \"127.0.0.1\" 80) (failure (f) (failure-cause f))))
+  (refusal (process:run-program '(\"ls\")))
+  (refusal (sockets:connect \"127.0.0.2\" 80)))
+(define-mock process::%process-run (&rest all) (values \"mocked\" nil (length all)))
+(refusal (process:run-program '(\"ls\") :output :string))";
+    let folder = folder("rights-mocks");
+    folder.file("work/main.esl", text);
+    let expected =
+        ["SCRIPTED", ":CONNECTION-REFUSED", "(:RUN \"ls\")", "(:NET \"127.0.0.2:80\")", "\"mocked\""];
+    assert_eq!(lines(&folder, &[]), expected);
+}
+
+/// Tests have the rights of the command, and no others.
+#[test]
+fn tests_have_the_same_flags() {
+    let folder = folder("rights-test");
+    folder.file(
+        "work/tests.esl",
+        "(defun text (path) (with-open-file (stream path) (read-line stream)))
+         (deftest own (is (equal (text \"own\") \"mine\")))
+         (deftest other (is (equal (text \"../other/secret\") \"5\")))",
+    );
+    let test = |arguments: &[&str]| {
+        let mut command = eslvm(&[&["test"], arguments, &["tests.esl"]].concat());
+        let done = process::run(command.current_dir(folder.path().join("work")), "");
+        (done.status, done.output)
+    };
+    let (status, output) = test(&[]);
+    assert_eq!(status, Some(1), "{output}");
+    assert!(output.contains("passed  OWN") && output.contains("FAILED  OTHER"), "{output}");
+    assert!(output.contains("--allow-read=../other/secret"), "{output}");
+    assert_eq!(test(&["--allow-read=../other"]).0, Some(0));
+}
+
 #[test]
 fn modules_are_read_in_their_folders_and_macros_read_nothing_else() {
     let files = [

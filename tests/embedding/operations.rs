@@ -1,6 +1,6 @@
 //! Operations: they park only the task that calls them, however the host behaves.
 
-use esl::engine::{Failure, Operation};
+use esl::engine::{Call, Failure, Operation};
 use esl::host::{Host, Incoming, News, RealHost, RecordingHost, ReplayHost, VirtualHost};
 use esl::{Config, Data, Engine, Error};
 use esl_bytecode::datum::Datum;
@@ -54,6 +54,9 @@ fn arguments_have_names_and_types_and_values_are_data() {
                      (type-error (e) (list (type-error-datum e) (type-error-expected-type e))))";
     check(&mut engine, failing, "(\"far\" REAL)");
     check(&mut engine, "(documentation 'velocity 'function)", "\"Returns a speed.\"");
+    let count = |call: Call| Ok::<_, Failure>(call.get::<Vec<Data>>("all")?.len() as i64);
+    engine.define("COUNT-ALL", "(&rest all)", "", count).expect("it compiles");
+    check(&mut engine, "(list (count-all) (count-all 1 'two \"three\"))", "(0 3)");
     let errors = engine.define("CAR", "(x)", "", |_| Ok(Data::Nil));
     assert!(matches!(errors, Err(Error::DoesNotCompile(_))), "{errors:?}");
 }
@@ -194,6 +197,25 @@ fn handles_are_events_and_tell_what_has_become_of_the_operation() {
                   (push (operation-status handle) seen)
                   (reverse seen))";
     check(&mut engine, text, "((:PENDING NIL T T OPERATION) (1 2) (:COMPLETED 0.5) :COMPLETED)");
+    // Each report signals the handle, while the operation goes on.
+    let reports = begun.clone();
+    let report = move |call: Call| {
+        let far: Data = call.get("far")?;
+        let begun = reports.lock().expect("no panic");
+        let operation = begun.last().ok_or_else(|| Failure::from("nothing was begun"))?;
+        operation.report_progress(far);
+        Ok::<_, Failure>(())
+    };
+    engine.define("REPORT", "(far)", "Reports.", report).expect("it compiles");
+    let watched = "(let ((handle (start (survey))) (seen nil))
+                     (dolist (far '(1 2))
+                       (let ((count (event-count handle)))
+                         (report far)
+                         (wait-for-event handle :unless-count count :timeout 60)
+                         (push (list (operation-status handle) (operation-progress handle)) seen)))
+                     (advance)
+                     (reverse seen))";
+    check(&mut engine, watched, "((:PENDING 1) (:PENDING 2))");
     let first = "(let ((slow (start (lag 5000))) (fast (start (lag 1 'x))))
                    (wait-for-events (list slow fast))
                    (list (operation-status slow) (operation-status fast) (operation-result fast)))";
@@ -204,7 +226,7 @@ fn handles_are_events_and_tell_what_has_become_of_the_operation() {
                        (list (operation-status handle)
                              (handler-case (operation-result handle) (failure (f) (failure-cause f)))))";
     check(&mut engine, cancelled, "(:CANCELLED :CANCELLED)");
-    check(&mut engine, "(princ-to-string (start (lag 1)))", "\"#<OPERATION LAG 5>\"");
+    check(&mut engine, "(princ-to-string (start (lag 1)))", "\"#<OPERATION LAG 6>\"");
     check(&mut engine, "(handler-case (start (car 1)) (error () 'refused))", "REFUSED");
 }
 
