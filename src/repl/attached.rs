@@ -24,7 +24,7 @@ const HELP: &str = "\
 :tasks              the tasks of the run, as a tree, with their numbers
 :bt [N]             the backtrace of the last failure here, or what task N does and where
 :failures           the latest failures of the run, if the run notes them
-:facts [NAME]       facts of the database
+:facts [NAME [N]]   facts of the database, 500 at a time, after the first N
 :data               relations, locks of properties, and inputs
 :watch FORM         writes the value of a form, and again after each change of what it reads
 :abort N            has task N end
@@ -494,7 +494,11 @@ impl Attached {
             }
             ":bt" => self.ask("esl:backtrace", &[number])?,
             ":failures" => self.ask("esl:failures", &[])?,
-            ":facts" => self.ask("esl:facts", &[WireForm::text(rest)])?,
+            ":facts" => {
+                let (name, from) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
+                let from = from.trim().parse().map(WireForm::Integer).unwrap_or(WireForm::nil());
+                self.ask("esl:facts", &[WireForm::text(name), from])?
+            }
             ":data" => self.ask("esl:data", &[])?,
             ":watch" if !rest.is_empty() => {
                 self.send("esl:watch", &[WireForm::text(rest)])?;

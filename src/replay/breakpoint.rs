@@ -18,6 +18,8 @@ pub(super) enum Target {
     Turn(u64),
     /// When the program learns that so many nanoseconds have passed.
     Time(u64),
+    /// When the run has taken so many records.
+    Record(u64),
     /// The next failure.
     Failure,
 }
@@ -31,11 +33,12 @@ impl FromStr for Target {
             None if text == "failure" => Ok(Target::Failure),
             Some(("tick", n)) => number(n).map(Target::Tick),
             Some(("turn", n)) => number(n).map(Target::Turn),
+            Some(("record", n)) => number(n).map(Target::Record),
             Some(("time", seconds)) => match seconds.parse::<f64>() {
                 Ok(seconds) if (0.0..1e9).contains(&seconds) => Ok(Target::Time((seconds * 1e9) as u64)),
                 _ => Err(format!("expected seconds, found `{seconds}`")),
             },
-            _ => Err("expected tick:N, turn:N, time:SECONDS or failure".into()),
+            _ => Err("expected tick:N, turn:N, time:SECONDS, record:N or failure".into()),
         }
     }
 }

@@ -68,6 +68,7 @@ struct Marks {
     ticks: u64,
     turns: u64,
     time: u64,
+    records: u64,
     happened: u64,
     failures: u64,
     is_over: bool,
@@ -149,6 +150,7 @@ impl Debugger {
             ticks: self.rerun.check().ticks,
             turns: machine.tasks_turns_and_switches().1,
             time: machine.last_time(),
+            records: self.rerun.host.replayed() as u64,
             happened: happened.count,
             failures: happened.failures,
             is_over: self.rerun.replayed().is_some(),
@@ -223,6 +225,12 @@ impl Debugger {
                     self.restart()?;
                 }
                 self.go_until(&|marks| marks.time >= time)
+            }
+            Target::Record(number) => {
+                if here.records >= number {
+                    self.restart()?;
+                }
+                self.go_until(&|marks| marks.records >= number)
             }
             Target::Failure => self.go_until(&|marks| marks.failures > here.failures),
         }

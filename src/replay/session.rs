@@ -15,7 +15,7 @@ const HELP: &str = "\
 step [N]           go N ticks on; a tick is a call or a turn of a loop
 turn [N]           go to the beginning of the next turn, or the N-th
 continue           go on to the next breakpoint, or the end
-until PLACE        go to tick:N, turn:N, time:SECONDS, or on to the next failure
+until PLACE        go to tick:N, turn:N, time:SECONDS, record:N, or on to the next failure
 back [N]           go N ticks back
 back turn [N]      go back to the beginning of the turn, or of the N-th before it
 reverse-continue   go back to the last breakpoint, or the beginning

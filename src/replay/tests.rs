@@ -13,6 +13,7 @@ use esl_vm::host::{
 };
 use proptest::prelude::*;
 
+use super::breakpoint::Target;
 use super::debugger::Debugger;
 use super::file::{Unwritten, beginning_bytes, end_bytes};
 use super::pack::{ByteReader, ByteWriter};
@@ -430,6 +431,23 @@ fn a_place_is_the_same_whatever_way_leads_there() {
         debugger.go_to(*ticks).expect("there is room");
         assert_eq!(&state(&mut debugger), expected);
     }
+}
+
+#[test]
+fn records_are_places_in_both_directions() {
+    let recorded = read(&recorded_bytes(CURIOUS));
+    let count = recorded.records.len() as u64;
+    let mut debugger = Debugger::begin(recorded, Vec::new(), |_, _| ()).expect("it can be begun");
+    let go = |debugger: &mut Debugger, number| {
+        assert!(debugger.go(&Target::Record(number)).expect("there is room"), "record {number}");
+        debugger.ticks()
+    };
+    let forward: Vec<u64> = (0..count - 9).map(|number| go(&mut debugger, number)).collect();
+    assert!(forward.is_sorted() && forward.last() > Some(&2000), "{forward:?}");
+    for number in (0..count - 9).rev().step_by(7) {
+        assert_eq!(go(&mut debugger, number), forward[number as usize], "record {number}");
+    }
+    assert!(!debugger.go(&Target::Record(count + 1)).expect("there is room"));
 }
 
 #[test]

@@ -111,6 +111,7 @@ fn the_page_shows_a_run_and_commands_it() {
     };
     let program =
         "(define-resource arm) (define-resource leg) (define-property mode ()) (assert '(mode calm))
+        (assert '(note \"Ridge\" 1))
         (spawn (:name 'left :daemon t) (with-resource (arm) (sleep 0.1) (with-resource (leg) nil)))
         (spawn (:name 'right :daemon t) (with-resource (leg) (sleep 0.1) (with-resource (arm) nil)))
         (spawn (:name '|<img src=x onerror=alert(1)>| :daemon t) (fail :slip \"<b>\"))
@@ -145,6 +146,9 @@ fn the_page_shows_a_run_and_commands_it() {
     browser.press("a");
     browser
         .until("last.cycle === 0 && document.getElementById('t-task').textContent.includes('It has ended')");
+    // Facts are shown as they are, at a click on their relation.
+    browser.value("[...document.querySelectorAll('#t-data a')].find(a => a.textContent.startsWith('note/')).click(), true");
+    browser.until("document.getElementById('t-data').textContent.includes('(NOTE \"Ridge\" 1)')");
     assert!(browser.complaints.is_empty(), "{:?}", browser.complaints);
     assert_eq!(run.end(), Some(0));
     browser.until("document.getElementById('alarm').textContent.startsWith('The run has ended')");

@@ -38,6 +38,8 @@ mod rights;
 mod secured;
 #[cfg(unix)]
 mod slime;
+#[cfg(unix)]
+mod standing;
 mod streams;
 mod terminal;
 mod testing;

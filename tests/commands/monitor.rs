@@ -2,6 +2,7 @@
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use esl_conformance::process::PATIENCE;
 use serde_json::Value;
@@ -237,6 +238,41 @@ fn viewers_come_and_go() {
     for _ in 0..3 {
         assert_eq!(viewer.next()["standings"]["stream"], 1);
     }
+    drop(stalled);
+    assert_eq!(run.end(), Some(0));
+}
+
+/// A viewer whose browser takes nothing is let go, and its place is free; others see on.
+#[test]
+fn a_viewer_who_takes_nothing_is_let_go() {
+    let folder = Folder::new("monitor_stalled");
+    let program = "(defvar *never* (make-event))
+        (dotimes (i 200)
+          (spawn (:daemon t :name (intern (format nil \"~a~a\" (make-string 1000 :initial-element #\\n) i)))
+            (wait-for-event *never*)))
+        (read-line *standard-input* nil)";
+    let WatchedRun { run, address, observe, .. } = watch(&folder, program);
+    let mut viewer = Viewer::come(&address, &observe, "awake");
+    viewer.until("all tasks", |event| event["total"] == 201);
+    let stalled = Viewer::come_in(&address, &observe, "stalled");
+    // Each view has an event sent at once, until the system keeps no more of them for who reads none.
+    let view = "{\"viewer\":\"stalled\",\"text\":\"\",\"from\":0,\"count\":120}";
+    let gone = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            until("the end of a viewer who takes nothing", || {
+                status(&post(&address, "/view", &observe, view)) == "409"
+            });
+            gone.store(true, Ordering::Relaxed);
+        });
+        let mut seen = 0;
+        while !gone.load(Ordering::Relaxed) {
+            assert!(viewer.goes_on(), "the other viewer is served");
+            seen += 1;
+        }
+        assert!(seen > 3, "{seen} events");
+    });
+    drop(Viewer::come_in(&address, &observe, "stalled"));
     drop(stalled);
     assert_eq!(run.end(), Some(0));
 }

@@ -104,6 +104,9 @@ const RECOVERS: &str = "
     (define-input news :capacity 1 :when-full :drop-newest)
     (dotimes (i 3) (signal news i))
     (catch 'over (with-recovery-procedures ((:slip (throw 'over nil))) (fail :slip)))
+    (let ((n 0))
+      (supervise () (child :restart :transient :backoff (0.001 1 0.001) (when (< (incf n) 3) (fail :weak)))))
+    (dotimes (i 9) (make-array 1000000))
     (spawn (:name 'waiter :daemon t) (wait-for-event (make-event)))
     (read-line *standard-input* nil)";
 
@@ -123,9 +126,24 @@ fn figures_are_served_to_prometheus() {
         "esl_recoveries_total 1",
         "esl_input_dropped_total{input=\"NEWS\"} 2",
         "esl_input_waiting{input=\"NEWS\"} 1",
+        "esl_failures_total{cause=\":WEAK\"} 2",
+        "esl_restarts_total 2",
+        "esl_paused 0",
         "# TYPE esl_ticks_total counter",
     ] {
         assert!(answer.lines().any(|found| found == line), "{line}\n{answer}");
+    }
+    for name in [
+        "esl_timer_lateness_seconds_count",
+        "esl_timer_lateness_longest_seconds",
+        "esl_pause_seconds_count",
+        "esl_pause_longest_seconds",
+        "esl_collections_total",
+        "esl_memory_committed_bytes",
+        "esl_ticks_total",
+    ] {
+        let value = answer.lines().find_map(|line| line.strip_prefix(name)?.trim().parse::<f64>().ok());
+        assert!(value.is_some_and(|value| value > 0.0), "{name}\n{answer}");
     }
     let status = |answer: String| answer.split(' ').nth(1).unwrap_or_default().to_string();
     assert_eq!(status(request(&address, "GET", "/", "", "")), "404");

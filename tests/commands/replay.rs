@@ -106,6 +106,52 @@ fn signals_are_recorded_and_a_killed_run_is_replayed_as_far_as_it_is_known() {
     }
 }
 
+/// Numbers of runs whose input comes in chunks; `ESL_SEEDS` sets another count, for longer runs by hand.
+fn seeds() -> std::ops::Range<u64> {
+    0..std::env::var("ESL_SEEDS").ok().and_then(|count| count.parse().ok()).unwrap_or(4)
+}
+
+/// Input that comes in chunks of any length at any time, while tasks work and timers end.
+#[test]
+fn input_in_chunks_is_replayed_as_it_came() {
+    let folder = Folder::new("replay-chunks");
+    let source = folder.file(
+        "program.esl",
+        "(defvar *n* 0)
+         (dotimes (i 3) (let ((i i)) (spawn (:daemon t) (loop (sleep (* 0.0007 (1+ i))) (incf *n*) (dotimes (j 90) (list j))))))
+         (let ((reader (spawn (loop for line = (read-line *standard-input* nil) while line
+                                    do (format t \"~a ~a ~a~%\" (length line) *n* (random 100))))))
+           (loop while (member (task-status reader) '(:running :waiting)) do (dotimes (j 300) (incf *n*)) (sleep 0.0005)))",
+    );
+    for seed in seeds() {
+        let recording = folder.join(&format!("{seed}.eslj"));
+        let mut child = process::start(&mut eslvm(&["run", "--record", &recording, &source]));
+        let mut input = child.stdin.take().expect("it is a pipe");
+        let mut state = seed.wrapping_mul(2).wrapping_add(1);
+        let mut below = move |count: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) % count
+        };
+        let writer = std::thread::spawn(move || {
+            for _ in 0..60 {
+                let text: String = (0..below(40)).map(|_| if below(6) == 0 { '\n' } else { 'ü' }).collect();
+                // Also in the middle of a character.
+                let cut = text.len() / 2 + below(2) as usize;
+                for part in [&text.as_bytes()[..cut.min(text.len())], &text.as_bytes()[cut.min(text.len())..]]
+                {
+                    std::io::Write::write_all(&mut input, part).expect("it reads");
+                    std::thread::sleep(std::time::Duration::from_micros(below(900)));
+                }
+            }
+        });
+        let run = process::finish(child);
+        writer.join().expect("all is read");
+        assert_eq!((run.status, &*run.errors), (Some(0), ""), "{}", run.output);
+        assert!(run.output.lines().count() > 50, "{}", run.output);
+        assert_eq!(replay(&[&recording], ""), run, "seed {seed}");
+    }
+}
+
 /// A connection, its telemetry, and a clock that is faster.
 #[test]
 fn a_flight_is_replayed_without_the_spacecraft() {
@@ -265,7 +311,7 @@ fn mistakes_in_commands_are_answered() {
         "Expected a query",
         "expected failure, failure:CAUSE, task:NAME, fact:PATTERN or function:NAME",
         "function:PRINT\n",
-        "expected tick:N, turn:N, time:SECONDS or failure",
+        "expected tick:N, turn:N, time:SECONDS, record:N or failure",
     ] {
         assert!(run.output.contains(expected), "{expected}: {}", run.output);
     }

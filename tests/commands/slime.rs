@@ -289,6 +289,39 @@ fn a_failure_waits_for_who_debugs_it() {
     assert_eq!(finished.output, "6\n");
 }
 
+/// A task that stands for the debugger is aborted, and ends by its limits, as any other. What may not wait
+/// does not stand.
+#[test]
+fn who_stands_for_the_debugger_is_aborted_and_limited_like_others() {
+    let folder = Folder::new("slime_limits");
+    let (run, address) = start(&folder);
+    let mut client = SlimeClient::connect(&address);
+    client.ask("(swank-repl:create-repl nil)");
+    let form = "(without-interrupts (fail :stuck 1))";
+    let answer = client.ask(&format!("(swank:interactive-eval \"{form}\")"));
+    assert!(answer.starts_with("(:abort \"A failure of cause :STUCK"), "{answer}");
+    assert!(!client.heard.iter().any(|packet| packet.starts_with("(:debug")), "{:?}", client.heard);
+    // Time passes while it stands, and its cleanups run when that is over.
+    client.ask("(swank:interactive-eval \"(defvar *cleaned* nil)\")");
+    let form = "(with-recovery-procedures ((:timeout (abort :late)))
+                  (with-timeout 0.05 (unwind-protect (stumble 1) (push :limit *cleaned*))))";
+    let asked = client.begin(&format!("(swank:interactive-eval \"{form}\")"), "t");
+    let debug = client.wait("(:debug ");
+    let thread = debug.split(' ').next().expect("it has a task").to_string();
+    assert_eq!(client.wait("(:debug-return "), format!("{thread} 1 nil)"));
+    assert_eq!(client.answer(asked), "(:ok \"=> :LATE\")");
+    let form = "(spawn (:name 'other :daemon t) (unwind-protect (stumble 2) (push :abort *cleaned*)))";
+    client.ask(&format!("(swank:interactive-eval \"{form}\")"));
+    let debug = client.wait("(:debug ");
+    let thread = debug.split(' ').next().expect("it has a task").to_string();
+    client.ask("(swank:interactive-eval \"(abort-task (find 'other (list-tasks) :key #'task-name))\")");
+    assert_eq!(client.wait("(:debug-return "), format!("{thread} 1 nil)"));
+    client.wait_for_end_of("other");
+    assert_eq!(client.ask("(swank:interactive-eval \"*cleaned*\")"), "(:ok \"=> (:ABORT :LIMIT)\")");
+    drop(client);
+    assert_eq!(run.finish().output, "6\n");
+}
+
 /// Whether Emacs with SLIME is there.
 fn has_emacs() -> bool {
     let mut emacs = Command::new("emacs");

@@ -305,13 +305,19 @@ impl OperatorSession {
     async fn facts(&self, arguments: &[WireForm]) -> Result<WireForm, String> {
         let name = arguments.first().and_then(WireForm::as_text).unwrap_or_default().to_uppercase();
         let from = arguments.get(1).and_then(WireForm::as_integer).and_then(|n| usize::try_from(n).ok());
-        let request = SurveyRequest { facts: Some((name, from.unwrap_or(0))), ..SurveyRequest::default() };
-        let facts = self.look(request).await?.facts;
-        Ok(WireForm::Text(if facts.is_empty() {
-            "There are none.\n".into()
-        } else {
-            facts.join("\n") + "\n"
-        }))
+        let from = from.unwrap_or(0);
+        let facts = Some((name.clone(), from));
+        let survey = self.look(SurveyRequest { data: true, facts, ..SurveyRequest::default() }).await?;
+        if survey.facts.is_empty() {
+            return Ok(WireForm::text("There are none.\n"));
+        }
+        let mut text = survey.facts.join("\n") + "\n";
+        let rows = survey.relations.iter().filter(|row| name.is_empty() || row.name == name);
+        let (to, all) = (from + survey.facts.len(), rows.map(|row| row.facts).sum::<usize>());
+        if to < all {
+            _ = writeln!(text, "; {} to {to} of {all}; `:facts NAME {to}` shows those after these", from + 1);
+        }
+        Ok(WireForm::Text(text))
     }
 
     async fn data(&self) -> Result<WireForm, String> {
