@@ -11,30 +11,41 @@ use rustix::termios::{Termios, tcgetattr};
 
 use crate::eslvm;
 
-/// What the session has written, as it comes.
-fn read_on(mut side: File) -> Receiver<String> {
-    let (sender, output) = channel();
-    std::thread::spawn(move || {
-        let mut bytes = [0; 4096];
-        while let Ok(count @ 1..) = side.read(&mut bytes) {
-            if sender.send(String::from_utf8_lossy(&bytes[..count]).into_owned()).is_err() {
-                return;
-            }
-        }
-    });
-    output
+/// Output of a session, as it comes.
+struct Output {
+    pieces: Receiver<String>,
+    /// What has come and was not awaited yet.
+    unread: String,
 }
 
-/// Reads on until something was written.
-fn await_text(output: &Receiver<String>, text: &str) -> String {
-    let mut all = String::new();
-    while !all.contains(text) {
-        match output.recv_timeout(Duration::from_secs(20)) {
-            Ok(more) => all.push_str(&more),
-            Err(error) => panic!("{error}; no {text} in {all:?}"),
+impl Output {
+    /// Begins to read.
+    fn of(mut side: File) -> Output {
+        let (sender, pieces) = channel();
+        std::thread::spawn(move || {
+            let mut bytes = [0; 4096];
+            while let Ok(count @ 1..) = side.read(&mut bytes) {
+                if sender.send(String::from_utf8_lossy(&bytes[..count]).into_owned()).is_err() {
+                    return;
+                }
+            }
+        });
+        Output { pieces, unread: String::new() }
+    }
+
+    /// Reads on until behind a text. What follows it is left, however much comes at once.
+    fn await_text(&mut self, text: &str) {
+        loop {
+            if let Some(at) = self.unread.find(text) {
+                self.unread.drain(..at + text.len());
+                return;
+            }
+            match self.pieces.recv_timeout(Duration::from_secs(20)) {
+                Ok(more) => self.unread.push_str(&more),
+                Err(error) => panic!("{error}; no {text} in {:?}", self.unread),
+            }
         }
     }
-    all
 }
 
 /// A session with an editor.
@@ -44,7 +55,7 @@ struct Session {
     /// Settings of the terminal before the session.
     before: Termios,
     child: Child,
-    output: Receiver<String>,
+    output: Output,
 }
 
 impl Session {
@@ -64,7 +75,7 @@ impl Session {
             .spawn()
             .expect("the command can be run");
         let person = File::from(person);
-        let output = read_on(person.try_clone().expect("it can be shared"));
+        let output = Output::of(person.try_clone().expect("it can be shared"));
         Session { person, terminal, before, child, output }
     }
 }
@@ -72,15 +83,15 @@ impl Session {
 /// It does so while the next line is edited, and leaves the terminal as it was.
 #[test]
 fn a_task_ends_the_session_at_once() {
-    let Session { mut person, terminal, before, mut child, output } = Session::begin();
-    await_text(&output, "? ");
+    let Session { mut person, terminal, before, mut child, mut output } = Session::begin();
+    output.await_text("? ");
     let form =
         "(progn (spawn (sleep 0.2) (unwind-protect (exit 7) (print (list 'cleaned 'up)))) (list 'go))\r";
     person.write_all(form.as_bytes()).expect("it is read");
-    await_text(&output, "(GO)");
+    output.await_text("(GO)");
     let status = child.wait().expect("it ends");
     assert_eq!(status.code(), Some(7));
-    await_text(&output, "(CLEANED UP)");
+    output.await_text("(CLEANED UP)");
     let after = tcgetattr(&terminal).expect("it is still a terminal");
     assert_eq!((after.local_modes, after.input_modes), (before.local_modes, before.input_modes));
 }
@@ -88,16 +99,12 @@ fn a_task_ends_the_session_at_once() {
 /// It is all evaluated, although the terminal delivers it in large pieces.
 #[test]
 fn what_is_typed_ahead_is_kept() {
-    let Session { mut person, mut child, output, .. } = Session::begin();
-    await_text(&output, "? ");
+    let Session { mut person, mut child, mut output, .. } = Session::begin();
+    output.await_text("? ");
     let forms: String = (0..200).map(|n| format!("(list 'form {n})\r")).collect();
     person.write_all(forms.as_bytes()).expect("it is read");
-    let mut seen = String::new();
     for n in 0..200 {
-        let value = format!("(FORM {n})");
-        if !seen.contains(&value) {
-            seen += &await_text(&output, &value);
-        }
+        output.await_text(&format!("(FORM {n})"));
     }
     person.write_all(b"(exit 3)\r").expect("it is read");
     assert_eq!(child.wait().expect("it ends").code(), Some(3));
