@@ -129,6 +129,19 @@ impl NativeKinds {
         self.before[at].as_deref().unwrap_or_default()
     }
 
+    /// Returns what is known before each word that can be reached, of the registers that may be read from there
+    /// on.
+    pub(crate) fn into_said(mut self) -> Vec<Option<Box<[Known]>>> {
+        for (known, &live) in self.before.iter_mut().zip(&self.live) {
+            for (register, known) in known.iter_mut().flatten().enumerate() {
+                if !live.contains(register) {
+                    *known = Known::Nothing;
+                }
+            }
+        }
+        self.before
+    }
+
     /// Returns whether a register may be read from the instruction at a word on.
     pub(crate) fn is_live(&self, at: usize, register: usize) -> bool {
         self.live[at].contains(register)

@@ -8,7 +8,7 @@ use cranelift_codegen::isa::{OwnedTargetIsa, TargetIsa};
 use cranelift_codegen::settings::{self, Configurable};
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
 use cranelift_jit::{JITBuilder, JITModule};
-use cranelift_module::{Linkage, Module, default_libcall_names};
+use cranelift_module::{Linkage, Module, ModuleError, default_libcall_names};
 use esl_heap::Value;
 
 use crate::abi::NativeEntry;
@@ -92,7 +92,7 @@ impl MachineCodeMaker {
             return Err(NotMade::Unfit);
         }
         let flow = NativeFlow::of(&source.words).ok_or(NotMade::Unfit)?;
-        let unsupported = |error: cranelift_module::ModuleError| NotMade::Unsupported(error.to_string());
+        let unsupported = |error: ModuleError| NotMade::Unsupported(error.to_string());
         let isa: Arc<dyn TargetIsa> = self.isa.clone();
         let mut module = JITModule::new(JITBuilder::with_isa(isa, default_libcall_names()));
         let mut context = module.make_context();
@@ -106,13 +106,25 @@ impl MachineCodeMaker {
         let kinds = NativeKinds::of(&flow, source);
         Translator::new(builder, source, (&flow, &kinds), itself, module.isa().pointer_type())
             .translate(config);
-        module.define_function(id, &mut context).map_err(unsupported)?;
+        let mut defined = module.define_function(id, &mut context);
         let bytes = context.compiled_code().map_or(0, |code| code.code_buffer().len());
-        module.finalize_definitions().map_err(unsupported)?;
+        if defined.is_ok() {
+            defined = module.finalize_definitions();
+        }
+        if let Err(error) = defined {
+            // SAFETY: nobody has an address of it. Dropped, it would keep its memory.
+            unsafe { module.free_memory() };
+            return Err(match error {
+                // Of this function only.
+                ModuleError::Compilation(_) => NotMade::Unfit,
+                error => unsupported(error),
+            });
+        }
         let address = module.get_finalized_function(id);
         // SAFETY: the function was declared with the signature of an entry, and is finished.
         let entry = unsafe { std::mem::transmute::<*const u8, NativeEntry>(address) };
-        Ok(MachineCode { module: Some(module), entry, bytes, loops: flow.loops })
+        let said = if cfg!(debug_assertions) { kinds.into_said() } else { Vec::new() };
+        Ok(MachineCode { module: Some(module), entry, bytes, loops: flow.loops, said })
     }
 }
 
@@ -130,6 +142,8 @@ pub struct MachineCode {
     entry: NativeEntry,
     bytes: usize,
     loops: Vec<usize>,
+    /// What is known of the registers before each instruction; in debug builds only.
+    said: Vec<Option<Box<[Known]>>>,
 }
 
 impl MachineCode {
@@ -141,6 +155,21 @@ impl MachineCode {
     /// Returns its length in bytes.
     pub fn bytes(&self) -> usize {
         self.bytes
+    }
+
+    /// Returns whether machine code may have been left at the instruction at a word with these registers, as far
+    /// as that is known: it is an instruction that can be reached, and the registers hold what they are known to
+    /// hold there. One may be something else, which is why it was left. Always in release builds.
+    pub fn may_be_left(&self, at: usize, registers: &[Value]) -> bool {
+        if self.said.is_empty() {
+            return true;
+        }
+        let Some(Some(said)) = self.said.get(at) else { return false };
+        let is_other = |&(&known, &value): &(&Known, &Value)| match known {
+            Known::Fixnum | Known::Double => Known::of(value) != known,
+            Known::Nothing | Known::Spent => false,
+        };
+        said.len() == registers.len() && said.iter().zip(registers).filter(is_other).count() <= 1
     }
 
     /// Returns the words of the loop instructions at which it may be entered, the first at place 1.

@@ -1,16 +1,33 @@
 //! Programs that are bad for a tier of machine code: functions that change while they run as such, code that
 //! piles up, code that is too long, recursion that is too deep, numbers that leave their kind in a loop.
 
+use std::process::Command;
+
 use esl::Config;
 use esl::host::VirtualHost;
 use esl::program::{self, Program, Source};
 use esl_vm::vm::Tier;
 use libtest_mimic::{Failed, Trial};
 
-use super::tiers::compare;
+use super::tiers::{compare, run_anyhow};
+
+/// The test that runs in a process of its own, since what it asks of the system lasts as long as the process.
+const NO_EXECUTABLE_MEMORY: &str = "tiers bad case: a host that forbids executable memory";
+
+/// Variable of the environment of that process.
+const IS_FORBIDDEN: &str = "ESL_EXECUTABLE_MEMORY_IS_FORBIDDEN";
+
+/// Has the system refuse to make memory executable (`PR_SET_MDWE`), which holds for what is executed too.
+/// Exit status 77 if the system does not know that.
+const FORBID: &str = "
+import ctypes, os, sys
+if ctypes.CDLL(None).prctl(65, 1, 0, 0, 0) != 0:
+    sys.exit(77)
+os.execv(sys.argv[1], sys.argv[1:])
+";
 
 /// Name and text of each.
-const CASES: [(&str, &str); 7] = [
+const CASES: [(&str, &str); 9] = [
     (
         "functions redefined while they run",
         "(defun step-of (x) (+ x 1))
@@ -92,6 +109,43 @@ const CASES: [(&str, &str); 7] = [
          (print (handler-case (scale (list 1.0) 2.0) (error (e) (type-of e))))",
     ),
     (
+        "special variables while doubles are kept back",
+        "(defvar *x* 1.5) (defvar *y* 2) (defvar *z* 0.25) (defvar *free*)
+         (defconstant +c+ 3.5)
+         (defun turn (n)
+           (let ((a 1.0) (b 0.5))
+             (dotimes (i n)
+               (setq a (* (+ a *x*) 0.5) b (- a *z*))
+               (setq *z* (+ b 0.125))
+               (when (= 0 (mod i 5))
+                 (let ((*x* (+ *x* 0.5)) (*y* i))
+                   (setq *x* (* *x* a) b (+ b *x*))
+                   (when (= 0 (mod i 3)) (let ((*x* :other)) (setq *y* (list *y* *x*))))
+                   (setq a (if (consp *y*) (- b a) (+ b *y*)))))
+               (setq *y* (+ *y* 1)))
+             (list a b *x* *y* *z*)))
+         (print (turn 3)) (print (turn 100)) (let ((*z* -1.0)) (print (turn 100))) (print (turn 7))
+         (defun read-free (n x)
+           (let ((sum x)) (dotimes (i n) (setq sum (+ sum 1.5)) (incf sum *free*)) sum))
+         (defun try (n) (print (handler-case (read-free n 0.5) (error (e) (type-of e)))))
+         (try 3) (let ((*free* 2.5)) (try 100) (setq *free* 'a) (try 2)) (try 50) (setq *free* 1) (try 50)
+         (defun set-constant (x) (setq x (* x 2.0)) (set '+c+ x) x)
+         (dotimes (i 5) (print (handler-case (set-constant 1.0) (error (e) (type-of e)))))
+         (defun deep (n) (if (= n 0) (list *x* *y*) (let ((*x* (+ *x* 1.0)) (*y* n)) (deep (- n 1)))))
+         (print (deep 100)) (print (deep 2000)) (print (list *x* *y* *z*))",
+    ),
+    (
+        "pairs of doubles and of other values",
+        "(defun pairs (n)
+           (let ((list nil) (x 1.0) (y 0.0))
+             (dotimes (i n)
+               (setq x (* x 1.01) y (+ y x))
+               (setq list (cons (cons x i) (if (= 0 (mod i 50)) nil (cons y list))))
+               (setq x (- x 0.001)))
+             (list x y (length list) (car list) (cadr list))))
+         (print (pairs 10)) (print (pairs 1000)) (print (pairs 30000))",
+    ),
+    (
         "doubles of frames that are left for good",
         "(defun inner (x n)
            (let ((a (* x 1.5)) (b (+ x 2.0)))
@@ -125,6 +179,7 @@ pub(super) fn trials() -> Vec<Trial> {
                 a_long_function_is_left_to_the_interpreter,
             ),
             Trial::test("tiers bad case: eval in a loop", machine_code_does_not_pile_up),
+            Trial::test(NO_EXECUTABLE_MEMORY, a_host_may_forbid_executable_memory),
         ])
         .collect()
 }
@@ -162,6 +217,43 @@ fn machine_code_does_not_pile_up() -> Result<(), Failed> {
     let report = &machine.tier().1;
     if report.bytes > (report.functions - 100) * PAGE {
         return Err(format!("nothing was given back: {report:?}").into());
+    }
+    Ok(())
+}
+
+fn a_host_may_forbid_executable_memory() -> Result<(), Failed> {
+    if std::env::var_os(IS_FORBIDDEN).is_some() {
+        return all_is_left_to_the_interpreter();
+    }
+    let mut command = Command::new("python3");
+    command.args(["-c", FORBID]).arg(std::env::current_exe()?).args(["--exact", NO_EXECUTABLE_MEMORY]);
+    let Ok(output) = command.env(IS_FORBIDDEN, "1").output() else { return Ok(()) };
+    let text = String::from_utf8_lossy(&output.stdout);
+    match output.status.code() {
+        Some(77) => Ok(()),
+        Some(0) if text.contains("1 passed") => Ok(()),
+        _ => Err(format!("{text}{}", String::from_utf8_lossy(&output.stderr)).into()),
+    }
+}
+
+/// Each function is asked for and refused, or only the first; the program does not see it.
+fn all_is_left_to_the_interpreter() -> Result<(), Failed> {
+    let program = compile(
+        "(defun add (x y) (+ x y))
+         (defun sums (n) (let ((sum 0.0)) (dotimes (i n) (setq sum (add sum 0.5))) sum))
+         (dotimes (i 20) (print (sums (* i 1000))))",
+    )?;
+    let config = Config::default();
+    let (interpreted, _) = run_anyhow(&program, &config, Tier::Interpreter)?;
+    for tier in [Tier::Native, Tier::Auto] {
+        let (outcome, refused) = run_anyhow(&program, &config, tier)?;
+        if outcome != interpreted {
+            return Err(format!("interpreted {interpreted:#?}\n{tier:?} {outcome:#?}").into());
+        }
+        // With `auto` the answer of the other thread may come too late.
+        if tier == Tier::Native && refused.is_none() {
+            return Err("machine code was made where the system forbids it".into());
+        }
     }
     Ok(())
 }

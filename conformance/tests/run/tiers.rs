@@ -20,7 +20,7 @@ const PROGRAMS: u64 = 8;
 
 /// What of a run does not depend on how functions run.
 #[derive(Debug, PartialEq)]
-struct TierOutcome {
+pub(super) struct TierOutcome {
     output: String,
     errors: String,
     ended: String,
@@ -103,22 +103,33 @@ pub(super) fn compare(program: &Program, config: &Config) -> Result<(), Failed> 
 }
 
 fn run(program: &Program, config: &Config, tier: Tier) -> Result<TierOutcome, Failed> {
+    match run_anyhow(program, config, tier)? {
+        (outcome, None) => Ok(outcome),
+        (_, Some(reason)) => Err(format!("there is no machine code: {reason}").into()),
+    }
+}
+
+/// Returns the outcome of a run, and why there was no machine code if there was none to be had.
+pub(super) fn run_anyhow(
+    program: &Program,
+    config: &Config,
+    tier: Tier,
+) -> Result<(TierOutcome, Option<String>), Failed> {
     let host = VirtualHost::new();
     let captured = host.captured();
     let mut machine = program::machine(config.clone(), Box::new(host))?;
     machine.set_tier(tier);
     let summary = program::run_in(&mut machine, program)?;
-    if let Some(reason) = &machine.tier().1.refused {
-        return Err(format!("there is no machine code: {reason}").into());
-    }
-    Ok(TierOutcome {
+    let refused = machine.tier().1.refused.clone();
+    let outcome = TierOutcome {
         output: captured.output(),
         errors: captured.error(),
         ended: format!("{:?}", summary.ended),
         ticks: summary.ticks,
         turns: summary.turns,
         canary: machine.canary(),
-    })
+    };
+    Ok((outcome, refused))
 }
 
 /// Makes programs of functions that compute with numbers of all kinds in loops.
