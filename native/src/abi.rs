@@ -33,6 +33,17 @@ pub type NativeHelper = unsafe extern "C" fn(*mut NativeContext, *const u32, *mu
 /// Function of the machine that overwrites a slot while objects are marked.
 pub type NativeStore = unsafe extern "C" fn(*mut NativeContext, *mut u64, u64);
 
+/// Function of the machine that returns the value of a symbol that was bound, which may be unbound. It looks
+/// at no frame.
+pub type NativeValueOf = unsafe extern "C" fn(*mut NativeContext, u64) -> u64;
+
+/// Function of the machine that sets a symbol that was bound and is no constant. It looks at no frame.
+pub type NativeSetValueOf = unsafe extern "C" fn(*mut NativeContext, u64, u64);
+
+/// Function of the machine that makes a pair, or returns 0 if that takes more than a hole of the heap. It
+/// looks at no frame.
+pub type NativeCons = unsafe extern "C" fn(*mut NativeContext, u64, u64) -> u64;
+
 /// Machine code of a function: the frame, and the place of entry: 0 for the first instruction, and the
 /// numbers from 1 on for loop instructions.
 pub type NativeEntry = unsafe extern "C" fn(*mut NativeContext, *mut u64, u64) -> NativeReply;
@@ -68,6 +79,16 @@ pub struct NativeContext {
     pub first_value: NativeHelper,
     /// Overwrites a slot while objects are marked.
     pub store: NativeStore,
+    /// Reads a special variable that was bound.
+    pub value_of: NativeValueOf,
+    /// Sets a special variable that was bound.
+    pub set_value_of: NativeSetValueOf,
+    /// Does a `bind`.
+    pub bind: NativeHelper,
+    /// Does an `unbind`.
+    pub unbind: NativeHelper,
+    /// Makes a pair.
+    pub cons: NativeCons,
 }
 
 /// How a function of machine code was left.

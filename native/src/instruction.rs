@@ -8,8 +8,9 @@ use cranelift_codegen::ir::condcodes::IntCC;
 use esl_bytecode::opcode::{Instr, RegisterAccess};
 use esl_heap::Value;
 use esl_heap::heap::Kind;
-use esl_heap::heap::layout::{Boxed, Cons, SymbolObject};
+use esl_heap::heap::layout::{Boxed, Cons};
 
+use crate::abi::NativeContext;
 use crate::arithmetic::{Arithmetic, NumberOrder};
 use crate::emit::in_object;
 use crate::flow::FlowStep;
@@ -273,21 +274,10 @@ impl Translator<'_, '_> {
                 self.require_kind(value, Kind::Function, slow);
                 self.finish_with(slow, value, dst.0);
             }
-            Instr::SymbolValue { dst, symbol } => {
-                let (symbol, slow) = (self.constant(usize::from(symbol.0)), self.cold_block());
-                self.refuse_flags(symbol, SymbolObject::EVER_BOUND, slow);
-                let value = self.load(symbol, in_object(offset_of!(SymbolObject, value)));
-                let is_unbound = self.equals(value, Value::UNBOUND.bits());
-                self.refuse(is_unbound, slow);
-                self.finish_with(slow, value, dst.0);
-            }
-            Instr::SetSymbolValue { src, symbol } => {
-                let (symbol, slow) = (self.constant(usize::from(symbol.0)), self.cold_block());
-                self.refuse_flags(symbol, SymbolObject::EVER_BOUND | SymbolObject::CONSTANT, slow);
-                let value = self.get(src.0);
-                self.store_slot(value, symbol, in_object(offset_of!(SymbolObject, value)));
-                self.finish_effect(slow);
-            }
+            Instr::SymbolValue { dst, symbol } => self.symbol_value(dst.0, symbol.0),
+            Instr::SetSymbolValue { src, symbol } => self.set_symbol_value(src.0, symbol.0),
+            Instr::Bind { .. } => self.bind(offset_of!(NativeContext, bind)),
+            Instr::Unbind { .. } => self.bind(offset_of!(NativeContext, unbind)),
 
             Instr::Call { window, count, want, .. } => self.call_given(window.0, count.0, want, step.next),
             Instr::CallGlobal { window, count, want, symbol } => {
@@ -310,12 +300,10 @@ impl Translator<'_, '_> {
             Instr::ReturnAll {} => self.return_values(),
             Instr::Apply { .. } | Instr::TailApply { .. } | Instr::Throw { .. } => self.leave(),
 
-            Instr::Cons { .. }
-            | Instr::List { .. }
+            Instr::Cons { dst, car, cdr } => self.cons(dst.0, car.0, cdr.0),
+            Instr::List { .. }
             | Instr::Eql { .. }
             | Instr::MakeBox { .. }
-            | Instr::Bind { .. }
-            | Instr::Unbind { .. }
             | Instr::BindList { .. }
             | Instr::FunctionRef { .. }
             | Instr::SetValues { .. }

@@ -129,8 +129,8 @@ impl NativeKinds {
         self.before[at].as_deref().unwrap_or_default()
     }
 
-    /// Returns what is known before each word that can be reached, of the registers that may be read from there
-    /// on.
+    /// Returns what is known before each word that can be reached, of the registers that may be read from
+    /// there on.
     pub(crate) fn into_said(mut self) -> Vec<Option<Box<[Known]>>> {
         for (known, &live) in self.before.iter_mut().zip(&self.live) {
             for (register, known) in known.iter_mut().flatten().enumerate() {

@@ -14,6 +14,7 @@
 //!   Those that are written on a way out are written as they are; [`NativeContext::raw_doubles`] names them,
 //!   and the machine makes words of them before anything else looks.
 //!   Where the function returns, they are no more; other words without an address are in their places.
+//!   Functions of the machine that look at no frame may be called while some are kept back.
 //! * **N4, exits.** Machine code is left at the beginning of an instruction, before it has had any effect
 //!   ([`AGAIN`]), or behind a function of the machine that has done the instruction and says what is to be
 //!   done next ([`SIGNAL`], [`RETURN_VALUES`]), or with the value of the function ([`RETURNED`]).
@@ -44,6 +45,7 @@ mod kinds;
 pub mod maker;
 mod objects;
 mod places;
+mod special;
 mod translate;
 
 pub use abi::{AGAIN, GUESSED_WRONG, NativeContext, NativeReply, RETURN_VALUES, RETURNED, SIGNAL};

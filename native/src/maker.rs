@@ -157,9 +157,9 @@ impl MachineCode {
         self.bytes
     }
 
-    /// Returns whether machine code may have been left at the instruction at a word with these registers, as far
-    /// as that is known: it is an instruction that can be reached, and the registers hold what they are known to
-    /// hold there. One may be something else, which is why it was left. Always in release builds.
+    /// Returns whether machine code may have been left at the instruction at a word with these registers, as
+    /// far as that is known: it is an instruction that can be reached, and the registers hold what they are
+    /// known to hold there. One may be something else, which is why it was left. Always in release builds.
     pub fn may_be_left(&self, at: usize, registers: &[Value]) -> bool {
         if self.said.is_empty() {
             return true;

@@ -8,6 +8,7 @@ use esl_heap::Value;
 use esl_heap::heap::Kind;
 use esl_heap::heap::layout::{FunctionObject, Header, Str};
 
+use crate::abi::NativeContext;
 use crate::emit::{ELEMENTS, WORD, in_cons, in_object, memory};
 use crate::kinds::Known;
 use crate::translate::Translator;
@@ -115,10 +116,23 @@ impl Translator<'_, '_> {
         self.load(function, capture(index))
     }
 
-    pub(crate) fn refuse_flags(&mut self, symbol: Ssa, flags: u8, otherwise: Block) {
+    /// Returns those of the flags that a symbol has.
+    pub(crate) fn flags(&mut self, symbol: Ssa, flags: u8) -> Ssa {
         let found = self.b.ins().uload8(types::I64, memory(), symbol, in_object(offset_of!(Header, flags)));
-        let set = self.b.ins().band_imm_s(found, i64::from(flags));
-        self.refuse(set, otherwise);
+        self.b.ins().band_imm_s(found, i64::from(flags))
+    }
+
+    /// Makes a pair: by a function of the machine that looks at no frame, or by the machine if that takes a
+    /// look at the heap.
+    pub(crate) fn cons(&mut self, dst: u8, car: u8, cdr: u8) {
+        self.make_word(usize::from(car));
+        self.make_word(usize::from(cdr));
+        let (car, cdr, slow) = (self.get(car), self.get(cdr), self.cold_block());
+        let (context, helper) = (self.context, self.load_context(offset_of!(NativeContext, cons)));
+        let call = self.b.ins().call_indirect(self.helper_signature, helper, &[context, car, cdr]);
+        let pair = self.b.inst_results(call)[0];
+        self.require(pair, slow);
+        self.finish_with(slow, pair, dst);
     }
 }
 

@@ -53,6 +53,7 @@ pub(crate) struct Translator<'a, 'f> {
     pub(crate) signal: Option<Block>,
     pub(crate) helper_signature: SigRef,
     pub(crate) store_signature: SigRef,
+    pub(crate) read_signature: SigRef,
     pub(crate) entry_signature: SigRef,
     /// Word of the instruction that is translated.
     pub(crate) at: usize,
@@ -81,6 +82,7 @@ impl<'a, 'f> Translator<'a, 'f> {
             b.import_signature(signature)
         };
         let (helper, store, entry) = (signature(3, 1), signature(3, 0), signature(3, 2));
+        let read = signature(2, 1);
         let variables: Vec<Variable> = (0..source.registers).map(|_| b.declare_var(types::I64)).collect();
         let doubles: Vec<Variable> = (0..source.registers).map(|_| b.declare_var(types::F64)).collect();
         let first = b.create_block();
@@ -110,6 +112,7 @@ impl<'a, 'f> Translator<'a, 'f> {
             signal: None,
             helper_signature: helper,
             store_signature: store,
+            read_signature: read,
             entry_signature: entry,
             at: 0,
             next: 0,

@@ -196,6 +196,11 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
         tail_builtin: step::tail_builtin,
         first_value: step::first_value,
         store: step::store,
+        value_of: step::value_of,
+        set_value_of: step::set_value_of,
+        bind: step::bind,
+        unbind: step::unbind,
+        cons: step::cons,
     };
     // SAFETY: N2, N7: by the contract; the machine is borrowed for as long, and only helpers use it. A tail
     // call has made the frame of the function whose machine code the reply names.
@@ -211,7 +216,13 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
     if matches!(reply.status, AGAIN | GUESSED_WRONG) {
         let base = std::ptr::with_exposed_provenance_mut(context.base as usize);
         // SAFETY: N3, N4: it was left in that frame.
-        unsafe { make_words(&mut context, base) };
+        unsafe {
+            make_words(&mut context, base);
+            debug_assert!(
+                reply.status == GUESSED_WRONG || is_as_said(vm, context.pc, base),
+                "left at what it was not made for"
+            );
+        }
     }
     if reply.status == AGAIN && context.ticks > 0 && vm.compiled.tier == Tier::Auto {
         // SAFETY: N4: it was left at an instruction of that frame.
@@ -233,6 +244,27 @@ unsafe fn run(vm: &mut Vm, entry: NativeEntry, place: u64, base: *mut Value, tic
         pc: std::ptr::with_exposed_provenance(context.pc as usize),
         base: std::ptr::with_exposed_provenance_mut(context.base as usize),
         ticks: context.ticks,
+    }
+}
+
+/// Returns whether the registers of the frame in which machine code was left are what its maker says of them
+/// there.
+///
+/// # Safety
+/// `base` is the frame in which it was left, and `pc` the address of an instruction of its function.
+unsafe fn is_as_said(vm: &Vm, pc: u64, base: *mut Value) -> bool {
+    // SAFETY: F2: the function of the frame keeps its code alive; an entry leads to an operation of the loop.
+    unsafe {
+        let code = code_of(*base.sub(2));
+        if *(*code).entry != u32::from(stubs::NATIVE_ENTRY) {
+            return false;
+        }
+        let number = (*(*code).entry.cast::<EntryStub>()).number as usize;
+        let registers = std::slice::from_raw_parts(base, (*code).nregs as usize);
+        let first = first_instruction(code).addr() as u64;
+        let at = pc.checked_sub(first).map(|bytes| bytes as usize / size_of::<u32>());
+        let installed = vm.compiled.installed.get(number).and_then(Option::as_ref);
+        installed.zip(at).is_some_and(|(installed, at)| installed.made.may_be_left(at, registers))
     }
 }
 

@@ -176,6 +176,72 @@ pub(super) unsafe extern "C" fn store(context: *mut NativeContext, slot: *mut u6
     }
 }
 
+/// Returns the value of a symbol that was bound.
+pub(super) unsafe extern "C" fn value_of(context: *mut NativeContext, symbol: u64) -> u64 {
+    // SAFETY: V4: machine code has found the flag in a symbol that is a constant of its function.
+    unsafe {
+        let (vm, _) = parts(context);
+        variable::bound_value(vm, Value::from_bits(symbol)).bits()
+    }
+}
+
+/// Sets a symbol that was bound and is no constant.
+pub(super) unsafe extern "C" fn set_value_of(context: *mut NativeContext, symbol: u64, value: u64) {
+    // SAFETY: V4: machine code has found the flags in a symbol that is a constant of its function; the value
+    // is one of the program.
+    unsafe {
+        let (vm, _) = parts(context);
+        let is_set = vm.set_symbol_value(Value::from_bits(symbol), Value::from_bits(value));
+        debug_assert!(is_set.is_ok(), "a symbol that is no constant");
+        attend(context, vm);
+    }
+}
+
+/// Makes a pair in the hole of the heap that is filled; 0 if it has no room.
+pub(super) unsafe extern "C" fn cons(context: *mut NativeContext, car: u64, cdr: u64) -> u64 {
+    // SAFETY: both are values of the program.
+    unsafe {
+        let (vm, _) = parts(context);
+        vm.heap.cons_in_hole(Value::from_bits(car), Value::from_bits(cdr)).map_or(0, Value::bits)
+    }
+}
+
+/// Does a `bind`.
+pub(super) unsafe extern "C" fn bind(context: *mut NativeContext, pc: *const u32, base: *mut u64) -> u64 {
+    // SAFETY: machine code calls this at such an instruction of the frame at `base`, all of it in its place.
+    unsafe {
+        let (vm, _) = parts(context);
+        let signal = variable::bind(vm, pc, base.cast());
+        end_binding(context, signal, pc, base)
+    }
+}
+
+/// Does an `unbind`.
+pub(super) unsafe extern "C" fn unbind(context: *mut NativeContext, pc: *const u32, base: *mut u64) -> u64 {
+    // SAFETY: machine code calls this at such an instruction of the frame at `base`.
+    unsafe {
+        let (vm, _) = parts(context);
+        let signal = variable::unbind(vm, pc, base.cast());
+        end_binding(context, signal, pc, base)
+    }
+}
+
+/// Goes on behind an instruction that binds, or leaves there.
+///
+/// # Safety
+/// That of a helper.
+unsafe fn end_binding(context: *mut NativeContext, signal: Signal, pc: *const u32, base: *mut u64) -> u64 {
+    // SAFETY: N4: the contract says that the context is that of `run`, and the frame the running one.
+    unsafe {
+        if signal != Signal::Next {
+            return leave(context, signal, pc, base.cast());
+        }
+        let (vm, _) = parts(context);
+        attend(context, vm);
+        STEP_NEXT
+    }
+}
+
 /// Calls the builtin of the instruction with the arguments in its window.
 ///
 /// # Safety
