@@ -145,3 +145,17 @@ fn colours_tell_failures_and_tasks_from_other_forms() {
     let folds = Query::new(&tree_sitter_esl::LANGUAGE.into(), tree_sitter_esl::FOLDS_QUERY);
     assert!(folds.is_ok(), "{folds:?}");
 }
+
+#[test]
+fn parameters_and_bindings_are_not_coloured_as_calls() {
+    let program = "(defun go (metres) (let ((a 1)) (dolist (b metres) (drive a b))))
+        (defmethod stop :before ((rover rover) speed) (lambda (force) force))";
+    let colours = colours(program);
+    for word in ["metres", "rover", "force"] {
+        assert_eq!(colours[word], "variable.parameter", "{word}");
+    }
+    for word in ["a", "b"] {
+        assert_eq!(colours[word], "variable", "{word}");
+    }
+    assert_eq!(colours["drive"], "function.call");
+}

@@ -44,3 +44,17 @@
   (#match? @keyword.function "^(defpackage)$"))
 ((list . (symbol) @keyword.function . (symbol) . (list) . (string) @string.documentation)
   (#match? @keyword.function "^(defun|defmacro|defgeneric)$"))
+
+; Parameters and bindings, which are not called.
+((list . (symbol) @keyword.function . [(symbol) (list)] . (list (symbol) @variable.parameter))
+  (#match? @keyword.function "^(defun|defmacro|defgeneric|define-mock|define-compiler-macro|deftype)$"))
+((list . (symbol) @keyword.function . (symbol) . (list (list . (symbol) @variable.parameter)))
+  (#match? @keyword.function "^(defun|defmacro|defmethod|define-mock)$"))
+((list . (symbol) @keyword.function . (symbol) . (keyword) . (list (list . (symbol) @variable.parameter)))
+  (#match? @keyword.function "^defmethod$"))
+((list . (symbol) @keyword . (list (symbol) @variable.parameter))
+  (#match? @keyword "^(lambda|multiple-value-bind|destructuring-bind)$"))
+((list . (symbol) @keyword . (list (list . (symbol) @variable)))
+  (#match? @keyword "^(let[*]?|do[*]?|symbol-macrolet)$"))
+((list . (symbol) @keyword . (list . (symbol) @variable))
+  (#match? @keyword "^(dolist|dotimes)$"))
