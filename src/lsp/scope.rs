@@ -136,7 +136,9 @@ fn is_description(tree: &SyntaxTree, list: NodeId) -> bool {
     let place = |inner: NodeId| {
         let outer = tree.parent(inner)?;
         let operator = tree.operator(outer).filter(|operator| operator.starts_with("def"))?;
-        Some((operator, tree.data(outer).position(|part| part == inner)?))
+        let at = tree.data(outer).position(|part| part == inner)?;
+        let qualifiers = tree.data(outer).filter(|&part| part < inner && is_qualifier(tree, part)).count();
+        Some((operator, at - qualifiers))
     };
     let has_slots = |operator: &str| matches!(operator, "defstruct" | "defclass" | "define-condition");
     let has_value = |operator: &str| {
@@ -152,6 +154,16 @@ fn is_description(tree: &SyntaxTree, list: NodeId) -> bool {
             _ => at == 2 && !has_value(&operator),
         }),
     }
+}
+
+/// Whether a name is a qualifier of a method, such as `:before`: it stands between name and parameters.
+pub(super) fn is_qualifier(tree: &SyntaxTree, node: NodeId) -> bool {
+    let Some(method) = tree.parent(node).filter(|&list| tree.kind(list) == SyntaxKind::List) else {
+        return false;
+    };
+    let operator = tree.data(method).next().and_then(|first| tree.name(first)?.rsplit(':').next());
+    operator.is_some_and(|operator| operator.eq_ignore_ascii_case("defmethod"))
+        && tree.data(method).skip(2).take_while(|&part| tree.name(part).is_some()).any(|part| part == node)
 }
 
 /// Whether a list is a clause of a `cond` or `case`, or a binding of a `let`: no call.

@@ -10,7 +10,7 @@ use super::definition::DefinedAs;
 use super::document::OpenText;
 use super::library::language;
 use super::project::Project;
-use super::scope::is_operator;
+use super::scope::{is_operator, is_qualifier};
 use crate::syntax::{NodeId, SyntaxKind, bare_name};
 
 const TYPES: [SemanticTokenType; 8] = [
@@ -144,6 +144,9 @@ fn classify(text: &OpenText, node: NodeId) -> Option<(SemanticTokenType, u32)> {
 fn of_name(text: &OpenText, node: NodeId) -> Option<(SemanticTokenType, u32)> {
     let tree = &text.tree;
     let written = tree.text(node);
+    if is_qualifier(tree, node) {
+        return Some((SemanticTokenType::KEYWORD, 0));
+    }
     if written.starts_with(':') {
         return Some((SemanticTokenType::ENUM_MEMBER, 0));
     }

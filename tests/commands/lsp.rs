@@ -480,3 +480,41 @@ fn names_of_the_language_are_told_as_the_reference_has_them() {
     assert_eq!(functions.count(), 2, "the structure's name, and list");
     editor.end();
 }
+
+#[test]
+fn a_qualifier_of_a_method_moves_nothing() {
+    let folder = Folder::with("lsp_methods", &[]);
+    let path = folder.join("methods.esl");
+    let mut editor = Editor::new(&folder);
+    editor.open(&path, "(defmethod go :before ((r rover) (n (eql 3)) speed) (list r :n))\n");
+    let document = json!({ "textDocument": { "uri": uri(&path) } });
+    let tokens = editor.ask("textDocument/semanticTokens/full", document);
+    let numbers: Vec<u64> =
+        tokens["data"].as_array().expect("a list").iter().filter_map(Value::as_u64).collect();
+    let mut column = 0;
+    let mut told = Vec::new();
+    for token in numbers.chunks(5) {
+        column += token[1];
+        told.push((column, token[3]));
+    }
+    // `defmethod` is a macro, `go`, `eql` and `list` are functions, `:before` is a keyword, `3` a number, and
+    // `:n` a symbol; no parameter is called.
+    let expected = [(1, 4), (11, 5), (14, 3), (37, 5), (41, 2), (53, 5), (60, 6)];
+    assert_eq!(told, expected);
+    editor.end();
+}
+
+#[test]
+fn forms_about_failures_and_tasks_stand_out() {
+    let folder = Folder::with("lsp_stand_out", &[]);
+    let path = folder.join("forms.esl");
+    let mut editor = Editor::new(&folder);
+    editor.open(&path, "(list 1)\n(spawn (fail :stuck))\n(car 2)\n");
+    let range = json!({ "start": { "line": 1, "character": 0 }, "end": { "line": 1, "character": 21 } });
+    let asked = json!({ "textDocument": { "uri": uri(&path) }, "range": range });
+    let tokens = editor.ask("textDocument/semanticTokens/range", asked);
+    // Line, column, length, type, modifiers: of the library (2), and of a failure (4) or a task (8).
+    let expected = json!([1, 1, 5, 4, 10, 0, 7, 4, 5, 6, 0, 5, 6, 6, 0]);
+    assert_eq!(tokens["data"], expected);
+    editor.end();
+}
