@@ -270,10 +270,15 @@ fn print_summary(found: &Exploration<Behaviour>, settings: &Settings, findings: 
     };
     let reads = match settings.grain {
         Grain::Changes => "; switches before a task only looks at what others do (--grain reads)",
-        Grain::Reads | Grain::Ticks => "",
+        Grain::Reads | Grain::Variables | Grain::Ticks => "",
     };
-    let objects = "changes of variables, slots and tables by tasks that are outside of critical sections \
-                   (--grain ticks)";
+    let variables = match settings.grain {
+        Grain::Variables | Grain::Ticks => "",
+        Grain::Changes | Grain::Reads => "variables (--grain variables), and of ",
+    };
+    let objects = format!(
+        "changes of {variables}slots and tables (--grain ticks), by tasks that are outside of critical sections"
+    );
     match (settings.grain, settings.timers) {
         (Grain::Ticks, TimerGrain::Any) => {}
         (Grain::Ticks, TimerGrain::Idle) => say!("Not seen: {}.", timers.trim_start_matches("; ")),

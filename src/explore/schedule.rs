@@ -111,11 +111,12 @@ impl Schedule {
         let machine = machine.ok_or(wrong(2, "a number, `-`, and a checksum in hexadecimal digits"))?;
         let program = hexadecimal(field(3, "program", "`program` and a checksum")?);
         let program = program.ok_or(wrong(3, "a checksum in hexadecimal digits"))?;
-        let grain = match field(4, "grain", "`grain changes`, `grain reads` or `grain ticks`")? {
+        let grain = match field(4, "grain", "`grain`, and `changes`, `reads`, `variables` or `ticks`")? {
             "changes" => Grain::Changes,
             "reads" => Grain::Reads,
+            "variables" => Grain::Variables,
             "ticks" => Grain::Ticks,
-            _ => return Err(wrong(4, "`changes`, `reads` or `ticks`")),
+            _ => return Err(wrong(4, "`changes`, `reads`, `variables` or `ticks`")),
         };
         let timers = match field(5, "timers", "`timers idle` or `timers any`")? {
             "idle" => TimerGrain::Idle,
@@ -160,6 +161,7 @@ impl fmt::Display for Schedule {
         let grain = match self.grain {
             Grain::Changes => "changes",
             Grain::Reads => "reads",
+            Grain::Variables => "variables",
             Grain::Ticks => "ticks",
         };
         let timers = match self.timers {

@@ -227,9 +227,9 @@ fn threads_find_the_same_as_one() {
     assert_eq!(one, found("5"));
 }
 
-/// What only a switch at a tick can show.
+/// What only a switch at a tick can show, after a use of a variable or anywhere.
 #[test]
-fn at_every_tick_shared_variables_are_seen() {
+fn at_ticks_shared_variables_are_seen() {
     let folder = Folder::new("exploring-ticks");
     let text = "(defvar *count* 0)
 (defun twice (n) (+ n n))
@@ -241,11 +241,18 @@ fn at_every_tick_shared_variables_are_seen() {
     folder.file("count.esl", text);
     let (status, output, errors) = run(&folder, &["explore", "count.esl"]);
     assert_eq!((status, errors.as_str()), (Some(0), ""), "{output}");
-    assert!(output.contains("outside of critical sections (--grain ticks)"), "{output}");
-    let (status, output, errors) = run(&folder, &["explore", "--grain", "ticks", "count.esl"]);
-    assert_eq!((status, errors.as_str()), (Some(1), ""), "{output}");
-    assert!(output.starts_with("finding 1: the program ends with status 9\n"), "{output}");
-    assert_eq!(run(&folder, &["run", "--schedule", "count-1.schedule", "count.esl"]).0, Some(9));
+    assert!(output.contains("Not seen: changes of variables (--grain variables), and of slots"), "{output}");
+    for grain in ["variables", "ticks"] {
+        let (status, output, errors) = run(&folder, &["explore", "--grain", grain, "count.esl"]);
+        assert_eq!((status, errors.as_str()), (Some(1), ""), "{output}");
+        assert!(output.starts_with("finding 1: the program ends with status 9\n"), "{output}");
+        assert_eq!(
+            output.contains("Not seen: changes of slots and tables"),
+            grain == "variables",
+            "{output}"
+        );
+        assert_eq!(run(&folder, &["run", "--schedule", "count-1.schedule", "count.esl"]).0, Some(9));
+    }
 }
 
 /// A finding is recorded, and gone through forwards and backwards.
@@ -265,4 +272,26 @@ fn a_run_by_a_schedule_is_recorded_and_replayed() {
     let finished = process::run(replay.current_dir(folder.path()), commands);
     assert_eq!(finished.status, Some(0), "{}", finished.errors);
     assert!(finished.output.contains("NIL") || finished.output.contains("T"), "{}", finished.output);
+}
+
+/// The explorations of the manual find what it says, with its figures.
+#[test]
+fn the_manual_shows_what_is_found() {
+    let manual = include_str!("../../docs/manual/testing.md");
+    let folder = Folder::new("exploring-manual");
+    let mut tried = 0;
+    for block in manual.split("```text\n$ eslvm explore ").skip(1) {
+        let (arguments, shown) = block.split_once('\n').expect("the command has a line");
+        let shown = shown.split("```").next().expect("it ends");
+        let before = manual.split(&format!("```text\n$ eslvm explore {arguments}\n")).next();
+        let program = before.and_then(|text| text.rsplit("```lisp\n").next()?.split("```").next());
+        let arguments: Vec<&str> = ["explore"].into_iter().chain(arguments.split(' ')).collect();
+        let name = arguments.last().expect("there is the command");
+        folder.file(name, program.expect("the program stands before"));
+        let (status, output, errors) = run(&folder, &arguments);
+        assert_eq!((status, errors.as_str()), (Some(1), ""), "{output}");
+        assert!(output.starts_with(shown), "{output}\n{shown}");
+        tried += 1;
+    }
+    assert_eq!(tried, 2);
 }

@@ -8,6 +8,7 @@ mod keeping;
 mod putting_back;
 mod resources;
 mod suspension;
+mod variables;
 
 use esl::explore::{Behaviour, Exploration, Grain, Settings, explore, explore_together, follow};
 use esl::program::{self, Ended, Program, Source};
@@ -57,7 +58,7 @@ fn ways(found: &Exploration<Behaviour>) -> Vec<(&Behaviour, &[u32], usize)> {
 }
 
 /// Returns the sorted outputs of an exploration whose runs have all ended well.
-fn outputs(found: &Exploration<Behaviour>) -> Vec<String> {
+pub(crate) fn outputs(found: &Exploration<Behaviour>) -> Vec<String> {
     let mut outputs = Vec::new();
     for ending in &found.endings {
         let Behaviour { ended, output, errors } = &ending.what;

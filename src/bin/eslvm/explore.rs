@@ -39,6 +39,7 @@ pub(crate) fn run_explore(
     let grain = match options.grain {
         GrainChoice::Changes => explore::Grain::Changes,
         GrainChoice::Reads => explore::Grain::Reads,
+        GrainChoice::Variables => explore::Grain::Variables,
         GrainChoice::Ticks => explore::Grain::Ticks,
     };
     let settings = explore::Settings {

@@ -20,7 +20,7 @@ pub(crate) struct Eslvm {
     /// ESL_LIBRARY
     #[arg(long, value_name = "FOLDER", global = true)]
     pub(crate) library: Vec<PathBuf>,
-    /// Do not say at a terminal how far a long compilation, test or exploration is
+    /// Show no progress line at a terminal
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
 }
@@ -99,7 +99,7 @@ pub(crate) enum EslvmAction {
         /// Only tests whose names contain this word, in any case
         #[arg(long, value_name = "WORD")]
         filter: Option<String>,
-        /// Number of tests that run at the same time; as many as there are processors if it is missing
+        /// Number of tests that run at the same time, by default that of the processors
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
         jobs: Option<u16>,
         /// Run each test with this seed only
@@ -126,7 +126,7 @@ pub(crate) enum EslvmAction {
     },
     /// Run a program under all schedules
     ///
-    /// Lets the tasks of the program take turns in every possible order, and tells of those orders that end
+    /// Lets the tasks of the program take turns in every possible order, and reports the orders that end
     /// badly: by a deadlock, a failure of the main task, a status other than 0. Writes each as a schedule,
     /// which `eslvm run --schedule` repeats. Exit status: 0 no schedule ends badly; 1 one does; 2 wrong
     /// usage, or a file that cannot be read or written; 3 the program does not compile or is refused; 7
@@ -171,7 +171,7 @@ pub(crate) enum EslvmAction {
         /// Shell
         shell: clap_complete::Shell,
     },
-    /// Write the manual pages, in the form of `man`
+    /// Write the manual pages
     Man {
         /// Folder to write them to, one page for each subcommand; without it, the first page is printed
         folder: Option<PathBuf>,
@@ -265,11 +265,10 @@ impl MachineOptions {
 
 #[derive(Args)]
 pub(crate) struct ExploreArguments {
-    /// Where a task may have to let others go first: before what others can see (changes), also before it
-    /// looks at what others do (reads), or at every tick, wherever the machine can preempt it (ticks)
+    /// Where a task may have to let others go first; a finer grain sees more, and has more states
     #[arg(long, value_enum, default_value = "changes")]
     pub(crate) grain: GrainChoice,
-    /// Number of threads, which find the same as one; as many as there are processors if it is missing
+    /// Number of threads, by default that of the processors; the findings do not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) jobs: Option<u16>,
     /// Most states
@@ -306,6 +305,8 @@ pub(crate) enum GrainChoice {
     Changes,
     /// Also before it looks at what others have changed
     Reads,
+    /// Also after it has read or set a variable of the program
+    Variables,
     /// At every tick, which is wherever the machine can preempt it
     Ticks,
 }

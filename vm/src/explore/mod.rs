@@ -15,9 +15,11 @@
 //! before it does something that other tasks can see: before it begins a wait, signals, passes a checkpoint,
 //! changes the database, enters a critical section, asks for an abort, and before its end; with
 //! [`Grain::Reads`] also before it looks at what others do: before it counts signals, asks what became of a
-//! task, or queries the database. Nothing between two points is visible to other tasks by these means, so
-//! every schedule of the machine behaves like one of those explored. State shared in other ways (variables,
-//! tables, structures) is not considered: programs protect it by critical sections, which are one step each.
+//! task, or queries the database; with [`Grain::Variables`] also at a tick after it has used a special
+//! variable of the program, and with [`Grain::Ticks`] at every tick. Nothing between two points is visible to
+//! other tasks by these means, so every schedule of the machine behaves like one of those explored. State
+//! shared in other ways (variables, tables, structures) is not considered: programs protect it by critical
+//! sections, which are one step each.
 //! Where a program itself chooses, by `choose`, each way is tried.
 //! A task that reaches no point is stopped after [`Settings::turn`] ticks.
 //!

@@ -1,9 +1,11 @@
 //! Running from point to point.
 
+use esl_bytecode::symbol::{CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE};
 use smallvec::SmallVec;
 
 use super::{Settings, TimerGrain};
 use crate::heap::Kind;
+use crate::heap::layout::SymbolObject;
 use crate::report::{program_place, task_label};
 use crate::run::{self, RunOutcome};
 use crate::schedule::{Choices, Due, Grain};
@@ -186,7 +188,10 @@ fn switch(vm: &mut Vm, runnable: Runnable<'_>, choice: u32) -> Switch {
 /// Makes tasks stop at points from now on.
 pub(super) fn explore_by(vm: &mut Vm, settings: &Settings) {
     vm.scheduler.points.grain = Some(settings.grain);
-    vm.config.slice = if settings.grain == Grain::Ticks { 1 } else { settings.turn };
+    vm.config.slice = match settings.grain {
+        Grain::Changes | Grain::Reads => settings.turn,
+        Grain::Variables | Grain::Ticks => 1,
+    };
     vm.scheduler.choices = Choices::first();
     vm.outside.console.note_all(settings.output);
 }
@@ -202,6 +207,19 @@ pub(super) struct PointRun {
     is_at_point: bool,
     /// Whether timers may fire while tasks can run.
     has_timers: bool,
+    /// With [`Grain::Variables`], what is to be known of the way since the last point.
+    unseen: Option<UnseenWay>,
+}
+
+/// The way of a task since it last stood at a point.
+#[derive(Clone, Copy, Debug)]
+struct UnseenWay {
+    /// Number of symbols whose variables are watched.
+    watched: usize,
+    /// Ticks since then.
+    ticks: u32,
+    /// Ticks after which there is a point in any case.
+    most: u32,
 }
 
 /// Says which of the tasks continues at a point, or `None` to give up the run.
@@ -216,6 +234,11 @@ impl PointRun {
             checks,
             is_at_point: false,
             has_timers: settings.timers == TimerGrain::Any,
+            unseen: (settings.grain == Grain::Variables).then_some(UnseenWay {
+                watched: 0,
+                ticks: 0,
+                most: settings.turn,
+            }),
         }
     }
 
@@ -236,12 +259,15 @@ impl PointRun {
                 run::go_on_with_turn(vm, turn, end);
                 continue;
             }
-            if !self.is_at_point
-                && let Some(outcome) = self.come_to_point(vm)
-            {
-                return Some(outcome);
+            if !std::mem::take(&mut self.is_at_point) {
+                if let Some(outcome) = self.come_to_point(vm) {
+                    return Some(outcome);
+                }
+                if let Some(index) = self.goes_on_unseen(vm) {
+                    run::give_turn(vm, index, end);
+                    continue;
+                }
             }
-            self.is_at_point = false;
             let mut runnable: Vec<(bool, TaskNumber, TaskIndex)> =
                 runnable_tasks(vm).map(|(number, index)| (number != self.last, number, index)).collect();
             runnable.sort_unstable();
@@ -287,6 +313,28 @@ impl PointRun {
         }
     }
 
+    /// Returns the task that ran last if it stands at a tick that is no point: if others have seen nothing of
+    /// it since its last point, giving way here would be as giving way there.
+    fn goes_on_unseen(&mut self, vm: &mut Vm) -> Option<TaskIndex> {
+        let way = self.unseen.as_mut()?;
+        let symbols = vm.world.symbol_count();
+        if way.watched != symbols {
+            watch_variables(vm);
+            way.watched = symbols;
+        }
+        let has_shown = std::mem::take(&mut vm.scheduler.points.has_shown);
+        let ticks = std::mem::take(&mut way.ticks) + 1;
+        if has_shown || ticks >= way.most || vm.scheduler.points.asked.is_some() {
+            return None;
+        }
+        let (_, index) = runnable_tasks(vm).find(|&(number, _)| number == self.last)?;
+        if vm.scheduler.tasks.at(index).is_none_or(|task| task.flags.at_point()) {
+            return None;
+        }
+        way.ticks = ticks;
+        Some(index)
+    }
+
     /// Does what is to be done between two turns. Returns how the run has ended, if it has.
     fn come_to_point(&self, vm: &mut Vm) -> Option<RunOutcome> {
         vm.scheduler.rounds += 1;
@@ -302,6 +350,25 @@ impl PointRun {
         (!check_state(vm, self.checks)).then_some(RunOutcome::BudgetSpent)
     }
 }
+
+/// Makes all uses of the program's special variables known. Those of the library are its own business: it
+/// protects them.
+fn watch_variables(vm: &mut Vm) {
+    let mut watched = Vec::new();
+    vm.world.each_symbol(&mut |symbol, object| {
+        let is_of_library = [CL_PACKAGE, ESL_PACKAGE, KEYWORD_PACKAGE].iter().any(|name| symbol.is_in(name));
+        if !is_of_library && vm.heap.symbol(object).is_some_and(|cell| cell.header.flags & NOT_WATCHED == 0) {
+            watched.push(object);
+        }
+    });
+    for object in watched {
+        let flags = vm.heap.symbol(object).map_or(0, |cell| cell.header.flags);
+        vm.heap.set_flags(object, Kind::Symbol, flags | SymbolObject::EVER_BOUND);
+    }
+}
+
+/// Flags of symbols that have no variable, or one whose uses are known already.
+const NOT_WATCHED: u8 = SymbolObject::CONSTANT | SymbolObject::EVER_BOUND;
 
 /// Returns whether time may pass while tasks can run. A cleanup takes no longer than it may: otherwise each
 /// that waits would be found to be cut off somewhere.

@@ -11,13 +11,14 @@ use crate::task::Binding;
 use crate::value::Value;
 use crate::vm::Vm;
 
-/// Returns the value of a special variable that some task has bound: that of the running task's newest
-/// binding, or else the global one.
+/// Returns the value of a special variable that some task has bound, or that is watched: that of the running
+/// task's newest binding, or else the global one.
 ///
 /// # Safety
 /// `symbol` is a Symbol.
 #[inline(never)]
-pub(super) unsafe fn bound_value(vm: &Vm, symbol: Value) -> Value {
+pub(super) unsafe fn bound_value(vm: &mut Vm, symbol: Value) -> Value {
+    vm.scheduler.points.note_shown();
     let bindings = vm.scheduler.running.as_ref().map(|task| &task.control.bindings);
     // SAFETY: by the contract this is a live Symbol.
     let global = unsafe { (*symbol.object_ptr().cast::<SymbolObject>()).value };
@@ -32,6 +33,7 @@ pub(super) unsafe fn symbol_value(vm: &mut Vm, pc: *const u32, base: *mut Value)
     unsafe {
         let word = word_at(pc);
         let symbol = constant(base, word.d());
+        vm.scheduler.points.note_shown();
         match vm.symbol_value(symbol) {
             Some(value) => {
                 *base.add(word.a()) = value;
@@ -126,12 +128,13 @@ impl Vm {
             let name = self.heap.string_text(cell.name).unwrap_or_default();
             return self.exchange.program_error(format!("{name} is a constant and cannot be set"));
         }
-        if flags & SymbolObject::EVER_BOUND != 0
-            && let Some(task) = self.scheduler.running.as_mut()
-            && let Some(place) = task.control.bindings.get_mut(symbol)
-        {
-            *place = value;
-            return Ok(());
+        if flags & SymbolObject::EVER_BOUND != 0 {
+            self.scheduler.points.note_shown();
+            let task = self.scheduler.running.as_mut();
+            if let Some(place) = task.and_then(|task| task.control.bindings.get_mut(symbol)) {
+                *place = value;
+                return Ok(());
+            }
         }
         self.heap.symbol_set_value(symbol, value);
         Ok(())

@@ -17,6 +17,9 @@ pub enum Grain {
     Changes,
     /// Also those that look at what others have changed.
     Reads,
+    /// Also ticks after something that other tasks can see, among which are reading and setting a special
+    /// variable of the program.
+    Variables,
     /// Also all ticks, which is wherever the machine can preempt a task.
     Ticks,
 }
@@ -28,10 +31,21 @@ pub(crate) struct Points {
     pub(crate) grain: Option<Grain>,
     /// Whether the running task may pass the point at which it stands.
     pub(crate) is_open: bool,
+    /// Whether the running task has passed a point, or used a special variable that is not only the task's
+    /// own, since it last stood at a point.
+    pub(crate) has_shown: bool,
     /// Number of ways among which the task that ran last wants one to be chosen.
     pub(crate) asked: Option<usize>,
     /// The way that was chosen for it.
     pub(crate) chosen: Option<usize>,
+}
+
+impl Points {
+    /// Notes that the running task has done something that other tasks can see, or has looked at it.
+    #[inline]
+    pub(crate) fn note_shown(&mut self) {
+        self.has_shown |= self.grain.is_some();
+    }
 }
 
 impl Scheduler {
@@ -51,7 +65,7 @@ impl Scheduler {
     /// As [`Scheduler::point`].
     #[inline]
     pub(crate) fn point_of_read(&mut self) -> Result<(), Exit> {
-        let is_fine = matches!(self.points.grain, Some(Grain::Reads | Grain::Ticks));
+        let is_fine = matches!(self.points.grain, Some(Grain::Reads | Grain::Variables | Grain::Ticks));
         if is_fine && self.stops_here() { Err(Exit::Again) } else { Ok(()) }
     }
 
@@ -59,6 +73,7 @@ impl Scheduler {
     #[cold]
     fn stops_here(&mut self) -> bool {
         if self.task().critical > 0 || std::mem::take(&mut self.points.is_open) {
+            self.points.note_shown();
             return false;
         }
         self.task_mut().flags.set_at_point(true);

@@ -239,6 +239,11 @@ impl World {
         self.symbols.iter().for_each(|(symbol, &value)| visit(symbol, value));
     }
 
+    /// Returns the number of symbols that have an object.
+    pub(crate) fn symbol_count(&self) -> usize {
+        self.symbols.len()
+    }
+
     /// Checks that there is room for the names that there are.
     ///
     /// # Errors

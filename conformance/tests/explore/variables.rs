@@ -1,0 +1,69 @@
+//! Switches at uses of special variables, which `Grain::Variables` adds: those that matter, and no others.
+
+use esl::explore::Grain;
+
+use crate::{check, endings, outputs};
+
+/// A variable, and changes of it with a call in between, before which the machine may preempt.
+const SETUP: &str = "(defvar *n* 0) (defun one-more (n) (+ n 1))
+    (defun update () (setq *n* (one-more *n*)))
+    (defun update-by-name () (set '*n* (one-more (symbol-value '*n*))))";
+
+/// Checks that two tasks come to these outputs, by fewer states than with points at all ticks.
+fn check_two(one: &str, two: &str, at_end: &str, expected: &[&str]) {
+    let text = format!("{SETUP} (task-net (one {one}) (two {two})) (princ {at_end})");
+    let found = check(&text, Grain::Variables, expected);
+    let all = check(&text, Grain::Ticks, expected);
+    assert!(found.states < all.states, "{} states of {}", found.states, all.states);
+}
+
+#[test]
+fn a_lost_update_is_found_at_the_grain_of_variables() {
+    let text = format!("{SETUP} (task-net (one (update)) (two (update))) (princ *n*)");
+    check(&text, Grain::Reads, &["2"]);
+    check_two("(update)", "(update)", "*n*", &["1", "2"]);
+    check_two("(update-by-name)", "(update)", "*n*", &["1", "2"]);
+}
+
+#[test]
+fn a_critical_section_is_one_step_and_a_binding_is_the_tasks_own() {
+    let update = "(without-interrupts (update))";
+    check_two(update, update, "*n*", &["2"]);
+    let bound = "(let ((*n* 5)) (update) (one-more *n*))";
+    check_two(bound, bound, "*n*", &["0"]);
+}
+
+#[test]
+fn a_variable_that_is_made_during_the_run_is_watched() {
+    let text = "(defun one-more (n) (+ n 1))
+         (eval (read-from-string \"(defvar *late* 0)\"))
+         (eval (read-from-string \"(defun update () (setq *late* (one-more *late*)))\"))
+         (task-net (one (update)) (two (update)))
+         (princ (symbol-value (intern \"*LATE*\")))";
+    check(text, Grain::Variables, &["1", "2"]);
+}
+
+#[test]
+fn programs_end_as_with_switches_at_all_ticks() {
+    // What a task does at a step, with its number in place of `#`.
+    let steps =
+        ["(setq *n* #)", "(push *n* seen-#)", "(assert '(mark #))", "(push (db-query '(mark ?)) seen-#)"];
+    let pairs: Vec<String> = steps
+        .iter()
+        .flat_map(|one| steps.iter().map(move |two| format!("(one-more 1) {one} (one-more 2) {two}")))
+        .collect();
+    for (at, one) in pairs.iter().enumerate() {
+        // Each with one that is like it and some others.
+        for two in pairs.iter().skip(at).step_by(5) {
+            let text = format!(
+                "{SETUP} (let ((seen-1 '()) (seen-2 '()))
+                   (task-net (one {}) (two {}))
+                   (princ (list seen-1 seen-2 *n* (db-query '(mark ?what)))))",
+                one.replace('#', "1"),
+                two.replace('#', "2"),
+            );
+            let found = endings(&text, Grain::Variables);
+            assert_eq!(outputs(&found), outputs(&endings(&text, Grain::Ticks)), "{text}");
+        }
+    }
+}
