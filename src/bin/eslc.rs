@@ -33,7 +33,7 @@ struct Style {
     /// Use of colour in diagnostics
     #[arg(long, value_enum, default_value_t = Color::Auto, global = true)]
     color: Color,
-    /// Do not say at a terminal that compiling takes long
+    /// Show no progress line at a terminal
     #[arg(long, short, global = true)]
     quiet: bool,
 }
@@ -58,7 +58,7 @@ enum Color {
 
 #[derive(Subcommand)]
 enum EslcAction {
-    /// Make a project: a plan, a stand-in for the outside, tests, settings of editors
+    /// Make a project: a plan, stand-ins for the outside, tests, editor settings
     New {
         /// Folder to be made
         name: PathBuf,
@@ -98,7 +98,7 @@ enum EslcAction {
     /// follows from the operators: library macros and those that the file and its modules define are indented
     /// by the `&body` of their lambda lists, or as `(declare (indent N))` says in them.
     Format(FormatOptions),
-    /// Serve an editor: a language server over standard input and output
+    /// Start the language server, which editors talk to over standard input and output
     Lsp {
         /// Taken for the sake of editors that name the way of talking
         #[arg(long, hide = true)]
@@ -111,7 +111,7 @@ enum EslcAction {
         /// Shell
         shell: clap_complete::Shell,
     },
-    /// Write the manual pages, in the form of `man`
+    /// Write the manual pages
     Man {
         /// Folder to write them to, one page for each subcommand; without it, the first page is printed
         folder: Option<PathBuf>,

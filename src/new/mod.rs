@@ -25,7 +25,7 @@ const FILES: [(&str, &str); 8] = [
     ("outside.esl", include_str!("template/outside.esl")),
     ("test.esl", include_str!("template/test.esl")),
     ("README.md", include_str!("template/README.md")),
-    (".gitignore", "*.eslb\n"),
+    (".gitignore", "*.eslb\n*.eslj\n*.schedule\n"),
     (".dir-locals.el", "((lisp-mode . ((indent-tabs-mode . nil) (eval . (eglot-ensure)))))\n"),
     (
         ".vscode/settings.json",
