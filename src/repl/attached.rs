@@ -486,6 +486,15 @@ impl Attached {
         let (command, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let rest = rest.trim();
         let number = rest.parse().map(WireForm::Integer).unwrap_or(WireForm::nil());
+        let needed = match command {
+            ":abort" | ":suspend" | ":resume" => Some("the number of a task, which `:tasks` shows"),
+            ":bt" if !rest.is_empty() => Some("the number of a task, which `:tasks` shows, or nothing"),
+            _ => None,
+        };
+        if let (Some(needed), false) = (needed, matches!(number, WireForm::Integer(_))) {
+            self.show(Err(format!("`{command}` needs {needed}")));
+            return Ok(());
+        }
         let answer = match command {
             ":tasks" => self.ask("esl:tasks", &[])?,
             ":bt" if rest.is_empty() => {
@@ -532,6 +541,9 @@ impl Attached {
                 Ok(WireForm::List(items)) if items.is_empty() => Err("there is no patch to be undone".into()),
                 answer => answer,
             },
+            ":watch" => Err("`:watch` needs a form".into()),
+            ":signal" => Err("`:signal` needs the name of an input, or of a variable with an event".into()),
+            ":patch" => Err("`:patch` needs the path of a file".into()),
             _ => Ok(WireForm::text(HELP)),
         };
         self.show(answer);

@@ -60,7 +60,7 @@ fn a_session_evaluates_and_patches_a_run_that_goes_on() {
          The value \"crater\" is not of type LIST.\n  in LOOK\n      WHERE = \"crater\"\n  in top level\n\
          Failure :TYPE-ERROR, no recovery available.\nAborted\n\
          ; /no/such/file cannot be read: No such file or directory (os error 2)\n; there is no task 9999\n\
-         ; `esl:abort` needs the number of a task\nhalf\nNIL\n"
+         ; `:abort` needs the number of a task, which `:tasks` shows\nhalf\nNIL\n"
     );
     assert_eq!((output, status), (expected, Some(0)));
     // Another session has a history of its own, and sees what the first has changed.

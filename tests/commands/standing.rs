@@ -136,6 +136,13 @@ fn many_facts_are_shown_by_pages() {
         (":facts seen 2000", 1, "There are none."),
         (":facts", 501, "; 1 to 500 of 1204; `:facts NAME 500` shows those after these"),
         (":facts mode", 1, "(MODE CALM)"),
+        (":data", 2, "relation SEEN/1: 1203 facts"),
+        // What is wrong with a command is said in its own words.
+        (":bt two", 1, "; `:bt` needs the number of a task, which `:tasks` shows, or nothing"),
+        (":resume", 1, "; `:resume` needs the number of a task, which `:tasks` shows"),
+        (":suspend 99", 1, "; there is no task 99"),
+        (":watch", 1, "; `:watch` needs a form"),
+        (":patch", 1, "; `:patch` needs the path of a file"),
     ] {
         let said = process::run(&mut eslvm(&["attach", &socket]), format!("{command}\n")).output;
         let said: Vec<&str> = said.lines().collect();

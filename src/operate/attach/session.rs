@@ -120,7 +120,9 @@ impl OperatorSession {
             }
             SessionRequest::Suspend | SessionRequest::Resume => {
                 let suspends = request == SessionRequest::Suspend;
-                let arguments = vec![integer(number()? as i64), boolean(suspends)];
+                let number = number()?;
+                self.task(number).await?;
+                let arguments = vec![integer(number as i64), boolean(suspends)];
                 self.call("%SESSION-SUSPEND", arguments).await
             }
             SessionRequest::Pause | SessionRequest::Continue => {
@@ -325,7 +327,8 @@ impl OperatorSession {
         let mut text = String::new();
         for row in &survey.relations {
             let what = if row.is_property { "property" } else { "relation" };
-            _ = writeln!(text, "{what} {} of {}: {} facts", row.name, row.width, row.facts);
+            let s = if row.facts == 1 { "" } else { "s" };
+            _ = writeln!(text, "{what} {}/{}: {} fact{s}", row.name, row.width, row.facts);
         }
         for row in &survey.locks {
             let tasks: Vec<String> = row.subscribers.iter().map(u64::to_string).collect();
