@@ -212,7 +212,7 @@ fn every_way_out_of_the_program_needs_its_right() {
 fn a_unix_socket_needs_both_rights() {
     let text = "(require :sockets)
 (defmacro refusal (form)
-  `(print (with-recovery-procedures (((:permission-denied right) (abort right))) ,form)))
+  `(print (with-recovery-procedures (((:permission-denied right object) (abort (list right object)))) ,form)))
 (with-rights (:read) (refusal (sockets:listen-unix \"talk\")))
 (with-rights (:write) (refusal (sockets:listen-unix \"talk\")))
 (sockets:with-socket (l (sockets:listen-unix \"talk\"))
@@ -221,7 +221,8 @@ fn a_unix_socket_needs_both_rights() {
   (with-rights (:read :write) (close (sockets:connect-unix \"talk\"))))";
     let folder = folder("rights-unix");
     folder.file("work/main.esl", text);
-    assert_eq!(lines(&folder, &[]), [":WRITE", ":READ", ":WRITE", ":READ"]);
+    let (read, write) = ("(:READ \"talk\")", "(:WRITE \"talk\")");
+    assert_eq!(lines(&folder, &[]), [write, read, write, read]);
 }
 
 /// What a script or a mock answers reaches nothing outside; what none answers needs its right.

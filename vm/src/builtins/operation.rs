@@ -34,11 +34,15 @@ pub(super) fn host_call(vm: &mut Vm, call: &[Value]) -> Result<(String, Vec<Datu
         rest = pair.cdr;
     }
     let name = name.unwrap_or_default();
+    let mut permitted = Vec::new();
     for need in vm.outside.needs(&name) {
+        // One argument may need several rights, and each refusal names it as the program does.
         if let Some(DatumKind::String(object)) = data.get(need.argument).map(Datum::kind) {
-            let permitted = demand(vm, need.right, object.as_ref())?;
-            data[need.argument] = Datum::string(&permitted, Span::default());
+            permitted.push((need.argument, demand(vm, need.right, object.as_ref())?));
         }
+    }
+    for (argument, object) in permitted {
+        data[argument] = Datum::string(&object, Span::default());
     }
     Ok((name, data))
 }
