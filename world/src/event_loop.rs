@@ -43,7 +43,7 @@ pub(crate) trait Stoppable: Future<Output = ()> + Send + Unpin + 'static {
 /// As [`spawn`].
 pub(crate) fn begin<F: Stoppable>(future: F) -> Result<(), String> {
     let handle = LOOP.get_or_init(start).as_ref().map_err(String::clone)?;
-    let begun = Arc::new(Begun(Mutex::new(Stage::RUNS)));
+    let begun = Arc::new(BegunFuture(Mutex::new(FutureStage::RUNS)));
     begun.run(handle, future, true);
     Ok(())
 }
@@ -58,10 +58,10 @@ thread_local! {
 }
 
 /// A future that was begun.
-struct Begun<F>(Mutex<Stage<F>>);
+struct BegunFuture<F>(Mutex<FutureStage<F>>);
 
 /// What has become of such a future.
-enum Stage<F> {
+enum FutureStage<F> {
     /// It is being polled. Meanwhile it was woken, and it was told to stop, or not.
     Runs { is_woken: bool, is_stopped: bool },
     /// It waits to be woken.
@@ -70,18 +70,18 @@ enum Stage<F> {
     Gone,
 }
 
-impl<F> Stage<F> {
-    const RUNS: Stage<F> = Stage::Runs { is_woken: false, is_stopped: false };
+impl<F> FutureStage<F> {
+    const RUNS: FutureStage<F> = FutureStage::Runs { is_woken: false, is_stopped: false };
 }
 
-impl<F> Begun<F> {
-    fn lock(&self) -> MutexGuard<'_, Stage<F>> {
+impl<F> BegunFuture<F> {
+    fn lock(&self) -> MutexGuard<'_, FutureStage<F>> {
         // Nothing runs under the lock that could leave the stage half changed.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl<F: Stoppable> Begun<F> {
+impl<F: Stoppable> BegunFuture<F> {
     /// Polls the future, whose stage is that it runs, until it waits or is over.
     fn run(self: &Arc<Self>, handle: &Handle, mut future: F, mut is_new: bool) {
         let waker = Waker::from(self.clone());
@@ -97,7 +97,7 @@ impl<F: Stoppable> Begun<F> {
                 polled
             };
             if !matches!(polled, Ok(Poll::Pending)) {
-                *self.lock() = Stage::Gone;
+                *self.lock() = FutureStage::Gone;
                 return;
             }
             if std::mem::take(&mut is_new) {
@@ -106,19 +106,19 @@ impl<F: Stoppable> Begun<F> {
             }
             let mut stage = self.lock();
             match &*stage {
-                Stage::Runs { is_stopped: true, .. } => {
-                    *stage = Stage::Gone;
+                FutureStage::Runs { is_stopped: true, .. } => {
+                    *stage = FutureStage::Gone;
                     drop(stage);
                     return future.stop();
                 }
-                Stage::Runs { is_woken: true, .. } if polls < POLLS => *stage = Stage::RUNS,
-                Stage::Runs { is_woken: true, .. } => {
-                    *stage = Stage::Waits(future);
+                FutureStage::Runs { is_woken: true, .. } if polls < POLLS => *stage = FutureStage::RUNS,
+                FutureStage::Runs { is_woken: true, .. } => {
+                    *stage = FutureStage::Waits(future);
                     drop(stage);
                     return self.wake_later(handle);
                 }
                 _ => {
-                    *stage = Stage::Waits(future);
+                    *stage = FutureStage::Waits(future);
                     return;
                 }
             }
@@ -135,38 +135,38 @@ impl<F: Stoppable> Begun<F> {
     fn stop(&self) {
         let mut stage = self.lock();
         match &mut *stage {
-            Stage::Runs { is_stopped, .. } => *is_stopped = true,
-            Stage::Waits(_) => {
-                let before = std::mem::replace(&mut *stage, Stage::Gone);
+            FutureStage::Runs { is_stopped, .. } => *is_stopped = true,
+            FutureStage::Waits(_) => {
+                let before = std::mem::replace(&mut *stage, FutureStage::Gone);
                 drop(stage);
-                if let Stage::Waits(future) = before {
+                if let FutureStage::Waits(future) = before {
                     future.stop();
                 }
             }
-            Stage::Gone => {}
+            FutureStage::Gone => {}
         }
     }
 }
 
-impl<F: Stoppable> Wake for Begun<F> {
+impl<F: Stoppable> Wake for BegunFuture<F> {
     fn wake(self: Arc<Self>) {
         // There is an event loop, since the future was begun.
         let Some(Ok(handle)) = LOOP.get() else { return };
         let mut stage = self.lock();
         match &mut *stage {
-            Stage::Runs { is_woken, .. } => *is_woken = true,
-            Stage::Waits(_) if POLLS_NOW.get() => {
+            FutureStage::Runs { is_woken, .. } => *is_woken = true,
+            FutureStage::Waits(_) if POLLS_NOW.get() => {
                 drop(stage);
                 self.wake_later(handle);
             }
-            Stage::Waits(_) => {
-                let before = std::mem::replace(&mut *stage, Stage::RUNS);
+            FutureStage::Waits(_) => {
+                let before = std::mem::replace(&mut *stage, FutureStage::RUNS);
                 drop(stage);
-                if let Stage::Waits(future) = before {
+                if let FutureStage::Waits(future) = before {
                     self.run(handle, future, false);
                 }
             }
-            Stage::Gone => {}
+            FutureStage::Gone => {}
         }
     }
 }

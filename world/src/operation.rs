@@ -33,15 +33,15 @@ impl Cancelled {
 pub(crate) type OperationFuture = Pin<Box<dyn Future<Output = Completion> + Send>>;
 
 /// An operation that was begun. There may be very many, so it is no larger than it has to be.
-struct Begun {
+struct BegunOperation {
     /// Dropped when it is over, and when the operation is cancelled.
     future: Option<OperationFuture>,
     operation: Option<HostOperation>,
 }
 
-impl Begun {
-    fn new(future: OperationFuture, operation: HostOperation) -> Begun {
-        Begun { future: Some(future), operation: Some(operation) }
+impl BegunOperation {
+    fn new(future: OperationFuture, operation: HostOperation) -> BegunOperation {
+        BegunOperation { future: Some(future), operation: Some(operation) }
     }
 
     fn end(&mut self, answer: Completion) {
@@ -59,7 +59,7 @@ impl Begun {
     }
 }
 
-impl Future for Begun {
+impl Future for BegunOperation {
     type Output = ();
 
     fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
@@ -71,7 +71,7 @@ impl Future for Begun {
     }
 }
 
-impl Stoppable for Begun {
+impl Stoppable for BegunOperation {
     fn listen(&self, stop: impl FnOnce() + Send + 'static) {
         if let Some(operation) = &self.operation {
             operation.on_cancel(stop);
@@ -85,7 +85,7 @@ impl Stoppable for Begun {
 
 /// An operation that is a task of the event loop.
 struct UnderWay {
-    begun: Begun,
+    begun: BegunOperation,
     /// Told when the operation is cancelled, unless the future sees to that itself.
     cancelled: Option<oneshot::Receiver<()>>,
 }
@@ -116,7 +116,7 @@ where
     add(machine, name, needs, move |operation| {
         let cancelled = Some(listen(&operation));
         let future = Box::pin(function(arguments_of(&operation)));
-        event_loop::spawn(UnderWay { begun: Begun::new(future, operation), cancelled })
+        event_loop::spawn(UnderWay { begun: BegunOperation::new(future, operation), cancelled })
     });
 }
 
@@ -129,7 +129,7 @@ where
 {
     add(machine, name, needs, move |operation| {
         let future = function(arguments_of(&operation));
-        event_loop::begin(Begun::new(future, operation))
+        event_loop::begin(BegunOperation::new(future, operation))
     });
 }
 
@@ -142,7 +142,7 @@ where
     add(machine, name, needs, move |operation| {
         let cancelled = Cancelled(listen(&operation));
         let future = Box::pin(function(arguments_of(&operation), cancelled));
-        event_loop::spawn(Begun::new(future, operation))
+        event_loop::spawn(BegunOperation::new(future, operation))
     });
 }
 
