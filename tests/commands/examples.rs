@@ -4,6 +4,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
+use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::Duration;
 
 use esl_conformance::process;
@@ -188,9 +189,12 @@ fn the_executive_flies_what_basilisk_simulates() {
     assert!(said.contains("no rule broken"), "{said}");
 }
 
-/// Returns a port that is free, from those that the system gives to nobody who asks for any.
+/// Returns a port that is free, from those that the system gives to nobody who asks for any; to each test
+/// another one.
 pub(crate) fn free_port() -> u16 {
+    static ASKED: AtomicU16 = AtomicU16::new(0);
     let first = 20_000 + u16::try_from(std::process::id() % 10_000).expect("it is small");
+    let first = first + 100 * ASKED.fetch_add(1, Ordering::Relaxed);
     (first..32_000).find(|&port| TcpListener::bind(("127.0.0.1", port)).is_ok()).expect("one is free")
 }
 
