@@ -1213,8 +1213,10 @@ macro_rules! for_each_builtin {
                 slowly "%SLOW-MAKE-STRING-INPUT";
             /// A stream that reads from `string`, which nobody else may have.
             ReadFromCopy = stream::read_from_copy, internal "%READ-FROM-COPY" ("string");
-            /// How many characters of its string such a stream has read.
-            StringInputPosition = stream::string_input_position, internal "%STRING-INPUT-POSITION" ("stream");
+            /// How many characters such a stream has read; if `as_rest`, how many bytes in UTF-8 are left of
+            /// those that it has.
+            StringInputPosition = stream::string_input_position,
+                internal "%STRING-INPUT-POSITION" ("stream &optional as-rest");
             /// A stream that gathers what is written to it.
             MakeStringOutput = stream::make_string_output, internal "%MAKE-STRING-OUTPUT" ("");
             /// What a string stream has gathered since this was last asked.
@@ -1265,14 +1267,17 @@ macro_rules! for_each_builtin {
             /// How many characters a channel has to be read, whether there is a whole line among the first of
             /// them, and whether no more will come.
             ChannelState = stream::channel_state, internal "%CHANNEL-STATE" ("channel");
-            /// Adds characters to those that a channel has to be read; with `NIL`, no more will come.
+            /// Adds characters to those that a channel has to be read; with `NIL`, no more will come until
+            /// some are added.
             SupplyChannel = stream::supply_channel, internal "%SUPPLY-CHANNEL" ("channel text");
             /// Reads many of the characters that a channel has to be read, a string.
             ChannelPiece = stream::channel_piece, internal "%CHANNEL-PIECE" ("channel");
-            /// The bytes that the characters 0 to 255 of a string stand for.
-            BytesOfString = stream::bytes_of_string, internal "%BYTES-OF-STRING" ("string");
-            /// The string of the characters that stand for the bytes of a vector.
-            StringOfBytes = stream::string_of_bytes, internal "%STRING-OF-BYTES" ("vector");
+            /// The bytes that the characters 0 to 255 of a string stand for; those of the string in UTF-8 if
+            /// `as_text`.
+            BytesOfString = stream::bytes_of_string, internal "%BYTES-OF-STRING" ("string &optional as-text");
+            /// The string of the characters that stand for the bytes of a vector; that of which they are the
+            /// UTF-8 if `as_text`.
+            StringOfBytes = stream::string_of_bytes, internal "%STRING-OF-BYTES" ("vector &optional as-text");
             /// Whether `object` is a stream.
             Streamp = stream::streamp, cl "STREAMP" ("object");
             /// Whether a stream can be read from.

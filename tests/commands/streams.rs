@@ -270,7 +270,7 @@ fn files_are_read_and_written_in_parts() {
     let lines: Vec<&str> = output.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
     let expected = [
         "(T NIL T 0)",
-        "(\"(zeile 0 \\\"größe\\\")\" 18 708890 (ZEILE 1 \"größe\") #\\()",
+        "(\"(zeile 0 \\\"größe\\\")\" 20 708890 (ZEILE 1 \"größe\") #\\()",
         "29998",
         ":END",
         "(40 50000 50001)",

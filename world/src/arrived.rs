@@ -14,9 +14,21 @@ pub(crate) struct Arrived {
     /// character.
     is_new: bool,
     is_ended: bool,
+    /// Where the first byte that was not taken is in what is read.
+    position: u64,
 }
 
 impl Arrived {
+    /// Returns that nothing was read yet, where reading begins at a position.
+    pub(crate) fn from(position: u64) -> Arrived {
+        Arrived { position, ..Arrived::default() }
+    }
+
+    /// Returns where the first byte is that was not taken.
+    pub(crate) fn position(&self) -> u64 {
+        self.position
+    }
+
     /// Returns whether there is something to be taken, or nothing will come.
     pub(crate) fn is_something(&self) -> bool {
         self.is_ended || self.is_new
@@ -44,6 +56,7 @@ impl Arrived {
     fn take(&mut self, count: usize, make: fn(&[u8]) -> Datum) -> Datum {
         let taken = make(&self.rest()[..count]);
         self.taken += count;
+        self.position += count as u64;
         if self.taken == self.bytes.len() {
             self.bytes.clear();
             self.taken = 0;

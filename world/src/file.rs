@@ -35,14 +35,22 @@ enum FileAccess {
     /// By threads; nothing once it is closed.
     Threads(Mutex<Option<File>>),
     /// Opened for each part that is written.
-    Appended(PathBuf),
+    Parts(PathBuf, Mutex<WrittenAt>),
+}
+
+/// Where the next part of a file is written.
+#[derive(Clone, Copy)]
+enum WrittenAt {
+    /// Behind what is there.
+    End,
+    Position(u64),
 }
 
 /// A file that is open.
 struct Open {
     access: FileAccess,
-    /// Whether it is read as text, and then closed at its end.
-    is_text: bool,
+    /// The path, if it is read as text, and then closed at its end.
+    text: Option<PathBuf>,
     arrived: Mutex<Arrived>,
     /// Held by the one who reads or writes.
     turn: tokio::sync::Mutex<()>,
@@ -56,9 +64,9 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Open {
-    fn new(access: FileAccess, is_text: bool) -> Open {
+    fn new(access: FileAccess, text: Option<PathBuf>) -> Open {
         let (closing, _) = watch::channel(false);
-        Open { access, is_text, arrived: Mutex::default(), turn: tokio::sync::Mutex::new(()), closing }
+        Open { access, text, arrived: Mutex::default(), turn: tokio::sync::Mutex::new(()), closing }
     }
 
     /// Returns what a future comes to, unless the file is closed before.
@@ -109,7 +117,7 @@ impl Open {
             Some(file) => read_part(file, &mut bytes)?,
             None => true,
         };
-        if is_ended && self.is_text {
+        if is_ended && self.text.is_some() {
             *file = None;
         }
         let mut arrived = lock(&self.arrived);
@@ -159,22 +167,57 @@ impl Open {
                 Some(file) => file.write_all(&bytes),
                 None => Err(Error::other("it is closed")),
             },
-            FileAccess::Appended(path) => {
-                OpenOptions::new().append(true).create(true).open(path)?.write_all(&bytes)
-            }
+            FileAccess::Parts(path, next) => write_part(path, &mut lock(next), &bytes),
             #[cfg(unix)]
             FileAccess::Polled(_) => Ok(()),
         })
         .await
     }
 
+    /// Goes on at a place of a regular file. Returns whether it does.
     fn seek(&self, position: u64) -> Result<bool, Error> {
-        let FileAccess::Threads(file) = &self.access else { return Ok(false) };
+        let file = match &self.access {
+            FileAccess::Threads(file) => file,
+            FileAccess::Parts(_, next) => {
+                *lock(next) = WrittenAt::Position(position);
+                return Ok(true);
+            }
+            #[cfg(unix)]
+            FileAccess::Polled(_) => return Ok(false),
+        };
         let mut file = lock(file);
+        if let (None, Some(path)) = (&*file, &self.text) {
+            *file = Some(at_once(OpenOptions::new().read(true)).open(path)?);
+        }
         let Some(file) = file.as_mut() else { return Ok(false) };
         file.seek(SeekFrom::Start(position))?;
-        *lock(&self.arrived) = Arrived::default();
+        *lock(&self.arrived) = Arrived::from(position);
         Ok(true)
+    }
+
+    /// Returns where the next byte is read or written; `None` for behind what is there.
+    fn position(&self) -> Option<u64> {
+        match &self.access {
+            FileAccess::Parts(_, next) => match *lock(next) {
+                WrittenAt::End => None,
+                WrittenAt::Position(position) => Some(position),
+            },
+            _ => Some(lock(&self.arrived).position()),
+        }
+    }
+}
+
+/// Writes a part of a file, and says where the one after it comes.
+fn write_part(path: &Path, next: &mut WrittenAt, bytes: &[u8]) -> Result<(), Error> {
+    match next {
+        WrittenAt::End => OpenOptions::new().append(true).create(true).open(path)?.write_all(bytes),
+        WrittenAt::Position(position) => {
+            let mut file = OpenOptions::new().write(true).create(true).truncate(false).open(path)?;
+            file.seek(SeekFrom::Start(*position))?;
+            file.write_all(bytes)?;
+            *position += bytes.len() as u64;
+            Ok(())
+        }
     }
 }
 
@@ -276,7 +319,7 @@ pub(crate) fn install(machine: &mut Vm) {
             let (open, text) = (known.get(arguments.number(0)?)?, arguments.text(1)?);
             let bytes = if arguments.is_true(2) { bytes_of(&text) } else { text.into_bytes() };
             // A disk is waited for: what is left half-written would come later, among other things.
-            let is_disk = matches!(open.access, FileAccess::Appended(_));
+            let is_disk = matches!(open.access, FileAccess::Parts(..));
             let target = open.clone();
             let write = open.unless_closed(target.write(bytes));
             tokio::select! {
@@ -365,6 +408,10 @@ fn define_immediate(machine: &mut Vm, files: &Files) {
         Ok(handle("FILE", files.add(), move |number| known.close(number)))
     });
     define("%FILE-TAKE", |arguments, files| Ok(files.get(arguments.number(0)?)?.take(arguments.is_true(1))));
+    define("%FILE-POSITION", |arguments, files| {
+        let position = files.get(arguments.number(0)?)?.position();
+        Ok(position.map_or_else(nil, |position| integer(i64::try_from(position).unwrap_or(i64::MAX))))
+    });
     define("%FILE-CLOSE", |arguments, files| {
         files.close(arguments.number(0)?);
         Ok(nil())
@@ -400,6 +447,7 @@ fn polled(file: &File, interest: tokio::io::Interest) -> Option<FileAccess> {
 /// `%FILE-OPEN-INPUT`: number, path, whether it is read as text.
 async fn open_input(arguments: CallArguments, files: Files) -> Completion {
     let (number, path) = (arguments.number(0)?, arguments.text(1)?);
+    let text = if arguments.is_true(2) { Some(PathBuf::from(&path)) } else { None };
     let open = move || {
         let file = at_once(OpenOptions::new().read(true)).open(&path)?;
         if file.metadata()?.is_dir() { Err(Error::other("it is a directory")) } else { Ok(file) }
@@ -414,7 +462,7 @@ async fn open_input(arguments: CallArguments, files: Files) -> Completion {
     #[cfg(not(unix))]
     let polled = None;
     let access = polled.unwrap_or_else(|| FileAccess::Threads(Mutex::new(Some(file))));
-    files.set(number, Open::new(access, arguments.is_true(2)));
+    files.set(number, Open::new(access, text));
     if is_regular {
         // What cannot be read fails here, and a short file is there at once.
         return answer(files.get(number)?.fill().await.map(|()| boolean(true)));
@@ -422,7 +470,8 @@ async fn open_input(arguments: CallArguments, files: Files) -> Completion {
     answer(Ok(boolean(false)))
 }
 
-/// `%FILE-OPEN-OUTPUT`: number, path, mode: 0 replaces the file, 1 appends to it, 2 fails if there is one.
+/// `%FILE-OPEN-OUTPUT`: number, path, mode: 0 replaces the file, 1 appends to it, 2 fails if there is one, 3
+/// writes over it from its beginning.
 async fn open_output(arguments: CallArguments, files: Files) -> Completion {
     let (number, path, mode) =
         (arguments.number(0)?, PathBuf::from(arguments.text(1)?), arguments.integer(2)?);
@@ -440,6 +489,7 @@ async fn open_output(arguments: CallArguments, files: Files) -> Completion {
         match mode {
             0 => options.write(true).create(true).truncate(true),
             1 => options.append(true).create(true),
+            3 => options.write(true).create(true).truncate(false),
             _ => options.write(true).create_new(true),
         };
         options.open(made).map(drop)
@@ -447,7 +497,8 @@ async fn open_output(arguments: CallArguments, files: Files) -> Completion {
     if let Err(error) = in_thread(make).await {
         return answer(Err(error));
     }
-    files.set(number, Open::new(FileAccess::Appended(path), true));
+    let next = if mode == 3 { WrittenAt::Position(0) } else { WrittenAt::End };
+    files.set(number, Open::new(FileAccess::Parts(path, Mutex::new(next)), None));
     answer(Ok(nil()))
 }
 
@@ -470,7 +521,7 @@ async fn open_device(number: i64, path: PathBuf, files: &Files) -> Result<(), Er
             Ok(file) => {
                 let polled = polled(&file, tokio::io::Interest::WRITABLE);
                 let access = polled.unwrap_or_else(|| FileAccess::Threads(Mutex::new(Some(file))));
-                files.set(number, Open::new(access, true));
+                files.set(number, Open::new(access, None));
                 return Ok(());
             }
             // The system tells nobody when a reader comes, so it is asked again.

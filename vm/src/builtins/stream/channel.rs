@@ -132,5 +132,6 @@ pub(in crate::builtins) fn supply_channel(vm: &mut Vm, arguments: &[Value]) -> O
     set_stream_slot(&mut vm.heap, channel, slot::POSITION, Value::index(position));
     set_stream_slot(&mut vm.heap, channel, slot::END, Value::index(length));
     set_stream_slot(&mut vm.heap, channel, slot::BEFORE, Value::index(before));
+    set_stream_slot(&mut vm.heap, channel, slot::MODE, Value::small(0));
     Ok(Value::T)
 }

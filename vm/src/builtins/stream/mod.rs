@@ -439,7 +439,12 @@ pub(super) fn bytes_of_string(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(characters) = characters_of(&vm.heap, arguments[0]) else {
         return vm.exchange.type_error(arguments[0], "STRING");
     };
-    let bytes: Vec<u8> = characters.iter().map(|&code| u8::try_from(code).unwrap_or(b'?')).collect();
+    let mut bytes = Vec::new();
+    if optional(arguments, 1).is_true() {
+        encode(characters, &mut bytes);
+    } else {
+        bytes.extend(characters.iter().map(|&code| u8::try_from(code).unwrap_or(b'?')));
+    }
     vm.exchange.charge_elements(bytes.len());
     Ok(vm.heap.alloc_bytes(&bytes)?)
 }
@@ -448,7 +453,11 @@ pub(super) fn string_of_bytes(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let Some(ArrayElements::Bytes(bytes)) = vector_elements(&vm.heap, arguments[0]) else {
         return vm.exchange.not_written(arguments[0], "(VECTOR (UNSIGNED-BYTE 8))");
     };
-    let characters: Vec<u32> = bytes.iter().map(|&byte| u32::from(byte)).collect();
+    let characters: Vec<u32> = if optional(arguments, 1).is_true() {
+        String::from_utf8_lossy(bytes).chars().map(u32::from).collect()
+    } else {
+        bytes.iter().map(|&byte| u32::from(byte)).collect()
+    };
     vm.exchange.charge_elements(characters.len());
     Ok(vm.heap.alloc_string(&characters)?)
 }

@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use crate::builtins::expect::exactly;
+use crate::builtins::expect::{exactly, optional};
 use crate::builtins::list::list_items;
 use crate::builtins::{COPY_LIMIT, LIMIT};
 use crate::raise::{Exit, Outcome};
@@ -30,6 +30,14 @@ pub(in crate::builtins) fn read_from_copy(vm: &mut Vm, arguments: &[Value]) -> O
 pub(in crate::builtins) fn string_input_position(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let (stream, kind) = designated_stream(vm, arguments[0], true)?;
     let position = stream_index(&vm.heap, stream, slot::POSITION);
+    if optional(arguments, 1).is_true() {
+        let end = stream_index(&vm.heap, stream, slot::END);
+        let buffer = stream_slot(&vm.heap, stream, slot::BUFFER);
+        let rest = vm.heap.string(buffer).and_then(|all| all.get(position..end)).unwrap_or_default();
+        let bytes = rest.iter().map(|&code| char::from_u32(code).map_or(3, char::len_utf8)).sum();
+        vm.exchange.charge_elements(rest.len());
+        return Ok(Value::index(bytes));
+    }
     let before = match kind {
         StreamKind::Channel => stream_index(&vm.heap, stream, slot::BEFORE),
         _ => 0,
