@@ -84,8 +84,9 @@ impl RunModel {
         self.note_rates(&survey.figures, &survey.inputs, now);
         (self.figures, self.relations, self.locks, self.inputs) =
             (survey.figures, survey.relations, survey.locks, survey.inputs);
-        // The tree of many tasks changes slowly, and takes long to make.
-        if self.cursor == 0 {
+        // The tree of many tasks changes slowly, and takes long to make. Of the first round, which may take
+        // long as well, one sees what there is so far.
+        if self.cursor == 0 || self.tasks.len() >= 2 * self.order.len() {
             self.arrange();
         }
     }
@@ -286,6 +287,8 @@ mod tests {
         let now = Instant::now();
         model.take(page(&[1, 2], true), 2, now);
         assert_eq!(model.cursor, 2);
+        // What the first round has told of so far is seen at once.
+        assert_eq!(model.visible(&ViewerView { count: 10, ..ViewerView::default() }), [1, 2]);
         model.take(page(&[3, 4], true), 2, now);
         // Task 2 was named, as a viewer sees it.
         model.take(page(&[2, 7], false), 2, now);
