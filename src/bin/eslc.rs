@@ -18,23 +18,42 @@ use esl_compiler::diagnostic::{Format, Renderer};
 struct Eslc {
     #[command(subcommand)]
     action: EslcAction,
+}
+
+/// Where required modules are.
+#[derive(Args)]
+struct LibraryOption {
+    /// Folder to search for required modules, after the folder of the file and before those of ESL_LIBRARY
+    #[arg(long, value_name = "FOLDER")]
+    library: Vec<PathBuf>,
+}
+
+/// Options of the commands that compile files.
+#[derive(Args)]
+struct CompilingOptions {
     #[command(flatten)]
     style: Style,
-    /// Folder to search for required modules, after the folder of the file and before those of ESL_LIBRARY
-    #[arg(long, value_name = "FOLDER", global = true)]
-    library: Vec<PathBuf>,
+    #[command(flatten)]
+    modules: LibraryOption,
+}
+
+impl CompilingOptions {
+    /// Returns where the modules of files are searched for.
+    fn path(&self, files: &[PathBuf]) -> ModulePath {
+        ModulePath::new(files.iter().map(PathBuf::as_path), &self.modules.library)
+    }
 }
 
 #[derive(Args)]
 struct Style {
     /// Form of diagnostics
-    #[arg(long, value_enum, default_value_t = Messages::Human, global = true)]
+    #[arg(long, value_enum, default_value_t = Messages::Human)]
     messages: Messages,
     /// Use of colour in diagnostics
-    #[arg(long, value_enum, default_value_t = Color::Auto, global = true)]
+    #[arg(long, value_enum, default_value_t = Color::Auto)]
     color: Color,
     /// Show no progress line at a terminal
-    #[arg(long, short, global = true)]
+    #[arg(long, short)]
     quiet: bool,
 }
 
@@ -75,34 +94,49 @@ enum EslcAction {
         /// File to write
         #[arg(short, value_name = "OUT")]
         output: Option<PathBuf>,
+        #[command(flatten)]
+        compiling: CompilingOptions,
     },
     /// Report errors and warnings, and write nothing
     Check {
         /// Source files; `-` is standard input
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
+        #[command(flatten)]
+        compiling: CompilingOptions,
     },
     /// Show the instructions of a program
     Disasm {
         /// Source or bytecode file; `-` is a source from standard input
         file: PathBuf,
+        #[command(flatten)]
+        compiling: CompilingOptions,
     },
     /// Show a program with its macros expanded
     Expand {
         /// Source file; `-` is standard input
         file: PathBuf,
+        #[command(flatten)]
+        compiling: CompilingOptions,
     },
     /// Indent files as Lisp programmers expect
     ///
     /// Lines keep their breaks; comments, strings and all that is read stay the same. What stands under what
     /// follows from the operators: library macros and those that the file and its modules define are indented
     /// by the `&body` of their lambda lists, or as `(declare (indent N))` says in them.
-    Format(FormatOptions),
+    Format {
+        #[command(flatten)]
+        options: FormatOptions,
+        #[command(flatten)]
+        modules: LibraryOption,
+    },
     /// Start the language server, which editors talk to over standard input and output
     Lsp {
         /// Taken for the sake of editors that name the way of talking
         #[arg(long, hide = true)]
         stdio: bool,
+        #[command(flatten)]
+        modules: LibraryOption,
     },
     /// Print the completions for a shell
     ///
@@ -119,23 +153,23 @@ enum EslcAction {
 }
 
 fn main() -> ExitCode {
-    let command = Eslc::parse();
-    let style = &command.style;
-    let folders = &command.library;
-    let path = |files: &[PathBuf]| ModulePath::new(files.iter().map(PathBuf::as_path), folders);
-    let status = match &command.action {
-        EslcAction::Compile { files, output: Some(output) } => {
-            compile(files, output, &path(files), Modules::Inside, style)
+    let status = match Eslc::parse().action {
+        EslcAction::Compile { files, output: Some(output), compiling } => {
+            compile(&files, &output, &compiling.path(&files), Modules::Inside, &compiling.style)
         }
-        EslcAction::Compile { files, output: None } => compile_each(files, folders, style),
-        EslcAction::Check { files } => check(files, &path(files), style),
-        EslcAction::Disasm { file } => disassemble(file, &path(std::slice::from_ref(file)), style),
-        EslcAction::Format(options) => Ok(format_files(options, folders)),
-        EslcAction::New { name } => Ok(esl::new::new_project(name)),
-        EslcAction::Lsp { .. } => Ok(esl::lsp::serve(folders.clone())),
-        EslcAction::Completions { shell } => Ok(command::print_completions(*shell, Eslc::command())),
+        EslcAction::Compile { files, output: None, compiling } => compile_each(&files, &compiling),
+        EslcAction::Check { files, compiling } => check(&files, &compiling.path(&files), &compiling.style),
+        EslcAction::Disasm { file, compiling } => {
+            disassemble(&file, &compiling.path(std::slice::from_ref(&file)), &compiling.style)
+        }
+        EslcAction::Format { options, modules } => Ok(format_files(&options, &modules.library)),
+        EslcAction::New { name } => Ok(esl::new::new_project(&name)),
+        EslcAction::Lsp { modules, .. } => Ok(esl::lsp::serve(modules.library)),
+        EslcAction::Completions { shell } => Ok(command::print_completions(shell, Eslc::command())),
         EslcAction::Man { folder } => Ok(command::write_man_pages(Eslc::command(), folder.as_deref())),
-        EslcAction::Expand { file } => expand(file, &path(std::slice::from_ref(file)), style),
+        EslcAction::Expand { file, compiling } => {
+            expand(&file, &compiling.path(std::slice::from_ref(&file)), &compiling.style)
+        }
     };
     ExitCode::from(status.unwrap_or_else(|status| status))
 }
@@ -186,16 +220,16 @@ fn compile(
     write(&compiled.program.ok_or(NOT_COMPILED)?, output)
 }
 
-fn compile_each(files: &[PathBuf], folders: &[PathBuf], style: &Style) -> Result<u8, u8> {
+fn compile_each(files: &[PathBuf], compiling: &CompilingOptions) -> Result<u8, u8> {
     let mut status = SUCCESS;
     for file in files {
         if file.as_os_str() == "-" {
             complain("a program from standard input has no name: say with -o where it goes");
             return Err(USAGE);
         }
-        let path = ModulePath::new([file.as_path()], folders);
         let files = std::slice::from_ref(file);
-        let result = compile(files, &file.with_extension("eslb"), &path, Modules::Apart, style);
+        let path = compiling.path(files);
+        let result = compile(files, &file.with_extension("eslb"), &path, Modules::Apart, &compiling.style);
         status = status.max(result.unwrap_or_else(|status| status));
     }
     Ok(status)

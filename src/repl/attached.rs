@@ -27,13 +27,13 @@ const HELP: &str = "\
 :facts [NAME [N]]   facts of the database, 500 at a time, after the first N
 :data               relations, locks of properties, and inputs
 :watch FORM         writes the value of a form, and again after each change of what it reads
-:abort N            has task N end
-:suspend N          has task N and those that it has made stand still
-:resume N           has them go on
-:pause, :continue   has all tasks stand still, and go on
+:abort N            aborts task N
+:suspend N          suspends task N and the tasks that it has made
+:resume N           resumes task N and the tasks that it has made
+:pause, :continue   stops all tasks, and lets them go on
 :signal NAME DATA…  signals an input, or the event that a variable holds
 :patch FILE         makes the definitions of a file in one step, or none of them
-:undo-patch         takes the newest patch back
+:undo-patch         undoes the newest patch
 :quit               ends this session; the run goes on
 ";
 

@@ -136,10 +136,14 @@ fn wrong_command_lines() {
         (&["run", "--budget", "many", "x.esl"], "invalid value"),
         (&["run", "--memory", "1", "x.esl"], "at least 4M"),
         (&["run", "--memory", "99999999999999G", "x.esl"], "more than there can be"),
+        (&["attach", "--library", "lib", "4005"], "unexpected argument '--library'"),
+        (&["replay", "-q", "x.eslj"], "unexpected argument '-q'"),
     ] {
         check(&run(&mut eslvm(arguments), b""), 2, message);
     }
     check(&run(&mut eslc(&["compile", "-"]), b"(print 1)"), 2, "say with -o where it goes");
+    let done = run(&mut eslc(&["format", "--messages", "json", "x.esl"]), b"");
+    check(&done, 2, "unexpected argument '--messages'");
     assert_eq!(run(&mut eslvm(&["--help"]), b"").status, Some(0));
     assert_eq!(run(&mut eslc(&["--version"]), b"").status, Some(0));
 }

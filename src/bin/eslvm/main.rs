@@ -21,7 +21,7 @@ use esl::replay;
 use esl::testing;
 
 use explore::run_explore;
-use options::{ClockChoice, Eslvm, EslvmAction};
+use options::{ClockChoice, CompilingOptions, Eslvm, EslvmAction};
 use run::{RunReports, run};
 
 /// Lets the process have as many open files and connections as the system allows it.
@@ -37,10 +37,10 @@ fn main() -> ExitCode {
     #[cfg(unix)]
     raise_limit_of_descriptors();
     esl_vm::allocator::return_large_blocks();
-    let Eslvm { action, library, quiet: is_quiet } = Eslvm::parse();
-    let status = match action {
+    let status = match Eslvm::parse().action {
         EslvmAction::Run {
             mut options,
+            compiling: CompilingOptions { modules, quiet: is_quiet },
             speed,
             stats,
             tier,
@@ -57,7 +57,7 @@ fn main() -> ExitCode {
             if schedule.is_some() {
                 options.clock = ClockChoice::Virtual;
             }
-            let path = ModulePath::new([file.as_path()], &library);
+            let path = ModulePath::new([file.as_path()], &modules.library);
             let rights = options.rights.rights();
             rights.and_then(|rights| {
                 let host = RealHost::new(arguments).with_rights(path.with_rights(rights)).with_speed(speed);
@@ -77,20 +77,34 @@ fn main() -> ExitCode {
             })
         }
         EslvmAction::Replay { options } => replay::run_command(&options),
-        EslvmAction::Test { filter, jobs, seed, junit, coverage, budget, memory, rights, sources } => {
+        EslvmAction::Test {
+            filter,
+            jobs,
+            seed,
+            junit,
+            coverage,
+            budget,
+            memory,
+            compiling,
+            rights,
+            sources,
+        } => {
+            let CompilingOptions { modules, quiet: is_quiet } = compiling;
             rights.rights().map(|rights| {
                 let config = Config { budget: Some(budget), memory, ..Config::default() };
                 let jobs = jobs.map_or_else(processors, usize::from);
                 testing::run(
                     &sources,
-                    &library,
+                    &modules.library,
                     &testing::Options { filter, jobs, seed, junit, coverage, config, rights, is_quiet },
                 )
             })
         }
         EslvmAction::Completions { shell } => Ok(command::print_completions(shell, Eslvm::command())),
         EslvmAction::Man { folder } => Ok(command::write_man_pages(Eslvm::command(), folder.as_deref())),
-        EslvmAction::Explore { options, file } => run_explore(&file, &options, &library, is_quiet),
+        EslvmAction::Explore { options, compiling, file } => {
+            run_explore(&file, &options, &compiling.modules.library, compiling.quiet)
+        }
         EslvmAction::Attach { secret_file, tls, ca_file, rights, address } => {
             let security = match (tls, &ca_file) {
                 (false, None) => AttachSecurity::Plain,
@@ -99,8 +113,8 @@ fn main() -> ExitCode {
             let attach = |rights| esl::repl::attach(&address, security, secret_file.as_deref(), &rights);
             rights.rights().and_then(attach)
         }
-        EslvmAction::Repl { options } => options.rights.rights().and_then(|rights| {
-            let path = ModulePath::new([Path::new("-")], &library);
+        EslvmAction::Repl { options, modules } => options.rights.rights().and_then(|rights| {
+            let path = ModulePath::new([Path::new("-")], &modules.library);
             esl::repl::run(options.config(), rights, options.clock == ClockChoice::Virtual, &path)
         }),
     };

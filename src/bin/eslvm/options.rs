@@ -16,12 +16,24 @@ use esl_vm::vm::Tier;
 pub(crate) struct Eslvm {
     #[command(subcommand)]
     pub(crate) action: EslvmAction,
+}
+
+/// Where required modules are.
+#[derive(Args)]
+pub(crate) struct LibraryOption {
     /// Folder to search for required modules, after the folder of the program and before those of
     /// ESL_LIBRARY
-    #[arg(long, value_name = "FOLDER", global = true)]
+    #[arg(long, value_name = "FOLDER")]
     pub(crate) library: Vec<PathBuf>,
+}
+
+/// Options of the commands that compile files.
+#[derive(Args)]
+pub(crate) struct CompilingOptions {
+    #[command(flatten)]
+    pub(crate) modules: LibraryOption,
     /// Show no progress line at a terminal
-    #[arg(long, short, global = true)]
+    #[arg(long, short)]
     pub(crate) quiet: bool,
 }
 
@@ -37,6 +49,8 @@ pub(crate) enum EslvmAction {
     Run {
         #[command(flatten)]
         options: MachineOptions,
+        #[command(flatten)]
+        compiling: CompilingOptions,
         /// Seconds of the program's clock in a second of real time:
         /// for a program whose outside is a simulator
         #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = parse_speed)]
@@ -119,6 +133,8 @@ pub(crate) enum EslvmAction {
         #[arg(long, value_name = "SIZE", default_value = "1G", value_parser = command::parse_size)]
         memory: usize,
         #[command(flatten)]
+        compiling: CompilingOptions,
+        #[command(flatten)]
         rights: RightsOptions,
         /// Source or bytecode files
         #[arg(required = true, value_name = "FILE")]
@@ -134,6 +150,8 @@ pub(crate) enum EslvmAction {
     Explore {
         #[command(flatten)]
         options: ExploreArguments,
+        #[command(flatten)]
+        compiling: CompilingOptions,
         /// Source or bytecode file
         file: PathBuf,
     },
@@ -163,6 +181,8 @@ pub(crate) enum EslvmAction {
     Repl {
         #[command(flatten)]
         options: MachineOptions,
+        #[command(flatten)]
+        modules: LibraryOption,
     },
     /// Print the completions for a shell
     ///
