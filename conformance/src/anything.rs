@@ -250,7 +250,7 @@ fn with_checksums_of_frames(bytes: &[u8]) -> Vec<u8> {
 pub fn with_checksums(bytes: &[u8]) -> Vec<u8> {
     const TABLE: usize = 32;
     const ENTRY: usize = 16;
-    const HEADER: usize = TABLE + 6 * ENTRY + 4;
+    const HEADER: usize = TABLE + file::Section::ALL.len() * ENTRY + 4;
     let mut file = bytes.to_vec();
     if file.len() < HEADER {
         return file;

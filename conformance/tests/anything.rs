@@ -5,6 +5,7 @@
 
 use std::sync::LazyLock;
 
+use esl_bytecode::file;
 use esl_bytecode::module::Module;
 use esl_conformance::{anything, programs};
 use proptest::prelude::*;
@@ -237,4 +238,15 @@ proptest! {
             anything::run_in_tiers(&module, slice);
         }
     }
+}
+
+#[test]
+fn damage_of_a_file_is_hidden_from_all_checksums() {
+    let module =
+        anything::compile("(defun f (x) (list x \"text\" 'name)) (print (f 1))").expect("it compiles");
+    let file = file::write(&module).expect("it can be written");
+    assert_eq!(anything::with_checksums(&file), file);
+    let mut damaged = file.clone();
+    *damaged.last_mut().expect("it has sections") ^= 1;
+    assert_ne!(anything::with_checksums(&damaged)[..damaged.len() - 1], file[..file.len() - 1]);
 }
