@@ -22,6 +22,9 @@ new_key_type! {
     pub(crate) struct JobId;
 }
 
+/// About how many bytes a compilation takes beside what it says of itself: its tables, empty or nearly so.
+const COMPILATION_BYTES: usize = 4 << 10;
+
 /// Object that a handle names.
 pub(crate) enum CompilerJob {
     /// A form that becomes a datum, which is then compiled.
@@ -32,6 +35,22 @@ pub(crate) enum CompilerJob {
     Text(FormText),
     /// Out of the table: a builtin works on it.
     Taken,
+}
+
+impl CompilerJob {
+    /// Returns about how many bytes the job takes.
+    fn bytes(&self) -> usize {
+        match self {
+            CompilerJob::Compilation(running) => {
+                let expansion = running.expansion.as_ref().map_or(0, DatumWalk::bytes);
+                let load = running.load.as_ref().map_or(0, |load| load.bytes());
+                COMPILATION_BYTES + running.compilation.bytes() + running.unit.bytes() + expansion + load
+            }
+            CompilerJob::Form(form) => form.walk.bytes() + form.unit.bytes(),
+            CompilerJob::Text(text) => text.text.len(),
+            CompilerJob::Taken => 0,
+        }
+    }
 }
 
 /// A text, and the position of its next form.
@@ -109,6 +128,8 @@ pub(crate) struct Compilations {
     pub(crate) compiler: Option<Box<dyn Compile>>,
     /// Jobs of programs.
     pub(crate) jobs: SlotMap<JobId, CompilerJob>,
+    /// About how many bytes those in the table take: a job changes only while it is out of the table.
+    pub(crate) held: usize,
     /// Objects and uninterned symbols of the compilation under way.
     pub(crate) unit: RefCell<Unit>,
     /// Errors of the form of a nameless text that was refused last, for the embedder.
@@ -146,6 +167,7 @@ impl Compilations {
     /// Adds a job and returns its handle.
     pub(crate) fn add(&mut self, job: CompilerJob) -> Value {
         self.begun += 1;
+        self.held += job.bytes();
         let id = self.jobs.insert(job).data().as_ffi();
         // A key's version stays far below the limit: it grows by two for each reuse of a slot.
         Value::handle(id as u32, (id >> 32) as u32 % Value::GENERATION_LIMIT).unwrap_or(Value::NIL)
@@ -153,18 +175,7 @@ impl Compilations {
 
     /// Returns about how many bytes the jobs take.
     pub(crate) fn bytes(&self) -> usize {
-        let of_job = |job: &CompilerJob| match job {
-            CompilerJob::Compilation(running) => {
-                let expansion = running.expansion.as_ref().map_or(0, DatumWalk::bytes);
-                let load = running.load.as_ref().map_or(0, |load| load.bytes());
-                running.compilation.bytes() + running.unit.bytes() + expansion + load
-            }
-            CompilerJob::Form(form) => form.walk.bytes() + form.unit.bytes(),
-            CompilerJob::Text(text) => text.text.len(),
-            CompilerJob::Taken => 0,
-        };
-        let remains: usize = self.remains.iter().map(UnitRemains::bytes).sum();
-        self.jobs.values().map(of_job).sum::<usize>() + remains
+        self.held + self.remains.iter().map(UnitRemains::bytes).sum::<usize>()
     }
 
     fn find(&self, handle: Value) -> Option<JobId> {
@@ -177,13 +188,15 @@ impl Compilations {
     /// ended.
     pub(crate) fn take(&mut self, handle: Value) -> Option<(JobId, CompilerJob)> {
         let id = self.find(handle)?;
-        let job = self.jobs.get_mut(id)?;
-        Some((id, std::mem::replace(job, CompilerJob::Taken)))
+        let job = std::mem::replace(self.jobs.get_mut(id)?, CompilerJob::Taken);
+        self.held = self.held.saturating_sub(job.bytes());
+        Some((id, job))
     }
 
     /// Puts a job back, unless it was ended meanwhile.
     pub(crate) fn put_back(&mut self, id: JobId, job: CompilerJob) {
         if let Some(slot) = self.jobs.get_mut(id) {
+            self.held += job.bytes();
             *slot = job;
         }
     }
@@ -191,6 +204,7 @@ impl Compilations {
     /// Ends the job that `handle` names, if there is one. Its data are freed by [`Compilations::free`].
     pub(crate) fn end(&mut self, handle: Value) {
         let job = self.find(handle).and_then(|id| self.jobs.remove(id));
+        self.held = self.held.saturating_sub(job.as_ref().map_or(0, CompilerJob::bytes));
         match job {
             Some(CompilerJob::Compilation(running)) => self.remains.push(UnitRemains::new(running.unit)),
             Some(CompilerJob::Form(form)) => self.remains.push(UnitRemains::new(form.unit)),

@@ -156,6 +156,7 @@ state! {
     Compilations by VisitCompiler :: compiler_content {
         content { jobs }
         transient { unit, refused, remains }
+        derived { held }
         process { compiler, begun }
     }
 }
