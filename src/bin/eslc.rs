@@ -22,7 +22,7 @@ struct Eslc {
 
 /// Where required modules are.
 #[derive(Args)]
-struct LibraryOption {
+struct LibraryFolders {
     /// Folder to search for required modules, after the folder of the file and before those of ESL_LIBRARY
     #[arg(long, value_name = "FOLDER")]
     library: Vec<PathBuf>,
@@ -30,14 +30,14 @@ struct LibraryOption {
 
 /// Options of the commands that compile files.
 #[derive(Args)]
-struct CompilingOptions {
+struct SourceOptions {
     #[command(flatten)]
     style: Style,
     #[command(flatten)]
-    modules: LibraryOption,
+    modules: LibraryFolders,
 }
 
-impl CompilingOptions {
+impl SourceOptions {
     /// Returns where the modules of files are searched for.
     fn path(&self, files: &[PathBuf]) -> ModulePath {
         ModulePath::new(files.iter().map(PathBuf::as_path), &self.modules.library)
@@ -95,7 +95,7 @@ enum EslcAction {
         #[arg(short, value_name = "OUT")]
         output: Option<PathBuf>,
         #[command(flatten)]
-        compiling: CompilingOptions,
+        compiling: SourceOptions,
     },
     /// Report errors and warnings, and write nothing
     Check {
@@ -103,21 +103,21 @@ enum EslcAction {
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
         #[command(flatten)]
-        compiling: CompilingOptions,
+        compiling: SourceOptions,
     },
     /// Show the instructions of a program
     Disasm {
         /// Source or bytecode file; `-` is a source from standard input
         file: PathBuf,
         #[command(flatten)]
-        compiling: CompilingOptions,
+        compiling: SourceOptions,
     },
     /// Show a program with its macros expanded
     Expand {
         /// Source file; `-` is standard input
         file: PathBuf,
         #[command(flatten)]
-        compiling: CompilingOptions,
+        compiling: SourceOptions,
     },
     /// Indent files as Lisp programmers expect
     ///
@@ -128,7 +128,7 @@ enum EslcAction {
         #[command(flatten)]
         options: FormatOptions,
         #[command(flatten)]
-        modules: LibraryOption,
+        modules: LibraryFolders,
     },
     /// Start the language server, which editors talk to over standard input and output
     Lsp {
@@ -136,7 +136,7 @@ enum EslcAction {
         #[arg(long, hide = true)]
         stdio: bool,
         #[command(flatten)]
-        modules: LibraryOption,
+        modules: LibraryFolders,
     },
     /// Print the completions for a shell
     ///
@@ -220,7 +220,7 @@ fn compile(
     write(&compiled.program.ok_or(NOT_COMPILED)?, output)
 }
 
-fn compile_each(files: &[PathBuf], compiling: &CompilingOptions) -> Result<u8, u8> {
+fn compile_each(files: &[PathBuf], compiling: &SourceOptions) -> Result<u8, u8> {
     let mut status = SUCCESS;
     for file in files {
         if file.as_os_str() == "-" {
