@@ -112,8 +112,8 @@ state! {
 state! {
     /// Visits the content of the rarely used parts of a task.
     Extra by VisitExtra :: extra_content {
-        content { limits, interrupts, fund, rests }
-        course { report, end, values, clock_behind, clock_stopped, suspended_by }
+        content { limits, interrupts, fund }
+        course { report, end, values }
     }
 }
 

@@ -34,7 +34,7 @@ pub(crate) fn nanoseconds(vm: &mut Vm, seconds: Value) -> Result<u64, Exit> {
 /// Returns the time of the running task's clock.
 fn time_of_task(vm: &mut Vm) -> u64 {
     let now = vm.scheduler.clock.read(&mut vm.outside.host);
-    vm.scheduler.task().time_at(now)
+    vm.scheduler.standstill().time_at(now)
 }
 
 /// Returns the sum of the counts of an event or of a list of events.
@@ -364,7 +364,7 @@ pub(super) fn take_signal(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     match latest.or_else(|| link::deadline(&vm.heap, wait)) {
         Some(deadline) if time_of_task(vm) >= deadline => Ok(vm.world.known.timeout),
         deadline => {
-            let deadline = deadline.map(|time| vm.scheduler.task().when(time));
+            let deadline = deadline.map(|time| vm.scheduler.standstill().when(time));
             vm.scheduler.park_at(wait, deadline)
         }
     }
@@ -388,7 +388,7 @@ pub(super) fn sleep_until(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     if time_of_task(vm) >= deadline {
         Ok(Value::NIL)
     } else {
-        let time = vm.scheduler.task().when(deadline);
+        let time = vm.scheduler.standstill().when(deadline);
         vm.scheduler.park_at(Value::NIL, Some(time))
     }
 }

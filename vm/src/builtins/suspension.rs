@@ -1,6 +1,6 @@
 //! Suspension of trees of tasks: finding their members, and those that stand still where they wait.
 
-use smallvec::SmallVec;
+use smallvec::{SmallVec, smallvec};
 
 use crate::builtins::LIMIT;
 use crate::builtins::expect::exactly;
@@ -20,40 +20,59 @@ fn index_argument(vm: &mut Vm, v: Value) -> Result<usize, Exit> {
     }
 }
 
-/// Returns the depth of the task `object`, at `place`, in the tree of the task `root`, which has depth 1; 0
-/// if it is not of that tree. `depths` is a vector of those that are known, by the places of the tasks. Adds
-/// the number of steps to `work`.
-fn depth_of(
-    vm: &mut Vm,
-    root: usize,
-    (place, object): (usize, Value),
-    depths: Value,
-    work: &mut usize,
-) -> usize {
-    let mut path: SmallVec<[usize; 16]> = SmallVec::new();
-    let (mut at, mut known_object) = (place, Some(object));
-    let mut depth = loop {
-        if at == root {
-            break 1;
+/// The depths of the tasks of a tree, in which `root` has depth 1. `known` is a vector of those that are
+/// known, by the places of the tasks; a task that is not of the tree has 0.
+#[derive(Clone, Copy)]
+struct Depths {
+    root: TaskIndex,
+    known: Value,
+}
+
+impl Depths {
+    /// Returns the depth of the task at `place`, if it is known.
+    fn known(self, vm: &Vm, place: TaskIndex) -> Option<usize> {
+        if place == self.root {
+            return Some(1);
         }
-        let known = vm.heap.vector(depths).and_then(|depths| depths.get(at)?.as_index());
-        if let Some(depth) = known {
-            break depth;
-        }
-        path.push(at);
-        let find = || vm.scheduler.find(TaskIndex(at as u32)).map(|task| task.object);
-        match known_object.take().or_else(find).and_then(|task| lineage::owner_of(&vm.heap, task)) {
-            Some(owner) => at = owner.as_usize(),
-            None => break 0,
-        }
-    };
-    *work += path.len();
-    // By reference, since a path has much room that would be moved.
-    for &place in path.iter().rev() {
-        depth += usize::from(depth > 0);
-        vm.heap.vector_set(depths, place, Value::index(depth));
+        vm.heap.vector(self.known)?.get(place.as_usize())?.as_index()
     }
-    depth
+
+    /// Returns the depth of the task `object`, at `place`. Adds the number of steps to `work`.
+    fn find(self, vm: &mut Vm, place: TaskIndex, object: Value, work: &mut usize) -> usize {
+        if let Some(depth) = self.known(vm, place) {
+            return depth;
+        }
+        match lineage::owner_of(&vm.heap, object) {
+            // Most have been made by the root, and it takes no longer to find that again than to note it.
+            Some(owner) if owner == self.root => 2,
+            Some(owner) => self.find_by_owner(vm, place, owner, work),
+            None => 0,
+        }
+    }
+
+    /// Returns the depth of the task at `place`, which is known once it is that of its owner.
+    fn find_by_owner(self, vm: &mut Vm, place: TaskIndex, owner: TaskIndex, work: &mut usize) -> usize {
+        let mut path: SmallVec<[TaskIndex; 16]> = smallvec![place];
+        let mut at = owner;
+        let mut depth = loop {
+            if let Some(depth) = self.known(vm, at) {
+                break depth;
+            }
+            path.push(at);
+            let task = vm.scheduler.find(at).map(|task| task.object);
+            match task.and_then(|task| lineage::owner_of(&vm.heap, task)) {
+                Some(owner) => at = owner,
+                None => break 0,
+            }
+        };
+        *work += path.len();
+        // By reference, since a path has much room that would be moved.
+        for &place in path.iter().rev() {
+            depth += usize::from(depth > 0);
+            vm.heap.vector_set(self.known, place.as_usize(), Value::index(depth));
+        }
+        depth
+    }
 }
 
 pub(super) fn tasks_made(vm: &mut Vm, _arguments: &[Value]) -> Outcome {
@@ -68,31 +87,38 @@ pub(super) fn tree_part(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let [above, below, end] = [above, below, end].map(|number| index_argument(vm, number));
     let (above, below, end) = (above? as u64, below? as u64, end?);
     let begin = end.saturating_sub(LIMIT);
-    let mut members = Vec::new();
+    let depths = Depths { root, known: depths };
+    let mut members = Vec::with_capacity(end - begin);
     let mut work = end - begin;
-    for place in (begin..end).rev() {
-        let Some(task) = vm.scheduler.find(TaskIndex(place as u32)) else { continue };
+    for place in (begin..end).map(|place| TaskIndex(place as u32)) {
+        let Some(task) = vm.scheduler.find(place) else { continue };
         let (number, object) = (task.number.0, task.object);
         // Of those that are newer nothing is known: their places may have been those of others.
         if task.state == TaskState::Ended || number <= above || number > below {
             continue;
         }
-        let depth = depth_of(vm, root.as_usize(), (place, object), depths, &mut work);
+        let depth = depths.find(vm, place, object, &mut work);
         if depth > 0 {
             members.push((depth - 1, object));
         }
     }
+    members.sort_by_key(|&(depth, _)| depth);
     let objects: Vec<Value> = members.iter().map(|&(_, object)| object).collect();
-    let mut cells = vm.heap.list(&objects)?;
-    vm.exchange.charge(16 * (work + members.len()));
-    let deepest = members.iter().map(|&(depth, _)| depth + 1).max().unwrap_or(0);
-    for (depth, _) in members {
-        let Some(pair) = vm.heap.as_cons(cells) else { break };
+    // All lists are made before one is noted.
+    let (mut lists, mut start) = (SmallVec::<[(usize, Value); 16]>::new(), 0);
+    for run in members.chunk_by(|left, right| left.0 == right.0) {
+        let depth = run[0].0;
         let others = vm.heap.vector(generations).and_then(|lists| lists.get(depth).copied());
-        vm.heap.set_cdr(cells, others.unwrap_or(Value::NIL));
-        vm.heap.vector_set(generations, depth, cells);
-        cells = pair.cdr;
+        let end = start + run.len();
+        let list = vm.heap.list_with_tail(&objects[start..end], others.unwrap_or(Value::NIL))?;
+        lists.push((depth, list));
+        start = end;
     }
+    for &(depth, list) in &lists {
+        vm.heap.vector_set(generations, depth, list);
+    }
+    vm.exchange.charge(16 * (work + members.len()));
+    let deepest = members.last().map_or(0, |&(depth, _)| depth + 1);
     vm.give_values(&[Value::index(begin), Value::index(deepest)])
 }
 
@@ -114,9 +140,7 @@ pub(super) fn begin_rest(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let others = vm.heap.list(&others)?;
     vm.exchange.charge(64 * resting.len());
     let now = vm.scheduler.clock.read(&mut vm.outside.host);
-    for index in resting {
-        run::begin_rest(vm, index, stops_clock.is_true(), now);
-    }
+    run::begin_rest(vm, &resting, stops_clock.is_true(), now);
     vm.give_values(&[others, rest])
 }
 
@@ -138,9 +162,7 @@ pub(super) fn resume_from_rest(vm: &mut Vm, arguments: &[Value]) -> Outcome {
     let others = vm.heap.list(&others)?;
     vm.exchange.charge(64 * resting.len());
     let now = vm.scheduler.clock.read(&mut vm.outside.host);
-    for index in resting {
-        run::resume_from_rest(vm, index, now);
-    }
+    run::resume_from_rest(vm, &resting, now);
     vm.give_values(&[rest, others])
 }
 

@@ -15,6 +15,7 @@ use crate::state::{
 use crate::task::{Allowance, Control, Entry, Extra, RunningCleanup, Task, TaskState};
 use crate::value::Value;
 use crate::vm::Vm;
+use crate::wait::event;
 use crate::world::World;
 use crate::world::load::image_origin;
 
@@ -62,6 +63,9 @@ impl VisitScheduler for Walk<'_> {
         }
         for task in tasks {
             self.task = Some(task);
+            let index = event::task_index(&self.vm.heap, task.object);
+            let standstill = index.map(|index| scheduler.tasks.standstill(index));
+            self.word(standstill.map_or(0, |standstill| u64::from(standstill.times)));
             self.task_content(task);
         }
     }
@@ -161,10 +165,6 @@ impl VisitExtra for Walk<'_> {
             }
             None => self.word(0),
         }
-    }
-
-    fn rests(&mut self, extra: &Extra) {
-        self.word(u64::from(extra.rests));
     }
 }
 

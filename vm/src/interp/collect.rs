@@ -153,8 +153,9 @@ fn mark_more(
     let SliceOutcome::Drained { left } = heap.slice(SLICE_VISITS) else { return };
     let (mut left, mut has_scanned) = (left as usize, false);
     let cycle = heap.cycle_id();
-    while let Some(task) = tasks.next_unmet() {
+    while let Some((task, held)) = tasks.next_unmet() {
         let mut cost = 1;
+        heap.mark(held);
         if let Some(task) = task
             && task.scanned != cycle
         {
@@ -292,6 +293,7 @@ impl Vm {
                     for task in running.as_deref_mut().into_iter().chain(tasks.iter_mut()) {
                         scan(heap, task);
                     }
+                    tasks.visit_standstills(&mut |value| heap.mark(value));
                 },
                 |heap| {
                     opaques.note_unreachable(heap);

@@ -59,7 +59,8 @@ pub(crate) fn reason_of(vm: &Vm, task: &Task) -> String {
     if task.state == TaskState::Writing {
         return "room for output".into();
     }
-    if let Some(by) = task.extra.as_ref().and_then(|extra| extra.suspended_by) {
+    let index = event::task_index(&vm.heap, task.object);
+    if let Some(by) = index.and_then(|index| vm.scheduler.tasks.standstill(index).by) {
         return format!("RESUME-TASK, suspended by {}", event_label(vm, by));
     }
     if task.wait.is_nil() {

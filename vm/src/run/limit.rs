@@ -16,6 +16,7 @@ pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, amount: Opt
     let number = scheduler.next_limit();
     let now = scheduler.clock.read(&mut vm.outside.host);
     let index = scheduler.turn.index;
+    let time_of_task = scheduler.standstill().time_at(now);
     let task = scheduler.task_mut();
     let Some(entry) = task.control.entries.last_mut() else { return false };
     if entry.kind != EntryKind::Catch || entry.data != tag {
@@ -26,7 +27,7 @@ pub(crate) fn open_limit(vm: &mut Vm, tag: Value, time: Option<u64>, amount: Opt
     let outer = task.account;
     // In a cleanup of a form that has spent its account, the new one is not to be spent with that.
     let is_free = task.runs_cleanup();
-    let ends = time.map(|time| task.time_at(now).saturating_add(time));
+    let ends = time.map(|time| time_of_task.saturating_add(time));
     let mut limit = Limit { entry, number, account: AccountId::NONE, outer, ends, expired: None };
     if let Some(amount) = amount {
         let parent = scheduler.accounts.for_child(outer, is_free);
@@ -51,11 +52,12 @@ pub(super) fn expire_in_time(vm: &mut Vm, index: TaskIndex, number: LimitNumber,
     let Some(task) = vm.scheduler.find(index) else { return };
     let limits = task.extra.as_ref().map_or(&[][..], |extra| &extra.limits[..]);
     let ends = limits.iter().find(|limit| limit.number == number).and_then(|limit| limit.ends);
+    let standstill = vm.scheduler.tasks.standstill(index);
     match ends {
-        Some(ends) if task.time_at(now) < ends => {
+        Some(ends) if standstill.time_at(now) < ends => {
             // The timer of one whose clock is stopped is set when it goes on.
-            if task.extra.as_ref().is_some_and(|extra| extra.clock_stopped.is_none()) {
-                let time = task.when(ends);
+            if standstill.stopped.is_none() {
+                let time = standstill.when(ends);
                 vm.scheduler.timers.push(time, index, Due::Limit(number));
             }
         }
@@ -66,10 +68,10 @@ pub(super) fn expire_in_time(vm: &mut Vm, index: TaskIndex, number: LimitNumber,
 /// Has the running task stand still, with its clock stopped or not.
 pub(crate) fn stand_still(vm: &mut Vm, stops_clock: bool) {
     let now = vm.scheduler.clock.read(&mut vm.outside.host);
-    let task = vm.scheduler.task_mut();
-    task.flags.set_suspended(true);
+    let index = vm.scheduler.turn.index;
+    vm.scheduler.task_mut().flags.set_suspended(true);
     if stops_clock {
-        task.extra_mut().clock_stopped.get_or_insert(now);
+        vm.scheduler.tasks.standstill_mut(&mut vm.heap, index).stopped.get_or_insert(now);
     }
 }
 
@@ -81,14 +83,17 @@ pub(crate) fn go_on(vm: &mut Vm) {
     task.flags.set_suspended(false);
     task.flags.set_attention(true);
     vm.exchange.charges.end_slice();
-    let Some(extra) = task.extra.as_mut() else { return };
-    let Some(stopped) = extra.clock_stopped.take() else { return };
-    extra.clock_behind = extra.clock_behind.saturating_add(now.saturating_sub(stopped));
-    let behind = extra.clock_behind;
-    let open = extra.limits.iter().filter_map(|limit| Some((limit.number, limit.ends?)));
+    if vm.scheduler.standstill().stopped.is_none() {
+        return;
+    }
+    let standstill = vm.scheduler.tasks.standstill_mut(&mut vm.heap, index);
+    standstill.start_clock(now);
+    let standstill = *standstill;
+    let limits = vm.scheduler.task().extra.as_ref().map_or(&[][..], |extra| &extra.limits[..]);
+    let open = limits.iter().filter_map(|limit| Some((limit.number, limit.ends?)));
     let timers: Vec<(LimitNumber, u64)> = open.collect();
     for (number, ends) in timers {
-        vm.scheduler.timers.push(ends.saturating_add(behind), index, Due::Limit(number));
+        vm.scheduler.timers.push(standstill.when(ends), index, Due::Limit(number));
     }
 }
 

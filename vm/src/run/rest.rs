@@ -50,55 +50,63 @@ fn has_procedures(vm: &Vm, task: &Task) -> bool {
     true
 }
 
-/// Has a task that [`can_rest`] stand still once more, by the running task, at the time `now`.
-pub(crate) fn begin_rest(vm: &mut Vm, index: TaskIndex, stops_clock: bool, now: u64) {
+/// Has tasks that [`can_rest`] stand still once more, by the running task, at the time `now`.
+pub(crate) fn begin_rest(vm: &mut Vm, tasks: &[TaskIndex], stops_clock: bool, now: u64) {
     let by = vm.scheduler.task().object;
-    let Some(task) = vm.scheduler.tasks.at_mut(index) else { return };
-    let was_at_rest = task.flags.rests();
-    task.flags.set_rests(true);
-    task.flags.set_suspended(true);
-    let extra = task.extra_mut();
-    extra.rests = extra.rests.saturating_add(1);
-    if was_at_rest {
-        return;
-    }
-    extra.suspended_by = Some(by);
-    if stops_clock {
-        extra.clock_stopped = Some(now);
-    }
-    task.recount(&mut vm.heap);
-    report::note(vm, index, Happening::Waits);
-}
-
-/// Resumes a task at rest once. It goes on if it was suspended no more often.
-pub(crate) fn resume_from_rest(vm: &mut Vm, index: TaskIndex, now: u64) {
-    let Some(task) = vm.scheduler.tasks.at_mut(index).filter(|task| task.flags.rests()) else { return };
-    let extra = task.extra_mut();
-    extra.rests = extra.rests.saturating_sub(1);
-    if extra.rests == 0 {
-        end_rest(vm, index, now);
+    vm.scheduler.tasks.make_standstills(&mut vm.heap);
+    for &index in tasks {
+        let Some((task, standstill)) = vm.scheduler.tasks.with_standstill(index) else { continue };
+        standstill.times = standstill.times.saturating_add(1);
+        if task.flags.rests() {
+            continue;
+        }
+        task.flags.set_rests(true);
+        task.flags.set_suspended(true);
+        standstill.by = Some(by);
+        if stops_clock {
+            standstill.stopped = Some(now);
+        }
+        report::note(vm, index, Happening::Waits);
     }
 }
 
-/// Has a task at rest stand still no more: what has come meanwhile reaches it. Returns how often it was to be
-/// resumed; 0 if it was not at rest.
+/// Resumes tasks at rest once. Those go on that were suspended no more often.
+pub(crate) fn resume_from_rest(vm: &mut Vm, tasks: &[TaskIndex], now: u64) {
+    for &index in tasks {
+        let Some((task, standstill)) = vm.scheduler.tasks.with_standstill(index) else { continue };
+        if task.flags.rests() {
+            standstill.times = standstill.times.saturating_sub(1);
+            if standstill.times == 0 {
+                go_on_from_rest(vm, index, now);
+            }
+        }
+    }
+}
+
+/// Has a task at rest stand still no more. Returns how often it was to be resumed; 0 if it was not at rest.
 pub(crate) fn end_rest(vm: &mut Vm, index: TaskIndex, now: u64) -> u32 {
-    let Some(task) = vm.scheduler.tasks.at_mut(index).filter(|task| task.flags.rests()) else { return 0 };
-    let was_woken = task.flags.woken();
+    let Some((task, standstill)) = vm.scheduler.tasks.with_standstill(index) else { return 0 };
+    if !task.flags.rests() {
+        return 0;
+    }
+    let times = std::mem::take(&mut standstill.times);
+    go_on_from_rest(vm, index, now);
+    times
+}
+
+/// Has a task at rest go on: what has come meanwhile reaches it.
+#[inline(always)]
+fn go_on_from_rest(vm: &mut Vm, index: TaskIndex, now: u64) {
+    let Some((task, standstill)) = vm.scheduler.tasks.with_standstill(index) else { return };
+    let (was_woken, is_urgent) = (task.flags.woken(), task.flags.attention());
     task.flags.set_rests(false);
     task.flags.set_suspended(false);
     task.flags.set_woken(false);
-    let is_urgent = task.flags.attention();
-    let extra = task.extra_mut();
-    let times = std::mem::take(&mut extra.rests);
-    if let Some(stopped) = extra.clock_stopped.take() {
-        extra.clock_behind = extra.clock_behind.saturating_add(now.saturating_sub(stopped));
-    }
-    vm.heap.log_if_marking(extra.suspended_by.take().unwrap_or(Value::NIL));
+    standstill.start_clock(now);
+    vm.heap.log_if_marking(standstill.by.take().unwrap_or(Value::NIL));
     if was_woken {
         make_runnable(vm, index, is_urgent);
     } else {
         report::note(vm, index, Happening::Waits);
     }
-    times
 }

@@ -154,7 +154,7 @@ pub(crate) fn make_task(
         slots[event::RESULT] = lineage::node_of(heap, maker.object)?;
     }
     let object = heap.alloc_record(Kind::Task, 0, 0, &slots)?;
-    let mut task = scheduler.tasks.make(object, words);
+    let mut task = scheduler.tasks.make(heap, object, words);
     interp::start::first_frame(heap, &mut task, scheduler.starter, function, arguments);
     // A new task holds nothing that was not found in a cycle under way: what it is made of is in hands of a
     // task that has been scanned, or of the host.

@@ -236,13 +236,12 @@ fn begin_running(vm: &mut Vm, account: AccountId) -> Result<(), Leave> {
 #[inline(always)]
 fn put_back(vm: &mut Vm, leave: Leave) {
     let scheduler = &mut vm.scheduler;
-    let Some(mut task) = scheduler.running.take() else { return };
+    let Some(task) = scheduler.running.take() else { return };
     let index = scheduler.turn.index;
     if leave == Leave::Ended && !task.flags.kept() {
         scheduler.turn.index = TaskIndex::NONE;
         if let Some(id) = scheduler.tasks.id_at(index) {
-            task.uncount(&mut vm.heap);
-            scheduler.tasks.retire(id, task);
+            scheduler.tasks.retire(&mut vm.heap, id, task);
         }
     } else {
         scheduler.tasks.put_back(index, task);

@@ -36,7 +36,9 @@ use crate::canary::Canary;
 use crate::config::Config;
 use crate::heap::Heap;
 use crate::raise::{Exit, Outcome};
-use crate::task::{AccountId, LimitNumber, Serial, Task, TaskId, TaskIndex, TaskNumber, TaskState, Tasks};
+use crate::task::{
+    AccountId, LimitNumber, Serial, Standstill, Task, TaskId, TaskIndex, TaskNumber, TaskState, Tasks,
+};
 use crate::value::Value;
 use crate::wait::{Deliveries, event, input, link};
 
@@ -164,6 +166,11 @@ impl Scheduler {
     #[inline(always)]
     pub(crate) fn task_mut(&mut self) -> &mut Task {
         self.running.as_mut().expect("a builtin is called by a task")
+    }
+
+    /// Returns the standstill of the running task.
+    pub(crate) fn standstill(&self) -> &Standstill {
+        self.tasks.standstill(self.turn.index)
     }
 
     /// Returns the number of the running task, or [`TaskNumber::NONE`].

@@ -13,6 +13,7 @@ mod control_stack;
 pub(crate) mod guard;
 mod id;
 mod limit;
+mod standstill;
 mod tasks;
 
 pub(crate) use binding::{Binding, Bindings};
@@ -22,6 +23,7 @@ pub(crate) use control_stack::{
 pub use id::TaskNumber;
 pub(crate) use id::{LimitNumber, Serial, TaskIndex};
 pub(crate) use limit::{AccountId, Allowance, Fund, Limit};
+pub(crate) use standstill::Standstill;
 pub use tasks::TaskId;
 pub(crate) use tasks::Tasks;
 
@@ -207,14 +209,6 @@ pub(crate) struct Extra {
     pub fund: Option<Fund>,
     /// Guards that interrupt it as soon as may be.
     pub interrupts: Vec<Value>,
-    /// Nanoseconds by which its clock is behind the machine's.
-    pub clock_behind: u64,
-    /// Time of the machine at which its clock was stopped, if it is.
-    pub clock_stopped: Option<u64>,
-    /// How often it was suspended where it is at rest.
-    pub rests: u32,
-    /// The task that has put it at rest first.
-    pub suspended_by: Option<Value>,
 }
 
 impl Extra {
@@ -226,7 +220,7 @@ impl Extra {
     /// Calls `visit` with every value that it holds.
     pub(crate) fn visit(&self, visit: &mut dyn FnMut(Value)) {
         self.limits.iter().filter_map(|limit| limit.expired).for_each(&mut *visit);
-        self.interrupts.iter().chain(&self.values).chain(&self.suspended_by).copied().for_each(&mut *visit);
+        self.interrupts.iter().chain(&self.values).copied().for_each(&mut *visit);
         if let Some(TaskEnd::Failed(condition)) = self.end {
             visit(condition);
         }
@@ -249,10 +243,6 @@ impl Clone for Extra {
             limits: copy_with_room(&self.limits),
             fund: self.fund,
             interrupts: self.interrupts.clone(),
-            clock_behind: self.clock_behind,
-            clock_stopped: self.clock_stopped,
-            rests: self.rests,
-            suspended_by: self.suspended_by,
         }
     }
 }
@@ -303,7 +293,7 @@ impl Task {
     /// Makes a new task of one that has ended and holds nothing any more.
     fn renew(&mut self, object: Value) {
         let stack = std::mem::replace(&mut self.stack, Stack::none());
-        *self = Task::with_stack(object, stack);
+        *self = Task { counted: self.counted, ..Task::with_stack(object, stack) };
     }
 
     /// Returns the bytes that a new task with so many words of stack takes.
@@ -336,17 +326,6 @@ impl Task {
     /// Returns the fields that few tasks need, made if they are not there.
     pub(crate) fn extra_mut(&mut self) -> &mut Extra {
         self.extra.get_or_insert_default()
-    }
-
-    /// Returns the time of its clock, which stands still while it is suspended, at the time `now`.
-    pub(crate) fn time_at(&self, now: u64) -> u64 {
-        let Some(extra) = &self.extra else { return now };
-        extra.clock_stopped.unwrap_or(now).saturating_sub(extra.clock_behind)
-    }
-
-    /// Returns when its clock will show `time`, unless it is stopped before.
-    pub(crate) fn when(&self, time: u64) -> u64 {
-        time.saturating_add(self.extra.as_ref().map_or(0, |extra| extra.clock_behind))
     }
 
     /// Returns whether it waits since it got this serial number.

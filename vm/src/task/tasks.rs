@@ -2,7 +2,8 @@
 
 use esl_heap::list_state;
 
-use super::{Task, TaskIndex};
+use super::{Standstill, Task, TaskIndex};
+use crate::heap::{Heap, Holder};
 use crate::stack::Stack;
 use crate::value::Value;
 
@@ -34,6 +35,8 @@ struct TaskPlace {
 #[derive(Clone, Default)]
 pub(crate) struct Tasks {
     places: Vec<TaskPlace>,
+    /// Standstills of the tasks at the first places; those behind were never suspended.
+    standstills: Vec<Standstill>,
     free: Vec<u32>,
     /// Records of tasks that have ended, to be used again.
     #[allow(clippy::vec_box, reason = "the boxes are what is kept: they go into places as they are")]
@@ -46,25 +49,36 @@ pub(crate) struct Tasks {
 
 list_state! { TaskId { index: Run, generation: Run } }
 list_state! { TaskPlace { task: Visited, generation: Run, taken: Run } }
-list_state! { Tasks { places: Run, free: Run, spare: Derived, unmet: Derived, discarded: Derived } }
+list_state! { Tasks {
+    places: Run,
+    standstills: Run,
+    free: Run,
+    spare: Derived,
+    unmet: Derived,
+    discarded: Derived,
+} }
 
 impl Tasks {
     /// Creates a task that has yet to be given a frame, with at least so many words of stack.
-    pub(crate) fn make(&mut self, object: Value, words: usize) -> Box<Task> {
-        match self.spare.pop() {
-            Some(mut task) if task.stack.capacity() >= words => {
+    pub(crate) fn make(&mut self, heap: &mut Heap, object: Value, words: usize) -> Box<Task> {
+        if let Some(mut task) = self.spare.pop() {
+            if task.stack.capacity() >= words {
                 task.renew(object);
-                task
+                return task;
             }
-            _ => Box::new(Task::new(object, words)),
+            task.uncount(heap);
         }
+        Box::new(Task::new(object, words))
     }
 
-    /// Frees the place of a task that has ended, and keeps its record if few are kept.
-    pub(crate) fn retire(&mut self, id: TaskId, task: Box<Task>) {
+    /// Frees the place of a task that has ended, and keeps its record if few are kept. The heap goes on
+    /// counting one that is kept.
+    pub(crate) fn retire(&mut self, heap: &mut Heap, id: TaskId, mut task: Box<Task>) {
         self.remove(id);
         if self.spare.len() < SPARE && task.stack.capacity() <= SPARE_WORDS {
             self.spare.push(task);
+        } else {
+            task.uncount(heap);
         }
     }
 
@@ -170,7 +184,45 @@ impl Tasks {
         }
         place.taken = false;
         self.free.push(id.index.0);
+        if let Some(standstill) = self.standstills.get_mut(id.index.as_usize()) {
+            *standstill = Standstill::NONE;
+        }
         place.task.take()
+    }
+
+    /// Returns the standstill of the task with this index.
+    #[inline]
+    pub(crate) fn standstill(&self, index: TaskIndex) -> &Standstill {
+        self.standstills.get(index.as_usize()).unwrap_or(&Standstill::NONE)
+    }
+
+    /// Returns the standstill of the task with this index, to be changed.
+    pub(crate) fn standstill_mut(&mut self, heap: &mut Heap, index: TaskIndex) -> &mut Standstill {
+        self.make_standstills(heap);
+        &mut self.standstills[index.as_usize()]
+    }
+
+    /// Returns the task with this index, unless it runs, and its standstill, if there is one for its place.
+    #[inline(always)]
+    pub(crate) fn with_standstill(&mut self, index: TaskIndex) -> Option<(&mut Task, &mut Standstill)> {
+        let task = self.places.get_mut(index.as_usize())?.task.as_deref_mut()?;
+        Some((task, self.standstills.get_mut(index.as_usize())?))
+    }
+
+    /// Makes a standstill for each place, and has the heap count them.
+    pub(crate) fn make_standstills(&mut self, heap: &mut Heap) {
+        if self.standstills.len() == self.places.len() {
+            return;
+        }
+        let bytes = |list: &Vec<Standstill>| list.capacity() * size_of::<Standstill>();
+        let before = bytes(&self.standstills);
+        self.standstills.resize(self.places.len(), Standstill::NONE);
+        heap.recount_external(Holder::Tasks, before, bytes(&self.standstills));
+    }
+
+    /// Calls `visit` with every value of the standstills.
+    pub(crate) fn visit_standstills(&self, visit: &mut dyn FnMut(Value)) {
+        self.standstills.iter().filter_map(|standstill| standstill.by).for_each(visit);
     }
 
     /// Returns the number of places; each task that has not ended has one.
@@ -198,10 +250,12 @@ impl Tasks {
         self.unmet = self.places.len();
     }
 
-    /// Returns the task at the next place for the collector to look at, unless it runs. `None` at the end.
-    pub(crate) fn next_unmet(&mut self) -> Option<Option<&mut Task>> {
+    /// Returns the task at the next place for the collector to look at, unless it runs, and what its
+    /// standstill holds. `None` at the end.
+    pub(crate) fn next_unmet(&mut self) -> Option<(Option<&mut Task>, Value)> {
         self.unmet = self.unmet.checked_sub(1)?;
-        Some(self.places[self.unmet].task.as_deref_mut())
+        let held = self.standstill(TaskIndex(self.unmet as u32)).by.unwrap_or(Value::NIL);
+        Some((self.places[self.unmet].task.as_deref_mut(), held))
     }
 
     /// Has the collector look again at the place that it has looked at last.
@@ -245,7 +299,7 @@ mod tests {
         let ids: Vec<TaskId> = (0..10).map(|_| tasks.insert(task())).collect();
         tasks.begin_cycle();
         let mut met = 0;
-        while let Some(task) = tasks.next_unmet() {
+        while let Some((task, _)) = tasks.next_unmet() {
             met += usize::from(task.is_some_and(|task| std::mem::replace(&mut task.scanned, 1) == 0));
             tasks.remove(ids[3]);
         }
