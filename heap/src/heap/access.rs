@@ -558,6 +558,7 @@ impl Heap {
     }
 
     /// Sets the flags of an object of this kind; `None` if `v` is not one.
+    #[inline]
     pub fn set_flags(&mut self, v: Value, kind: Kind, flags: u8) -> Option<()> {
         let object = self.object_of(v, kind)?;
         // SAFETY: `object_of` has found a live object; H3: neither size nor contents depend on the flags.

@@ -118,6 +118,7 @@ impl Heap {
     /// # Panics
     /// If `kind` is not a record, or is one whose contents the heap guarantees (symbol, function, array,
     /// structure, hash table): these have functions of their own.
+    #[inline(always)]
     pub fn alloc_record(
         &mut self,
         kind: Kind,
@@ -475,7 +476,7 @@ impl Heap {
     }
 
     /// Allocates an object. Its header is written, its `len` elements are not.
-    #[inline]
+    #[inline(always)]
     fn begin_object(
         &mut self,
         kind: Kind,
@@ -504,6 +505,7 @@ impl Heap {
     }
 
     /// Creates a record of the values of `first` and then those of `rest`.
+    #[inline(always)]
     fn record_from(
         &mut self,
         kind: Kind,
